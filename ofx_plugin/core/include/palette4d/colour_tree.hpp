@@ -1,0 +1,44 @@
+// A frame's colours as a k-d tree of weighted points: what the losses of section 3 are measured on.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "palette4d/polytope.hpp"
+
+namespace palette4d {
+
+/// Weighted colours (a colour and how many pixels have it), kept in a balanced k-d tree whose nodes
+/// carry bounding boxes, so that whole subtrees inside a palette cost one test.
+class ColourTree {
+public:
+    struct Node {
+        Vec3 low, high;
+        int begin, end;   ///< points of the subtree
+        int left, right;  ///< children, -1 in a leaf
+    };
+
+    /// n colours (finite) and n positive counts. Throws std::invalid_argument otherwise.
+    ColourTree(std::vector<Vec3> rgb, std::vector<double> counts);
+
+    /// The mean of the k pixels nearest to v (v_N of eq. 3); all pixels when there are fewer than
+    /// k. Pixels tied at the k-th distance share what is left evenly, so their order does not
+    /// matter.
+    Vec3 nearest_mean(const Vec3& v, double k) const;
+
+    const std::vector<Vec3>& rgb() const { return rgb_; }
+    const std::vector<double>& counts() const { return counts_; }
+    const std::vector<Node>& nodes() const { return nodes_; }
+    double total() const { return total_; }
+
+private:
+    int build(int begin, int end, std::vector<int>& order, const std::vector<Vec3>& rgb);
+
+    std::vector<Vec3> rgb_;
+    std::vector<double> counts_;
+    std::vector<Node> nodes_;
+    double total_ = 0;
+};
+
+}  // namespace palette4d

@@ -1,0 +1,37 @@
+// The losses of one frame (section 3): reconstruction (eq. 2) and compactness (eq. 3), with their
+// gradients with respect to the palette's colours.
+#pragma once
+
+#include <vector>
+
+#include "palette4d/colour_tree.hpp"
+#include "palette4d/polytope.hpp"
+
+namespace palette4d {
+
+struct LossWeights {
+    double lambda = 50;  ///< of eq. 4
+    double k = 50;       ///< pixels a vertex is compared with in eq. 3
+    double convexity =
+        0;  ///< weight of the concavity term below; 0 in every figure that is reported
+};
+
+/// What one frame contributes. R, C as in the paper; D is the concavity of the triangle mesh: the
+/// sum over its edges of six times the volume by which the two faces fold inwards (0 when convex).
+struct FrameLoss {
+    double R = 0;
+    double C = 0;
+    double D = 0;
+    double outside = 0;       ///< share of pixels outside
+    double max_distance = 0;  ///< of a pixel outside
+};
+
+/// The body is the convex hull of the n palette colours, as in eq. 2; fewer than four colours, or
+/// flat ones, are handled. `faces` (may be empty) serve D only. `gradient`, when not null, receives
+/// the n derivatives of lambda R + C + convexity D; v_N of eq. 3 counts as constant (it is, almost
+/// everywhere, on a finite set of pixels).
+FrameLoss palette_loss(const ColourTree& colours, const std::vector<Vec3>& palette,
+                       const std::vector<Face>& faces, const LossWeights& weights,
+                       std::vector<Vec3>* gradient);
+
+}  // namespace palette4d

@@ -1,0 +1,119 @@
+#include "palette4d/colour_bins.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <stdexcept>
+
+namespace palette4d {
+namespace {
+
+constexpr std::int64_t kOffset = 1 << 20;  // bin numbers are kept in 21 bits each
+
+struct Bin {
+    std::uint64_t key;
+    double sum[3];
+    double count;
+};
+
+/// Open-addressing hash table of bins in order of first appearance.
+class Table {
+public:
+    explicit Table(std::size_t capacity) : slots_(capacity, -1) {}
+
+    void add(std::uint64_t key, double r, double g, double b, double n) {
+        std::size_t mask = slots_.size() - 1;
+        std::size_t at = (key * 0x9E3779B97F4A7C15ull >> 20) & mask;
+        while (slots_[at] >= 0 && bins_[slots_[at]].key != key) at = (at + 1) & mask;
+        if (slots_[at] < 0) {
+            slots_[at] = static_cast<std::int64_t>(bins_.size());
+            bins_.push_back({key, {0, 0, 0}, 0});
+            if (bins_.size() * 2 > slots_.size()) {
+                grow();
+                Bin& fresh = bins_.back();
+                fill(fresh, r, g, b, n);
+                return;
+            }
+        }
+        fill(bins_[slots_[at]], r, g, b, n);
+    }
+
+    const std::vector<Bin>& bins() const { return bins_; }
+
+private:
+    static void fill(Bin& bin, double r, double g, double b, double n) {
+        bin.sum[0] += r;
+        bin.sum[1] += g;
+        bin.sum[2] += b;
+        bin.count += n;
+    }
+
+    void grow() {
+        std::vector<std::int64_t> wider(slots_.size() * 2, -1);
+        const std::size_t mask = wider.size() - 1;
+        for (std::size_t i = 0; i < bins_.size(); ++i) {
+            std::size_t at = (bins_[i].key * 0x9E3779B97F4A7C15ull >> 20) & mask;
+            while (wider[at] >= 0) at = (at + 1) & mask;
+            wider[at] = static_cast<std::int64_t>(i);
+        }
+        slots_.swap(wider);
+    }
+
+    std::vector<std::int64_t> slots_;
+    std::vector<Bin> bins_;
+};
+
+std::uint64_t bin_number(double x, double inverse) {
+    const double n = std::floor(x * inverse + 0.5);
+    const auto clamped = static_cast<std::int64_t>(
+        std::clamp(n, static_cast<double>(-kOffset), static_cast<double>(kOffset - 1)));
+    return static_cast<std::uint64_t>(clamped + kOffset);
+}
+
+std::uint64_t key_of(double r, double g, double b, double inverse) {
+    return bin_number(r, inverse) << 42 | bin_number(g, inverse) << 21 | bin_number(b, inverse);
+}
+
+}  // namespace
+
+ColourBins bin_colours(const float* data, int width, int height, int channels,
+                       std::ptrdiff_t row_bytes, double step, std::size_t most) {
+    if (channels != 3 && channels != 4)
+        throw std::invalid_argument("found " + std::to_string(channels) +
+                                    " channels, expected 3 (RGB) or 4 (RGBA)");
+    if (!(step > 0) || !std::isfinite(step) || most < 1)
+        throw std::invalid_argument("bins need a positive width and room for at least one");
+    ColourBins out;
+    Table table(1 << 16);
+    const double inverse = 1 / step;
+    for (int y = 0; y < height; ++y) {
+        const float* row = reinterpret_cast<const float*>(
+            reinterpret_cast<const char*>(data) + static_cast<std::ptrdiff_t>(y) * row_bytes);
+        for (int x = 0; x < width; ++x, row += channels) {
+            const double r = row[0], g = row[1], b = row[2];
+            if (!std::isfinite(r) || !std::isfinite(g) || !std::isfinite(b) ||
+                (channels == 4 && row[3] == 0)) {
+                ++out.ignored;
+                continue;
+            }
+            table.add(key_of(r, g, b, inverse), r, g, b, 1);
+        }
+    }
+    while (table.bins().size() > most) {
+        step *= 2;
+        Table wider(1 << 16);
+        for (const Bin& bin : table.bins())
+            wider.add(key_of(bin.sum[0] / bin.count, bin.sum[1] / bin.count, bin.sum[2] / bin.count,
+                             1 / step),
+                      bin.sum[0], bin.sum[1], bin.sum[2], bin.count);
+        table = std::move(wider);
+    }
+    out.step = step;
+    for (const Bin& bin : table.bins()) {
+        out.rgb.push_back({bin.sum[0] / bin.count, bin.sum[1] / bin.count, bin.sum[2] / bin.count});
+        out.counts.push_back(bin.count);
+    }
+    return out;
+}
+
+}  // namespace palette4d

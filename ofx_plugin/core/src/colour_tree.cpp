@@ -1,0 +1,140 @@
+#include "palette4d/colour_tree.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <stdexcept>
+
+namespace palette4d {
+namespace {
+
+constexpr int kLeafSize = 12;
+// Squared distances closer than this are ties (8-bit colours differ by far more).
+constexpr double kTie = 1e-12;
+
+double squared_distance_to_box(const Vec3& p, const ColourTree::Node& node) {
+    double sum = 0;
+    for (int c = 0; c < 3; ++c) {
+        const double d = std::max({node.low[c] - p[c], 0.0, p[c] - node.high[c]});
+        sum += d * d;
+    }
+    return sum;
+}
+
+struct Candidate {
+    double d2;
+    int point;
+};
+
+}  // namespace
+
+ColourTree::ColourTree(std::vector<Vec3> rgb, std::vector<double> counts) {
+    if (rgb.empty() || rgb.size() != counts.size())
+        throw std::invalid_argument("a colour tree needs as many counts as colours, at least one");
+    for (std::size_t i = 0; i < rgb.size(); ++i) {
+        if (!(counts[i] > 0) || !std::isfinite(counts[i]) || !std::isfinite(rgb[i][0]) ||
+            !std::isfinite(rgb[i][1]) || !std::isfinite(rgb[i][2]))
+            throw std::invalid_argument("a colour tree needs finite colours and positive counts");
+    }
+    std::vector<int> order(rgb.size());
+    std::iota(order.begin(), order.end(), 0);
+    nodes_.reserve(4 * rgb.size() / kLeafSize + 4);
+    build(0, static_cast<int>(rgb.size()), order, rgb);
+    rgb_.resize(rgb.size());
+    counts_.resize(rgb.size());
+    for (std::size_t i = 0; i < order.size(); ++i) {
+        rgb_[i] = rgb[order[i]];
+        counts_[i] = counts[order[i]];
+        total_ += counts_[i];
+    }
+}
+
+int ColourTree::build(int begin, int end, std::vector<int>& order, const std::vector<Vec3>& rgb) {
+    const int index = static_cast<int>(nodes_.size());
+    nodes_.push_back({});
+    Node node{rgb[order[begin]], rgb[order[begin]], begin, end, -1, -1};
+    for (int i = begin; i < end; ++i)
+        for (int c = 0; c < 3; ++c) {
+            node.low[c] = std::min(node.low[c], rgb[order[i]][c]);
+            node.high[c] = std::max(node.high[c], rgb[order[i]][c]);
+        }
+    if (end - begin > kLeafSize) {
+        int axis = 0;
+        for (int c = 1; c < 3; ++c)
+            if (node.high[c] - node.low[c] > node.high[axis] - node.low[axis]) axis = c;
+        const int middle = begin + (end - begin) / 2;
+        std::nth_element(
+            order.begin() + begin, order.begin() + middle, order.begin() + end, [&](int a, int b) {
+                return rgb[a][axis] != rgb[b][axis] ? rgb[a][axis] < rgb[b][axis] : a < b;
+            });
+        node.left = build(begin, middle, order, rgb);
+        node.right = build(middle, end, order, rgb);
+    }
+    nodes_[index] = node;
+    return index;
+}
+
+Vec3 ColourTree::nearest_mean(const Vec3& v, double k) const {
+    k = std::min(k, total_);
+    // Candidates sorted by distance; the farthest group of ties goes as soon as the rest suffices.
+    thread_local std::vector<Candidate> best;
+    thread_local std::vector<std::pair<double, int>> stack;
+    best.clear();
+    stack.clear();
+    double have = 0;
+    double limit = std::numeric_limits<double>::infinity();
+    stack.emplace_back(squared_distance_to_box(v, nodes_[0]), 0);
+    while (!stack.empty()) {
+        const auto [box, index] = stack.back();
+        stack.pop_back();
+        if (box > limit + kTie) continue;
+        const Node& node = nodes_[index];
+        if (node.left >= 0) {
+            const double l = squared_distance_to_box(v, nodes_[node.left]);
+            const double r = squared_distance_to_box(v, nodes_[node.right]);
+            if (l <= r) {
+                stack.emplace_back(r, node.right);
+                stack.emplace_back(l, node.left);
+            } else {
+                stack.emplace_back(l, node.left);
+                stack.emplace_back(r, node.right);
+            }
+            continue;
+        }
+        for (int i = node.begin; i < node.end; ++i) {
+            const double dx = rgb_[i][0] - v[0], dy = rgb_[i][1] - v[1], dz = rgb_[i][2] - v[2];
+            const double d2 = dx * dx + dy * dy + dz * dz;
+            if (d2 > limit + kTie) continue;
+            auto at = best.end();
+            while (at != best.begin() && (at - 1)->d2 > d2) --at;
+            best.insert(at, {d2, i});
+            have += counts_[i];
+            while (have >= k) {
+                limit = best.back().d2;
+                double group = 0;
+                std::size_t first = best.size();
+                while (first > 0 && best[first - 1].d2 >= limit - kTie)
+                    group += counts_[best[--first].point];
+                if (first == 0 || have - group < k) break;
+                best.resize(first);
+                have -= group;
+            }
+        }
+    }
+    const double last = best.back().d2;
+    double near = 0, tied = 0;
+    Vec3 sum{0, 0, 0}, tied_sum{0, 0, 0};
+    for (const Candidate& b : best) {
+        const double n = counts_[b.point];
+        const bool tie = b.d2 >= last - kTie;
+        (tie ? tied : near) += n;
+        Vec3& s = tie ? tied_sum : sum;
+        for (int c = 0; c < 3; ++c) s[c] += n * rgb_[b.point][c];
+    }
+    const double share = (k - near) / tied;
+    return {(sum[0] + share * tied_sum[0]) / k, (sum[1] + share * tied_sum[1]) / k,
+            (sum[2] + share * tied_sum[2]) / k};
+}
+
+}  // namespace palette4d

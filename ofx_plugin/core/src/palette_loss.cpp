@@ -1,0 +1,246 @@
+#include "palette4d/palette_loss.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace palette4d {
+namespace {
+
+Vec3 sub(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Vec3 cross(const Vec3& a, const Vec3& b) {
+    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+void add(Vec3& a, double s, const Vec3& b) {
+    for (int c = 0; c < 3; ++c) a[c] += s * b[c];
+}
+
+constexpr double kFlat = 1e-9;  // a vertex this close to a plane counts as in it
+
+struct Facet {
+    Face at;
+    Vec3 normal;  // unit, outwards
+    double offset;
+};
+
+/// All vertex triples that support the hull. Coplanar vertices give overlapping triangles, which
+/// does no harm to a closest point. `solid` is false for flat palettes: then every triple is a
+/// facet.
+struct Hull {
+    std::vector<Facet> facets;
+    bool solid = false;
+};
+
+void build_hull(const std::vector<Vec3>& v, Hull& hull) {
+    hull.facets.clear();
+    hull.solid = false;
+    const int n = static_cast<int>(v.size());
+    for (int i = 0; i < n; ++i)
+        for (int j = i + 1; j < n; ++j)
+            for (int k = j + 1; k < n; ++k) {
+                Vec3 normal = cross(sub(v[j], v[i]), sub(v[k], v[i]));
+                const double length = std::sqrt(dot(normal, normal));
+                if (length < 1e-14) continue;
+                for (double& x : normal) x /= length;
+                const double offset = -dot(normal, v[i]);
+                double low = 0, high = 0;
+                for (int m = 0; m < n; ++m) {
+                    if (m == i || m == j || m == k) continue;
+                    const double d = dot(normal, v[m]) + offset;
+                    low = std::min(low, d);
+                    high = std::max(high, d);
+                    if (low < -kFlat && high > kFlat) break;
+                }
+                if (low < -kFlat && high > kFlat) continue;
+                if (high > kFlat) {
+                    hull.facets.push_back(
+                        {{i, k, j}, {-normal[0], -normal[1], -normal[2]}, -offset});
+                    hull.solid = true;
+                } else if (low < -kFlat) {
+                    hull.facets.push_back({{i, j, k}, normal, offset});
+                    hull.solid = true;
+                } else {
+                    hull.facets.push_back({{i, j, k}, normal, offset});
+                }
+            }
+    if (hull.solid || !hull.facets.empty()) return;
+    // All on a line (or one colour): the segments between all pairs, as degenerate triangles.
+    for (int i = 0; i < n; ++i)
+        for (int j = i; j < n; ++j)
+            if (i != j || n == 1) hull.facets.push_back({{i, i, j}, {0, 0, 0}, 0});
+}
+
+struct Closest {
+    double d2 = std::numeric_limits<double>::infinity();
+    Face at{0, 0, 0};
+    Vec3 weight{1, 0, 0};
+};
+
+void try_segment(const Vec3& p, const std::vector<Vec3>& v, int a, int b, Closest& best) {
+    const Vec3 ab = sub(v[b], v[a]);
+    const double length2 = dot(ab, ab);
+    double s = length2 > 0 ? dot(sub(p, v[a]), ab) / length2 : 0;
+    s = std::clamp(s, 0.0, 1.0);
+    Vec3 d = sub(p, v[a]);
+    add(d, -s, ab);
+    const double d2 = dot(d, d);
+    if (d2 < best.d2) best = {d2, {a, b, b}, {1 - s, s, 0}};
+}
+
+void try_triangle(const Vec3& p, const std::vector<Vec3>& v, const Face& f, Closest& best) {
+    const Vec3 ab = sub(v[f[1]], v[f[0]]), ac = sub(v[f[2]], v[f[0]]), ap = sub(p, v[f[0]]);
+    const Vec3 n = cross(ab, ac);
+    const double nn = dot(n, n);
+    if (nn > 1e-28) {
+        const double wb = dot(cross(ap, ac), n) / nn;
+        const double wc = dot(cross(ab, ap), n) / nn;
+        if (wb >= 0 && wc >= 0 && wb + wc <= 1) {
+            const double h = dot(ap, n);
+            const double d2 = h * h / nn;
+            if (d2 < best.d2) best = {d2, f, {1 - wb - wc, wb, wc}};
+            return;
+        }
+    }
+    try_segment(p, v, f[0], f[1], best);
+    try_segment(p, v, f[1], f[2], best);
+    try_segment(p, v, f[2], f[0], best);
+}
+
+/// Sums count * distance over the pixels outside.
+class Outside {
+public:
+    Outside(const ColourTree& colours, const std::vector<Vec3>& v, const Hull& hull,
+            std::vector<Vec3>* gradient)
+        : colours_(colours), v_(v), hull_(hull), gradient_(gradient) {}
+
+    void run(FrameLoss& loss) {
+        if (gradient_) gradient_->assign(v_.size(), Vec3{0, 0, 0});
+        std::vector<int> active(hull_.facets.size());
+        for (std::size_t i = 0; i < active.size(); ++i) active[i] = static_cast<int>(i);
+        active_.push_back(std::move(active));
+        visit(0, 0);
+        loss.R = sum_ / colours_.total();
+        loss.outside = count_ / colours_.total();
+        loss.max_distance = max_;
+        if (gradient_)
+            for (Vec3& g : *gradient_)
+                for (double& x : g) x /= colours_.total();
+    }
+
+private:
+    // active_[depth]: the facets that some colour of the node may lie outside of.
+    void visit(int index, std::size_t depth) {
+        const ColourTree::Node& node = colours_.nodes()[index];
+        if (active_.size() <= depth + 1) active_.emplace_back();
+        const std::vector<int>& from = active_[depth];
+        std::vector<int>& facets = active_[depth + 1];
+        if (hull_.solid) {
+            facets.clear();
+            for (int f : from) {
+                const Facet& facet = hull_.facets[f];
+                double high = facet.offset;
+                for (int c = 0; c < 3; ++c)
+                    high += facet.normal[c] * (facet.normal[c] > 0 ? node.high[c] : node.low[c]);
+                if (high > 0) facets.push_back(f);
+            }
+            if (facets.empty()) return;
+        } else {
+            facets = from;
+        }
+        if (node.left >= 0) {
+            const int left = node.left, right = node.right;
+            visit(left, depth + 1);
+            visit(right, depth + 1);
+            return;
+        }
+        for (int i = node.begin; i < node.end; ++i) {
+            const Vec3& p = colours_.rgb()[i];
+            Closest best;
+            for (int f : active_[depth + 1]) {
+                const Facet& facet = hull_.facets[f];
+                // The closest point of a convex body lies on a facet that the point sees.
+                if (hull_.solid && dot(facet.normal, p) + facet.offset <= 0) continue;
+                try_triangle(p, v_, facet.at, best);
+            }
+            if (best.d2 == std::numeric_limits<double>::infinity() || best.d2 <= 0) continue;
+            const double d = std::sqrt(best.d2);
+            const double n = colours_.counts()[i];
+            sum_ += n * d;
+            if (d > 1e-6) count_ += n;
+            max_ = std::max(max_, d);
+            if (gradient_) {
+                Vec3 u = p;
+                for (int c = 0; c < 3; ++c) add(u, -best.weight[c], v_[best.at[c]]);
+                for (int c = 0; c < 3; ++c)
+                    add((*gradient_)[best.at[c]], -n * best.weight[c] / d, u);
+            }
+        }
+    }
+
+    const ColourTree& colours_;
+    const std::vector<Vec3>& v_;
+    const Hull& hull_;
+    std::vector<Vec3>* gradient_;
+    std::vector<std::vector<int>> active_;
+    double sum_ = 0, count_ = 0, max_ = 0;
+};
+
+/// Six times the volumes by which faces fold inwards, summed over the mesh's edges.
+double concavity(const std::vector<Vec3>& v, const std::vector<Face>& faces, double scale,
+                 std::vector<Vec3>* gradient) {
+    double sum = 0;
+    for (const Face& f : faces)
+        for (int e = 0; e < 3; ++e) {
+            const int a = f[e], b = f[(e + 1) % 3], c = f[(e + 2) % 3];
+            if (a > b) continue;  // each edge once
+            for (const Face& g : faces)
+                for (int m = 0; m < 3; ++m) {
+                    if (g[m] != b || g[(m + 1) % 3] != a) continue;
+                    const int d = g[(m + 2) % 3];
+                    if (d == c) continue;
+                    const Vec3 ab = sub(v[b], v[a]), ac = sub(v[c], v[a]), ad = sub(v[d], v[a]);
+                    const Vec3 gd = cross(ab, ac);
+                    const double volume = dot(gd, ad);
+                    if (volume <= 0) continue;  // d lies below the face: convex here
+                    sum += volume;
+                    if (!gradient) continue;
+                    const Vec3 gb = cross(ac, ad), gc = cross(ad, ab);
+                    add((*gradient)[b], scale, gb);
+                    add((*gradient)[c], scale, gc);
+                    add((*gradient)[d], scale, gd);
+                    add((*gradient)[a], -scale, gb);
+                    add((*gradient)[a], -scale, gc);
+                    add((*gradient)[a], -scale, gd);
+                }
+        }
+    return sum;
+}
+
+}  // namespace
+
+FrameLoss palette_loss(const ColourTree& colours, const std::vector<Vec3>& palette,
+                       const std::vector<Face>& faces, const LossWeights& weights,
+                       std::vector<Vec3>* gradient) {
+    FrameLoss loss;
+    Hull hull;
+    build_hull(palette, hull);
+    Outside(colours, palette, hull, gradient).run(loss);
+    if (gradient)
+        for (Vec3& g : *gradient)
+            for (double& x : g) x *= weights.lambda;
+    const double n = static_cast<double>(palette.size());
+    for (std::size_t i = 0; i < palette.size(); ++i) {
+        const Vec3 d = sub(palette[i], colours.nearest_mean(palette[i], weights.k));
+        const double length = std::sqrt(dot(d, d));
+        loss.C += length / n;
+        if (gradient && length > 1e-12) add((*gradient)[i], 1 / (n * length), d);
+    }
+    if (weights.convexity > 0)
+        loss.D = concavity(palette, faces, weights.convexity, gradient);
+    else
+        loss.D = concavity(palette, faces, 0, nullptr);
+    return loss;
+}
+
+}  // namespace palette4d

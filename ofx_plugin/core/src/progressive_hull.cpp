@@ -1,0 +1,250 @@
+#include "palette4d/progressive_hull.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <queue>
+#include <set>
+#include <stdexcept>
+
+namespace palette4d {
+namespace {
+
+Vec3 sub(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Vec3 cross(const Vec3& a, const Vec3& b) {
+    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+constexpr double kBound = 4;      // new vertices stay within [-kBound, 1 + kBound]
+constexpr double kSlack = 1e-10;  // a constraint met this closely counts as met
+
+/// a . x >= b
+template <int N>
+struct HalfSpace {
+    std::array<double, N> a;
+    double b;
+};
+
+/// Seidel's incremental linear program: minimise c . x over the half-spaces, within a box.
+/// Constraints are taken in the given order; when one is violated, the optimum lies on its
+/// boundary, which is a program of one dimension less.
+template <int N>
+std::optional<std::array<double, N>> minimise(const std::array<double, N>& c,
+                                              const std::vector<HalfSpace<N>>& constraints,
+                                              const std::array<double, N>& low,
+                                              const std::array<double, N>& high);
+
+template <>
+std::optional<std::array<double, 1>> minimise<1>(const std::array<double, 1>& c,
+                                                 const std::vector<HalfSpace<1>>& constraints,
+                                                 const std::array<double, 1>& low,
+                                                 const std::array<double, 1>& high) {
+    double lo = low[0], hi = high[0];
+    for (const auto& h : constraints) {
+        if (std::abs(h.a[0]) < 1e-13) {
+            if (h.b > kSlack) return std::nullopt;
+        } else if (h.a[0] > 0) {
+            lo = std::max(lo, h.b / h.a[0]);
+        } else {
+            hi = std::min(hi, h.b / h.a[0]);
+        }
+    }
+    if (lo > hi + kSlack) return std::nullopt;
+    return std::array<double, 1>{c[0] >= 0 ? lo : hi};
+}
+
+template <int N>
+std::optional<std::array<double, N>> minimise(const std::array<double, N>& c,
+                                              const std::vector<HalfSpace<N>>& constraints,
+                                              const std::array<double, N>& low,
+                                              const std::array<double, N>& high) {
+    std::array<double, N> x;
+    for (int i = 0; i < N; ++i) x[i] = c[i] >= 0 ? low[i] : high[i];
+    for (std::size_t m = 0; m < constraints.size(); ++m) {
+        const auto& h = constraints[m];
+        double value = -h.b;
+        for (int i = 0; i < N; ++i) value += h.a[i] * x[i];
+        if (value >= -kSlack) continue;
+        // Eliminate the variable with the largest coefficient: x_e = (b - sum a_i x_i) / a_e.
+        int e = 0;
+        for (int i = 1; i < N; ++i)
+            if (std::abs(h.a[i]) > std::abs(h.a[e])) e = i;
+        if (std::abs(h.a[e]) < 1e-13) return std::nullopt;
+        auto project = [&](const std::array<double, N>& a, double b) {
+            HalfSpace<N - 1> out;
+            const double s = a[e] / h.a[e];
+            for (int i = 0, j = 0; i < N; ++i)
+                if (i != e) out.a[j++] = a[i] - s * h.a[i];
+            out.b = b - s * h.b;
+            return out;
+        };
+        std::vector<HalfSpace<N - 1>> rest;
+        for (std::size_t q = 0; q < m; ++q)
+            rest.push_back(project(constraints[q].a, constraints[q].b));
+        std::array<double, N> unit{};
+        unit[e] = 1;
+        rest.push_back(project(unit, low[e]));
+        unit[e] = -1;
+        rest.push_back(project(unit, -high[e]));
+        const HalfSpace<N - 1> objective = project(c, 0);
+        std::array<double, N - 1> sublow, subhigh;
+        for (int i = 0, j = 0; i < N; ++i)
+            if (i != e) {
+                sublow[j] = low[i];
+                subhigh[j++] = high[i];
+            }
+        const auto sub_x = minimise<N - 1>(objective.a, rest, sublow, subhigh);
+        if (!sub_x) return std::nullopt;
+        double sum = h.b;
+        for (int i = 0, j = 0; i < N; ++i)
+            if (i != e) {
+                x[i] = (*sub_x)[j++];
+                sum -= h.a[i] * x[i];
+            }
+        x[e] = sum / h.a[e];
+    }
+    return x;
+}
+
+class Mesh {
+public:
+    Mesh(const std::vector<Vec3>& rgb, const std::vector<Face>& faces)
+        : position_(rgb), faces_(faces), alive_(faces.size(), true), at_(rgb.size()) {
+        for (int f = 0; f < static_cast<int>(faces_.size()); ++f)
+            for (int v : faces_[f]) at_[v].insert(f);
+        std::map<std::pair<int, int>, int> directed;
+        for (const Face& f : faces_)
+            for (int e = 0; e < 3; ++e) ++directed[{f[e], f[(e + 1) % 3]}];
+        for (const auto& [edge, n] : directed) {
+            const auto back = directed.find({edge.second, edge.first});
+            if (n != 1 || back == directed.end() || back->second != 1)
+                throw std::invalid_argument("progressive_hull needs a closed, oriented mesh");
+        }
+        for (const auto& a : at_) left_ += !a.empty();
+    }
+
+    std::vector<Vec3> simplify(int target) {
+        for (std::size_t f = 0; f < faces_.size(); ++f)
+            for (int e = 0; e < 3; ++e)
+                if (faces_[f][e] < faces_[f][(e + 1) % 3])
+                    push(faces_[f][e], faces_[f][(e + 1) % 3]);
+        while (left_ > target && !queue_.empty()) {
+            const Entry entry = queue_.top();
+            queue_.pop();
+            const auto current = stamp_.find({entry.a, entry.b});
+            if (current == stamp_.end() || current->second != entry.stamp) continue;
+            contract(entry);
+        }
+        std::vector<Vec3> out;
+        for (std::size_t v = 0; v < at_.size(); ++v)
+            if (!at_[v].empty()) out.push_back(position_[v]);
+        return out;
+    }
+
+private:
+    struct Entry {
+        double volume;
+        int a, b;
+        long stamp;
+        Vec3 x;
+        bool operator<(const Entry& o) const {  // the queue's top is the smallest volume
+            if (volume != o.volume) return volume > o.volume;
+            return a != o.a ? a > o.a : b > o.b;
+        }
+    };
+
+    std::set<int> neighbours(int v) const {
+        std::set<int> out;
+        for (int f : at_[v])
+            for (int w : faces_[f])
+                if (w != v) out.insert(w);
+        return out;
+    }
+
+    void push(int a, int b) {
+        if (a > b) std::swap(a, b);
+        stamp_.erase({a, b});
+        // Contracting keeps the mesh a sphere only when the ends share exactly two neighbours.
+        int shared = 0;
+        const std::set<int> na = neighbours(a), nb = neighbours(b);
+        for (int w : na) shared += static_cast<int>(nb.count(w));
+        if (shared != 2 || !na.count(b)) return;
+
+        std::set<int> around(at_[a]);
+        around.insert(at_[b].begin(), at_[b].end());
+        std::vector<HalfSpace<3>> constraints;
+        Vec3 objective{0, 0, 0};
+        double constant = 0;
+        for (int f : around) {
+            const Vec3& p = position_[faces_[f][0]];
+            Vec3 n = cross(sub(position_[faces_[f][1]], p), sub(position_[faces_[f][2]], p));
+            // volume of the tetrahedron over the face: (n . x - n . p) / 6 with n of length 2 area
+            for (int c = 0; c < 3; ++c) objective[c] += n[c] / 6;
+            constant -= dot(n, p) / 6;
+            const double length = std::sqrt(dot(n, n));
+            if (length < 1e-15) continue;
+            for (double& x : n) x /= length;
+            constraints.push_back({n, dot(n, p)});
+        }
+        const auto x = minimise<3>(objective, constraints, {-kBound, -kBound, -kBound},
+                                   {1 + kBound, 1 + kBound, 1 + kBound});
+        if (!x) return;
+        const double volume = std::max(0.0, dot(objective, *x) + constant);
+        stamp_[{a, b}] = ++clock_;
+        queue_.push({volume, a, b, clock_, *x});
+    }
+
+    void contract(const Entry& entry) {
+        const int a = entry.a, b = entry.b;
+        std::set<int> ring = neighbours(a);
+        const std::set<int> other = neighbours(b);
+        ring.insert(other.begin(), other.end());
+        ring.erase(a);
+        ring.erase(b);
+        for (int w : other) stamp_.erase({std::min(b, w), std::max(b, w)});
+        const std::set<int> faces_b = at_[b];
+        for (int f : faces_b) {
+            if (at_[a].count(f)) {
+                for (int v : faces_[f]) at_[v].erase(f);
+                alive_[f] = false;
+                continue;
+            }
+            for (int& v : faces_[f])
+                if (v == b) v = a;
+            at_[a].insert(f);
+        }
+        at_[b].clear();
+        position_[a] = entry.x;
+        --left_;
+        // Every edge with a face that changed: those at a, the ring, and the ring's own edges.
+        std::set<std::pair<int, int>> touched;
+        for (int v : ring)
+            for (int w : neighbours(v)) touched.insert({std::min(v, w), std::max(v, w)});
+        for (const auto& [v, w] : touched) push(v, w);
+    }
+
+    std::vector<Vec3> position_;
+    std::vector<Face> faces_;
+    std::vector<bool> alive_;
+    std::vector<std::set<int>> at_;
+    std::map<std::pair<int, int>, long> stamp_;
+    std::priority_queue<Entry> queue_;
+    long clock_ = 0;
+    int left_ = 0;
+};
+
+}  // namespace
+
+std::vector<Vec3> progressive_hull(const std::vector<Vec3>& rgb, const std::vector<Face>& faces,
+                                   int target) {
+    for (const Face& f : faces)
+        for (int v : f)
+            if (v < 0 || v >= static_cast<int>(rgb.size()))
+                throw std::invalid_argument("a face names vertex " + std::to_string(v));
+    return Mesh(rgb, faces).simplify(std::max(4, target));
+}
+
+}  // namespace palette4d
