@@ -1,0 +1,213 @@
+"""The verb `analyze`: a clip in, a sidecar out."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import sys
+import time
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from palette4d.analysis.options import AnalysisOptions
+
+if TYPE_CHECKING:
+    from palette4d.analysis.clip import Clip
+    from palette4d.analysis.pipeline import Analysis
+
+DESCRIPTION = """\
+Find the time-varying palette of a clip: a 4D skew polytope in RGB and time whose slice at a frame
+is that frame's palette (Du, Lei, Xu, Tan and Gingold 2021), and write it to a sidecar file.
+
+CLIP is an image sequence (shot.####.exr, shot.%04d.png, shot.1001-1100x2#.dpx, or a folder that
+holds one), a single image, or a movie file. The clip should be one shot: a palette must not span a
+cut.
+"""
+
+EPILOG = """\
+example:
+  palette4d analyze shot010.####.exr -o shot010.p4d.json
+  palette4d analyze plates/ --frames 1001-1100x2 -o plates.p4d.json
+  palette4d analyze take3.mov -o take3.p4d.json --eta2 4      fewer handles, looser fit
+"""
+
+# option, metavar, field, help
+PAPER_OPTIONS = (
+    ("--lambda", "X", "lambda_", "weight of the reconstruction loss, eq. 4"),
+    ("--k", "N", "k", "pixels a palette colour is compared with, eq. 3"),
+    ("--alpha", "X", "alpha", "block merging: weight of the block's length, eq. 10"),
+    ("--beta", "X", "beta", "block merging: weight of the palette's size, eq. 10"),
+    ("--eta1", "X", "eta1", "block merging stops above this multiple of the first loss"),
+    ("--eta2", "X", "eta2", "vertex removal stops above this multiple of the first loss"),
+    ("--gamma", "X", "gamma", "weight of smoothness in time, eq. 12"),
+    ("--removal-candidates", "N", "removal_candidates", "vertices tried for each removal"),
+    ("--refinement-box", "X", "refinement_box", "how far a colour may move in refinement"),
+    ("--refinement-cycles", "N", "refinement_cycles", "rounds of vertex refinement"),
+)
+OUR_OPTIONS = (
+    ("--palette-size", "N", "palette_size", "most colours of one frame's palette"),
+    ("--merge-distance", "X", "merge_distance", "palette colours closer than this become one"),
+    ("--hull-box", "X", "hull_box", "how far a colour may move when a frame's hull is refined"),
+    ("--convexity", "X", "convexity", "weight of keeping the palettes convex; 0 is the paper"),
+    ("--colours", "N", "colours", "most colour bins kept of a frame, for the losses"),
+    ("--coarse-colours", "N", "coarse_colours", "the same for hulls, merging and removal"),
+    ("--seed", "N", "seed", "recorded; every step is deterministic at present"),
+    ("--threads", "N", "threads", "threads; 0 is one a processor; never changes the result"),
+)
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the verb to the command line."""
+    parser = subparsers.add_parser(
+        "analyze",
+        help="find a clip's time-varying palette",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("clip", metavar="CLIP", help="image sequence, folder, image or movie file")
+    parser.add_argument("-o", "--output", required=True, metavar="OUT.p4d.json", type=Path)
+    parser.add_argument("--frames", metavar="A-B[xN]", help="only these frames (1001-1100x2)")
+    parser.add_argument("--rate", metavar="N/D", type=_rate, help="frames a second (24000/1001)")
+    parser.add_argument(
+        "--skip-bad-frames",
+        action="store_true",
+        help="pass over missing and unreadable frames instead of stopping at the first",
+    )
+    edits = parser.add_mutually_exclusive_group()
+    edits.add_argument(
+        "--keep-edits",
+        dest="on_edits",
+        action="store_const",
+        const="keep",
+        help="carry the edits of an existing OUT over (needs the same palette)",
+    )
+    edits.add_argument(
+        "--drop-edits",
+        dest="on_edits",
+        action="store_const",
+        const="drop",
+        help="throw the edits of an existing OUT away",
+    )
+    parser.set_defaults(on_edits="refuse")
+    parser.add_argument("--json", action="store_true", help="print the report as JSON")
+    parser.add_argument("--quiet", action="store_true", help="no progress, no report")
+    defaults = AnalysisOptions()
+    for title, table in (
+        ("options of the paper", PAPER_OPTIONS),
+        ("options of this program", OUR_OPTIONS),
+    ):
+        group = parser.add_argument_group(title)
+        for flag, metavar, field, text in table:
+            default = getattr(defaults, field)
+            group.add_argument(
+                flag,
+                dest=field,
+                metavar=metavar,
+                type=int if isinstance(default, int) else float,
+                default=default,
+                help=f"{text} (default {default:g})",
+            )
+    parser.set_defaults(run=run)
+
+
+def _rate(text: str) -> Fraction:
+    try:
+        rate = Fraction(text)
+    except (ValueError, ZeroDivisionError):
+        rate = Fraction(0)
+    if rate <= 0:
+        raise argparse.ArgumentTypeError(
+            f"found {text!r}, expected frames a second such as 24 or 24000/1001"
+        )
+    return rate
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run `palette4d analyze`."""
+    from palette4d.analysis import pipeline, sidecar
+    from palette4d.analysis.clip import open_clip
+
+    fields = {field.name for field in dataclasses.fields(AnalysisOptions)}
+    options = AnalysisOptions(**{k: v for k, v in vars(args).items() if k in fields})
+    sidecar.check_target(args.output, on_edits=args.on_edits)
+    clip = open_clip(
+        args.clip, frames=args.frames, rate=args.rate, skip_bad_frames=args.skip_bad_frames
+    )
+    show = _Bars(hidden=args.quiet or args.json)
+    try:
+        document, analysis = pipeline.analyze_clip(clip, options, show)
+    finally:
+        show.close()
+    sidecar.save(document, args.output, on_edits=args.on_edits)
+    for remark in (*_skipped(clip), *analysis.remarks):
+        print(f"palette4d: note: {remark}", file=sys.stderr)
+    if args.json:
+        report = {
+            "sidecar": str(args.output),
+            "stages": [stage.row() for stage in analysis.stages],
+            "seconds": show.seconds,
+        }
+        print(json.dumps(report, indent=2))
+    elif not args.quiet:
+        _print_report(args.output, clip, analysis, show)
+    return 0
+
+
+def _skipped(clip: Clip) -> list[str]:
+    if not clip.skipped:
+        return []
+    return [f"{len(clip.skipped)} bad frames were skipped: {sorted(clip.skipped)}"]
+
+
+def _print_report(output: Path, clip: Clip, analysis: Analysis, show: _Bars) -> None:
+    print(f"{clip.name}: {len(clip.frames)} frames, {clip.width}x{clip.height}")
+    print(
+        f"{'stage':<18} {'vertices':>8} {'blocks':>6} {'R':>8} {'C':>8} {'L':>8} {'K':>8} "
+        f"{'outside':>8} {'farthest':>8} {'seconds':>8}"
+    )
+    for stage in analysis.stages:
+        x = stage.losses
+        print(
+            f"{stage.stage:<18} {stage.vertices:>8} {stage.blocks:>6} {x.R:>8.5f} {x.C:>8.4f} "
+            f"{x.L:>8.4f} {x.K:>8.3f} {x.outside:>8.2%} {x.max_distance:>8.3f} "
+            f"{show.seconds.get(stage.stage, 0):>8.2f}"
+        )
+    print(f"wrote {output}: {analysis.stages[-1].vertices} palette colours to edit")
+    print(f"next: palette4d plot {output} -o palette.png")
+
+
+class _Bars:
+    """A progress bar a stage, and the time each took."""
+
+    def __init__(self, hidden: bool) -> None:
+        self.hidden = hidden
+        self.seconds: dict[str, float] = {}
+        self.stage = ""
+        self.bar: object | None = None
+        self.since = time.perf_counter()
+
+    def __call__(self, stage: str, done: int, total: int) -> None:
+        from tqdm import tqdm
+
+        if stage != self.stage:
+            self._finish()
+            self.stage = stage
+            self.bar = tqdm(total=total, desc=f"{stage:<18}", unit="", disable=self.hidden or None)
+        bar = self.bar
+        assert isinstance(bar, tqdm)
+        bar.update(done - bar.n)
+        now = time.perf_counter()
+        self.seconds[stage] = round(now - self.since, 3)
+
+    def _finish(self) -> None:
+        if self.bar is not None:
+            self.bar.close()  # type: ignore[attr-defined]
+        self.since = time.perf_counter()
+
+    def close(self) -> None:
+        """End the last bar."""
+        self._finish()
+        self.bar = None

@@ -1,0 +1,240 @@
+"""What a clip is: frame numbers, a rate, a size, and pixels that are read one frame at a time.
+
+`clip.py` opens one, `clip_images.py` and `clip_movie.py` implement it. Memory holds one frame,
+however long the clip.
+"""
+
+from __future__ import annotations
+
+import abc
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from palette4d.errors import Palette4dError
+
+F32 = NDArray[np.float32]
+
+DEFAULT_RATE = Fraction(24)
+#: Longer than any clip; stops numbers that are dates or ids from being taken for frames.
+MAX_FRAMES = 1_000_000
+
+
+class ClipError(Palette4dError):
+    """A clip that cannot be opened: what was found, what was expected, what to do."""
+
+
+class FrameError(ClipError):
+    """One frame is missing, unreadable or unlike the others; `--skip-bad-frames` skips it."""
+
+
+@dataclass(frozen=True)
+class Image:
+    """One frame as it is stored, upright.
+
+    pixels is (h, w, 3 or 4) float32, integer formats scaled to 0..1 by their largest value, float
+    formats untouched (negative, above 1, NaN and infinities included). metadata holds
+    (name, OpenImageIO type, value) of what is worth carrying into a recoloured file.
+    """
+
+    frame: int
+    pixels: F32
+    metadata: tuple[tuple[str, Any, Any], ...] = ()
+
+
+@dataclass
+class Clip(abc.ABC):
+    """An opened clip; see `palette4d.analysis.clip.open_clip`.
+
+    Attributes
+    ----------
+    name : str
+        Short name, for people.
+    source : str
+        The sequence with one `#` for each digit, the movie, or the single image.
+    frames : list of int
+        Frame numbers in rising order, an arithmetic progression; includes the bad frames that
+        `skip_bad_frames` will pass over.
+    rate : Fraction
+        Frames a second.
+    width, height : int
+        Pixels, after the orientation that the file states has been applied.
+    encoding : str
+        Colour encoding as the file states it ("sRGB", "Rec.709", …), or "unknown".
+    has_alpha : bool
+        The pixels have four channels, the last is alpha.
+    premultiplied : bool
+        Colours are multiplied by alpha (EXR and DPX by convention, TIFF if it says so). PNG and
+        movies hold them straight. Nothing is converted on reading: see `straight_colours`.
+    depth : str
+        Stored sample: "uint8", "uint10", "uint12", "uint16", "half", "float", …
+    is_movie : bool
+        The clip is a movie file: its frame numbers start at 0.
+    notes : list of str
+        Remarks for the user, such as a variable frame rate.
+    skipped : list of int
+        Frames passed over so far, in rising order.
+    """
+
+    name: str
+    source: str
+    frames: list[int]
+    rate: Fraction
+    width: int
+    height: int
+    encoding: str
+    has_alpha: bool
+    premultiplied: bool
+    depth: str
+    skip_bad_frames: bool = False
+    is_movie: bool = False
+    notes: list[str] = field(default_factory=list)
+    skipped: list[int] = field(default_factory=list)
+
+    @property
+    def step(self) -> int:
+        """Distance between two frame numbers (1 for a single frame)."""
+        return self.frames[1] - self.frames[0] if len(self.frames) > 1 else 1
+
+    @abc.abstractmethod
+    def load(self, frame: int) -> Image:
+        """Read one frame with its metadata; FrameError when it is missing or unreadable."""
+
+    @abc.abstractmethod
+    def file(self, frame: int) -> Path:
+        """File that holds a frame, whether it exists or not."""
+
+    def iter_images(self) -> Iterator[Image]:
+        """Read the frames in order, one at a time.
+
+        Raises
+        ------
+        FrameError
+            For the first bad frame, or, with `skip_bad_frames`, when every frame is bad.
+        """
+        good = 0
+        for frame in self.frames:
+            try:
+                image = self.load(frame)
+            except FrameError:
+                if not self.skip_bad_frames:
+                    raise
+                self._skip(frame)
+                continue
+            good += 1
+            yield image
+        if not good:
+            raise FrameError(
+                f"{self.source}: none of the {len(self.frames)} frames can be read; "
+                "expected at least one good frame. Run without --skip-bad-frames to see the cause."
+            )
+
+    def iter_frames(self) -> Iterator[tuple[int, F32]]:
+        """(frame number, (h, w, 3 or 4) float32 pixels), in order, one frame at a time."""
+        for image in self.iter_images():
+            yield image.frame, image.pixels
+
+    def iter_colours(self) -> Iterator[tuple[int, F32]]:
+        """(frame number, (h, w, 3) float32 straight colours): see `straight_colours`."""
+        for image in self.iter_images():
+            yield image.frame, self.straight_colours(image.pixels)
+
+    def read(self, frame: int) -> F32:
+        """(h, w, 3 or 4) float32 pixels of one frame; ClipError when it is not in the clip."""
+        if frame not in self.frames:
+            raise ClipError(
+                f"{self.source}: frame {frame} was asked for, the clip has {describe(self.frames)}"
+            )
+        return self.load(frame).pixels
+
+    def straight_colours(self, pixels: F32) -> F32:
+        """(h, w, 3) float32 colours that a recolouring sees.
+
+        Premultiplied colours are divided by alpha, as the node does. Pixels with alpha 0 have no
+        colour that shows: they become NaN, which the analysis leaves out. A frame whose alpha is 0
+        everywhere has an unused alpha channel, and keeps its colours as they are.
+        """
+        if pixels.shape[2] == 3:
+            return pixels
+        alpha = pixels[..., 3:]
+        seen = alpha != 0
+        if not seen.any():
+            return np.ascontiguousarray(pixels[..., :3])
+        divisor = alpha if self.premultiplied else np.float32(1)
+        colours = np.full_like(pixels[..., :3], np.nan)
+        with np.errstate(over="ignore", invalid="ignore"):
+            np.divide(pixels[..., :3], divisor, out=colours, where=seen)
+        return colours
+
+    def _skip(self, frame: int) -> None:
+        if frame not in self.skipped:
+            self.skipped.append(frame)
+            self.skipped.sort()
+
+
+def parse_frames(text: str) -> list[int]:
+    """Frame numbers of `A-B`, `A-BxN`, `A`, `A,B,C` (fileseq's syntax) in rising order.
+
+    >>> parse_frames("1001-1007x2")
+    [1001, 1003, 1005, 1007]
+    >>> parse_frames("-2-1")
+    [-2, -1, 0, 1]
+    """
+    from fileseq.exceptions import FileSeqException
+    from fileseq.frameset import FrameSet
+
+    what_to_do = "expected A-B, A-BxN, single numbers or a comma list, such as 1001-1100x2"
+    try:
+        numbers = sorted(set(FrameSet(text.strip())))
+    except (FileSeqException, ValueError) as error:
+        raise ClipError(f'frame range "{text}" cannot be understood; {what_to_do}') from error
+    if not numbers or any(int(number) != number for number in numbers):
+        raise ClipError(f'frame range "{text}" holds no whole frame numbers; {what_to_do}')
+    if len(numbers) > MAX_FRAMES:
+        raise ClipError(
+            f'frame range "{text}" holds {len(numbers)} frames, at most {MAX_FRAMES} are possible'
+        )
+    frames = [int(number) for number in numbers]
+    if len(set(np.diff(frames))) > 1:
+        raise ClipError(
+            f'frame range "{text}" gives the frames {describe(frames)}, which are not evenly '
+            "spaced; expected a range with one step, such as 1-10 or 1-10x3"
+        )
+    return frames
+
+
+def progression_step(numbers: Sequence[int]) -> int:
+    """Largest step with which a range holds all of the (rising) numbers; 1 for one number."""
+    step = 0
+    for before, after in itertools.pairwise(numbers):
+        step = math.gcd(step, after - before)
+    return step or 1
+
+
+def describe(frames: Sequence[int]) -> str:
+    """Frames for a message, short: `3`, `1-10`, `1-9x2`, or a list that ends in an ellipsis."""
+    if len(frames) == 1:
+        return f"{frames[0]}"
+    step = frames[1] - frames[0]
+    if len(frames) > 2 and all(b - a == step for a, b in itertools.pairwise(frames)):
+        return f"{frames[0]}-{frames[-1]}" + (f"x{step}" if step != 1 else "")
+    if len(frames) == 2 and step == 1:
+        return f"{frames[0]}-{frames[1]}"
+    shown = ", ".join(str(frame) for frame in frames[:8])
+    return shown + (f", … ({len(frames)} in all)" if len(frames) > 8 else "")
+
+
+def as_rate(value: float) -> Fraction | None:
+    """Nearest usual rate of a floating-point one: 23.976 -> 24000/1001; None if it is no rate."""
+    if not math.isfinite(value) or value <= 0:
+        return None
+    for whole in range(1, 241):
+        if abs(value - whole * 1000 / 1001) < 2e-4 * whole / 24:
+            return Fraction(whole * 1000, 1001)
+    return Fraction(value).limit_denominator(1001) or None

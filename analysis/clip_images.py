@@ -1,0 +1,379 @@
+"""Clips of image files, read through OpenImageIO."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from palette4d.analysis.clip_base import (
+    DEFAULT_RATE,
+    F32,
+    MAX_FRAMES,
+    Clip,
+    ClipError,
+    FrameError,
+    Image,
+    as_rate,
+    describe,
+    parse_frames,
+    progression_step,
+)
+from palette4d.analysis.clip_sequence import Sequence
+
+#: Metadata that a recoloured copy of the frame keeps.
+CARRIED = (
+    "FramesPerSecond",
+    "smpte:TimeCode",
+    "smpte:KeyCode",
+    "oiio:ColorSpace",
+    "chromaticities",
+    "colorInteropID",
+    "PixelAspectRatio",
+    "ICCProfile",
+    "whiteLuminance",
+    "reelName",
+    "DateTime",
+    "Copyright",
+    "Artist",
+    "ImageDescription",
+    "Make",
+    "Model",
+)
+_RATE_NAMES = ("FramesPerSecond", "dpx:FrameRate", "dpx:TemporalFrameRate")
+# OpenImageIO's names for what people call sRGB and so on; other names pass as they are.
+_ENCODINGS = {
+    "srgb_rec709_scene": "sRGB",
+    "srgb_rec709_display": "sRGB",
+    "srgb": "sRGB",
+    "lin_rec709_scene": "linear Rec.709",
+    "lin_rec709": "linear Rec.709",
+    "scene_linear": "linear",
+    "linear": "linear",
+    "rec709": "Rec.709",
+    "ocio:lin_rec709_scene": "linear Rec.709",
+}
+
+
+@dataclass
+class ImageClip(Clip):
+    """An image sequence, or a single image as a clip of one frame."""
+
+    sequence: Sequence = field(kw_only=True)
+
+    def file(self, frame: int) -> Path:
+        """File that holds a frame, whether it exists or not."""
+        return self.sequence.path(frame)
+
+    def load(self, frame: int) -> Image:
+        """Read one frame; FrameError when it is missing, unreadable, or of another size."""
+        path = self.sequence.path(frame)
+        if frame not in self.sequence.files:
+            raise _missing(self.sequence, [frame])
+        header, pixels = read_image(path, f"frame {frame}")
+        if (header.width, header.height) != (self.width, self.height):
+            raise FrameError(
+                f"{path}: frame {frame} is {header.width}x{header.height} pixels, expected "
+                f"{self.width}x{self.height} as in the frames before. Mend the clip, take a range "
+                "with --frames, or leave such frames out with --skip-bad-frames."
+            )
+        if (header.has_alpha, header.premultiplied) != (self.has_alpha, self.premultiplied):
+            raise FrameError(
+                f"{path}: frame {frame} has {_channels(header)}, expected "
+                f"{_channels(self)} as in the frames before. Mend the clip, take a range "
+                "with --frames, or leave such frames out with --skip-bad-frames."
+            )
+        return Image(frame, pixels, header.metadata)
+
+
+@dataclass(frozen=True)
+class Header:
+    """What an image file says about itself; width and height upright."""
+
+    width: int
+    height: int
+    has_alpha: bool
+    premultiplied: bool
+    depth: str
+    encoding: str
+    rate: Fraction | None
+    metadata: tuple[tuple[str, Any, Any], ...]
+
+
+def open_images(
+    sequence: Sequence,
+    frames: str | None,
+    embedded: str | None,
+    rate: Fraction | None,
+    skip_bad_frames: bool,
+    single: bool = False,
+) -> ImageClip:
+    """Open a sequence over the asked range; ClipError or FrameError as `open_clip` says."""
+    wanted = _wanted_frames(sequence, frames, embedded)
+    missing = [frame for frame in wanted if frame not in sequence.files]
+    if missing and not skip_bad_frames:
+        raise _missing(sequence, missing)
+    source = str(next(iter(sequence.files.values()))) if single else sequence.pattern
+    header: Header | None = None
+    for frame in wanted:
+        if frame in missing:
+            continue
+        try:
+            header = read_header(sequence.path(frame), f"frame {frame}")
+            break
+        except FrameError:
+            if not skip_bad_frames:
+                raise
+    if header is None:
+        raise FrameError(
+            f"{source}: none of the frames {describe(wanted)} can be read; expected at least one "
+            "good frame. Run without --skip-bad-frames to see the cause."
+        )
+    return ImageClip(
+        name=sequence.name,
+        source=source,
+        frames=wanted,
+        rate=rate or header.rate or DEFAULT_RATE,
+        width=header.width,
+        height=header.height,
+        encoding=header.encoding,
+        has_alpha=header.has_alpha,
+        premultiplied=header.premultiplied,
+        depth=header.depth,
+        skip_bad_frames=skip_bad_frames,
+        skipped=missing,
+        sequence=sequence,
+    )
+
+
+def _wanted_frames(sequence: Sequence, frames: str | None, embedded: str | None) -> list[int]:
+    found = sequence.numbers
+    if embedded is not None:
+        inside = parse_frames(embedded)
+        if frames is None:
+            wanted = inside
+        else:
+            wanted = parse_frames(frames)
+            if outside := sorted(set(wanted) - set(inside)):
+                raise ClipError(
+                    f"{sequence.pattern}: --frames {frames} asks for {describe(outside)}, which "
+                    f"the pattern's own range {embedded} leaves out. Give one of the two."
+                )
+    elif frames is not None:
+        wanted = parse_frames(frames)
+    else:
+        step = progression_step(found)
+        count = (found[-1] - found[0]) // step + 1
+        if count > MAX_FRAMES:
+            raise ClipError(
+                f"{sequence.pattern}: the {len(found)} files are numbered from {found[0]} to "
+                f"{found[-1]}, which looks like dates or ids; expected frame numbers. "
+                "Number the files, or choose a range with --frames."
+            )
+        return list(range(found[0], found[-1] + 1, step))
+    if not set(wanted) & set(found):
+        raise ClipError(
+            f"{sequence.pattern}: the frames {describe(wanted)} were asked for, the clip has "
+            f"{describe(found)}. Choose a range inside the clip."
+        )
+    return wanted
+
+
+def _missing(sequence: Sequence, missing: list[int]) -> FrameError:
+    found = sequence.numbers
+    inside = [frame for frame in missing if found[0] < frame < found[-1]]
+    if not inside:
+        return FrameError(
+            f"{sequence.pattern}: the range asks for frame{'s' * (len(missing) > 1)} "
+            f"{describe(missing)}, the clip has {describe(found)}. Choose a range inside the clip, "
+            "or leave such frames out with --skip-bad-frames."
+        )
+    return FrameError(
+        f"{sequence.pattern}: frame{'s' * (len(missing) > 1)} {describe(missing)} missing between "
+        f"{found[0]} and {found[-1]} (no file {sequence.path(missing[0]).name}). Bring the file "
+        "back, choose a range with --frames, or leave such frames out with --skip-bad-frames."
+    )
+
+
+def _channels(what: Header | Clip) -> str:
+    if not what.has_alpha:
+        return "no alpha"
+    return "premultiplied alpha" if what.premultiplied else "straight alpha"
+
+
+def read_header(path: Path, what: str) -> Header:
+    """Open an image for its header alone; FrameError names `what` and the file."""
+    source, spec = _open(path, what)
+    source.close()
+    return _header(path, spec, _channel_choice(spec))
+
+
+def read_image(path: Path, what: str = "the image") -> tuple[Header, F32]:
+    """Header and (h, w, 3 or 4) float32 pixels; FrameError names `what` and the file."""
+    source, spec = _open(path, what)
+    chosen = _channel_choice(spec)
+    first, last = min(chosen), max(chosen) + 1
+    stored = source.read_image(source.current_subimage(), 0, first, last, spec.format)
+    problem = source.geterror()
+    source.close()
+    # JPEG returns grey pixels together with an error: both count.
+    if stored is None or problem:
+        raise _unreadable(path, what, problem)
+    pixels = _scaled(np.asarray(stored), _bits(spec))
+    pixels = pixels[..., [channel - first for channel in chosen]]
+    pixels = _in_display_window(pixels, spec)
+    pixels = _upright(pixels, spec.get_int_attribute("Orientation", 1))
+    return _header(path, spec, chosen), np.ascontiguousarray(pixels)
+
+
+def _unreadable(path: Path, what: str, problem: str) -> FrameError:
+    reason = problem.strip().splitlines()[0] if problem.strip() else "no reason given"
+    return FrameError(
+        f"{path}: {what} cannot be read ({reason}); expected a whole image file. Bring a good "
+        "copy, or leave such frames out with --skip-bad-frames."
+    )
+
+
+def _open(path: Path, what: str) -> tuple[Any, Any]:
+    import OpenImageIO as oiio
+
+    if not path.is_file():
+        raise FrameError(f"{path}: {what} is missing; expected a file")
+    if path.stat().st_size == 0:
+        raise _unreadable(path, what, "the file is empty")
+    config = oiio.ImageSpec()
+    config.attribute("oiio:UnassociatedAlpha", 1)  # values as they are stored
+    source = oiio.ImageInput.open(str(path), config)
+    if source is None:
+        raise _unreadable(path, what, oiio.geterror())
+    # The part of a multi-part EXR that holds the colours; the first one otherwise.
+    part = 0
+    while source.seek_subimage(part, 0):
+        if {"R", "G", "B"} <= set(source.spec().channelnames):
+            break
+        part += 1
+    else:
+        source.geterror()
+        source.seek_subimage(0, 0)
+    spec = source.spec()
+    if spec.deep:
+        source.close()
+        raise _unreadable(path, what, "it is a deep image, expected a flat one")
+    if spec.width < 1 or spec.height < 1 or spec.nchannels < 1:
+        source.close()
+        raise _unreadable(path, what, f"its size is {spec.width}x{spec.height}")
+    return source, spec
+
+
+def _channel_choice(spec: Any) -> list[int]:
+    """Channels to read as R, G, B and perhaps A; a grey one stands for all three."""
+    names = list(spec.channelnames)
+    alpha = [spec.alpha_channel] if 0 <= spec.alpha_channel < len(names) else []
+    if {"R", "G", "B"} <= set(names):
+        return [names.index(name) for name in "RGB"] + alpha
+    colours = [index for index in range(len(names)) if index not in alpha]
+    if len(colours) < 3:
+        grey = colours[0] if colours else alpha[0]
+        return [grey] * 3 + (alpha if colours else [])
+    for red in names:  # a layer: diffuse.R, diffuse.G, diffuse.B
+        if red.endswith(".R") and {red[:-1] + "G", red[:-1] + "B"} <= set(names):
+            layer = [names.index(red[:-1] + one) for one in "RGB"]
+            return layer + ([names.index(red[:-1] + "A")] if red[:-1] + "A" in names else [])
+    return colours[:3] + alpha
+
+
+def _bits(spec: Any) -> int:
+    """Bits a sample where they are fewer than its memory type's, else 0."""
+    bits = int(spec.get_int_attribute("oiio:BitsPerSample", 0))
+    return bits if str(spec.format) == "uint16" and 8 < bits < 16 else 0
+
+
+def _scaled(stored: NDArray[Any], bits: int) -> F32:
+    """Integers over their largest value, floats as they are, as (h, w, c) float32."""
+    if stored.dtype.kind == "f":
+        with np.errstate(over="ignore"):
+            return stored.astype(np.float32, copy=False)
+    if bits:
+        # OpenImageIO widens 10 and 12 bits to 16: the upper bits are the stored value.
+        return (stored >> (16 - bits)).astype(np.float32) / np.float32((1 << bits) - 1)
+    largest = np.iinfo(stored.dtype).max
+    if stored.dtype.itemsize > 2:
+        return (stored / np.float64(largest)).astype(np.float32)
+    return stored.astype(np.float32) / np.float32(largest)
+
+
+def _in_display_window(pixels: F32, spec: Any) -> F32:
+    """An EXR's data window laid into its display window: black outside, overscan cut off."""
+    if (spec.x, spec.y, spec.width, spec.height) == (
+        spec.full_x,
+        spec.full_y,
+        spec.full_width,
+        spec.full_height,
+    ):
+        return pixels
+    left, top = spec.x - spec.full_x, spec.y - spec.full_y
+    framed = np.zeros((spec.full_height, spec.full_width, pixels.shape[2]), np.float32)
+    x0, y0 = max(left, 0), max(top, 0)
+    x1, y1 = min(left + spec.width, spec.full_width), min(top + spec.height, spec.full_height)
+    if x0 < x1 and y0 < y1:
+        framed[y0:y1, x0:x1] = pixels[y0 - top : y1 - top, x0 - left : x1 - left]
+    return framed
+
+
+def _upright(pixels: F32, orientation: int) -> F32:
+    """Apply Exif's orientation 1 to 8."""
+    turned = {
+        2: lambda p: p[:, ::-1],
+        3: lambda p: p[::-1, ::-1],
+        4: lambda p: p[::-1],
+        5: lambda p: p.swapaxes(0, 1),
+        6: lambda p: np.rot90(p, -1),
+        7: lambda p: p[::-1, ::-1].swapaxes(0, 1),
+        8: lambda p: np.rot90(p, 1),
+    }.get(orientation)
+    return turned(pixels) if turned else pixels
+
+
+def _header(path: Path, spec: Any, chosen: list[int]) -> Header:
+    width, height = spec.full_width, spec.full_height
+    if 5 <= spec.get_int_attribute("Orientation", 1) <= 8:
+        width, height = height, width
+    has_alpha = len(chosen) == 4
+    straight = bool(spec.get_int_attribute("oiio:UnassociatedAlpha", 0))
+    bits = _bits(spec)
+    space = str(spec.get_string_attribute("oiio:ColorSpace"))
+    return Header(
+        width=width,
+        height=height,
+        has_alpha=has_alpha,
+        premultiplied=has_alpha and not straight,
+        depth=f"uint{bits}" if bits else str(spec.format),
+        encoding=_ENCODINGS.get(space.lower(), space) or _dpx_encoding(spec) or "unknown",
+        rate=_rate(spec),
+        metadata=tuple(
+            (param.name, param.type, param.value)
+            for param in spec.extra_attribs
+            if param.name in CARRIED
+        ),
+    )
+
+
+def _dpx_encoding(spec: Any) -> str:
+    transfer = str(spec.get_string_attribute("dpx:Transfer"))
+    return "" if transfer in ("", "Undefined", "User defined") else transfer
+
+
+def _rate(spec: Any) -> Fraction | None:
+    for name in _RATE_NAMES:
+        value = spec.getattribute(name)
+        if value is None:
+            continue
+        if isinstance(value, tuple):
+            if len(value) == 2 and value[0] > 0 and value[1] > 0:
+                return Fraction(int(value[0]), int(value[1]))
+        elif isinstance(value, int | float) and (rate := as_rate(float(value))):
+            return rate
+    return None

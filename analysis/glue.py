@@ -1,0 +1,291 @@
+"""Stage 2, section 5.2.2: gluing the palettes of two frames into a two-frame 4D skew polytope.
+
+Input: two palettes. Output: `Glue`: the inter-frame edges (pairs of colour indices) that obey the
+two inter-degree rules and the two topological rules at the least total colour distance, searched
+exhaustively (branch and bound) among the edges of the 4D convex hull of both palettes; and the
+triangle mesh that holds between the two frames, whose corners are those edges.
+
+Where the hull's edges allow no solution all pairs are searched, and where none exists at all (the
+two palettes' triangulations cannot be mapped onto each other) topological rule 2 is broken as
+little as possible.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+
+import numpy as np
+from numpy.typing import NDArray
+from palette4d.analysis.polytope import Palette
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial import ConvexHull, QhullError
+
+F64 = NDArray[np.float64]
+I32 = NDArray[np.int32]
+Bool = NDArray[np.bool_]
+
+# Search nodes before the best solution so far is taken; the searches of real clips end far below.
+MOST_NODES = 200_000
+# A broken rule costs more than any colour distance that it could save.
+BROKEN = 10.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Glue:
+    """Inter-frame edges between two palettes.
+
+    Attributes
+    ----------
+    links : (i, j) pairs, colour i of the first palette to colour j of the second, sorted.
+    broken : how many intra-frame edges break topological rule 2 (0 wherever possible).
+    consistent : all one-to-one and the same connectivity (section 5.3).
+    """
+
+    links: tuple[tuple[int, int], ...]
+    broken: int
+    consistent: bool
+
+
+def glue(first: Palette, second: Palette) -> Glue:
+    """Return the best inter-frame edges between two palettes."""
+    n, m = len(first.rgb), len(second.rgb)
+    distance = np.linalg.norm(first.rgb[:, None] - second.rgb[None], axis=2)
+    if min(n, m) <= 2:
+        links = _nearest_links(distance)
+        return Glue(links, 0, n == m and _same_topology(first, second, links))
+    hull = hull_pairs(first.rgb, second.rgb)
+    for allowed in (hull, np.ones_like(hull)):
+        found = _Search(first, second, distance, allowed, strict=True).run()
+        if found is not None:
+            return Glue(found[0], 0, n == m and _same_topology(first, second, found[0]))
+    found = _Search(first, second, distance, np.ones_like(hull), strict=False).run()
+    if found is None:
+        links = _nearest_links(distance)
+        found = links, _broken_edges(first, second, links)
+    return Glue(found[0], found[1], False)
+
+
+def one_to_one(count: int) -> tuple[tuple[int, int], ...]:
+    """Return the inter-frame edges inside a block."""
+    return tuple((i, i) for i in range(count))
+
+
+def hull_pairs(first: F64, second: F64) -> Bool:
+    """Return which (i, j) are edges of the RGBT convex hull of two palettes one frame apart."""
+    n, m = len(first), len(second)
+    points = np.vstack([np.hstack([first, np.zeros((n, 1))]), np.hstack([second, np.ones((m, 1))])])
+    out = np.zeros((n, m), bool)
+    try:
+        hull = ConvexHull(points, qhull_options="QJ")
+    except QhullError:
+        return ~out
+    for simplex in hull.simplices:
+        early, late = simplex[simplex < n], simplex[simplex >= n] - n
+        out[np.ix_(early, late)] = True
+    return out
+
+
+class _Search:
+    """Branch and bound over the first palette's colours, each choosing the colours it links to."""
+
+    def __init__(
+        self, first: Palette, second: Palette, distance: F64, allowed: Bool, strict: bool
+    ) -> None:
+        self.n, self.m = distance.shape
+        self.strict = strict
+        self.distance = distance.tolist()
+        self.near_first: list[list[bool]] = first.adjacency().tolist()
+        self.near_second: list[list[bool]] = second.adjacency().tolist()
+        self.order = _breadth_first(first.adjacency())
+        self.choices = [self._choices(v, allowed[v]) for v in range(self.n)]
+        self.rest = [0.0] * (self.n + 1)  # the least that the colours still to come must cost
+        for at in range(self.n - 1, -1, -1):
+            costs = [cost for cost, _ in self.choices[self.order[at]]]
+            self.rest[at] = self.rest[at + 1] + (min(costs) if costs else np.inf)
+        self.chosen: list[tuple[int, ...]] = [()] * self.n
+        self.users: list[list[int]] = [[] for _ in range(self.m)]
+        self.best = np.inf
+        self.best_links: tuple[tuple[int, int], ...] | None = None
+        self.best_broken = 0
+        self.nodes = 0
+
+    def _choices(self, v: int, allowed: Bool) -> list[tuple[float, tuple[int, ...]]]:
+        """Sets of one to three colours that v may link to; topological rule 1 within each set."""
+        near = np.flatnonzero(allowed).tolist()
+        out = []
+        for size in (1, 2, 3):
+            for group in itertools.combinations(near, size):
+                if all(self.near_second[a][b] for a, b in itertools.combinations(group, 2)):
+                    out.append((sum(self.distance[v][u] for u in group), group))
+        return sorted(out)
+
+    def run(self) -> tuple[tuple[tuple[int, int], ...], int] | None:
+        if np.isfinite(self.rest[0]):
+            self._descend(0, 0.0, 0)
+        return None if self.best_links is None else (self.best_links, self.best_broken)
+
+    def _fits(self, v: int, group: tuple[int, ...]) -> bool:
+        for u in group:
+            users = self.users[u]
+            if not users:
+                continue
+            # Inter-degree rule 2: u becomes a merging vertex, so nothing that it links to may
+            # split.
+            if len(group) > 1 or any(len(self.chosen[w]) > 1 for w in users):
+                return False
+            if not all(self.near_first[v][w] for w in users):  # topological rule 1
+                return False
+        return True
+
+    def _maps_edge(self, v: int, w: int) -> bool:
+        """Topological rule 2 for an intra-frame edge of the first palette."""
+        return any(a == b or self.near_second[a][b] for a in self.chosen[v] for b in self.chosen[w])
+
+    def _broken_back(self) -> int:
+        """Topological rule 2 for the second palette's edges."""
+        return sum(
+            self.near_second[a][b]
+            and not any(
+                v == w or self.near_first[v][w] for v in self.users[a] for w in self.users[b]
+            )
+            for a, b in itertools.combinations(range(self.m), 2)
+        )
+
+    def _descend(self, at: int, cost: float, broken: int) -> None:
+        self.nodes += 1
+        if self.nodes > MOST_NODES and (self.best_links is not None or self.nodes > 2 * MOST_NODES):
+            return
+        if at == self.n:
+            if not all(self.users):  # inter-degree rule 1
+                return
+            back = self._broken_back()
+            if self.strict and back:
+                return
+            total = cost + BROKEN * back
+            if total < self.best:
+                self.best, self.best_broken = total, broken + back
+                self.best_links = tuple((v, u) for v in range(self.n) for u in self.chosen[v])
+            return
+        v = self.order[at]
+        earlier = [w for w in self.order[:at] if self.near_first[v][w]]
+        for extra, group in self.choices[v]:
+            if cost + extra + self.rest[at + 1] >= self.best:
+                break
+            if not self._fits(v, group):
+                continue
+            self.chosen[v] = group
+            wrong = sum(not self._maps_edge(v, w) for w in earlier)
+            if not (self.strict and wrong):
+                for u in group:
+                    self.users[u].append(v)
+                self._descend(at + 1, cost + extra + BROKEN * wrong, broken + wrong)
+                for u in group:
+                    self.users[u].pop()
+            self.chosen[v] = ()
+
+
+def _breadth_first(adjacency: Bool) -> list[int]:
+    """Order the vertices so that each touches an earlier one: rules prune early."""
+    order = [int(np.argmax(adjacency.sum(axis=1)))]
+    while len(order) < len(adjacency):
+        rest = [v for v in range(len(adjacency)) if v not in order]
+        order.append(max(rest, key=lambda v: (int(adjacency[v, order].sum()), -v)))
+    return order
+
+
+def _nearest_links(distance: F64) -> tuple[tuple[int, int], ...]:
+    """Match the smaller palette one-to-one at least total distance; the rest go to the nearest
+    colour."""
+    if distance.shape[0] > distance.shape[1]:
+        return tuple(sorted((i, j) for j, i in _nearest_links(distance.T)))
+    rows, columns = linear_sum_assignment(distance)
+    links = {(int(i), int(j)) for i, j in zip(rows, columns, strict=True)}
+    for j in set(range(distance.shape[1])) - {j for _, j in links}:
+        links.add((int(np.argmin(distance[:, j])), j))
+    return tuple(sorted(links))
+
+
+def _same_topology(first: Palette, second: Palette, links: tuple[tuple[int, int], ...]) -> bool:
+    if len(links) != len(first.rgb) or len({i for i, _ in links}) != len({j for _, j in links}):
+        return False
+    to = dict(links)
+    image = {_triangle(to[int(a)], to[int(b)], to[int(c)]) for a, b, c in first.faces}
+    return image == {_triangle(*map(int, face)) for face in second.faces}
+
+
+def _broken_edges(first: Palette, second: Palette, links: tuple[tuple[int, int], ...]) -> int:
+    near, far = first.adjacency(), second.adjacency()
+    broken = 0
+    for one, other, pairs in ((near, far, links), (far, near, tuple((j, i) for i, j in links))):
+        images = [[j for i, j in pairs if i == v] for v in range(len(one))]
+        broken += sum(
+            bool(one[v, w]) and not any(a == b or other[a, b] for a in images[v] for b in images[w])
+            for v, w in itertools.combinations(range(len(one)), 2)
+        )
+    return broken
+
+
+def _triangle(a: int, b: int, c: int) -> tuple[int, int, int]:
+    """Rotate so that equal oriented triangles compare equal."""
+    return min((a, b, c), (b, c, a), (c, a, b))
+
+
+def transition_faces(first: Palette, second: Palette, links: tuple[tuple[int, int], ...]) -> I32:
+    """Return the (f, 3) triangles over the links: the topology between the two frames.
+
+    Where colours only split it is the second palette's mesh, where they only merge the first's.
+    Where both happen the second's mesh is taken and each merging vertex is split into its strands,
+    along the cut that reproduces most of the first palette's triangles (all of them when the rules
+    hold).
+    """
+    late = [j for _, j in links]
+    early = [i for i, _ in links]
+    if len(set(late)) == len(links):
+        place = {j: at for at, j in enumerate(late)}
+        return _relabel(second.faces, place)
+    if len(set(early)) == len(links):
+        place = {i: at for at, i in enumerate(early)}
+        return _relabel(first.faces, place)
+    strands = {j: [at for at, (_, b) in enumerate(links) if b == j] for j in set(late)}
+    mesh = [tuple(strands[int(v)][0] for v in face) for face in second.faces]
+    wanted = {_triangle(*map(int, face)) for face in first.faces}
+    for j in sorted(strands):
+        for fresh in strands[j][1:]:
+            mesh = _split_vertex(mesh, strands[j][0], fresh, early, wanted)
+    return np.array(mesh, np.int32).reshape(-1, 3)
+
+
+def _relabel(faces: I32, place: dict[int, int]) -> I32:
+    return np.array([[place[int(v)] for v in face] for face in faces], np.int32).reshape(-1, 3)
+
+
+Mesh = list[tuple[int, ...]]
+
+
+def _split_vertex(
+    mesh: Mesh, old: int, fresh: int, early: list[int], wanted: set[tuple[int, int, int]]
+) -> Mesh:
+    """Split `old` into `old` and `fresh` along the best pair of its neighbours."""
+    star = {}  # neighbour -> next neighbour, anticlockwise round `old`
+    for face in mesh:
+        if old in face:
+            at = face.index(old)
+            star[face[(at + 1) % 3]] = face[(at + 2) % 3]
+    ring = [min(star)]
+    while len(ring) < len(star):
+        ring.append(star[ring[-1]])
+    others = [face for face in mesh if old not in face]
+    best: tuple[int, Mesh] | None = None
+    for i, j in itertools.permutations(range(len(ring)), 2):
+        span = [ring[(i + s) % len(ring)] for s in range((j - i) % len(ring) + 1)]
+        back = [ring[(j + s) % len(ring)] for s in range((i - j) % len(ring) + 1)]
+        fan: Mesh = [(fresh, a, b) for a, b in itertools.pairwise(span)]
+        fan += [(old, a, b) for a, b in itertools.pairwise(back)]
+        fan += [(fresh, span[-1], old), (old, span[0], fresh)]
+        candidate = others + fan
+        score = len(wanted & {_triangle(*(early[v] for v in face)) for face in candidate})
+        if best is None or score > best[0]:
+            best = score, candidate
+    assert best is not None  # a closed mesh has at least three neighbours round every vertex
+    return best[1]

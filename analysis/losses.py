@@ -1,0 +1,152 @@
+"""The paper's losses (eqs. 2 to 4, 8, 11 and 12) of palettes and polytopes, computed by the
+core."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import os
+from collections.abc import Callable
+
+import nlopt
+import numpy as np
+from numpy.typing import NDArray
+from palette4d import _core
+from palette4d.analysis.options import AnalysisOptions
+
+F64 = NDArray[np.float64]
+Objective = Callable[[F64], tuple[float, F64]]
+I32 = NDArray[np.int32]
+NO_FACES: I32 = np.zeros((0, 3), np.int32)
+
+
+@dataclasses.dataclass(frozen=True)
+class Losses:
+    """Means over the frames: R (eq. 2), C (eq. 3), L (eqs. 4, 8); K (eq. 11); L' (eq. 12)."""
+
+    R: float
+    C: float
+    L: float
+    K: float
+    L_prime: float
+    outside: float
+    max_distance: float
+
+
+def thread_count(options: AnalysisOptions) -> int:
+    """Return how many threads the loss evaluation uses."""
+    return options.threads or os.cpu_count() or 1
+
+
+def palette_loss(colours: _core.ColourTree, rgb: F64, options: AnalysisOptions) -> float:
+    """Eq. 4 of one (n, 3) palette."""
+    r, c, *_ = _core.palette_loss(colours, rgb, NO_FACES, options.lambda_, options.k, 0.0)
+    return options.lambda_ * r + c
+
+
+def smoothness(vertices: F64, edges: I32, length: float) -> tuple[float, F64]:
+    """Eq. 11 and its (n, 4) gradient with respect to the vertices; `length` is the clip's, in
+    frames.
+
+    Edges without extent in time (there are none in a valid polytope) count as nothing.
+    """
+    gradient = np.zeros_like(vertices)
+    if len(edges) == 0:
+        return 0.0, gradient
+    u, v = edges[:, 0], edges[:, 1]
+    colour = vertices[v, :3] - vertices[u, :3]
+    dt = (vertices[v, 3] - vertices[u, 3]) / length
+    distance = np.linalg.norm(colour, axis=1)
+    slope = distance / dt
+    unit = colour / np.maximum(distance, 1e-12)[:, None] / dt[:, None] / len(edges)
+    np.add.at(gradient[:, :3], v, unit)
+    np.add.at(gradient[:, :3], u, -unit)
+    along = slope / dt / length / len(edges)
+    np.add.at(gradient[:, 3], v, -along)
+    np.add.at(gradient[:, 3], u, along)
+    return float(slope.mean()), gradient
+
+
+def summarise(rows: F64, k: float, options: AnalysisOptions) -> Losses:
+    """Means of (n, 5) rows R, C, D, outside, max distance, with smoothness `k`."""
+    r, c = float(rows[:, 0].mean()), float(rows[:, 1].mean())
+    loss = options.lambda_ * r + c
+    return Losses(
+        R=r,
+        C=c,
+        L=loss,
+        K=k,
+        L_prime=loss + options.gamma * k,
+        outside=float(rows[:, 3].mean()),
+        max_distance=float(rows[:, 4].max()),
+    )
+
+
+def refine_palette(
+    colours: _core.ColourTree,
+    rgb: F64,
+    faces: I32,
+    low: F64,
+    high: F64,
+    options: AnalysisOptions,
+    most_evaluations: int = 60,
+) -> F64:
+    """Move a palette's (n, 3) colours to lower eq. 4, each in a box (Wang et al. 2019).
+
+    All vertices move together, by NLopt's L-BFGS with the core's gradient, inside `hull_box` around
+    where they are and inside the gamut [low, high]. Never returns a worse palette. `faces` keeps
+    the mesh convex when options.convexity asks for it.
+    """
+    n = len(rgb)
+    weight = options.convexity if len(faces) else 0.0
+
+    def objective(x: F64) -> tuple[float, F64]:
+        r, c, d, _, _, gradient = _core.palette_loss(
+            colours, x.reshape(n, 3), faces, options.lambda_, options.k, weight
+        )
+        return options.lambda_ * r + c + weight * d, gradient.ravel()
+
+    start = np.clip(rgb, low, high)
+    best = minimise(
+        objective,
+        start.ravel(),
+        np.maximum(start - options.hull_box, low).ravel(),
+        np.minimum(start + options.hull_box, high).ravel(),
+        most_evaluations,
+    )
+    return best.reshape(n, 3)
+
+
+def minimise(
+    objective: Objective,
+    x: F64,
+    low: F64,
+    high: F64,
+    most_evaluations: int,
+    tolerance: float = 1e-4,
+) -> F64:
+    """Minimise a function with gradient inside a box (NLopt, L-BFGS); the best point ever seen.
+
+    The losses have kinks (a pixel enters the palette, the nearest pixels change), where a line
+    search may fail: that ends the search, and the best point still counts.
+    """
+    best_value, best = objective(x)[0], x.copy()
+
+    def call(point: F64, gradient: F64) -> float:
+        nonlocal best_value, best
+        value, slope = objective(point)
+        if gradient.size:
+            gradient[:] = slope
+        if value < best_value:
+            best_value, best = value, point.copy()
+        return value
+
+    solver = nlopt.opt(nlopt.LD_LBFGS, len(x))
+    solver.set_min_objective(call)
+    solver.set_lower_bounds(low)
+    solver.set_upper_bounds(high)
+    solver.set_maxeval(most_evaluations)
+    solver.set_ftol_rel(tolerance)
+    with contextlib.suppress(nlopt.RoundoffLimited, nlopt.runtime_error, nlopt.invalid_argument):
+        solver.optimize(np.clip(x, low, high))
+    return best

@@ -1,0 +1,166 @@
+"""The 4D skew polytope (section 4.1) as the analysis builds it, and its form in the sidecar.
+
+Times are frame numbers. `Palette` is one frame's polyhedron; `SkewPolytope` the whole: vertices,
+and for each block and each transition between blocks the tracks (chains of vertices) and the
+triangles over them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+F64 = NDArray[np.float64]
+I32 = NDArray[np.int32]
+
+
+@dataclasses.dataclass(frozen=True)
+class Palette:
+    """A polyhedral palette: (n, 3) colours and (f, 3) outward triangles (none for n < 3)."""
+
+    rgb: F64
+    faces: I32
+
+    def adjacency(self) -> NDArray[np.bool_]:
+        """Return the (n, n) intra-frame edges; colours of a palette without faces all touch."""
+        n = len(self.rgb)
+        if len(self.faces) == 0:
+            return ~np.eye(n, dtype=bool)
+        out = np.zeros((n, n), bool)
+        for a, b in ((0, 1), (1, 2), (2, 0)):
+            out[self.faces[:, a], self.faces[:, b]] = True
+            out[self.faces[:, b], self.faces[:, a]] = True
+        return out
+
+
+@dataclasses.dataclass(frozen=True)
+class Section:
+    """A block [first, last] or a transition (first, last): tracks of vertex indices, and
+    triangles."""
+
+    first: float
+    last: float
+    tracks: tuple[tuple[int, ...], ...]
+    faces: I32
+
+
+@dataclasses.dataclass(frozen=True)
+class SkewPolytope:
+    """Vertices (n, 4) float64, columns r, g, b, frame; blocks, and the transitions between them."""
+
+    vertices: F64
+    blocks: tuple[Section, ...]
+    transitions: tuple[Section, ...]
+
+    def edges(self) -> I32:
+        """Return the inter-frame edges E, (m, 2) vertex indices, earlier end first, each once."""
+        found = {
+            pair
+            for section in (*self.blocks, *self.transitions)
+            for track in section.tracks
+            for pair in itertools.pairwise(track)
+        }
+        return np.array(sorted(found), np.int32).reshape(-1, 2)
+
+    def length(self) -> float:
+        """Return the clip's length in frames; 1 for a single frame, so that it can divide."""
+        return max(self.blocks[-1].last - self.blocks[0].first, 1.0)
+
+    def fixed_times(self) -> NDArray[np.bool_]:
+        """Which vertices may not move in time: in the first or last frame, splitting or merging."""
+        edges = self.edges()
+        n = len(self.vertices)
+        outgoing = np.bincount(edges[:, 0], minlength=n)
+        incoming = np.bincount(edges[:, 1], minlength=n)
+        return (outgoing != 1) | (incoming != 1)
+
+    def neighbours(self) -> tuple[list[list[int]], list[list[int]]]:
+        """Return, for each vertex, the vertices its edges come from and those they go to."""
+        before: list[list[int]] = [[] for _ in self.vertices]
+        after: list[list[int]] = [[] for _ in self.vertices]
+        for u, v in self.edges().tolist():
+            before[v].append(u)
+            after[u].append(v)
+        return before, after
+
+    def extended_tracks(self, block: Section) -> list[list[int]]:
+        """Return a block's tracks, each going on to the next vertex before and after it.
+
+        A vertex at the block's end may move into the block; the track then goes on behind it. Only
+        splitting and merging vertices, which stay where they are, have no single vertex to go on
+        to.
+        """
+        before, after = self.neighbours()
+        out = []
+        for track in block.tracks:
+            head, tail = before[track[0]], after[track[-1]]
+            out.append(
+                [*(head if len(head) == 1 else []), *track, *(tail if len(tail) == 1 else [])]
+            )
+        return out
+
+    def with_vertices(self, vertices: F64) -> SkewPolytope:
+        """Return the same edges with other vertices, whose times may have moved inside their
+        blocks."""
+        blocks = []
+        for block in self.blocks:
+            tracks = []
+            for track in self.extended_tracks(block):
+                times = vertices[track, 3]
+                # The shortest run that covers the block.
+                start = max(int(np.searchsorted(times, block.first, side="right")) - 1, 0)
+                end = int(np.searchsorted(times, block.last, side="left"))
+                tracks.append(tuple(track[start : end + 1]))
+            blocks.append(dataclasses.replace(block, tracks=tuple(tracks)))
+        return dataclasses.replace(self, vertices=vertices, blocks=tuple(blocks))
+
+    def fields(self) -> dict[str, Any]:
+        """Return the sidecar's "polytope": ids v1, v2, … and e1, e2, … in order of time.
+
+        Ids are given once, here; edits refer to them.
+        """
+        order = sorted(
+            range(len(self.vertices)), key=lambda i: (self.vertices[i, 3], *self.vertices[i, :3], i)
+        )
+        name = {index: f"v{place}" for place, index in enumerate(order, 1)}
+        place = {index: at for at, index in enumerate(order)}
+        edges = sorted((place[int(u)], place[int(v)]) for u, v in self.edges())
+        return {
+            "vertices": [
+                {
+                    "id": name[i],
+                    "frame": _number(self.vertices[i, 3]),
+                    "rgb": [float(x) for x in self.vertices[i, :3]],
+                }
+                for i in order
+            ],
+            "edges": [
+                {"id": f"e{at}", "from": name[order[u]], "to": name[order[v]]}
+                for at, (u, v) in enumerate(edges, 1)
+            ],
+            "blocks": [
+                {
+                    "first": _number(b.first),
+                    "last": _number(b.last),
+                    "tracks": [[name[i] for i in track] for track in b.tracks],
+                    "faces": b.faces.tolist(),
+                }
+                for b in self.blocks
+            ],
+            "transitions": [
+                {
+                    "tracks": [[name[i] for i in track] for track in t.tracks],
+                    "faces": t.faces.tolist(),
+                }
+                for t in self.transitions
+            ],
+        }
+
+
+def _number(x: float) -> int | float:
+    """Whole frame numbers as integers, others as they are."""
+    return int(x) if float(x).is_integer() else float(x)

@@ -1,0 +1,29 @@
+// NumPy arrays to and from the core's vectors, with errors that say what was found.
+#pragma once
+
+#include <pybind11/numpy.h>
+
+#include <string>
+#include <vector>
+
+#include "palette4d/polytope.hpp"
+
+namespace py = pybind11;
+
+namespace palette4d::bindings {
+
+using DoubleArray = py::array_t<double, py::array::c_style>;
+using IntArray = py::array_t<int, py::array::c_style>;
+
+/// "(4, 3)"
+std::string shape_text(const py::array& array);
+/// Anything NumPy turns into an (n, 3) array of real numbers. `what` names it in the ValueError.
+std::vector<Vec3> colours_from(const py::object& object, const char* what);
+/// (f, 3) integers; an empty array of any shape is no faces.
+std::vector<Face> faces_from(const py::object& object);
+/// (n, 3) float64.
+DoubleArray to_array(const std::vector<Vec3>& colours);
+/// (f, 3) int32.
+IntArray to_array(const std::vector<Face>& faces);
+
+}  // namespace palette4d::bindings

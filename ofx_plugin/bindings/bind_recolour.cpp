@@ -1,0 +1,119 @@
+// Recolouring of float32 images for Python.
+#include <limits>
+#include <memory>
+
+#include "arrays.hpp"
+#include "binders.hpp"
+#include "palette4d/recolour.hpp"
+
+using namespace palette4d;
+using namespace palette4d::bindings;
+
+namespace {
+
+/// (h, w, 3 or 4) float32 whose pixels are packed within a row; rows may lie anywhere.
+void require_image(const py::array& image, const char* what) {
+    const std::string name(what);
+    if (!py::isinstance<py::array_t<float>>(image)) {
+        throw py::value_error(name + ": found dtype " + std::string(py::str(image.dtype())) +
+                              ", expected float32");
+    }
+    if (image.ndim() != 3 || (image.shape(2) != 3 && image.shape(2) != 4)) {
+        throw py::value_error(name + ": found shape " + shape_text(image) +
+                              ", expected (h, w, 3) or (h, w, 4)");
+    }
+    if (image.shape(0) > std::numeric_limits<int>::max() ||
+        image.shape(1) > std::numeric_limits<int>::max()) {
+        throw py::value_error(name + ": found shape " + shape_text(image) +
+                              ", expected less than 2^31 rows and columns");
+    }
+    if (image.size() == 0) return;
+    const py::ssize_t channel = sizeof(float), pixel = channel * image.shape(2);
+    if (image.strides(2) != channel || (image.shape(1) > 1 && image.strides(1) != pixel)) {
+        throw py::value_error(name + ": found strides of " + std::to_string(image.strides(1)) +
+                              " bytes a pixel and " + std::to_string(image.strides(2)) +
+                              " a channel, expected packed rows (" + std::to_string(pixel) +
+                              " and " + std::to_string(channel) +
+                              "); numpy.ascontiguousarray makes them so");
+    }
+    if (image.shape(0) > 1 && std::abs(image.strides(0)) < pixel * image.shape(1)) {
+        throw py::value_error(name + ": found rows " + std::to_string(image.strides(0)) +
+                              " bytes apart, expected rows that do not overlap");
+    }
+    if (image.strides(0) % channel != 0 ||
+        reinterpret_cast<std::uintptr_t>(image.data()) % alignof(float) != 0) {
+        throw py::value_error(name + ": found unaligned memory, expected aligned float32");
+    }
+}
+
+template <class View, class Pixel>
+View view_of(const py::array& image, Pixel* data) {
+    return {data, static_cast<int>(image.shape(1)), static_cast<int>(image.shape(0)),
+            static_cast<int>(image.shape(2)), image.strides(0)};
+}
+
+/// Whether two images that are not the very same rows share memory.
+bool overlap(const py::array& a, const py::array& b) {
+    if (a.size() == 0 || b.size() == 0) return false;
+    if (a.data() == b.data() && a.strides(0) == b.strides(0)) return false;
+    const auto span = [](const py::array& image) {
+        const auto first = reinterpret_cast<std::intptr_t>(image.data());
+        const auto last = first + image.strides(0) * (image.shape(0) - 1);
+        const auto row = image.shape(1) * image.shape(2) * py::ssize_t{sizeof(float)};
+        return std::make_pair(std::min(first, last), std::max(first, last) + row);
+    };
+    const auto x = span(a), y = span(b);
+    return x.first < y.second && y.first < x.second;
+}
+
+py::array apply(const Recolourer& self, const py::array& image, double strength, bool premultiplied,
+                int threads, const py::object& out) {
+    require_image(image, "image");
+    py::array result;
+    if (out.is_none()) {
+        result = py::array_t<float>({image.shape(0), image.shape(1), image.shape(2)});
+    } else {
+        if (!py::isinstance<py::array>(out)) throw py::value_error("out: not a NumPy array");
+        result = py::reinterpret_borrow<py::array>(out);
+        require_image(result, "out");
+        if (!result.writeable()) throw py::value_error("out: found a read-only array");
+        for (py::ssize_t axis = 0; axis < 3; ++axis) {
+            if (result.shape(axis) != image.shape(axis)) {
+                throw py::value_error("out: found shape " + shape_text(result) +
+                                      ", expected the image's, " + shape_text(image));
+            }
+        }
+        if (overlap(image, result)) {
+            throw py::value_error(
+                "out: found memory that overlaps the image's, expected the same rows or others");
+        }
+    }
+    const auto in_view = view_of<ConstImageView>(image, static_cast<const float*>(image.data()));
+    const auto out_view = view_of<ImageView>(result, static_cast<float*>(result.mutable_data()));
+    const RecolourOptions options{strength, premultiplied, threads};
+    {
+        const py::gil_scoped_release unlocked;
+        self.apply(in_view, out_view, options);
+    }
+    return result;
+}
+
+}  // namespace
+
+void bind_recolour(py::module_& module) {
+    py::class_<Recolourer>(
+        module, "Recolourer",
+        "One frame's recolouring: p' = p + strength * sum_i w_i(q) (v'_i - v_i).")
+        .def(py::init(
+                 [](const py::object& original, const py::object& edited, const py::object& faces) {
+                     return std::make_unique<Recolourer>(colours_from(original, "original"),
+                                                         colours_from(edited, "edited"),
+                                                         faces_from(faces));
+                 }),
+             py::arg("original"), py::arg("edited"), py::arg("faces"))
+        .def_property_readonly("identity", &Recolourer::identity,
+                               "No colour is edited: apply() copies bit for bit.")
+        .def("apply", &apply, py::arg("image"), py::kw_only(), py::arg("strength") = 1.0,
+             py::arg("premultiplied") = false, py::arg("threads") = 1, py::arg("out") = py::none(),
+             "(h, w, 3 or 4) float32 in and out; threads 0 means one per processor.");
+}

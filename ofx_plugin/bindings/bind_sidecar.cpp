@@ -1,0 +1,135 @@
+// The sidecar reader for Python: Sidecar, Edits, read_sidecar and parse_sidecar.
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "binders.hpp"
+#include "palette4d/sidecar.hpp"
+
+using palette4d::Edits;
+using palette4d::Sidecar;
+using palette4d::Vec3;
+
+namespace {
+
+/// Edits by index, as the core wants them, with the ids that Python wants.
+struct NamedEdits : Edits {
+    std::vector<std::string> vertex_ids, edge_ids;
+};
+
+struct BoundSidecar {
+    Sidecar sidecar;
+    NamedEdits edits;
+};
+
+py::tuple as_tuple(const Vec3& rgb) { return py::make_tuple(rgb[0], rgb[1], rgb[2]); }
+
+std::unique_ptr<BoundSidecar> bound(Sidecar sidecar) {
+    auto result = std::make_unique<BoundSidecar>();
+    static_cast<Edits&>(result->edits) = sidecar.edits;
+    for (const auto& vertex : sidecar.polytope.vertices()) {
+        result->edits.vertex_ids.push_back(vertex.id);
+    }
+    for (const auto& edge : sidecar.polytope.edges()) result->edits.edge_ids.push_back(edge.id);
+    result->sidecar = std::move(sidecar);
+    return result;
+}
+
+/// Bytes of a path: str, bytes or os.PathLike, in the file system's encoding.
+std::string path_bytes(const py::object& path) {
+    PyObject* converted = nullptr;
+    if (PyUnicode_FSConverter(path.ptr(), &converted) == 0) throw py::error_already_set();
+    return std::string(py::reinterpret_steal<py::bytes>(converted));
+}
+
+/// UTF-8 of a str, or bytes as they are; a lone surrogate passes, for the reader to refuse.
+std::string text_bytes(const py::object& text) {
+    if (py::isinstance<py::bytes>(text)) return text.cast<std::string>();
+    if (!py::isinstance<py::str>(text)) {
+        throw py::type_error("parse_sidecar: expected the text as str or bytes");
+    }
+    PyObject* encoded = PyUnicode_AsEncodedString(text.ptr(), "utf-8", "surrogatepass");
+    if (encoded == nullptr) throw py::error_already_set();
+    return std::string(py::reinterpret_steal<py::bytes>(encoded));
+}
+
+py::dict clip_of(const BoundSidecar& self) {
+    const palette4d::ClipInfo& clip = self.sidecar.clip;
+    py::dict result;
+    result["name"] = clip.name;
+    result["source"] = clip.source;
+    result["first"] = clip.first;
+    result["last"] = clip.last;
+    result["step"] = clip.step;
+    result["rate"] = py::make_tuple(clip.rate_num, clip.rate_den);
+    result["width"] = clip.width;
+    result["height"] = clip.height;
+    result["encoding"] = clip.encoding;
+    return result;
+}
+
+py::dict vertex_rgb_of(const NamedEdits& self) {
+    py::dict result;
+    for (std::size_t i = 0; i < self.vertex_rgb.size(); ++i) {
+        if (self.vertex_rgb[i]) result[py::str(self.vertex_ids[i])] = as_tuple(*self.vertex_rgb[i]);
+    }
+    return result;
+}
+
+py::list stops_of(const NamedEdits& self) {
+    py::list result;
+    for (const palette4d::Stop& stop : self.stops) {
+        py::dict entry;
+        entry["id"] = stop.id;
+        entry["edge"] = self.edge_ids[static_cast<std::size_t>(stop.edge)];
+        entry["frame"] = stop.frame;
+        entry["rgb"] = as_tuple(stop.rgb);
+        result.append(entry);
+    }
+    return result;
+}
+
+}  // namespace
+
+void bind_sidecar(py::module_& module) {
+    module.attr("SIDECAR_VERSION") = palette4d::kSidecarVersion;
+
+    py::class_<Edits>(module, "_Edits");
+    py::class_<NamedEdits, Edits>(module, "Edits",
+                                  "Edited colours of vertices and colour stops on edges.")
+        .def_property_readonly("vertex_rgb", &vertex_rgb_of)
+        .def_property_readonly("stops", &stops_of);
+
+    py::class_<BoundSidecar>(module, "Sidecar", "A validated sidecar file.")
+        .def_property_readonly("version",
+                               [](const BoundSidecar& self) { return self.sidecar.version; })
+        .def_property_readonly("clip", &clip_of)
+        .def_property_readonly(
+            "polytope", [](const BoundSidecar& self) { return &self.sidecar.polytope; },
+            py::return_value_policy::reference_internal)
+        .def_property_readonly(
+            "edits", [](const BoundSidecar& self) { return &self.edits; },
+            py::return_value_policy::reference_internal);
+
+    module.def(
+        "read_sidecar",
+        [](const py::object& path) {
+            const std::string bytes = path_bytes(path);
+            py::gil_scoped_release unlocked;
+            return bound(palette4d::read_sidecar(bytes));
+        },
+        py::arg("path"), "Read and validate a sidecar file; SidecarError when it is unusable.");
+    module.def(
+        "parse_sidecar",
+        [](const py::object& text, const std::string& name) {
+            const std::string bytes = text_bytes(text);
+            py::gil_scoped_release unlocked;
+            return bound(palette4d::parse_sidecar(bytes, name));
+        },
+        py::arg("text"), py::arg("name") = "<text>",
+        "The same for text (str or bytes) in memory; `name` stands for the file in errors.");
+}

@@ -1,0 +1,15 @@
+// One binder a subject; module.cpp calls them in the order in which their types depend on each
+// other.
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+namespace py = pybind11;
+
+void bind_errors(py::module_& module);    ///< SidecarError, and the one exception translator
+void bind_polytope(py::module_& module);  ///< Polytope
+void bind_sidecar(py::module_& module);   ///< Edits, Sidecar, read_sidecar, parse_sidecar
+void bind_slice(py::module_& module);     ///< Slice, slice_at, edited_colours
+void bind_mvc(py::module_& module);       ///< mean value coordinates and palette weights
+void bind_recolour(py::module_& module);  ///< Recolourer
+void bind_analysis(py::module_& module);  ///< the hot loops of palette4d.analysis

@@ -1,0 +1,120 @@
+"""The compiled core: polytope slicing, mean value coordinates, recolouring, the sidecar reader."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+F64 = NDArray[np.float64]
+F32 = NDArray[np.float32]
+I32 = NDArray[np.int32]
+
+__version__: str
+SIDECAR_VERSION: int
+
+class SidecarError(Exception):
+    """An unusable sidecar; `str()` is "FILE: POINTER: found X, expected Y"."""
+
+    file: str
+    pointer: str
+    found: str
+    expected: str
+
+class Polytope:
+    """The 4D skew polytope (section 4.1). Build one with `parse_sidecar` or `read_sidecar`."""
+
+    @property
+    def vertices(self) -> F64:
+        """(n, 4) float64, columns r, g, b, t; t is a frame number."""
+    @property
+    def vertex_ids(self) -> list[str]: ...
+    @property
+    def edges(self) -> I32:
+        """(m, 2) int32 vertex indices, earlier end first."""
+    @property
+    def edge_ids(self) -> list[str]: ...
+    @property
+    def sections(self) -> list[dict[str, Any]]:
+        """Blocks and transitions in order: first, last, transition, tracks, faces."""
+    @property
+    def first_frame(self) -> float: ...
+    @property
+    def last_frame(self) -> float: ...
+
+class Edits:
+    """Edited colours of vertices and colour stops on edges."""
+
+    @property
+    def vertex_rgb(self) -> dict[str, tuple[float, float, float]]: ...
+    @property
+    def stops(self) -> list[dict[str, Any]]:
+        """id, edge (its id), frame, rgb."""
+
+class Sidecar:
+    """A validated sidecar file."""
+
+    @property
+    def version(self) -> int: ...
+    @property
+    def clip(self) -> dict[str, Any]:
+        """name, source, first, last, step, rate (num, den), width, height, encoding."""
+    @property
+    def polytope(self) -> Polytope: ...
+    @property
+    def edits(self) -> Edits: ...
+
+class Slice:
+    """The polyhedral palette at one time (eq. 5)."""
+
+    @property
+    def frame(self) -> float: ...
+    @property
+    def section(self) -> int: ...
+    @property
+    def rgb(self) -> F64:
+        """(n, 3) float64 original palette colours."""
+    @property
+    def faces(self) -> I32:
+        """(f, 3) int32, anticlockwise from outside; (0, 3) for one or two colours."""
+    @property
+    def edges(self) -> I32:
+        """(n,) int32 edge of each vertex, -1 when it lies on a polytope vertex."""
+    @property
+    def ends(self) -> I32:
+        """(n, 2) int32 polytope vertices from, to."""
+    @property
+    def weights(self) -> F64:
+        """(n,) float64 weight of `to` (eq. 6)."""
+
+def read_sidecar(path: str) -> Sidecar: ...
+def parse_sidecar(text: str, name: str = ...) -> Sidecar: ...
+def slice_at(polytope: Polytope, frame: float) -> Slice: ...
+def edited_colours(polytope: Polytope, edits: Edits, slice: Slice) -> F64:
+    """(n, 3) float64 edited colours of the slice's vertices."""
+
+def mean_value_coordinates(points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> F64:
+    """(m, 3), (n, 3), (f, 3) -> (m, n) weights."""
+
+def palette_weights(points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> tuple[F64, F64]:
+    """(m, 3), (n, 3), (f, 3) -> (m, n) weights of q(p) and (m,) distances |p - q|, 0 inside."""
+
+def polytope_weights(points: ArrayLike, polytope: Polytope, frame: float) -> F64:
+    """Eq. 7: (m, 3) colours at one time -> (m, N) weights of the N polytope vertices."""
+
+class Recolourer:
+    """One frame's recolouring: p' = p + strength * sum_i w_i(q) (v'_i - v_i)."""
+
+    def __init__(self, original: ArrayLike, edited: ArrayLike, faces: ArrayLike) -> None: ...
+    @property
+    def identity(self) -> bool: ...
+    def apply(
+        self,
+        image: NDArray[np.float32],
+        *,
+        strength: float = ...,
+        premultiplied: bool = ...,
+        threads: int = ...,
+        out: NDArray[np.float32] | None = ...,
+    ) -> F32:
+        """(h, w, 3 or 4) float32 in and out; threads 0 means one per processor."""
