@@ -44,6 +44,7 @@ CARRIED = (
     "Model",
 )
 _RATE_NAMES = ("FramesPerSecond", "dpx:FrameRate", "dpx:TemporalFrameRate")
+_DEPTHS = {"uint": "uint32", "int": "int32"}
 # OpenImageIO's names for what people call sRGB and so on; other names pass as they are.
 _ENCODINGS = {
     "srgb_rec709_scene": "sRGB",
@@ -350,7 +351,7 @@ def _header(path: Path, spec: Any, chosen: list[int]) -> Header:
         height=height,
         has_alpha=has_alpha,
         premultiplied=has_alpha and not straight,
-        depth=f"uint{bits}" if bits else str(spec.format),
+        depth=f"uint{bits}" if bits else _DEPTHS.get(str(spec.format), str(spec.format)),
         encoding=_ENCODINGS.get(space.lower(), space) or _dpx_encoding(spec) or "unknown",
         rate=_rate(spec),
         metadata=tuple(

@@ -2,7 +2,8 @@
 
 Frame numbers start at 0 and count pictures in presentation order. A first pass reads the packets'
 time stamps without decoding, so that a picture which cannot be decoded later is named by its own
-number and moves no other.
+number and moves no other. Damage is named where the decoder reports it (H.264, ProRes and most
+others do); FFV1 and VP9 conceal it, and FFmpeg passes no word of it on.
 """
 
 from __future__ import annotations

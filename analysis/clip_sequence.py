@@ -203,13 +203,13 @@ def of_pattern(spec: str) -> tuple[Sequence, str | None]:
     names = _file_names(folder)
     matches = [(match[1], name) for name in names if (match := number.fullmatch(name))]
 
-    def files(digits: int) -> dict[int, Path]:
-        return {int(n): folder / name for n, name in matches if _digits_fit(n, digits)}
-
     # A lone `#` means any number in some programs and four digits in others: what lies there tells.
-    widths = [width, 4] if str(parsed.padding()) == "#" else [width]
-    best = max(widths, key=lambda digits: len(files(digits)))
-    sequence = Sequence(folder, prefix, suffix, best, files(best))
+    if str(parsed.padding()) == "#" and matches:
+        found = list(_by_width(folder, prefix, suffix, matches))
+        sequence = max(found, key=lambda one: len(one.files))
+    else:
+        files = {int(n): folder / name for n, name in matches if _digits_fit(n, width)}
+        sequence = Sequence(folder, prefix, suffix, width, files)
     if not sequence.files:
         raise ClipError(f"{spec}: no file matches the pattern; {_near(spec, folder)}")
     return sequence, embedded

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from palette4d import _core
-from palette4d.analysis.losses import palette_loss, refine_palette
+from palette4d.analysis.losses import colour_scale, palette_loss, refine_palette
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Palette
 from scipy.spatial import ConvexHull, QhullError
@@ -30,15 +30,19 @@ def frame_palette(
     flat = flat_palette(colours.rgb, options)
     if flat is not None:
         return flat
+    close = options.merge_distance * colour_scale(low, high)
     mesh = hull_mesh(colours.rgb)
     simple = _core.progressive_hull(mesh.rgb, mesh.faces, options.palette_size)
-    palette = hull_mesh(merge_close(np.clip(simple, low, high), options.merge_distance))
+    if len(simple) > options.palette_size:
+        # No edge of a sliver-thin hull may be contracted: its extreme points do instead.
+        simple = extreme_points(mesh.rgb, options.palette_size)
+    palette = hull_mesh(merge_close(np.clip(simple, low, high), close))
     best, best_loss = palette, palette_loss(colours, palette.rgb, options)
     for _ in range(
         2
     ):  # refining may push a vertex inside; the second round starts from the new hull
         moved = refine_palette(colours, best.rgb, best.faces, low, high, options)
-        palette = hull_mesh(merge_close(moved, options.merge_distance))
+        palette = hull_mesh(merge_close(moved, close))
         loss = palette_loss(colours, palette.rgb, options)
         if loss >= best_loss and len(palette.rgb) >= len(best.rgb):
             break
@@ -66,6 +70,15 @@ def hull_mesh(points: F64) -> Palette:
     inwards = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
     faces[inwards] = faces[inwards][:, ::-1]
     return Palette(rgb, faces.astype(np.int32))
+
+
+def extreme_points(points: F64, count: int) -> F64:
+    """Return `count` of the (n, 3) points, each the farthest from those before it."""
+    chosen = [int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
+    while len(chosen) < min(count, len(points)):
+        gaps = np.linalg.norm(points[:, None] - points[chosen][None], axis=2).min(axis=1)
+        chosen.append(int(np.argmax(gaps)))
+    return points[chosen]
 
 
 def merge_close(points: F64, distance: float) -> F64:

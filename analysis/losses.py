@@ -38,6 +38,17 @@ def thread_count(options: AnalysisOptions) -> int:
     return options.threads or os.cpu_count() or 1
 
 
+def colour_scale(low: F64, high: F64) -> float:
+    """Return the size of the gamut [low, high], 1 for the unit cube: distances in options scale
+    with it."""
+    return max(1.0, float(np.max(high - low)))
+
+
+def convexity_weight(options: AnalysisOptions, scale: float) -> float:
+    """Return the weight that sets volumes (scale cubed) against losses, which are distances."""
+    return options.convexity / scale**2
+
+
 def palette_loss(colours: _core.ColourTree, rgb: F64, options: AnalysisOptions) -> float:
     """Eq. 4 of one (n, 3) palette."""
     r, c, *_ = _core.palette_loss(colours, rgb, NO_FACES, options.lambda_, options.k, 0.0)
@@ -98,7 +109,8 @@ def refine_palette(
     the mesh convex when options.convexity asks for it.
     """
     n = len(rgb)
-    weight = options.convexity if len(faces) else 0.0
+    scale = colour_scale(low, high)
+    weight = convexity_weight(options, scale) if len(faces) else 0.0
 
     def objective(x: F64) -> tuple[float, F64]:
         r, c, d, _, _, gradient = _core.palette_loss(
@@ -110,8 +122,8 @@ def refine_palette(
     best = minimise(
         objective,
         start.ravel(),
-        np.maximum(start - options.hull_box, low).ravel(),
-        np.minimum(start + options.hull_box, high).ravel(),
+        np.maximum(start - options.hull_box * scale, low).ravel(),
+        np.minimum(start + options.hull_box * scale, high).ravel(),
         most_evaluations,
     )
     return best.reshape(n, 3)

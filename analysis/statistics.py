@@ -18,6 +18,9 @@ from palette4d.analysis.options import AnalysisOptions
 FINEST_STEP = 1 / 255  # 8-bit colours stay apart; finer differences do not matter to a palette
 
 
+MOST_STEPS = 2**19  # bins from 0 to the largest colour, what the core's bin numbers hold
+
+
 @dataclasses.dataclass(frozen=True)
 class FrameStatistics:
     """One frame's colours.
@@ -44,18 +47,25 @@ def gather(
     frame: int, image: NDArray[np.float32], options: AnalysisOptions
 ) -> FrameStatistics | None:
     """Return the statistics of an (h, w, 3 or 4) image, or None when no pixel counts."""
-    rgb, counts, _, ignored = _core.bin_colours(image, FINEST_STEP, options.colours)
+    step = max(FINEST_STEP, _largest(image) / MOST_STEPS)
+    rgb, counts, _, ignored = _core.bin_colours(image, step, options.colours)
     if len(rgb) == 0:
         return None
     fine = _core.ColourTree(rgb, counts)
     coarse = fine
     if len(rgb) > options.coarse_colours:
-        rgb, counts, _, _ = _core.bin_colours(image, FINEST_STEP, options.coarse_colours)
+        rgb, counts, _, _ = _core.bin_colours(image, step, options.coarse_colours)
         coarse = _core.ColourTree(rgb, counts)
     points = fine.rgb
     return FrameStatistics(
         frame, fine, coarse, points.min(axis=0), points.max(axis=0), round(fine.total), ignored
     )
+
+
+def _largest(image: NDArray[np.float32]) -> float:
+    """Return the largest finite magnitude among an image's colours."""
+    colours = np.abs(image[..., :3])
+    return float(np.max(colours, initial=0.0, where=np.isfinite(colours)))
 
 
 def gamut_box(

@@ -14,7 +14,13 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 from palette4d import _core
-from palette4d.analysis.losses import minimise, smoothness, thread_count
+from palette4d.analysis.losses import (
+    colour_scale,
+    convexity_weight,
+    minimise,
+    smoothness,
+    thread_count,
+)
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import SkewPolytope
 from palette4d.analysis.statistics import FrameStatistics
@@ -43,7 +49,7 @@ def refine(
     progress: Callable[[int, int], None] | None = None,
 ) -> SkewPolytope:
     """Return the polytope with its vertices refined."""
-    evaluate = _Objective(polytope, statistics, options)
+    evaluate = _Objective(polytope, statistics, options, colour_scale(low, high))
     vertices = polytope.vertices.copy()
     vertices[:, :3] = np.clip(vertices[:, :3], low, high)
     steps = options.refinement_cycles * (len(vertices) + 1)
@@ -101,7 +107,10 @@ class _Objective:
         polytope: SkewPolytope,
         statistics: Sequence[FrameStatistics],
         options: AnalysisOptions,
+        scale_of_colours: float,
     ) -> None:
+        self.colour_box = options.refinement_box * scale_of_colours
+        self.convexity = convexity_weight(options, scale_of_colours)
         self.loss = loss_of(polytope, statistics)
         self.options = options
         self.threads = thread_count(options)
@@ -123,9 +132,10 @@ class _Objective:
         """Return sum over `which` of L / N + gamma K (+ the convexity term), and the gradient."""
         o = self.options
         rows, gradient = self.loss.evaluate(
-            vertices, which, o.lambda_, o.k, o.convexity, self.threads, True
+            vertices, which, o.lambda_, o.k, self.convexity, self.threads, True
         )
-        value = (o.lambda_ * rows[:, 0] + rows[:, 1] + o.convexity * rows[:, 2]).sum() / self.count
+        sums = rows.sum(axis=0)
+        value = (o.lambda_ * sums[0] + sums[1] + self.convexity * sums[2]) / self.count
         gradient = gradient / self.count
         if o.gamma and self.count > 1:
             k, slope = smoothness(vertices, self.edges, self.length)
@@ -151,8 +161,8 @@ class _Objective:
     ) -> tuple[F64, F64]:
         """Return the lower and upper (n, 4) bounds of section 5.5."""
         lower, upper = vertices[moving].copy(), vertices[moving].copy()
-        lower[:, :3] = np.maximum(lower[:, :3] - self.options.refinement_box, low)
-        upper[:, :3] = np.minimum(upper[:, :3] + self.options.refinement_box, high)
+        lower[:, :3] = np.maximum(lower[:, :3] - self.colour_box, low)
+        upper[:, :3] = np.minimum(upper[:, :3] + self.colour_box, high)
         for row, v in enumerate(moving):
             if self.fixed[v]:
                 continue

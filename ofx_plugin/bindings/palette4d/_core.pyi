@@ -1,10 +1,12 @@
 """The compiled core: polytope slicing, mean value coordinates, recolouring, the sidecar reader."""
 
-from collections.abc import Sequence
+import os
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from palette4d.errors import SidecarError as SidecarError
 
 F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
@@ -12,14 +14,6 @@ I32 = NDArray[np.int32]
 
 __version__: str
 SIDECAR_VERSION: int
-
-class SidecarError(Exception):
-    """An unusable sidecar; `str()` is "FILE: POINTER: found X, expected Y"."""
-
-    file: str
-    pointer: str
-    found: str
-    expected: str
 
 class Polytope:
     """The 4D skew polytope (section 4.1). Build one with `parse_sidecar` or `read_sidecar`."""
@@ -87,17 +81,20 @@ class Slice:
     def weights(self) -> F64:
         """(n,) float64 weight of `to` (eq. 6)."""
 
-def read_sidecar(path: str) -> Sidecar: ...
-def parse_sidecar(text: str, name: str = ...) -> Sidecar: ...
+def read_sidecar(path: str | os.PathLike[str]) -> Sidecar: ...
+def parse_sidecar(text: str | bytes, name: str = ...) -> Sidecar: ...
 def slice_at(polytope: Polytope, frame: float) -> Slice: ...
 def edited_colours(polytope: Polytope, edits: Edits, slice: Slice) -> F64:
     """(n, 3) float64 edited colours of the slice's vertices."""
 
 def mean_value_coordinates(points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> F64:
-    """(m, 3), (n, 3), (f, 3) -> (m, n) weights."""
+    """(m, 3), (n, 3), (f, 3) -> (m, n) weights. Points that are not finite give NaN."""
 
 def palette_weights(points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> tuple[F64, F64]:
-    """(m, 3), (n, 3), (f, 3) -> (m, n) weights of q(p) and (m,) distances |p - q|, 0 inside."""
+    """(m, 3), (n, 3), (f, 3) -> (m, n) weights of q(p) and (m,) distances |p - q|, 0 inside.
+
+    Points that are not finite give NaN.
+    """
 
 def polytope_weights(points: ArrayLike, polytope: Polytope, frame: float) -> F64:
     """Eq. 7: (m, 3) colours at one time -> (m, N) weights of the N polytope vertices."""
@@ -117,4 +114,8 @@ class Recolourer:
         threads: int = ...,
         out: NDArray[np.float32] | None = ...,
     ) -> F32:
-        """(h, w, 3 or 4) float32 in and out; threads 0 means one per processor."""
+        """(h, w, 3 or 4) float32 in and out; threads 0 means one per processor.
+
+        Pixels must be packed within a row, rows may lie anywhere (``image[::-1]``, a crop); `out`
+        may be `image` itself.
+        """

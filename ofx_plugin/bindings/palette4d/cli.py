@@ -26,7 +26,7 @@ VERB_MODULES = (
 
 EPILOG = """\
 example:
-  palette4d sample-clip clip/
+  palette4d sample-clip -o clip/frame.####.png
   palette4d analyze clip/ -o clip.p4d.json
   palette4d info clip.p4d.json
   palette4d edit clip.p4d.json set --near 0.9,0.5,0.2 --frame 40 --rgb 0.7 0.2 0.6

@@ -13,7 +13,8 @@ from typing import Any
 
 from palette4d import _core, edits
 from palette4d.analysis import sidecar
-from palette4d.edits import Colour, Document
+from palette4d.analysis.sidecar import Document
+from palette4d.edits import Colour
 from palette4d.errors import Palette4dError
 
 # argparse takes "-1e-3" and "-0.1,0.2,0.3" for options unless told that they are numbers.
@@ -102,7 +103,7 @@ def _verb(
 ) -> argparse.ArgumentParser:
     parser = subparsers.add_parser(
         name,
-        help=re.split(r"[:.]", description)[0],
+        help=re.split(r"[:.(]", description[0].lower() + description[1:])[0].strip(),
         description=textwrap.fill(description, 79),
         usage=usage and f"palette4d edit [-h] SIDECAR {name} {usage}",
         epilog=epilog,

@@ -56,6 +56,8 @@ class FramePattern:
                 f'output {text}: found the extension "{path.suffix}", expected .exr, .png or .tif; '
                 "name the frames as in OUT.####.exr"
             )
+        if not any(mark in path.name for mark in "#@%$"):
+            return cls(path.parent, path.stem, path.suffix, None)
         try:
             parsed = FileSequence(path.name, pad_style=PAD_STYLE_HASH1)
         except FileSeqException as error:

@@ -122,12 +122,12 @@ def keyed(keys: tuple[tuple[float, tuple[float, float, float]], ...], time: floa
     times = [key[0] for key in keys]
     colours = np.array([key[1] for key in keys], np.float32)
     if time <= times[0]:
-        return colours[0]
+        return np.asarray(colours[0])
     for index in range(1, len(keys)):
         if time < times[index]:
             part = _step(times[index - 1], times[index], time)
             return np.asarray(colours[index - 1] * (1 - part) + colours[index] * part, np.float32)
-    return colours[-1]
+    return np.asarray(colours[-1])
 
 
 def _step(low: float, high: float, value: ArrayLike) -> F32:

@@ -24,6 +24,9 @@ constexpr double kThin = 1e-8;
 constexpr double kNearPlane = 0.05;
 /// Total weights below this share of the weights' own sizes are rounding.
 constexpr double kVanishing = 1e-11;
+/// Further out than this many extents the weights (of the size of the distance, and of both signs)
+/// have lost too many digits to reproduce anything.
+constexpr double kFar = 1000;
 /// Colours further out than this are drawn in first, so that no product overflows.
 constexpr double kReach = 1e30;
 
@@ -60,8 +63,8 @@ PaletteBody::PaletteBody(std::vector<Vec3> rgb, std::vector<Face> faces)
             largest = std::max(largest, std::abs(colour[c]));
         }
     }
-    tolerance_ =
-        kRounding * norm(high - low) + 2 * std::numeric_limits<double>::epsilon() * largest;
+    extent_ = norm(high - low);
+    tolerance_ = kRounding * extent_ + 2 * std::numeric_limits<double>::epsilon() * largest;
 
     std::map<std::pair<int, int>, int> edge_of;
     planes_.reserve(faces_.size());
@@ -96,7 +99,24 @@ PaletteBody::PaletteBody(std::vector<Vec3> rgb, std::vector<Face> faces)
         planes_.push_back(plane);
     }
 
-    convex_ = !planes_.empty();
+    const auto first_plane = std::find_if(planes_.begin(), planes_.end(),
+                                          [](const Plane& plane) { return !plane.degenerate; });
+    if (first_plane != planes_.end()) {
+        const Vec3& corner = rgb_[faces_[first_plane - planes_.begin()][0]];
+        flat_ = std::all_of(rgb_.begin(), rgb_.end(), [&](const Vec3& colour) {
+            return std::abs(dot(first_plane->normal, colour - corner)) <= tolerance_;
+        });
+    }
+    // The two sides of a flat body may be cut into different triangles, but a colour must always be
+    // weighed on the same side, or the weights would jump where it crosses one of their edges.
+    for (std::size_t f = 0; f < faces_.size(); ++f) {
+        if (flat_ && (planes_[f].degenerate || dot(planes_[f].normal, first_plane->normal) < 0)) {
+            continue;
+        }
+        skin_.push_back(f);
+    }
+
+    convex_ = !planes_.empty() && !flat_;
     for (std::size_t f = 0; convex_ && f < faces_.size(); ++f) {
         if (planes_[f].degenerate) convex_ = false;
         for (const Vec3& colour : rgb_) {
@@ -124,17 +144,19 @@ PaletteBody::Closest PaletteBody::closest_on_face(const Vec3& p, std::size_t f) 
     const Face& face = faces_[f];
     const Plane& plane = planes_[f];
     if (!plane.degenerate) {
-        const std::array<Vec3, 3> to{rgb_[face[0]] - p, rgb_[face[1]] - p, rgb_[face[2]] - p};
         std::array<double, 3> weights;
         for (std::size_t k = 0; k < 3; ++k) {
-            weights[k] =
-                dot(plane.normal, cross(to[(k + 1) % 3], to[(k + 2) % 3])) / plane.twice_area;
+            const Vec3 from_side = p - rgb_[face[(k + 1) % 3]];
+            weights[k] = dot(plane.normal, cross(plane.along[k], from_side)) / plane.twice_area;
         }
-        if (weights[0] >= 0 && weights[1] >= 0 && weights[2] >= 0) {
-            const double sum = weights[0] + weights[1] + weights[2];
-            for (double& weight : weights) weight /= sum;
-            const double height = dot(plane.normal, to[0]);
-            return {p + height * plane.normal, std::abs(height), face, weights};
+        const double sum = weights[0] + weights[1] + weights[2];
+        if (weights[0] >= 0 && weights[1] >= 0 && weights[2] >= 0 && sum > 0.5) {
+            Vec3 q{};
+            for (std::size_t k = 0; k < 3; ++k) {
+                weights[k] /= sum;
+                q = q + weights[k] * rgb_[face[k]];
+            }
+            return {q, norm(p - q), face, weights};
         }
     }
     Closest best = closest_on_segment(p, face[0], face[1]);
@@ -148,12 +170,13 @@ PaletteBody::Closest PaletteBody::closest_on_face(const Vec3& p, std::size_t f) 
 PaletteBody::Closest PaletteBody::closest_point(const Vec3& p, bool visible_only) const {
     Closest best{};
     best.distance = std::numeric_limits<double>::infinity();
-    for (std::size_t f = 0; f < faces_.size(); ++f) {
+    for (const std::size_t f : skin_) {
         if (visible_only && dot(planes_[f].normal, rgb_[faces_[f][0]] - p) > tolerance_) {
             continue;
         }
         const Closest here = closest_on_face(p, f);
-        if (here.distance < best.distance) best = here;
+        // Among faces at the same distance the first one counts, whatever the rounding.
+        if (here.distance < best.distance - tolerance_) best = here;
     }
     return best;
 }
@@ -216,6 +239,7 @@ bool PaletteBody::mean_value_or_fail(const Vec3& p, double* weights, Workspace& 
             return true;
         }
     }
+    if (w.distance_[0] > kFar * extent_) return false;
     prepare_edges(w);
 
     for (std::size_t f = 0; f < faces_.size(); ++f) {
@@ -302,7 +326,9 @@ void PaletteBody::mean_value(const Vec3& p, double* weights, Workspace& workspac
         return;
     }
     const Vec3 near = within_reach(p);
-    if (!mean_value_or_fail(near, weights, workspace)) spread(closest_point(near, false), weights);
+    if (flat_ || !mean_value_or_fail(near, weights, workspace)) {
+        spread(closest_point(near, false), weights);
+    }
 }
 
 Projection PaletteBody::project(const Vec3& p, double* weights, Workspace& workspace) const {
@@ -325,7 +351,7 @@ Projection PaletteBody::project(const Vec3& p, double* weights, Workspace& works
         closest = closest_point(near, true);
     } else {
         closest = closest_point(near, false);
-        if (closest.distance > tolerance_ && std::abs(winding_number(near)) > 0.5 &&
+        if (!flat_ && closest.distance > tolerance_ && std::abs(winding_number(near)) > 0.5 &&
             mean_value_or_fail(near, weights, workspace)) {
             return {p, 0, true};
         }

@@ -240,11 +240,27 @@ private:
 
 std::vector<Vec3> progressive_hull(const std::vector<Vec3>& rgb, const std::vector<Face>& faces,
                                    int target) {
+    if (rgb.empty()) throw std::invalid_argument("progressive_hull needs at least four vertices");
     for (const Face& f : faces)
         for (int v : f)
             if (v < 0 || v >= static_cast<int>(rgb.size()))
                 throw std::invalid_argument("a face names vertex " + std::to_string(v));
-    return Mesh(rgb, faces).simplify(std::max(4, target));
+    // The bounds and tolerances are meant for colours of about unit size: work in a unit cube.
+    Vec3 low = rgb.at(0), high = rgb.at(0);
+    for (const Vec3& v : rgb)
+        for (int c = 0; c < 3; ++c) {
+            low[c] = std::min(low[c], v[c]);
+            high[c] = std::max(high[c], v[c]);
+        }
+    const double extent = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
+    const double scale = extent > 0 ? extent : 1;
+    std::vector<Vec3> unit(rgb);
+    for (Vec3& v : unit)
+        for (int c = 0; c < 3; ++c) v[c] = (v[c] - low[c]) / scale;
+    std::vector<Vec3> out = Mesh(unit, faces).simplify(std::max(4, target));
+    for (Vec3& v : out)
+        for (int c = 0; c < 3; ++c) v[c] = low[c] + scale * v[c];
+    return out;
 }
 
 }  // namespace palette4d

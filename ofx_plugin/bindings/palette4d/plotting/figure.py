@@ -87,10 +87,10 @@ def moment(
     # A golden-ratio sequence picks evenly without following rows or columns.
     count = min(pixels, len(flat))
     picked = flat[(np.arange(count) * 0.6180339887498949 % 1 * len(flat)).astype(np.int64)]
-    picked = picked[np.isfinite(picked).all(axis=1)].astype(np.float64)
+    cloud: F64 = picked[np.isfinite(picked).all(axis=1)].astype(np.float64)
     return Moment(
         frame,
-        polyhedron.Shape(rgb, np.asarray(edited), faces, picked),
+        polyhedron.Shape(rgb, np.asarray(edited), faces, cloud),
         _reduced(image, thumbnail),
         _reduced(after, thumbnail),
     )
@@ -106,7 +106,7 @@ def _reduced(image: F32, width: int) -> F32:
     cut = image[: rows * tall, : columns * block].astype(np.float64)
     with np.errstate(invalid="ignore", over="ignore"):
         mean = cut.reshape(rows, tall, columns, block, 3).mean(axis=(1, 3))
-    return mean.astype(np.float32)
+    return np.asarray(mean, dtype=np.float32)
 
 
 def heading(sidecar: _core.Sidecar, palette: timeline.Palette) -> tuple[str, str]:
@@ -189,7 +189,7 @@ def build(sidecar: _core.Sidecar, moments: Sequence[Moment]) -> Any:
                 va="center",
             )
     centres = [MARGIN + column / 2 + k * (column + GUTTER) for k in range(count)]
-    low, high = polyhedron.box_of([m.shape for m in moments])
+    extent = polyhedron.extent_of([m.shape for m in moments])
     for centre, shown in zip(centres, moments, strict=False):
         _draw_pin(axes, panel, shown, centre, pictures)
         if shown.before is not None and shown.after is not None:
@@ -198,7 +198,7 @@ def build(sidecar: _core.Sidecar, moments: Sequence[Moment]) -> Any:
             below = top - picture_height - 4
             _draw_picture(axes, shown.after, centre, below, picture_width, encoding)
         middle = panel.bottom - LEADER - 30 - cube / 2
-        view = polyhedron.View.fit(low, high, (centre, middle), cube)
+        view = polyhedron.View.fit(extent, (centre, middle), cube)
         polyhedron.draw(axes, shown.shape, view, encoding)
     return figure
 
@@ -314,9 +314,10 @@ def save(figure: Any, path: Path, kind: str, width: int) -> None:
     """Write the figure as "png" (`width` pixels wide), "svg" or "pdf", without dates in it."""
     # A fraction of a pixel more, so that rounding does not lose the last column.
     dpi = (width + 0.01) / (WIDTH / 72)
-    metadata: dict[str, Any] = {
-        "png": {"Software": f"palette4d {_core.__version__}"},
-        "svg": {"Date": None, "Creator": f"palette4d {_core.__version__}"},
-        "pdf": {"CreationDate": None, "Creator": f"palette4d {_core.__version__}"},
-    }[kind]
-    figure.savefig(path, format=kind, dpi=dpi, metadata=metadata, facecolor=style.PAGE)
+    creator = f"palette4d {_core.__version__}"
+    metadata: dict[str, dict[str, Any]] = {
+        "png": {"Software": creator},
+        "svg": {"Date": None, "Creator": creator},
+        "pdf": {"CreationDate": None, "Creator": creator},
+    }
+    figure.savefig(path, format=kind, dpi=dpi, metadata=metadata[kind], facecolor=style.PAGE)

@@ -20,6 +20,8 @@ LUMA = np.array([0.2126, 0.7152, 0.0722])
 #: What a fork costs per row it spans, and per chain it crosses; a place off the luma order costs 1
 #: over all chains together.
 SPAN_COST, CROSSING_COST, ORDER_COST = 1.0, 2.5, 0.35
+#: What one row less is worth in that cost; and when rows count as many.
+ROW_SAVING, MANY_ROWS = 1.5, 24
 #: Moves that are tried at most: bounds the search on palettes of hundreds of vertices.
 MAX_TRIALS = 20_000
 
@@ -212,22 +214,46 @@ def _order(forks: _Forks, order: list[int]) -> list[int]:
     return order
 
 
-def _share_rows(chains: Sequence[Chain], order: Sequence[int], gap: float) -> NDArray[np.int64]:
-    """Give neighbours in the order that never meet in time (with a gap) the same row."""
-    rows: list[list[int]] = []
-    for chain in order:
-        new = chains[chain]
-        if rows and all(
-            chains[other].last + gap < new.first or new.last + gap < chains[other].first
-            for other in rows[-1]
-        ):
-            rows[-1].append(chain)
-        else:
-            rows.append([chain])
-    result = np.zeros(len(chains), dtype=np.int64)
-    for row, members in enumerate(rows):
-        result[members] = row
-    return result
+def _apart(chains: Sequence[Chain], some: Sequence[int], others: Sequence[int], gap: float) -> bool:
+    """Whether no two chains of two groups meet in time, with a gap between them."""
+    return all(
+        chains[a].last + gap < chains[b].first or chains[b].last + gap < chains[a].first
+        for a in some
+        for b in others
+    )
+
+
+def _share_rows(
+    chains: Sequence[Chain], order: Sequence[int], forks: _Forks, gap: float
+) -> NDArray[np.int64]:
+    """Put chains that never meet in time (with a gap) into one row, where forks do not suffer."""
+
+    def numbered(rows: Sequence[Sequence[int]]) -> NDArray[np.int64]:
+        result = np.zeros(len(chains), dtype=np.int64)
+        for row, members in enumerate(rows):
+            result[list(members)] = row
+        return result
+
+    rows = [[chain] for chain in order]
+    while True:
+        limit = forks.cost(numbered(rows).astype(np.float64)) + ROW_SAVING
+        best: tuple[float, list[list[int]]] | None = None
+        for a in range(len(rows)):
+            # Among many rows only neighbours are tried: the search stays short.
+            reach = len(rows) if len(rows) <= MANY_ROWS else a + 2
+            for b in range(a + 1, min(reach, len(rows))):
+                if not _apart(chains, rows[a], rows[b], gap):
+                    continue
+                joined = rows[a] + rows[b]
+                for kept, gone in ((a, b), (b, a)):
+                    candidate = [joined if k == kept else r for k, r in enumerate(rows)]
+                    del candidate[gone]
+                    found = forks.cost(numbered(candidate).astype(np.float64))
+                    if found <= limit and (best is None or found < best[0]):
+                        best = found, candidate
+        if best is None:
+            return numbered(rows)
+        rows = best[1]
 
 
 def arrange(frames: F64, rgb: F64, edges: Sequence[tuple[int, int]]) -> Layout:
@@ -253,4 +279,4 @@ def arrange(frames: F64, rgb: F64, edges: Sequence[tuple[int, int]]) -> Layout:
     forks = _find_forks(chains, frames, edges, vertex_chain, target)
     order = _order(forks, [int(i) for i in light_first])
     gap = 0.04 * float(np.ptp(frames)) if frames.size else 0.0
-    return Layout(chains, _share_rows(chains, order, gap), vertex_chain, edge_chain)
+    return Layout(chains, _share_rows(chains, order, forks, gap), vertex_chain, edge_chain)

@@ -1,8 +1,8 @@
 """A sliced polyhedral palette in the RGB cube, with the frame's pixels inside it.
 
 A parallel projection of the cube standing on its black corner, so that light colours are above dark
-ones and hues spread sideways: warm to the right, cold to the left, green in front. Drawn from far to
-near: cube, far faces and edges, pixels, near faces and edges, palette colours.
+ones and hues spread sideways: warm to the right, cold to the left, green in front. Drawn from far
+to near: cube, far faces and edges, pixels, near faces and edges, palette colours.
 """
 
 from dataclasses import dataclass
@@ -20,45 +20,38 @@ F64 = NDArray[np.float64]
 FINENESS = 3.0
 
 
+#: The corners of the RGB cube; bit 0, 1, 2 of the index: red, green, blue.
+CORNERS = np.array([[i >> 0 & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)], dtype=np.float64)
+
+
 @dataclass(frozen=True)
 class View:
-    """A parallel projection that fits a box of colours into a square on the page.
+    """A parallel projection of colours onto the page.
 
     Attributes
     ----------
-    low, high : (3,) float64
-        The box: the RGB cube, or more where the palette reaches out of it.
     centre : (float, float)
-        Where the middle of the box stands, in points.
+        Where the middle of the RGB cube stands, in points.
     scale : float
         Points per unit of colour.
     """
 
-    low: F64
-    high: F64
     centre: tuple[float, float]
     scale: float
 
     AZIMUTH, ELEVATION = np.radians(-14.0), np.radians(9.0)
 
     @classmethod
-    def fit(cls, low: F64, high: F64, centre: tuple[float, float], size: float) -> "View":
-        """Return the view in which the box just fits a square of `size` points."""
-        unit = cls(low, high, (0.0, 0.0), 1.0)
-        points, _ = unit.project(unit.corners())
-        extent = float(np.ptp(points, axis=0).max())
-        scale = size / extent
+    def fit(cls, colours: F64, centre: tuple[float, float], size: float) -> "View":
+        """Return the view in which (k, 3) colours just fit a square of `size` points."""
+        points, _ = cls((0.0, 0.0), 1.0).project(colours)
+        scale = size / float(np.ptp(points, axis=0).max())
         middle = (points.max(axis=0) + points.min(axis=0)) / 2 * scale
-        return cls(low, high, (centre[0] - float(middle[0]), centre[1] - float(middle[1])), scale)
-
-    def corners(self) -> F64:
-        """Return the (8, 3) corners of the box."""
-        bits = np.array([[i >> 0 & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)])
-        return np.where(bits, self.high, self.low)
+        return cls((centre[0] - float(middle[0]), centre[1] - float(middle[1])), scale)
 
     def project(self, rgb: F64) -> tuple[F64, F64]:
         """Return (n, 2) points on the page and (n,) depths, larger is nearer."""
-        centred = np.asarray(rgb, dtype=np.float64) - (self.low + self.high) / 2
+        centred = np.asarray(rgb, dtype=np.float64) - 0.5
         # Right-handed: from blue to red and yellow, from magenta to green (towards us), grey up.
         warm = (centred @ [1.0, 0.0, -1.0]) / np.sqrt(2.0)
         front = (centred @ [-1.0, 2.0, -1.0]) / np.sqrt(6.0)
@@ -82,12 +75,9 @@ class Shape:
     pixels: F64 | None = None
 
 
-def box_of(shapes: list[Shape]) -> tuple[F64, F64]:
-    """Return the box that holds the RGB cube and every palette colour."""
-    everything = [np.zeros((1, 3)), np.ones((1, 3))]
-    everything += [s.rgb for s in shapes] + [s.edited for s in shapes]
-    colours = np.concatenate(everything)
-    return colours.min(axis=0), colours.max(axis=0)
+def extent_of(shapes: list[Shape]) -> F64:
+    """Return the colours that a view has to hold: the RGB cube and every palette colour."""
+    return np.concatenate([CORNERS, *(s.rgb for s in shapes), *(s.edited for s in shapes)])
 
 
 def draw(axes: Any, shape: Shape, view: View, encoding: str) -> None:
@@ -126,8 +116,7 @@ def draw(axes: Any, shape: Shape, view: View, encoding: str) -> None:
 
 
 def _draw_cube(axes: Any, view: View) -> None:
-    corners = view.corners()
-    points, depth = view.project(corners)
+    points, depth = view.project(CORNERS)
     farthest = int(np.argmin(depth))
     for a in range(8):
         for bit in (1, 2, 4):
@@ -238,7 +227,8 @@ def _draw_edges(
         if len(points) == 2:  # a palette of two colours: a line
             axes.plot(points[:, 0], points[:, 1], color=style.TEXT, linewidth=1.0, zorder=7)
         return
-    near, far = [], []
+    near: list[F64] = []
+    far: list[F64] = []
     for (a, b), sides in _edges(faces).items():
         line = points[[a, b]]
         (near if any(towards[s] for s in sides) else far).append(line)

@@ -4,6 +4,7 @@ Nothing around a colour may tint it: every surface, line and letter is grey.
 """
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,15 +27,16 @@ INK = "#141414"
 FONT = "DejaVu Sans"  # comes with matplotlib, so that every machine draws the same picture
 
 #: matplotlib settings, so that a user's own matplotlibrc does not change the picture.
-RC = {
+RC: dict[Any, Any] = {
     "font.family": [FONT],
     "svg.fonttype": "none",  # text stays text: ids can be searched for
     "svg.hashsalt": "palette4d",  # the same picture gives the same file
     "pdf.fonttype": 42,
     "path.simplify": False,
+    "text.hinting": "no_hinting",  # as wide at every resolution as it was measured
 }
 
-_LINEAR = ("linear", "acescg", "aces2065", "scene")
+_LINEAR = ("linear", "lin_", "acescg", "aces2065", "scene")
 
 
 def shown(rgb: NDArray[np.floating], encoding: str) -> F64:

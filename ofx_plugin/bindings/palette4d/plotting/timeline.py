@@ -417,10 +417,12 @@ def half_disc(
 
     kind: "plain" (unedited vertex), "edited" (edited vertex) or "stop".
     """
-    from matplotlib.patches import Circle, Wedge
+    from matplotlib.patches import Circle, Patch, Wedge
 
     ring = {"plain": style.RING, "edited": style.BRIGHT, "stop": style.BRIGHT}[kind]
-    parts = [Circle((x, y), radius + 1.9, facecolor=style.INK, linewidth=0, zorder=zorder)]
+    parts: list[Patch] = [
+        Circle((x, y), radius + 1.9, facecolor=style.INK, linewidth=0, zorder=zorder)
+    ]
     if kind == "stop":
         # A second ring, apart from the first, tells a stop from a vertex.
         parts.append(
@@ -473,7 +475,8 @@ def _radii(largest: float, x: F64, y: F64) -> F64:
         gaps = np.diff(x[members])
         for side in (members[:-1], members[1:]):
             radius[side] = np.minimum(radius[side], np.maximum(gaps / 2 - 2.2, 2.6))
-    return radius
+    # Not too different from each other: size has no meaning here.
+    return np.minimum(radius, 1.5 * np.median(radius)) if len(radius) else radius
 
 
 def _draw_discs(
@@ -486,7 +489,17 @@ def _draw_discs(
 ) -> None:
     largest = 0.33 * frame.row_height
     vertex_x = np.asarray(frame.x(palette.frames), dtype=np.float64)
-    radii = _radii(largest, vertex_x, vertex_y)
+    stop_xy = np.array(
+        [
+            [np.interp(when, paths[edge][0], paths[edge][1][:, k]) for k in range(2)]
+            for _, edge, when, _ in palette.stops
+        ]
+    ).reshape(-1, 2)
+    radii = _radii(
+        largest,
+        np.concatenate([vertex_x, stop_xy[:, 0]]),
+        np.concatenate([vertex_y, stop_xy[:, 1]]),
+    )
     marks = []  # (x, y, radius, text, bright)
     for index, name in enumerate(palette.ids):
         before = style.shown(palette.rgb[index], encoding)
@@ -505,12 +518,10 @@ def _draw_discs(
             gid=f"vertex-{name}",
         )
         marks.append((x, y, radius + 2, name, changed))
-    for name, edge, when, colour in palette.stops:
-        times, points = paths[edge]
-        x = float(np.interp(when, times, points[:, 0]))
-        y = float(np.interp(when, times, points[:, 1]))
+    for index, (name, edge, when, colour) in enumerate(palette.stops):
+        x, y = float(stop_xy[index, 0]), float(stop_xy[index, 1])
         before = style.shown(palette.before(edge, np.array([when]))[0], encoding)
-        radius = 0.66 * largest
+        radius = min(0.66 * largest, float(radii[len(palette.ids) + index]))
         half_disc(
             axes,
             x,

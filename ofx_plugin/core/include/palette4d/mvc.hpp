@@ -10,7 +10,8 @@ namespace palette4d {
 
 /// Mean value coordinates of p, n weights that sum to 1 and reproduce p. On a vertex, edge or face
 /// they are that simplex's barycentric weights; a triangle in whose plane p lies outside it adds
-/// nothing. Needs a mesh with faces.
+/// nothing. Where the weights' total vanishes (far outside, in collapsed meshes) they are those of
+/// the closest surface point. Needs a mesh with faces.
 void mean_value_coordinates(const Vec3& p, const std::vector<Vec3>& rgb,
                             const std::vector<Face>& faces, double* weights);
 

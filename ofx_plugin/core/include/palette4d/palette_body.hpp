@@ -67,8 +67,11 @@ private:
     std::vector<Face> faces_;
     std::vector<Plane> planes_;
     std::vector<std::array<int, 2>> edges_;
+    double extent_ = 0;     ///< diagonal of the bounding box
     double tolerance_ = 0;  ///< distances below it are rounding
     bool convex_ = false;
+    bool flat_ = false;              ///< all colours in one plane
+    std::vector<std::size_t> skin_;  ///< faces that make up the surface (one side of a flat body)
 };
 
 }  // namespace palette4d

@@ -1,0 +1,111 @@
+"""Write the field table of docs/sidecar.md from the JSON Schema.
+
+python docs/sidecar_fields.py            writes the table into the page
+python docs/sidecar_fields.py --check    exits 1 when the page is not up to date
+"""
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGE = ROOT / "docs" / "sidecar.md"
+SCHEMA = ROOT / "ofx_plugin" / "bindings" / "palette4d" / "sidecar_v1.schema.json"
+BEGIN = "<!-- begin: written by python docs/sidecar_fields.py -->"
+END = "<!-- end: written by python docs/sidecar_fields.py -->"
+
+Node = dict[str, Any]
+
+
+def table(schema: Node) -> str:
+    """Return the Markdown table of every member that the schema names."""
+    rows = ["| member | type | range | meaning |", "|---|---|---|---|"]
+    rows += [
+        f"| `{path}` | {kind} | {span} | {text} |" for path, kind, span, text in fields(schema)
+    ]
+    return "\n".join(rows)
+
+
+def fields(schema: Node) -> list[tuple[str, str, str, str]]:
+    """Return path, type, range and meaning of every member, in the order of the file."""
+    found: list[tuple[str, str, str, str]] = []
+    _walk(schema, _resolved(schema, schema), "", found)
+    return found
+
+
+def _resolved(schema: Node, node: Node) -> Node:
+    while "$ref" in node:
+        target = schema["$defs"][node["$ref"].removeprefix("#/$defs/")]
+        node = {**target, **{key: value for key, value in node.items() if key != "$ref"}}
+    return node
+
+
+def _walk(schema: Node, node: Node, path: str, found: list[tuple[str, str, str, str]]) -> None:
+    for name, member in node.get("properties", {}).items():
+        member = _resolved(schema, member)
+        here = f"{path}.{name}" if path else name
+        found.append((here, _type(schema, member), _range(schema, member), member["description"]))
+        inner = member
+        while inner.get("type") == "array" and isinstance(inner.get("items"), dict):
+            inner = _resolved(schema, inner["items"])
+            here += "[]"
+        _walk(schema, inner, here, found)
+
+
+def _type(schema: Node, node: Node) -> str:
+    node = _resolved(schema, node)
+    if "const" in node:
+        return "text" if isinstance(node["const"], str) else "integer"
+    kind = node["type"]
+    if kind == "array":
+        if "prefixItems" in node:
+            count, item = str(len(node["prefixItems"])), node["prefixItems"][0]
+        else:
+            fixed = node.get("maxItems", 0) == node.get("minItems")
+            count, item = str(node["maxItems"]) if fixed else "", node["items"]
+        of = _type(schema, item)
+        return f"{count} × {of}" if count else f"list of {of}"
+    names = {"string": "id" if "pattern" in node else "text", "object": "object"}
+    return names.get(kind, kind) if isinstance(kind, str) else "number, text, true, false or null"
+
+
+def _range(schema: Node, node: Node) -> str:
+    if "const" in node:
+        return f"`{json.dumps(node['const'])}`"
+    if node.get("type") == "array":
+        item = node["prefixItems"][0] if "prefixItems" in node else node["items"]
+        inner = _range(schema, _resolved(schema, item))
+        fixed = "prefixItems" in node or node.get("minItems") == node.get("maxItems")
+        parts = [f"each {inner}" if inner and not inner.startswith("each ") else inner]
+        if not fixed and "maxItems" in node:
+            parts.append(f"{node.get('minItems', 0)} to {node['maxItems']}")
+        elif not fixed and "minItems" in node:
+            parts.append(f"at least {node['minItems']}")
+        return "; ".join(part for part in reversed(parts) if part)
+    if "minimum" in node and "maximum" in node:
+        return f"{node['minimum']} to {node['maximum']}"
+    return f"from {node['minimum']}" if "minimum" in node else ""
+
+
+def written(page: str, schema: Node) -> str:
+    """Return the page with its table made anew."""
+    head, rest = page.split(BEGIN)
+    _, tail = rest.split(END)
+    return f"{head}{BEGIN}\n{table(schema)}\n{END}{tail}"
+
+
+def main() -> int:
+    """Write or check the page."""
+    page = PAGE.read_text(encoding="utf-8")
+    new = written(page, json.loads(SCHEMA.read_text(encoding="utf-8")))
+    if "--check" in sys.argv[1:]:
+        if new != page:
+            print(f"{PAGE} is not up to date; run: python docs/sidecar_fields.py", file=sys.stderr)
+        return int(new != page)
+    PAGE.write_text(new, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,100 @@
+"""Per-frame palettes: they enclose, they are small, and flat colours get flat palettes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from analysis_frames import constant, grey, mixture, noise, stats
+from palette4d import _core
+from palette4d.analysis.frame_hulls import frame_palette, hull_mesh, merge_close
+from palette4d.analysis.losses import palette_loss
+from palette4d.analysis.options import AnalysisOptions
+from scipy.spatial import ConvexHull
+
+LOW, HIGH = np.zeros(3), np.ones(3)
+OPTIONS = AnalysisOptions()
+
+
+def is_closed_and_outward(palette):
+    directed = {(int(f[e]), int(f[(e + 1) % 3])) for f in palette.faces for e in range(3)}
+    closed = len(directed) == 3 * len(palette.faces) and all(
+        (b, a) in directed for a, b in directed
+    )
+    corners = palette.rgb[palette.faces] - palette.rgb.mean(axis=0)
+    volume = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6
+    return closed, volume
+
+
+def test_progressive_hull_encloses_the_hull_it_simplifies():
+    rng = np.random.default_rng(1)
+    for _ in range(10):
+        mesh = hull_mesh(rng.normal(0.5, 0.15, (400, 3)))
+        outer = _core.progressive_hull(mesh.rgb, mesh.faces, 8)
+        assert 4 <= len(outer) <= 8
+        equations = ConvexHull(outer).equations
+        inside = mesh.rgb @ equations[:, :3].T + equations[:, 3]
+        assert inside.max() < 1e-7
+        assert ConvexHull(outer).volume >= ConvexHull(mesh.rgb).volume
+
+
+def test_progressive_hull_needs_a_closed_mesh():
+    mesh = hull_mesh(np.random.default_rng(2).random((30, 3)))
+    with pytest.raises(ValueError, match="closed"):
+        _core.progressive_hull(mesh.rgb, mesh.faces[1:], 8)
+
+
+def test_scale_does_not_matter_to_the_progressive_hull():
+    mesh = hull_mesh(np.random.default_rng(3).random((200, 3)))
+    small = _core.progressive_hull(mesh.rgb, mesh.faces, 8)
+    large = _core.progressive_hull(mesh.rgb * 1000 - 300, mesh.faces, 8)
+    np.testing.assert_allclose(large, small * 1000 - 300, atol=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_solid_frame_gets_a_small_closed_palette(seed):
+    corners = [[0.1, 0.1, 0.1], [0.9, 0.2, 0.1], [0.2, 0.8, 0.2], [0.2, 0.3, 0.9], [0.9, 0.9, 0.8]]
+    (frame,) = stats([mixture(corners, seed)])
+    palette = frame_palette(frame.coarse, LOW, HIGH, OPTIONS)
+    assert 4 <= len(palette.rgb) <= 8
+    closed, volume = is_closed_and_outward(palette)
+    assert closed
+    assert volume > 0
+    gaps = np.linalg.norm(np.array(corners)[:, None] - palette.rgb[None], axis=2).min(axis=1)
+    assert gaps.max() < 0.1  # each true colour has a handle near it
+    assert palette_loss(frame.colours, palette.rgb, OPTIONS) < 0.1
+
+
+def test_one_colour_and_a_line_of_colours():
+    one = frame_palette(stats([constant([0.2, 0.4, 0.6])])[0].coarse, LOW, HIGH, OPTIONS)
+    np.testing.assert_allclose(one.rgb, [[0.2, 0.4, 0.6]], atol=1e-6)
+    assert len(one.faces) == 0
+    line = frame_palette(stats([grey(5)])[0].coarse, LOW, HIGH, OPTIONS)
+    assert len(line.rgb) == 2
+    assert len(line.faces) == 0
+    assert np.ptp(line.rgb, axis=1).max() < 1e-6  # both ends are grey
+    assert abs(line.rgb[0, 0] - line.rgb[1, 0]) > 0.9
+
+
+def test_flat_colours_get_a_two_sided_polygon():
+    image = noise(6)
+    image[..., 2] = 0.5
+    palette = frame_palette(stats([image])[0].coarse, LOW, HIGH, OPTIONS)
+    assert 3 <= len(palette.rgb) <= 8
+    closed, volume = is_closed_and_outward(palette)
+    assert closed
+    assert abs(volume) < 1e-9
+    assert len(palette.faces) == 2 * (len(palette.rgb) - 2)
+
+
+def test_colours_above_one_keep_their_place():
+    (frame,) = stats([noise(7, scale=8, offset=-1)])
+    palette = frame_palette(frame.coarse, np.full(3, -1.0), np.full(3, 7.0), OPTIONS)
+    assert len(palette.rgb) <= 8
+    assert palette.rgb.max() > 6
+    assert palette.rgb.min() < 0
+
+
+def test_merging_stops_at_four_points():
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0.01, 0, 0]], float)
+    assert len(merge_close(points, 0.1)) == 4
+    assert len(merge_close(points, 10.0)) == 4

@@ -1,0 +1,175 @@
+"""The losses against a plain reference that shares no code with the core."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from palette4d import _core
+from palette4d.analysis.losses import NO_FACES, refine_palette, smoothness
+from palette4d.analysis.options import AnalysisOptions
+from scipy.optimize import minimize
+from scipy.spatial import ConvexHull
+
+BOX = np.array(list(itertools.product([0.25, 0.75], repeat=3)))
+
+
+def tree(points, counts=None):
+    points = np.atleast_2d(np.asarray(points, float))
+    return _core.ColourTree(points, np.ones(len(points)) if counts is None else counts)
+
+
+def loss(points, palette, counts=None, k=1.0):
+    r, c, d, outside, far, _ = _core.palette_loss(
+        tree(points, counts), np.asarray(palette, float), NO_FACES, 50.0, k, 0.0
+    )
+    return {"R": r, "C": c, "D": d, "outside": outside, "far": far}
+
+
+@pytest.mark.parametrize(
+    ("point", "distance"),
+    [
+        ([0.5, 0.5, 0.5], 0.0),
+        ([0.75, 0.5, 0.5], 0.0),
+        ([0.85, 0.5, 0.5], 0.1),
+        ([0.85, 0.85, 0.5], 0.1 * 2**0.5),
+        ([0.85, 0.85, 0.85], 0.1 * 3**0.5),
+        ([0.0, 0.0, 0.0], 0.25 * 3**0.5),
+    ],
+)
+def test_distance_to_a_cube(point, distance):
+    assert loss(point, BOX)["R"] == pytest.approx(distance, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("palette", "point", "distance"),
+    [
+        ([[0.2, 0.2, 0.2]], [0.2, 0.6, 0.5], 0.5),
+        ([[0, 0, 0], [1, 1, 1]], [1, 0, 0], (2 / 3) ** 0.5),
+        ([[0, 0, 0], [1, 1, 1]], [2, 2, 2], 3**0.5),
+        ([[0, 0, 0.5], [1, 0, 0.5], [0, 1, 0.5], [1, 1, 0.5]], [0.5, 0.5, 0.8], 0.3),
+        ([[0, 0, 0.5], [1, 0, 0.5], [0, 1, 0.5], [1, 1, 0.5]], [1.3, 0.5, 0.9], 0.5),
+    ],
+)
+def test_distance_to_flat_palettes(palette, point, distance):
+    assert loss(point, palette)["R"] == pytest.approx(distance, abs=1e-12)
+
+
+def closest_by_optimisation(point, palette):
+    """Distance to the convex hull as a quadratic program over convex weights."""
+    n = len(palette)
+    result = minimize(
+        lambda w: ((w @ palette - point) ** 2).sum(),
+        np.full(n, 1 / n),
+        jac=lambda w: 2 * palette @ (w @ palette - point),
+        bounds=[(0, 1)] * n,
+        constraints={"type": "eq", "fun": lambda w: w.sum() - 1},
+        method="SLSQP",
+        options={"ftol": 1e-14, "maxiter": 500},
+    )
+    return result.fun**0.5
+
+
+def test_distance_matches_a_quadratic_program():
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        palette = rng.random((rng.integers(4, 9), 3))
+        point = rng.random(3) * 2 - 0.5
+        expected = closest_by_optimisation(point, palette)
+        assert loss(point, palette)["R"] == pytest.approx(expected, abs=2e-5)
+
+
+def test_inside_agrees_with_qhull():
+    rng = np.random.default_rng(4)
+    points = rng.random((3000, 3))
+    palette = rng.random((8, 3))
+    hull = ConvexHull(palette)
+    outside = (points @ hull.equations[:, :3].T + hull.equations[:, 3] > 1e-6).any(axis=1)
+    assert loss(points, palette)["outside"] == pytest.approx(outside.mean())
+
+
+def test_counts_weigh_like_repeated_pixels():
+    rng = np.random.default_rng(5)
+    points, counts = rng.random((200, 3)), rng.integers(1, 6, 200)
+    once = loss(points, BOX, counts.astype(float), k=50)
+    many = loss(np.repeat(points, counts, axis=0), BOX, k=50)
+    assert once["R"] == pytest.approx(many["R"], rel=1e-12)
+    assert once["C"] == pytest.approx(many["C"], rel=1e-9)
+
+
+def test_compactness_shares_ties_and_takes_parts_of_counts():
+    points = [[0.1, 0, 0], [0.2, 0, 0], [0.9, 0.9, 0.9]]
+    found = loss(points, [[0, 0, 0]], np.array([30.0, 40, 500]), k=50)["C"]
+    assert found == pytest.approx((30 * 0.1 + 20 * 0.2) / 50)
+    tied = loss([[0.6, 0.5, 0.5], [0.4, 0.5, 0.5]], [[0.5] * 3], np.array([50.0, 50]), k=50)
+    assert tied["C"] == pytest.approx(0, abs=1e-15)
+
+
+def test_nearest_mean_matches_a_sorted_list():
+    rng = np.random.default_rng(6)
+    points = rng.random((2000, 3))
+    for v in rng.random((20, 3)) * 2 - 0.5:
+        order = np.argsort(((points - v) ** 2).sum(axis=1))
+        expected = points[order[:50]].mean(axis=0)
+        np.testing.assert_allclose(
+            tree(points).nearest_mean(v[None], 50.0)[0], expected, atol=1e-12
+        )
+    few = tree(points[:7]).nearest_mean(np.zeros((1, 3)), 50.0)[0]
+    np.testing.assert_allclose(few, points[:7].mean(axis=0))
+
+
+def test_gradient_matches_differences():
+    rng = np.random.default_rng(7)
+    colours = tree(rng.random((500, 3)))
+    palette = BOX + rng.normal(0, 0.02, BOX.shape)
+    faces = np.array([[0, 1, 2], [1, 3, 2]], np.int32)
+
+    def value(x):
+        r, c, d, *_ = _core.palette_loss(colours, x, faces, 50.0, 500.0, 0.7)
+        return 50 * r + c + 0.7 * d
+
+    *_, gradient = _core.palette_loss(colours, palette, faces, 50.0, 500.0, 0.7)
+    for i, c in itertools.product(range(8), range(3)):
+        step = np.zeros((8, 3))
+        step[i, c] = 1e-6
+        slope = (value(palette + step) - value(palette - step)) / 2e-6
+        assert gradient[i, c] == pytest.approx(slope, abs=1e-4)
+
+
+def test_smoothness_by_hand_and_its_gradient():
+    vertices = np.array([[0, 0, 0, 0], [0.3, 0.4, 0, 5], [0.1, 0.2, 0.3, 10]], float)
+    edges = np.array([[0, 1], [1, 2]], np.int32)
+    k, gradient = smoothness(vertices, edges, 10.0)
+    by_hand = (0.5 / 0.5 + np.linalg.norm([0.2, 0.2, 0.3]) / 0.5) / 2
+    assert k == pytest.approx(by_hand)
+    for i, c in itertools.product(range(3), range(4)):
+        step = np.zeros((3, 4))
+        step[i, c] = 1e-6
+        up, down = (smoothness(vertices + s * step, edges, 10.0)[0] for s in (1, -1))
+        assert gradient[i, c] == pytest.approx((up - down) / 2e-6, abs=1e-6)
+    assert smoothness(vertices, np.zeros((0, 2), np.int32), 10.0)[0] == 0
+
+
+def test_refinement_never_worsens_and_stays_in_its_box():
+    rng = np.random.default_rng(8)
+    options = AnalysisOptions(hull_box=0.05)
+    colours = tree(rng.random((2000, 3)) * 0.6 + 0.2)
+    before = _core.palette_loss(colours, BOX, NO_FACES, 50.0, 50.0, 0.0)
+    moved = refine_palette(colours, BOX, NO_FACES, np.zeros(3), np.ones(3), options)
+    after = _core.palette_loss(colours, moved, NO_FACES, 50.0, 50.0, 0.0)
+    assert 50 * after[0] + after[1] < 50 * before[0] + before[1]
+    assert np.abs(moved - BOX).max() <= 0.05 + 1e-12
+
+
+def test_bad_arguments_are_refused():
+    with pytest.raises(ValueError, match="finite"):
+        tree([[np.nan, 0, 0]])
+    with pytest.raises(ValueError, match="positive"):
+        tree([[0, 0, 0]], np.array([0.0]))
+    with pytest.raises(ValueError, match="shape"):
+        _core.palette_loss(tree([[0, 0, 0]]), np.zeros((4, 2)), NO_FACES, 50.0, 50.0, 0.0)
+    with pytest.raises(ValueError, match="at least one"):
+        _core.palette_loss(tree([[0, 0, 0]]), np.zeros((0, 3)), NO_FACES, 50.0, 50.0, 0.0)
+    with pytest.raises(ValueError, match="face"):
+        _core.palette_loss(tree([[0, 0, 0]]), BOX, np.array([[0, 1, 99]]), 50.0, 50.0, 0.0)

@@ -1,0 +1,56 @@
+"""Small frames for the analysis' tests, all from seeded generators."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+from palette4d.analysis import statistics
+from palette4d.analysis.options import AnalysisOptions
+
+F32 = NDArray[np.float32]
+
+
+class ArrayClip:
+    """A clip in memory: what the pipeline asks of a clip, over arrays."""
+
+    def __init__(self, frames: list[F32], first: int = 1001, step: int = 1) -> None:
+        self.images = frames
+        self.frames = [first + step * i for i in range(len(frames))]
+        self.name, self.source, self.encoding = "array", "array.####.exr", "unknown"
+        self.rate = Fraction(24)
+        self.height, self.width = frames[0].shape[:2]
+        self.skipped: list[int] = []
+
+    def iter_colours(self):
+        yield from zip(self.frames, self.images, strict=True)
+
+
+def noise(seed: int, scale: float = 1.0, offset: float = 0.0, size: tuple[int, int] = (20, 30)):
+    rng = np.random.default_rng(seed)
+    return (rng.random((*size, 3)) * scale + offset).astype(np.float32)
+
+
+def constant(colour) -> F32:
+    return np.broadcast_to(np.array(colour, np.float32), (20, 30, 3)).copy()
+
+
+def grey(seed: int) -> F32:
+    return np.repeat(noise(seed)[..., :1], 3, axis=2)
+
+
+def mixture(corners, seed: int, pixels: int = 600) -> F32:
+    """Pixels that are convex mixtures of the corners, some of them the corners themselves."""
+    rng = np.random.default_rng(seed)
+    corners = np.asarray(corners, float)
+    weights = rng.dirichlet(np.full(len(corners), 0.3), pixels)
+    weights[: len(corners) * 20] = np.repeat(np.eye(len(corners)), 20, axis=0)
+    return (weights @ corners).astype(np.float32).reshape(-1, 30, 3)
+
+
+def stats(images: list[F32], options: AnalysisOptions | None = None, first: int = 0):
+    options = options or AnalysisOptions()
+    out = [statistics.gather(first + i, image, options) for i, image in enumerate(images)]
+    assert all(s is not None for s in out)
+    return out

@@ -1,0 +1,493 @@
+"""The sidecar reader as Python sees it: values, typed errors, and a table of broken documents."""
+
+import copy
+import json
+import os
+import pickle
+import random
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import palette4d
+import pytest
+from palette4d import Palette4dError, SidecarError, _core
+
+GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
+FILES = sorted(GOLDEN.glob("v1_*.p4d.json"))
+
+Document = dict[str, Any]
+
+
+def golden(name: str) -> Document:
+    document: Document = json.loads((GOLDEN / f"v1_{name}.p4d.json").read_text(encoding="utf-8"))
+    return document
+
+
+def refusal(document: Document | str | bytes) -> SidecarError:
+    text = document if isinstance(document, str | bytes) else json.dumps(document)
+    with pytest.raises(SidecarError) as caught:
+        _core.parse_sidecar(text, "clip.p4d.json")
+    return caught.value
+
+
+def test_there_is_a_corpus() -> None:
+    assert len(FILES) >= 10
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
+def test_golden_files_arrive_unchanged(path: Path) -> None:
+    document = json.loads(path.read_text(encoding="utf-8"))
+    read = _core.read_sidecar(path)
+    clip, polytope = document["clip"], document["polytope"]
+    assert read.version == 1
+    assert read.clip == {
+        "name": clip["name"],
+        "source": clip["source"],
+        "first": clip["frames"]["first"],
+        "last": clip["frames"]["last"],
+        "step": clip["frames"]["step"],
+        "rate": tuple(clip["rate"]),
+        "width": clip["size"][0],
+        "height": clip["size"][1],
+        "encoding": clip["encoding"],
+    }
+    np.testing.assert_array_equal(
+        read.polytope.vertices, [[*v["rgb"], v["frame"]] for v in polytope["vertices"]]
+    )
+    assert read.polytope.vertex_ids == [v["id"] for v in polytope["vertices"]]
+    assert read.polytope.edge_ids == [e["id"] for e in polytope["edges"]]
+    assert len(read.polytope.sections) == len(polytope["blocks"]) + len(polytope["transitions"])
+    assert read.edits.vertex_rgb == {
+        e["vertex"]: tuple(e["rgb"]) for e in document["edits"]["vertices"]
+    }
+    assert read.edits.stops == [
+        {**stop, "rgb": tuple(stop["rgb"])} for stop in document["edits"]["stops"]
+    ]
+
+
+def test_transitions_fill_the_time_between_blocks() -> None:
+    sections = _core.read_sidecar(GOLDEN / "v1_split.p4d.json").polytope.sections
+    spans = [(s["first"], s["last"], s["transition"]) for s in sections]
+    assert spans == [(0, 9, False), (9, 10, True), (10, 20, False)]
+
+
+def test_parts_outlive_their_sidecar() -> None:
+    edits = _core.read_sidecar(GOLDEN / "v1_edited.p4d.json").edits
+    assert edits.vertex_rgb["v4"] == (0.9, 0.1, 0.1)
+
+
+def test_error_has_its_parts_and_can_be_pickled() -> None:
+    document = golden("edited")
+    document["edits"]["stops"][2]["frame"] = 9
+    error = refusal(document)
+    assert isinstance(error, Palette4dError)
+    assert palette4d.SidecarError is _core.SidecarError
+    assert (error.file, error.pointer) == ("clip.p4d.json", "/edits/stops/2/frame")
+    assert error.found == "the number 9"
+    assert "e13" in error.expected
+    assert (
+        str(error)
+        == f"clip.p4d.json: {error.pointer}: found {error.found}, expected {error.expected}"
+    )
+    again = pickle.loads(pickle.dumps(error))
+    assert type(again) is SidecarError
+    assert str(again) == str(error)
+
+
+# What to break in v1_edited.p4d.json, and the pointer that the error must give.
+def _put(*path: str | int, value: Any) -> Callable[[Document], None]:
+    def change(document: Any) -> None:
+        for step in path[:-1]:
+            document = document[step]
+        document[path[-1]] = value
+
+    return change
+
+
+def _drop(*path: str | int) -> Callable[[Document], None]:
+    def change(document: Any) -> None:
+        for step in path[:-1]:
+            document = document[step]
+        del document[path[-1]]
+
+    return change
+
+
+def _add(*path: str | int, value: Any) -> Callable[[Document], None]:
+    def change(document: Any) -> None:
+        for step in path:
+            document = document[step]
+        document.append(value)
+
+    return change
+
+
+MEMBERS = [
+    ("schema",),
+    ("version",),
+    ("generator",),
+    ("clip",),
+    ("clip", "name"),
+    ("clip", "source"),
+    ("clip", "frames"),
+    ("clip", "frames", "first"),
+    ("clip", "frames", "last"),
+    ("clip", "frames", "step"),
+    ("clip", "frames", "skipped"),
+    ("clip", "rate"),
+    ("clip", "rate", 0),
+    ("clip", "size"),
+    ("clip", "size", 1),
+    ("clip", "encoding"),
+    ("polytope",),
+    ("polytope", "vertices"),
+    ("polytope", "vertices", 3),
+    ("polytope", "vertices", 3, "id"),
+    ("polytope", "vertices", 3, "frame"),
+    ("polytope", "vertices", 3, "rgb"),
+    ("polytope", "vertices", 3, "rgb", 2),
+    ("polytope", "edges"),
+    ("polytope", "edges", 2),
+    ("polytope", "edges", 2, "id"),
+    ("polytope", "edges", 2, "from"),
+    ("polytope", "edges", 2, "to"),
+    ("polytope", "blocks"),
+    ("polytope", "blocks", 1),
+    ("polytope", "blocks", 1, "first"),
+    ("polytope", "blocks", 1, "last"),
+    ("polytope", "blocks", 1, "tracks"),
+    ("polytope", "blocks", 1, "tracks", 4),
+    ("polytope", "blocks", 1, "tracks", 4, 1),
+    ("polytope", "blocks", 1, "faces"),
+    ("polytope", "blocks", 1, "faces", 5),
+    ("polytope", "blocks", 1, "faces", 5, 0),
+    ("polytope", "transitions"),
+    ("polytope", "transitions", 0),
+    ("polytope", "transitions", 0, "tracks"),
+    ("polytope", "transitions", 0, "faces"),
+    ("quality",),
+    ("quality", "stages"),
+    ("quality", "stages", 1),
+    ("quality", "stages", 1, "stage"),
+    ("quality", "options"),
+    ("quality", "versions"),
+    ("edits",),
+    ("edits", "vertices"),
+    ("edits", "vertices", 1),
+    ("edits", "vertices", 1, "vertex"),
+    ("edits", "vertices", 1, "rgb"),
+    ("edits", "stops"),
+    ("edits", "stops", 2),
+    ("edits", "stops", 2, "id"),
+    ("edits", "stops", 2, "edge"),
+    ("edits", "stops", 2, "frame"),
+    ("edits", "stops", 2, "rgb"),
+    ("edits", "stops", 2, "rgb", 0),
+    ("extra",),
+]  # fmt: skip
+
+
+def pointer(path: tuple[str | int, ...]) -> str:
+    return "".join(f"/{step}" for step in path)
+
+
+@pytest.mark.parametrize("path", MEMBERS, ids=pointer)
+@pytest.mark.parametrize("wrong", [None, True], ids=["null", "true"])
+def test_every_member_has_a_type(path: tuple[str | int, ...], wrong: Any) -> None:
+    document = golden("edited")
+    _put(*path, value=wrong)(document)
+    assert refusal(document).pointer == pointer(path)
+
+
+@pytest.mark.parametrize(
+    "path", [path for path in MEMBERS if isinstance(path[-1], str)], ids=pointer
+)
+def test_every_member_is_required(path: tuple[str | int, ...]) -> None:
+    document = golden("edited")
+    _drop(*path)(document)
+    error = refusal(document)
+    assert error.pointer == pointer(path)
+    assert error.found == "nothing"
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        (),
+        ("clip",),
+        ("clip", "frames"),
+        ("polytope",),
+        ("polytope", "vertices", 0),
+        ("polytope", "edges", 0),
+        ("polytope", "blocks", 0),
+        ("polytope", "transitions", 0),
+        ("quality",),
+        ("edits",),
+        ("edits", "vertices", 0),
+        ("edits", "stops", 0),
+    ],
+    ids=pointer,
+)
+def test_unknown_members_are_refused(path: tuple[str | int, ...]) -> None:
+    document = golden("edited")
+    _put(*path, "a/b~c", value=0)(document)
+    assert refusal(document).pointer == pointer(path) + "/a~1b~0c"
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("extra", "anything"), {"deep": [[[{"er": None}]]], "": 1e-300}),
+        (("quality", "options", "a new option"), "text"),
+        (("quality", "versions", "libm"), None),
+        (("quality", "stages", 0, "seconds"), 1.5),
+    ],
+)
+def test_free_members_are_free(path: tuple[str | int, ...], value: Any) -> None:
+    document = golden("edited")
+    _put(*path, value=value)(document)
+    assert _core.parse_sidecar(json.dumps(document)).version == 1
+
+
+BROKEN: list[tuple[str, Callable[[Document], None], str]] = [
+    ("schema", _put("schema", value="palette4d.palette"), "/schema"),
+    ("newer version", _put("version", value=2), "/version"),
+    ("version 0", _put("version", value=0), "/version"),
+    ("fractional version", _put("version", value=1.25), "/version"),
+    ("first after last", _put("clip", "frames", "first", value=21), "/clip/frames/last"),
+    ("step does not divide", _put("clip", "frames", "step", value=7), "/clip/frames/step"),
+    ("step 0", _put("clip", "frames", "step", value=0), "/clip/frames/step"),
+    ("huge frame", _put("clip", "frames", "last", value=10**12), "/clip/frames/last"),
+    ("huge integer", _put("clip", "frames", "last", value=10**30), "/clip/frames/last"),
+    ("skipped twice", _put("clip", "frames", "skipped", value=[3, 3]), "/clip/frames/skipped/1"),
+    ("skipped outside", _put("clip", "frames", "skipped", value=[21]), "/clip/frames/skipped/0"),
+    ("rate 0", _put("clip", "rate", value=[0, 1]), "/clip/rate/0"),
+    ("negative rate", _put("clip", "rate", value=[24, -1]), "/clip/rate/1"),
+    ("rate of one", _put("clip", "rate", value=[24]), "/clip/rate"),
+    ("size of three", _put("clip", "size", value=[1, 2, 3]), "/clip/size"),
+    ("no pixels", _put("clip", "size", value=[0, 36]), "/clip/size/0"),
+    ("no vertices", _put("polytope", "vertices", value=[]), "/polytope/edges/0/from"),
+    ("two numbers", _put("polytope", "vertices", 0, "rgb", value=[1, 2]),
+     "/polytope/vertices/0/rgb"),
+    ("colour too large", _put("polytope", "vertices", 0, "rgb", 1, value=1.0000001e6),
+     "/polytope/vertices/0/rgb/1"),
+    ("id with a space", _put("polytope", "vertices", 0, "id", value="v 1"),
+     "/polytope/vertices/0/id"),
+    ("id too long", _put("polytope", "vertices", 0, "id", value="v" * 65),
+     "/polytope/vertices/0/id"),
+    ("id not ASCII", _put("polytope", "vertices", 0, "id", value="é"), "/polytope/vertices/0/id"),
+    ("vertex id twice", _put("polytope", "vertices", 1, "id", value="v1"),
+     "/polytope/vertices/1/id"),
+    ("edge id twice", _put("polytope", "edges", 1, "id", value="e1"), "/polytope/edges/1/id"),
+    ("edge with a vertex's id", _put("polytope", "edges", 1, "id", value="v1"),
+     "/polytope/edges/1/id"),
+    ("edge from nowhere", _put("polytope", "edges", 1, "from", value="v99"),
+     "/polytope/edges/1/from"),
+    ("edge backwards", _put("polytope", "edges", 1, value={"id": "e2", "from": "v6", "to": "v2"}),
+     "/polytope/edges/1"),
+    ("edge to itself", _put("polytope", "edges", 1, "to", value="v2"), "/polytope/edges/1"),
+    ("edge twice", _add("polytope", "edges", value={"id": "e99", "from": "v1", "to": "v5"}),
+     "/polytope/edges/14"),
+    ("no blocks", _put("polytope", "blocks", value=[]), "/polytope/blocks"),
+    ("transition missing", _put("polytope", "transitions", value=[]), "/polytope/transitions"),
+    ("transition too many", _add("polytope", "transitions", value={"tracks": [], "faces": []}),
+     "/polytope/transitions"),
+    ("late first block", _put("polytope", "blocks", 0, "first", value=0.5),
+     "/polytope/blocks/0/first"),
+    ("early last block", _put("polytope", "blocks", 1, "last", value=19),
+     "/polytope/blocks/1/last"),
+    ("block backwards", _put("polytope", "blocks", 0, "last", value=-1), "/polytope/blocks/0/last"),
+    ("blocks touch", _put("polytope", "blocks", 1, "first", value=9), "/polytope/blocks/1/first"),
+    ("unknown vertex in a track", _put("polytope", "blocks", 0, "tracks", 1, 0, value="v0"),
+     "/polytope/blocks/0/tracks/1/0"),
+    ("track without an edge", _put("polytope", "blocks", 0, "tracks", 1, 1, value="v5"),
+     "/polytope/blocks/0/tracks/1/1"),
+    ("track too short", _put("polytope", "blocks", 0, "tracks", 1, value=["v2"]),
+     "/polytope/blocks/0/tracks/1"),
+    ("empty track", _put("polytope", "blocks", 0, "tracks", 1, value=[]),
+     "/polytope/blocks/0/tracks/1"),
+    ("track twice", _put("polytope", "blocks", 0, "tracks", 1, value=["v1", "v5"]),
+     "/polytope/blocks/0/tracks/1"),
+    ("face index too large", _put("polytope", "blocks", 0, "faces", 2, 1, value=4),
+     "/polytope/blocks/0/faces/2/1"),
+    ("negative face index", _put("polytope", "blocks", 0, "faces", 2, 1, value=-1),
+     "/polytope/blocks/0/faces/2/1"),
+    ("fractional face index", _put("polytope", "blocks", 0, "faces", 2, 1, value=1.5),
+     "/polytope/blocks/0/faces/2/1"),
+    ("face of four", _put("polytope", "blocks", 0, "faces", 2, value=[0, 1, 2, 3]),
+     "/polytope/blocks/0/faces/2"),
+    ("face turned over", _put("polytope", "blocks", 0, "faces", 3, value=[1, 3, 2]),
+     "/polytope/blocks/0/faces/3"),
+    ("face missing", _drop("polytope", "blocks", 0, "faces", 3), "/polytope/blocks/0/faces/0"),
+    ("stage of lists", _put("quality", "stages", 0, "R", value=[0.1]), "/quality/stages/0/R"),
+    ("option of objects", _put("quality", "options", "lambda", value={}),
+     "/quality/options/lambda"),
+    ("version of lists", _put("quality", "versions", "python", value=[3, 11]),
+     "/quality/versions/python"),
+    ("edit of nothing", _put("edits", "vertices", 0, "vertex", value="v99"),
+     "/edits/vertices/0/vertex"),
+    ("edit of an edge", _put("edits", "vertices", 0, "vertex", value="e1"),
+     "/edits/vertices/0/vertex"),
+    ("second edit", _put("edits", "vertices", 1, "vertex", value="v4"), "/edits/vertices/1/vertex"),
+    ("stop on nothing", _put("edits", "stops", 0, "edge", value="e99"), "/edits/stops/0/edge"),
+    ("stop on a vertex", _put("edits", "stops", 0, "edge", value="v1"), "/edits/stops/0/edge"),
+    ("stop at the edge's start", _put("edits", "stops", 0, "frame", value=0),
+     "/edits/stops/0/frame"),
+    ("stop at the edge's end", _put("edits", "stops", 0, "frame", value=9), "/edits/stops/0/frame"),
+    ("stop beyond", _put("edits", "stops", 0, "frame", value=9.001), "/edits/stops/0/frame"),
+    ("two stops at once", _put("edits", "stops", 1, "frame", value=4.5), "/edits/stops/1/frame"),
+    ("stop id twice", _put("edits", "stops", 1, "id", value="s1"), "/edits/stops/1/id"),
+    ("stop with an edge's id", _put("edits", "stops", 1, "id", value="e1"), "/edits/stops/1/id"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("change", "where"), [row[1:] for row in BROKEN], ids=[r[0] for r in BROKEN]
+)
+def test_broken_documents(change: Callable[[Document], None], where: str) -> None:
+    document = golden("edited")
+    change(document)
+    error = refusal(document)
+    assert error.pointer == where
+    assert error.file == "clip.p4d.json"
+    assert error.found
+    assert error.expected
+
+
+def test_newer_version_asks_for_an_update() -> None:
+    document = golden("tetrahedron")
+    document["version"] = 2
+    document["something new"] = {}
+    assert "written by a newer palette4d" in str(refusal(document))
+    assert "update" in str(refusal(document))
+
+
+def test_continuity_problems_point_into_the_polytope() -> None:
+    document = golden("split")
+    del document["polytope"]["transitions"][0]["tracks"][4]
+    document["polytope"]["transitions"][0]["faces"] = document["polytope"]["blocks"][0]["faces"]
+    assert refusal(document).pointer == "/polytope/blocks/1/tracks/4"
+
+
+TETRAHEDRON = (GOLDEN / "v1_tetrahedron.p4d.json").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("text", "where", "word"),
+    [
+        ("", "", "empty"),
+        (" ", "", "JSON"),
+        ("{", "", "JSON"),
+        (TETRAHEDRON + "x", "", "JSON"),
+        ("\ufeff" + TETRAHEDRON, "", "byte order mark"),
+        (TETRAHEDRON.encode("utf-16"), "", "byte order mark"),
+        (TETRAHEDRON.encode("utf-16-le"), "", "JSON"),
+        (TETRAHEDRON.replace("golden", "\udc80", 1), "/clip/name", "JSON"),
+        (TETRAHEDRON.replace("golden", "\\ud800", 1), "/clip/name", "JSON"),
+        (TETRAHEDRON.encode().replace(b"golden", b"\xff", 1), "/clip/name", "JSON"),
+        (TETRAHEDRON.replace("0.9", "NaN", 1), "/polytope/vertices/1/rgb/0", "JSON"),
+        (TETRAHEDRON.replace("0.9", "Infinity", 1), "/polytope/vertices/1/rgb/0", "JSON"),
+        (TETRAHEDRON.replace("0.9", "1e999", 1), "/polytope/vertices/1/rgb/0", "too large"),
+        (TETRAHEDRON.replace("0.9", "9" * 400, 1), "/polytope/vertices/1/rgb/0", "too large"),
+        (TETRAHEDRON.replace('"extra": {', '"extra": {"a": 1, "a": 1', 1), "/extra/a", "second"),
+        (TETRAHEDRON.replace('"extra": {', '"extra": {"a":' + "[" * 70, 1), None, "nesting"),
+        ("[" * 100_000, None, "nesting"),
+        ('{"a":' * 100_000, None, "nesting"),
+        ("[]", "", "a list"),
+        ("0", "", "the number 0"),
+    ],
+)
+def test_text_that_is_no_sidecar(text: str | bytes, where: str | None, word: str) -> None:
+    error = refusal(text)
+    assert word in str(error)
+    if where is not None:
+        assert error.pointer == where
+    str(error).encode("utf-8")
+
+
+def test_parse_takes_text_only() -> None:
+    with pytest.raises(TypeError):
+        _core.parse_sidecar(12)  # type: ignore[arg-type]
+
+
+def test_paths(tmp_path: Path) -> None:
+    for path in (tmp_path, tmp_path / "missing.json", tmp_path / "é\udcff.json"):
+        with pytest.raises(SidecarError) as caught:
+            _core.read_sidecar(path)
+        assert caught.value.file == str(path)
+        assert caught.value.pointer == ""
+    target = tmp_path / "é ❄.p4d.json"
+    target.write_text(TETRAHEDRON, encoding="utf-8")
+    assert _core.read_sidecar(str(target)).clip["name"] == "golden"
+    empty = tmp_path / "empty.json"
+    empty.touch()
+    with pytest.raises(SidecarError, match="empty"):
+        _core.read_sidecar(empty)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+def test_a_pipe_is_refused_without_waiting(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(SidecarError, match="no regular file"):
+        _core.read_sidecar(tmp_path / "pipe")
+
+
+def test_too_large_a_file_is_refused(tmp_path: Path) -> None:
+    large = tmp_path / "large.json"
+    with large.open("wb") as stream:
+        stream.truncate((64 << 20) + 1)
+    with pytest.raises(SidecarError, match="bytes"):
+        _core.read_sidecar(large)
+
+
+def _places(value: Any, path: tuple[str | int, ...] = ()) -> list[tuple[str | int, ...]]:
+    items = value.items() if isinstance(value, dict) else enumerate(value)
+    found = []
+    for key, item in items:
+        found.append((*path, key))
+        if isinstance(item, dict | list):
+            found += _places(item, (*path, key))
+    return found
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
+def test_mutations_never_do_more_than_raise(path: Path) -> None:
+    """Documents with one or two values replaced: read, or refused with a SidecarError."""
+    rng = random.Random(4711)
+    original = json.loads(path.read_text(encoding="utf-8"))
+    places = _places(original)
+    values: list[Any] = [
+        None,
+        True,
+        -1,
+        0,
+        1,
+        2,
+        10**9,
+        1.5,
+        -1e300,
+        "",
+        "v1",
+        "e1",
+        [],
+        {},
+        [0, 1, 2],
+        ["v1"],
+    ]
+    pointers = []
+    for _ in range(400):
+        document = copy.deepcopy(original)
+        for place in rng.sample(places, rng.choice([1, 1, 2])):
+            value = copy.deepcopy(rng.choice(values))
+            try:
+                (_drop(*place) if rng.random() < 0.2 else _put(*place, value=value))(document)
+            except (KeyError, IndexError, TypeError):
+                continue  # the first change took the place of the second away
+        try:
+            _core.parse_sidecar(json.dumps(document))
+        except SidecarError as error:
+            pointers.append(error.pointer)
+    assert len(pointers) > 200
+    assert all(pointer == "" or pointer.startswith("/") for pointer in pointers)

@@ -1,0 +1,125 @@
+"""`palette4d analyze` as a user calls it."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from analysis_frames import mixture
+from clip_files import write_image
+from palette4d import cli
+
+CORNERS = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
+
+
+@pytest.fixture
+def clip(tmp_path) -> Path:
+    folder = tmp_path / "clip"
+    folder.mkdir()
+    for i in range(6):
+        write_image(folder / f"shot.{1001 + i}.png", mixture(CORNERS + 0.01 * i, i))
+    return folder
+
+
+def test_writes_a_sidecar_and_a_report(clip, tmp_path, capsys):
+    out = tmp_path / "shot.p4d.json"
+    assert cli.main(["analyze", str(clip), "-o", str(out), "--rate", "24000/1001"]) == 0
+    printed = capsys.readouterr().out
+    for stage in ("frame_hulls", "block_merging", "vertex_removal", "vertex_refinement"):
+        assert stage in printed
+    document = json.loads(out.read_text())
+    assert document["clip"]["rate"] == [24000, 1001]
+    assert document["clip"]["frames"]["first"] == 1001
+    assert document["quality"]["options"]["lambda"] == 50
+
+
+def test_json_report_and_frames(clip, tmp_path, capsys):
+    out = tmp_path / "shot.p4d.json"
+    assert (
+        cli.main(["analyze", str(clip), "-o", str(out), "--frames", "1002-1006x2", "--json"]) == 0
+    )
+    report = json.loads(capsys.readouterr().out)
+    assert report["stages"][-1]["stage"] == "vertex_refinement"
+    frames = json.loads(out.read_text())["clip"]["frames"]
+    assert (frames["first"], frames["last"], frames["step"]) == (1002, 1006, 2)
+
+
+def test_the_files_bytes_are_the_same_every_time(clip, tmp_path):
+    for name, threads in (("a", "1"), ("b", "1"), ("c", "4")):
+        arguments = ["analyze", str(clip), "-o", str(tmp_path / name), "--threads", threads]
+        assert cli.main([*arguments, "--quiet"]) == 0
+    texts = {(tmp_path / name).read_bytes() for name in "abc"}
+    assert len(texts) == 1
+
+
+def test_edits_are_not_lost(clip, tmp_path, capsys):
+    out = tmp_path / "shot.p4d.json"
+    assert cli.main(["analyze", str(clip), "-o", str(out), "--quiet"]) == 0
+    edit = ["edit", str(out), "set", "--near", "0.9,0.2,0.2", "--frame", "1001"]
+    assert cli.main([*edit, "--rgb", "1", "0.5", "0"]) == 0
+    edited = out.read_bytes()
+    assert cli.main(["analyze", str(clip), "-o", str(out), "--quiet"]) == 1
+    error = capsys.readouterr().err
+    assert "--keep-edits" in error
+    assert "--drop-edits" in error
+    assert out.read_bytes() == edited
+    assert cli.main(["analyze", str(clip), "-o", str(out), "--quiet", "--keep-edits"]) == 0
+    assert out.read_bytes() == edited
+    assert cli.main(["analyze", str(clip), "-o", str(out), "--quiet", "--drop-edits"]) == 0
+    assert json.loads(out.read_text())["edits"] == {"vertices": [], "stops": []}
+
+
+def test_bad_frames(clip, tmp_path, capsys):
+    out = tmp_path / "shot.p4d.json"
+    (clip / "shot.1003.png").write_bytes((clip / "shot.1003.png").read_bytes()[:60])
+    assert cli.main(["analyze", str(clip), "-o", str(out), "--quiet"]) == 1
+    assert "1003" in capsys.readouterr().err
+    assert not out.exists()
+    assert cli.main(["analyze", str(clip), "-o", str(out), "--quiet", "--skip-bad-frames"]) == 0
+    assert "1003" in capsys.readouterr().err
+    assert json.loads(out.read_text())["clip"]["frames"]["skipped"] == [1003]
+
+
+def test_wrong_usage(clip, tmp_path, capsys):
+    out = str(tmp_path / "x.p4d.json")
+    for arguments in (
+        ["analyze", str(clip)],
+        ["analyze", str(clip), "-o", out, "--rate", "fast"],
+        ["analyze", str(clip), "-o", out, "--keep-edits", "--drop-edits"],
+    ):
+        with pytest.raises(SystemExit) as stop:
+            cli.main(arguments)
+        assert stop.value.code == 2
+    assert cli.main(["analyze", str(clip), "-o", out, "--eta1", "0.2"]) == 1
+    assert "eta1" in capsys.readouterr().err
+    assert cli.main(["analyze", str(tmp_path / "nothing"), "-o", out]) == 1
+    assert not Path(out).exists()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
+def test_ctrl_c_leaves_nothing(clip, tmp_path):
+    out = tmp_path / "shot.p4d.json"
+    for i in range(6, 2000):  # long enough to be interrupted
+        (clip / f"shot.{1001 + i}.png").hardlink_to(clip / "shot.1001.png")
+    command = [sys.executable, "-m", "palette4d", "analyze", str(clip), "-o", str(out)]
+    before = sorted(tmp_path.iterdir())
+    process = subprocess.Popen(
+        command,
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        # Where the tests run in the background, children inherit an ignored SIGINT.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    time.sleep(4.0)
+    assert process.poll() is None, "ended before it could be interrupted"
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert sorted(tmp_path.iterdir()) == before

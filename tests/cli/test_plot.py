@@ -1,0 +1,251 @@
+"""The verb plot: pictures of all sorts of sidecars, and what must be seen in them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from palette4d import _core
+from palette4d.cli import main
+from palette4d.plotting import layout, style, timeline
+
+GOLDEN = Path(__file__).resolve().parent.parent / "golden" / "sidecars"
+ALL_GOLDEN = sorted(GOLDEN.glob("v1_*.p4d.json"))
+
+
+def pixels(path: Path) -> NDArray[np.uint8]:
+    from PIL import Image
+
+    with Image.open(path) as image:
+        return np.asarray(image.convert("RGB"))
+
+
+def holds(image: NDArray[np.uint8], rgb: list[float], least: int) -> bool:
+    """Whether at least so many pixels have a colour, to a rounding of 8 bits."""
+    wanted = np.round(np.clip(rgb, 0, 1) * 255)
+    near = (np.abs(image.astype(int) - wanted) <= 1).all(axis=-1)
+    return int(near.sum()) >= least
+
+
+def tetrahedron_through(blocks: int) -> dict[str, Any]:
+    """A sidecar with many blocks: vertices at every block's first and last frame."""
+    document: dict[str, Any] = json.loads(
+        (GOLDEN / "v1_tetrahedron.p4d.json").read_text(encoding="utf-8")
+    )
+    faces = document["polytope"]["blocks"][0]["faces"]
+    base = [[0.05, 0.05, 0.05], [0.9, 0.15, 0.1], [0.2, 0.8, 0.1], [0.3, 0.4, 0.95]]
+    times = sorted(t for k in range(blocks) for t in (5 * k, 5 * k + 4))
+    polytope: dict[str, Any] = {"vertices": [], "edges": [], "blocks": [], "transitions": []}
+    for time in times:
+        for rgb in base:
+            number = len(polytope["vertices"]) + 1
+            polytope["vertices"].append({"id": f"v{number}", "frame": time, "rgb": rgb})
+    for k in range(len(times) - 1):
+        tracks = [[f"v{4 * k + c + 1}", f"v{4 * k + c + 5}"] for c in range(4)]
+        for start, end in tracks:
+            number = len(polytope["edges"]) + 1
+            polytope["edges"].append({"id": f"e{number}", "from": start, "to": end})
+        if k % 2:
+            polytope["transitions"].append({"tracks": tracks, "faces": faces})
+        else:
+            polytope["blocks"].append(
+                {"first": times[k], "last": times[k + 1], "tracks": tracks, "faces": faces}
+            )
+    document["polytope"] = polytope
+    document["clip"]["frames"] = {"first": 0, "last": times[-1], "step": 1, "skipped": []}
+    document["clip"]["name"] = "\u5b63\u7bc0 $x_1$ \u2744"  # no glyphs for some; no mathematics
+    return document
+
+
+@pytest.mark.parametrize("sidecar", ALL_GOLDEN, ids=lambda path: path.name.split(".")[0])
+def test_every_golden_sidecar_gives_a_picture(sidecar: Path, tmp_path: Path) -> None:
+    out = tmp_path / "palette.png"
+    assert main(["plot", str(sidecar), "-o", str(out), "--width", "800"]) == 0
+    image = pixels(out)
+    assert image.shape[1] == 800
+    assert image.shape[0] > 250
+    loaded = _core.read_sidecar(str(sidecar))
+    vertices = np.asarray(loaded.polytope.vertices)
+    for rgb in style.shown(vertices[:, :3], str(loaded.clip["encoding"])):
+        assert holds(image, list(rgb), 20)
+    assert [path.name for path in tmp_path.iterdir()] == ["palette.png"]
+
+
+def test_the_edited_colours_are_seen(tmp_path: Path) -> None:
+    document = json.loads((GOLDEN / "v1_edited.p4d.json").read_text(encoding="utf-8"))
+    plain = dict(document, edits={"vertices": [], "stops": []})
+    sidecar = tmp_path / "a.p4d.json"
+    images = []
+    vertex = document["polytope"]["vertices"][2]["id"]
+    new_vertex, new_stop = [0.93, 0.37, 0.71], [0.61, 0.29, 0.83]
+    edited = dict(
+        document,
+        edits={
+            "vertices": [{"vertex": vertex, "rgb": new_vertex}],
+            "stops": [{"id": "s7", "edge": "e2", "frame": 4.5, "rgb": new_stop}],
+        },
+    )
+    for content in (plain, edited):
+        sidecar.write_text(json.dumps(content), encoding="utf-8")
+        out = tmp_path / "a.png"
+        assert main(["plot", str(sidecar), "-o", str(out), "--width", "1200", "--force"]) == 0
+        images.append(pixels(out))
+    for colour in (new_vertex, new_stop):
+        assert not holds(images[0], colour, 1)
+        assert holds(images[1], colour, 25)
+
+
+def test_upper_half_before_lower_half_after(tmp_path: Path) -> None:
+    document = json.loads((GOLDEN / "v1_edited.p4d.json").read_text(encoding="utf-8"))
+    before, after = [0.31, 0.62, 0.47], [0.93, 0.37, 0.71]
+    document["polytope"]["vertices"][0]["rgb"] = before
+    document["edits"] = {"vertices": [{"vertex": "v1", "rgb": after}], "stops": []}
+    sidecar, out = tmp_path / "a.p4d.json", tmp_path / "a.png"
+    sidecar.write_text(json.dumps(document), encoding="utf-8")
+    # Only the timeline: the polyhedra of another frame do not hold these colours.
+    assert main(["plot", str(sidecar), "-o", str(out), "--frames", "20", "--width", "1600"]) == 0
+    image = pixels(out).astype(int)
+    rows = [
+        np.flatnonzero((np.abs(image - np.round(np.array(c) * 255)) <= 1).all(axis=-1).any(axis=1))
+        for c in (before, after)
+    ]
+    assert len(rows[0]) > 4
+    assert len(rows[1]) > 4
+    assert rows[0].max() < rows[1].min()
+
+
+def test_svg_holds_the_ids_as_text(tmp_path: Path) -> None:
+    out = tmp_path / "a.svg"
+    assert main(["plot", str(GOLDEN / "v1_edited.p4d.json"), "-o", str(out)]) == 0
+    text = out.read_text(encoding="utf-8")
+    loaded = _core.read_sidecar(str(GOLDEN / "v1_edited.p4d.json"))
+    for name in loaded.polytope.vertex_ids:
+        assert f'id="vertex-{name}"' in text
+        assert f">{name}</text>" in text
+    for stop in loaded.edits.stops:
+        assert f'id="stop-{stop["id"]}"' in text
+
+
+def test_pdf_and_reproducible_pictures(tmp_path: Path) -> None:
+    sidecar = str(GOLDEN / "v1_split.p4d.json")
+    for extension in ("pdf", "svg", "png"):
+        outs = [tmp_path / f"{k}.{extension}" for k in range(2)]
+        for out in outs:
+            assert main(["plot", sidecar, "-o", str(out), "--width", "600"]) == 0
+        assert outs[0].read_bytes() == outs[1].read_bytes()
+    assert (tmp_path / "0.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_many_blocks_and_a_name_the_font_lacks(tmp_path: Path) -> None:
+    sidecar = tmp_path / "many.p4d.json"
+    sidecar.write_text(json.dumps(tetrahedron_through(30)), encoding="utf-8")
+    out = tmp_path / "many.png"
+    assert main(["plot", str(sidecar), "-o", str(out), "--width", "900"]) == 0
+    assert pixels(out).shape[1] == 900
+
+
+def test_frames_and_clip_show_the_pictures(tmp_path: Path) -> None:
+    import OpenImageIO as oiio
+
+    folder = tmp_path / "clip"
+    folder.mkdir()
+    colour = [0.42, 0.23, 0.35]
+    for frame in range(21):
+        output = oiio.ImageOutput.create("frame.png")
+        assert output.open(str(folder / f"f.{frame:04d}.png"), oiio.ImageSpec(64, 36, 3, "uint8"))
+        assert output.write_image(np.full((36, 64, 3), colour, dtype=np.float32))
+        output.close()
+    out = tmp_path / "a.png"
+    arguments = ["plot", str(GOLDEN / "v1_split.p4d.json"), "-o", str(out), "--width", "800"]
+    assert main([*arguments, "--frames", "3,12.5"]) == 0
+    without = pixels(out)
+    assert not holds(without, colour, 30)
+    assert (
+        main([*arguments, "--frames", "3,12.5", "--force", "--clip", f"{folder}/f.####.png"]) == 0
+    )
+    with_clip = pixels(out)
+    assert with_clip.shape[0] > without.shape[0]
+    # Two moments, before and after (nothing is edited): four thumbnails.
+    assert holds(with_clip, colour, 4 * 200 * 100)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["-o", "a.jpg"], ".png, .svg, .pdf"),
+        (["-o", "a.png", "--frames", "99"], "from 0 to 20"),
+        (["-o", "none/a.png"], "no folder"),
+        (["-o", "a.png", "--clip", "nowhere.####.png"], "nowhere"),
+    ],
+)
+def test_refusals(
+    arguments: list[str],
+    word: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["plot", str(GOLDEN / "v1_split.p4d.json"), *arguments]) == 1
+    message = capsys.readouterr().err
+    assert message.startswith("palette4d: error: ")
+    assert word in message
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_existing_picture_needs_force(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "a.png"
+    out.write_bytes(b"mine")
+    assert main(["plot", str(GOLDEN / "v1_split.p4d.json"), "-o", str(out)]) == 1
+    assert "--force" in capsys.readouterr().err
+    assert out.read_bytes() == b"mine"
+
+
+@pytest.mark.parametrize("frame", [0.0, 2.25, 4.5, 6.0, 9.0, 9.25, 9.6, 14.0, 20.0])
+def test_bands_show_the_cores_colours(frame: float) -> None:
+    """The drawn interpolation in time equals the core's, original and edited."""
+    sidecar = _core.read_sidecar(str(GOLDEN / "v1_edited.p4d.json"))
+    palette = timeline.Palette.of(sidecar)
+    cut = _core.slice_at(sidecar.polytope, frame)
+    edited = _core.edited_colours(sidecar.polytope, sidecar.edits, cut)
+    for index, edge in enumerate(cut.edges):
+        if edge >= 0:
+            when = np.array([frame])
+            np.testing.assert_allclose(palette.before(edge, when)[0], cut.rgb[index], atol=1e-12)
+            np.testing.assert_allclose(palette.after(edge, when)[0], edited[index], atol=1e-12)
+        else:
+            np.testing.assert_allclose(palette.edited[cut.ends[index, 0]], edited[index])
+
+
+@pytest.mark.parametrize("name", ["v1_split", "v1_merge"])
+def test_a_fork_is_a_chain_of_its_own(name: str) -> None:
+    palette = timeline.Palette.of(_core.read_sidecar(str(GOLDEN / f"{name}.p4d.json")))
+    rows = layout.arrange(palette.frames, palette.rgb, palette.edges)
+    # Four colours on one side, five on the other: one fork.
+    assert len(rows.chains) == 5
+    assert rows.row_count == 5
+    placed = [v for chain in rows.chains for v in chain.vertices]
+    assert sorted(placed) == list(range(len(palette.ids)))
+    assert sorted(e for chain in rows.chains for e in chain.edges) == list(
+        range(len(palette.edges))
+    )
+    forks = [
+        abs(int(rows.rows[rows.vertex_chain[v]]) - int(rows.rows[rows.edge_chain[e]]))
+        for e, ends in enumerate(palette.edges)
+        for v in ends
+        if rows.vertex_chain[v] != rows.edge_chain[e]
+    ]
+    assert forks == [1]  # beside the row it leaves or joins
+
+
+def test_chains_that_never_meet_share_a_row() -> None:
+    # a: 0..100; b: 0..20 joins a at 20; c leaves a at 60.
+    frames = np.array([0.0, 0.0, 20.0, 60.0, 100.0, 100.0])
+    rgb = np.array([[0.5] * 3, [0.6] * 3, [0.5] * 3, [0.5] * 3, [0.5] * 3, [0.6] * 3])
+    rows = layout.arrange(frames, rgb, [(0, 2), (1, 2), (2, 3), (3, 4), (3, 5)])
+    assert len(rows.chains) == 3
+    assert rows.row_count == 2

@@ -1,0 +1,117 @@
+"""Fixtures that every part of the test suite may use, and the rule that host tests must have run.
+
+Environment
+-----------
+PALETTE4D_SHARED
+    A folder with the paper's clips and reference results (``clips/seasons``, ``reference``).
+    Default: ``shared`` beside the repository. Tests that need it skip, and say so, without it.
+PALETTE4D_REQUIRE_HOST
+    ``1`` turns every skipped test under ``tests/host`` into a failure of the run, and a run that
+    collected no host test at all as well. ``.ci/run`` sets it.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Generator
+from pathlib import Path
+
+import pytest
+
+REPO_ROOT = Path(__file__).resolve().parent.parent
+
+
+def shared_folder() -> Path:
+    """Where the shared material is expected; it need not exist."""
+    return Path(os.environ.get("PALETTE4D_SHARED") or REPO_ROOT.parent / "shared").resolve()
+
+
+@pytest.fixture(scope="session")
+def repo_root() -> Path:
+    """The repository's root folder (for files that the wheel does not carry)."""
+    return REPO_ROOT
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """The shared material; the test skips where it is absent."""
+    folder = shared_folder()
+    if not folder.is_dir():
+        pytest.skip(f"shared material absent: no folder {folder} (set PALETTE4D_SHARED)")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def seasons(shared: Path) -> Path:
+    """The paper's SEASONS clip: a folder of 50 frames of 696 x 380."""
+    folder = shared / "clips" / "seasons"
+    if not folder.is_dir():
+        pytest.skip(f"the SEASONS clip is absent: no folder {folder}")
+    return folder
+
+
+def host_tests_required() -> bool:
+    """Whether a host test that could not run must make the whole run fail."""
+    return os.environ.get("PALETTE4D_REQUIRE_HOST", "") not in ("", "0")
+
+
+class HostWatch:
+    """Remembers which tests under ``tests/host`` ran and which were skipped."""
+
+    def __init__(self) -> None:
+        self.ran: set[str] = set()
+        self.skipped: dict[str, str] = {}
+
+    @staticmethod
+    def concerns(nodeid: str) -> bool:
+        """Whether this node lies under ``tests/host``."""
+        path = Path(nodeid.partition("::")[0])
+        return not path.is_absolute() and path.parts[:2] == ("tests", "host")
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Note what became of one phase of one test."""
+        if not self.concerns(report.nodeid):
+            return
+        if report.skipped:
+            reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr
+            self.skipped[report.nodeid] = str(reason)
+        elif report.when == "call":
+            self.ran.add(report.nodeid)
+
+    def pytest_collectreport(self, report: pytest.CollectReport) -> None:
+        """Note a module that skipped itself as a whole."""
+        if report.skipped and self.concerns(report.nodeid):
+            reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr
+            self.skipped[report.nodeid] = str(reason)
+
+    def complaints(self) -> list[str]:
+        """What keeps this run from counting as tested in a real host."""
+        found = [f"{node}: {reason}" for node, reason in sorted(self.skipped.items())]
+        if not self.ran:
+            found.append("no test under tests/host ran at all")
+        return found
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Watch the host tests when they are required."""
+    if host_tests_required():
+        config.pluginmanager.register(HostWatch(), "palette4d-host-watch")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_sessionfinish(session: pytest.Session) -> Generator[None, None, None]:
+    """Turn a run whose host tests could not run into a failed one."""
+    watch = session.config.pluginmanager.get_plugin("palette4d-host-watch")
+    if watch is not None and watch.complaints() and session.exitstatus == pytest.ExitCode.OK:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+    return (yield)
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Say which host tests could not run."""
+    watch = terminalreporter.config.pluginmanager.get_plugin("palette4d-host-watch")
+    if watch is None or not watch.complaints():
+        return
+    terminalreporter.section("host tests were required (PALETTE4D_REQUIRE_HOST) but could not run")
+    for complaint in watch.complaints():
+        terminalreporter.line(complaint)

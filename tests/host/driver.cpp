@@ -1,0 +1,138 @@
+// strict_host render BUNDLE SIDECAR --frame T --width W --height H [options] IN.raw OUT.raw
+// One picture through the node, for tests in other languages. Raw files hold rows of interleaved
+// pixels without gaps: float32 of this machine or bytes.
+#include <cstring>
+#include <exception>
+#include <fstream>
+#include <iostream>
+#include <map>
+#include <stdexcept>
+
+#include "palette4d/sidecar.hpp"
+#include "strict_host.hpp"
+
+namespace {
+
+constexpr const char* kUsage =
+    "usage: strict_host render BUNDLE SIDECAR [options] IN.raw OUT.raw\n"
+    "  --width W --height H     size of the picture\n"
+    "  --frame T                frame of the sidecar (or --time T: the host's, 0 at the clip's "
+    "first)\n"
+    "  --components RGBA|RGB    (RGBA)\n"
+    "  --depth float|byte       (float)\n"
+    "  --strength S             (1)\n"
+    "  --offset F               parameter frameOffset (0)\n"
+    "  --premultiplied 0|1      (0)\n"
+    "  --padding BYTES          after each row (0)\n"
+    "  --upside-down 0|1        negative rowBytes (0)\n"
+    "  --origin X,Y             of the picture (0,0)\n"
+    "  --tile N                 render in tiles of N x N pixels (the whole picture at once)\n"
+    "  --processors N           of the host (4)\n"
+    "  --context Filter|General (Filter)\n"
+    "prints the status line, and the persistent message if there is one; exit status 3: faults\n";
+
+using Options = std::map<std::string, std::string>;
+
+std::vector<char> read(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    if (!file) throw std::runtime_error(path + ": cannot be read");
+    return {std::istreambuf_iterator<char>(file), {}};
+}
+
+int render(const std::vector<std::string>& names, const Options& options) {
+    const auto get = [&](const char* name, const char* initial) {
+        const auto found = options.find(name);
+        return found == options.end() ? std::string(initial) : found->second;
+    };
+    strict::Layout layout;
+    int x = 0, y = 0;
+    char comma = 0;
+    const std::string origin = get("origin", "0,0");
+    if (std::sscanf(origin.c_str(), "%d%c%d", &x, &comma, &y) != 3) {
+        throw std::runtime_error("--origin: found " + origin + ", expected X,Y");
+    }
+    layout.bounds = {x, y, x + std::stoi(get("width", "0")), y + std::stoi(get("height", "0"))};
+    layout.channels = get("components", "RGBA") == "RGB" ? 3 : 4;
+    layout.depth = get("depth", "float") == "byte" ? strict::Depth::kByte : strict::Depth::kFloat;
+    layout.padding = std::stoi(get("padding", "0"));
+    layout.upside_down = get("upside-down", "0") == "1";
+    if (get("premultiplied", "0") == "1") layout.premultiplication = kOfxImagePreMultiplied;
+
+    double time = std::stod(get("time", "0"));
+    if (options.count("frame")) {
+        const palette4d::Sidecar sidecar = palette4d::read_sidecar(names[1]);
+        time = std::stod(options.at("frame")) - static_cast<double>(sidecar.clip.first);
+    }
+
+    strict::Config config;
+    config.processors = static_cast<unsigned>(std::stoul(get("processors", "4")));
+    strict::Host::get().configure(config);
+    const std::string context = "OfxImageEffectContext" + get("context", "Filter");
+    const std::size_t row = static_cast<std::size_t>(layout.width()) * layout.pixel_bytes();
+    const std::vector<char> pixels = read(names[2]);
+    if (layout.width() <= 0 || layout.height() <= 0 || pixels.size() != row * layout.height()) {
+        throw std::runtime_error(names[2] + ": found " + std::to_string(pixels.size()) +
+                                 " bytes, expected width x height x pixel");
+    }
+    strict::Picture source(layout), output(layout);
+    for (int r = 0; r < layout.height(); ++r) {
+        std::memcpy(source.at(x, y + r), pixels.data() + row * r, row);
+    }
+    int failed = 0;
+    {
+        strict::Plugin plugin(names[0]);
+        const auto instance = plugin.create(context);
+        instance->set("sidecar", names[1]);
+        instance->set("strength", std::stod(get("strength", "1")));
+        instance->set("frameOffset", std::stod(get("offset", "0")));
+        instance->changed("sidecar");
+        const int tile = std::max(1, std::stoi(get("tile", "1000000000")));
+        for (long ty = y; ty < layout.bounds.y2; ty += tile) {
+            for (long tx = x; tx < layout.bounds.x2; tx += tile) {
+                const OfxRectI window = {
+                    static_cast<int>(tx), static_cast<int>(ty),
+                    static_cast<int>(std::min<long>(tx + tile, layout.bounds.x2)),
+                    static_cast<int>(std::min<long>(ty + tile, layout.bounds.y2))};
+                failed |= instance->render(time, &source, output, window) != kOfxStatOK;
+            }
+        }
+        std::cout << "status: " << instance->text("status") << "\n";
+        if (!instance->effect().persistent_message.empty()) {
+            std::cout << "message: " << instance->effect().persistent_message << "\n";
+        }
+    }
+    std::ofstream file(names[3], std::ios::binary);
+    const auto result = output.pixels(layout.bounds);
+    file.write(reinterpret_cast<const char*>(result.data()),
+               static_cast<std::streamsize>(result.size()));
+    if (!file.flush()) throw std::runtime_error(names[3] + ": cannot be written");
+    const std::vector<std::string> faults = strict::Host::get().take_faults();
+    for (const std::string& fault : faults) std::cerr << "fault: " << fault << "\n";
+    if (failed) std::cerr << "the render failed\n";
+    return faults.empty() ? failed : 3;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    std::vector<std::string> names;
+    Options options;
+    for (int i = 2; i < argc; ++i) {
+        if (std::strncmp(argv[i], "--", 2) == 0 && i + 1 < argc) {
+            options[argv[i] + 2] = argv[i + 1];
+            ++i;
+        } else {
+            names.emplace_back(argv[i]);
+        }
+    }
+    if (argc < 2 || std::strcmp(argv[1], "render") != 0 || names.size() != 4) {
+        std::cerr << kUsage;
+        return 2;
+    }
+    try {
+        return render(names, options);
+    } catch (const std::exception& error) {
+        std::cerr << "strict_host: " << error.what() << "\n";
+        return 1;
+    }
+}

@@ -1,0 +1,188 @@
+#include "harness.hpp"
+
+#include <cmath>
+#include <cstring>
+#include <exception>
+#include <fstream>
+#include <iostream>
+#include <limits>
+#include <random>
+#include <sstream>
+
+namespace test {
+namespace {
+
+std::string g_bundle;
+std::filesystem::path g_folder;
+int g_failures = 0;
+
+}  // namespace
+
+std::vector<Case>& cases() {
+    static std::vector<Case> all;
+    return all;
+}
+
+void failed(const char* file, int line, const std::string& what) {
+    ++g_failures;
+    std::cerr << file << ":" << line << ": " << what << "\n";
+}
+
+const std::string& bundle() { return g_bundle; }
+std::filesystem::path folder() { return g_folder; }
+
+std::string write(const std::string& name, const std::string& text) {
+    const std::filesystem::path path = g_folder / name;
+    std::ofstream(path, std::ios::binary | std::ios::trunc) << text;
+    return path.u8string();
+}
+
+std::string sidecar_text(bool edited) {
+    std::ostringstream json;
+    json << R"({"schema": "palette4d.sidecar", "version": 1, "generator": "palette4d tests",
+  "clip": {"name": "box", "source": "box.####.exr",
+           "frames": {"first": 10, "last": 20, "step": 1, "skipped": []},
+           "rate": [24, 1], "size": [64, 48], "encoding": "linear"},
+  "polytope": {"vertices": [)";
+    for (int end = 0; end < 2; ++end) {
+        for (int corner = 0; corner < 8; ++corner) {
+            const double high = end ? 0.8 : 0.9, low = end ? 0.2 : 0.1;
+            json << (end || corner ? ", " : "") << R"({"id": "v)" << end * 8 + corner
+                 << R"(", "frame": )" << (end ? 20 : 10) << R"(, "rgb": [)"
+                 << (corner & 1 ? high : low) << ", " << (corner & 2 ? high : low) << ", "
+                 << (corner & 4 ? high : low) << "]}";
+        }
+    }
+    json << R"(], "edges": [)";
+    for (int corner = 0; corner < 8; ++corner) {
+        json << (corner ? ", " : "") << R"({"id": "e)" << corner << R"(", "from": "v)" << corner
+             << R"(", "to": "v)" << corner + 8 << R"("})";
+    }
+    json << R"(], "blocks": [{"first": 10, "last": 20, "tracks": [)";
+    for (int corner = 0; corner < 8; ++corner) {
+        json << (corner ? ", " : "") << R"(["v)" << corner << R"(", "v)" << corner + 8 << R"("])";
+    }
+    // Each side of the box as two triangles, anticlockwise from outside.
+    json << R"(], "faces": [[0,2,3],[0,3,1],[4,5,7],[4,7,6],[0,1,5],[0,5,4],
+                            [2,6,7],[2,7,3],[0,4,6],[0,6,2],[1,3,7],[1,7,5]]}],
+                "transitions": []},
+  "quality": {"stages": [], "options": {}, "versions": {}},
+  "edits": {)";
+    if (edited) {
+        json << R"("vertices": [{"vertex": "v1", "rgb": [0.2, 0.7, 0.1]},
+                                {"vertex": "v11", "rgb": [1.4, -0.3, 0.25]}],
+                   "stops": [{"id": "s1", "edge": "e2", "frame": 15, "rgb": [0.5, 0.5, 0.9]}])";
+    } else {
+        json << R"("vertices": [], "stops": [])";
+    }
+    json << R"(}, "extra": {}})";
+    return json.str();
+}
+
+std::string sidecar(const std::string& name, bool edited) {
+    return write(name, sidecar_text(edited));
+}
+
+void fill(strict::Picture& picture, unsigned seed, bool odd_values) {
+    const strict::Layout& layout = picture.layout();
+    std::mt19937 random(seed);
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    const float odd[] = {
+        std::numeric_limits<float>::quiet_NaN(), kInfinity, -kInfinity, -0.0f, 1e30f,
+        std::numeric_limits<float>::denorm_min()};
+    for (int y = layout.bounds.y1; y < layout.bounds.y2; ++y) {
+        for (int x = layout.bounds.x1; x < layout.bounds.x2; ++x) {
+            for (int c = 0; c < layout.channels; ++c) {
+                const auto r = static_cast<unsigned>(random());
+                if (layout.depth == strict::Depth::kByte) {
+                    picture.at(x, y)[c] = static_cast<unsigned char>(r >> 24);
+                    continue;
+                }
+                float value = static_cast<float>(r >> 8) / 16777216.0f;
+                if (c < 3) value = 1.6f * value - 0.3f;
+                if (odd_values && r % 61 == 0) value = odd[(r / 61) % std::size(odd)];
+                // Fully transparent pixels, too.
+                if (c == 3 && r % 17 == 0) value = 0.0f;
+                std::memcpy(picture.at(x, y) + 4 * c, &value, 4);
+            }
+        }
+    }
+}
+
+std::vector<unsigned char> recoloured(const palette4d::Sidecar& sidecar, double frame,
+                                      const strict::Picture& picture, const OfxRectI& area,
+                                      double strength) {
+    using namespace palette4d;
+    const Slice slice = slice_at(sidecar.polytope, frame);
+    const Recolourer recolourer(slice.rgb, edited_colours(sidecar.polytope, sidecar.edits, slice),
+                                slice.faces);
+    const std::vector<unsigned char> pixels = picture.pixels(area);
+    const strict::Layout& layout = picture.layout();
+    const int width = area.x2 - area.x1, height = area.y2 - area.y1;
+    const bool bytes = layout.depth == strict::Depth::kByte;
+    std::vector<float> values(static_cast<std::size_t>(width) * height * layout.channels);
+    if (bytes) {
+        for (std::size_t i = 0; i < values.size(); ++i) {
+            values[i] = static_cast<float>(pixels[i]) / 255.0f;
+        }
+    } else {
+        std::memcpy(values.data(), pixels.data(), pixels.size());
+    }
+    const std::ptrdiff_t stride = static_cast<std::ptrdiff_t>(width) * layout.channels * 4;
+    RecolourOptions options;
+    options.strength = strength;
+    options.premultiplied =
+        layout.channels == 4 && layout.premultiplication == kOfxImagePreMultiplied;
+    recolourer.apply({values.data(), width, height, layout.channels, stride},
+                     {values.data(), width, height, layout.channels, stride}, options);
+    std::vector<unsigned char> result(pixels.size());
+    if (bytes) {
+        for (std::size_t i = 0; i < values.size(); ++i) {
+            const double v = values[i] * 255.0f;
+            result[i] =
+                static_cast<unsigned char>(std::floor(std::fmin(std::fmax(v, 0), 255) + 0.5));
+        }
+    } else {
+        std::memcpy(result.data(), values.data(), result.size());
+    }
+    return result;
+}
+
+OfxRectI rect(int x1, int y1, int x2, int y2) { return {x1, y1, x2, y2}; }
+
+}  // namespace test
+
+/// palette4d_host_tests BUNDLE FOLDER [NAME …]: runs the tests whose names contain one of NAME.
+int main(int argc, char** argv) {
+    if (argc < 3) {
+        std::cerr << "usage: " << argv[0] << " BUNDLE FOLDER [NAME ...]\n";
+        return 2;
+    }
+    test::g_bundle = argv[1];
+    int failed_cases = 0, run = 0;
+    for (const test::Case& test_case : test::cases()) {
+        bool wanted = argc == 3;
+        for (int i = 3; i < argc; ++i) wanted |= std::strstr(test_case.name, argv[i]) != nullptr;
+        if (!wanted) continue;
+        ++run;
+        test::g_folder = std::filesystem::u8path(argv[2]) / test_case.name;
+        std::filesystem::remove_all(test::g_folder);
+        std::filesystem::create_directories(test::g_folder);
+        const int before = test::g_failures;
+        strict::Host::get().configure({});
+        strict::Host::get().take_faults();
+        try {
+            test_case.run();
+        } catch (const std::exception& error) {
+            test::failed(test_case.name, 0, std::string("exception: ") + error.what());
+        }
+        for (const std::string& fault : strict::Host::get().take_faults()) {
+            test::failed(test_case.name, 0, "fault: " + fault);
+        }
+        const bool ok = test::g_failures == before;
+        failed_cases += !ok;
+        std::cout << (ok ? "ok    " : "FAILED ") << test_case.name << std::endl;
+    }
+    std::cout << run - failed_cases << " of " << run << " passed" << std::endl;
+    return failed_cases || !run ? 1 : 0;
+}

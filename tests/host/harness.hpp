@@ -1,0 +1,63 @@
+// A few lines of test harness, and what the node's tests share: sidecars, pictures, expectations.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "palette4d/recolour.hpp"
+#include "palette4d/sidecar.hpp"
+#include "strict_host.hpp"
+
+namespace test {
+
+struct Case {
+    const char* name;
+    void (*run)();
+};
+std::vector<Case>& cases();
+struct Registration {
+    Registration(const char* name, void (*run)()) { cases().push_back({name, run}); }
+};
+#define TEST(name)                                                       \
+    static void name();                                                  \
+    static const ::test::Registration registration_##name(#name, &name); \
+    static void name()
+
+void failed(const char* file, int line, const std::string& what);
+#define CHECK(condition)                                                  \
+    do {                                                                  \
+        if (!(condition)) ::test::failed(__FILE__, __LINE__, #condition); \
+    } while (false)
+/// The same with words of one's own.
+#define EXPECT(condition, words)                                       \
+    do {                                                               \
+        if (!(condition)) ::test::failed(__FILE__, __LINE__, (words)); \
+    } while (false)
+
+/// The bundle under test, and a folder of the running test's own.
+const std::string& bundle();
+std::filesystem::path folder();
+
+/// Writes a file in folder(); its path.
+std::string write(const std::string& name, const std::string& text);
+
+/// A sidecar of a box of eight colours over frames 10 to 20, which shrinks towards the end. With
+/// `edited`, some corners and a stop change; corners at blue 1 stay as they are.
+std::string sidecar_text(bool edited = true);
+/// The same, written under a name; its path.
+std::string sidecar(const std::string& name = "clip.p4d.json", bool edited = true);
+
+/// Colours inside and outside the palette, below 0 and above 1; for float, NaN and infinities too.
+void fill(strict::Picture& picture, unsigned seed = 1, bool odd_values = true);
+
+/// What the core makes of an area of a picture: float or byte pixels without gaps. Bytes go through
+/// byte / 255, and come back rounded and clamped. `frame` is the sidecar's.
+std::vector<unsigned char> recoloured(const palette4d::Sidecar& sidecar, double frame,
+                                      const strict::Picture& picture, const OfxRectI& area,
+                                      double strength = 1);
+
+OfxRectI rect(int x1, int y1, int x2, int y2);
+
+}  // namespace test

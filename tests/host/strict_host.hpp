@@ -1,0 +1,278 @@
+// A small OpenFX host that forgives nothing. It hands a plugin the suites, watches every call, and
+// notes each breach of the standard as a fault: names it does not know, wrong types, calls in the
+// wrong action, images not given back, bytes written outside the render window. It can also behave
+// badly itself: leave out suites, functions and properties, and refuse any single call.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "ofxCore.h"
+#include "ofxImageEffect.h"
+#include "ofxMemory.h"
+#include "ofxMessage.h"
+#include "ofxMultiThread.h"
+#include "ofxParam.h"
+#include "ofxProperty.h"
+
+namespace strict {
+
+// ---------------------------------------------------------------- properties
+
+enum Kind : unsigned {
+    kHost = 1,
+    kEffectDescriptor = 2,
+    kClipDescriptor = 4,
+    kParamDescriptor = 8,
+    kParamSet = 16,
+    kEffect = 32,
+    kClip = 64,
+    kParam = 128,
+    kImage = 256,
+    kInArgs = 512,
+    kOutArgs = 1024,
+};
+
+using Value = std::variant<int, double, std::string, void*>;
+
+}  // namespace strict
+
+/// The standard's opaque types are ours to define.
+struct OfxPropertySetStruct {
+    strict::Kind kind;
+    std::map<std::string, std::vector<strict::Value>> values;
+
+    explicit OfxPropertySetStruct(strict::Kind k);
+    ~OfxPropertySetStruct();
+    OfxPropertySetStruct(const OfxPropertySetStruct& other);
+    OfxPropertySetStruct& operator=(const OfxPropertySetStruct&) = delete;
+
+    /// The host's own, unchecked way in.
+    void put(const std::string& name, strict::Value value) { values[name] = {std::move(value)}; }
+    void put_all(const std::string& name, std::vector<strict::Value> all) {
+        values[name] = std::move(all);
+    }
+    bool has(const std::string& name) const { return values.count(name) != 0; }
+    std::string text(const std::string& name, std::size_t index = 0) const;
+    double number(const std::string& name, std::size_t index = 0) const;
+};
+
+struct OfxParamStruct {
+    std::string type, name;
+    OfxPropertySetStruct properties;
+    strict::Value value;
+    std::map<double, double> keys;  ///< linear between keys; empty: `value` at all times
+};
+
+struct OfxParamSetStruct {
+    explicit OfxParamSetStruct(bool of_descriptor) : descriptor(of_descriptor) {}
+    bool descriptor;
+    OfxPropertySetStruct properties{strict::kParamSet};
+    std::map<std::string, std::unique_ptr<OfxParamStruct>> params;
+    std::vector<std::string> order;
+};
+
+struct OfxImageClipStruct {
+    std::string name;
+    OfxPropertySetStruct properties;
+};
+
+struct OfxImageEffectStruct {
+    explicit OfxImageEffectStruct(bool is_descriptor)
+        : descriptor(is_descriptor),
+          properties(is_descriptor ? strict::kEffectDescriptor : strict::kEffect),
+          params(is_descriptor) {}
+    bool descriptor;
+    OfxPropertySetStruct properties;
+    OfxParamSetStruct params;
+    std::map<std::string, std::unique_ptr<OfxImageClipStruct>> clips;
+    std::mutex mutex;
+    std::string persistent_message;     ///< empty: none shown
+    std::vector<std::string> messages;  ///< of both kinds, in order
+    std::atomic<int> abort_after{-1};   ///< polls until abort() says 1; -1: never
+    std::atomic<int> abort_polls{0};
+};
+
+namespace strict {
+
+// ---------------------------------------------------------------- pictures
+
+enum class Depth { kByte, kFloat };
+
+struct Layout {
+    OfxRectI bounds{0, 0, 16, 16};
+    int channels = 4;
+    Depth depth = Depth::kFloat;
+    std::ptrdiff_t padding = 0;  ///< bytes after each row
+    bool upside_down = false;    ///< negative rowBytes
+    std::string premultiplication = kOfxImageUnPreMultiplied;
+
+    int width() const { return bounds.x2 - bounds.x1; }
+    int height() const { return bounds.y2 - bounds.y1; }
+    int pixel_bytes() const { return channels * (depth == Depth::kByte ? 1 : 4); }
+};
+
+/// Pixels between guard bytes, in any layout.
+class Picture {
+public:
+    explicit Picture(const Layout& layout, std::uint8_t fill = 0xa5);
+    const Layout& layout() const { return layout_; }
+    std::ptrdiff_t row_bytes() const;
+    unsigned char* at(int x, int y);
+    const unsigned char* at(int x, int y) const;
+    float* floats(int x, int y) { return reinterpret_cast<float*>(at(x, y)); }
+    const float* floats(int x, int y) const { return reinterpret_cast<const float*>(at(x, y)); }
+    /// Everything, guards and padding included.
+    const std::vector<unsigned char>& storage() const { return storage_; }
+    /// The pixels of an area, row after row without gaps.
+    std::vector<unsigned char> pixels(const OfxRectI& area) const;
+    /// Whether a byte of storage belongs to a pixel of the area.
+    std::vector<bool> mask(const OfxRectI& area) const;
+
+private:
+    Layout layout_;
+    std::size_t stride_;
+    std::vector<unsigned char> storage_;
+};
+
+// ---------------------------------------------------------------- the host
+
+struct Config {
+    std::set<std::string> missing_suites;      ///< "OfxMessageSuite/2"
+    std::set<std::string> null_functions;      ///< "propSetString", "setPersistentMessage", …
+    std::set<std::string> missing_properties;  ///< answered with kOfxStatErrUnknown
+    long refused_call = -1;                    ///< this call of a suite, counted from 0, fails
+    unsigned processors = 4;
+};
+
+/// The process' one host. Change its configuration only while no plugin runs.
+class Host {
+public:
+    static Host& get();
+    OfxHost* ofx() { return &ofx_; }
+    /// New behaviour for plugins loaded from now on; the calls are counted from 0 again.
+    void configure(Config config);
+    const Config& config() const { return config_; }
+
+    void fault(const std::string& what);
+    std::vector<std::string> take_faults();
+    long calls() const { return calls_.load(); }
+    bool refused() const { return refused_.load(); }
+
+    // For the suites.
+    const void* suite(const std::string& name, int version);
+    bool count_call(const char* function);  ///< false: refuse this one
+
+private:
+    Host();
+    OfxPropertySetStruct properties_{kHost};
+    OfxHost ofx_{};
+    Config config_;
+    std::atomic<long> calls_{0};
+    std::atomic<bool> refused_{false};
+    std::mutex mutex_;
+    std::vector<std::string> faults_;
+    std::vector<std::unique_ptr<std::vector<unsigned char>>> handed_out_;
+};
+
+/// What the current thread is doing for the plugin.
+struct Activity {
+    std::string action;  ///< empty outside actions
+    bool worker = false;
+    Picture* output = nullptr;
+    const Picture* source = nullptr;
+    std::set<OfxPropertySetHandle>* images = nullptr;
+};
+Activity& activity();
+
+/// Made at the head of every suite function: the strings given out before become rubbish, and a
+/// worker thread that calls what it must not is noted.
+class Call {
+public:
+    explicit Call(const char* function, bool allowed_in_worker = false);
+    bool refused() const { return refused_; }
+    const char* function() const { return function_; }
+
+private:
+    const char* function_;
+    bool refused_;
+};
+/// Keeps a string for the plugin until this thread's next call.
+char* lend(const std::string& text);
+
+// The suites, and the names of their functions by offset (for Config::null_functions).
+struct SuiteTable {
+    const void* data;
+    std::size_t size;
+    std::map<std::string, std::size_t> functions;
+};
+SuiteTable property_suite();
+SuiteTable parameter_suite();
+SuiteTable effect_suite();
+SuiteTable memory_suite();
+SuiteTable thread_suite();
+SuiteTable message_suite_v1();
+SuiteTable message_suite_v2();
+
+// ---------------------------------------------------------------- plugins and instances
+
+class Instance;
+
+/// A bundle's binary and its first plugin.
+class Plugin {
+public:
+    explicit Plugin(const std::string& bundle);
+    ~Plugin();
+    Plugin(const Plugin&) = delete;
+    Plugin& operator=(const Plugin&) = delete;
+
+    const OfxPlugin& ofx() const { return *plugin_; }
+    OfxStatus call(const char* action, const void* handle, OfxPropertySetHandle in_args,
+                   OfxPropertySetHandle out_args);
+    OfxStatus load();
+    OfxStatus unload();
+    /// Describe and DescribeInContext, with their results checked. Empty when the plugin failed.
+    std::unique_ptr<OfxImageEffectStruct> describe(const std::string& context);
+    /// Load, describe and create; throws std::runtime_error when one of them fails.
+    std::unique_ptr<Instance> create(const std::string& context = kOfxImageEffectContextFilter);
+
+private:
+    void* library_ = nullptr;
+    OfxPlugin* plugin_ = nullptr;
+};
+
+class Instance {
+public:
+    Instance(Plugin& plugin, const OfxImageEffectStruct& descriptor, const std::string& context);
+    ~Instance();
+
+    OfxImageEffectStruct& effect() { return effect_; }
+    OfxStatus create();
+    OfxStatus destroy();
+    void set(const std::string& param, Value value);  ///< no action is sent
+    void animate(const std::string& param, std::map<double, double> keys);
+    OfxStatus changed(const std::string& param);
+    OfxStatus sync();
+    std::string text(const std::string& param);
+    /// kOfxStatOK: the clip's name and time are filled in.
+    OfxStatus is_identity(double time, std::string& clip, double& clip_time);
+    OfxStatus clip_preferences(bool& frame_varying);
+    /// Renders `window`; null source: the host has no picture. Checks images and guards afterwards.
+    OfxStatus render(double time, const Picture* source, Picture& output, const OfxRectI& window);
+
+private:
+    Plugin& plugin_;
+    OfxImageEffectStruct effect_;
+    bool created_ = false;
+};
+
+}  // namespace strict

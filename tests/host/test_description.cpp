@@ -1,0 +1,159 @@
+// What the node says about itself, and its life in the host.
+#include <algorithm>
+
+#include "harness.hpp"
+
+using namespace strict;
+using namespace test;
+
+TEST(node_describes_itself) {
+    Plugin plugin(bundle());
+    CHECK(plugin.ofx().pluginApi == std::string(kOfxImageEffectPluginApi));
+    CHECK(plugin.ofx().apiVersion == 1);
+    CHECK(plugin.ofx().pluginIdentifier == std::string("org.palette4d.Palette4D"));
+    CHECK(plugin.ofx().pluginVersionMajor == 1 && plugin.ofx().pluginVersionMinor == 0);
+    CHECK(plugin.load() == kOfxStatOK);
+    for (const char* context : {kOfxImageEffectContextFilter, kOfxImageEffectContextGeneral}) {
+        const auto effect = plugin.describe(context);
+        CHECK(effect != nullptr);
+        if (!effect) continue;
+        const OfxPropertySetStruct& p = effect->properties;
+        CHECK(p.text(kOfxPropLabel) == "Palette4D");
+        CHECK(p.values.at(kOfxImageEffectPropSupportedContexts).size() == 2);
+        CHECK(p.values.at(kOfxImageEffectPropSupportedPixelDepths).size() == 2);
+        CHECK(p.text(kOfxImageEffectPropSupportedPixelDepths, 0) == kOfxBitDepthFloat);
+        CHECK(p.text(kOfxImageEffectPropSupportedPixelDepths, 1) == kOfxBitDepthByte);
+        CHECK(p.text(kOfxImageEffectPluginRenderThreadSafety) == kOfxImageEffectRenderFullySafe);
+        CHECK(p.number(kOfxImageEffectPluginPropHostFrameThreading) == 0);
+        CHECK(p.number(kOfxImageEffectPropSupportsTiles) == 1);
+        CHECK(p.number(kOfxImageEffectPropSupportsMultiResolution) == 1);
+        CHECK(p.text("OfxImageEffectPropCPURenderSupported") == "true");
+        CHECK(p.text("OfxImageEffectPropNoSpatialAwareness") == "true");
+        for (const auto& [name, clip] : effect->clips) {
+            const OfxPropertySetStruct& c = clip->properties;
+            CHECK(c.text(kOfxImageEffectPropSupportedComponents, 0) == kOfxImageComponentRGBA);
+            CHECK(c.text(kOfxImageEffectPropSupportedComponents, 1) == kOfxImageComponentRGB);
+        }
+        const std::vector<std::string> names = {"sidecar", "strength", "frameOffset", "status"};
+        CHECK(effect->params.order == names);
+        const auto& params = effect->params.params;
+        const OfxPropertySetStruct& sidecar = params.at("sidecar")->properties;
+        CHECK(sidecar.text(kOfxParamPropStringMode) == kOfxParamStringIsFilePath);
+        CHECK(sidecar.number(kOfxParamPropStringFilePathExists) == 1);
+        const OfxPropertySetStruct& strength = params.at("strength")->properties;
+        CHECK(strength.number(kOfxParamPropMin) == 0 && strength.number(kOfxParamPropMax) == 1);
+        CHECK(strength.number(kOfxParamPropDefault) == 1);
+        CHECK(params.at("frameOffset")->properties.number(kOfxParamPropDefault) == 0);
+        const OfxPropertySetStruct& status = params.at("status")->properties;
+        CHECK(status.text(kOfxParamPropStringMode) == kOfxParamStringIsLabel);
+        CHECK(status.number(kOfxParamPropEnabled) == 0);
+        CHECK(status.number(kOfxParamPropPersistant) == 0);
+    }
+    CHECK(plugin.unload() == kOfxStatOK);
+}
+
+TEST(unknown_actions_are_left_to_the_host) {
+    Plugin plugin(bundle());
+    const auto instance = plugin.create();
+    for (const char* action :
+         {"OfxActionSomethingNew", kOfxImageEffectActionGetRegionOfDefinition,
+          kOfxImageEffectActionGetRegionsOfInterest, kOfxImageEffectActionGetFramesNeeded,
+          kOfxImageEffectActionBeginSequenceRender, kOfxImageEffectActionEndSequenceRender,
+          kOfxActionBeginInstanceChanged, kOfxActionEndInstanceChanged}) {
+        CHECK(plugin.call(action, &instance->effect(), nullptr, nullptr) == kOfxStatReplyDefault);
+    }
+    CHECK(plugin.ofx().mainEntry(nullptr, nullptr, nullptr, nullptr) == kOfxStatReplyDefault);
+    CHECK(plugin.call(kOfxActionPurgeCaches, &instance->effect(), nullptr, nullptr) == kOfxStatOK);
+}
+
+TEST(a_still_picture_varies_from_frame_to_frame) {
+    Plugin plugin(bundle());
+    const auto instance = plugin.create();
+    bool varying = false;
+    CHECK(instance->clip_preferences(varying) == kOfxStatOK);
+    CHECK(varying);
+}
+
+TEST(status_says_what_was_loaded) {
+    Plugin plugin(bundle());
+    const auto instance = plugin.create();
+    CHECK(instance->text("status") == "No sidecar chosen");
+    instance->set("sidecar", sidecar());
+    CHECK(instance->changed("sidecar") == kOfxStatOK);
+    CHECK(instance->text("status") == "box: frames 10-20 at 24 fps, 16 palette vertices, 3 edits");
+    instance->set("sidecar", (folder() / "gone.p4d.json").u8string());
+    CHECK(instance->changed("strength") == kOfxStatOK);
+    CHECK(instance->text("status").find("box") == 0);
+    CHECK(instance->changed("sidecar") == kOfxStatOK);
+    CHECK(instance->text("status").find("gone.p4d.json") != std::string::npos);
+    CHECK(instance->text("status").find("does not exist") != std::string::npos);
+    instance->set("sidecar", write("broken.p4d.json", "{\"schema\": 5}"));
+    CHECK(instance->sync() == kOfxStatOK);
+    CHECK(instance->text("status").find("broken.p4d.json") != std::string::npos);
+    CHECK(instance->text("status").find("expected") != std::string::npos);
+    instance->set("sidecar", std::string());
+    CHECK(instance->changed("sidecar") == kOfxStatOK);
+    CHECK(instance->text("status") == "No sidecar chosen");
+}
+
+TEST(a_reopened_project_has_its_status) {
+    Plugin plugin(bundle());
+    CHECK(plugin.load() == kOfxStatOK);
+    const auto descriptor = plugin.describe(kOfxImageEffectContextGeneral);
+    Instance instance(plugin, *descriptor, kOfxImageEffectContextGeneral);
+    instance.set("sidecar", sidecar());
+    CHECK(instance.create() == kOfxStatOK);
+    CHECK(instance.text("status").find("box: frames 10-20") == 0);
+}
+
+TEST(load_and_unload_repeat) {
+    const std::string path = sidecar();
+    const palette4d::Sidecar parsed = palette4d::read_sidecar(path);
+    for (int binary = 0; binary < 3; ++binary) {
+        Plugin plugin(bundle());
+        for (int round = 0; round < 4; ++round) {
+            {
+                // Loaded again by each instance, as MLT does.
+                const auto first = plugin.create();
+                const auto second = plugin.create(kOfxImageEffectContextGeneral);
+                Picture source{Layout()}, output{Layout()};
+                fill(source);
+                for (Instance* instance : {first.get(), second.get()}) {
+                    instance->set("sidecar", path);
+                    CHECK(instance->render(3, &source, output, output.layout().bounds) ==
+                          kOfxStatOK);
+                    CHECK(output.pixels(output.layout().bounds) ==
+                          recoloured(parsed, 13, source, output.layout().bounds));
+                }
+            }
+            CHECK(plugin.unload() == kOfxStatOK);
+        }
+    }
+}
+
+TEST(identity_is_reported) {
+    Plugin plugin(bundle());
+    const auto instance = plugin.create();
+    std::string clip;
+    double time = 0;
+    const auto identity = [&](double at) {
+        const OfxStatus status = instance->is_identity(at, clip, time);
+        CHECK(status == kOfxStatOK || status == kOfxStatReplyDefault);
+        if (status == kOfxStatOK) CHECK(clip == "Source" && time == at);
+        return status == kOfxStatOK;
+    };
+    CHECK(identity(2.5));  // no sidecar
+    instance->set("sidecar", sidecar());
+    CHECK(!identity(2.5));
+    instance->set("strength", 0.0);
+    CHECK(identity(2.5));
+    instance->animate("strength", {{0, 0}, {10, 1}});
+    CHECK(identity(0));
+    CHECK(!identity(0.25));
+    instance->animate("strength", {});
+    instance->set("strength", 1.0);
+    instance->set("sidecar", sidecar("plain.p4d.json", false));
+    CHECK(identity(2.5));
+    instance->set("sidecar", std::string("/nowhere/at/all.p4d.json"));
+    CHECK(!identity(2.5));  // there is a message to show
+}

@@ -1,0 +1,216 @@
+// Sidecars that are missing, broken, replaced, truncated and rewritten.
+#include <atomic>
+#include <fstream>
+#include <thread>
+
+#include "harness.hpp"
+
+using namespace strict;
+using namespace test;
+
+namespace {
+
+struct Scene {
+    Plugin plugin{bundle()};
+    std::unique_ptr<Instance> instance = plugin.create();
+    Layout layout;
+    Picture source{layout}, output{layout};
+    Scene() { fill(source); }
+
+    std::vector<unsigned char> render(double time = 2) {
+        output = Picture(layout);
+        CHECK(instance->render(time, &source, output, layout.bounds) == kOfxStatOK);
+        return output.pixels(layout.bounds);
+    }
+    std::vector<unsigned char> unchanged() const { return source.pixels(layout.bounds); }
+    std::string message() { return instance->effect().persistent_message; }
+};
+
+/// Moves the file's time out of the span in which a second change could hide.
+void age(const std::string& path, int seconds) {
+    namespace fs = std::filesystem;
+    fs::last_write_time(path, fs::file_time_type::clock::now() - std::chrono::seconds(seconds));
+}
+
+}  // namespace
+
+TEST(unusable_sidecars_pass_the_picture_through) {
+    Scene scene;
+    const std::string whole = sidecar_text();
+    std::vector<std::pair<std::string, std::string>> bad = {
+        {(folder() / "missing.p4d.json").u8string(), "does not exist"},
+        {folder().u8string(), "not a file"},
+        {write("empty.p4d.json", ""), "empty.p4d.json"},
+        {write("binary.p4d.json", std::string("\0\xff\xfe\x01", 4)), "binary.p4d.json"},
+        {write("other.p4d.json", "[1, 2, 3]"), "other.p4d.json"},
+        {write("percent.p4d.json", "{\"schema\": \"%s%n%d\"}"), "percent.p4d.json"},
+        {(folder() / "a\nb%s%n.json").u8string(), "%s%n"},
+        {std::string("\xff\xfe/not utf-8"), ""},
+        {std::string(5000, 'x'), ""},
+    };
+    std::string newer = whole;
+    newer.replace(newer.find("\"version\": 1"), 12, "\"version\": 9");
+    bad.emplace_back(write("newer.p4d.json", newer), "/version");
+    for (std::size_t cut : {1u, 100u, 700u, 1500u}) {
+        bad.emplace_back(write("cut" + std::to_string(cut) + ".p4d.json", whole.substr(0, cut)),
+                         "");
+    }
+    for (const auto& [path, word] : bad) {
+        scene.instance->set("sidecar", path);
+        CHECK(scene.render() == scene.unchanged());
+        EXPECT(!scene.message().empty(), "no message for " + path);
+        EXPECT(scene.message().find(word) != std::string::npos,
+               "no '" + word + "' in: " + scene.message());
+    }
+    // And all is well again with a good one.
+    scene.instance->set("sidecar", sidecar());
+    CHECK(scene.render() != scene.unchanged());
+    CHECK(scene.message().empty());
+}
+
+TEST(a_message_is_shown_once_and_taken_away) {
+    Scene scene;
+    scene.instance->set("sidecar", std::string("/nowhere.p4d.json"));
+    for (int i = 0; i < 5; ++i) scene.render(i);
+    CHECK(scene.instance->effect().messages.size() == 1);
+    scene.instance->set("sidecar", std::string());
+    scene.render();
+    CHECK(scene.message().empty());
+    CHECK(scene.instance->effect().messages.size() == 1);
+    // An instance of its own has its own message.
+    const auto other = scene.plugin.create();
+    CHECK(other->effect().messages.empty());
+}
+
+TEST(a_changed_sidecar_is_read_again) {
+    Scene scene;
+    const std::string path = sidecar();
+    const palette4d::Sidecar edited = palette4d::read_sidecar(path);
+    scene.instance->set("sidecar", path);
+    const auto first = scene.render();
+    CHECK(first == recoloured(edited, 12, scene.source, scene.layout.bounds));
+    age(path, 100);
+    CHECK(scene.render() == first);
+    // Another size, within the same second.
+    write("clip.p4d.json", sidecar_text(false));
+    CHECK(scene.render() == scene.unchanged());
+    // The same size and the same time, within a clock tick: the content tells.
+    std::string other = sidecar_text();
+    const std::size_t at = other.find("[0.2, 0.7, 0.1]");
+    CHECK(at != std::string::npos);
+    write("clip.p4d.json", other);
+    const auto stamp = std::filesystem::last_write_time(path);
+    CHECK(scene.render() == first);
+    other.replace(at, 15, "[0.2, 0.1, 0.7]");
+    write("clip.p4d.json", other);
+    std::filesystem::last_write_time(path, stamp);
+    const auto second = scene.render();
+    CHECK(second != first);
+    CHECK(second ==
+          recoloured(palette4d::read_sidecar(path), 12, scene.source, scene.layout.bounds));
+    // Replaced by renaming, as the one writer does, with a time in the past.
+    write("new.p4d.json", sidecar_text());
+    age((folder() / "new.p4d.json").u8string(), 1000);
+    std::filesystem::rename(folder() / "new.p4d.json", folder() / "clip.p4d.json");
+    CHECK(scene.render() == first);
+    // Removed, and back.
+    std::filesystem::remove(path);
+    CHECK(scene.render() == scene.unchanged());
+    CHECK(scene.message().find("does not exist") != std::string::npos);
+    sidecar();
+    CHECK(scene.render() == first);
+    CHECK(scene.message().empty());
+}
+
+TEST(one_file_by_several_names) {
+    Scene scene;
+    const std::string path = sidecar();
+    std::filesystem::create_directories(folder() / "deep");
+    scene.instance->set("sidecar", path);
+    const auto expected = scene.render();
+    CHECK(expected != scene.unchanged());
+    scene.instance->set("sidecar", (folder() / "deep" / ".." / "clip.p4d.json").u8string());
+    CHECK(scene.render() == expected);
+    const std::string spaced = sidecar("ein schöner Pfad 'mit' \"allem\".p4d.json");
+    scene.instance->set("sidecar", spaced);
+    CHECK(scene.render() == expected);
+    std::error_code error;
+    std::filesystem::create_symlink(path, folder() / "link.p4d.json", error);
+    if (!error) {
+        scene.instance->set("sidecar", (folder() / "link.p4d.json").u8string());
+        CHECK(scene.render() == expected);
+    }
+}
+
+TEST(more_sidecars_than_the_cache_holds) {
+    Scene scene;
+    const std::string text = sidecar_text();
+    std::vector<unsigned char> expected;
+    for (int i = 0; i < 80; ++i) {
+        scene.instance->set("sidecar", write("clip" + std::to_string(i) + ".p4d.json", text));
+        const auto picture = scene.render();
+        if (i) CHECK(picture == expected);
+        expected = picture;
+    }
+    CHECK(expected != scene.unchanged());
+}
+
+TEST(a_sidecar_rewritten_while_rendering) {
+    // Whole, truncated, gone and other files come and go under the renders: each picture is one of
+    // the honest three, never a mixture.
+    Scene scene;
+    const std::string path = sidecar();
+    const std::string whole = sidecar_text(), plain = sidecar_text(false);
+    const auto edited =
+        recoloured(palette4d::read_sidecar(path), 12, scene.source, scene.layout.bounds);
+    const auto unchanged = scene.unchanged();
+    CHECK(edited != unchanged);
+    std::atomic<bool> done{false};
+    std::atomic<int> wrong{0}, seen_edited{0}, seen_unchanged{0};
+    std::vector<std::thread> threads;
+    for (int t = 0; t < 4; ++t) {
+        threads.emplace_back([&] {
+            const auto instance = scene.plugin.create();
+            instance->set("sidecar", path);
+            Picture output(scene.layout);
+            while (!done) {
+                wrong +=
+                    instance->render(2, &scene.source, output, scene.layout.bounds) != kOfxStatOK;
+                const auto pixels = output.pixels(scene.layout.bounds);
+                if (pixels == edited) {
+                    ++seen_edited;
+                } else if (pixels == unchanged) {
+                    ++seen_unchanged;
+                } else {
+                    ++wrong;
+                }
+            }
+        });
+    }
+    for (int round = 0; round < 200; ++round) {
+        switch (round % 5) {
+            case 0:
+                write("clip.p4d.json", whole);
+                break;
+            case 1:
+                write("clip.p4d.json", whole.substr(0, whole.size() / 2));
+                break;
+            case 2:
+                write("next.p4d.json", whole);
+                std::filesystem::rename(folder() / "next.p4d.json", folder() / "clip.p4d.json");
+                break;
+            case 3:
+                write("clip.p4d.json", plain);
+                break;
+            case 4:
+                std::filesystem::remove(path);
+                break;
+        }
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    done = true;
+    for (std::thread& thread : threads) thread.join();
+    CHECK(wrong == 0);
+    CHECK(seen_edited > 0);
+    CHECK(seen_unchanged > 0);
+}

@@ -1,0 +1,383 @@
+"""The node in a real host: every frame that melt renders is the core's, to the host's rounding.
+
+melt exits with 0 and hands the picture through whatever happens to a filter, so each test also
+sees to it that pixels really changed, or really did not.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+from numpy.typing import NDArray
+from palette4d import _core
+
+SERVICE = "openfx.org.palette4d.Palette4D"
+RATE = 25  # melt's own idea of the rate of numbered pictures
+Image = NDArray[Any]  # (h, w, 3 or 4) uint8 or uint16
+
+# Corners 0..7 count in red, green, blue bits; anticlockwise from outside.
+BOX_FACES = [
+    *([0, 2, 3], [0, 3, 1], [4, 5, 7], [4, 7, 6], [0, 1, 5], [0, 5, 4]),
+    *([2, 6, 7], [2, 7, 3], [0, 4, 6], [0, 6, 2], [1, 3, 7], [1, 7, 5]),
+]  # fmt: skip
+
+
+def write_image(path: Path, image: Image) -> None:
+    spec = oiio.ImageSpec(image.shape[1], image.shape[0], image.shape[2], str(image.dtype))
+    output = oiio.ImageOutput.create(str(path))
+    assert output.open(str(path), spec)
+    assert output.write_image(np.ascontiguousarray(image))
+    assert output.close()
+
+
+def read_image(path: Path) -> Image:
+    hint = oiio.ImageSpec()
+    hint.attribute("oiio:UnassociatedAlpha", 1)
+    source = oiio.ImageInput.open(str(path), hint)
+    assert source, f"{path}: {oiio.geterror()}"
+    image = np.asarray(source.read_image(str(source.spec().format)))
+    source.close()
+    return image
+
+
+def box_sidecar(path: Path, clip: Sequence[Image], first: int = 100) -> _core.Sidecar:
+    """A sidecar around all of a clip's colours, edited in time.
+
+    Nothing is edited at the first frame, a lot at the last, and there is a stop between.
+    """
+    count = len(clip)
+    top = np.iinfo(clip[0].dtype).max
+    low = np.min([frame[..., :3].min(axis=(0, 1)) for frame in clip], axis=0) / top - 0.02
+    high = np.max([frame[..., :3].max(axis=(0, 1)) for frame in clip], axis=0) / top + 0.02
+    corners = [[float((high if i >> c & 1 else low)[c]) for c in range(3)] for i in range(8)]
+    vertices = [
+        {"id": f"{end}{i}", "frame": frame, "rgb": corners[i]}
+        for end, frame in (("a", first), ("b", first + count - 1))
+        for i in range(8)
+    ]
+    document = {
+        "schema": "palette4d.sidecar",
+        "version": 1,
+        "generator": "palette4d tests",
+        "clip": {
+            "name": "box",
+            "source": "in_###.png",
+            "frames": {"first": first, "last": first + count - 1, "step": 1, "skipped": []},
+            "rate": [RATE, 1],
+            "size": [clip[0].shape[1], clip[0].shape[0]],
+            "encoding": "sRGB",
+        },
+        "polytope": {
+            "vertices": vertices,
+            "edges": [{"id": f"e{i}", "from": f"a{i}", "to": f"b{i}"} for i in range(8)],
+            "blocks": [
+                {
+                    "first": first,
+                    "last": first + count - 1,
+                    "tracks": [[f"a{i}", f"b{i}"] for i in range(8)],
+                    "faces": BOX_FACES,
+                }
+            ],
+            "transitions": [],
+        },
+        "quality": {"stages": [], "options": {}, "versions": {}},
+        "edits": {
+            "vertices": [
+                {"vertex": "b1", "rgb": [0.2, 0.9, 0.4]},
+                {"vertex": "b6", "rgb": [1.3, 0.1, -0.2]},
+            ],
+            "stops": [
+                {"id": "s0", "edge": "e3", "frame": first + count // 2, "rgb": [0.3, 0.2, 0.8]}
+            ],
+        },
+        "extra": {},
+    }
+    path.write_text(json.dumps(document), encoding="utf-8")
+    return _core.read_sidecar(str(path))
+
+
+def recolour(
+    sidecar: _core.Sidecar, frame: float, image: Image, strength: float = 1.0
+) -> NDArray[np.float32]:
+    """What the core makes of a frame, clamped to 0..1 as files of integers are."""
+    cut = _core.slice_at(sidecar.polytope, frame)
+    edited = _core.edited_colours(sidecar.polytope, sidecar.edits, cut)
+    recolourer = _core.Recolourer(cut.rgb, edited, cut.faces)
+    top = np.float32(np.iinfo(image.dtype).max)
+    values = image.astype(np.float32) / top
+    return np.clip(recolourer.apply(values, strength=strength), 0, 1)
+
+
+@dataclass
+class Scene:
+    """A clip as numbered pictures, and melt to render it through the node."""
+
+    melt: Path
+    plugins: Path
+    folder: Path
+    clip: list[Image]
+
+    def __post_init__(self) -> None:
+        height, width = self.clip[0].shape[:2]
+        self.folder.mkdir(parents=True)
+        for index, image in enumerate(self.clip):
+            write_image(self.folder / f"in_{index:03d}.png", image)
+        profile = {
+            "description": "test",
+            "frame_rate_num": RATE,
+            "frame_rate_den": 1,
+            "width": width,
+            "height": height,
+            "progressive": 1,
+            "sample_aspect_num": 1,
+            "sample_aspect_den": 1,
+            "display_aspect_num": width,
+            "display_aspect_den": height,
+            "colorspace": 709,
+        }
+        lines = [f"{key}={value}\n" for key, value in profile.items()]
+        (self.folder / "profile").write_text("".join(lines))
+
+    def run(self, *words: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [str(self.melt), *words],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            cwd=self.folder,
+            env={**os.environ, "OFX_PLUGIN_PATH": str(self.plugins)},
+            timeout=300,
+            check=True,
+        )
+
+    def render(self, *, real_time: int = -1, **parameters: object) -> tuple[list[Image], str]:
+        """The clip through the node, at its own depth, and what melt said meanwhile."""
+        for old in self.folder.glob("out_*.png"):
+            old.unlink()
+        image_format = "rgba" if self.clip[0].dtype == np.uint8 else "rgba64"
+        pixels = "rgba" if image_format == "rgba" else "rgba64be"
+        done = self.run(
+            # abnormal: without the loader's normalisers, which take pictures through 4:2:2.
+            # Not -quiet: it would keep the persistent messages to itself.
+            *("-profile", "profile", "abnormal:in_%03d.png", "-attach", SERVICE),
+            *(f"{name}={value}" for name, value in parameters.items()),
+            *("-consumer", "avformat:out_%03d.png", "vcodec=png", "an=1", f"pix_fmt={pixels}"),
+            *(f"mlt_image_format={image_format}", f"real_time={real_time}"),
+        )
+        files = sorted(self.folder.glob("out_*.png"))
+        assert len(files) == len(self.clip), done.stderr
+        return [read_image(path) for path in files], done.stderr
+
+    def unchanged(self, frames: list[Image]) -> bool:
+        """Whether every frame came through bit for bit."""
+        return all(
+            np.array_equal(frame[..., :3], image[..., :3])
+            for frame, image in zip(frames, self.clip, strict=True)
+        )
+
+    def check(
+        self,
+        frames: list[Image],
+        sidecar: _core.Sidecar,
+        *,
+        strength: Sequence[float] | None = None,
+        offset: float = 0.0,
+    ) -> None:
+        """Every frame is the core's to within one step of its depth, and not the source's."""
+        first = float(sidecar.clip["first"])
+        top = float(np.iinfo(self.clip[0].dtype).max)
+        changed = 0.0
+        for index, (frame, image) in enumerate(zip(frames, self.clip, strict=True)):
+            s = 1.0 if strength is None else strength[index]
+            expected = recolour(sidecar, first + index + offset, image[..., :3], s)
+            error = np.abs(frame[..., :3].astype(np.float64) - expected * top)
+            # Bytes are rounded by the node itself; floats by the host, which may cut them off.
+            limit = 0.5 + 1e-3 if top == 255 else 1.0 + 1e-2
+            assert error.max() <= limit, f"frame {index}: off by {error.max()} of {top}"
+            assert np.all(frame[..., 3] == top), f"frame {index}: its alpha changed"
+            changed += float(np.abs(expected - image[..., :3] / top).mean())
+        assert changed / len(frames) > 0.01, "the edit changed next to nothing"
+
+
+def moving_clip(depth: type[np.uint8] | type[np.uint16], count: int = 10) -> list[Image]:
+    """Ramps of all three colours that drift, with some noise."""
+    random = np.random.default_rng(5)
+    y, x = np.mgrid[0:34, 0:46] / 45.0
+    top = np.iinfo(depth).max
+    clip = []
+    for index in range(count):
+        t = index / count
+        rgb = np.stack([(x + t) % 1, (y * 1.3 + t / 2) % 1, (x * y + 1 - t) % 1], axis=-1)
+        rgb = np.clip(rgb * 0.8 + 0.1 + random.normal(0, 0.02, rgb.shape), 0, 1)
+        clip.append(np.round(rgb * top).astype(depth))
+    return clip
+
+
+@pytest.fixture(scope="module", params=[np.uint8, np.uint16], ids=["8bit", "16bit"])
+def scene(
+    request: pytest.FixtureRequest,
+    melt: Path,
+    bundle: Path,
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Scene:
+    folder = tmp_path_factory.mktemp("melt") / "clip"
+    return Scene(melt, bundle.parent, folder, moving_clip(request.param))
+
+
+@pytest.fixture(scope="module")
+def sidecar(scene: Scene) -> _core.Sidecar:
+    return box_sidecar(scene.folder / "box.p4d.json", scene.clip)
+
+
+def path_of(scene: Scene) -> Path:
+    return scene.folder / "box.p4d.json"
+
+
+def test_the_node_is_offered_with_its_parameters(scene: Scene) -> None:
+    assert f"- {SERVICE}\n" in scene.run("-query", "filters").stdout
+    about = scene.run("-query", f"filter={SERVICE}").stdout
+    for name in ("sidecar", "strength", "frameOffset", "status"):
+        assert f"- identifier: {name}\n" in about
+
+
+def test_every_frame_is_the_cores(scene: Scene, sidecar: _core.Sidecar) -> None:
+    frames, said = scene.render(sidecar=path_of(scene))
+    scene.check(frames, sidecar)
+    assert "persistent" not in said
+
+
+@pytest.fixture(scope="module", params=[np.uint8, np.uint16], ids=["8bit", "16bit"])
+def still_scene(
+    request: pytest.FixtureRequest,
+    melt: Path,
+    bundle: Path,
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Scene:
+    """One picture ten times over.
+
+    With several threads melt now and then hands a filter the pixels of a neighbouring frame, with
+    or without the node. On a still picture that does not show, and a palette of the wrong time does.
+    """
+    folder = tmp_path_factory.mktemp("melt") / "still"
+    return Scene(melt, bundle.parent, folder, moving_clip(request.param)[:1] * 10)
+
+
+@pytest.mark.parametrize("threads", [-2, -4])
+def test_many_threads_keep_their_times(still_scene: Scene, threads: int) -> None:
+    sidecar = box_sidecar(path_of(still_scene), still_scene.clip)
+    frames, said = still_scene.render(sidecar=path_of(still_scene), real_time=threads)
+    still_scene.check(frames, sidecar)
+    assert "persistent" not in said
+
+
+def test_strength(scene: Scene, sidecar: _core.Sidecar) -> None:
+    frames, _ = scene.render(sidecar=path_of(scene), strength=0.35)
+    scene.check(frames, sidecar, strength=[0.35] * len(scene.clip))
+    frames, said = scene.render(sidecar=path_of(scene), strength=0)
+    assert scene.unchanged(frames)
+    assert "persistent" not in said
+
+
+def test_keyframed_strength(scene: Scene, sidecar: _core.Sidecar) -> None:
+    last = len(scene.clip) - 1
+    frames, _ = scene.render(sidecar=path_of(scene), strength=f"0=0;{last}=1")
+    scene.check(frames, sidecar, strength=[index / last for index in range(last + 1)])
+
+
+@pytest.mark.parametrize("offset", [3.0, -2.5])
+def test_frame_offset(scene: Scene, sidecar: _core.Sidecar, offset: float) -> None:
+    frames, _ = scene.render(sidecar=path_of(scene), frameOffset=offset)
+    scene.check(frames, sidecar, offset=offset)
+
+
+def test_without_a_sidecar_the_picture_passes(scene: Scene) -> None:
+    frames, said = scene.render()
+    assert scene.unchanged(frames)
+    assert "persistent" not in said
+
+
+@pytest.mark.parametrize("kind", ["missing", "broken", "truncated", "newer"])
+def test_an_unusable_sidecar_passes_the_picture_with_a_message(
+    scene: Scene, sidecar: _core.Sidecar, kind: str
+) -> None:
+    text = path_of(scene).read_text()
+    bad = scene.folder / f"{kind}.p4d.json"
+    if kind == "broken":
+        bad.write_text("this is not JSON")
+    elif kind == "truncated":
+        bad.write_text(text[: len(text) // 2])
+    elif kind == "newer":
+        bad.write_text(text.replace('"version": 1', '"version": 99'))
+    frames, said = scene.render(sidecar=bad)
+    assert scene.unchanged(frames)
+    messages = [line for line in said.splitlines() if "persistent" in line]
+    assert messages, said
+    assert bad.name in messages[0]
+
+
+def test_a_path_with_spaces_and_umlauts(scene: Scene, sidecar: _core.Sidecar) -> None:
+    folder = scene.folder / "Grüne Blätter, Nr. 7"
+    folder.mkdir(exist_ok=True)
+    path = folder / "schöner Clip.p4d.json"
+    path.write_bytes(path_of(scene).read_bytes())
+    frames, _ = scene.render(sidecar=path)
+    scene.check(frames, sidecar)
+
+
+def test_golden_sidecars(scene: Scene, repo_root: Path) -> None:
+    golden = sorted((repo_root / "tests" / "golden" / "sidecars").glob("v1_edit*.p4d.json"))
+    assert golden
+    for path in golden:
+        sidecar = _core.read_sidecar(str(path))
+        frames, said = scene.render(sidecar=path)
+        assert "persistent" not in said
+        scene.check(frames, sidecar)
+
+
+@pytest.fixture(scope="module", params=[np.uint8, np.uint16], ids=["8bit", "16bit"])
+def seasons_scene(
+    request: pytest.FixtureRequest,
+    melt: Path,
+    bundle: Path,
+    seasons: Path,
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Scene:
+    """The paper's SEASONS clip (where it is at hand), from spring to winter."""
+    # Every sixth frame, each second pixel: all seasons, in little time.
+    clip = [read_image(path)[::2, ::2, :3] for path in sorted(seasons.glob("*.png"))[::6]]
+    if request.param is np.uint16:
+        # Between the 8-bit steps too.
+        random = np.random.default_rng(7)
+        clip = [
+            np.clip(
+                image.astype(np.int64) * 257 + random.integers(-128, 129, image.shape), 0, 65535
+            ).astype(np.uint16)
+            for image in clip
+        ]
+    folder = tmp_path_factory.mktemp("melt") / "seasons"
+    return Scene(melt, bundle.parent, folder, clip)
+
+
+def test_seasons(seasons_scene: Scene) -> None:
+    scene = seasons_scene
+    sidecar = box_sidecar(path_of(scene), scene.clip)
+    frames, said = scene.render(sidecar=path_of(scene))
+    assert "persistent" not in said
+    scene.check(frames, sidecar)
+    # Nothing is edited at the first frame: spring stays, winter does not.
+    first, last = (
+        float(np.abs(frames[i][..., :3].astype(np.float64) - scene.clip[i]).mean()) for i in (0, -1)
+    )
+    top = np.iinfo(scene.clip[0].dtype).max
+    assert first < 1e-4 * top
+    assert last > 0.02 * top

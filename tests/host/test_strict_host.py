@@ -1,0 +1,103 @@
+"""The parity cases through the node, in the strict host: the same bytes as the compiled core."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from palette4d import _core
+
+FORMATS = {
+    "float RGBA": ("RGBA", "float", ()),
+    "float RGB": ("RGB", "float", ()),
+    "byte RGBA": ("RGBA", "byte", ()),
+    "premultiplied": ("RGBA", "float", ("--premultiplied", "1")),
+    "upside down tiles": (
+        "RGBA",
+        "float",
+        ("--upside-down", "1", "--padding", "24", "--origin", "-7,5", "--tile", "9"),
+    ),
+}
+
+
+def picture(channels: int, depth: str) -> NDArray[np.float32] | NDArray[np.uint8]:
+    random = np.random.default_rng(11)
+    if depth == "byte":
+        return random.integers(0, 256, (27, 31, channels), np.uint8)
+    image = (random.random((27, 31, channels)) * 1.8 - 0.4).astype(np.float32)
+    image[3, 4, 0] = np.nan
+    image[5, 6, 1] = np.inf
+    image[7, 8, 2] = -np.inf
+    return image
+
+
+def through_the_core(
+    path: Path,
+    frame: float,
+    image: NDArray[np.float32] | NDArray[np.uint8],
+    strength: float,
+    premultiplied: bool,
+) -> bytes:
+    sidecar = _core.read_sidecar(str(path))
+    cut = _core.slice_at(sidecar.polytope, frame)
+    edited = _core.edited_colours(sidecar.polytope, sidecar.edits, cut)
+    recolourer = _core.Recolourer(cut.rgb, edited, cut.faces)
+    if image.dtype == np.float32:
+        return recolourer.apply(image, strength=strength, premultiplied=premultiplied).tobytes()
+    values = image.astype(np.float32) / np.float32(255)
+    result = np.clip(recolourer.apply(values, strength=strength), 0, 1) * np.float32(255)
+    return np.floor(result.astype(np.float64) + 0.5).astype(np.uint8).tobytes()
+
+
+def golden() -> list[Path]:
+    folder = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
+    return sorted(folder.glob("v1_*.p4d.json"))
+
+
+@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("path", golden(), ids=lambda path: path.name.split(".")[0])
+def test_the_nodes_bytes_are_the_cores(
+    strict_host: Path, bundle: Path, tmp_path: Path, path: Path, name: str
+) -> None:
+    components, depth, options = FORMATS[name]
+    image = picture(len(components), depth)
+    image.tofile(tmp_path / "in.raw")
+    polytope = _core.read_sidecar(str(path)).polytope
+    first, last = polytope.first_frame, polytope.last_frame
+    for part in (0.0, 0.375, 0.5, 1.0):
+        frame = float(first + round((last - first) * part * 4) / 4)
+        strength = 0.75 if part == 0.5 else 1.0
+        done = subprocess.run(
+            [
+                *(strict_host, "render", bundle, path),
+                *("--frame", repr(frame), "--width", "31", "--height", "27"),
+                *("--components", components, "--depth", depth),
+                *("--strength", str(strength), *options),
+                *(tmp_path / "in.raw", tmp_path / "out.raw"),
+            ],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        assert "message:" not in done.stdout
+        expected = through_the_core(path, frame, image, strength, "--premultiplied" in options)
+        assert (tmp_path / "out.raw").read_bytes() == expected
+
+
+def test_the_driver_says_what_is_wrong(strict_host: Path, bundle: Path, tmp_path: Path) -> None:
+    (tmp_path / "in.raw").write_bytes(b"too short")
+    done = subprocess.run(
+        [
+            *(strict_host, "render", bundle, "x.json", "--width", "8", "--height", "8"),
+            *(tmp_path / "in.raw", tmp_path / "out.raw"),
+        ],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert "expected width x height" in done.stderr

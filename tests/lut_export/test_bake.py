@@ -1,0 +1,425 @@
+"""The bake: what is written, read back through OpenColorIO, against the exact core."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import PyOpenColorIO as ocio
+import pytest
+from numpy.typing import NDArray
+from palette4d import Palette4dError, SidecarError, _core
+from palette4d.cli import main
+from palette4d.lut_export import lattice as lattices
+from palette4d.lut_export.bake import BakeOptions, bake, stated
+from palette4d.lut_export.formats import LoadedLut
+
+F32 = NDArray[np.float32]
+
+
+def read_back(path: Path, colours: F32, interpolation: ocio.Interpolation) -> F32:
+    """Apply a LUT file as a host with OpenColorIO does, independent of the code under test."""
+    ocio.ClearAllCaches()
+    transform = ocio.FileTransform(src=str(path), interpolation=interpolation)
+    processor = ocio.Config.CreateRaw().getProcessor(transform).getDefaultCPUProcessor()
+    result = np.array(colours, dtype=np.float32, order="C")
+    processor.applyRGB(result)
+    return result
+
+
+def exact(sidecar: Path, frame: float, colours: F32, strength: float = 1.0) -> F32:
+    """What the node would make of colours."""
+    recolourer = lattices.recolourer_at(_core.read_sidecar(str(sidecar)), frame)
+    return recolourer.apply(colours, strength=strength)
+
+
+def random_colours(count: int = 20_000) -> F32:
+    return np.random.default_rng(4).random((1, count, 3), dtype=np.float32)
+
+
+@pytest.mark.parametrize("extension", [".cube", ".clf"])
+def test_a_file_read_back_keeps_its_stated_error(
+    extension: str, warm_sidecar: Path, tmp_path: Path
+) -> None:
+    image = random_colours().reshape(100, 200, 3)
+    out = tmp_path / f"warm{extension}"
+    result = bake(warm_sidecar, out, BakeOptions(4.0, 17), image=image, image_frame=4)
+    assert result.clip is not None
+    want = exact(warm_sidecar, 4.0, image)
+    assert np.abs(want - image).max() > 0.2  # the edit does something
+    readings = (
+        [ocio.INTERP_DEFAULT, ocio.INTERP_LINEAR, ocio.INTERP_TETRAHEDRAL, ocio.INTERP_BEST]
+        if extension == ".cube"
+        else [ocio.INTERP_DEFAULT]
+    )
+    # OpenColorIO's default, optimised processors round differently in the last bits.
+    slack = 1e-6
+    worst = 0.0
+    for reading in readings:
+        difference = np.abs(read_back(out, image, reading).astype(np.float64) - want)
+        assert difference.max() <= result.clip.largest + slack
+        assert difference.mean() <= result.clip.mean + slack
+        worst = max(worst, float(difference.max()))
+    # The statement is no loose bound either.
+    assert worst == pytest.approx(result.clip.largest, abs=slack)
+    assert 0 < result.clip.mean < result.clip.largest < 0.05
+
+
+def test_midpoint_error_is_what_it_says(warm_sidecar: Path, tmp_path: Path) -> None:
+    out = tmp_path / "warm.clf"
+    result = bake(warm_sidecar, out, BakeOptions(0.0, 9))
+    channel = ((np.arange(8) + 0.5) / 8).astype(np.float32)
+    colours = np.stack(np.meshgrid(channel, channel, channel, indexing="ij"), axis=-1)
+    colours = np.ascontiguousarray(colours.reshape(1, -1, 3))
+    got = read_back(out, colours, ocio.INTERP_DEFAULT).astype(np.float64)
+    difference = np.abs(got - exact(warm_sidecar, 0.0, colours))
+    assert result.midpoints.colours == 512
+    assert result.midpoints.largest == pytest.approx(difference.max(), abs=1e-6)
+    assert result.midpoints.mean == pytest.approx(difference.mean(), abs=1e-6)
+    assert result.clip is None
+    assert result.clip_frame is None
+
+
+def test_error_shrinks_with_size(warm_sidecar: Path, tmp_path: Path) -> None:
+    means = [
+        bake(warm_sidecar, tmp_path / f"{size}.clf", BakeOptions(0.0, size)).midpoints.mean
+        for size in (5, 9, 17, 33)
+    ]
+    assert means == sorted(means, reverse=True)
+    assert means[-1] < means[0] / 10
+
+
+@pytest.mark.parametrize(("extension", "tolerance"), [(".cube", 6e-7), (".clf", 1.5e-7)])
+def test_no_edit_is_the_identity(
+    extension: str, tolerance: float, write_sidecar: Callable[..., Path], tmp_path: Path
+) -> None:
+    out = tmp_path / f"same{extension}"
+    result = bake(write_sidecar(), out, BakeOptions(3.5, 33))
+    assert result.identity
+    colours = random_colours()
+    for reading in (ocio.INTERP_DEFAULT, ocio.INTERP_TETRAHEDRAL):
+        assert np.abs(read_back(out, colours, reading) - colours).max() <= tolerance
+    assert result.midpoints.largest <= tolerance
+
+
+def test_strength_zero_is_the_identity_and_half_is_half(warm_sidecar: Path, tmp_path: Path) -> None:
+    nothing = bake(warm_sidecar, tmp_path / "0.clf", BakeOptions(0.0, 9, strength=0.0))
+    assert nothing.identity
+    assert nothing.midpoints.largest < 1e-6
+    bake(warm_sidecar, tmp_path / "half.clf", BakeOptions(0.0, 9, strength=0.5))
+    white = np.ones((1, 1, 3), dtype=np.float32)
+    got = read_back(tmp_path / "half.clf", white, ocio.INTERP_DEFAULT)
+    np.testing.assert_allclose(got[0, 0], [1.0, 0.9, 0.775], atol=1e-6)
+
+
+@pytest.mark.parametrize("extension", [".cube", ".clf"])
+@pytest.mark.parametrize("channel", [0, 1, 2])
+def test_axes_are_not_transposed(
+    channel: int, extension: str, write_sidecar: Callable[..., Path], tmp_path: Path
+) -> None:
+    """Only one channel changes, and only by its own value: halved."""
+
+    def halved(colour: tuple[float, float, float]) -> tuple[float, float, float]:
+        values = list(colour)
+        values[channel] *= 0.5
+        return values[0], values[1], values[2]
+
+    out = tmp_path / f"axis{extension}"
+    bake(write_sidecar(halved), out, BakeOptions(0.0, 17))
+    colours = random_colours()
+    want = colours.copy()
+    want[..., channel] *= 0.5
+    assert np.abs(read_back(out, colours, ocio.INTERP_DEFAULT) - want).max() < 2e-6
+
+
+def test_a_cube_file_lists_red_fastest(write_sidecar: Callable[..., Path], tmp_path: Path) -> None:
+    out = tmp_path / "order.cube"
+    bake(write_sidecar(lambda c: (c[0] * 0.5, c[1], c[2])), out, BakeOptions(0.0, 3))
+    lines = out.read_text(encoding="utf-8").splitlines()
+    assert "LUT_3D_SIZE 3" in lines
+    numbers = [line for line in lines if line[:1].isdigit()]
+    assert len(numbers) == 27
+    assert [float(v) for v in numbers[1].split()] == [0.25, 0.0, 0.0]
+    assert [float(v) for v in numbers[3].split()] == [0.0, 0.5, 0.0]
+    assert [float(v) for v in numbers[9].split()] == [0.0, 0.0, 0.5]
+
+
+def test_cube_and_clf_agree(warm_sidecar: Path, tmp_path: Path) -> None:
+    colours = random_colours()
+    for name in ("a.cube", "a.clf"):
+        bake(warm_sidecar, tmp_path / name, BakeOptions(2.0, 33))
+    cube = read_back(tmp_path / "a.cube", colours, ocio.INTERP_TETRAHEDRAL)
+    clf = read_back(tmp_path / "a.clf", colours, ocio.INTERP_DEFAULT)
+    assert np.abs(cube - clf).max() < 2e-6  # six decimals in the .cube
+    assert np.abs(clf - colours).max() > 0.2
+
+
+def test_nodes_hold_the_exact_colours(warm_sidecar: Path, tmp_path: Path) -> None:
+    out = tmp_path / "nodes.clf"
+    bake(warm_sidecar, out, BakeOptions(7.25, 9))
+    nodes = lattices.grid(lattices.samples(9))
+    got = read_back(out, nodes, ocio.INTERP_DEFAULT)
+    np.testing.assert_allclose(got, exact(warm_sidecar, 7.25, nodes), atol=2e-7, rtol=0)
+
+
+def test_clf_metadata(write_sidecar: Callable[..., Path], tmp_path: Path) -> None:
+    sidecar = write_sidecar(lambda c: (c[0], c[1] * 0.9, c[2]), name="A & <B>\n\u00e9\x01")
+    out = tmp_path / "meta.clf"
+    image = random_colours(100)
+    result = bake(sidecar, out, BakeOptions(4.5, 5), image=image, image_frame=4)
+    root = ElementTree.parse(out).getroot()
+    space = root.tag.partition("}")[0] + "}"
+    sha256 = hashlib.sha256(sidecar.read_bytes()).hexdigest()
+
+    assert root.get("id") == result.id
+    assert result.id.startswith("urn:uuid:")
+    assert root.get("name") == "palette4d A & <B> \u00e9 frame 4.5"
+    assert root.findtext(f"{space}InputDescriptor") == "sRGB"
+    assert root.findtext(f"{space}OutputDescriptor") == "sRGB"
+    descriptions = [e.text or "" for e in root.findall(f"{space}Description")]
+    assert any(sha256 in line for line in descriptions)
+    assert any("error |a-b| on the clip's colours at frame 4" in line for line in descriptions)
+    info = root.find(f"{space}Info")
+    assert info is not None
+    assert info.findtext(f"{space}AppRelease") == f"palette4d {_core.__version__}"
+    ours = info.find(f"{space}Palette4D")
+    assert ours is not None
+    assert ours.findtext(f"{space}Frame") == "4.5"
+    assert ours.findtext(f"{space}SidecarSha256") == sha256
+    assert result.clip is not None
+    largest = ours.findtext(f"{space}Error/{space}ClipLargest")
+    assert largest == stated(result.clip.largest)
+    lut = root.find(f"{space}LUT3D")
+    assert lut is not None
+    assert lut.get("interpolation") == "tetrahedral"
+
+    # OpenColorIO gives the same metadata back.
+    ocio.ClearAllCaches()
+    group = (
+        ocio.Config.CreateRaw()
+        .getProcessor(ocio.FileTransform(src=str(out)))
+        .createGroupTransform()
+    )
+    assert group.getFormatMetadata().getID() == result.id
+
+
+def test_cube_comments(warm_sidecar: Path, tmp_path: Path) -> None:
+    out = tmp_path / "c.cube"
+    result = bake(warm_sidecar, out, BakeOptions(1.0, 5))
+    comments = [line for line in out.read_text("utf-8").splitlines() if line.startswith("#")]
+    text = "\n".join(comments)
+    assert "clip cube, frame 1, strength 1, lattice 5" in text
+    assert result.sidecar_sha256 in text
+    assert f"largest {stated(result.midpoints.largest)}" in text
+    assert result.id in text
+
+
+def test_the_same_bake_gives_the_same_bytes_and_id(warm_sidecar: Path, tmp_path: Path) -> None:
+    for extension in (".cube", ".clf"):
+        names = [tmp_path / f"{k}{extension}" for k in range(2)]
+        first, second = (bake(warm_sidecar, name, BakeOptions(1.0, 9)) for name in names)
+        assert names[0].read_bytes() == names[1].read_bytes()
+        assert first.id == second.id
+    ids = {
+        bake(warm_sidecar, tmp_path / "x.clf", options, force=True).id
+        for options in (BakeOptions(1.0, 9), BakeOptions(2.0, 9), BakeOptions(1.0, 5))
+    }
+    assert len(ids) == 3
+
+
+def test_smallest_size(warm_sidecar: Path, tmp_path: Path) -> None:
+    for name in ("2.cube", "2.clf"):
+        assert bake(warm_sidecar, tmp_path / name, BakeOptions(0.0, 2)).midpoints.colours == 1
+
+
+def test_largest_size(warm_sidecar: Path, tmp_path: Path) -> None:
+    out = tmp_path / "129.cube"
+    result = bake(warm_sidecar, out, BakeOptions(0.0, 129))
+    assert result.midpoints.colours == 128**3
+    with out.open(encoding="utf-8") as lines:
+        assert sum(line[:1].isdigit() for line in lines) == 129**3
+
+
+def test_colours_outside_the_domain_are_counted(warm_sidecar: Path, tmp_path: Path) -> None:
+    image = np.full((2, 2, 3), 0.5, dtype=np.float32)
+    image[0, 0] = [2.0, 0.5, 0.5]
+    image[1, 1] = np.nan
+    result = bake(warm_sidecar, tmp_path / "o.clf", BakeOptions(0.0, 9), image=image, image_frame=0)
+    assert result.clip is not None
+    assert result.clip.colours == 3
+    assert result.clip.outside_domain == pytest.approx(1 / 3)
+    assert result.clip.largest >= 0.9  # the clamp is part of the error
+
+
+@pytest.mark.parametrize(
+    ("options", "name", "word"),
+    [
+        (BakeOptions(0.0, 0), "a.cube", "2 to 129"),
+        (BakeOptions(0.0, 1), "a.cube", "2 to 129"),
+        (BakeOptions(0.0, 130), "a.clf", "2 to 129"),
+        (BakeOptions(0.0, -3), "a.clf", "2 to 129"),
+        (BakeOptions(-0.5, 9), "a.clf", "from 0 to 10"),
+        (BakeOptions(10.01, 9), "a.clf", "from 0 to 10"),
+        (BakeOptions(0.0, 9, strength=1.5), "a.clf", "0 to 1"),
+        (BakeOptions(0.0, 9), "a.xyz", r"\.cube .*\.clf"),
+        (BakeOptions(0.0, 9), "a", "no extension"),
+        (BakeOptions(0.0, 9), "none/a.clf", "no folder"),
+    ],
+)
+def test_refusals_write_nothing(
+    options: BakeOptions, name: str, word: str, warm_sidecar: Path, tmp_path: Path
+) -> None:
+    before = sorted(tmp_path.iterdir())
+    with pytest.raises(Palette4dError, match=word):
+        bake(warm_sidecar, tmp_path / name, options)
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_existing_output_needs_force(warm_sidecar: Path, tmp_path: Path) -> None:
+    out = tmp_path / "there.cube"
+    out.write_text("mine", encoding="utf-8")
+    with pytest.raises(Palette4dError, match="--force"):
+        bake(warm_sidecar, out, BakeOptions(0.0, 5))
+    assert out.read_text(encoding="utf-8") == "mine"
+    bake(warm_sidecar, out, BakeOptions(0.0, 5), force=True)
+    assert "LUT_3D_SIZE 5" in out.read_text(encoding="utf-8")
+
+
+def test_a_failure_midway_leaves_the_old_file(
+    warm_sidecar: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "there.cube"
+    out.write_text("mine", encoding="utf-8")
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("palette4d.lut_export.bake._check_same", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        bake(warm_sidecar, out, BakeOptions(0.0, 5), force=True)
+    assert out.read_text(encoding="utf-8") == "mine"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["cube.p4d.json", "there.cube"]
+
+
+@pytest.mark.parametrize("name", ["a.cube", "a.clf"])
+def test_folder_names_are_taken_as_they_are(name: str, warm_sidecar: Path, tmp_path: Path) -> None:
+    """OpenColorIO would read $HOME and %x% as variables."""
+    folder = tmp_path / "d$HOME%x% \u00fc #"
+    folder.mkdir()
+    result = bake(warm_sidecar, folder / name, BakeOptions(0.0, 9))
+    assert 0 < result.midpoints.mean < 0.01
+    assert [path.name for path in folder.iterdir()] == [name]
+
+
+def test_a_file_that_is_no_lut(tmp_path: Path) -> None:
+    path = tmp_path / "no.cube"
+    with pytest.raises(Palette4dError, match="cannot read it"):
+        LoadedLut(path, "linear")
+    path.write_text("nothing", encoding="utf-8")
+    with pytest.raises(Palette4dError, match="cannot read it"):
+        LoadedLut(path, "linear")
+
+
+def test_a_broken_sidecar_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "broken.p4d.json"
+    path.write_text("{", encoding="utf-8")
+    with pytest.raises(SidecarError, match=r"broken\.p4d\.json"):
+        bake(path, tmp_path / "a.cube", BakeOptions(0.0))
+
+
+@pytest.mark.parametrize("value", [0.0, 1e-12, 0.0123401, 0.5, 0.9999, 3.0, 123.4])
+def test_stated_figures_are_never_too_small(value: float) -> None:
+    assert value <= float(stated(value)) <= value * 1.01
+
+
+class TestCommand:
+    def write_frames(self, folder: Path, frames: range) -> F32:
+        import OpenImageIO as oiio
+
+        folder.mkdir()
+        image = random_colours(64 * 36).reshape(36, 64, 3)
+        for frame in frames:
+            output = oiio.ImageOutput.create("frame.exr")
+            output.open(str(folder / f"f.{frame:04d}.exr"), oiio.ImageSpec(64, 36, 3, "float"))
+            assert output.write_image(image)
+            output.close()
+        return image
+
+    def test_json_with_the_sidecars_own_clip(
+        self,
+        write_sidecar: Callable[..., Path],
+        tmp_path: Path,
+        capsys: pytest.CaptureFixture[str],
+    ) -> None:
+        image = self.write_frames(tmp_path / "frames", range(11))
+        sidecar = write_sidecar(
+            lambda c: (1.0, 0.8, 0.5) if c == (1.0, 1.0, 1.0) else c, source="frames/f.####.exr"
+        )
+        out = tmp_path / "a.clf"
+        arguments = ["bake", str(sidecar), "--frame", "4.4", "-o", str(out), "--size", "9"]
+        assert main([*arguments, "--json"]) == 0
+        printed = capsys.readouterr()
+        report = json.loads(printed.out)
+        assert report["clip_frame"] == 4
+        assert report["clip"]["colours"] == 64 * 36
+        difference = np.abs(
+            read_back(out, image, ocio.INTERP_DEFAULT).astype(np.float64)
+            - exact(sidecar, 4.4, image)
+        )
+        assert report["clip"]["largest"] == pytest.approx(difference.max(), abs=1e-6)
+        assert report["clip"]["mean"] == pytest.approx(difference.mean(), abs=1e-6)
+        assert printed.err == ""
+
+    def test_without_the_clip_it_says_so(
+        self, warm_sidecar: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        out = tmp_path / "a.cube"
+        assert main(["bake", str(warm_sidecar), "--frame", "0", "-o", str(out)]) == 0
+        printed = capsys.readouterr()
+        assert "--clip" in printed.err
+        assert "lattice's midpoints" in printed.out
+        assert "clip's colours" not in printed.out
+        assert "tetrahedral" in printed.out
+        assert out.is_file()
+
+    def test_a_given_clip_must_be_there(
+        self, warm_sidecar: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        out = tmp_path / "a.cube"
+        arguments = ["bake", str(warm_sidecar), "--frame", "0", "-o", str(out)]
+        assert main([*arguments, "--clip", str(tmp_path / "no.####.png")]) == 1
+        assert "palette4d: error:" in capsys.readouterr().err
+        assert not out.exists()
+
+    def test_outside_the_clip(
+        self, warm_sidecar: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        out = tmp_path / "a.cube"
+        assert main(["bake", str(warm_sidecar), "--frame", "11", "-o", str(out)]) == 1
+        assert "from 0 to 10" in capsys.readouterr().err
+        assert not out.exists()
+
+    @pytest.mark.parametrize("frame", ["nan", "inf", "x"])
+    def test_no_frame_number(self, frame: str, warm_sidecar: Path, tmp_path: Path) -> None:
+        with pytest.raises(SystemExit) as stop:
+            main(["bake", str(warm_sidecar), f"--frame={frame}", "-o", str(tmp_path / "a.cube")])
+        assert stop.value.code == 2
+
+
+@pytest.mark.parametrize("extension", [".cube", ".clf"])
+def test_a_real_frame(extension: str, seasons: Path, warm_sidecar: Path, tmp_path: Path) -> None:
+    from palette4d.analysis.clip import open_clip
+
+    image = open_clip(str(seasons)).read(40)
+    out = tmp_path / f"real{extension}"
+    result = bake(warm_sidecar, out, BakeOptions(5.0, 33), image=image, image_frame=40)
+    assert result.clip is not None
+    got = read_back(out, image, ocio.INTERP_DEFAULT)
+    difference = np.abs(got.astype(np.float64) - exact(warm_sidecar, 5.0, image))
+    assert difference.max() <= result.clip.largest + 1e-6
+    assert difference.mean() <= result.clip.mean + 1e-6
+    assert result.clip.mean < 1e-3

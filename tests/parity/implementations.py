@@ -1,0 +1,149 @@
+"""The implementations under test, behind one interface."""
+
+from __future__ import annotations
+
+import json
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from palette4d import _core
+from parity import reference
+
+F64 = NDArray[np.float64]
+Document = dict[str, Any]
+Position = tuple[str, str, float]
+
+
+class Implementation(Protocol):
+    """What a case asks of an implementation."""
+
+    name: str
+
+    def slice(
+        self, document: Document, frame: float
+    ) -> tuple[F64, list[list[int]], list[Position]]:
+        """Palette colours, faces, and where each colour lies in the polytope."""
+        ...
+
+    def edited(self, document: Document, frame: float) -> F64:
+        """Edited palette colours."""
+        ...
+
+    def mvc(self, points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> F64:
+        """Mean value coordinates."""
+        ...
+
+    def weights(self, points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> tuple[F64, F64]:
+        """Palette weights and distances."""
+        ...
+
+    def polytope_weights(self, points: ArrayLike, document: Document, frame: float) -> F64:
+        """Weights of the polytope's vertices."""
+        ...
+
+    def recolour(
+        self,
+        image: NDArray[np.float32],
+        document: Document,
+        frame: float,
+        strength: float = 1.0,
+        premultiplied: bool = False,
+    ) -> NDArray[np.float32]:
+        """The whole road from a sidecar to a picture."""
+        ...
+
+
+class Reference:
+    """Plain NumPy."""
+
+    name = "reference"
+
+    def slice(
+        self, document: Document, frame: float
+    ) -> tuple[F64, list[list[int]], list[Position]]:
+        return (
+            reference.slice_rgb(document, frame),
+            reference.slice_faces(document, frame),
+            reference.positions(document, frame),
+        )
+
+    def edited(self, document: Document, frame: float) -> F64:
+        return reference.edited_colours(document, frame)
+
+    def mvc(self, points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> F64:
+        return reference.mean_value_coordinates(points, rgb, faces)
+
+    def weights(self, points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> tuple[F64, F64]:
+        return reference.palette_weights(points, rgb, faces)
+
+    def polytope_weights(self, points: ArrayLike, document: Document, frame: float) -> F64:
+        return reference.polytope_weights(points, document, frame)
+
+    def recolour(
+        self,
+        image: NDArray[np.float32],
+        document: Document,
+        frame: float,
+        strength: float = 1.0,
+        premultiplied: bool = False,
+    ) -> NDArray[np.float32]:
+        original = reference.slice_rgb(document, frame)
+        faces = reference.slice_faces(document, frame)
+        edited = reference.edited_colours(document, frame)
+        return reference.recolour(image, original, edited, faces, strength, premultiplied)
+
+
+class Core:
+    """The compiled core through its bindings."""
+
+    name = "_core"
+
+    @staticmethod
+    def sidecar(document: Document) -> _core.Sidecar:
+        return _core.parse_sidecar(json.dumps(document), "case")
+
+    def slice(
+        self, document: Document, frame: float
+    ) -> tuple[F64, list[list[int]], list[Position]]:
+        polytope = self.sidecar(document).polytope
+        cut = _core.slice_at(polytope, frame)
+        names = polytope.vertex_ids
+        where = [
+            (names[a], names[b], float(w))
+            for (a, b), w in zip(cut.ends.tolist(), cut.weights, strict=True)
+        ]
+        return cut.rgb, cut.faces.tolist(), where
+
+    def edited(self, document: Document, frame: float) -> F64:
+        sidecar = self.sidecar(document)
+        cut = _core.slice_at(sidecar.polytope, frame)
+        return _core.edited_colours(sidecar.polytope, sidecar.edits, cut)
+
+    def mvc(self, points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> F64:
+        return _core.mean_value_coordinates(points, rgb, faces)
+
+    def weights(self, points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> tuple[F64, F64]:
+        return _core.palette_weights(points, rgb, faces)
+
+    def polytope_weights(self, points: ArrayLike, document: Document, frame: float) -> F64:
+        return _core.polytope_weights(points, self.sidecar(document).polytope, frame)
+
+    def recolour(
+        self,
+        image: NDArray[np.float32],
+        document: Document,
+        frame: float,
+        strength: float = 1.0,
+        premultiplied: bool = False,
+    ) -> NDArray[np.float32]:
+        sidecar = self.sidecar(document)
+        cut = _core.slice_at(sidecar.polytope, frame)
+        edited = _core.edited_colours(sidecar.polytope, sidecar.edits, cut)
+        recolourer = _core.Recolourer(cut.rgb, edited, cut.faces)
+        return recolourer.apply(image, strength=strength, premultiplied=premultiplied)
+
+
+REFERENCE: Implementation = Reference()
+CORE: Implementation = Core()
+IMPLEMENTATIONS: list[Implementation] = [REFERENCE, CORE]

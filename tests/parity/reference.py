@@ -1,0 +1,274 @@
+"""The plain reference: slices, edited colours, weights and recolouring in textbook NumPy.
+
+Written from the paper and from Ju, Schaefer and Warren (2005), float64, one point at a time, with
+no thought of speed and apart from the C++ core. It reads the sidecar's JSON document directly. All
+cases of `cases.py` run on it and on the compiled core; where they differ, one of them is wrong.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+F64 = NDArray[np.float64]
+Document = dict[str, Any]
+
+ON_SURFACE = 1e-11  # distances that count as none
+
+
+# Slices (eq. 5) and edits (section 6.3) ---------------------------------------------------------
+
+
+def vertices_by_id(document: Document) -> dict[str, dict[str, Any]]:
+    """The polytope's vertices by their ids."""
+    return {vertex["id"]: vertex for vertex in document["polytope"]["vertices"]}
+
+
+def section_at(document: Document, frame: float) -> dict[str, Any]:
+    """The block that holds a frame of the clip, else the transition between two blocks."""
+    blocks = document["polytope"]["blocks"]
+    for block in blocks:
+        if block["first"] <= frame <= block["last"]:
+            return block
+    for before, after, transition in zip(
+        blocks[:-1], blocks[1:], document["polytope"]["transitions"], strict=True
+    ):
+        if before["last"] < frame < after["first"]:
+            return transition
+    raise AssertionError(f"frame {frame} lies in no section")
+
+
+def clamped(document: Document, frame: float) -> float:
+    """The frame, or the clip's nearest."""
+    blocks = document["polytope"]["blocks"]
+    return min(max(float(frame), float(blocks[0]["first"])), float(blocks[-1]["last"]))
+
+
+def positions(document: Document, frame: float) -> list[tuple[str, str, float]]:
+    """For each track, (id of the vertex before, id of the one after, weight of the latter)."""
+    frame = clamped(document, frame)
+    vertices = vertices_by_id(document)
+    result = []
+    for track in section_at(document, frame)["tracks"]:
+        for name in track:
+            if vertices[name]["frame"] == frame:
+                result.append((name, name, 0.0))
+                break
+        else:
+            for earlier, later in itertools.pairwise(track):
+                start, end = vertices[earlier]["frame"], vertices[later]["frame"]
+                if start < frame < end:
+                    result.append((earlier, later, (frame - start) / (end - start)))
+    return result
+
+
+def slice_rgb(document: Document, frame: float) -> F64:
+    """(n, 3) original palette colours at a frame."""
+    vertices = vertices_by_id(document)
+    rows = []
+    for earlier, later, weight in positions(document, frame):
+        u, v = np.array(vertices[earlier]["rgb"], float), np.array(vertices[later]["rgb"], float)
+        rows.append((1 - weight) * u + weight * v)
+    return np.array(rows).reshape(-1, 3)
+
+
+def slice_faces(document: Document, frame: float) -> list[list[int]]:
+    """Triangles of track indices at a frame."""
+    return section_at(document, clamped(document, frame))["faces"]
+
+
+def edited_colours(document: Document, frame: float) -> F64:
+    """(n, 3) palette colours at a frame after the edits: each edge is a line through its stops."""
+    frame = clamped(document, frame)
+    vertices = vertices_by_id(document)
+    new = {edit["vertex"]: edit["rgb"] for edit in document["edits"]["vertices"]}
+    edges = {(edge["from"], edge["to"]): edge["id"] for edge in document["polytope"]["edges"]}
+    rows = []
+    for earlier, later, _ in positions(document, frame):
+        ends = {name: new.get(name, vertices[name]["rgb"]) for name in (earlier, later)}
+        if earlier == later:
+            rows.append(np.array(ends[earlier], float))
+            continue
+        knots = [(vertices[name]["frame"], rgb) for name, rgb in ends.items()]
+        for stop in document["edits"]["stops"]:
+            if stop["edge"] == edges[earlier, later]:
+                knots.append((stop["frame"], stop["rgb"]))
+        knots.sort(key=lambda knot: knot[0])
+        for (start, before), (end, after) in itertools.pairwise(knots):
+            if start <= frame <= end:
+                weight = (frame - start) / (end - start)
+                row = (1 - weight) * np.array(before, float) + weight * np.array(after, float)
+        rows.append(row)
+    return np.array(rows).reshape(-1, 3)
+
+
+# Weights -----------------------------------------------------------------------------------------
+
+
+def mean_value_weights(p: F64, rgb: F64, faces: list[list[int]]) -> F64 | None:
+    """Mean value coordinates as in figure 4 of Ju, Schaefer and Warren; None when they vanish."""
+    eps = 1e-9
+    d = np.linalg.norm(rgb - p, axis=1)
+    if d.min() < ON_SURFACE:
+        return (np.arange(len(rgb)) == d.argmin()).astype(float)
+    u = (rgb - p) / d[:, None]
+    total = np.zeros(len(rgb))
+    for face in faces:
+        chords = [np.linalg.norm(u[face[(i + 1) % 3]] - u[face[(i + 2) % 3]]) for i in range(3)]
+        theta = [2 * np.arcsin(min(chord / 2, 1.0)) for chord in chords]
+        h = sum(theta) / 2
+        if np.pi - h < eps:  # on the triangle: two-dimensional barycentric coordinates
+            weights = np.zeros(len(rgb))
+            for i in range(3):
+                weights[face[i]] = np.sin(theta[i]) * d[face[(i + 1) % 3]] * d[face[(i + 2) % 3]]
+            return weights / weights.sum()
+        if min(np.sin(theta)) <= eps:  # seen from p, two corners coincide
+            continue
+        c = [
+            2
+            * np.sin(h)
+            * np.sin(h - theta[i])
+            / (np.sin(theta[(i + 1) % 3]) * np.sin(theta[(i + 2) % 3]))
+            - 1
+            for i in range(3)
+        ]
+        sign = np.sign(np.linalg.det(u[face]))
+        s = [sign * np.sqrt(max(1 - x * x, 0.0)) for x in c]
+        if min(abs(x) for x in s) <= eps:  # in the triangle's plane, beside it
+            continue
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            total[face[i]] += (theta[i] - c[j] * theta[k] - c[k] * theta[j]) / (
+                d[face[i]] * np.sin(theta[j]) * s[k]
+            )
+    if abs(total.sum()) <= 1e-9 * np.abs(total).sum() or not total.any():
+        return None
+    return total / total.sum()
+
+
+def closest_on_simplex(p: F64, corners: F64) -> tuple[float, F64]:
+    """Distance to, and weights of, the closest point of a point, segment or triangle.
+
+    Tries the affine span of every subset of the corners, and keeps the best that lies within.
+    """
+    best: tuple[float, F64] | None = None
+    count = len(corners)
+    for mask in range(1, 2**count):
+        subset = [i for i in range(count) if mask >> i & 1]
+        origin = corners[subset[0]]
+        basis = (corners[subset[1:]] - origin).T
+        if basis.size and np.linalg.matrix_rank(basis) < len(subset) - 1:
+            continue
+        steps = np.linalg.lstsq(basis, p - origin, rcond=None)[0] if basis.size else np.zeros(0)
+        inner = np.concatenate([[1 - steps.sum()], steps])
+        if inner.min() < 0:
+            continue
+        weights = np.zeros(count)
+        weights[subset] = inner
+        distance = float(np.linalg.norm(weights @ corners - p))
+        if best is None or distance < best[0]:
+            best = distance, weights
+    assert best is not None
+    return best
+
+
+def closest_weights(p: F64, rgb: F64, faces: list[list[int]]) -> tuple[float, F64]:
+    """Distance to, and weights of, the closest point of the palette's surface."""
+    simplices = faces if len(faces) else [list(range(len(rgb)))]
+    if len(rgb) > 3 and np.linalg.matrix_rank(rgb - rgb[0], tol=1e-11) == 2:
+        # Flat: one side only, that of the first face; the other may be cut differently.
+        normals = np.array([np.cross(rgb[b] - rgb[a], rgb[c] - rgb[a]) for a, b, c in faces])
+        first = normals[np.linalg.norm(normals, axis=1).argmax()]
+        simplices = [f for f, normal in zip(faces, normals, strict=True) if normal @ first > 0]
+    best = np.inf, np.zeros(len(rgb))
+    for simplex in simplices:
+        distance, inner = closest_on_simplex(p, rgb[simplex])
+        if distance < best[0] - 1e-12:
+            weights = np.zeros(len(rgb))
+            weights[simplex] = inner
+            best = distance, weights
+    return best
+
+
+def solid_angle_turns(p: F64, rgb: F64, faces: list[list[int]]) -> float:
+    """How many times the surface goes around p (van Oosterom and Strackee 1983)."""
+    total = 0.0
+    for face in faces:
+        a, b, c = rgb[face] - p
+        la, lb, lc = (np.linalg.norm(x) for x in (a, b, c))
+        total += 2 * np.arctan2(
+            a @ np.cross(b, c), la * lb * lc + (a @ b) * lc + (b @ c) * la + (c @ a) * lb
+        )
+    return total / (4 * np.pi)
+
+
+def mean_value_coordinates(points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> F64:
+    """(m, 3), (n, 3), (f, 3) -> (m, n) weights."""
+    colours, triangles = np.asarray(rgb, float), np.asarray(faces, int).reshape(-1, 3).tolist()
+    rows = []
+    for p in np.asarray(points, float):
+        weights = mean_value_weights(p, colours, triangles)
+        rows.append(closest_weights(p, colours, triangles)[1] if weights is None else weights)
+    return np.array(rows).reshape(-1, len(colours))
+
+
+def palette_weights(points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> tuple[F64, F64]:
+    """(m, 3), (n, 3), (f, 3) -> (m, n) weights of q(p) and (m,) distances |p - q|."""
+    colours, triangles = np.asarray(rgb, float), np.asarray(faces, int).reshape(-1, 3).tolist()
+    rows, distances = [], []
+    for p in np.asarray(points, float):
+        distance, weights = closest_weights(p, colours, triangles)
+        if distance <= ON_SURFACE:
+            distance = 0.0
+        elif triangles and abs(solid_angle_turns(p, colours, triangles)) > 0.5:
+            inner = mean_value_weights(p, colours, triangles)
+            if inner is not None:
+                distance, weights = 0.0, inner
+        rows.append(weights)
+        distances.append(distance)
+    return np.array(rows).reshape(-1, len(colours)), np.array(distances)
+
+
+def polytope_weights(points: ArrayLike, document: Document, frame: float) -> F64:
+    """Eq. 7: (m, 3) -> (m, N), the product of W_p and the matrix W_t of eq. 6."""
+    names = [vertex["id"] for vertex in document["polytope"]["vertices"]]
+    where = positions(document, frame)
+    matrix = np.zeros((len(where), len(names)))
+    for row, (earlier, later, weight) in enumerate(where):
+        matrix[row, names.index(earlier)] += 1 - weight
+        matrix[row, names.index(later)] += weight
+    inner, _ = palette_weights(points, slice_rgb(document, frame), slice_faces(document, frame))
+    return inner @ matrix
+
+
+# Recolouring -------------------------------------------------------------------------------------
+
+
+def recolour(
+    image: NDArray[np.float32],
+    original: ArrayLike,
+    edited: ArrayLike,
+    faces: ArrayLike,
+    strength: float = 1.0,
+    premultiplied: bool = False,
+) -> NDArray[np.float32]:
+    """p' = p + strength sum_i w_i(q) (v'_i - v_i) for every pixel of an (h, w, 3 or 4) image."""
+    displacement = np.asarray(edited, float) - np.asarray(original, float)
+    result = image.copy()
+    for y in range(image.shape[0]):
+        for x in range(image.shape[1]):
+            p = image[y, x, :3].astype(float)
+            alpha = 1.0
+            if premultiplied and image.shape[2] == 4:
+                alpha = float(image[y, x, 3])
+            if not np.isfinite(p).all() or not np.isfinite(alpha) or alpha == 0:
+                continue
+            weights, _ = palette_weights([p / alpha], original, faces)
+            moved = alpha * strength * (weights[0] @ displacement)
+            for channel in range(3):
+                if moved[channel] != 0:
+                    result[y, x, channel] = np.float32(p[channel] + moved[channel])
+    return result

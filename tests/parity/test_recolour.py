@@ -1,0 +1,82 @@
+"""From a sidecar to a picture: every implementation, every document."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from parity.cases import DOCUMENTS, picture, same_bits
+from parity.implementations import CORE, IMPLEMENTATIONS, REFERENCE, Implementation
+
+IMPLEMENTED = pytest.mark.parametrize("code", IMPLEMENTATIONS, ids=lambda code: code.name)
+EDITED = [name for name in DOCUMENTS if "-" in name and name != "changes-back"]
+UNEDITED = [name for name in DOCUMENTS if name not in EDITED]
+
+
+def times_of(name: str) -> list[float]:
+    """A few times within and around a document's clip."""
+    blocks = DOCUMENTS[name]["polytope"]["blocks"]
+    first, last = blocks[0]["first"], blocks[-1]["last"]
+    return [first - 1, first, first + 0.29 * (last - first), first + 0.72 * (last - first), last]
+
+
+@pytest.mark.parametrize(("channels", "premultiplied"), [(3, False), (4, False), (4, True)])
+@pytest.mark.parametrize("name", EDITED)
+def test_the_core_recolours_as_the_reference(name: str, channels: int, premultiplied: bool) -> None:
+    image = picture(channels)
+    for frame in times_of(name):
+        for strength in (1.0, 0.4):
+            arguments = image, DOCUMENTS[name], frame, strength, premultiplied
+            expected, found = REFERENCE.recolour(*arguments), CORE.recolour(*arguments)
+            # Half a unit in the last place of float32 either way, and the weights' own rounding.
+            np.testing.assert_allclose(found, expected, rtol=1.3e-7, atol=3e-8)
+
+
+@IMPLEMENTED
+@pytest.mark.parametrize("name", UNEDITED)
+def test_without_an_edit_the_picture_is_untouched(code: Implementation, name: str) -> None:
+    for channels in (3, 4):
+        image = picture(channels)
+        for frame in times_of(name):
+            result = code.recolour(image, DOCUMENTS[name], frame, 1.0, channels == 4)
+            assert same_bits(result, image).all()
+
+
+@IMPLEMENTED
+@pytest.mark.parametrize("name", EDITED)
+def test_strength_0_is_the_input_and_strength_is_linear(code: Implementation, name: str) -> None:
+    image = picture(3)
+    frame = times_of(name)[3]
+    assert same_bits(code.recolour(image, DOCUMENTS[name], frame, 0.0), image).all()
+    finite = np.isfinite(image).all(axis=2)
+    full = code.recolour(image, DOCUMENTS[name], frame, 1.0)[finite].astype(float)
+    half = code.recolour(image, DOCUMENTS[name], frame, 0.5)[finite].astype(float)
+    np.testing.assert_allclose(half, (full + image[finite]) / 2, rtol=2e-7, atol=2e-7)
+    assert (full != image[finite]).any()
+
+
+@IMPLEMENTED
+def test_awkward_pixels_pass_bit_for_bit(code: Implementation) -> None:
+    image = picture(4)
+    odd = ~np.isfinite(image[:, :, :3]).all(axis=2) | (image[:, :, 3] == 0)
+    assert odd.sum() >= 5
+    result = code.recolour(image, DOCUMENTS["changes-vertex"], 9.0, 1.0, True)
+    assert same_bits(result[odd], image[odd]).all()
+    assert same_bits(result[:, :, 3], image[:, :, 3]).all()
+    assert not same_bits(result[~odd][:, :3], image[~odd][:, :3]).all()
+
+
+@IMPLEMENTED
+def test_colours_outside_keep_their_distance(code: Implementation) -> None:
+    """Far beyond one corner of the body, everything moves as the corner does."""
+    document = DOCUMENTS["still-edited"]
+    image = np.array([[[0.0, 40.0, 0.0], [-3.0, 25.0, -5.0]]], np.float32)
+    moved = code.recolour(image, document, 7).astype(float) - image
+    np.testing.assert_allclose(moved, np.tile([0.3, -0.2, 0.1], (1, 2, 1)), atol=4e-6)
+
+
+def test_rounds_are_rare_where_the_implementations_differ() -> None:
+    """Both compute in float64 and round once, so that nearly all results share all bits."""
+    image = picture(3)
+    result = CORE.recolour(image, DOCUMENTS["changes-stops"], 12.5)
+    expected = REFERENCE.recolour(image, DOCUMENTS["changes-stops"], 12.5)
+    assert same_bits(result, expected).mean() > 0.98

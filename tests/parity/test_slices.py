@@ -1,0 +1,108 @@
+"""Slices and edited colours: every implementation, every document, every kind of time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from parity.cases import DOCUMENTS, NUDGE, SLICES, frames_of
+from parity.implementations import CORE, IMPLEMENTATIONS, REFERENCE, Implementation
+
+IMPLEMENTED = pytest.mark.parametrize("code", IMPLEMENTATIONS, ids=lambda code: code.name)
+
+
+@pytest.mark.parametrize(("name", "frame"), SLICES)
+def test_the_core_slices_as_the_reference(name: str, frame: float) -> None:
+    document = DOCUMENTS[name]
+    expected, found = REFERENCE.slice(document, frame), CORE.slice(document, frame)
+    np.testing.assert_allclose(found[0], expected[0], rtol=0, atol=1e-14)
+    assert found[1] == expected[1]
+    assert [position[:2] for position in found[2]] == [position[:2] for position in expected[2]]
+    np.testing.assert_allclose(
+        [position[2] for position in found[2]],
+        [position[2] for position in expected[2]],
+        rtol=0,
+        atol=1e-14,
+    )
+    np.testing.assert_allclose(
+        CORE.edited(document, frame), REFERENCE.edited(document, frame), rtol=0, atol=1e-14
+    )
+
+
+@IMPLEMENTED
+@pytest.mark.parametrize("name", DOCUMENTS)
+def test_vertices_and_stops_hold_at_their_own_frames(code: Implementation, name: str) -> None:
+    document = DOCUMENTS[name]
+    new = {edit["vertex"]: edit["rgb"] for edit in document["edits"]["vertices"]}
+    held = 0
+    for vertex in document["polytope"]["vertices"]:
+        rgb, _, where = code.slice(document, vertex["frame"])
+        edited = code.edited(document, vertex["frame"])
+        for row, (first, last, weight) in enumerate(where):
+            if first == vertex["id"]:
+                assert (last, weight) == (vertex["id"], 0)
+                assert rgb[row].tolist() == vertex["rgb"]
+                assert edited[row].tolist() == new.get(vertex["id"], vertex["rgb"])
+                held += 1
+    assert held >= len(document["polytope"]["vertices"])
+    ends = {edge["id"]: (edge["from"], edge["to"]) for edge in document["polytope"]["edges"]}
+    for stop in document["edits"]["stops"]:
+        where = code.slice(document, stop["frame"])[2]
+        rows = [row for row, place in enumerate(where) if place[:2] == ends[stop["edge"]]]
+        assert rows
+        for row in rows:
+            assert code.edited(document, stop["frame"])[row].tolist() == stop["rgb"]
+
+
+@IMPLEMENTED
+@pytest.mark.parametrize("name", DOCUMENTS)
+def test_colours_are_continuous_in_time(code: Implementation, name: str) -> None:
+    """Beside every mark each colour is close to one at the mark, and the other way around."""
+    document = DOCUMENTS[name]
+    for frame in frames_of(name):
+        if not np.isfinite(frame):
+            continue
+        for colours in (lambda t: code.slice(document, t)[0], lambda t: code.edited(document, t)):
+            here = colours(frame)
+            for side in (-NUDGE, NUDGE):
+                there = colours(frame + side)
+                distance = np.abs(here[:, None] - there[None]).max(axis=2)
+                assert distance.min(axis=0).max() < 10 * NUDGE
+                assert distance.min(axis=1).max() < 10 * NUDGE
+
+
+@IMPLEMENTED
+@pytest.mark.parametrize(("name", "frame"), SLICES)
+def test_faces_are_closed_and_oriented(code: Implementation, name: str, frame: float) -> None:
+    rgb, faces, where = code.slice(DOCUMENTS[name], frame)
+    assert len(rgb) == len(where)
+    sides = [(f[k], f[(k + 1) % 3]) for f in faces for k in range(3)]
+    assert len(set(sides)) == len(sides)
+    assert {(b, a) for a, b in sides} == set(sides)
+    assert len(faces) == max(2 * len(rgb) - 4, 0)
+
+
+@IMPLEMENTED
+def test_outside_the_clip_its_ends_hold(code: Implementation) -> None:
+    for document in DOCUMENTS.values():
+        blocks = document["polytope"]["blocks"]
+        for outside, end in ((-1e9, blocks[0]["first"]), (1e9, blocks[-1]["last"])):
+            assert (
+                code.slice(document, outside)[0].tolist() == code.slice(document, end)[0].tolist()
+            )
+
+
+@IMPLEMENTED
+def test_an_edit_leaves_other_times_alone(code: Implementation) -> None:
+    """bm (14.5) and d1 (8) are edited: at the clip's ends, and at 23 but for b, nothing changes."""
+    document = DOCUMENTS["changes-vertex"]
+    for frame in (0, 30):
+        assert code.edited(document, frame).tolist() == code.slice(document, frame)[0].tolist()
+    changed = (code.edited(document, 23) != code.slice(document, 23)[0]).any(axis=1)
+    assert changed.tolist() == [False, True, False, False]
+
+
+def test_an_unedited_slice_is_bit_identical() -> None:
+    for name in ("still", "colour", "grey", "flat", "changes", "changes-back"):
+        for frame in frames_of(name):
+            rgb = CORE.slice(DOCUMENTS[name], frame)[0]
+            assert CORE.edited(DOCUMENTS[name], frame).tobytes() == rgb.tobytes()
