@@ -119,7 +119,7 @@ def flat_palette(points: F64, options: AnalysisOptions) -> Palette | None:
         return Palette(points[ends], none)
     if extent[2] > 2 * THIN:
         return None
-    polygon = ConvexHull(along[:, :2]).vertices  # anticlockwise
+    polygon: NDArray[np.int32] = ConvexHull(along[:, :2]).vertices  # anticlockwise
     while len(polygon) > max(3, options.palette_size):
         polygon = np.delete(polygon, _least_corner(along[polygon, :2]))
     n = len(polygon)

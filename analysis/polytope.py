@@ -72,11 +72,9 @@ class SkewPolytope:
 
     def fixed_times(self) -> NDArray[np.bool_]:
         """Which vertices may not move in time: in the first or last frame, splitting or merging."""
-        edges = self.edges()
-        n = len(self.vertices)
-        outgoing = np.bincount(edges[:, 0], minlength=n)
-        incoming = np.bincount(edges[:, 1], minlength=n)
-        return (outgoing != 1) | (incoming != 1)
+        before, after = self.neighbours()
+        single = [len(b) == 1 and len(a) == 1 for b, a in zip(before, after, strict=True)]
+        return ~np.array(single, bool)
 
     def neighbours(self) -> tuple[list[list[int]], list[list[int]]]:
         """Return, for each vertex, the vertices its edges come from and those they go to."""

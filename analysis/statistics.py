@@ -48,13 +48,13 @@ def gather(
 ) -> FrameStatistics | None:
     """Return the statistics of an (h, w, 3 or 4) image, or None when no pixel counts."""
     step = max(FINEST_STEP, _largest(image) / MOST_STEPS)
-    rgb, counts, _, ignored = _core.bin_colours(image, step, options.colours)
+    rgb, counts, step, ignored = _core.bin_colours(image, step, options.colours)
     if len(rgb) == 0:
         return None
     fine = _core.ColourTree(rgb, counts)
     coarse = fine
     if len(rgb) > options.coarse_colours:
-        rgb, counts, _, _ = _core.bin_colours(image, step, options.coarse_colours)
+        rgb, counts, _ = _core.coarsen_colours(rgb, counts, step, options.coarse_colours)
         coarse = _core.ColourTree(rgb, counts)
     points = fine.rgb
     return FrameStatistics(

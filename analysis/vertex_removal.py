@@ -74,7 +74,8 @@ class Strands:
     def colour(self, vertex: int) -> F64:
         """Return the (3,) colour of a vertex (of a ghost: where its edge passes)."""
         i, s = self.at[vertex]
-        return self.position[i][s]
+        rgb: F64 = self.position[i][s]
+        return rgb
 
     def removable(self, vertex: int) -> bool:
         """Whether section 5.4.1 allows it, and no two strands would become the same edge."""

@@ -99,6 +99,15 @@ void bind_analysis(py::module_& m) {
         },
         py::arg("image"), py::arg("step"), py::arg("most"));
 
+    m.def(
+        "coarsen_colours",
+        [](const Doubles& rgb, const Doubles& counts, double step, std::size_t most) {
+            const std::vector<double> n(counts.data(), counts.data() + counts.size());
+            const ColourBins bins = coarsen_colours(rows<3>(rgb, "rgb"), n, step, most);
+            return py::make_tuple(table(bins.rgb), column(bins.counts), bins.step);
+        },
+        py::arg("rgb"), py::arg("counts"), py::arg("step"), py::arg("most"));
+
     py::class_<ColourTree, std::shared_ptr<ColourTree>>(m, "ColourTree")
         .def(py::init([](const Doubles& rgb, const Doubles& counts) {
                  std::vector<double> n(counts.data(), counts.data() + counts.size());

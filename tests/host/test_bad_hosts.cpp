@@ -196,7 +196,8 @@ TEST(every_call_refused_in_turn) {
     for (long n = 0;; ++n) {
         Config config;
         config.refused_call = n;
-        config.processors = 1 + static_cast<unsigned>(n % 3);  // with threads of the host and without
+        config.processors =
+            1 + static_cast<unsigned>(n % 3);  // with threads of the host and without
         Host::get().configure(config);
         OfxStatus status = kOfxStatFailed;
         const auto pixels = live(plugin, pictures, status);

@@ -265,8 +265,8 @@ def still_scene(
 ) -> Scene:
     """One picture ten times over.
 
-    With several threads melt now and then hands a filter the pixels of a neighbouring frame, with
-    or without the node. On a still picture that does not show, and a palette of the wrong time does.
+    With several threads melt now and then hands out the pixels of a neighbouring frame, edited or
+    not. On a still picture that does not show, and a palette of the wrong time does.
     """
     folder = tmp_path_factory.mktemp("melt") / "still"
     return Scene(melt, bundle.parent, folder, moving_clip(request.param)[:1] * 10)

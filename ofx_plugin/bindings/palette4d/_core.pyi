@@ -1,6 +1,7 @@
 """The compiled core: polytope slicing, mean value coordinates, recolouring, the sidecar reader."""
 
 import os
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -119,3 +120,69 @@ class Recolourer:
         Pixels must be packed within a row, rows may lie anywhere (``image[::-1]``, a crop); `out`
         may be `image` itself.
         """
+
+def bin_colours(image: NDArray[np.float32], step: float, most: int) -> tuple[F64, F64, float, int]:
+    """Gather an (h, w, 3 or 4) float32 image's pixels in bins of width `step`.
+
+    Returns (n, 3) mean colours, (n,) pixel counts, the width of the bins, which is doubled until at
+    most `most` are left, and how many pixels do not count (not finite, or alpha 0).
+    """
+
+def coarsen_colours(
+    rgb: ArrayLike, counts: ArrayLike, step: float, most: int
+) -> tuple[F64, F64, float]:
+    """Do the same for (n, 3) colours with (n,) counts; returns colours, counts, width."""
+
+class ColourTree:
+    """Weighted colours in a k-d tree: what the losses are measured on."""
+
+    def __init__(self, rgb: ArrayLike, counts: ArrayLike) -> None: ...
+    @property
+    def rgb(self) -> F64:
+        """(n, 3) float64 colours, in the tree's order."""
+    @property
+    def counts(self) -> F64:
+        """(n,) float64 pixels of each colour."""
+    @property
+    def total(self) -> float: ...
+    def nearest_mean(self, v: ArrayLike, k: float) -> F64:
+        """(m, 3) -> (m, 3) means of the k pixels nearest to each colour (v_N of eq. 3)."""
+    def __len__(self) -> int: ...
+
+def palette_loss(
+    colours: ColourTree,
+    palette: ArrayLike,
+    faces: ArrayLike,
+    lambda_: float,
+    k: float,
+    convexity: float,
+) -> tuple[float, float, float, float, float, F64]:
+    """R (eq. 2), C (eq. 3), concavity D, share of pixels outside, largest distance, and gradient.
+
+    `palette` is (n, 3); the (n, 3) gradient is that of lambda R + C + convexity D.
+    """
+
+class PolytopeLoss:
+    """Losses of a 4D skew polytope of fixed structure, frame by frame."""
+
+    def __init__(
+        self,
+        blocks: Sequence[tuple[float, float, Sequence[Sequence[int]], ArrayLike]],
+        frames: ArrayLike,
+        colours: Sequence[ColourTree],
+    ) -> None:
+        """Blocks (first, last, tracks, faces), (n,) frame numbers and their n colour trees."""
+    def evaluate(
+        self,
+        vertices: ArrayLike,
+        which: Sequence[int],
+        lambda_: float,
+        k: float,
+        convexity: float,
+        threads: int,
+        gradient: bool,
+    ) -> tuple[F64, F64]:
+        """Rows R, C, D, outside, largest distance of each frame; the summed (N, 4) gradient."""
+
+def progressive_hull(rgb: ArrayLike, faces: ArrayLike, target: int) -> F64:
+    """Simplify a closed convex mesh, (n, 3) and (f, 3), to at most `target` enclosing vertices."""

@@ -64,14 +64,35 @@ private:
 };
 
 std::uint64_t bin_number(double x, double inverse) {
-    const double n = std::floor(x * inverse + 0.5);
-    const auto clamped = static_cast<std::int64_t>(
-        std::clamp(n, static_cast<double>(-kOffset), static_cast<double>(kOffset - 1)));
-    return static_cast<std::uint64_t>(clamped + kOffset);
+    // Shifted to be positive, so that the conversion, which truncates, rounds down.
+    constexpr double kShift = static_cast<double>(kOffset) + 0.5;
+    const double n = x * inverse + kShift;
+    return static_cast<std::uint64_t>(std::min(std::max(n, 0.0), 2.0 * kOffset - 1.0));
 }
 
 std::uint64_t key_of(double r, double g, double b, double inverse) {
     return bin_number(r, inverse) << 42 | bin_number(g, inverse) << 21 | bin_number(b, inverse);
+}
+
+/// Widens the bins until at most `most` are left.
+ColourBins finish(Table table, double step, std::size_t most, std::size_t ignored) {
+    while (table.bins().size() > most) {
+        step *= 2;
+        Table wider(1 << 16);
+        for (const Bin& bin : table.bins())
+            wider.add(key_of(bin.sum[0] / bin.count, bin.sum[1] / bin.count, bin.sum[2] / bin.count,
+                             1 / step),
+                      bin.sum[0], bin.sum[1], bin.sum[2], bin.count);
+        table = std::move(wider);
+    }
+    ColourBins out;
+    out.step = step;
+    out.ignored = ignored;
+    for (const Bin& bin : table.bins()) {
+        out.rgb.push_back({bin.sum[0] / bin.count, bin.sum[1] / bin.count, bin.sum[2] / bin.count});
+        out.counts.push_back(bin.count);
+    }
+    return out;
 }
 
 }  // namespace
@@ -83,7 +104,7 @@ ColourBins bin_colours(const float* data, int width, int height, int channels,
                                     " channels, expected 3 (RGB) or 4 (RGBA)");
     if (!(step > 0) || !std::isfinite(step) || most < 1)
         throw std::invalid_argument("bins need a positive width and room for at least one");
-    ColourBins out;
+    std::size_t ignored = 0;
     Table table(1 << 16);
     const double inverse = 1 / step;
     for (int y = 0; y < height; ++y) {
@@ -93,27 +114,27 @@ ColourBins bin_colours(const float* data, int width, int height, int channels,
             const double r = row[0], g = row[1], b = row[2];
             if (!std::isfinite(r) || !std::isfinite(g) || !std::isfinite(b) ||
                 (channels == 4 && row[3] == 0)) {
-                ++out.ignored;
+                ++ignored;
                 continue;
             }
             table.add(key_of(r, g, b, inverse), r, g, b, 1);
         }
     }
-    while (table.bins().size() > most) {
-        step *= 2;
-        Table wider(1 << 16);
-        for (const Bin& bin : table.bins())
-            wider.add(key_of(bin.sum[0] / bin.count, bin.sum[1] / bin.count, bin.sum[2] / bin.count,
-                             1 / step),
-                      bin.sum[0], bin.sum[1], bin.sum[2], bin.count);
-        table = std::move(wider);
+    return finish(std::move(table), step, most, ignored);
+}
+
+ColourBins coarsen_colours(const std::vector<Vec3>& rgb, const std::vector<double>& counts,
+                           double step, std::size_t most) {
+    if (rgb.size() != counts.size() || !(step > 0) || !std::isfinite(step) || most < 1)
+        throw std::invalid_argument("coarsening needs a count a colour and bins of positive width");
+    Table table(1 << 16);
+    const double inverse = 1 / step;
+    for (std::size_t i = 0; i < rgb.size(); ++i) {
+        const double n = counts[i];
+        table.add(key_of(rgb[i][0], rgb[i][1], rgb[i][2], inverse), n * rgb[i][0], n * rgb[i][1],
+                  n * rgb[i][2], n);
     }
-    out.step = step;
-    for (const Bin& bin : table.bins()) {
-        out.rgb.push_back({bin.sum[0] / bin.count, bin.sum[1] / bin.count, bin.sum[2] / bin.count});
-        out.counts.push_back(bin.count);
-    }
-    return out;
+    return finish(std::move(table), step, most, 0);
 }
 
 }  // namespace palette4d
