@@ -1,0 +1,16 @@
+// What the node tells the host about itself.
+#pragma once
+
+#include "host.hpp"
+
+namespace palette4d::plugin {
+
+/// kOfxActionDescribe.
+OfxStatus describe(const Suites& suites, OfxImageEffectHandle effect);
+/// kOfxActionDescribeInContext: the same clips and parameters in every context.
+OfxStatus describe_in_context(const Suites& suites, OfxImageEffectHandle effect);
+/// kOfxImageEffectActionGetClipPreferences: a still picture comes out different from frame to
+/// frame.
+OfxStatus clip_preferences(const Properties& out_args);
+
+}  // namespace palette4d::plugin

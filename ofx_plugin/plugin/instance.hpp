@@ -1,0 +1,32 @@
+// One node in the host's project: the message it shows and its status line.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "host.hpp"
+
+namespace palette4d::plugin {
+
+/// What the plugin remembers about an instance. All else is in the host's parameters.
+struct Instance {
+    std::mutex mutex;
+    std::string message;  ///< the persistent message that the host shows; empty for none
+};
+
+/// The actions of an instance's life. They never fail: without its record an instance still
+/// renders, it only repeats its messages.
+void create_instance(const Suites& suites, OfxImageEffectHandle effect);
+void destroy_instance(OfxImageEffectHandle effect);
+/// Says in the parameter `status` what the instance's sidecar is or what is wrong with it. Not
+/// allowed while rendering.
+void update_status(const Suites& suites, OfxImageEffectHandle effect);
+/// kOfxActionInstanceChanged: a new sidecar gives a new status.
+void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const Properties& args);
+
+/// Shows a problem as the instance's persistent message, or takes the message away when `problem`
+/// is empty. Allowed while rendering; tells the host only what is new.
+void report(const Suites& suites, OfxImageEffectHandle effect, const std::string& problem);
+
+}  // namespace palette4d::plugin

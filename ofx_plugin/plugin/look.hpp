@@ -1,0 +1,28 @@
+// What a node does to one moment of its clip: parameters and time in, a prepared palette out.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "host.hpp"
+#include "palette4d/recolour.hpp"
+#include "palette4d/sidecar.hpp"
+
+namespace palette4d::plugin {
+
+struct Look {
+    /// Null when the picture passes through unchanged.
+    std::shared_ptr<const Recolourer> recolourer;
+    double strength = 1;
+    /// Why the picture passes through although a sidecar was asked for; empty when all is well.
+    std::string problem;
+};
+
+/// The sidecar frame shown at a host's time: the host's frame 0 is the clip's first frame.
+double sidecar_frame(const ClipInfo& clip, OfxTime host_time, double frame_offset);
+
+/// The look of an instance at a time. Reads parameters in the way allowed while rendering. Problems
+/// are in the result; throws std::bad_alloc only.
+Look look_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time);
+
+}  // namespace palette4d::plugin

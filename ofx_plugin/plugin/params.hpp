@@ -1,0 +1,40 @@
+// The node's parameters. Their names are saved in users' projects: they never change.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "host.hpp"
+
+namespace palette4d::plugin {
+
+inline constexpr const char* kParamSidecar = "sidecar";
+inline constexpr const char* kParamStrength = "strength";
+inline constexpr const char* kParamFrameOffset = "frameOffset";
+inline constexpr const char* kParamStatus = "status";
+
+/// Defines them in a context's descriptor. A property or a parameter that the host refuses keeps
+/// its default.
+void define_params(const Suites& suites, OfxParamSetHandle params);
+
+/// Reads and writes one instance's parameters. Empty where the host refuses.
+class Params {
+public:
+    Params(const Suites& suites, OfxImageEffectHandle effect);
+
+    /// At a time: the one way that is allowed while rendering.
+    std::optional<std::string> string_at(const char* name, OfxTime time) const;
+    std::optional<double> double_at(const char* name, OfxTime time) const;
+    /// Without a time: for actions other than rendering.
+    std::optional<std::string> string_now(const char* name) const;
+    /// For instance changes only, never while rendering.
+    bool set_string(const char* name, const std::string& value) const;
+
+private:
+    OfxParamHandle find(const char* name) const;
+
+    const OfxParameterSuiteV1* suite_;
+    OfxParamSetHandle set_ = nullptr;
+};
+
+}  // namespace palette4d::plugin

@@ -1,0 +1,159 @@
+#include "pixels.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <vector>
+
+namespace palette4d::plugin {
+namespace {
+
+// Floats of one round trip byte -> float -> byte: stays in the second-level cache.
+constexpr std::size_t kChunkFloats = 32768;
+
+int bytes_of_depth(const std::string& depth) {
+    if (depth == kOfxBitDepthByte) return 1;
+    if (depth == kOfxBitDepthShort || depth == kOfxBitDepthHalf) return 2;
+    if (depth == kOfxBitDepthFloat) return 4;
+    return 0;
+}
+
+int channels_of(const std::string& components) {
+    if (components == kOfxImageComponentRGBA) return 4;
+    if (components == kOfxImageComponentRGB) return 3;
+    if (components == kOfxImageComponentAlpha) return 1;
+    return 0;
+}
+
+std::string either(const Properties& image, const Properties& clip, const char* name) {
+    if (auto value = image.get_string(name)) return *value;
+    return clip.get_string(name).value_or("");
+}
+
+std::uint8_t to_byte(float value) {
+    // NaN fails both comparisons' opposites: it becomes 0.
+    if (!(value > 0.0f)) return 0;
+    if (value >= 1.0f) return 255;
+    return static_cast<std::uint8_t>(value * 255.0f + 0.5f);
+}
+
+void recolour_bytes(const Image& in, const Image& out, const OfxRectI& area,
+                    const Recolourer& recolourer, const RecolourOptions& options) {
+    const int width = area.x2 - area.x1;
+    const std::size_t row = static_cast<std::size_t>(width) * static_cast<std::size_t>(in.channels);
+    const int rows_at_once = static_cast<int>(std::max<std::size_t>(1, kChunkFloats / row));
+    std::vector<float> floats;
+    for (int y = area.y1; y < area.y2; y += rows_at_once) {
+        const int rows = std::min(rows_at_once, area.y2 - y);
+        floats.resize(row * static_cast<std::size_t>(rows));
+        float* to = floats.data();
+        for (int r = 0; r < rows; ++r) {
+            const auto* from = reinterpret_cast<const std::uint8_t*>(in.at(area.x1, y + r));
+            for (std::size_t i = 0; i < row; ++i) *to++ = static_cast<float>(from[i]) / 255.0f;
+        }
+        const auto stride = static_cast<std::ptrdiff_t>(row * sizeof(float));
+        recolourer.apply({floats.data(), width, rows, in.channels, stride},
+                         {floats.data(), width, rows, in.channels, stride}, options);
+        const float* from = floats.data();
+        for (int r = 0; r < rows; ++r) {
+            auto* bytes = reinterpret_cast<std::uint8_t*>(out.at(area.x1, y + r));
+            for (std::size_t i = 0; i < row; ++i) bytes[i] = to_byte(*from++);
+        }
+    }
+}
+
+/// Clears what `covered` leaves of `area`.
+void clear_around(const Image& out, const OfxRectI& area, const OfxRectI& covered) {
+    if (is_empty(covered)) {
+        clear(out, area);
+        return;
+    }
+    clear(out, {area.x1, area.y1, area.x2, covered.y1});
+    clear(out, {area.x1, covered.y2, area.x2, area.y2});
+    clear(out, {area.x1, covered.y1, covered.x1, covered.y2});
+    clear(out, {covered.x2, covered.y1, area.x2, covered.y2});
+}
+
+}  // namespace
+
+std::optional<Image> read_image(const Properties& image, const Properties& clip) {
+    const auto data = image.get_pointer(kOfxImagePropData);
+    const auto bounds = image.get_rect(kOfxImagePropBounds);
+    const auto row_bytes = image.get_int(kOfxImagePropRowBytes);
+    if (!data || !*data || !bounds || !row_bytes || is_empty(*bounds)) return std::nullopt;
+
+    Image result;
+    result.data = static_cast<char*>(*data);
+    result.bounds = *bounds;
+    result.row_bytes = *row_bytes;
+    const std::string depth = either(image, clip, kOfxImageEffectPropPixelDepth);
+    result.depth = depth == kOfxBitDepthByte    ? Depth::kByte
+                   : depth == kOfxBitDepthFloat ? Depth::kFloat
+                                                : Depth::kOther;
+    result.channels = channels_of(either(image, clip, kOfxImageEffectPropComponents));
+    result.pixel_bytes = bytes_of_depth(depth) * result.channels;
+    result.premultiplied =
+        result.channels == 4 &&
+        either(image, clip, kOfxImageEffectPropPreMultiplication) == kOfxImagePreMultiplied;
+
+    const std::int64_t width = static_cast<std::int64_t>(bounds->x2) - bounds->x1;
+    const std::int64_t stride = result.row_bytes < 0 ? -result.row_bytes : result.row_bytes;
+    const bool one_row = static_cast<std::int64_t>(bounds->y2) - bounds->y1 == 1;
+    if (result.pixel_bytes == 0 || (stride < width * result.pixel_bytes && !one_row)) {
+        return std::nullopt;
+    }
+    return result;
+}
+
+OfxRectI intersect(const OfxRectI& a, const OfxRectI& b) {
+    return {std::max(a.x1, b.x1), std::max(a.y1, b.y1), std::min(a.x2, b.x2), std::min(a.y2, b.y2)};
+}
+
+bool is_empty(const OfxRectI& rect) { return rect.x1 >= rect.x2 || rect.y1 >= rect.y2; }
+
+bool same_format(const Image& a, const Image& b) {
+    return a.depth == b.depth && a.channels == b.channels && a.pixel_bytes == b.pixel_bytes;
+}
+
+void clear(const Image& out, const OfxRectI& area) {
+    if (is_empty(area)) return;
+    const std::size_t bytes =
+        static_cast<std::size_t>(area.x2 - area.x1) * static_cast<std::size_t>(out.pixel_bytes);
+    for (int y = area.y1; y < area.y2; ++y) std::memset(out.at(area.x1, y), 0, bytes);
+}
+
+void copy(const Image& in, const Image& out, const OfxRectI& area) {
+    const OfxRectI covered = intersect(area, in.bounds);
+    clear_around(out, area, covered);
+    if (is_empty(covered)) return;
+    const std::size_t bytes = static_cast<std::size_t>(covered.x2 - covered.x1) *
+                              static_cast<std::size_t>(out.pixel_bytes);
+    for (int y = covered.y1; y < covered.y2; ++y) {
+        std::memmove(out.at(covered.x1, y), in.at(covered.x1, y), bytes);
+    }
+}
+
+void recolour(const Image& in, const Image& out, const OfxRectI& area, const Recolourer& recolourer,
+              double strength) {
+    const OfxRectI covered = intersect(area, in.bounds);
+    clear_around(out, area, covered);
+    if (is_empty(covered)) return;
+    RecolourOptions options;
+    options.strength = strength;
+    options.premultiplied = in.premultiplied;
+    options.threads = 1;  // the rows are shared among the host's threads already
+    if (in.depth == Depth::kByte) {
+        recolour_bytes(in, out, covered, recolourer, options);
+        return;
+    }
+    const int width = covered.x2 - covered.x1;
+    const int height = covered.y2 - covered.y1;
+    recolourer.apply({reinterpret_cast<const float*>(in.at(covered.x1, covered.y1)), width, height,
+                      in.channels, in.row_bytes},
+                     {reinterpret_cast<float*>(out.at(covered.x1, covered.y1)), width, height,
+                      out.channels, out.row_bytes},
+                     options);
+}
+
+}  // namespace palette4d::plugin

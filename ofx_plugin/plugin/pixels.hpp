@@ -1,0 +1,49 @@
+// The pixels of OFX images: where they lie, and the three things that are done to rows of them.
+// Rows count upwards from bounds.y1; row_bytes is signed and may hold padding.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+
+#include "host.hpp"
+#include "palette4d/recolour.hpp"
+
+namespace palette4d::plugin {
+
+enum class Depth { kByte, kFloat, kOther };
+
+/// An image as its property set describes it.
+struct Image {
+    char* data = nullptr;  ///< the pixel at (bounds.x1, bounds.y1)
+    OfxRectI bounds{};
+    std::ptrdiff_t row_bytes = 0;
+    Depth depth = Depth::kOther;
+    int channels = 0;
+    int pixel_bytes = 0;
+    bool premultiplied = false;  ///< only ever for four channels
+
+    char* at(int x, int y) const {
+        return data + (static_cast<std::ptrdiff_t>(y) - bounds.y1) * row_bytes +
+               (static_cast<std::ptrdiff_t>(x) - bounds.x1) * pixel_bytes;
+    }
+};
+
+/// Empty when the host does not say where the pixels lie, or lays them where they cannot be. Depth,
+/// components and premultiplication that the image does not tell are taken from its clip.
+std::optional<Image> read_image(const Properties& image, const Properties& clip);
+
+OfxRectI intersect(const OfxRectI& a, const OfxRectI& b);
+bool is_empty(const OfxRectI& rect);
+/// The two hold the same pixels in the same layout, so that one can be copied to the other.
+bool same_format(const Image& a, const Image& b);
+
+/// Transparent black.
+void clear(const Image& out, const OfxRectI& area);
+/// Copies what `in` covers of `area`; the rest becomes transparent black.
+void copy(const Image& in, const Image& out, const OfxRectI& area);
+/// Recolours what `in` covers of `area`; the rest becomes transparent black. Bytes are recoloured
+/// as byte / 255 and come back rounded and clamped.
+void recolour(const Image& in, const Image& out, const OfxRectI& area, const Recolourer& recolourer,
+              double strength);
+
+}  // namespace palette4d::plugin

@@ -1,0 +1,222 @@
+#include "sidecar_cache.hpp"
+
+#include <chrono>
+#include <cstdint>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <new>
+#include <optional>
+#include <utility>
+
+namespace palette4d::plugin {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = fs::file_time_type::clock;
+
+constexpr std::size_t kMaxFrames =
+    32;  ///< prepared frames a sidecar: more than a machine's threads
+constexpr std::size_t kMaxSidecars = 32;
+// File systems store times as coarsely as two seconds (FAT): younger files may change unseen.
+constexpr auto kSettled = std::chrono::seconds(3);
+
+/// What the file system says about a file; a change of it means that the file is to be read again.
+struct Stamp {
+    fs::file_time_type modified{};
+    std::uintmax_t bytes = 0;
+    bool operator==(const Stamp& other) const {
+        return modified == other.modified && bytes == other.bytes;
+    }
+};
+
+/// One path's latest reading. Its mutex makes threads that want the same new file read it once.
+struct Entry {
+    std::mutex mutex;
+    bool read = false;
+    Stamp stamp;
+    bool settled = false;  ///< the stamp was old enough at the reading to be trusted
+    std::string text;      ///< kept until settled, to see whether a young file really changed
+    SidecarResult result;
+    std::uint64_t last_use = 0;
+};
+
+struct Cache {
+    std::mutex mutex;
+    std::map<std::string, std::shared_ptr<Entry>> entries;
+    std::uint64_t uses = 0;
+};
+
+Cache& cache() {
+    static Cache instance;
+    return instance;
+}
+
+std::optional<Stamp> stamp_of(const fs::path& path, std::string& problem) {
+    std::error_code error;
+    const fs::file_status status = fs::status(path, error);
+    if (status.type() == fs::file_type::not_found) {
+        problem = "the file does not exist";
+        return std::nullopt;
+    }
+    if (!error && status.type() != fs::file_type::regular) {
+        problem = "it is not a file";
+        return std::nullopt;
+    }
+    Stamp stamp;
+    if (!error) stamp.modified = fs::last_write_time(path, error);
+    if (!error) stamp.bytes = fs::file_size(path, error);
+    if (error) {
+        problem = "the file cannot be examined (" + error.message() + ")";
+        return std::nullopt;
+    }
+    if (stamp.bytes > kMaxSidecarBytes) {
+        problem = "found " + std::to_string(stamp.bytes) + " bytes, expected at most " +
+                  std::to_string(kMaxSidecarBytes);
+        return std::nullopt;
+    }
+    return stamp;
+}
+
+/// The file's text, at most one byte more than a sidecar may have (the parser then refuses it).
+std::optional<std::string> text_of(const fs::path& path, std::uintmax_t expected) {
+    std::ifstream file(path, std::ios::binary);
+    if (!file) return std::nullopt;
+    std::string text;
+    text.reserve(static_cast<std::size_t>(expected));
+    char block[65536];
+    while (text.size() <= kMaxSidecarBytes) {
+        file.read(block, sizeof block);
+        text.append(block, static_cast<std::size_t>(file.gcount()));
+        if (!file) break;
+    }
+    if (file.bad()) return std::nullopt;
+    return text;
+}
+
+SidecarResult parse(const std::string& text, const std::string& path) {
+    SidecarResult result;
+    try {
+        result.loaded = std::make_shared<LoadedSidecar>(parse_sidecar(text, path));
+    } catch (const std::bad_alloc&) {
+        throw;
+    } catch (const std::exception& error) {
+        result.problem = error.what();
+    }
+    return result;
+}
+
+/// Brings an entry up to date with its file; its mutex is held.
+void refresh(Entry& entry, const fs::path& path, const std::string& name) {
+    std::string problem;
+    for (int attempt = 0; attempt < 3; ++attempt) {
+        const std::optional<Stamp> before = stamp_of(path, problem);
+        if (!before) break;
+        const bool same = entry.read && *before == entry.stamp;
+        if (same && entry.settled) return;
+        const bool settled = Clock::now() - before->modified > kSettled;
+        std::optional<std::string> text = text_of(path, before->bytes);
+        if (!text) {
+            problem = "the file cannot be read";
+            break;
+        }
+        // Written while it was read: what was read may be two halves.
+        const std::optional<Stamp> after = stamp_of(path, problem);
+        if (!after) break;
+        if (!(*after == *before)) {
+            if (attempt < 2) continue;
+        }
+        if (!(entry.read && *text == entry.text && !entry.settled)) {
+            entry.result = parse(*text, name);
+        }
+        entry.read = true;
+        entry.stamp = *after;
+        entry.settled = settled && *after == *before;
+        entry.text = entry.settled ? std::string() : std::move(*text);
+        return;
+    }
+    entry.read = false;
+    entry.settled = false;
+    entry.text.clear();
+    entry.result = {nullptr, name + ": " + problem};
+}
+
+std::shared_ptr<Entry> entry_of(const std::string& key) {
+    Cache& all = cache();
+    const std::lock_guard<std::mutex> lock(all.mutex);
+    std::shared_ptr<Entry>& entry = all.entries[key];
+    if (!entry) entry = std::make_shared<Entry>();
+    const std::shared_ptr<Entry> wanted = entry;
+    wanted->last_use = ++all.uses;
+    while (all.entries.size() > kMaxSidecars) {
+        auto oldest = all.entries.begin();
+        for (auto it = all.entries.begin(); it != all.entries.end(); ++it) {
+            if (it->second->last_use < oldest->second->last_use) oldest = it;
+        }
+        all.entries.erase(oldest);
+    }
+    return wanted;
+}
+
+}  // namespace
+
+LoadedSidecar::LoadedSidecar(Sidecar sidecar) : sidecar_(std::move(sidecar)) {}
+
+std::shared_ptr<const Recolourer> LoadedSidecar::recolourer_at(double frame) {
+    const Polytope& polytope = sidecar_.polytope;
+    // All of the time before the clip is its first frame, all after it the last.
+    if (frame < polytope.first_frame()) frame = polytope.first_frame();
+    if (frame > polytope.last_frame()) frame = polytope.last_frame();
+
+    std::shared_ptr<Prepared> prepared;
+    {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        std::shared_ptr<Prepared>& slot = frames_[frame];
+        if (slot) {
+            recent_.remove(frame);
+        } else {
+            slot = std::make_shared<Prepared>();
+        }
+        prepared = slot;
+        recent_.push_front(frame);
+        while (recent_.size() > kMaxFrames) {
+            frames_.erase(recent_.back());
+            recent_.pop_back();
+        }
+    }
+    // Only threads that want this very frame wait for it.
+    const std::lock_guard<std::mutex> lock(prepared->building);
+    if (!prepared->recolourer) {
+        Slice slice = slice_at(polytope, frame);
+        std::vector<Vec3> edited = edited_colours(polytope, sidecar_.edits, slice);
+        prepared->recolourer = std::make_shared<const Recolourer>(
+            std::move(slice.rgb), std::move(edited), std::move(slice.faces));
+    }
+    return prepared->recolourer;
+}
+
+SidecarResult load_sidecar(const std::string& path) {
+    try {
+        const fs::path given = fs::u8path(path);
+        std::error_code error;
+        fs::path canonical = fs::weakly_canonical(given, error);
+        if (error) canonical = given;
+        const std::shared_ptr<Entry> entry = entry_of(canonical.u8string());
+        const std::lock_guard<std::mutex> lock(entry->mutex);
+        refresh(*entry, canonical, path);
+        return entry->result;
+    } catch (const std::bad_alloc&) {
+        throw;
+    } catch (const std::exception& error) {
+        return {nullptr, path + ": " + error.what()};
+    }
+}
+
+void purge_sidecars() {
+    Cache& all = cache();
+    std::map<std::string, std::shared_ptr<Entry>> dropped;
+    const std::lock_guard<std::mutex> lock(all.mutex);
+    dropped.swap(all.entries);
+}
+
+}  // namespace palette4d::plugin
