@@ -5,9 +5,10 @@ two inter-degree rules and the two topological rules at the least total colour d
 exhaustively (branch and bound) among the edges of the 4D convex hull of both palettes; and the
 triangle mesh that holds between the two frames, whose corners are those edges.
 
-Where the hull's edges allow no solution all pairs are searched, and where none exists at all (the
-two palettes' triangulations cannot be mapped onto each other) topological rule 2 is broken as
-little as possible.
+The search then goes on among all pairs of colours, and a shorter solution there wins: the paper
+restricts its search to the hull's edges, but colours that lie inside the hull of both frames then
+link to strangers. Where no solution exists at all (the two palettes' triangulations cannot be
+mapped onto each other), topological rule 2 is broken as little as possible.
 """
 
 from __future__ import annotations
@@ -55,11 +56,14 @@ def glue(first: Palette, second: Palette) -> Glue:
         links = _nearest_links(distance)
         return Glue(links, 0, n == m and _same_topology(first, second, links))
     hull = hull_pairs(first.rgb, second.rgb)
-    for allowed in (hull, np.ones_like(hull)):
-        found = _Search(first, second, distance, allowed, strict=True).run()
-        if found is not None:
-            return Glue(found[0], 0, n == m and _same_topology(first, second, found[0]))
-    found = _Search(first, second, distance, np.ones_like(hull), strict=False).run()
+    everything = np.ones_like(hull)
+    found = _Search(first, second, distance, hull, strict=True).run()
+    bound = np.inf if found is None else sum(float(distance[i, j]) for i, j in found[0])
+    shorter = _Search(first, second, distance, everything, strict=True, bound=bound).run()
+    found = shorter or found
+    if found is not None:
+        return Glue(found[0], 0, n == m and _same_topology(first, second, found[0]))
+    found = _Search(first, second, distance, everything, strict=False).run()
     if found is None:
         links = _nearest_links(distance)
         found = links, _broken_edges(first, second, links)
@@ -90,7 +94,13 @@ class _Search:
     """Branch and bound over the first palette's colours, each choosing the colours it links to."""
 
     def __init__(
-        self, first: Palette, second: Palette, distance: F64, allowed: Bool, strict: bool
+        self,
+        first: Palette,
+        second: Palette,
+        distance: F64,
+        allowed: Bool,
+        strict: bool,
+        bound: float = np.inf,
     ) -> None:
         self.n, self.m = distance.shape
         self.strict = strict
@@ -105,7 +115,7 @@ class _Search:
             self.rest[at] = self.rest[at + 1] + (min(costs) if costs else np.inf)
         self.chosen: list[tuple[int, ...]] = [()] * self.n
         self.users: list[list[int]] = [[] for _ in range(self.m)]
-        self.best = np.inf
+        self.best = bound  # only solutions shorter than this are wanted
         self.best_links: tuple[tuple[int, int], ...] | None = None
         self.best_broken = 0
         self.nodes = 0
