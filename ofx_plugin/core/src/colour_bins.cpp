@@ -10,6 +10,8 @@ namespace {
 
 constexpr std::int64_t kOffset = 1 << 20;  // bin numbers are kept in 21 bits each
 
+constexpr std::size_t kRoom = 16;  // bins held while reading, in multiples of those kept
+
 struct Bin {
     std::uint64_t key;
     double sum[3];
@@ -23,7 +25,7 @@ public:
 
     void add(std::uint64_t key, double r, double g, double b, double n) {
         std::size_t mask = slots_.size() - 1;
-        std::size_t at = (key * 0x9E3779B97F4A7C15ull >> 20) & mask;
+        std::size_t at = slot_of(key) & mask;
         while (slots_[at] >= 0 && bins_[slots_[at]].key != key) at = (at + 1) & mask;
         if (slots_[at] < 0) {
             slots_[at] = static_cast<std::int64_t>(bins_.size());
@@ -41,6 +43,9 @@ public:
     const std::vector<Bin>& bins() const { return bins_; }
 
 private:
+    /// The product's upper bits depend on every bit of the key (Fibonacci hashing).
+    static std::size_t slot_of(std::uint64_t key) { return key * 0x9E3779B97F4A7C15ull >> 36; }
+
     static void fill(Bin& bin, double r, double g, double b, double n) {
         bin.sum[0] += r;
         bin.sum[1] += g;
@@ -52,7 +57,7 @@ private:
         std::vector<std::int64_t> wider(slots_.size() * 2, -1);
         const std::size_t mask = wider.size() - 1;
         for (std::size_t i = 0; i < bins_.size(); ++i) {
-            std::size_t at = (bins_[i].key * 0x9E3779B97F4A7C15ull >> 20) & mask;
+            std::size_t at = slot_of(bins_[i].key) & mask;
             while (wider[at] >= 0) at = (at + 1) & mask;
             wider[at] = static_cast<std::int64_t>(i);
         }
@@ -74,8 +79,8 @@ std::uint64_t key_of(double r, double g, double b, double inverse) {
     return bin_number(r, inverse) << 42 | bin_number(g, inverse) << 21 | bin_number(b, inverse);
 }
 
-/// Widens the bins until at most `most` are left.
-ColourBins finish(Table table, double step, std::size_t most, std::size_t ignored) {
+/// Doubles the bins' width until at most `most` are left.
+void widen(Table& table, double& step, std::size_t most) {
     while (table.bins().size() > most) {
         step *= 2;
         Table wider(1 << 16);
@@ -85,6 +90,10 @@ ColourBins finish(Table table, double step, std::size_t most, std::size_t ignore
                       bin.sum[0], bin.sum[1], bin.sum[2], bin.count);
         table = std::move(wider);
     }
+}
+
+ColourBins finish(Table table, double step, std::size_t most, std::size_t ignored) {
+    widen(table, step, most);
     ColourBins out;
     out.step = step;
     out.ignored = ignored;
@@ -106,7 +115,7 @@ ColourBins bin_colours(const float* data, int width, int height, int channels,
         throw std::invalid_argument("bins need a positive width and room for at least one");
     std::size_t ignored = 0;
     Table table(1 << 16);
-    const double inverse = 1 / step;
+    double inverse = 1 / step;
     for (int y = 0; y < height; ++y) {
         const float* row = reinterpret_cast<const float*>(
             reinterpret_cast<const char*>(data) + static_cast<std::ptrdiff_t>(y) * row_bytes);
@@ -118,6 +127,11 @@ ColourBins bin_colours(const float* data, int width, int height, int channels,
                 continue;
             }
             table.add(key_of(r, g, b, inverse), r, g, b, 1);
+        }
+        // Grain gives nearly every pixel a colour of its own: memory stays bounded on the way, too.
+        if (table.bins().size() > kRoom * most) {
+            widen(table, step, kRoom * most / 2);
+            inverse = 1 / step;
         }
     }
     return finish(std::move(table), step, most, ignored);
