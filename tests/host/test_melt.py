@@ -7,46 +7,19 @@ sees to it that pixels really changed, or really did not.
 from __future__ import annotations
 
 import json
-import os
-import subprocess
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import OpenImageIO as oiio
 import pytest
-from numpy.typing import NDArray
+from host.scene import RATE, SERVICE, Image, Scene, read_image
 from palette4d import _core
-
-SERVICE = "openfx.org.palette4d.Palette4D"
-RATE = 25  # melt's own idea of the rate of numbered pictures
-Image = NDArray[Any]  # (h, w, 3 or 4) uint8 or uint16
 
 # Corners 0..7 count in red, green, blue bits; anticlockwise from outside.
 BOX_FACES = [
     *([0, 2, 3], [0, 3, 1], [4, 5, 7], [4, 7, 6], [0, 1, 5], [0, 5, 4]),
     *([2, 6, 7], [2, 7, 3], [0, 4, 6], [0, 6, 2], [1, 3, 7], [1, 7, 5]),
 ]  # fmt: skip
-
-
-def write_image(path: Path, image: Image) -> None:
-    spec = oiio.ImageSpec(image.shape[1], image.shape[0], image.shape[2], str(image.dtype))
-    output = oiio.ImageOutput.create(str(path))
-    assert output.open(str(path), spec)
-    assert output.write_image(np.ascontiguousarray(image))
-    assert output.close()
-
-
-def read_image(path: Path) -> Image:
-    hint = oiio.ImageSpec()
-    hint.attribute("oiio:UnassociatedAlpha", 1)
-    source = oiio.ImageInput.open(str(path), hint)
-    assert source, f"{path}: {oiio.geterror()}"
-    image = np.asarray(source.read_image(str(source.spec().format)))
-    source.close()
-    return image
 
 
 def box_sidecar(path: Path, clip: Sequence[Image], first: int = 100) -> _core.Sidecar:
@@ -103,110 +76,6 @@ def box_sidecar(path: Path, clip: Sequence[Image], first: int = 100) -> _core.Si
     }
     path.write_text(json.dumps(document), encoding="utf-8")
     return _core.read_sidecar(str(path))
-
-
-def recolour(
-    sidecar: _core.Sidecar, frame: float, image: Image, strength: float = 1.0
-) -> NDArray[np.float32]:
-    """What the core makes of a frame, clamped to 0..1 as files of integers are."""
-    cut = _core.slice_at(sidecar.polytope, frame)
-    edited = _core.edited_colours(sidecar.polytope, sidecar.edits, cut)
-    recolourer = _core.Recolourer(cut.rgb, edited, cut.faces)
-    top = np.float32(np.iinfo(image.dtype).max)
-    values = image.astype(np.float32) / top
-    return np.clip(recolourer.apply(values, strength=strength), 0, 1)
-
-
-@dataclass
-class Scene:
-    """A clip as numbered pictures, and melt to render it through the node."""
-
-    melt: Path
-    plugins: Path
-    folder: Path
-    clip: list[Image]
-
-    def __post_init__(self) -> None:
-        height, width = self.clip[0].shape[:2]
-        self.folder.mkdir(parents=True)
-        for index, image in enumerate(self.clip):
-            write_image(self.folder / f"in_{index:03d}.png", image)
-        profile = {
-            "description": "test",
-            "frame_rate_num": RATE,
-            "frame_rate_den": 1,
-            "width": width,
-            "height": height,
-            "progressive": 1,
-            "sample_aspect_num": 1,
-            "sample_aspect_den": 1,
-            "display_aspect_num": width,
-            "display_aspect_den": height,
-            "colorspace": 709,
-        }
-        lines = [f"{key}={value}\n" for key, value in profile.items()]
-        (self.folder / "profile").write_text("".join(lines))
-
-    def run(self, *words: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [str(self.melt), *words],
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            cwd=self.folder,
-            env={**os.environ, "OFX_PLUGIN_PATH": str(self.plugins)},
-            timeout=300,
-            check=True,
-        )
-
-    def render(self, *, real_time: int = -1, **parameters: object) -> tuple[list[Image], str]:
-        """The clip through the node, at its own depth, and what melt said meanwhile."""
-        for old in self.folder.glob("out_*.png"):
-            old.unlink()
-        image_format = "rgba" if self.clip[0].dtype == np.uint8 else "rgba64"
-        pixels = "rgba" if image_format == "rgba" else "rgba64be"
-        done = self.run(
-            # abnormal: without the loader's normalisers, which take pictures through 4:2:2.
-            # Not -quiet: it would keep the persistent messages to itself.
-            *("-profile", "profile", "abnormal:in_%03d.png", "-attach", SERVICE),
-            *(f"{name}={value}" for name, value in parameters.items()),
-            *("-consumer", "avformat:out_%03d.png", "vcodec=png", "an=1", f"pix_fmt={pixels}"),
-            *(f"mlt_image_format={image_format}", f"real_time={real_time}"),
-        )
-        files = sorted(self.folder.glob("out_*.png"))
-        assert len(files) == len(self.clip), done.stderr
-        return [read_image(path) for path in files], done.stderr
-
-    def unchanged(self, frames: list[Image]) -> bool:
-        """Whether every frame came through bit for bit."""
-        return all(
-            np.array_equal(frame[..., :3], image[..., :3])
-            for frame, image in zip(frames, self.clip, strict=True)
-        )
-
-    def check(
-        self,
-        frames: list[Image],
-        sidecar: _core.Sidecar,
-        *,
-        strength: Sequence[float] | None = None,
-        offset: float = 0.0,
-    ) -> None:
-        """Every frame is the core's to within one step of its depth, and not the source's."""
-        first = float(sidecar.clip["first"])
-        top = float(np.iinfo(self.clip[0].dtype).max)
-        changed = 0.0
-        for index, (frame, image) in enumerate(zip(frames, self.clip, strict=True)):
-            s = 1.0 if strength is None else strength[index]
-            expected = recolour(sidecar, first + index + offset, image[..., :3], s)
-            error = np.abs(frame[..., :3].astype(np.float64) - expected * top)
-            # Bytes are rounded by the node itself; floats by the host, which may cut them off.
-            limit = 0.5 + 1e-3 if top == 255 else 1.0 + 1e-2
-            assert error.max() <= limit, f"frame {index}: off by {error.max()} of {top}"
-            assert np.all(frame[..., 3] == top), f"frame {index}: its alpha changed"
-            changed += float(np.abs(expected - image[..., :3] / top).mean())
-        assert changed / len(frames) > 0.01, "the edit changed next to nothing"
 
 
 def moving_clip(depth: type[np.uint8] | type[np.uint16], count: int = 10) -> list[Image]:

@@ -230,7 +230,21 @@ def all_documents() -> dict[str, Document]:
 
 DOCUMENTS = all_documents()
 
+EDITED = [name for name in DOCUMENTS if "-" in name and name != "changes-back"]
+UNEDITED = [name for name in DOCUMENTS if name not in EDITED]
+
+#: How closely a picture must agree with the reference's: half a unit in the last place of float32
+#: either way, and the weights' own rounding.
+PICTURE_TOLERANCE = {"rtol": 1.3e-7, "atol": 3e-8}
+
 NUDGE = 1e-6
+
+
+def times_of(name: str) -> list[float]:
+    """A few times within and around a document's clip."""
+    blocks = DOCUMENTS[name]["polytope"]["blocks"]
+    first, last = blocks[0]["first"], blocks[-1]["last"]
+    return [first - 1, first, first + 0.29 * (last - first), first + 0.72 * (last - first), last]
 
 
 def frames_of(name: str) -> list[float]:

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from parity.cases import DOCUMENTS, picture, same_bits
+from parity.cases import (
+    DOCUMENTS,
+    EDITED,
+    PICTURE_TOLERANCE,
+    UNEDITED,
+    picture,
+    same_bits,
+    times_of,
+)
 from parity.implementations import CORE, IMPLEMENTATIONS, REFERENCE, Implementation
 
 IMPLEMENTED = pytest.mark.parametrize("code", IMPLEMENTATIONS, ids=lambda code: code.name)
-EDITED = [name for name in DOCUMENTS if "-" in name and name != "changes-back"]
-UNEDITED = [name for name in DOCUMENTS if name not in EDITED]
-
-
-def times_of(name: str) -> list[float]:
-    """A few times within and around a document's clip."""
-    blocks = DOCUMENTS[name]["polytope"]["blocks"]
-    first, last = blocks[0]["first"], blocks[-1]["last"]
-    return [first - 1, first, first + 0.29 * (last - first), first + 0.72 * (last - first), last]
 
 
 @pytest.mark.parametrize(("channels", "premultiplied"), [(3, False), (4, False), (4, True)])
@@ -27,8 +26,7 @@ def test_the_core_recolours_as_the_reference(name: str, channels: int, premultip
         for strength in (1.0, 0.4):
             arguments = image, DOCUMENTS[name], frame, strength, premultiplied
             expected, found = REFERENCE.recolour(*arguments), CORE.recolour(*arguments)
-            # Half a unit in the last place of float32 either way, and the weights' own rounding.
-            np.testing.assert_allclose(found, expected, rtol=1.3e-7, atol=3e-8)
+            np.testing.assert_allclose(found, expected, **PICTURE_TOLERANCE)
 
 
 @IMPLEMENTED

@@ -1,0 +1,169 @@
+# palette4d: from a fresh clone to results. Needs Python 3.11 to 3.13, make and a C++17 compiler;
+# cmake, ninja and all else come from the package index that pip is set up for.
+#
+# Everything built lies under .venv/, build/ and demo_output/; `make clean` removes them.
+
+SHELL := /bin/sh
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+
+# The Python to build with: the first suitable one on PATH, or make PYTHON=/path/to/python3.12 ...
+PYTHON ?=
+CXX ?= g++
+# Passed on to pytest: make test-py PYTEST_ARGS="-k slice -x"
+PYTEST_ARGS ?=
+
+# A Python path or an active environment of the caller must not leak into what is tested.
+unexport PYTHONPATH PYTHONHOME VIRTUAL_ENV
+
+VENV := .venv
+TOOLS := build/tools
+TEST_VENV := build/test-venv
+WHEELS := build/wheels
+PIP := -m pip --quiet --disable-pip-version-check
+
+# Folders are listed too, so that a removed file counts as a change.
+SOURCES := pyproject.toml README.md LICENSE $(shell find ofx_plugin analysis lut_export \
+	! -name '__pycache__*' ! -name '*.pyc')
+CXX_FILES = $(shell find ofx_plugin tests -name '*.cpp' -o -name '*.hpp' -o -name '*.h')
+
+.PHONY: help demo test install dev wheel lint style types build-cpp build-sanitize test-cpp \
+	test-sanitize test-py format clean compiler
+
+help: ## this list
+	@echo "make demo            from nothing to results in demo_output/"
+	@echo "make test            everything: lint, C++ tests (plain and sanitized), the wheel, host tests"
+	@echo
+	@echo "make install         .venv with palette4d in it (.venv/bin/palette4d)"
+	@echo "make dev             .venv with an editable palette4d and every tool"
+	@echo "make wheel           the wheel, in $(WHEELS)/"
+	@echo "make lint            ruff, clang-format, mypy (strict, on the installed wheel)"
+	@echo "make test-cpp        C++ tests, warnings as errors"
+	@echo "make test-sanitize   the same under AddressSanitizer and UndefinedBehaviorSanitizer"
+	@echo "make test-py         pytest on the wheel in a fresh environment (PYTEST_ARGS=... is passed on)"
+	@echo "make format          rewrite the sources as ruff and clang-format want them"
+	@echo "make clean           remove everything that was built"
+	@echo
+	@echo "PYTHON=/path/to/python3.12 chooses the Python; CXX=... the compiler."
+
+# ---------------------------------------------------------------------------- environments
+
+# $(call new-venv,FOLDER)
+define new-venv
+	@rm -rf $(1)
+	@mkdir -p $(dir $(1))
+	@python=$$(tools/find_python.sh "$(PYTHON)") && echo "== $(1), with $$python" && \
+		"$$python" -m venv $(1)
+endef
+
+compiler:
+	@command -v $(firstword $(CXX)) >/dev/null 2>&1 || { \
+		echo "palette4d needs a C++17 compiler: $(CXX) was not found (install g++, or set CXX)" >&2; \
+		exit 1; }
+
+$(VENV)/.created:
+	$(call new-venv,$(VENV))
+	@touch $@
+
+build/wheel.stamp: $(SOURCES) | $(VENV)/.created compiler
+	@echo "== the wheel (compiles the core, the bindings and the OpenFX bundle)"
+	@rm -rf $(WHEELS)
+	$(VENV)/bin/python $(PIP) wheel . --no-deps --wheel-dir $(WHEELS)
+	@touch $@
+
+ifeq ($(wildcard $(VENV)/.editable),)
+$(VENV)/.installed: build/wheel.stamp
+	@echo "== palette4d into $(VENV)"
+	$(VENV)/bin/python $(PIP) install $(WHEELS)/*.whl
+	$(VENV)/bin/python $(PIP) install --no-deps --force-reinstall $(WHEELS)/*.whl
+	@touch $@
+else
+$(VENV)/.installed: $(SOURCES)
+	@echo "== palette4d into $(VENV) (editable)"
+	$(VENV)/bin/python $(PIP) install --no-build-isolation --no-deps --editable .
+	@touch $@
+endif
+
+install: $(VENV)/.installed ## .venv with palette4d in it
+
+dev: $(VENV)/.created compiler ## .venv with an editable palette4d and every tool
+	@mkdir -p build
+	$(VENV)/bin/python tools/requirements.py native > build/native.txt
+	$(VENV)/bin/python $(PIP) install -r build/native.txt
+	$(VENV)/bin/python $(PIP) install --no-build-isolation --editable '.[dev]'
+	@touch $(VENV)/.editable $(VENV)/.installed
+	@echo "An editable palette4d and its tools are in $(VENV); C++ changes are compiled by: make dev"
+
+$(TOOLS)/.installed: pyproject.toml tools/requirements.py
+	$(call new-venv,$(TOOLS))
+	$(TOOLS)/bin/python tools/requirements.py native lint > $(TOOLS)/requirements.txt
+	$(TOOLS)/bin/python $(PIP) install -r $(TOOLS)/requirements.txt
+	@touch $@
+
+# A fresh environment for every new wheel: nothing but the wheel, its dependencies and the tests'.
+$(TEST_VENV)/.installed: build/wheel.stamp
+	$(call new-venv,$(TEST_VENV))
+	@wheel=$$(echo $(WHEELS)/*.whl) && set -x && \
+		$(TEST_VENV)/bin/python $(PIP) install "$$wheel[test]"
+	@touch $@
+
+# ---------------------------------------------------------------------------- demo
+
+demo: $(VENV)/.installed ## from nothing to results in demo_output/
+	@$(VENV)/bin/python tools/demo.py demo_output
+
+# ---------------------------------------------------------------------------- tests
+
+test: lint test-cpp test-sanitize test-py ## everything
+	@echo "== all of make test passed"
+
+wheel: build/wheel.stamp ## the wheel
+	@ls $(WHEELS)/*.whl
+
+lint: style types
+
+style: $(TOOLS)/.installed
+	@echo "== ruff, clang-format"
+	$(TOOLS)/bin/ruff check .
+	$(TOOLS)/bin/ruff format --check .
+	@$(TOOLS)/bin/clang-format --dry-run --Werror $(CXX_FILES)
+
+# mypy sees palette4d as its users do: the installed wheel, never the source tree.
+types: $(TOOLS)/.installed $(TEST_VENV)/.installed
+	@echo "== mypy --strict on the installed wheel"
+	$(TOOLS)/bin/mypy --python-executable $(TEST_VENV)/bin/python -p palette4d
+	$(TOOLS)/bin/mypy --python-executable $(TEST_VENV)/bin/python tools
+
+# $(call preset,NAME,COMMAND): run a command of CMake's with our tools, where the presets are
+define preset
+	@PATH="$(CURDIR)/$(TOOLS)/bin:$$PATH" && export PATH && cd ofx_plugin && $(2) --preset $(1)
+endef
+
+build-cpp build-sanitize: build-%: $(TOOLS)/.installed compiler
+	@echo "== C++ (preset $(PRESET_$*))"
+	$(call preset,$(PRESET_$*),cmake -DPython_EXECUTABLE="$(CURDIR)/$(TOOLS)/bin/python")
+	$(call preset,$(PRESET_$*),cmake --build)
+PRESET_cpp := test
+PRESET_sanitize := sanitize
+
+test-cpp test-sanitize: test-%: build-%
+	@echo "== C++ tests (preset $(PRESET_$*))"
+	$(call preset,$(PRESET_$*),ctest)
+
+# From a folder of its own, so that no file of the tree can stand in for the installed package.
+# build-cpp: the strict host, which the tests of the packaged node drive.
+test-py: $(TEST_VENV)/.installed build-cpp
+	@echo "== pytest on the installed wheel"
+	@rm -rf build/test-run && mkdir -p build/test-run
+	@wheel=$$(echo "$(CURDIR)"/$(WHEELS)/*.whl) && cd build/test-run && \
+		PALETTE4D_WHEEL="$$wheel" "$(CURDIR)/$(TEST_VENV)/bin/python" -P -m pytest \
+		-c "$(CURDIR)/pyproject.toml" --rootdir "$(CURDIR)" "$(CURDIR)/tests" $(PYTEST_ARGS)
+
+format: $(TOOLS)/.installed ## rewrite the sources as ruff and clang-format want them
+	$(TOOLS)/bin/ruff check --fix .
+	$(TOOLS)/bin/ruff format .
+	$(TOOLS)/bin/clang-format -i $(CXX_FILES)
+
+clean: ## remove everything that was built
+	rm -rf $(VENV) build dist demo_output .cache .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	find ofx_plugin analysis lut_export tests tools -name __pycache__ -type d -exec rm -rf {} +

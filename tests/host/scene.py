@@ -1,0 +1,149 @@
+"""A clip as numbered pictures, and melt to render it through the node."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenImageIO as oiio
+from numpy.typing import NDArray
+from palette4d import _core
+
+SERVICE = "openfx.org.palette4d.Palette4D"
+RATE = 25  # melt's own idea of the rate of numbered pictures
+Image = NDArray[Any]  # (h, w, 3 or 4) uint8 or uint16
+
+
+def write_image(path: Path, image: Image) -> None:
+    spec = oiio.ImageSpec(image.shape[1], image.shape[0], image.shape[2], str(image.dtype))
+    output = oiio.ImageOutput.create(str(path))
+    assert output.open(str(path), spec)
+    assert output.write_image(np.ascontiguousarray(image))
+    assert output.close()
+
+
+def read_image(path: Path) -> Image:
+    hint = oiio.ImageSpec()
+    hint.attribute("oiio:UnassociatedAlpha", 1)
+    source = oiio.ImageInput.open(str(path), hint)
+    assert source, f"{path}: {oiio.geterror()}"
+    image = np.asarray(source.read_image(str(source.spec().format)))
+    source.close()
+    return image
+
+
+def recolour(
+    sidecar: _core.Sidecar, frame: float, image: Image, strength: float = 1.0
+) -> NDArray[np.float32]:
+    """What the core makes of a frame, clamped to 0..1 as files of integers are."""
+    cut = _core.slice_at(sidecar.polytope, frame)
+    edited = _core.edited_colours(sidecar.polytope, sidecar.edits, cut)
+    recolourer = _core.Recolourer(cut.rgb, edited, cut.faces)
+    top = np.float32(np.iinfo(image.dtype).max)
+    values = image.astype(np.float32) / top
+    return np.clip(recolourer.apply(values, strength=strength), 0, 1)
+
+
+@dataclass
+class Scene:
+    """A clip as numbered pictures, and melt to render it through the node."""
+
+    melt: Path
+    plugins: Path
+    folder: Path
+    clip: list[Image]
+
+    def __post_init__(self) -> None:
+        height, width = self.clip[0].shape[:2]
+        self.folder.mkdir(parents=True)
+        for index, image in enumerate(self.clip):
+            write_image(self.folder / f"in_{index:03d}.png", image)
+        profile = {
+            "description": "test",
+            "frame_rate_num": RATE,
+            "frame_rate_den": 1,
+            "width": width,
+            "height": height,
+            "progressive": 1,
+            "sample_aspect_num": 1,
+            "sample_aspect_den": 1,
+            "display_aspect_num": width,
+            "display_aspect_den": height,
+            "colorspace": 709,
+        }
+        lines = [f"{key}={value}\n" for key, value in profile.items()]
+        (self.folder / "profile").write_text("".join(lines))
+
+    def run(self, *words: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [str(self.melt), *words],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            cwd=self.folder,
+            env={**os.environ, "OFX_PLUGIN_PATH": str(self.plugins)},
+            timeout=300,
+            check=True,
+        )
+
+    def render(self, *, real_time: int = -1, **parameters: object) -> tuple[list[Image], str]:
+        """The clip through the node, at its own depth, and what melt said meanwhile."""
+        for old in self.folder.glob("out_*.png"):
+            old.unlink()
+        image_format = "rgba" if self.clip[0].dtype == np.uint8 else "rgba64"
+        pixels = "rgba" if image_format == "rgba" else "rgba64be"
+        done = self.run(
+            # abnormal: without the loader's normalisers, which take pictures through 4:2:2.
+            # Not -quiet: it would keep the persistent messages to itself.
+            *("-profile", "profile", "abnormal:in_%03d.png", "-attach", SERVICE),
+            *(f"{name}={value}" for name, value in parameters.items()),
+            *("-consumer", "avformat:out_%03d.png", "vcodec=png", "an=1", f"pix_fmt={pixels}"),
+            *(f"mlt_image_format={image_format}", f"real_time={real_time}"),
+        )
+        files = sorted(self.folder.glob("out_*.png"))
+        assert len(files) == len(self.clip), done.stderr
+        return [read_image(path) for path in files], done.stderr
+
+    def unchanged(self, frames: list[Image]) -> bool:
+        """Whether every frame came through bit for bit."""
+        return all(
+            np.array_equal(frame[..., :3], image[..., :3])
+            for frame, image in zip(frames, self.clip, strict=True)
+        )
+
+    def check(
+        self,
+        frames: list[Image],
+        sidecar: _core.Sidecar,
+        *,
+        strength: Sequence[float] | None = None,
+        offset: float = 0.0,
+    ) -> None:
+        """Every frame is the core's, rounded to its depth, and not the source's."""
+        first = float(sidecar.clip["first"])
+        expected = []
+        for index, image in enumerate(self.clip):
+            s = 1.0 if strength is None else strength[index]
+            expected.append(recolour(sidecar, first + index + offset, image[..., :3], s))
+        self.check_against(frames, expected)
+
+    def check_against(self, frames: list[Image], expected: Iterable[NDArray[np.float32]]) -> None:
+        """Every frame is the expected one, (h, w, 3) within 0..1, rounded to its depth, and
+        together they are not the source."""
+        top = float(np.iinfo(self.clip[0].dtype).max)
+        # Bytes are rounded by the node itself; floats by the host, which computes in float32.
+        limit = 0.5 + (1e-3 if top == 255 else 1e-2)
+        changed = 0.0
+        together = zip(frames, self.clip, expected, strict=True)
+        for index, (frame, image, wanted) in enumerate(together):
+            error = np.abs(frame[..., :3].astype(np.float64) - wanted.astype(np.float64) * top)
+            assert error.max() <= limit, f"frame {index}: off by {error.max()} of {top}"
+            assert np.all(frame[..., 3] == top), f"frame {index}: its alpha changed"
+            changed += float(np.abs(wanted - image[..., :3] / top).mean())
+        assert changed / len(frames) > 0.005, "the edit changed next to nothing"

@@ -1,0 +1,137 @@
+"""The node as a third implementation of the parity cases: the core's bits, the reference's values.
+
+Each picture goes through the node's bundle in the strict host, in a process of its own.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from parity.cases import (
+    DOCUMENTS,
+    EDITED,
+    PICTURE_TOLERANCE,
+    UNEDITED,
+    frames_of,
+    picture,
+    same_bits,
+    times_of,
+)
+from parity.implementations import CORE, REFERENCE
+
+Picture = NDArray[np.float32]  # (h, w, 3 or 4)
+SHAPES = [(3, False), (4, False), (4, True)]  # channels, premultiplied
+
+
+@dataclass(frozen=True)
+class Node:
+    """The road from a sidecar to a picture, through the packaged bundle."""
+
+    driver: Path
+    bundle: Path
+    folder: Path
+
+    def recolour(
+        self,
+        image: Picture,
+        document: dict[str, Any],
+        frame: float,
+        strength: float = 1.0,
+        premultiplied: bool = False,
+    ) -> Picture:
+        sidecar, source, output = (self.folder / name for name in ("p4d.json", "in", "out"))
+        sidecar.write_text(json.dumps(document), encoding="utf-8")
+        output.unlink(missing_ok=True)
+        image.tofile(source)
+        height, width, channels = image.shape
+        done = subprocess.run(
+            [
+                *(self.driver, "render", self.bundle, sidecar, "--depth", "float"),
+                *("--width", str(width), "--height", str(height)),
+                *("--components", {3: "RGB", 4: "RGBA"}[channels]),
+                *("--frame", repr(float(frame)), "--strength", repr(strength)),
+                *("--premultiplied", str(int(premultiplied)), source, output),
+            ],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        assert "message:" not in done.stdout, done.stdout
+        return np.fromfile(output, np.float32).reshape(image.shape)
+
+
+@pytest.fixture
+def node(strict_host: Path, bundle: Path, tmp_path: Path) -> Node:
+    return Node(strict_host, bundle, tmp_path)
+
+
+def hosts_frame(document: dict[str, Any], frame: float) -> float:
+    """A frame after its way through the host's time, which counts from the clip's first frame."""
+    first = float(document["clip"]["frames"]["first"])
+    return first + (frame - first)
+
+
+@pytest.mark.parametrize(("channels", "premultiplied"), SHAPES)
+@pytest.mark.parametrize("name", EDITED)
+def test_the_node_recolours_as_the_core_and_the_reference(
+    node: Node, name: str, channels: int, premultiplied: bool
+) -> None:
+    image, document = picture(channels), DOCUMENTS[name]
+    changed = False
+    for time in times_of(name):
+        frame = hosts_frame(document, time)
+        for strength in (1.0, 0.4):
+            arguments = image, document, frame, strength, premultiplied
+            found = node.recolour(*arguments)
+            assert same_bits(found, CORE.recolour(*arguments)).all(), f"frame {frame}"
+            expected = REFERENCE.recolour(*arguments)
+            np.testing.assert_allclose(found, expected, **PICTURE_TOLERANCE)
+            changed |= not same_bits(found, image).all()
+    assert changed
+
+
+@pytest.mark.parametrize("name", EDITED)
+def test_at_beside_and_between_all_that_happens_the_node_is_the_core(node: Node, name: str) -> None:
+    image, document = picture(4), DOCUMENTS[name]
+    for time in filter(math.isfinite, frames_of(name)):
+        frame = hosts_frame(document, time)
+        found = node.recolour(image, document, frame)
+        assert same_bits(found, CORE.recolour(image, document, frame)).all(), f"frame {frame}"
+
+
+@pytest.mark.parametrize(("channels", "premultiplied"), SHAPES)
+@pytest.mark.parametrize("name", UNEDITED)
+def test_without_an_edit_the_node_leaves_the_picture_alone(
+    node: Node, name: str, channels: int, premultiplied: bool
+) -> None:
+    image = picture(channels)
+    for time in times_of(name):
+        found = node.recolour(image, DOCUMENTS[name], time, 1.0, premultiplied)
+        assert same_bits(found, image).all()
+
+
+@pytest.mark.parametrize("name", EDITED)
+def test_strength_0_is_the_input(node: Node, name: str) -> None:
+    image = picture(4)
+    for premultiplied in (False, True):
+        found = node.recolour(image, DOCUMENTS[name], times_of(name)[3], 0.0, premultiplied)
+        assert same_bits(found, image).all()
+
+
+def test_awkward_pixels_pass_the_node_bit_for_bit(node: Node) -> None:
+    image = picture(4)
+    odd = ~np.isfinite(image[:, :, :3]).all(axis=2) | (image[:, :, 3] == 0)
+    assert odd.sum() >= 5
+    result = node.recolour(image, DOCUMENTS["changes-vertex"], 9.0, 1.0, True)
+    assert same_bits(result[odd], image[odd]).all()
+    assert same_bits(result[:, :, 3], image[:, :, 3]).all()
+    assert not same_bits(result[~odd][:, :3], image[~odd][:, :3]).all()

@@ -1,0 +1,155 @@
+"""`make demo`: the whole road on the built-in sample clip, by the commands that anyone would type.
+
+Every step runs the installed command `palette4d` and is shown as typed; the first one that fails
+ends the demo with its exit status. Only before_after.png is made here, from the frames on disk.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+from numpy.typing import NDArray
+
+FRAMES = (1, 11, 22, 30, 38, 48)
+"""Shown in the pictures: summer, its end, autumn, dusk and night."""
+AUTUMN = 30
+"""The frame whose edit is baked."""
+
+COMMAND = Path(sys.executable).with_name("palette4d")
+
+
+def say(text: str) -> None:
+    """Print at once, so that the order with the commands' own output holds in a pipe, too."""
+    print(text, flush=True)
+
+
+def run(title: str, *arguments: str) -> None:
+    """Show and run one `palette4d` command; a failure ends the demo with the same status."""
+    words = [shown(COMMAND), *arguments]
+    say(f"\n== {title}\n$ {shlex.join(words)}")
+    status = subprocess.run([COMMAND, *arguments], check=False).returncode
+    if status != 0:
+        sys.exit(f"demo: stopped, the command above ended with status {status}")
+
+
+def shown(path: Path) -> str:
+    """Return the path as one would type it here: relative where that is shorter."""
+    return str(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path)
+
+
+def read(path: Path) -> NDArray[np.float32]:
+    """Return one frame, (h, w, 3) float32."""
+    buffer = oiio.ImageBuf(str(path))
+    pixels = buffer.get_pixels(oiio.FLOAT)
+    if buffer.has_error or pixels is None:
+        sys.exit(f"demo: cannot read {path}: {buffer.geterror()}")
+    return np.asarray(pixels, dtype=np.float32)[..., :3]
+
+
+def before_after(clip: Path, graded: Path, out: Path) -> None:
+    """Put frames of the clip above the same frames graded, and print how far they moved."""
+    pairs = [
+        (read(clip / f"sample.{frame:04d}.png"), read(graded / f"sample.{frame:04d}.exr"))
+        for frame in FRAMES
+    ]
+    say(f"\n== Before and after, {shown(out)}")
+    for frame, (before, after) in zip(FRAMES, pairs, strict=True):
+        moved = np.abs(after - before).max(axis=2)
+        share = float((moved > 0.02).mean())
+        say(f"   frame {frame:2d}: {share:4.0%} of the pixels changed, by up to {moved.max():.2f}")
+    rows = [np.concatenate([pair[row] for pair in pairs], axis=1) for row in (0, 1)]
+    sheet = np.clip(np.concatenate(rows, axis=0), 0, 1)
+    height, width, channels = sheet.shape
+    buffer = oiio.ImageBuf(oiio.ImageSpec(width, height, channels, oiio.UINT8))
+    buffer.set_pixels(oiio.ROI(), np.ascontiguousarray(sheet))
+    if not buffer.write(str(out)):
+        sys.exit(f"demo: cannot write {out}: {buffer.geterror()}")
+
+
+def demo(out: Path) -> None:
+    """Do everything into the folder `out`; what an earlier demo left there is replaced."""
+    clip, graded = out / "clip", out / "graded"
+    sidecar, sheet = out / "sample.p4d.json", out / "before_after.png"
+    palette, edited = out / "palette.png", out / "palette_edited.png"
+    cube, clf = out / "dusk.cube", out / "dusk.clf"
+    for folder in (clip, graded):
+        shutil.rmtree(folder, ignore_errors=True)
+    for file in (sidecar, sheet, palette, edited, cube, clf):
+        file.unlink(missing_ok=True)
+    for folder in (clip, graded):
+        folder.mkdir(parents=True)
+    frames = str(clip / "sample.####.png")
+
+    run("A clip: a lake from a summer day to an autumn night", "sample-clip", "-o", frames)
+    run("Its palette over time", "analyze", frames, "-o", str(sidecar))
+    run("What was found", "info", str(sidecar))
+    run("The palette as a picture", "plot", str(sidecar), "--clip", frames, "-o", str(palette))
+    # fmt: off
+    run("Edit: the golden leaves of late autumn become violet",
+        "edit", str(sidecar), "set", "--near", "0.96,0.56,0.05", "--frame", str(AUTUMN),
+        "--rgb", "0.72", "0.2", "0.85")
+    run("Edit: a colour stop turns the noon sky turquoise, around frame 11 only",
+        "edit", str(sidecar), "stop", "--near", "0.2,0.47,0.85", "--frame", "11",
+        "--rgb", "0.05", "0.75", "0.75")
+    # fmt: on
+    run("The palette with its edits", "plot", str(sidecar), "--clip", frames, "-o", str(edited))
+    run("Render", "render", str(sidecar), frames, "-o", str(graded / "sample.####.exr"))
+    for file in (cube, clf):
+        run(
+            f"Bake frame {AUTUMN} as a LUT, {file.suffix}",
+            *("bake", str(sidecar), "--frame", str(AUTUMN), "--clip", frames, "-o", str(file)),
+        )
+    before_after(clip, graded, sheet)
+
+    command = shown(COMMAND)
+    say(f"""
+== Done. What lies where
+
+  {sheet}
+        frames {", ".join(map(str, FRAMES))}: the clip above, the result below
+  {palette}, {edited}
+        the palette over time before and after the edits, and its polyhedra in RGB
+  {graded}/sample.####.exr
+        the recoloured frames, 32-bit float
+  {cube}, {clf}
+        the edit of frame {AUTUMN} as a LUT, for Resolve and for OpenColorIO
+  {sidecar}
+        the sidecar: the palette and its edits, a text file
+  {clip}/sample.####.png
+        the sample clip, 16 bit
+
+== What to try next
+
+  another colour
+      {command} edit {sidecar} set --near 0.89,0.13,0.07 --frame 29 --rgb 0.1 0.4 0.9
+      {command} render {sidecar} '{frames}' -o '{graded}/sample.####.exr' --force
+  undo every edit
+      {command} edit {sidecar} reset
+  your own clip
+      {command} analyze '/path/to/your.####.exr' -o yours.p4d.json
+  in an OpenFX host
+      {command} install-plugin --dest ~/OFX
+      start the host with OFX_PLUGIN_PATH=~/OFX, add the effect Palette4D, choose the sidecar
+  every verb
+      {command} --help""")
+
+
+def main() -> None:
+    """Run the demo into the folder that the command line names."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0] if __doc__ else None)
+    parser.add_argument("folder", type=Path, help="where the results go")
+    started = time.monotonic()
+    demo(parser.parse_args().folder)
+    say(f"\n{time.monotonic() - started:.0f} s")
+
+
+if __name__ == "__main__":
+    main()
