@@ -21,6 +21,7 @@ Image = NDArray[Any]  # (h, w, 3 or 4) uint8 or uint16
 
 def write_image(path: Path, image: Image) -> None:
     spec = oiio.ImageSpec(image.shape[1], image.shape[0], image.shape[2], str(image.dtype))
+    spec.attribute("png:compressionLevel", 1)
     output = oiio.ImageOutput.create(str(path))
     assert output.open(str(path), spec)
     assert output.write_image(np.ascontiguousarray(image))

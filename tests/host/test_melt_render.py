@@ -67,7 +67,7 @@ def render_both_ways(melt: Path, bundle: Path, sidecar: Path, clip: Path) -> Ren
     return Rendered(scene, frames, expected, said)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def crimson_autumn(
     melt: Path, bundle: Path, seasons: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> Rendered:
@@ -101,7 +101,7 @@ def test_the_orange_leaves_turn_crimson(crimson_autumn: Rendered) -> None:
     assert change[2] > 0.05
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def recoloured_sample(
     melt: Path, bundle: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> Rendered:
