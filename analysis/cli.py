@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
+import os
 import sys
 import time
 from fractions import Fraction
@@ -141,6 +142,7 @@ def run(args: argparse.Namespace) -> int:
         document, analysis = pipeline.analyze_clip(clip, options, show)
     finally:
         show.close()
+    document["clip"]["source"] = _beside(document["clip"]["source"], args.output)
     sidecar.save(document, args.output, on_edits=args.on_edits)
     for remark in (*_skipped(clip), *analysis.remarks):
         print(f"palette4d: note: {remark}", file=sys.stderr)
@@ -154,6 +156,16 @@ def run(args: argparse.Namespace) -> int:
     elif not args.quiet:
         _print_report(args.output, clip, analysis, show)
     return 0
+
+
+def _beside(source: str, output: Path) -> str:
+    """Return a relative source as seen from the sidecar's folder: both may then move together."""
+    if Path(source).is_absolute():
+        return source
+    try:
+        return Path(os.path.relpath(source, output.absolute().parent)).as_posix()
+    except ValueError:  # on another drive
+        return str(Path(source).absolute())
 
 
 def _skipped(clip: Clip) -> list[str]:

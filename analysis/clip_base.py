@@ -21,6 +21,9 @@ from palette4d.errors import Palette4dError
 
 F32 = NDArray[np.float32]
 
+LEAST_ALPHA = np.float32(1 / 255)
+"""Below it a pixel does not show in 8 bit."""
+
 DEFAULT_RATE = Fraction(24)
 #: Longer than any clip; stops numbers that are dates or ids from being taken for frames.
 MAX_FRAMES = 1_000_000
@@ -156,14 +159,15 @@ class Clip(abc.ABC):
     def straight_colours(self, pixels: F32) -> F32:
         """(h, w, 3) float32 colours that a recolouring sees.
 
-        Premultiplied colours are divided by alpha, as the node does. Pixels with alpha 0 have no
-        colour that shows: they become NaN, which the analysis leaves out. A frame whose alpha is 0
-        everywhere has an unused alpha channel, and keeps its colours as they are.
+        Premultiplied colours are divided by alpha, as the node does. Pixels with an alpha below
+        1/255 have no colour that shows, and dividing by it would magnify noise into colours far
+        outside the clip's: they become NaN, which the analysis leaves out. A frame with nothing else
+        has an unused alpha channel, and keeps its colours as they are.
         """
         if pixels.shape[2] == 3:
             return pixels
         alpha = pixels[..., 3:]
-        seen = alpha != 0
+        seen = alpha >= LEAST_ALPHA
         if not seen.any():
             return np.ascontiguousarray(pixels[..., :3])
         divisor = alpha if self.premultiplied else np.float32(1)

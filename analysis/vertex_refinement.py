@@ -104,7 +104,8 @@ def _move(
     lower, upper = ((bound / evaluate.scale).ravel() for bound in box)
     best = minimise(objective, start, lower, upper, most_evaluations, tolerance=1e-5)
     out = vertices.copy()
-    out[moving] = best.reshape(-1, 4) * evaluate.scale
+    # Scaling there and back rounds: a vertex at the edge of its box must not leave its block.
+    out[moving] = np.clip(best.reshape(-1, 4) * evaluate.scale, *box)
     fixed = evaluate.fixed[moving]
     out[moving[fixed], 3] = vertices[moving[fixed], 3]
     return out

@@ -352,6 +352,9 @@ def test_premultiplied_alpha_is_read_as_stored(tmp_path):
         colours = clip.straight_colours(pixels)
         np.testing.assert_array_equal(colours[0, 0], [1.0, 0.5, 0.25])
         assert np.isnan(colours[0, 1]).all()
+    faint = values.copy()
+    faint[0, 1, 3] = 1e-5  # 0.5 / 1e-5 would be a colour far outside the clip's
+    assert np.isnan(clip.straight_colours(faint)[0, 1]).all()
     empty = values.copy()
     empty[..., 3] = 0
     np.testing.assert_array_equal(clip.straight_colours(empty), empty[..., :3])

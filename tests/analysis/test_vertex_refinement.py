@@ -11,7 +11,7 @@ from palette4d.analysis.frame_hulls import hull_mesh
 from palette4d.analysis.losses import smoothness
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Section, SkewPolytope
-from palette4d.analysis.vertex_refinement import loss_of, refine
+from palette4d.analysis.vertex_refinement import _move, _Objective, loss_of, refine
 
 FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
 FACES = hull_mesh(FOUR).faces
@@ -124,3 +124,20 @@ def test_a_vertex_that_leaves_a_block_end_keeps_both_blocks_covered():
     assert result.blocks[0].tracks == whole
     assert result.blocks[1].tracks == late
     assert polytope.extended_tracks(polytope.blocks[0])[1] == [1, 8, 5]
+
+
+def test_a_vertex_at_the_edge_of_its_box_stays_in_its_block():
+    """Lengths whose division and multiplication do not cancel used to push it out by rounding."""
+    for last in (46, 47, 48, 49, 53):
+        polytope = bent(6.0)
+        vertices = polytope.vertices.copy()
+        vertices[4:8, 3] = last
+        block = Section(0.0, float(last), polytope.blocks[0].tracks, FACES)
+        polytope = SkewPolytope(vertices, (block,), ())
+        frames = stats([mixture(colours_at(polytope, t), t, 300) for t in range(last + 1)])
+        evaluate = _Objective(polytope, frames, AnalysisOptions(gamma=0.0), 1.0, coarse=True)
+        for at in np.linspace(5.0, 7.0, 23):
+            box = (vertices[[8]].copy(), vertices[[8]].copy())
+            box[0][0, 3] = box[1][0, 3] = at  # nowhere to go but here
+            moved = _move(evaluate, vertices, np.array([8]), [3], box, 3)
+            assert moved[8, 3] == at

@@ -123,3 +123,14 @@ def test_ctrl_c_leaves_nothing(clip, tmp_path):
     process.communicate(timeout=60)
     assert process.returncode == 130
     assert sorted(tmp_path.iterdir()) == before
+
+
+def test_the_source_is_found_from_the_sidecar(clip, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "sidecars").mkdir()
+    assert cli.main(["analyze", "clip", "-o", "sidecars/a.p4d.json", "--quiet"]) == 0
+    source = json.loads(Path("sidecars/a.p4d.json").read_text())["clip"]["source"]
+    assert source == "../clip/shot.####.png"
+    assert cli.main(["analyze", str(clip), "-o", "b.p4d.json", "--quiet"]) == 0
+    source = json.loads(Path("b.p4d.json").read_text())["clip"]["source"]
+    assert source == str(clip / "shot.####.png")
