@@ -66,14 +66,14 @@ $(VENV)/.created:
 	@touch $@
 
 build/wheel.stamp: $(SOURCES) | $(VENV)/.created compiler
-	@echo "== the wheel (compiles the core, the bindings and the OpenFX bundle)"
+	@echo "== the wheel (compiles the core, the bindings and the OpenFX bundle; takes 1 to 3 minutes)"
 	@rm -rf $(WHEELS)
 	$(VENV)/bin/python $(PIP) wheel . --no-deps --wheel-dir $(WHEELS)
 	@touch $@
 
 ifeq ($(wildcard $(VENV)/.editable),)
 $(VENV)/.installed: build/wheel.stamp
-	@echo "== palette4d into $(VENV)"
+	@echo "== palette4d and what it needs into $(VENV) (takes 1 to 3 minutes the first time)"
 	$(VENV)/bin/python $(PIP) install $(WHEELS)/*.whl
 	$(VENV)/bin/python $(PIP) install --no-deps --force-reinstall $(WHEELS)/*.whl
 	@touch $@

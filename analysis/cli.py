@@ -8,11 +8,14 @@ import json
 import os
 import sys
 import time
+from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from palette4d.analysis.options import AnalysisOptions
+from palette4d.arguments import checked, frame_range, number, whole
+from palette4d.wording import counted
 
 if TYPE_CHECKING:
     from palette4d.analysis.clip import Clip
@@ -54,7 +57,7 @@ OUR_OPTIONS = (
     ("--convexity", "X", "convexity", "weight of keeping the palettes convex; 0 is the paper"),
     ("--colours", "N", "colours", "most colour bins kept of a frame, for the losses"),
     ("--coarse-colours", "N", "coarse_colours", "the same for hulls, merging and removal"),
-    ("--seed", "N", "seed", "recorded; every step is deterministic at present"),
+    ("--seed", "N", "seed", "accepted and recorded; nothing is random at present"),
     ("--threads", "N", "threads", "threads; 0 is one a processor; never changes the result"),
 )
 
@@ -70,7 +73,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("clip", metavar="CLIP", help="image sequence, folder, image or movie file")
     parser.add_argument("-o", "--output", required=True, metavar="OUT.p4d.json", type=Path)
-    parser.add_argument("--frames", metavar="A-B[xN]", help="only these frames (1001-1100x2)")
+    parser.add_argument(
+        "--frames",
+        metavar="A-B[xN]",
+        type=frame_range,
+        help="only these frames, evenly spaced (1001-1100x2)",
+    )
     parser.add_argument("--rate", metavar="N/D", type=_rate, help="frames a second (24000/1001)")
     parser.add_argument(
         "--skip-bad-frames",
@@ -107,11 +115,16 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
                 flag,
                 dest=field,
                 metavar=metavar,
-                type=int if isinstance(default, int) else float,
+                type=checked(whole() if isinstance(default, int) else number(), _check(field)),
                 default=default,
                 help=f"{text} (default {default:g})",
             )
     parser.set_defaults(run=run)
+
+
+def _check(field: str) -> Callable[[float], AnalysisOptions]:
+    """Return a function that refuses a value out of the option's range."""
+    return lambda value: AnalysisOptions(**{field: value})  # type: ignore[arg-type]
 
 
 def _rate(text: str) -> Fraction:
@@ -171,11 +184,12 @@ def _beside(source: str, output: Path) -> str:
 def _skipped(clip: Clip) -> list[str]:
     if not clip.skipped:
         return []
-    return [f"{len(clip.skipped)} bad frames were skipped: {sorted(clip.skipped)}"]
+    what = counted(len(clip.skipped), "bad frame was", "bad frames were")
+    return [f"{what} skipped: {sorted(clip.skipped)}"]
 
 
 def _print_report(output: Path, clip: Clip, analysis: Analysis, show: _Bars) -> None:
-    print(f"{clip.name}: {len(clip.frames)} frames, {clip.width}x{clip.height}")
+    print(f"{clip.name}: {counted(len(clip.frames), 'frame')}, {clip.width}x{clip.height}")
     print(
         f"{'stage':<18} {'vertices':>8} {'blocks':>6} {'R':>8} {'C':>8} {'L':>8} {'K':>8} "
         f"{'outside':>8} {'farthest':>8} {'seconds':>8}"
@@ -187,7 +201,8 @@ def _print_report(output: Path, clip: Clip, analysis: Analysis, show: _Bars) -> 
             f"{x.L:>8.4f} {x.K:>8.3f} {x.outside:>8.2%} {x.max_distance:>8.3f} "
             f"{show.seconds.get(stage.stage, 0):>8.2f}"
         )
-    print(f"wrote {output}: {analysis.stages[-1].vertices} palette colours to edit")
+    colours = counted(analysis.stages[-1].vertices, "palette colour")
+    print(f"wrote {output}: {colours} to edit")
     print(f"next: palette4d plot {output} -o palette.png")
 
 

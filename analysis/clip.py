@@ -1,7 +1,7 @@
 """Clip reading, the first stage: image sequences and movies as numbered float32 frames.
 
 Input: a pattern, a folder, an image or a movie file. Output: a `Clip`, which yields one frame at a
-time, (h, w, 3 or 4) float32 with frame numbers that rise in even steps. Colours keep the file's own
+time, (h, w, 3 or 4) float32 with frame numbers that rise. Colours keep the file's own
 encoding: nothing is converted, and alpha is left as it is stored (`Clip.premultiplied`).
 """
 
@@ -11,9 +11,9 @@ from fractions import Fraction
 from pathlib import Path
 
 from palette4d.analysis import clip_sequence
-from palette4d.analysis.clip_base import Clip, ClipError, FrameError, Image, parse_frames
+from palette4d.analysis.clip_base import Clip, ClipError, FrameError, Image
 
-__all__ = ["Clip", "ClipError", "FrameError", "Image", "open_clip", "parse_frames"]
+__all__ = ["Clip", "ClipError", "FrameError", "Image", "open_clip"]
 
 
 def open_clip(
@@ -31,7 +31,8 @@ def open_clip(
         `name.####.exr` (one # a digit), `name.%04d.exr`, `name.@@@@.exr`, `name.1-10x2#.exr`, a
         folder with one image sequence, a single image, or a movie file.
     frames : str, optional
-        `A-B`, `A-BxN`, single numbers or comma lists, evenly spaced; the whole clip by default.
+        `A-B`, `A-BxN`, single numbers or comma lists (`palette4d.arguments.parse_frames`); the
+        whole clip by default.
     rate : Fraction, optional
         Frames a second; the file's own by default, 24 where it has none.
     skip_bad_frames : bool
@@ -41,6 +42,8 @@ def open_clip(
     ------
     ClipError
         When there is no such clip, the range does not fit, or the format is not supported.
+    Palette4dError
+        When the range cannot be understood.
     FrameError
         When a frame is missing or unreadable and `skip_bad_frames` is not set.
     """
@@ -48,6 +51,11 @@ def open_clip(
 
     if rate is not None and rate <= 0:
         raise ClipError(f"rate {rate}: expected frames a second above 0, such as 24 or 24000/1001")
+    if not spec.strip():
+        raise ClipError(
+            "the clip's name is empty; expected a pattern such as name.####.exr, a folder (. is "
+            "the working folder), an image or a movie file"
+        )
     path = Path(spec)
     if path.is_dir():
         found = clip_sequence.in_folder(path)

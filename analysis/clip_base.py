@@ -25,8 +25,6 @@ LEAST_ALPHA = np.float32(1 / 255)
 """Below it a pixel does not show in 8 bit."""
 
 DEFAULT_RATE = Fraction(24)
-#: Longer than any clip; stops numbers that are dates or ids from being taken for frames.
-MAX_FRAMES = 1_000_000
 
 
 class ClipError(Palette4dError):
@@ -62,8 +60,8 @@ class Clip(abc.ABC):
     source : str
         The sequence with one `#` for each digit, the movie, or the single image.
     frames : list of int
-        Frame numbers in rising order, an arithmetic progression; includes the bad frames that
-        `skip_bad_frames` will pass over.
+        Frame numbers in rising order; includes the bad frames that `skip_bad_frames` will pass
+        over.
     rate : Fraction
         Frames a second.
     width, height : int
@@ -102,8 +100,8 @@ class Clip(abc.ABC):
 
     @property
     def step(self) -> int:
-        """Distance between two frame numbers (1 for a single frame)."""
-        return self.frames[1] - self.frames[0] if len(self.frames) > 1 else 1
+        """Distance between neighbouring frame numbers (1 for a single frame); 0 when it varies."""
+        return even_step(self.frames)
 
     @abc.abstractmethod
     def load(self, frame: int) -> Image:
@@ -134,7 +132,7 @@ class Clip(abc.ABC):
             yield image
         if not good:
             raise FrameError(
-                f"{self.source}: none of the {len(self.frames)} frames can be read; "
+                f"{self.source}: found none readable of {named(self.frames)}; "
                 "expected at least one good frame. Run without --skip-bad-frames to see the cause."
             )
 
@@ -161,8 +159,8 @@ class Clip(abc.ABC):
 
         Premultiplied colours are divided by alpha, as the node does. Pixels with an alpha below
         1/255 have no colour that shows, and dividing by it would magnify noise into colours far
-        outside the clip's: they become NaN, which the analysis leaves out. A frame with nothing else
-        has an unused alpha channel, and keeps its colours as they are.
+        outside the clip's: they become NaN, which the analysis leaves out. A frame with nothing
+        else has an unused alpha channel, and keeps its colours as they are.
         """
         if pixels.shape[2] == 3:
             return pixels
@@ -182,35 +180,10 @@ class Clip(abc.ABC):
             self.skipped.sort()
 
 
-def parse_frames(text: str) -> list[int]:
-    """Frame numbers of `A-B`, `A-BxN`, `A`, `A,B,C` (fileseq's syntax) in rising order.
-
-    >>> parse_frames("1001-1007x2")
-    [1001, 1003, 1005, 1007]
-    >>> parse_frames("-2-1")
-    [-2, -1, 0, 1]
-    """
-    from fileseq.exceptions import FileSeqException
-    from fileseq.frameset import FrameSet
-
-    what_to_do = "expected A-B, A-BxN, single numbers or a comma list, such as 1001-1100x2"
-    try:
-        numbers = sorted(set(FrameSet(text.strip())))
-    except (FileSeqException, ValueError) as error:
-        raise ClipError(f'frame range "{text}" cannot be understood; {what_to_do}') from error
-    if not numbers or any(int(number) != number for number in numbers):
-        raise ClipError(f'frame range "{text}" holds no whole frame numbers; {what_to_do}')
-    if len(numbers) > MAX_FRAMES:
-        raise ClipError(
-            f'frame range "{text}" holds {len(numbers)} frames, at most {MAX_FRAMES} are possible'
-        )
-    frames = [int(number) for number in numbers]
-    if len(set(np.diff(frames))) > 1:
-        raise ClipError(
-            f'frame range "{text}" gives the frames {describe(frames)}, which are not evenly '
-            "spaced; expected a range with one step, such as 1-10 or 1-10x3"
-        )
-    return frames
+def even_step(numbers: Sequence[int]) -> int:
+    """Distance between neighbours of the (rising) numbers, 1 for one number, 0 when it varies."""
+    steps = {after - before for before, after in itertools.pairwise(numbers)} or {1}
+    return steps.pop() if len(steps) == 1 else 0
 
 
 def progression_step(numbers: Sequence[int]) -> int:
@@ -232,6 +205,11 @@ def describe(frames: Sequence[int]) -> str:
         return f"{frames[0]}-{frames[1]}"
     shown = ", ".join(str(frame) for frame in frames[:8])
     return shown + (f", … ({len(frames)} in all)" if len(frames) > 8 else "")
+
+
+def named(frames: Sequence[int]) -> str:
+    """Frames for a message, with the noun: `frame 3`, `frames 1-10`."""
+    return f"frame{'s' * (len(frames) != 1)} {describe(frames)}"
 
 
 def as_rate(value: float) -> Fraction | None:

@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 from palette4d.analysis.clip_base import (
     DEFAULT_RATE,
     F32,
-    MAX_FRAMES,
     Clip,
     ClipError,
     FrameError,
     Image,
     as_rate,
     describe,
-    parse_frames,
+    named,
     progression_step,
 )
 from palette4d.analysis.clip_sequence import Sequence
+from palette4d.arguments import MAX_FRAMES, parse_frames
 
 #: Metadata that a recoloured copy of the frame keeps.
 CARRIED = (
@@ -130,7 +130,7 @@ def open_images(
                 raise
     if header is None:
         raise FrameError(
-            f"{source}: none of the frames {describe(wanted)} can be read; expected at least one "
+            f"{source}: found none readable of {named(wanted)}; expected at least one "
             "good frame. Run without --skip-bad-frames to see the cause."
         )
     return ImageClip(
@@ -177,7 +177,7 @@ def _wanted_frames(sequence: Sequence, frames: str | None, embedded: str | None)
         return list(range(found[0], found[-1] + 1, step))
     if not set(wanted) & set(found):
         raise ClipError(
-            f"{sequence.pattern}: the frames {describe(wanted)} were asked for, the clip has "
+            f"{sequence.pattern}: found no {named(wanted)}, the clip has "
             f"{describe(found)}. Choose a range inside the clip."
         )
     return wanted

@@ -26,8 +26,9 @@ from palette4d.analysis.clip_base import (
     FrameError,
     Image,
     describe,
-    parse_frames,
+    named,
 )
+from palette4d.arguments import parse_frames
 
 # H.273 code points; libswscale and PyAV use the same numbers.
 _TRANSFERS = {
@@ -182,7 +183,7 @@ def open_movie(
         wanted = parse_frames(frames)
         if wanted[0] < 0 or wanted[-1] >= count:
             raise ClipError(
-                f"{path}: the frames {describe(wanted)} were asked for, the movie has "
+                f"{path}: asked for {named(wanted)}, the movie has "
                 f"{describe(range(count))} (its frame numbers start at 0). Choose a range inside."
             )
     if wanted[-1] >= packets and not skip_bad_frames:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from palette4d.analysis.clip_base import ClipError, describe
+from palette4d.wording import counted
 
 # fmt: off
 IMAGE_EXTENSIONS = frozenset({
@@ -140,7 +141,18 @@ def _by_width(
 def in_folder(folder: Path) -> Sequence | Path:
     """The one image sequence of a folder, or its one image when that has no number."""
     found = sequences_in(folder)
+    names = _file_names(folder)
+    images = [name for name in names if extension(name) in IMAGE_EXTENSIONS]
     if len(found) == 1:
+        # One numbered image among others (beach.png, sky2.png) is no sequence, but one of them.
+        if len(found[0].files) == 1 and len(images) > 1:
+            listed = "\n".join(f"  {folder / name}" for name in images[:12])
+            more = f"\n  … and {len(images) - 12} more" if len(images) > 12 else ""
+            raise ClipError(
+                f"{folder}: found {len(images)} images that are no sequence, expected one image "
+                f"sequence such as name.0001.exr, name.0002.exr, …:\n{listed}{more}\n"
+                "Give the image or the pattern that you mean."
+            )
         return found[0]
     if len(found) > 1:
         listed = "\n".join(
@@ -151,20 +163,20 @@ def in_folder(folder: Path) -> Sequence | Path:
             f"{folder}: found {len(found)} image sequences, expected one:\n{listed}{more}\n"
             "Give the pattern of the one you mean."
         )
-    names = _file_names(folder)
-    images = [name for name in names if extension(name) in IMAGE_EXTENSIONS]
     if len(images) == 1:
         return folder / images[0]
     movies = [name for name in names if extension(name) in MOVIE_EXTENSIONS]
     if movies:
         raise ClipError(
-            f"{folder}: found {len(movies)} movie file(s) such as {movies[0]} and no image "
-            "sequence; give the movie file itself."
+            f"{folder}: found {counted(len(movies), 'movie file')} such as {movies[0]} and no "
+            "image sequence; give the movie file itself."
         )
     what = (
         f"{len(images)} images without frame numbers"
         if images
-        else (f"{len(names)} file(s), none of them an image" if names else "an empty folder")
+        else (
+            f"{counted(len(names), 'file')}, none of them an image" if names else "an empty folder"
+        )
     )
     raise ClipError(
         f"{folder}: found {what}, expected one image sequence such as name.0001.exr, "

@@ -46,7 +46,7 @@ class AnalysisOptions:
     palette_size: int = 8
     merge_distance: float = 0.1
     hull_box: float = 0.15
-    convexity: float = 0.5
+    convexity: float = 3.0
     colours: int = 32768
     coarse_colours: int = 8192
     seed: int = 0

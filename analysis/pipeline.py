@@ -20,11 +20,13 @@ from palette4d.analysis import (
     vertex_refinement,
     vertex_removal,
 )
+from palette4d.analysis.clip_base import describe, even_step
 from palette4d.analysis.losses import Losses, smoothness, summarise, thread_count
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Palette, SkewPolytope
 from palette4d.analysis.statistics import FrameStatistics
 from palette4d.errors import Palette4dError
+from palette4d.wording import counted
 
 if TYPE_CHECKING:
     from palette4d.analysis.clip import Clip
@@ -79,8 +81,15 @@ def analyze_clip(
     Raises
     ------
     Palette4dError
-        When a frame cannot be read, or no frame has a pixel to go by.
+        When a frame cannot be read, the frames are not evenly spaced (a sidecar has one step), or
+        no frame has a pixel to go by.
     """
+    step = even_step(clip.frames)
+    if not step:
+        raise Palette4dError(
+            f"the frames {describe(clip.frames)} are not evenly spaced, and a palette is analysed "
+            "from frames with one step between them; expected a range such as 1-10 or 1-10x3"
+        )
     report = progress or (lambda stage, done, total: None)
     gathered: list[FrameStatistics | None] = []
     numbers: list[int] = []
@@ -91,7 +100,6 @@ def analyze_clip(
     skipped = set(clip.skipped)
     usable, remarks = _usable(clip.frames, dict(zip(numbers, gathered, strict=True)), skipped)
     analysis = analyze(usable, options, report)
-    step = clip.frames[1] - clip.frames[0] if len(clip.frames) > 1 else 1
     document = sidecar.new_document(
         {
             "name": clip.name,
@@ -135,13 +143,18 @@ def _usable(
     have = {n: s for n, s in gathered.items() if s is not None}
     if not have:
         raise Palette4dError(
-            f"no frame of the clip has a pixel to go by: all {len(numbers)} are empty, fully "
-            "transparent or not finite; expected at least one with colours"
+            f"no frame of the clip has a pixel to go by: found {counted(len(numbers), 'frame')} "
+            "empty, fully transparent or not finite; expected at least one with colours"
         )
     remarks = []
     blank = sorted(n for n, s in gathered.items() if s is None)
     if blank:
-        remarks.append(f"{len(blank)} frames have no usable pixel and were passed over: {blank}")
+        what = counted(
+            len(blank),
+            "frame has no usable pixel and was",
+            "frames have no usable pixel and were",
+        )
+        remarks.append(f"{what} passed over: {blank}")
     for end, nearest in ((numbers[0], min(have)), (numbers[-1], max(have))):
         if end not in have:
             have[end] = dataclasses.replace(have[nearest], frame=end)
@@ -221,8 +234,9 @@ def _remarks(between: list[glue.Glue]) -> list[str]:
     broken = sum(g.broken > 0 for g in between)
     if not broken:
         return []
+    boundaries = counted(len(between), "block boundary", "block boundaries")
     return [
-        f"at {broken} of {len(between)} block boundaries no set of edges obeys topological rule 2; "
+        f"at {broken} of {boundaries} no set of edges obeys topological rule 2; "
         "the mesh between the two frames is the nearest one"
     ]
 

@@ -2,9 +2,10 @@
 
 import argparse
 import json
-import math
 import sys
 from pathlib import Path
+
+from palette4d.arguments import number, whole
 
 EPILOG = """\
 The extension chooses the format: .cube (Resolve) or .clf (Academy/ASC Common LUT Format).
@@ -21,13 +22,6 @@ example:
 """
 
 
-def _frame(text: str) -> float:
-    value = float(text)
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a frame number")
-    return value
-
-
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the verb ``bake``."""
     parser = subparsers.add_parser(
@@ -42,7 +36,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument(
         "--frame",
         metavar="T",
-        type=_frame,
+        type=number(),
         required=True,
         help="the time, a frame number of the clip; fractions are allowed",
     )
@@ -50,12 +44,16 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         "-o", "--output", metavar="OUT", type=Path, required=True, help="OUT.cube or OUT.clf"
     )
     parser.add_argument(
-        "--size", metavar="N", type=int, default=33, help="samples a side, 2 to 129 (default 33)"
+        "--size",
+        metavar="N",
+        type=whole(2, 129),
+        default=33,
+        help="samples a side, 2 to 129 (default 33)",
     )
     parser.add_argument(
         "--strength",
         metavar="S",
-        type=float,
+        type=number(0, 1),
         default=1.0,
         help="0 to 1, as in the node (default 1)",
     )

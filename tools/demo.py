@@ -7,21 +7,23 @@ ends the demo with its exit status. Only before_after.png is made here, from the
 from __future__ import annotations
 
 import argparse
+import json
 import shlex
 import shutil
 import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 FRAMES = (1, 11, 22, 30, 38, 48)
-"""Shown in the pictures: summer, its end, autumn, dusk and night."""
+"""Shown in before_after.png: a summer day, its end, autumn, late autumn, dusk and night."""
 AUTUMN = 30
-"""The frame whose edit is baked."""
+"""The frame whose edit is baked: late autumn."""
 
 COMMAND = Path(sys.executable).with_name("palette4d")
 
@@ -55,7 +57,10 @@ def read(path: Path) -> NDArray[np.float32]:
 
 
 def before_after(clip: Path, graded: Path, out: Path) -> None:
-    """Put frames of the clip above the same frames graded, and print how far they moved."""
+    """Draw frames of the clip above the same frames graded, and print how far they moved."""
+    from matplotlib.figure import Figure
+    from palette4d.plotting import style
+
     pairs = [
         (read(clip / f"sample.{frame:04d}.png"), read(graded / f"sample.{frame:04d}.exr"))
         for frame in FRAMES
@@ -65,13 +70,39 @@ def before_after(clip: Path, graded: Path, out: Path) -> None:
         moved = np.abs(after - before).max(axis=2)
         share = float((moved > 0.02).mean())
         say(f"   frame {frame:2d}: {share:4.0%} of the pixels changed, by up to {moved.max():.2f}")
-    rows = [np.concatenate([pair[row] for pair in pairs], axis=1) for row in (0, 1)]
-    sheet = np.clip(np.concatenate(rows, axis=0), 0, 1)
-    height, width, channels = sheet.shape
-    buffer = oiio.ImageBuf(oiio.ImageSpec(width, height, channels, oiio.UINT8))
-    buffer.set_pixels(oiio.ROI(), np.ascontiguousarray(sheet))
-    if not buffer.write(str(out)):
-        sys.exit(f"demo: cannot write {out}: {buffer.geterror()}")
+
+    # In pixels of the clip, so that a picture's pixel is a clip's pixel.
+    tall, wide = pairs[0][0].shape[:2]
+    gap, left, head = 8, 30, 30
+    width = left + len(pairs) * (wide + gap)
+    height = head + 2 * (tall + gap)
+    figure = Figure(figsize=(width / 100, height / 100), dpi=100, facecolor=style.PAGE)
+    words: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 10, "color": style.TEXT}
+    for column, (frame, pair) in enumerate(zip(FRAMES, pairs, strict=True)):
+        x = left + column * (wide + gap)
+        for row, picture in enumerate(pair):
+            y = height - head - (row + 1) * tall - row * gap
+            axes = figure.add_axes((x / width, y / height, wide / width, tall / height))
+            axes.imshow(np.clip(picture, 0, 1), interpolation="nearest", aspect="auto")
+            axes.set_axis_off()
+        figure.text((x + wide / 2) / width, 1 - head / 2 / height, f"frame {frame}", **words)
+    for row, name in enumerate(("before", "after")):
+        y = height - head - (row + 0.5) * tall - row * gap
+        figure.text(left / 2 / width, y / height, name, rotation=90, **words)
+    figure.savefig(out, dpi=100, facecolor=style.PAGE)
+
+
+def fade(sidecar: Path) -> str:
+    """Say over which frames the sidecar's one colour stop acts: between its edge's two vertices."""
+    document = json.loads(sidecar.read_text(encoding="utf-8"))
+    (stop,) = document["edits"]["stops"]
+    (edge,) = (e for e in document["polytope"]["edges"] if e["id"] == stop["edge"])
+    when = {v["id"]: v["frame"] for v in document["polytope"]["vertices"]}
+    return (
+        f"{stop['id']} is full at frame {stop['frame']:g}; it comes in from frame "
+        f"{when[edge['from']]:.3g} and is gone by frame {when[edge['to']]:.3g}, "
+        "the vertices around it"
+    )
 
 
 def demo(out: Path) -> None:
@@ -79,7 +110,7 @@ def demo(out: Path) -> None:
     clip, graded = out / "clip", out / "graded"
     sidecar, sheet = out / "sample.p4d.json", out / "before_after.png"
     palette, edited = out / "palette.png", out / "palette_edited.png"
-    cube, clf = out / "dusk.cube", out / "dusk.clf"
+    cube, clf = out / "autumn.cube", out / "autumn.clf"
     for folder in (clip, graded):
         shutil.rmtree(folder, ignore_errors=True)
     for file in (sidecar, sheet, palette, edited, cube, clf):
@@ -93,13 +124,14 @@ def demo(out: Path) -> None:
     run("What was found", "info", str(sidecar))
     run("The palette as a picture", "plot", str(sidecar), "--clip", frames, "-o", str(palette))
     # fmt: off
-    run("Edit: the golden leaves of late autumn become violet",
+    run("Edit: the gold of late autumn, in leaves and meadow, becomes rose",
         "edit", str(sidecar), "set", "--near", "0.96,0.56,0.05", "--frame", str(AUTUMN),
-        "--rgb", "0.72", "0.2", "0.85")
-    run("Edit: a colour stop turns the noon sky turquoise, around frame 11 only",
+        "--rgb", "0.9", "0.42", "0.62")
+    run("Edit: a colour stop turns the day's blue, in the sky and the haze, to lavender",
         "edit", str(sidecar), "stop", "--near", "0.2,0.47,0.85", "--frame", "11",
-        "--rgb", "0.05", "0.75", "0.75")
+        "--rgb", "0.52", "0.45", "0.85")
     # fmt: on
+    say(f"   {fade(sidecar)}")
     run("The palette with its edits", "plot", str(sidecar), "--clip", frames, "-o", str(edited))
     run("Render", "render", str(sidecar), frames, "-o", str(graded / "sample.####.exr"))
     for file in (cube, clf):
@@ -118,9 +150,10 @@ def demo(out: Path) -> None:
   {palette}, {edited}
         the palette over time before and after the edits, and its polyhedra in RGB
   {graded}/sample.####.exr
-        the recoloured frames, 32-bit float
+        the recoloured frames, 32-bit float; they hold the clip's own encoding, sRGB, and look
+        too bright in viewers that expect linear light in EXR files (read them as sRGB)
   {cube}, {clf}
-        the edit of frame {AUTUMN} as a LUT, for Resolve and for OpenColorIO
+        the edit of frame {AUTUMN}, late autumn, as a LUT, for Resolve and for OpenColorIO
   {sidecar}
         the sidecar: the palette and its edits, a text file
   {clip}/sample.####.png

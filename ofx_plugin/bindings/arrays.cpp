@@ -15,16 +15,42 @@ py::array array_from(const py::object& object, const char* what) {
     return array;
 }
 
-void require_three_columns(const py::array& array, const char* what, const char* rows) {
-    if (array.ndim() != 2 || array.shape(1) != 3) {
+void require_columns(const py::array& array, const char* what, const char* rows,
+                     std::size_t columns) {
+    if (array.ndim() != 2 || array.shape(1) != static_cast<py::ssize_t>(columns)) {
         throw py::value_error(std::string(what) + ": found shape " + shape_text(array) +
-                              ", expected (" + rows + ", 3)");
+                              ", expected (" + rows + ", " + std::to_string(columns) + ")");
     }
 }
 
 [[noreturn]] void wrong_type(const py::array& array, const char* what, const char* expected) {
     throw py::value_error(std::string(what) + ": found dtype " +
                           std::string(py::str(array.dtype())) + ", expected " + expected);
+}
+
+py::array_t<double, py::array::c_style | py::array::forcecast> doubles_of(const py::array& array,
+                                                                          const char* what) {
+    const char kind = array.dtype().kind();
+    if (kind != 'f' && kind != 'i' && kind != 'u') wrong_type(array, what, "real numbers");
+    return array;
+}
+
+template <std::size_t N>
+std::vector<std::array<double, N>> rows_from(const py::object& object, const char* what) {
+    const py::array array = array_from(object, what);
+    require_columns(array, what, "n", N);
+    const auto doubles = doubles_of(array, what);
+    std::vector<std::array<double, N>> rows(static_cast<std::size_t>(array.shape(0)));
+    if (!rows.empty()) std::memcpy(rows.data(), doubles.data(), rows.size() * sizeof(rows[0]));
+    return rows;
+}
+
+template <std::size_t N>
+DoubleArray rows_to_array(const std::vector<std::array<double, N>>& rows) {
+    DoubleArray array({static_cast<py::ssize_t>(rows.size()), static_cast<py::ssize_t>(N)});
+    if (!rows.empty())
+        std::memcpy(array.mutable_data(), rows.data(), rows.size() * sizeof(rows[0]));
+    return array;
 }
 
 }  // namespace
@@ -38,22 +64,27 @@ std::string shape_text(const py::array& array) {
 }
 
 std::vector<Vec3> colours_from(const py::object& object, const char* what) {
+    return rows_from<3>(object, what);
+}
+
+std::vector<std::array<double, 4>> vertices_from(const py::object& object, const char* what) {
+    return rows_from<4>(object, what);
+}
+
+std::vector<double> numbers_from(const py::object& object, const char* what) {
     const py::array array = array_from(object, what);
-    require_three_columns(array, what, "n");
-    const char kind = array.dtype().kind();
-    if (kind != 'f' && kind != 'i' && kind != 'u') wrong_type(array, what, "real numbers");
-    const auto doubles = py::array_t<double, py::array::c_style | py::array::forcecast>(array);
-    std::vector<Vec3> colours(static_cast<std::size_t>(array.shape(0)));
-    if (!colours.empty()) {
-        std::memcpy(colours.data(), doubles.data(), colours.size() * sizeof(Vec3));
+    if (array.ndim() != 1) {
+        throw py::value_error(std::string(what) + ": found shape " + shape_text(array) +
+                              ", expected (n,)");
     }
-    return colours;
+    const auto doubles = doubles_of(array, what);
+    return std::vector<double>(doubles.data(), doubles.data() + doubles.size());
 }
 
 std::vector<Face> faces_from(const py::object& object) {
     const py::array array = array_from(object, "faces");
     if (array.size() == 0) return {};
-    require_three_columns(array, "faces", "f");
+    require_columns(array, "faces", "f", 3);
     const char kind = array.dtype().kind();
     if (kind != 'i' && kind != 'u') wrong_type(array, "faces", "integers");
     const auto wide = py::array_t<long long, py::array::c_style | py::array::forcecast>(array);
@@ -71,12 +102,14 @@ std::vector<Face> faces_from(const py::object& object) {
     return faces;
 }
 
-DoubleArray to_array(const std::vector<Vec3>& colours) {
-    DoubleArray array({static_cast<py::ssize_t>(colours.size()), py::ssize_t{3}});
-    if (!colours.empty()) {
-        std::memcpy(array.mutable_data(), colours.data(), colours.size() * sizeof(Vec3));
-    }
-    return array;
+DoubleArray to_array(const std::vector<double>& numbers) {
+    return DoubleArray(static_cast<py::ssize_t>(numbers.size()), numbers.data());
+}
+
+DoubleArray to_array(const std::vector<Vec3>& colours) { return rows_to_array(colours); }
+
+DoubleArray to_array(const std::vector<std::array<double, 4>>& vertices) {
+    return rows_to_array(vertices);
 }
 
 IntArray to_array(const std::vector<Face>& faces) {

@@ -3,6 +3,7 @@
 
 #include <pybind11/numpy.h>
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -19,10 +20,18 @@ using IntArray = py::array_t<int, py::array::c_style>;
 std::string shape_text(const py::array& array);
 /// Anything NumPy turns into an (n, 3) array of real numbers. `what` names it in the ValueError.
 std::vector<Vec3> colours_from(const py::object& object, const char* what);
+/// The same for (n, 4): colours and times.
+std::vector<std::array<double, 4>> vertices_from(const py::object& object, const char* what);
+/// Anything NumPy turns into (n,) real numbers.
+std::vector<double> numbers_from(const py::object& object, const char* what);
 /// (f, 3) integers; an empty array of any shape is no faces.
 std::vector<Face> faces_from(const py::object& object);
+/// (n,) float64.
+DoubleArray to_array(const std::vector<double>& numbers);
 /// (n, 3) float64.
 DoubleArray to_array(const std::vector<Vec3>& colours);
+/// (n, 4) float64.
+DoubleArray to_array(const std::vector<std::array<double, 4>>& vertices);
 /// (f, 3) int32.
 IntArray to_array(const std::vector<Face>& faces);
 

@@ -46,7 +46,8 @@ OfxStatus dispatch(const char* action, OfxImageEffectHandle effect, OfxPropertyS
         destroy_instance(effect);
         return kOfxStatOK;
     }
-    if (is(kOfxActionInstanceChanged)) {
+    if (is(kOfxActionInstanceChanged) || is(kOfxActionBeginInstanceChanged) ||
+        is(kOfxActionEndInstanceChanged)) {
         instance_changed(host, effect, in);
         return kOfxStatOK;
     }

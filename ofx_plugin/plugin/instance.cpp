@@ -86,6 +86,15 @@ void destroy_instance(OfxImageEffectHandle effect) {
 }
 
 void update_status(const Suites& suites, OfxImageEffectHandle effect) {
+    // A host tells of the new status from within the call that sets it. Hosts that do so without
+    // saying what changed, and do not give back the text they were given, would go round for ever.
+    thread_local bool updating = false;
+    if (updating) return;
+    struct Guard {
+        bool& flag;
+        explicit Guard(bool& f) : flag(f) { flag = true; }
+        ~Guard() { flag = false; }
+    } const guard(updating);
     const Params params(suites, effect);
     const std::string text = status_of(params.string_now(kParamSidecar).value_or(""));
     if (params.string_now(kParamStatus) != text) params.set_string(kParamStatus, text);
@@ -94,8 +103,9 @@ void update_status(const Suites& suites, OfxImageEffectHandle effect) {
 void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const Properties& args) {
     const std::optional<std::string> name = args.get_string(kOfxPropName);
     const std::optional<std::string> reason = args.get_string(kOfxPropChangeReason);
-    if (reason && *reason == kOfxChangeTime) return;
-    if (name && *name != kParamSidecar) return;
+    // The plugin itself sets nothing but the status.
+    if (name && *name == kParamStatus) return;
+    if (reason && *reason == kOfxChangePluginEdited) return;
     update_status(suites, effect);
 }
 

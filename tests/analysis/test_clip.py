@@ -8,9 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from clip_files import grey_levels, write_image
-from palette4d.analysis.clip import ClipError, FrameError, open_clip, parse_frames
+from palette4d.analysis import pipeline
+from palette4d.analysis.clip import ClipError, FrameError, open_clip
 from palette4d.analysis.clip_base import as_rate, describe
 from palette4d.analysis.clip_sequence import frame_number
+from palette4d.analysis.options import AnalysisOptions
+from palette4d.arguments import parse_frames
+from palette4d.errors import Palette4dError
 
 
 def reds(clip) -> dict[int, int]:
@@ -24,7 +28,8 @@ def reds(clip) -> dict[int, int]:
         ("1001-1100x2", list(range(1001, 1101, 2))),
         ("7", [7]),
         ("1,3,5", [1, 3, 5]),
-        ("3-1", [1, 2, 3]),
+        ("12,0,30,12", [0, 12, 30]),
+        ("-5,-4,1-9x4,2", [-5, -4, 1, 2, 5, 9]),
         ("-3-1", [-3, -2, -1, 0, 1]),
         ("-5--3", [-5, -4, -3]),
         ("1-3,4-6", [1, 2, 3, 4, 5, 6]),
@@ -34,14 +39,16 @@ def test_frame_ranges(text, frames):
     assert parse_frames(text) == frames
 
 
-@pytest.mark.parametrize("text", ["", "a-b", "1-", "1,2,4", "1-10y3", "1.5-3.5", "1-10x0", "1--"])
+@pytest.mark.parametrize(
+    "text", ["", "a-b", "1-", "5-1", "-4--5", "1,", "1-10y3", "1.5-3.5", "1-10x0", "1--", "1x2"]
+)
 def test_bad_frame_ranges_are_named(text):
-    with pytest.raises(ClipError, match="frame range"):
+    with pytest.raises(Palette4dError, match="frame range"):
         parse_frames(text)
 
 
 def test_huge_frame_range_is_refused():
-    with pytest.raises(ClipError, match="frame"):
+    with pytest.raises(Palette4dError, match="more than 1000000 frames"):
         parse_frames("1-99999999999")
 
 
@@ -104,8 +111,11 @@ def test_ranges_in_the_pattern_and_outside(tmp_path):
         open_clip(str(folder), frames="5-8")
     with pytest.raises(FrameError, match=r"1011, 1012|1011-1012"):
         open_clip(str(folder), frames="1009-1012")
-    with pytest.raises(ClipError, match="evenly"):
-        open_clip(str(folder), frames="1001,1002,1004")
+    some = open_clip(str(folder), frames="1001,1002,1004")
+    assert list(reds(some)) == some.frames == [1001, 1002, 1004]
+    assert some.step == 0
+    with pytest.raises(Palette4dError, match=r"1001, 1002, 1004 are not evenly spaced.*1-10x3"):
+        pipeline.analyze_clip(some, AnalysisOptions())
     with pytest.raises(ClipError, match="frame 5 was asked for"):
         open_clip(str(folder)).read(5)
 
@@ -197,7 +207,7 @@ def test_first_frame_may_be_the_bad_one(tmp_path):
 def test_nothing_readable_says_so(tmp_path):
     for frame in range(3):
         (tmp_path / f"clip.{frame}.png").write_bytes(b"no picture")
-    with pytest.raises(FrameError, match="none of the frames 0-2"):
+    with pytest.raises(FrameError, match="none readable of frames 0-2"):
         open_clip(str(tmp_path), skip_bad_frames=True)
 
 
@@ -409,3 +419,30 @@ def test_the_seasons_clip(seasons):
     pixels = clip.read(49)
     assert pixels.shape == (380, 696, 3)
     assert 0 <= pixels.min() < pixels.max() <= 1
+
+
+@pytest.mark.parametrize("spec", ["", " "])
+def test_an_empty_name_is_not_the_working_folder(tmp_path, monkeypatch, spec):
+    monkeypatch.chdir(grey_levels(tmp_path, range(3)))
+    assert open_clip(".").frames == [0, 1, 2]
+    with pytest.raises(ClipError, match="name is empty"):
+        open_clip(spec)
+
+
+def test_one_numbered_image_among_others_is_no_sequence(tmp_path):
+    grey_levels(tmp_path, range(7, 8))
+    assert open_clip(str(tmp_path)).frames == [7]
+    grey_levels(tmp_path, range(1), "beach.png")
+    with pytest.raises(ClipError, match=r"(?s)2 images.*beach\.png.*clip\.0007\.png.*Give the"):
+        open_clip(str(tmp_path))
+    grey_levels(tmp_path, range(8, 9))
+    assert open_clip(str(tmp_path)).frames == [7, 8]
+
+
+def test_one_frame_is_no_frames(tmp_path):
+    grey_levels(tmp_path, range(3, 4))
+    (tmp_path / "clip.0003.png").write_bytes(b"")
+    with pytest.raises(FrameError, match="none readable of frame 3;"):
+        open_clip(str(tmp_path), skip_bad_frames=True)
+    with pytest.raises(ClipError, match="found no frame 9, the clip has 3"):
+        open_clip(str(tmp_path), frames="9")

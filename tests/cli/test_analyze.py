@@ -97,8 +97,8 @@ def test_wrong_usage(clip, tmp_path, capsys):
         with pytest.raises(SystemExit) as stop:
             cli.main(arguments)
         assert stop.value.code == 2
-    assert cli.main(["analyze", str(clip), "-o", out, "--eta1", "0.2"]) == 1
-    assert "eta1" in capsys.readouterr().err
+    assert cli.main(["analyze", str(clip), "-o", out, "--frames", "1001,1002,1004"]) == 1
+    assert "not evenly spaced" in capsys.readouterr().err
     assert cli.main(["analyze", str(tmp_path / "nothing"), "-o", out]) == 1
     assert not Path(out).exists()
 

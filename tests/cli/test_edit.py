@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from palette4d import Palette4dError, _core, cli, edits
 from palette4d.analysis import sidecar
@@ -212,6 +213,10 @@ def test_reset_gives_the_file_back(plain: str) -> None:
         (["set", "v4", "--rgb", "#12345"], "#rrggbb"),
         (["set", "v4", "--rgb", "2e6", "0", "0"], "1e+06"),
         (["set", "--rgb", "1,1,1"], "neither ID nor --near"),
+        (["set", "--rgb", "1", "0", "0", "v3"], "has taken 'v3'"),
+        (["set", "--rgb", "v3", "1", "0", "0"], "expected the ID before --rgb: `v3 --rgb 1 0 0`"),
+        (["set", "--rgb", "#ff0000", "v3"], "`v3 --rgb '#ff0000'`"),
+        (["stop", "--frame", "3", "--rgb", "1,0,0", "e3"], "expected the EDGE before --rgb"),
         (["set", "v4", "--near", "1,1,1", "--frame", "3", "--rgb", "1,1,1"], "both"),
         (["set", "--near", "1,1,1", "--rgb", "1,1,1"], "go together"),
         (["set", "v4", "--frame", "3", "--rgb", "1,1,1"], "go together"),
@@ -330,13 +335,27 @@ def test_functions_leave_their_argument_alone() -> None:
     assert json.dumps(document) == text
 
 
-@pytest.mark.parametrize("frame", [0, 0.5, 2, 4.5, 5, 6.99, 7, 8, 9])
-def test_edited_colours_agree_with_the_core(frame: float) -> None:
-    path = str(GOLDEN / "v1_edited.p4d.json")
+@pytest.mark.parametrize("path", sorted(GOLDEN.glob("*.json")), ids=lambda path: path.name)
+def test_edited_colours_are_linear_between_handles(path: Path) -> None:
     document = sidecar.load(path)
-    core = edited_slice(path, frame)
-    for track, edge in ((2, "e3"), (3, "e4")):
-        assert edits.edited_at(document, edge, frame) == pytest.approx(core[track], abs=1e-12)
+    vertices = {vertex["id"]: vertex for vertex in document["polytope"]["vertices"]}
+    for edge in document["polytope"]["edges"]:
+        ends = [vertices[edge[end]] for end in ("from", "to")]
+        handles = [(end["frame"], edits.colour_of(document, end["id"])) for end in ends]
+        handles += [
+            (stop["frame"], stop["rgb"])
+            for stop in document["edits"]["stops"]
+            if stop["edge"] == edge["id"]
+        ]
+        frames, colours = zip(*sorted(handles), strict=True)
+        for frame in [*frames, *np.linspace(frames[0], frames[-1], 7).tolist()]:
+            expected = [
+                np.interp(frame, frames, component) for component in zip(*colours, strict=True)
+            ]
+            found = edits.edited_at(document, edge["id"], frame)
+            assert found == pytest.approx(expected, abs=1e-12), (edge["id"], frame)
+        with pytest.raises(Palette4dError, match="expected one in between"):
+            edits.edited_at(document, edge["id"], frames[-1] + 0.5)
 
 
 def test_nearest_handle_says_what_it_found() -> None:

@@ -143,8 +143,8 @@ def test_negative_frames(capsys: pytest.CaptureFixture[str]) -> None:
     assert [cut["frame"] for cut in json.loads(capsys.readouterr().out)] == [-3, -2, -1]
 
 
-@pytest.mark.parametrize("text", ["", "x", "5-1", "1-5x0", "0-21", "1,,2"])
-def test_frames_that_make_no_sense(capsys: pytest.CaptureFixture[str], text: str) -> None:
+@pytest.mark.parametrize("text", ["0-21", "-1", "30,1"])
+def test_frames_outside_the_clip(capsys: pytest.CaptureFixture[str], text: str) -> None:
     assert cli.main(["slice", EDITED, "--frames", text]) == 1
     assert capsys.readouterr().err.startswith("palette4d: error: ")
 
@@ -153,7 +153,7 @@ def test_frames_that_make_no_sense(capsys: pytest.CaptureFixture[str], text: str
 def test_slice_for_people(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["slice", str(path), "--frames", "all"]) == 0
     assert capsys.readouterr().out.count("frame ") == len(
-        edit_cli.parse_frames("all", json.loads(path.read_text(encoding="utf-8")))
+        edit_cli.chosen_frames("all", json.loads(path.read_text(encoding="utf-8")))
     )
 
 

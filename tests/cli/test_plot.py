@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.cli import main
-from palette4d.plotting import layout, style, timeline
+from palette4d.plotting import figure, layout, style, timeline
 
 GOLDEN = Path(__file__).resolve().parent.parent / "golden" / "sidecars"
 ALL_GOLDEN = sorted(GOLDEN.glob("v1_*.p4d.json"))
@@ -169,8 +169,80 @@ def test_frames_and_clip_show_the_pictures(tmp_path: Path) -> None:
     )
     with_clip = pixels(out)
     assert with_clip.shape[0] > without.shape[0]
-    # Two moments, before and after (nothing is edited): four thumbnails.
-    assert holds(with_clip, colour, 4 * 200 * 100)
+    # Two moments; nothing is edited, so there is nothing to show after: two thumbnails.
+    thumbnail = (800 / 1200 * 420) * (800 / 1200 * 420 * 36 / 64)
+    assert holds(with_clip, colour, int(1.9 * thumbnail))
+    assert not holds(with_clip, colour, int(2.5 * thumbnail))
+
+    # An edit that does not reach these frames still gets its row: before and after are the same.
+    document = json.loads((GOLDEN / "v1_split.p4d.json").read_text(encoding="utf-8"))
+    unmoved = document["polytope"]["vertices"][0]
+    document["edits"] = {
+        "vertices": [{"vertex": unmoved["id"], "rgb": unmoved["rgb"]}],
+        "stops": [],
+    }
+    sidecar = tmp_path / "edited.p4d.json"
+    sidecar.write_text(json.dumps(document), encoding="utf-8")
+    arguments[1] = str(sidecar)
+    assert (
+        main([*arguments, "--frames", "3,12.5", "--force", "--clip", f"{folder}/f.####.png"]) == 0
+    )
+    assert holds(pixels(out), colour, int(3.8 * thumbnail))
+
+
+def test_a_note_says_that_the_clip_is_not_there(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "a.png"
+    assert main(["plot", str(GOLDEN / "v1_split.p4d.json"), "-o", str(out), "--width", "400"]) == 0
+    printed = capsys.readouterr()
+    assert printed.err.startswith("palette4d: note: the clip's pixels could not be read")
+    assert "--clip" in printed.err
+    assert printed.out.strip() == str(out)
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "edited", "expected"),
+    [
+        (0, 30, [], [0, 10, 20, 30]),
+        (5, 5, [5], [5]),
+        (0, 2, [1], [0, 1, 2]),
+        (0, 100, [40], [0, 40, 70, 100]),
+        (0, 100, [40.3, 44, 97], [0, 44, 70, 97]),  # 40 is too close to 44; 97 stands for the end
+        (0, 100, list(range(20, 90, 3)), [0, 26, 50, 74, 100]),
+    ],
+)
+def test_default_frames(
+    first: float, last: float, edited: list[float], expected: list[float]
+) -> None:
+    chosen = figure.default_frames(first, last, edited)
+    assert chosen == expected
+    for time in edited:  # every edit is near to a frame that is shown, as far as five can reach
+        assert min(abs(time - v) for v in chosen) <= max(0.5, (last - first) / 8)
+
+
+@pytest.mark.parametrize("count", [2, 3, 30, 120])
+@pytest.mark.parametrize("distance", [0.0, 1.0, 7.0])
+def test_close_discs_make_way(count: int, distance: float) -> None:
+    home = np.concatenate([200 + distance * np.arange(count), [30.0, 950.0]])
+    home = np.clip(home, 30.0, 950.0)
+    row = np.zeros(len(home))
+    wanted = np.full(len(home), 16.5)
+    x, radius = timeline._place(wanted, home, row, 10.0, 990.0)
+    order = np.argsort(home, kind="stable")
+    gaps = np.diff(x[order])
+    room = radius[order][:-1] + radius[order][1:]
+    assert (gaps >= room + 2 * timeline.COLLAR - 1e-6).all() or (count >= 120 and (gaps > 0).all())
+    assert radius.min() >= 1.6
+    assert (x - radius >= 10.0).all()
+    assert (x + radius <= 990.0).all()
+
+
+def test_discs_with_room_stay_where_they_belong() -> None:
+    home, row = np.array([100.0, 160.0, 161.0]), np.array([50.0, 50.0, 90.0])
+    x, radius = timeline._place(np.full(3, 16.5), home, row, 10.0, 990.0)
+    np.testing.assert_allclose(x, home)
+    np.testing.assert_allclose(radius, 16.5)
 
 
 @pytest.mark.parametrize(

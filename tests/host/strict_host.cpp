@@ -305,6 +305,7 @@ Instance::Instance(Plugin& plugin, const OfxImageEffectStruct& descriptor,
         } else {
             copy->value = param.properties.text(kOfxParamPropDefault);
         }
+        copy->on_set = [this](const std::string& set) { tell(set); };
         effect_.params.params[name] = std::move(copy);
         effect_.params.order.push_back(name);
     }
@@ -339,13 +340,41 @@ void Instance::animate(const std::string& param, std::map<double, double> keys) 
 }
 
 OfxStatus Instance::changed(const std::string& param) {
+    return changed(kOfxTypeParameter, param, kOfxChangeUserEdited);
+}
+
+OfxStatus Instance::changed(const std::string& type, const std::string& name,
+                            const std::string& reason) {
     OfxPropertySetStruct in(kInArgs);
-    in.put(kOfxPropType, std::string(kOfxTypeParameter));
-    in.put(kOfxPropName, param);
-    in.put(kOfxPropChangeReason, std::string(kOfxChangeUserEdited));
+    if (!type.empty()) {
+        in.put(kOfxPropType, type);
+        in.put(kOfxPropName, name);
+    }
+    in.put(kOfxPropChangeReason, reason);
     in.put(kOfxPropTime, 0.0);
     in.put_all(kOfxImageEffectPropRenderScale, {1.0, 1.0});
     return plugin_.call(kOfxActionInstanceChanged, &effect_, &in, nullptr);
+}
+
+OfxStatus Instance::bracket(const char* action, const std::string& reason) {
+    OfxPropertySetStruct in(kInArgs);
+    in.put(kOfxPropChangeReason, reason);
+    return plugin_.call(action, &effect_, &in, nullptr);
+}
+
+// Hosts built on the standard's host library do the same: the plugin hears of its own setting
+// before the call that sets returns. It may not answer that with another setting.
+void Instance::tell(const std::string& param) {
+    ++settings_;
+    if (telling_) {
+        Host::get().fault("paramSetValue: in answer to the plugin's own setting");
+        return;
+    }
+    telling_ = true;
+    bracket(kOfxActionBeginInstanceChanged, kOfxChangePluginEdited);
+    changed(kOfxTypeParameter, param, kOfxChangePluginEdited);
+    bracket(kOfxActionEndInstanceChanged, kOfxChangePluginEdited);
+    telling_ = false;
 }
 
 OfxStatus Instance::sync() {

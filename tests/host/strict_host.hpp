@@ -71,6 +71,7 @@ struct OfxParamStruct {
     OfxPropertySetStruct properties;
     strict::Value value;
     std::map<double, double> keys;  ///< linear between keys; empty: `value` at all times
+    std::function<void(const std::string& name)> on_set{};  ///< the plugin has set an instance's
 };
 
 struct OfxParamSetStruct {
@@ -261,6 +262,12 @@ public:
     void set(const std::string& param, Value value);  ///< no action is sent
     void animate(const std::string& param, std::map<double, double> keys);
     OfxStatus changed(const std::string& param);
+    /// Any instance change: `type` is kOfxTypeParameter or kOfxTypeClip, or empty for the time.
+    OfxStatus changed(const std::string& type, const std::string& name, const std::string& reason);
+    /// kOfxActionBeginInstanceChanged or its End.
+    OfxStatus bracket(const char* action, const std::string& reason);
+    /// How often the plugin has set a parameter.
+    int settings() const { return settings_; }
     OfxStatus sync();
     std::string text(const std::string& param);
     /// kOfxStatOK: the clip's name and time are filled in.
@@ -273,6 +280,10 @@ private:
     Plugin& plugin_;
     OfxImageEffectStruct effect_;
     bool created_ = false;
+    int settings_ = 0;
+    bool telling_ = false;  ///< the plugin is being told of its own setting
+
+    void tell(const std::string& param);
 };
 
 }  // namespace strict

@@ -126,7 +126,8 @@ OfxStatus set_value(OfxParamHandle param, ...) {
     const Call call("paramSetValue");
     if (call.refused()) return kOfxStatFailed;
     const std::string& action = activity().action;
-    if (action != kOfxActionCreateInstance && action != kOfxActionInstanceChanged &&
+    if (action != kOfxActionCreateInstance && action != kOfxActionBeginInstanceChanged &&
+        action != kOfxActionInstanceChanged && action != kOfxActionEndInstanceChanged &&
         action != kOfxActionSyncPrivateData) {
         Host::get().fault("paramSetValue: not allowed in " + action);
         return kOfxStatFailed;
@@ -143,6 +144,7 @@ OfxStatus set_value(OfxParamHandle param, ...) {
         }
     }
     va_end(arguments);
+    if (param->on_set) param->on_set(param->name);
     return kOfxStatOK;
 }
 

@@ -122,6 +122,110 @@ TEST(a_changed_sidecar_is_read_again) {
     CHECK(scene.message().empty());
 }
 
+TEST(the_status_follows_the_file) {
+    Scene scene;
+    Instance& node = *scene.instance;
+    const std::string path = sidecar(), whole = sidecar_text(), plain = sidecar_text(false);
+    const std::string good = "box: frames 10-20 at 24 fps, 16 palette vertices, ";
+    node.set("sidecar", path);
+    CHECK(node.changed("sidecar") == kOfxStatOK);
+    CHECK(node.text("status") == good + "3 edits");
+    struct Way {
+        const char* words;
+        std::function<OfxStatus()> poke;
+    };
+    const std::vector<Way> ways = {
+        {"sidecar", [&] { return node.changed("sidecar"); }},
+        {"strength", [&] { return node.changed("strength"); }},
+        {"frameOffset", [&] { return node.changed("frameOffset"); }},
+        {"a parameter that follows its keys",
+         [&] { return node.changed(kOfxTypeParameter, "strength", kOfxChangeTime); }},
+        {"the time", [&] { return node.changed("", "", kOfxChangeTime); }},
+        {"the clip", [&] { return node.changed(kOfxTypeClip, "Source", kOfxChangeUserEdited); }},
+        {"Begin",
+         [&] { return node.bracket(kOfxActionBeginInstanceChanged, kOfxChangeUserEdited); }},
+        {"End", [&] { return node.bracket(kOfxActionEndInstanceChanged, kOfxChangeUserEdited); }},
+        {"End without arguments",
+         [&] {
+             return scene.plugin.call(kOfxActionEndInstanceChanged, &node.effect(), nullptr,
+                                      nullptr);
+         }},
+        {"SyncPrivateData", [&] { return node.sync(); }},
+    };
+    for (const Way& way : ways) {
+        // Every step changes the text: it is set once, and a second poke leaves it alone.
+        const auto expect = [&](const std::string& begin, const std::string& end) {
+            const int before = node.settings();
+            CHECK(way.poke() == kOfxStatOK);
+            const std::string text = node.text("status");
+            EXPECT(text.find(begin) == 0 && text.find(end) != std::string::npos,
+                   std::string(way.words) + ": expected " + begin + " … " + end + ", got " + text);
+            CHECK(node.settings() == before + 1);
+            CHECK(way.poke() == kOfxStatOK);
+            CHECK(node.text("status") == text);
+            CHECK(node.settings() == before + 1);
+        };
+        write("clip.p4d.json", plain);
+        expect(good, "0 edits");
+        write("clip.p4d.json", whole.substr(0, whole.size() / 2));
+        expect(path, "expected");
+        write("clip.p4d.json", plain);
+        expect(good, "0 edits");
+        std::filesystem::remove(path);
+        expect(path, "does not exist");
+        write("clip.p4d.json", whole);
+        expect(good, "3 edits");
+    }
+}
+
+TEST(the_status_is_set_only_where_it_may_be) {
+    // The strict host takes a setting anywhere else, and one in answer to a setting, for a fault.
+    Scene scene;
+    Instance& node = *scene.instance;
+    node.set("sidecar", sidecar());
+    CHECK(node.changed("sidecar") == kOfxStatOK);
+    const std::string old = node.text("status");
+    const int before = node.settings();
+    write("clip.p4d.json", sidecar_text(false));
+    scene.render();
+    std::string clip;
+    double time = 0;
+    bool varying = false;
+    CHECK(node.is_identity(2, clip, time) == kOfxStatOK);
+    CHECK(node.clip_preferences(varying) == kOfxStatOK);
+    for (const char* action :
+         {kOfxActionPurgeCaches, kOfxImageEffectActionBeginSequenceRender,
+          kOfxImageEffectActionEndSequenceRender, "OfxActionBeginInstanceEdit"}) {
+        const OfxStatus status = scene.plugin.call(action, &node.effect(), nullptr, nullptr);
+        CHECK(status == kOfxStatOK || status == kOfxStatReplyDefault);
+    }
+    // The plugin's own setting, told later instead of at once.
+    CHECK(node.bracket(kOfxActionBeginInstanceChanged, kOfxChangePluginEdited) == kOfxStatOK);
+    CHECK(node.changed(kOfxTypeParameter, "status", kOfxChangePluginEdited) == kOfxStatOK);
+    CHECK(node.changed(kOfxTypeParameter, "status", kOfxChangeUserEdited) == kOfxStatOK);
+    CHECK(node.bracket(kOfxActionEndInstanceChanged, kOfxChangePluginEdited) == kOfxStatOK);
+    CHECK(node.text("status") == old);
+    CHECK(node.settings() == before);
+    CHECK(node.changed("strength") == kOfxStatOK);
+    CHECK(node.text("status").find("0 edits") != std::string::npos);
+    CHECK(node.settings() == before + 1);
+}
+
+TEST(a_host_that_says_nothing_of_a_change_is_answered_once) {
+    // It tells of the plugin's own setting without name and reason, and gives no text back: only
+    // the plugin can know that it is being told of itself.
+    Config config;
+    config.missing_properties = {kOfxPropName, kOfxPropChangeReason};
+    config.null_functions = {"paramGetValue"};
+    Host::get().configure(config);
+    Scene scene;
+    for (int i = 0; i < 3; ++i) {
+        const int before = scene.instance->settings();
+        CHECK(scene.instance->changed("strength") == kOfxStatOK);
+        CHECK(scene.instance->settings() == before + 1);
+    }
+}
+
 TEST(one_file_by_several_names) {
     Scene scene;
     const std::string path = sidecar();

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable, Sequence
 
 from palette4d import __version__
+from palette4d.arguments import accept_negative_values
 from palette4d.errors import Palette4dError
 
 #: The modules of the verbs, in the order of a day's work (and of ``palette4d --help``).
@@ -49,6 +50,7 @@ def build_parser() -> argparse.ArgumentParser:
     subparsers = parser.add_subparsers(title="verbs", metavar="VERB", dest="verb", required=True)
     for name in VERB_MODULES:
         importlib.import_module(name).add_parser(subparsers)
+    accept_negative_values(subparsers)
     return parser
 
 

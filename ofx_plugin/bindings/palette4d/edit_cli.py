@@ -2,7 +2,6 @@
 
 import argparse
 import json
-import math
 import os
 import re
 import shlex
@@ -14,13 +13,18 @@ from typing import Any
 from palette4d import _core, edits
 from palette4d.analysis import sidecar
 from palette4d.analysis.sidecar import Document
+from palette4d.arguments import (
+    accept_negative_values,
+    frame_range_or_all,
+    number,
+    parse_frames,
+)
 from palette4d.edits import Colour
 from palette4d.errors import Palette4dError
+from palette4d.wording import counted
 
-# argparse takes "-1e-3" and "-0.1,0.2,0.3" for options unless told that they are numbers.
-_NEGATIVE = re.compile(r"-\.?\d[\d.,eE+-]*$")
 _HEX = re.compile(r"#([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})")
-_RANGE = re.compile(r"(-?\d+)(?:-(-?\d+)(?:x(\d+))?)?")
+_number = number()
 
 INFO_EPILOG = """\
 example:
@@ -78,7 +82,10 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         "--frame", type=_number, metavar="T", help="the frame number; may lie between two frames"
     )
     when.add_argument(
-        "--frames", metavar="RANGE", help="many frames: all, 10, 1-20, 1001-1100x2, 1-9,15"
+        "--frames",
+        metavar="RANGE",
+        type=frame_range_or_all,
+        help="many frames: all, 10, 1-20, 1001-1100x2, 1-9,15",
     )
     cut.add_argument("--json", action="store_true", help="print JSON (a list with --frames)")
     cut.set_defaults(run=run_slice)
@@ -101,7 +108,7 @@ def _verb(
     epilog: str,
     usage: str | None = None,
 ) -> argparse.ArgumentParser:
-    parser = subparsers.add_parser(
+    return subparsers.add_parser(
         name,
         help=re.split(r"[:.(]", description[0].lower() + description[1:])[0].strip(),
         description=textwrap.fill(description, 79),
@@ -109,8 +116,6 @@ def _verb(
         epilog=epilog,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser._negative_number_matcher = _NEGATIVE
-    return parser
 
 
 def _add_actions(edit: argparse.ArgumentParser) -> None:
@@ -167,6 +172,7 @@ def _add_actions(edit: argparse.ArgumentParser) -> None:
     )
     undo.add_argument("id", nargs="?", metavar="ID", help="a vertex or a stop")
     undo.set_defaults(run=run_reset)
+    accept_negative_values(actions)
 
 
 def _add_rgb(parser: argparse.ArgumentParser) -> None:
@@ -180,16 +186,6 @@ def _add_near(parser: argparse.ArgumentParser, text: str) -> None:
 
 
 # ------------------------------------------------------------------------------------- arguments
-
-
-def _number(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"found {text!r}, expected a number") from None
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"found {text!r}, expected a finite number")
-    return value
 
 
 def parse_colour(words: Sequence[str]) -> Colour:
@@ -216,24 +212,14 @@ def parse_colour(words: Sequence[str]) -> Colour:
     return (values[0], values[1], values[2])
 
 
-def parse_frames(text: str, document: Document) -> list[int]:
-    """Return the frames of "all", "10", "1-20", "1-20x2" or several with commas."""
+def chosen_frames(text: str, document: Document) -> list[int]:
+    """Return the clip's frames for "all", else those of a frame range within the clip."""
     clip = document["clip"]["frames"]
     if text == "all":
         return list(range(clip["first"], clip["last"] + 1, clip["step"]))
-    frames: list[int] = []
-    for part in text.split(","):
-        match = _RANGE.fullmatch(part.strip())
-        first = int(match[1]) if match else 0
-        last = int(match[2] or match[1]) if match else -1
-        step = int(match[3] or 1) if match else 0
-        if last < first or step < 1:
-            raise Palette4dError(
-                f"found the frames {text!r}, expected all, A, A-B, A-BxN, or several with commas"
-            )
-        for end in (first, last):
-            edits.check_frame(document, end)
-        frames.extend(range(first, last + 1, step))
+    frames = parse_frames(text)
+    for end in (frames[0], frames[-1]):
+        edits.check_frame(document, end)
     return frames
 
 
@@ -320,10 +306,14 @@ def run_info(args: argparse.Namespace) -> int:
     print(f"frames    {first} to {last}{step}{skipped}, {numerator / denominator:g} per second")
     print(f"picture   {info['size'][0]} x {info['size'][1]}, {info['encoding']}")
     print(
-        f"palette   {info['vertices']} vertices, {info['edges']} edges, {info['blocks']} blocks: "
+        f"palette   {counted(info['vertices'], 'vertex', 'vertices')}, "
+        f"{counted(info['edges'], 'edge')}, {counted(info['blocks'], 'block')}: "
         + ", ".join(f"{a:g}-{b:g}" for a, b in info["block_ranges"])
     )
-    print(f"edits     {info['edited_vertices']} vertices, {info['stops']} stops")
+    print(
+        f"edits     {counted(info['edited_vertices'], 'vertex', 'vertices')}, "
+        f"{counted(info['stops'], 'stop')}"
+    )
     print(f"by        {info['generator']}")
     _print_stages(info["stages"])
     _print_palette(info)
@@ -419,7 +409,7 @@ def run_slice(args: argparse.Namespace) -> int:
                 file=sys.stderr,
             )
     else:
-        wanted = parse_frames(args.frames, sidecar.load(args.sidecar))
+        wanted = chosen_frames(args.frames, sidecar.load(args.sidecar))
         slices = [slice_of(read, frame) for frame in wanted]
     if args.json:
         _print_json(slices[0] if args.frames is None else slices)
@@ -430,7 +420,10 @@ def run_slice(args: argparse.Namespace) -> int:
 
 
 def _print_slice(cut: dict[str, Any]) -> None:
-    print(f"frame {cut['frame']:g}: {len(cut['vertices'])} colours, {len(cut['faces'])} faces")
+    print(
+        f"frame {cut['frame']:g}: {counted(len(cut['vertices']), 'colour')}, "
+        f"{counted(len(cut['faces']), 'face')}"
+    )
     for i, (rgb, new, track) in enumerate(
         zip(cut["vertices"], cut["edited"], cut["tracks"], strict=True)
     ):
@@ -469,12 +462,27 @@ def _near(args: argparse.Namespace, kind: str) -> Colour | None:
         raise Palette4dError(f"found both {kind} {args.id!r} and --near, expected one of them")
     if args.near is None:
         if args.id is None:
+            _refuse_swallowed(args.rgb, kind)
             raise Palette4dError(
                 f"found neither {kind} nor --near, expected one of them; `palette4d info "
                 f"{args.sidecar}` lists the ids"
             )
         return None
     return parse_colour([args.near])
+
+
+def _refuse_swallowed(words: Sequence[str], kind: str) -> None:
+    """Say so when --rgb, which takes every word up to the next option, has taken the id too."""
+    for id_, colour in ((words[-1], words[:-1]), (words[0], words[1:])):
+        try:
+            parse_colour(colour or [""])
+        except Palette4dError:
+            continue
+        raise Palette4dError(
+            f"--rgb found the {len(words)} words {shlex.join(words)!r} and has taken {id_!r} as a "
+            f"part of the colour; expected the {kind} before --rgb: `{id_} --rgb "
+            f"{shlex.join(colour)}`"
+        )
 
 
 def run_set(args: argparse.Namespace) -> int:

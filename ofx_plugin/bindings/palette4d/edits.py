@@ -206,26 +206,17 @@ def nearest_edge(document: Document, rgb: Iterable[float], frame: float) -> tupl
 
 
 def edited_at(document: Document, edge: str, frame: float) -> Colour:
-    """Return the edited colour on an edge at a frame: linear in time between ends and stops."""
+    """Return the edited colour on an edge at a frame from its start to its end, by the core."""
     entry = _edge(document, edge)
-    points = [
-        (_require(_find(document["polytope"]["vertices"], entry[end]))["frame"],
-         colour_of(document, entry[end]))
-        for end in ("from", "to")
-    ]  # fmt: skip
-    points += [
-        (stop["frame"], _colour(stop["rgb"]))
-        for stop in document["edits"]["stops"]
-        if stop["edge"] == edge
-    ]
-    points.sort()
-    before = max(p for p in points if p[0] <= frame)
-    after = min(p for p in points if p[0] >= frame)
-    if before[0] == after[0]:
-        return before[1]
-    w = (frame - before[0]) / (after[0] - before[0])
-    r, g, b = ((1 - w) * x + w * y for x, y in zip(before[1], after[1], strict=True))
-    return (r, g, b)
+    for vertex in (entry["from"], entry["to"]):
+        if frame == _vertex(document, vertex)["frame"]:
+            return colour_of(document, vertex)
+    _check_inside(document, edge, frame)
+    read = validate(document)
+    cut = _core.slice_at(read.polytope, frame)
+    # Where tracks share the edge, each of them has the same colour there.
+    track = cut.edges.tolist().index(read.polytope.edge_ids.index(edge))
+    return _colour(_core.edited_colours(read.polytope, read.edits, cut)[track].tolist())
 
 
 def check_frame(document: Document, frame: float) -> None:

@@ -1,8 +1,10 @@
 """The verb ``palette4d plot``: a picture of a palette and its edits."""
 
 import argparse
-import math
+import sys
 from pathlib import Path
+
+from palette4d.arguments import times, whole
 
 EXTENSIONS = (".png", ".svg", ".pdf")
 
@@ -10,8 +12,9 @@ EPILOG = """\
 Each row is a palette colour through time. A disc is a palette vertex; where it is edited, its upper
 half shows the colour before and its lower half the colour after, and so does the band. A smaller
 disc with two rings is a colour stop. Rows fork where a colour splits and join where colours merge.
+Discs that are too close to each other stand aside; a line shows where one belongs.
 Below, the palette as a polyhedron in the RGB cube at some frames; with the clip at hand also the
-frames, before and after, and their pixels.
+frames, before and after the edits, and their pixels.
 
 The clip is looked up where the sidecar says (relative to the sidecar, then to the working folder).
 
@@ -19,25 +22,6 @@ example:
   palette4d plot seasons.p4d.json -o seasons.png
   palette4d plot seasons.p4d.json -o seasons.svg --frames 0,12,40 --clip seasons/#####.png
 """
-
-
-def _frames(text: str) -> list[float]:
-    try:
-        values = [float(part) for part in text.split(",")]
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is not a list of frame numbers such as 0,12,40"
-        ) from error
-    if not all(math.isfinite(value) for value in values):
-        raise argparse.ArgumentTypeError(f"{text!r} holds a number that is no frame")
-    return values
-
-
-def _width(text: str) -> int:
-    value = int(text)
-    if not 400 <= value <= 16000:
-        raise argparse.ArgumentTypeError(f"{value} pixels; expected 400 to 16000")
-    return value
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -61,8 +45,8 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument(
         "--frames",
         metavar="A,B,C",
-        type=_frames,
-        help="the frames to show as polyhedra (default: four, evenly spaced)",
+        type=times,
+        help="the frames to show (default: four or five over the clip, edited ones among them)",
     )
     parser.add_argument(
         "--clip", metavar="CLIP", help="the clip (default: where the sidecar says, if it is there)"
@@ -70,7 +54,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument(
         "--width",
         metavar="PIXELS",
-        type=_width,
+        type=whole(400, 16000),
         default=2400,
         help="width of a .png (default 2400)",
     )
@@ -119,9 +103,10 @@ def plot(
     sidecar_path, output : Path
         The sidecar and the picture.
     frames : list of float, optional
-        Times to show as polyhedra; four, evenly spaced, by default.
+        Times to show; by default four or five over the clip, edited ones among them.
     clip : str, optional
-        The clip; by default where the sidecar says, left out when it is not there.
+        The clip; by default where the sidecar says. When it is not there, or lacks one of the
+        frames, the palette is drawn without those pixels, and a note on stderr says so.
     width : int
         Pixels, for .png.
     force : bool
@@ -138,23 +123,36 @@ def plot(
     from palette4d import _core
     from palette4d.errors import Palette4dError
     from palette4d.plotting import figure as pages
-    from palette4d.plotting import style
+    from palette4d.plotting import style, timeline
     from palette4d.replacing import replacing
     from palette4d.source_clip import frame_colours
 
     sidecar = _core.read_sidecar(str(sidecar_path))
     first, last = sidecar.polytope.first_frame, sidecar.polytope.last_frame
-    chosen = pages.default_frames(first, last) if frames is None else sorted(set(frames))
+    if frames is None:
+        chosen = pages.default_frames(first, last, timeline.Palette.of(sidecar).edited_times)
+    else:
+        chosen = sorted(set(frames))
     for frame in chosen:
         if not first <= frame <= last:
             raise Palette4dError(
                 f"frame {frame:g} is outside the clip {sidecar.clip['name']!r}; expected times "
                 f"from {first:g} to {last:g}"
             )
-    moments = []
+    moments, missing = [], []
     for frame in chosen:
         image, _ = frame_colours(sidecar_path, sidecar.clip, frame, clip)
         moments.append(pages.moment(sidecar, frame, image))
+        if image is None:
+            missing.append(f"{frame:g}")
+    if missing:
+        which = "" if len(missing) == len(moments) else f" of frame {', '.join(missing)}"
+        source = repr(sidecar.clip["source"]) if sidecar.clip["source"] else "anywhere"
+        print(
+            f"palette4d: note: the clip's pixels{which} could not be read from {source}; only the "
+            "palette is drawn there (name the clip with --clip)",
+            file=sys.stderr,
+        )
     with (
         matplotlib.style.context("default"),
         matplotlib.rc_context(style.RC),

@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palette4d import _core
-from palette4d.errors import Palette4dError, SidecarError
+from palette4d.arguments import frame_range, number, whole
+from palette4d.errors import Palette4dError
+from palette4d.wording import counted
 
 if TYPE_CHECKING:
     from palette4d.analysis.clip_base import Clip, Image
@@ -61,16 +63,25 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         metavar="OUT.####.exr",
         help="frames to write, .exr, .png or .tif, one # a digit; a plain name for a single frame",
     )
-    parser.add_argument("--frames", metavar="A-B[xN]", help="frames to render (default: all)")
     parser.add_argument(
-        "--strength", type=float, default=1.0, metavar="S", help="0 the original, 1 the edit (1)"
+        "--frames",
+        metavar="RANGE",
+        type=frame_range,
+        help="frames to render: 10, 1-20, 1001-1100x2, 0,12,30 (default: all)",
+    )
+    parser.add_argument(
+        "--strength",
+        type=number(0, 1),
+        default=1.0,
+        metavar="S",
+        help="0 the original, 1 the edit (1)",
     )
     parser.add_argument("--half", action="store_true", help="EXR with 16-bit float")
     parser.add_argument(
         "--bits", type=int, choices=(8, 16, 32), help="bits a sample of PNG (8, 16) or TIFF"
     )
     parser.add_argument(
-        "--threads", type=int, default=0, metavar="N", help="0: one per processor (default)"
+        "--threads", type=whole(0), default=0, metavar="N", help="0: one per processor (default)"
     )
     parser.add_argument("--force", action="store_true", help="replace frames that exist already")
     parser.add_argument(
@@ -111,11 +122,7 @@ def run(args: argparse.Namespace) -> int:
     from palette4d.analysis.clip import open_clip
     from palette4d.imageio import FramePattern, make_folder, sample_type
 
-    if not np.isfinite(args.strength) or not 0 <= args.strength <= 1:
-        raise Palette4dError(f"--strength {args.strength:g}: expected a number from 0 to 1")
-    if args.threads < 0:
-        raise Palette4dError(f"--threads {args.threads}: expected 0 (one per processor) or more")
-    sidecar = read_sidecar(args.sidecar)
+    sidecar = _core.read_sidecar(args.sidecar)
     pattern = FramePattern.parse(args.output)
     clip = open_clip(args.clip, frames=args.frames, skip_bad_frames=args.skip_bad_frames)
     samples = sample_type(pattern.extension, clip.depth, half=args.half, bits=args.bits)
@@ -125,21 +132,15 @@ def run(args: argparse.Namespace) -> int:
     options = RenderOptions(args.strength, args.threads)
     written = render(sidecar, clip, pattern, samples, options, quiet=args.quiet)
     first, last = pattern.path(written[0]), pattern.path(written[-1])
-    what = f"{first}" if len(written) == 1 else f"{len(written)} frames, {first} to {last.name}"
+    what = (
+        f"{first}"
+        if len(written) == 1
+        else f"{counted(len(written), 'frame')}, {first} to {last.name}"
+    )
     print(f"rendered {what}")
     if clip.skipped:
-        print(f"palette4d: skipped bad frames: {_list(clip.skipped)}", file=sys.stderr)
+        print(f"palette4d: skipped bad {_named(clip.skipped)}", file=sys.stderr)
     return 0
-
-
-def read_sidecar(path: str) -> _core.Sidecar:
-    """The core's reader, with its error as a Palette4dError."""
-    try:
-        return _core.read_sidecar(path)
-    except _core.SidecarError as error:
-        if isinstance(error, Palette4dError):
-            raise
-        raise SidecarError(error.file, error.pointer, error.found, error.expected) from error
 
 
 def render(
@@ -237,9 +238,10 @@ def _warn(clip: Clip, sidecar: _core.Sidecar) -> None:
         print(f"palette4d: note: {note}", file=sys.stderr)
     outside = [frame for frame in clip.frames if not first <= frame <= last]
     if outside:
+        take = "takes" if len(outside) == 1 else "take"
         print(
-            f"palette4d: warning: the sidecar's palette spans frames {first:g} to {last:g}; frames "
-            f"{_list(outside)} take the nearest end's palette",
+            f"palette4d: warning: the sidecar's palette spans frames {first:g} to {last:g}; "
+            f"{_named(outside)} {take} the nearest end's palette",
             file=sys.stderr,
         )
     size = (sidecar.clip.get("width"), sidecar.clip.get("height"))
@@ -251,7 +253,7 @@ def _warn(clip: Clip, sidecar: _core.Sidecar) -> None:
         )
 
 
-def _list(frames: list[int]) -> str:
-    from palette4d.analysis.clip_base import describe
+def _named(frames: list[int]) -> str:
+    from palette4d.analysis.clip_base import named
 
-    return describe(frames)
+    return named(frames)

@@ -8,7 +8,9 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from palette4d.arguments import whole
 from palette4d.errors import Palette4dError
+from palette4d.wording import counted
 
 if TYPE_CHECKING:
     from palette4d.imageio import FramePattern
@@ -45,15 +47,22 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "-o", "--output", required=True, metavar="OUT.####.png", help="frames, .png, .exr or .tif"
     )
     parser.add_argument(
-        "--frames", type=int, default=FRAMES, metavar="N", help=f"how many (default {FRAMES})"
+        "--frames",
+        type=whole(1, 100_000),
+        default=FRAMES,
+        metavar="N",
+        help=f"how many (default {FRAMES})",
     )
     parser.add_argument(
         "--size",
-        default=f"{SIZE[0]}x{SIZE[1]}",
+        type=parse_size,
+        default=SIZE,
         metavar="WxH",
         help=f"pixels (default {SIZE[0]}x{SIZE[1]})",
     )
-    parser.add_argument("--first", type=int, default=1, metavar="N", help="first frame number (1)")
+    parser.add_argument(
+        "--first", type=whole(), default=1, metavar="N", help="first frame number (1)"
+    )
     parser.add_argument("--half", action="store_true", help="EXR with 16-bit float")
     parser.add_argument("--force", action="store_true", help="replace frames that exist already")
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
@@ -69,8 +78,8 @@ def parse_size(text: str) -> tuple[int, int]:
     match = re.fullmatch(r"([0-9]{1,5})x([0-9]{1,5})", text.strip())
     size = (int(match[1]), int(match[2])) if match else (0, 0)
     if not all(8 <= edge <= _LARGEST for edge in size):
-        raise Palette4dError(
-            f'--size {text}: expected width x height, each 8 to {_LARGEST}, such as "320x180"'
+        raise argparse.ArgumentTypeError(
+            f"found {text!r}, expected width x height, each 8 to {_LARGEST}, such as 320x180"
         )
     return size
 
@@ -79,9 +88,6 @@ def run(args: argparse.Namespace) -> int:
     """Write the clip; returns the exit status."""
     from palette4d.imageio import FramePattern, make_folder
 
-    if not 1 <= args.frames <= 100_000:
-        raise Palette4dError(f"--frames {args.frames}: expected 1 to 100000 frames")
-    size = parse_size(args.size)
     pattern = FramePattern.parse(args.output)
     if pattern.width is None and args.frames > 1:
         raise Palette4dError(
@@ -98,9 +104,9 @@ def run(args: argparse.Namespace) -> int:
         )
     make_folder(pattern.folder)
     written = write_sample_clip(
-        pattern, args.frames, size, first=args.first, half=args.half, quiet=args.quiet
+        pattern, args.frames, args.size, first=args.first, half=args.half, quiet=args.quiet
     )
-    print(f"wrote {len(written)} frames, {written[0]} to {written[-1].name}")
+    print(f"wrote {counted(len(written), 'frame')}, {written[0]} to {written[-1].name}")
     return 0
 
 

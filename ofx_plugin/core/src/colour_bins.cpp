@@ -4,6 +4,9 @@
 #include <cmath>
 #include <cstdint>
 #include <stdexcept>
+#include <string>
+
+#include "vec3.hpp"
 
 namespace palette4d {
 namespace {
@@ -69,10 +72,11 @@ private:
 };
 
 std::uint64_t bin_number(double x, double inverse) {
-    // Shifted to be positive, so that the conversion, which truncates, rounds down.
+    // Shifted to be positive, so that the conversion, which truncates, rounds down. The order of
+    // max's arguments turns what is not a number (0 over a vanishing width) into 0.
     constexpr double kShift = static_cast<double>(kOffset) + 0.5;
     const double n = x * inverse + kShift;
-    return static_cast<std::uint64_t>(std::min(std::max(n, 0.0), 2.0 * kOffset - 1.0));
+    return static_cast<std::uint64_t>(std::min(std::max(0.0, n), 2.0 * kOffset - 1.0));
 }
 
 std::uint64_t key_of(double r, double g, double b, double inverse) {
@@ -143,8 +147,15 @@ ColourBins coarsen_colours(const std::vector<Vec3>& rgb, const std::vector<doubl
         throw std::invalid_argument("coarsening needs a count a colour and bins of positive width");
     Table table(1 << 16);
     const double inverse = 1 / step;
+    double size = 0;  // bounds every sum
     for (std::size_t i = 0; i < rgb.size(); ++i) {
         const double n = counts[i];
+        const bool valid = finite(rgb[i]) && n > 0 && std::isfinite(n);
+        for (int c = 0; valid && c < 3; ++c) size += n * std::abs(rgb[i][c]);
+        if (!valid || !std::isfinite(size))
+            throw std::invalid_argument(
+                "coarsening needs finite colours and positive, finite counts; colour " +
+                std::to_string(i) + " is not, or too large");
         table.add(key_of(rgb[i][0], rgb[i][1], rgb[i][2], inverse), n * rgb[i][0], n * rgb[i][1],
                   n * rgb[i][2], n);
     }

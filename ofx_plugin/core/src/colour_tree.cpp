@@ -6,6 +6,8 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "vec3.hpp"
+
 namespace palette4d {
 namespace {
 
@@ -33,8 +35,7 @@ ColourTree::ColourTree(std::vector<Vec3> rgb, std::vector<double> counts) {
     if (rgb.empty() || rgb.size() != counts.size())
         throw std::invalid_argument("a colour tree needs as many counts as colours, at least one");
     for (std::size_t i = 0; i < rgb.size(); ++i) {
-        if (!(counts[i] > 0) || !std::isfinite(counts[i]) || !std::isfinite(rgb[i][0]) ||
-            !std::isfinite(rgb[i][1]) || !std::isfinite(rgb[i][2]))
+        if (!(counts[i] > 0) || !std::isfinite(counts[i]) || !finite(rgb[i]))
             throw std::invalid_argument("a colour tree needs finite colours and positive counts");
     }
     std::vector<int> order(rgb.size());
@@ -76,6 +77,8 @@ int ColourTree::build(int begin, int end, std::vector<int>& order, const std::ve
 }
 
 Vec3 ColourTree::nearest_mean(const Vec3& v, double k) const {
+    if (!finite(v) || !(k > 0))
+        throw std::invalid_argument("nearest_mean needs a finite colour and a positive k");
     k = std::min(k, total_);
     // Candidates sorted by distance; the farthest group of ties goes as soon as the rest suffices.
     thread_local std::vector<Candidate> best;

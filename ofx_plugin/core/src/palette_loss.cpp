@@ -4,14 +4,11 @@
 #include <cmath>
 #include <limits>
 
+#include "vec3.hpp"
+
 namespace palette4d {
 namespace {
 
-Vec3 sub(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vec3 cross(const Vec3& a, const Vec3& b) {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
 void add(Vec3& a, double s, const Vec3& b) {
     for (int c = 0; c < 3; ++c) a[c] += s * b[c];
 }
@@ -39,7 +36,7 @@ void build_hull(const std::vector<Vec3>& v, Hull& hull) {
     for (int i = 0; i < n; ++i)
         for (int j = i + 1; j < n; ++j)
             for (int k = j + 1; k < n; ++k) {
-                Vec3 normal = cross(sub(v[j], v[i]), sub(v[k], v[i]));
+                Vec3 normal = cross(v[j] - v[i], v[k] - v[i]);
                 const double length = std::sqrt(dot(normal, normal));
                 if (length < 1e-14) continue;
                 for (double& x : normal) x /= length;
@@ -78,18 +75,18 @@ struct Closest {
 };
 
 void try_segment(const Vec3& p, const std::vector<Vec3>& v, int a, int b, Closest& best) {
-    const Vec3 ab = sub(v[b], v[a]);
+    const Vec3 ab = v[b] - v[a];
     const double length2 = dot(ab, ab);
-    double s = length2 > 0 ? dot(sub(p, v[a]), ab) / length2 : 0;
+    double s = length2 > 0 ? dot(p - v[a], ab) / length2 : 0;
     s = std::clamp(s, 0.0, 1.0);
-    Vec3 d = sub(p, v[a]);
+    Vec3 d = p - v[a];
     add(d, -s, ab);
     const double d2 = dot(d, d);
     if (d2 < best.d2) best = {d2, {a, b, b}, {1 - s, s, 0}};
 }
 
 void try_triangle(const Vec3& p, const std::vector<Vec3>& v, const Face& f, Closest& best) {
-    const Vec3 ab = sub(v[f[1]], v[f[0]]), ac = sub(v[f[2]], v[f[0]]), ap = sub(p, v[f[0]]);
+    const Vec3 ab = v[f[1]] - v[f[0]], ac = v[f[2]] - v[f[0]], ap = p - v[f[0]];
     const Vec3 n = cross(ab, ac);
     const double nn = dot(n, n);
     if (nn > 1e-28) {
@@ -199,7 +196,7 @@ double concavity(const std::vector<Vec3>& v, const std::vector<Face>& faces, dou
                     if (g[m] != b || g[(m + 1) % 3] != a) continue;
                     const int d = g[(m + 2) % 3];
                     if (d == c) continue;
-                    const Vec3 ab = sub(v[b], v[a]), ac = sub(v[c], v[a]), ad = sub(v[d], v[a]);
+                    const Vec3 ab = v[b] - v[a], ac = v[c] - v[a], ad = v[d] - v[a];
                     const Vec3 gd = cross(ab, ac);
                     const double volume = dot(gd, ad);
                     if (volume <= 0) continue;  // d lies below the face: convex here
@@ -231,7 +228,7 @@ FrameLoss palette_loss(const ColourTree& colours, const std::vector<Vec3>& palet
             for (double& x : g) x *= weights.lambda;
     const double n = static_cast<double>(palette.size());
     for (std::size_t i = 0; i < palette.size(); ++i) {
-        const Vec3 d = sub(palette[i], colours.nearest_mean(palette[i], weights.k));
+        const Vec3 d = palette[i] - colours.nearest_mean(palette[i], weights.k);
         const double length = std::sqrt(dot(d, d));
         loss.C += length / n;
         if (gradient && length > 1e-12) add((*gradient)[i], 1 / (n * length), d);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <exception>
 #include <stdexcept>
+#include <system_error>
 #include <thread>
 
 namespace palette4d {
@@ -107,8 +108,14 @@ std::vector<FrameLoss> polytope_loss(const std::vector<Vec4>& vertices,
             failures[self] = std::current_exception();
         }
     };
+    const int used = std::max(1, std::min(threads, count / 4));
     std::vector<std::thread> pool;
-    for (int i = 1; i < std::min(threads, count / 4); ++i) pool.emplace_back(work, i);
+    pool.reserve(static_cast<std::size_t>(used - 1));
+    try {
+        for (int i = 1; i < used; ++i) pool.emplace_back(work, i);
+    } catch (const std::system_error&) {
+        // No more threads to be had: those that run share the frames.
+    }
     work(0);
     for (std::thread& t : pool) t.join();
     for (const std::exception_ptr& failure : failures)

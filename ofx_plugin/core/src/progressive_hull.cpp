@@ -9,14 +9,10 @@
 #include <set>
 #include <stdexcept>
 
+#include "vec3.hpp"
+
 namespace palette4d {
 namespace {
-
-Vec3 sub(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vec3 cross(const Vec3& a, const Vec3& b) {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
 
 constexpr double kBound = 4;      // new vertices stay within [-kBound, 1 + kBound]
 constexpr double kSlack = 1e-10;  // a constraint met this closely counts as met
@@ -180,7 +176,7 @@ private:
         double constant = 0;
         for (int f : around) {
             const Vec3& p = position_[faces_[f][0]];
-            Vec3 n = cross(sub(position_[faces_[f][1]], p), sub(position_[faces_[f][2]], p));
+            Vec3 n = cross(position_[faces_[f][1]] - p, position_[faces_[f][2]] - p);
             // volume of the tetrahedron over the face: (n . x - n . p) / 6 with n of length 2 area
             for (int c = 0; c < 3; ++c) objective[c] += n[c] / 6;
             constant -= dot(n, p) / 6;
@@ -245,6 +241,8 @@ std::vector<Vec3> progressive_hull(const std::vector<Vec3>& rgb, const std::vect
         for (int v : f)
             if (v < 0 || v >= static_cast<int>(rgb.size()))
                 throw std::invalid_argument("a face names vertex " + std::to_string(v));
+    for (const Vec3& v : rgb)
+        if (!finite(v)) throw std::invalid_argument("progressive_hull needs finite vertices");
     // The bounds and tolerances are meant for colours of about unit size: work in a unit cube.
     Vec3 low = rgb.at(0), high = rgb.at(0);
     for (const Vec3& v : rgb)

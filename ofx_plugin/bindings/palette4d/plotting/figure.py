@@ -1,5 +1,6 @@
 """The page: heading, frames before and after, the timeline, the polyhedra, and how to read it."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,7 +36,7 @@ class Moment:
     shape : polyhedron.Shape
         The sliced palette, with pixels when the clip is at hand.
     before, after : (h, w, 3) float32 or None
-        The clip's frame and its recolouring, reduced in size.
+        The clip's frame and its recolouring, reduced in size; `after` only where there are edits.
     """
 
     frame: float
@@ -44,12 +45,53 @@ class Moment:
     after: F32 | None = None
 
 
-def default_frames(first: float, last: float, count: int = 4) -> list[float]:
-    """Return evenly spaced whole frame numbers from first to last, without repetition."""
+def default_frames(
+    first: float, last: float, edited: Sequence[float] = (), count: int = 4, most: int = 5
+) -> list[float]:
+    """Choose what to show: whole frame numbers spread over the clip, and those that are edited.
+
+    Parameters
+    ----------
+    first, last : float
+        The clip's first and last frame.
+    edited : sequence of float
+        Times of edited vertices and stops.
+    count, most : int
+        How many to show, and how many when edits ask for more; none closer than a tenth of the
+        clip, but where the clip has no more frames.
+    """
     if last <= first:
         return [first]
-    spaced = [float(round(v)) for v in np.linspace(first, last, count)]
-    return sorted({min(max(v, first), last) for v in spaced})
+
+    def whole(time: float) -> float:
+        return min(max(float(round(time)), first), last)
+
+    if not edited:
+        return sorted({whole(v) for v in np.linspace(first, last, count)})
+    gap = max(1.0, (last - first) / 10)
+    wanted = sorted({whole(v) for v in edited})
+    # The clip's ends, or an edited frame that is as good as one.
+    chosen = {
+        min([v for v in wanted if v - first < gap], default=first),
+        max([v for v in wanted if last - v < gap], default=last),
+    }
+
+    def distance(time: float) -> float:
+        return min(abs(time - v) for v in chosen)
+
+    while len(chosen) < most:
+        best = max(wanted, key=distance)
+        if distance(best) < gap:
+            break
+        chosen.add(best)
+    while len(chosen) < count:
+        ordered = sorted(chosen)
+        start, end = max(itertools.pairwise(ordered), key=lambda pair: pair[1] - pair[0])
+        middle = whole((start + end) / 2)
+        if distance(middle) < gap:
+            break
+        chosen.add(middle)
+    return sorted(chosen)
 
 
 def moment(
@@ -81,8 +123,10 @@ def moment(
     rgb, faces = np.asarray(palette.rgb), np.asarray(palette.faces)
     if image is None:
         return Moment(frame, polyhedron.Shape(rgb, np.asarray(edited), faces))
-    recolourer = _core.Recolourer(palette.rgb, edited, palette.faces)
-    after = recolourer.apply(np.ascontiguousarray(image, dtype=np.float32), threads=0)
+    after: F32 | None = None
+    if sidecar.edits.vertex_rgb or sidecar.edits.stops:
+        recolourer = _core.Recolourer(palette.rgb, edited, palette.faces)
+        after = recolourer.apply(np.ascontiguousarray(image, dtype=np.float32), threads=0)
     flat = image.reshape(-1, 3)
     # A golden-ratio sequence picks evenly without following rows or columns.
     count = min(pixels, len(flat))
@@ -92,7 +136,7 @@ def moment(
         frame,
         polyhedron.Shape(rgb, np.asarray(edited), faces, cloud),
         _reduced(image, thumbnail),
-        _reduced(after, thumbnail),
+        None if after is None else _reduced(after, thumbnail),
     )
 
 
@@ -150,7 +194,8 @@ def build(sidecar: _core.Sidecar, moments: Sequence[Moment]) -> Any:
     )
     picture_width = min(column, 420.0, 260.0 / aspect if aspect else column)
     picture_height = picture_width * aspect
-    pictures_height = 2 * picture_height + 6 + LEADER if pictures else 0.0
+    names = ["before", "after"] if any(m.after is not None for m in moments) else ["clip"]
+    pictures_height = len(names) * (picture_height + 4) - 2 + LEADER if pictures else 0.0
     cube = min(column * 0.96, 300.0)
     solids_height = LEADER + 30 + cube + 8 if moments else 0.0
 
@@ -177,10 +222,10 @@ def build(sidecar: _core.Sidecar, moments: Sequence[Moment]) -> Any:
     _draw_heading(axes, sidecar, palette, height)
     timeline.draw(axes, palette, rows, panel, encoding)
     if pictures:
-        for name, middle in (("before", 0.5), ("after", 1.5)):
+        for row_above, name in enumerate(names):
             axes.text(
                 MARGIN / 2 + 2,
-                height - HEADER - middle * picture_height - 4 * (middle > 1),
+                height - HEADER - (row_above + 0.5) * picture_height - 4 * row_above,
                 name,
                 fontsize=8,
                 color=style.FAINT,
@@ -192,9 +237,10 @@ def build(sidecar: _core.Sidecar, moments: Sequence[Moment]) -> Any:
     extent = polyhedron.extent_of([m.shape for m in moments])
     for centre, shown in zip(centres, moments, strict=False):
         _draw_pin(axes, panel, shown, centre, pictures)
-        if shown.before is not None and shown.after is not None:
-            top = height - HEADER
+        top = height - HEADER
+        if shown.before is not None:
             _draw_picture(axes, shown.before, centre, top, picture_width, encoding)
+        if shown.after is not None:
             below = top - picture_height - 4
             _draw_picture(axes, shown.after, centre, below, picture_width, encoding)
         middle = panel.bottom - LEADER - 30 - cube / 2

@@ -96,6 +96,11 @@ class Palette:
         colours = np.stack([self.edited[start], *(s[3] for s in inner), self.edited[end]])
         return np.stack([np.interp(frames, knots, colours[:, c]) for c in range(3)], axis=-1)
 
+    @property
+    def edited_times(self) -> list[float]:
+        """Return the frames of edited vertices and of stops."""
+        return [float(t) for t in self.frames[self.changed]] + [stop[2] for stop in self.stops]
+
     def touched(self, edge: int) -> bool:
         """Whether anything on this edge is edited."""
         start, end = self.edges[edge]
@@ -466,17 +471,66 @@ def half_disc(
     axes.add_patch(rim)
 
 
-def _radii(largest: float, x: F64, y: F64) -> F64:
-    """Shrink discs that stand close in a row, down to a size that still shows both halves."""
-    radius = np.full(len(x), largest)
+#: Room that a disc takes beyond its radius: the dark rim, or a stop's second ring.
+COLLAR = 2.6
+
+
+def _place(largest: F64, x: F64, y: F64, low: float, high: float) -> tuple[F64, F64]:
+    """Make discs that stand close in a row smaller, and where that is not enough push them apart.
+
+    Parameters
+    ----------
+    largest : (n,) float64
+        The radius that each would have with room enough.
+    x, y : (n,) float64
+        Where they belong; discs of equal y are in one row.
+    low, high : float
+        What a row offers, in x.
+
+    Returns
+    -------
+    x, radius : (n,) float64
+        Discs of a row keep their order and do not overlap, as long as a row has fewer than some
+        hundred of them.
+    """
+    radius, placed = largest.copy(), x.copy()
     for row in np.unique(y):
         members = np.flatnonzero(y == row)
         members = members[np.argsort(x[members], kind="stable")]
+        if len(members) < 2:
+            continue
         gaps = np.diff(x[members])
-        for side in (members[:-1], members[1:]):
-            radius[side] = np.minimum(radius[side], np.maximum(gaps / 2 - 2.2, 2.6))
+        each = (high - low) / len(members)
+        least = np.minimum(0.5 * largest[members], max(1.6, each / 2 - COLLAR))
+        for side, bound in ((members[:-1], least[:-1]), (members[1:], least[1:])):
+            radius[side] = np.minimum(radius[side], np.maximum(gaps / 2 - COLLAR, bound))
     # Not too different from each other: size has no meaning here.
-    return np.minimum(radius, 1.5 * np.median(radius)) if len(radius) else radius
+    if len(radius):
+        radius = np.minimum(radius, 1.5 * np.median(radius))
+    for row in np.unique(y):
+        members = np.flatnonzero(y == row)
+        members = members[np.argsort(x[members], kind="stable")]
+        reach = radius[members] + COLLAR
+        apart = np.concatenate([[0.0], np.cumsum(reach[:-1] + reach[1:])])
+        apart *= min(1.0, (high - low - reach[0] - reach[-1]) / max(apart[-1], 1e-9))
+        # The nearest places that keep these distances: least squares under an order, with what
+        # a disc must stand off from the row's first one taken away.
+        free = _increasing(x[members] - apart)
+        free = np.clip(free, low + reach[0], high - reach[-1] - apart[-1])
+        placed[members] = free + apart
+    return placed, radius
+
+
+def _increasing(values: F64) -> F64:
+    """Return the non-decreasing sequence that is nearest to `values`: neighbours are pooled."""
+    pools: list[tuple[float, int]] = []
+    for value in values:
+        mean, count = float(value), 1
+        while pools and pools[-1][0] > mean:
+            before, many = pools.pop()
+            mean, count = (before * many + mean * count) / (many + count), many + count
+        pools.append((mean, count))
+    return np.concatenate([np.full(count, mean) for mean, count in pools])
 
 
 def _draw_discs(
@@ -495,16 +549,26 @@ def _draw_discs(
             for _, edge, when, _ in palette.stops
         ]
     ).reshape(-1, 2)
-    radii = _radii(
-        largest,
-        np.concatenate([vertex_x, stop_xy[:, 0]]),
-        np.concatenate([vertex_y, stop_xy[:, 1]]),
-    )
+    home_x = np.concatenate([vertex_x, stop_xy[:, 0]])
+    home_y = np.concatenate([vertex_y, stop_xy[:, 1]])
+    wanted = np.repeat([largest, 0.66 * largest], [len(vertex_x), len(stop_xy)])
+    placed, radii = _place(wanted, home_x, home_y, frame.left + 4, frame.right - 4)
+    for x, home, y, radius in zip(placed, home_x, home_y, radii, strict=True):
+        # A disc that had to make way: a line from where it belongs, in time, to where it stands.
+        if abs(x - home) > 2.5:
+            foot = y - 0.17 * frame.row_height - 3.5
+            axes.plot(
+                [home, home, x],
+                [y, foot, y - radius],
+                color=style.RING,
+                linewidth=0.8,
+                zorder=9,
+            )
     marks = []  # (x, y, radius, text, bright)
     for index, name in enumerate(palette.ids):
         before = style.shown(palette.rgb[index], encoding)
         after = style.shown(palette.edited[index], encoding)
-        x, y, radius = float(vertex_x[index]), float(vertex_y[index]), float(radii[index])
+        x, y, radius = float(placed[index]), float(vertex_y[index]), float(radii[index])
         changed = bool(palette.changed[index])
         half_disc(
             axes,
@@ -519,9 +583,9 @@ def _draw_discs(
         )
         marks.append((x, y, radius + 2, name, changed))
     for index, (name, edge, when, colour) in enumerate(palette.stops):
-        x, y = float(stop_xy[index, 0]), float(stop_xy[index, 1])
+        x, y = float(placed[len(palette.ids) + index]), float(stop_xy[index, 1])
         before = style.shown(palette.before(edge, np.array([when]))[0], encoding)
-        radius = min(0.66 * largest, float(radii[len(palette.ids) + index]))
+        radius = float(radii[len(palette.ids) + index])
         half_disc(
             axes,
             x,

@@ -21,7 +21,8 @@ struct ColourBins {
 ColourBins bin_colours(const float* data, int width, int height, int channels,
                        std::ptrdiff_t row_bytes, double step, std::size_t most);
 
-/// The same for colours with counts, such as other bins.
+/// The same for colours with counts, such as other bins. Throws std::invalid_argument unless all
+/// colours are finite and all counts positive and finite.
 ColourBins coarsen_colours(const std::vector<Vec3>& rgb, const std::vector<double>& counts,
                            double step, std::size_t most);
 

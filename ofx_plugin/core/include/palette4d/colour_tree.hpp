@@ -24,7 +24,7 @@ public:
 
     /// The mean of the k pixels nearest to v (v_N of eq. 3); all pixels when there are fewer than
     /// k. Pixels tied at the k-th distance share what is left evenly, so their order does not
-    /// matter.
+    /// matter. Throws std::invalid_argument unless v is finite and k > 0.
     Vec3 nearest_mean(const Vec3& v, double k) const;
 
     const std::vector<Vec3>& rgb() const { return rgb_; }
