@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.arguments import checked, frame_range, number, whole
@@ -207,34 +207,28 @@ def _print_report(output: Path, clip: Clip, analysis: Analysis, show: _Bars) -> 
 
 
 class _Bars:
-    """A progress bar a stage, and the time each took."""
+    """A progress bar a stage, and the time each took: from the end of the stage before it."""
 
     def __init__(self, hidden: bool) -> None:
         self.hidden = hidden
         self.seconds: dict[str, float] = {}
         self.stage = ""
-        self.bar: object | None = None
-        self.since = time.perf_counter()
+        self.bar: Any = None
+        self.since = self.last = time.perf_counter()
 
     def __call__(self, stage: str, done: int, total: int) -> None:
         from tqdm import tqdm
 
         if stage != self.stage:
-            self._finish()
-            self.stage = stage
+            self.close()
+            self.stage, self.since = stage, self.last
             self.bar = tqdm(total=total, desc=f"{stage:<18}", unit="", disable=self.hidden or None)
-        bar = self.bar
-        assert isinstance(bar, tqdm)
-        bar.update(done - bar.n)
-        now = time.perf_counter()
-        self.seconds[stage] = round(now - self.since, 3)
-
-    def _finish(self) -> None:
-        if self.bar is not None:
-            self.bar.close()  # type: ignore[attr-defined]
-        self.since = time.perf_counter()
+        self.bar.update(done - self.bar.n)
+        self.last = time.perf_counter()
+        self.seconds[stage] = round(self.last - self.since, 3)
 
     def close(self) -> None:
         """End the last bar."""
-        self._finish()
+        if self.bar is not None:
+            self.bar.close()
         self.bar = None
