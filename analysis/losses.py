@@ -17,6 +17,13 @@ from palette4d.analysis.options import AnalysisOptions
 F64 = NDArray[np.float64]
 Objective = Callable[[F64], tuple[float, F64]]
 I32 = NDArray[np.int32]
+# How NLopt says that it stopped early: no progress left in the floating-point numbers, or asked to.
+STOPPED = (
+    nlopt.RoundoffLimited,
+    nlopt.ForcedStop,
+    nlopt.runtime_error,
+    nlopt.invalid_argument,
+)
 NO_FACES: I32 = np.zeros((0, 3), np.int32)
 
 
@@ -144,14 +151,23 @@ def minimise(
     """
     best_value, best = objective(x)[0], x.copy()
 
+    failures: list[BaseException] = []
+
     def call(point: F64, gradient: F64) -> float:
         nonlocal best_value, best
-        value, slope = objective(point)
-        if gradient.size:
-            gradient[:] = slope
-        if value < best_value:
-            best_value, best = value, point.copy()
-        return value
+        if failures:  # a line search calls a few times more before it stops
+            return float("inf")
+        try:
+            value, slope = objective(point)
+            if gradient.size:
+                gradient[:] = slope
+            if value < best_value:
+                best_value, best = value, point.copy()
+            return value
+        except BaseException as error:  # NLopt drops what a callback raises, Ctrl-C included
+            failures.append(error)
+            solver.force_stop()
+            return float("inf")
 
     solver = nlopt.opt(nlopt.LD_LBFGS, len(x))
     solver.set_min_objective(call)
@@ -159,6 +175,8 @@ def minimise(
     solver.set_upper_bounds(high)
     solver.set_maxeval(most_evaluations)
     solver.set_ftol_rel(tolerance)
-    with contextlib.suppress(nlopt.RoundoffLimited, nlopt.runtime_error, nlopt.invalid_argument):
+    with contextlib.suppress(*STOPPED):
         solver.optimize(np.clip(x, low, high))
+    if failures:
+        raise failures[0]
     return best

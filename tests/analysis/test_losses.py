@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 from palette4d import _core
-from palette4d.analysis.losses import NO_FACES, refine_palette, smoothness
+from palette4d.analysis.losses import NO_FACES, minimise, refine_palette, smoothness
 from palette4d.analysis.options import AnalysisOptions
 from scipy.optimize import minimize
 from scipy.spatial import ConvexHull
@@ -160,6 +160,25 @@ def test_refinement_never_worsens_and_stays_in_its_box():
     after = _core.palette_loss(colours, moved, NO_FACES, 50.0, 50.0, 0.0)
     assert 50 * after[0] + after[1] < 50 * before[0] + before[1]
     assert np.abs(moved - BOX).max() <= 0.05 + 1e-12
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ZeroDivisionError])
+@pytest.mark.parametrize("at", [2, 3, 5])
+def test_what_an_objective_raises_comes_out(error, at):
+    """NLopt would drop it: Ctrl-C in the middle of a search must end the program."""
+    calls = []
+
+    def objective(x):
+        calls.append(x)
+        if len(calls) == at:
+            raise error
+        bend = x[1] - x[0] ** 2  # Rosenbrock's valley: not reached in a few steps
+        slope = np.array([-400 * x[0] * bend - 2 * (1 - x[0]), 200 * bend])
+        return float(100 * bend**2 + (1 - x[0]) ** 2), slope
+
+    with pytest.raises(error):
+        minimise(objective, np.array([-1.2, 1.0]), np.full(2, -5.0), np.full(2, 5.0), 50)
+    assert len(calls) == at
 
 
 def test_bad_arguments_are_refused():

@@ -120,7 +120,10 @@ def test_ctrl_c_leaves_nothing(clip, tmp_path):
     time.sleep(4.0)
     assert process.poll() is None, "ended before it could be interrupted"
     process.send_signal(signal.SIGINT)
-    process.communicate(timeout=60)
+    try:
+        process.communicate(timeout=60)
+    finally:
+        process.kill()
     assert process.returncode == 130
     assert sorted(tmp_path.iterdir()) == before
 
