@@ -13,13 +13,13 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from palette4d.analysis.options import AnalysisOptions
+from palette4d.analysis.options import METHODS, AnalysisOptions
 from palette4d.arguments import checked, frame_range, number, whole
 from palette4d.wording import counted
 
 if TYPE_CHECKING:
     from palette4d.analysis.clip import Clip
-    from palette4d.analysis.pipeline import Analysis
+    from palette4d.analysis.methods import Analysis
 
 DESCRIPTION = """\
 Find the time-varying palette of a clip: a 4D skew polytope in RGB and time whose slice at a frame
@@ -34,7 +34,7 @@ EPILOG = """\
 example:
   palette4d analyze shot010.####.exr -o shot010.p4d.json
   palette4d analyze plates/ --frames 1001-1100x2 -o plates.p4d.json
-  palette4d analyze take3.mov -o take3.p4d.json --eta2 4      fewer handles, looser fit
+  palette4d analyze take3.mov -o take3.p4d.json --vertices 16      fewer handles, looser fit
 """
 
 # option, metavar, field, help
@@ -43,18 +43,29 @@ PAPER_OPTIONS = (
     ("--k", "N", "k", "pixels a palette colour is compared with, eq. 3"),
     ("--alpha", "X", "alpha", "block merging: weight of the block's length, eq. 10"),
     ("--beta", "X", "beta", "block merging: weight of the palette's size, eq. 10"),
-    ("--eta1", "X", "eta1", "block merging stops above this multiple of the first loss"),
-    ("--eta2", "X", "eta2", "vertex removal stops above this multiple of the first loss"),
+    ("--eta1", "X", "eta1", "method paper: merging stops above this multiple of the first loss"),
+    ("--eta2", "X", "eta2", "method paper: removal stops above this multiple of the first loss"),
     ("--gamma", "X", "gamma", "weight of smoothness in time, eq. 12"),
-    ("--removal-candidates", "N", "removal_candidates", "vertices tried for each removal"),
+    (
+        "--removal-candidates",
+        "N",
+        "removal_candidates",
+        "method paper: vertices tried for each removal",
+    ),
     ("--refinement-box", "X", "refinement_box", "how far a colour may move in refinement"),
-    ("--refinement-cycles", "N", "refinement_cycles", "rounds of vertex refinement"),
+    ("--refinement-cycles", "N", "refinement_cycles", "method paper: rounds of vertex refinement"),
+)
+HANDLE_OPTIONS = (
+    ("--handle-cost", "X", "handle_cost", "what a handle must be worth: the rise of L' without it"),
+    ("--vertices", "N", "vertices", "most handles; 0 keeps all that are worth it"),
+    ("--blocks", "N", "blocks", "most stretches of time with a topology of their own"),
 )
 OUR_OPTIONS = (
     ("--palette-size", "N", "palette_size", "most colours of one frame's palette"),
     ("--merge-distance", "X", "merge_distance", "palette colours closer than this become one"),
     ("--hull-box", "X", "hull_box", "how far a colour may move when a frame's hull is refined"),
     ("--convexity", "X", "convexity", "weight of keeping the palettes convex; 0 is the paper"),
+    ("--separation", "X", "separation", "palette colours nearer than this repel; 0 is the paper"),
     ("--colours", "N", "colours", "most colour bins kept of a frame, for the losses"),
     ("--coarse-colours", "N", "coarse_colours", "the same for hulls, merging and removal"),
     ("--seed", "N", "seed", "accepted and recorded; nothing is random at present"),
@@ -104,7 +115,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--json", action="store_true", help="print the report as JSON")
     parser.add_argument("--quiet", action="store_true", help="no progress, no report")
     defaults = AnalysisOptions()
+    parser.add_argument(
+        "--method",
+        choices=METHODS,
+        default=defaults.method,
+        help="; ".join(f"{name}: {text}" for name, text in METHODS.items()),
+    )
     for title, table in (
+        ("how many handles", HANDLE_OPTIONS),
         ("options of the paper", PAPER_OPTIONS),
         ("options of this program", OUR_OPTIONS),
     ):
@@ -160,12 +178,7 @@ def run(args: argparse.Namespace) -> int:
     for remark in (*_skipped(clip), *analysis.remarks):
         print(f"palette4d: note: {remark}", file=sys.stderr)
     if args.json:
-        report = {
-            "sidecar": str(args.output),
-            "stages": [stage.row() for stage in analysis.stages],
-            "seconds": show.seconds,
-        }
-        print(json.dumps(report, indent=2))
+        print(json.dumps(_machine_report(args.output, analysis, show), indent=2))
     elif not args.quiet:
         _print_report(args.output, clip, analysis, show)
     return 0
@@ -188,22 +201,57 @@ def _skipped(clip: Clip) -> list[str]:
     return [f"{what} skipped: {sorted(clip.skipped)}"]
 
 
+def _machine_report(output: Path, analysis: Analysis, show: _Bars) -> dict[str, Any]:
+    assert analysis.report is not None  # analyze_clip always measures
+    return {
+        "sidecar": str(output),
+        "stages": [stage.row() for stage in analysis.stages],
+        "palette": analysis.report.figures(),
+        "frames": [dataclasses.asdict(fit) for fit in analysis.report.fits],
+        "notes": list(analysis.remarks),
+        "seconds": show.seconds,
+        "cpu_seconds": round(time.process_time(), 3),
+    }
+
+
 def _print_report(output: Path, clip: Clip, analysis: Analysis, show: _Bars) -> None:
     print(f"{clip.name}: {counted(len(clip.frames), 'frame')}, {clip.width}x{clip.height}")
     print(
         f"{'stage':<18} {'vertices':>8} {'blocks':>6} {'R':>8} {'C':>8} {'L':>8} {'K':>8} "
-        f"{'outside':>8} {'farthest':>8} {'seconds':>8}"
+        f"{'L_prime':>8} {'outside':>8} {'farthest':>8} {'seconds':>8}"
     )
     for stage in analysis.stages:
         x = stage.losses
         print(
             f"{stage.stage:<18} {stage.vertices:>8} {stage.blocks:>6} {x.R:>8.5f} {x.C:>8.4f} "
-            f"{x.L:>8.4f} {x.K:>8.3f} {x.outside:>8.2%} {x.max_distance:>8.3f} "
+            f"{x.L:>8.4f} {x.K:>8.3f} {x.L_prime:>8.4f} {x.outside:>8.2%} "
+            f"{x.max_distance:>8.3f} "
             f"{show.seconds.get(stage.stage, 0):>8.2f}"
         )
+    _print_palette(analysis)
+    seconds = [f"{stage} {took:.2f}" for stage, took in show.seconds.items()]
+    print(f"{'seconds':<10} {', '.join(seconds)}")
     colours = counted(analysis.stages[-1].vertices, "palette colour")
     print(f"wrote {output}: {colours} to edit")
     print(f"next: palette4d plot {output} -o palette.png")
+
+
+def _print_palette(analysis: Analysis) -> None:
+    x = analysis.report
+    assert x is not None  # analyze_clip always measures
+    farthest = max(x.fits, key=lambda fit: fit.farthest)
+    print(
+        f"{'fit':<10} worst frame {x.worst.frame} (L {x.worst.L:.3f}, the median frame's "
+        f"{x.median_loss:.3f}); farthest pixel {farthest.farthest:.3f} outside, in frame "
+        f"{farthest.frame}"
+    )
+    changes = f"{counted(x.splits, 'split')}, {counted(x.merges, 'merge')}"
+    print(f"{'handles':<10} {x.colours:.1f} colours a frame, {changes}", end="")
+    if x.closest:
+        distance, frame, one, other = x.closest
+        print(f"; nearest {one} and {other}, {distance:.2f} apart at frame {frame}", end="")
+    print(f"; least used {x.least_used[0]}, up to {x.least_used[1]:.1%} of the picture")
+    print(f"{'shape':<10} deepest dent {x.dent[0]:.2%} of the convex hull, at frame {x.dent[1]}")
 
 
 class _Bars:

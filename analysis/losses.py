@@ -51,14 +51,27 @@ def colour_scale(low: F64, high: F64) -> float:
     return max(1.0, float(np.max(high - low)))
 
 
-def convexity_weight(options: AnalysisOptions, scale: float) -> float:
-    """Return the weight that sets volumes (scale cubed) against losses, which are distances."""
-    return options.convexity / scale**2
+def loss_weights(options: AnalysisOptions) -> _core.LossWeights:
+    """Return the weights of the paper's losses alone: what every reported figure is made with."""
+    return _core.LossWeights(options.lambda_, options.k)
+
+
+def shaped_weights(options: AnalysisOptions, scale: float, faces: bool = True) -> _core.LossWeights:
+    """Return the weights of what is minimised: the paper's losses, convexity and separation.
+
+    Losses are distances: `scale` (of `colour_scale`) sets volumes, its cube, against them.
+    """
+    return _core.LossWeights(
+        options.lambda_,
+        options.k,
+        options.convexity / scale**2 if faces else 0.0,
+        options.separation * scale,
+    )
 
 
 def palette_loss(colours: _core.ColourTree, rgb: F64, options: AnalysisOptions) -> float:
     """Eq. 4 of one (n, 3) palette."""
-    r, c, *_ = _core.palette_loss(colours, rgb, NO_FACES, options.lambda_, options.k, 0.0)
+    r, c, *_ = _core.palette_loss(colours, rgb, NO_FACES, loss_weights(options))
     return options.lambda_ * r + c
 
 
@@ -86,7 +99,7 @@ def smoothness(vertices: F64, edges: I32, length: float) -> tuple[float, F64]:
 
 
 def summarise(rows: F64, k: float, options: AnalysisOptions) -> Losses:
-    """Means of (n, 5) rows R, C, D, outside, max distance, with smoothness `k`."""
+    """Means of (n, 5) rows R, C, shape, outside, max distance, with smoothness `k`."""
     r, c = float(rows[:, 0].mean()), float(rows[:, 1].mean())
     loss = options.lambda_ * r + c
     return Losses(
@@ -113,17 +126,15 @@ def refine_palette(
 
     All vertices move together, by NLopt's L-BFGS with the core's gradient, inside `hull_box` around
     where they are and inside the gamut [low, high]. Never returns a worse palette. `faces` keeps
-    the mesh convex when options.convexity asks for it.
+    the mesh convex when options.convexity asks for it, options.separation its colours apart.
     """
     n = len(rgb)
     scale = colour_scale(low, high)
-    weight = convexity_weight(options, scale) if len(faces) else 0.0
+    weights = shaped_weights(options, scale, len(faces) > 0)
 
     def objective(x: F64) -> tuple[float, F64]:
-        r, c, d, _, _, gradient = _core.palette_loss(
-            colours, x.reshape(n, 3), faces, options.lambda_, options.k, weight
-        )
-        return options.lambda_ * r + c + weight * d, gradient.ravel()
+        r, c, shape, _, _, gradient = _core.palette_loss(colours, x.reshape(n, 3), faces, weights)
+        return options.lambda_ * r + c + shape, gradient.ravel()
 
     start = np.clip(rgb, low, high)
     best = minimise(

@@ -7,6 +7,12 @@ import math
 
 from palette4d.errors import Palette4dError
 
+METHODS = {
+    "skew": "a 4D skew polytope; its structure by what each handle is worth (the default)",
+    "paper": "the same by the paper's own rules, eta1 and eta2",
+    "static": "one palette for the whole clip, the static RGB hull of section 6.2",
+}
+
 
 @dataclasses.dataclass(frozen=True)
 class AnalysisOptions:
@@ -14,25 +20,34 @@ class AnalysisOptions:
 
     Attributes
     ----------
+    method : one of `METHODS`.
+    handle_cost : the rise of eq. 12 that a vertex must be worth to stay (ours, `skew`).
+    vertices : most vertices of the palette, 0 for as many as are worth it (`skew`, `rgbt`).
+    blocks : most blocks of one topology (`skew`).
     lambda_ : weight of the reconstruction loss in eq. 4 (50).
     k : pixels a palette colour is compared with in eq. 3 (50).
     alpha, beta : weights of block size and palette size in eq. 10 (10, 1).
-    eta1 : block merging stops above eta1 times the initial block loss (3.5, section 5.3.3).
-    eta2 : vertex removal stops above eta2 times the loss after merging (3, section 5.4.2).
+    eta1 : block merging stops above eta1 times the first block loss (3.5, 5.3.3; `paper`).
+    eta2 : vertex removal stops above eta2 times the loss after merging (3, 5.4.2; `paper`).
     gamma : weight of the smoothness term in eq. 12 (0.01).
-    removal_candidates : vertices tried for each removal (10, section 5.4.2).
+    removal_candidates : vertices tried for each removal (10, section 5.4.2; `paper`).
     refinement_box : half width of the colour box a vertex may move in (0.1, section 5.5).
-    refinement_cycles : rounds over all vertices (3, section 5.5).
+    refinement_cycles : rounds over all vertices (3, section 5.5; `paper`).
     palette_size : most colours of a frame's palette (8, as the authors' program).
-    merge_distance : palette colours closer than this become one (0.1, as the authors' program).
+    merge_distance : palette colours closer than this become one (the authors' program: 0.1).
     hull_box : half width of the box in the per-frame refinement (0.15, Wang et al. 2019).
     convexity : weight of a term that keeps slices convex (ours; 0 is the paper).
+    separation : palette colours nearer than this repel each other (ours; 0 is the paper).
     colours : most colour bins kept of a frame; 8-bit frames with no more distinct colours are
     exact. coarse_colours : the same for hulls, merging and removal, where speed counts.
     seed : seeds what is random (nothing at present: every step is deterministic).
     threads : threads of the loss evaluation; the result does not depend on it. 0: one a processor.
     """
 
+    method: str = "skew"
+    handle_cost: float = 0.0025
+    vertices: int = 0
+    blocks: int = 3
     lambda_: float = 50.0
     k: float = 50.0
     alpha: float = 10.0
@@ -44,17 +59,21 @@ class AnalysisOptions:
     refinement_box: float = 0.1
     refinement_cycles: int = 3
     palette_size: int = 8
-    merge_distance: float = 0.1
+    merge_distance: float = 0.15
     hull_box: float = 0.15
     convexity: float = 3.0
+    separation: float = 0.15
     colours: int = 32768
-    coarse_colours: int = 8192
+    coarse_colours: int = 4096
     seed: int = 0
     threads: int = 0
 
     def __post_init__(self) -> None:
         """Refuse values outside their range, naming the option."""
         limits: dict[str, tuple[float, float]] = {
+            "handle_cost": (0.0, 1e6),
+            "vertices": (0, 1e6),
+            "blocks": (1, 1e6),
             "lambda_": (0.0, 1e6),
             "k": (1, 1e9),
             "alpha": (0.0, 1e6),
@@ -69,11 +88,16 @@ class AnalysisOptions:
             "merge_distance": (0.0, 1.0),
             "hull_box": (0.0, 10.0),
             "convexity": (0.0, 1e6),
+            "separation": (0.0, 1.0),
             "colours": (64, 1e8),
             "coarse_colours": (64, 1e8),
             "seed": (0, 2**63),
             "threads": (0, 1024),
         }
+        if self.method not in METHODS:
+            raise Palette4dError(
+                f"option method: found {self.method!r}, expected one of {', '.join(METHODS)}"
+            )
         for name, (low, high) in limits.items():
             value = getattr(self, name)
             if not math.isfinite(value) or not low <= value <= high:
@@ -82,7 +106,7 @@ class AnalysisOptions:
                     f"expected a number from {low:g} to {high:g}"
                 )
 
-    def recorded(self) -> dict[str, float | int]:
+    def recorded(self) -> dict[str, float | int | str]:
         """Return what goes into the sidecar: everything that can change the result."""
         fields = dataclasses.asdict(self)
         del fields["threads"]

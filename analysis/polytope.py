@@ -116,6 +116,41 @@ class SkewPolytope:
             blocks.append(dataclasses.replace(block, tracks=tuple(tracks)))
         return dataclasses.replace(self, vertices=vertices, blocks=tuple(blocks))
 
+    def removable(self) -> list[int]:
+        """Return the vertices that section 5.4.1 lets go: neither at the clip's ends nor splitting
+        or merging, and no two edges would become one."""
+        before, after = self.neighbours()
+        edges = {(int(u), int(v)) for u, v in self.edges()}
+        return [
+            v
+            for v in range(len(self.vertices))
+            if len(before[v]) == len(after[v]) == 1 and (before[v][0], after[v][0]) not in edges
+        ]
+
+    def without(self, vertex: int) -> SkewPolytope:
+        """Return the polytope without a removable vertex: its neighbours in time become joined."""
+        before, after = (side[vertex][0] for side in self.neighbours())
+
+        def rejoined(track: tuple[int, ...]) -> tuple[int, ...]:
+            if vertex not in track:
+                rest = list(track)
+            else:
+                rest = [v for v in track if v != vertex]
+                if track[0] == vertex:
+                    rest.insert(0, before)
+                if track[-1] == vertex:
+                    rest.append(after)
+            return tuple(v - (v > vertex) for v in rest)
+
+        def section(old: Section) -> Section:
+            return dataclasses.replace(old, tracks=tuple(rejoined(t) for t in old.tracks))
+
+        return SkewPolytope(
+            np.delete(self.vertices, vertex, axis=0),
+            tuple(section(b) for b in self.blocks),
+            tuple(section(t) for t in self.transitions),
+        )
+
     def fields(self) -> dict[str, Any]:
         """Return the sidecar's "polytope": ids v1, v2, … and e1, e2, … in order of time.
 

@@ -1,142 +1,72 @@
 """Stage 4, section 5.4: removing vertices that the others predict.
 
-Input: blocks with a palette a frame, and the inter-frame edges between blocks. Output: a
-`SkewPolytope` with few vertices. A removed vertex becomes a ghost on the edge between its
-neighbours in time (5.4.1). Never removed: splitting and merging vertices, and those of the first
-and last frame. Greedy by the overall loss (eq. 8, theta = 1), among the candidates closest to
-their ghosts, until it exceeds eta2 times its first value.
+Input and output: `Strands`, whose vertices become ghosts. `remove_vertices` is the paper's rule:
+greedy by the overall loss (eq. 8, theta = 1), among the candidates closest to their ghosts, until
+it exceeds eta2 times its first value. `thin` takes many vertices at a time while it costs little:
+what comes before the removal that refines as it goes (`handle_removal`).
 """
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from palette4d.analysis.losses import palette_loss
 from palette4d.analysis.options import AnalysisOptions
-from palette4d.analysis.polytope import Palette, Section, SkewPolytope
 from palette4d.analysis.statistics import FrameStatistics
+from palette4d.analysis.strands import Strands
 
 F64 = NDArray[np.float64]
-I32 = NDArray[np.int32]
-Links = tuple[tuple[int, int], ...]
-BlockPalettes = Sequence[Sequence[Palette]]
-
 
 # A loss per frame that nobody sees (1/200 of an 8-bit step off, at lambda 50); without it, rounding
 # would keep vertices of clips whose loss is zero.
 NEGLIGIBLE = 1e-3
+# Where `thin` stops: well before the losses say which vertices matter.
+THINNED = 1.6
+# What counts as a straight path of a colour: so near to the line between two vertices.
+STRAIGHT = 0.08
 
 
-class Strands:
-    """The full skew polytope as strands: every vertex, its neighbours in time, and the ghosts.
-
-    `node[i][s]` is the vertex of colour s in frame i. Ghosts stay in `chain`: for each edge (v,
-    w), the removed vertices between v and w, in order of time.
-    """
+class _Trials:
+    """Each frame's loss, and what it would be without a vertex, remembered while nothing moves."""
 
     def __init__(
-        self, frames: Sequence[int], blocks: BlockPalettes, links: Sequence[Links]
+        self, strands: Strands, statistics: Sequence[FrameStatistics], options: AnalysisOptions
     ) -> None:
-        self.frames = [float(f) for f in frames]
-        self.faces = [block[0].faces for block in blocks]
-        self.links = list(links)
-        self.block_frames: list[range] = []
-        self.node: list[list[int]] = []
-        self.position: list[F64] = []
-        self.at: list[tuple[int, int]] = []  # (frame index, colour) of each vertex
-        for block in blocks:
-            begin = len(self.node)
-            self.block_frames.append(range(begin, begin + len(block)))
-            for i, palette in enumerate(block, begin):
-                self.node.append(list(range(len(self.at), len(self.at) + len(palette.rgb))))
-                self.at += [(i, s) for s in range(len(palette.rgb))]
-                self.position.append(palette.rgb.copy())
-        self.before: list[list[int]] = [[] for _ in self.at]
-        self.after: list[list[int]] = [[] for _ in self.at]
-        self.chain: dict[tuple[int, int], list[int]] = {}
-        for b, inside in enumerate(self.block_frames):
-            for i in inside[:-1]:
-                for u, v in zip(self.node[i], self.node[i + 1], strict=True):
-                    self._join(u, v)
-            if b + 1 < len(self.block_frames):
-                last, first = self.node[inside[-1]], self.node[inside[-1] + 1]
-                for i, j in self.links[b]:
-                    self._join(last[i], first[j])
-        self.alive = [True] * len(self.at)
+        self.strands, self.statistics, self.options = strands, statistics, options
+        self.losses = np.array([self.loss(i, rgb) for i, rgb in enumerate(strands.position)])
+        self.version = [0] * len(self.losses)  # counts the changes of each frame's palette
+        self.tried: dict[int, tuple[tuple[int, ...], dict[int, float]]] = {}
 
-    def _join(self, u: int, v: int) -> None:
-        self.after[u].append(v)
-        self.before[v].append(u)
-        self.chain[u, v] = []
+    def loss(self, frame: int, rgb: F64) -> float:
+        return palette_loss(self.statistics[frame].coarse, rgb, self.options)
 
-    def colour(self, vertex: int) -> F64:
-        """Return the (3,) colour of a vertex (of a ghost: where its edge passes)."""
-        i, s = self.at[vertex]
-        rgb: F64 = self.position[i][s]
-        return rgb
+    def without(self, vertex: int) -> dict[int, float]:
+        """Losses of the frames that removing `vertex` touches, by frame index."""
+        moved = self.strands.ghosts(vertex)
+        state = tuple(self.version[i] for i, _, _ in moved)
+        known = self.tried.get(vertex)
+        if known is not None and known[0] == state and len(known[1]) == len(moved):
+            return known[1]
+        new = {}
+        for i, s, rgb in moved:
+            palette = self.strands.position[i].copy()
+            palette[s] = rgb
+            new[i] = self.loss(i, palette)
+        self.tried[vertex] = state, new
+        return new
 
-    def removable(self, vertex: int) -> bool:
-        """Whether section 5.4.1 allows it, and no two strands would become the same edge."""
-        if not self.alive[vertex]:
-            return False
-        if len(self.before[vertex]) != 1 or len(self.after[vertex]) != 1:
-            return False
-        return (self.before[vertex][0], self.after[vertex][0]) not in self.chain
-
-    def ghosts(self, vertex: int) -> list[tuple[int, int, F64]]:
-        """Return (frame index, colour, (3,) position) of all that moves when `vertex` is
-        removed."""
-        v, w = self.before[vertex][0], self.after[vertex][0]
-        start, end = self.frames[self.at[v][0]], self.frames[self.at[w][0]]
-        a, b = self.colour(v), self.colour(w)
-        out = []
-        for ghost in (*self.chain[v, vertex], vertex, *self.chain[vertex, w]):
-            i, s = self.at[ghost]
-            weight = (self.frames[i] - start) / (end - start)
-            out.append((i, s, a + weight * (b - a)))
-        return out
+    def change(self, vertex: int) -> float:
+        """By how much removing `vertex` raises the sum of the losses."""
+        return sum(new - float(self.losses[i]) for i, new in self.without(vertex).items())
 
     def remove(self, vertex: int) -> None:
-        """Turn `vertex` into a ghost."""
-        moved = self.ghosts(vertex)
-        v, w = self.before[vertex][0], self.after[vertex][0]
-        self.chain[v, w] = [*self.chain.pop((v, vertex)), vertex, *self.chain.pop((vertex, w))]
-        self.after[v][self.after[v].index(vertex)] = w
-        self.before[w][self.before[w].index(vertex)] = v
-        self.alive[vertex] = False
-        for i, s, rgb in moved:
-            self.position[i][s] = rgb
-
-    def polytope(self) -> SkewPolytope:
-        """Return what is left, with tracks through the living vertices."""
-        keep = [v for v, alive in enumerate(self.alive) if alive]
-        index = {v: n for n, v in enumerate(keep)}
-        edge_of = {ghost: edge for edge, chain in self.chain.items() for ghost in chain}
-        vertices = np.array([[*self.colour(v), self.frames[self.at[v][0]]] for v in keep])
-
-        def through(nodes: Sequence[int]) -> tuple[int, ...]:
-            """Return the track that passes the given vertices and ghosts, as living vertices."""
-            out = [index[v] for v in nodes if self.alive[v]]
-            if not self.alive[nodes[0]]:
-                out.insert(0, index[edge_of[nodes[0]][0]])
-            if not self.alive[nodes[-1]]:
-                out.append(index[edge_of[nodes[-1]][1]])
-            return tuple(out)
-
-        blocks, transitions = [], []
-        for b, inside in enumerate(self.block_frames):
-            colours = range(len(self.node[inside[0]]))
-            tracks = tuple(through([self.node[i][s] for i in inside]) for s in colours)
-            first, last = self.frames[inside[0]], self.frames[inside[-1]]
-            blocks.append(Section(first, last, tracks, self.faces[b]))
-            if b + 1 < len(self.block_frames):
-                ends, begins = self.node[inside[-1]], self.node[inside[-1] + 1]
-                links = tuple(through([ends[i], begins[j]]) for i, j in self.links[b])
-                none: I32 = np.zeros((0, 3), np.int32)
-                transitions.append(Section(last, self.frames[inside[-1] + 1], links, none))
-        return SkewPolytope(vertices, tuple(blocks), tuple(transitions))
+        for i, new in self.without(vertex).items():
+            self.losses[i] = new
+            self.version[i] += 1
+        self.strands.remove(vertex)
 
 
 def remove_vertices(
@@ -146,35 +76,11 @@ def remove_vertices(
     progress: Callable[[int, int], None] | None = None,
 ) -> None:
     """Remove vertices from `strands` (section 5.4.2), in place."""
-    losses = np.array(
-        [
-            palette_loss(s.coarse, rgb, options)
-            for s, rgb in zip(statistics, strands.position, strict=True)
-        ]
-    )
-    version = [0] * len(losses)  # counts the changes of each frame's palette
-    tried: dict[int, tuple[tuple[int, ...], dict[int, float]]] = {}
-    total = float(losses.sum())
-    threshold = options.eta2 * total + NEGLIGIBLE * len(losses)
+    trials = _Trials(strands, statistics, options)
+    total = float(trials.losses.sum())
+    threshold = options.eta2 * total + NEGLIGIBLE * len(trials.losses)
     pool = [v for v in range(len(strands.at)) if strands.removable(v)]
     start, removed = len(pool), 0
-
-    def evaluate(vertex: int) -> dict[int, float]:
-        """Losses of the frames that removing `vertex` touches, remembered while they stay as they
-        are."""
-        moved = strands.ghosts(vertex)
-        state = tuple(version[i] for i, _, _ in moved)
-        known = tried.get(vertex)
-        if known is not None and known[0] == state and len(known[1]) == len(moved):
-            return known[1]
-        new = {}
-        for i, s, rgb in moved:
-            palette = strands.position[i].copy()
-            palette[s] = rgb
-            new[i] = palette_loss(statistics[i].coarse, palette, options)
-        tried[vertex] = state, new
-        return new
-
     distance: dict[int, tuple[tuple[int, int], float]] = {}
 
     def ghost_distance(vertex: int) -> float:
@@ -192,20 +98,75 @@ def remove_vertices(
         if not pool:
             break
         nearest = sorted(pool, key=lambda v: (ghost_distance(v), v))[: options.removal_candidates]
-        best: tuple[float, int] | None = None
-        for vertex in nearest:
-            change = sum(new - losses[i] for i, new in evaluate(vertex).items())
-            if best is None or (change, vertex) < best:
-                best = change, vertex
-        assert best is not None
-        change, vertex = best
+        change, vertex = min((trials.change(v), v) for v in nearest)
         if total + change > threshold:
             break
-        for i, new in evaluate(vertex).items():
-            losses[i] = new
-            version[i] += 1
-        strands.remove(vertex)
-        total = float(losses.sum())
+        trials.remove(vertex)
+        total = float(trials.losses.sum())
         removed += 1
         if progress:
             progress(removed, start)
+
+
+def thin(
+    strands: Strands, statistics: Sequence[FrameStatistics], options: AnalysisOptions
+) -> NDArray[np.float64]:
+    """Remove vertices many at a time, in place, until the loss is THINNED times its first value.
+
+    First those whose colours lie where the others predict them. Then each round tries every vertex
+    and removes the cheapest, a quarter of them at most, no two of them neighbours in time. Returns
+    each frame's loss.
+    """
+    first = _Trials(strands, statistics, options).losses
+    threshold = THINNED * float(first.sum()) + NEGLIGIBLE * len(first)
+    _straighten(strands, STRAIGHT)
+    trials = _Trials(strands, statistics, options)
+    pool = [v for v in range(len(strands.at)) if strands.removable(v)]
+    while pool:
+        total = float(trials.losses.sum())
+        room = max(1, len(pool) // 4)
+        busy: set[int] = set()
+        for change, vertex in sorted((trials.change(v), v) for v in pool):
+            if total + change > threshold or room == 0:
+                break
+            near = {vertex, *strands.before[vertex], *strands.after[vertex]}
+            if busy & near or not strands.removable(vertex):
+                continue
+            busy |= near
+            room -= 1
+            # Two tracks of one frame may change in one round: what that costs together is seen
+            # here, as the second is tried again.
+            total = float(trials.losses.sum()) + trials.change(vertex)
+            if total > threshold:
+                break
+            trials.remove(vertex)
+        if not busy:
+            break
+        pool = [v for v in pool if strands.removable(v)]
+    return trials.losses
+
+
+def _straighten(strands: Strands, tolerance: float) -> None:
+    """Remove vertices, the straightest first, while every ghost stays within `tolerance` of the
+    colour that it stands for."""
+    original = [rgb.copy() for rgb in strands.position]
+
+    def bend(vertex: int) -> float:
+        return max(
+            float(np.linalg.norm(rgb - original[i][s])) for i, s, rgb in strands.ghosts(vertex)
+        )
+
+    pool = [v for v in range(len(strands.at)) if strands.removable(v)]
+    queue = [(bend(v), v) for v in pool]
+    heapq.heapify(queue)
+    while queue:
+        known, vertex = heapq.heappop(queue)
+        if known > tolerance:
+            break
+        if not strands.removable(vertex):
+            continue
+        now = bend(vertex)  # may have grown since it was queued
+        if now > known:
+            heapq.heappush(queue, (now, vertex))
+            continue
+        strands.remove(vertex)

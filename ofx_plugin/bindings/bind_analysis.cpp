@@ -19,11 +19,17 @@ using namespace palette4d::bindings;
 namespace {
 
 /// Rows: R, C, D, share of pixels outside, largest distance.
-DoubleArray loss_rows(const std::vector<FrameLoss>& losses) {
+/// What is minimised beside the paper's losses.
+double shape_of(const FrameLoss& loss, const LossWeights& weights) {
+    return weights.convexity * loss.D + loss.S;
+}
+
+DoubleArray loss_rows(const std::vector<FrameLoss>& losses, const LossWeights& weights) {
     DoubleArray rows({static_cast<py::ssize_t>(losses.size()), py::ssize_t{5}});
     double* out = rows.mutable_data();
     for (const FrameLoss& l : losses)
-        for (const double x : {l.R, l.C, l.D, l.outside, l.max_distance}) *out++ = x;
+        for (const double x : {l.R, l.C, shape_of(l, weights), l.outside, l.max_distance})
+            *out++ = x;
     return rows;
 }
 
@@ -90,7 +96,14 @@ void bind_analysis(py::module_& m) {
                  return std::make_shared<ColourTree>(std::move(v), std::move(n));
              }),
              py::arg("rgb"), py::arg("counts"))
-        .def_property_readonly("rgb", [](const ColourTree& t) { return to_array(t.rgb()); })
+        .def_property_readonly("rgb",
+                               [](const ColourTree& t) {
+                                   std::vector<Vec3> rgb;
+                                   rgb.reserve(t.size());
+                                   for (std::size_t i = 0; i < t.size(); ++i)
+                                       rgb.push_back(t.rgb(static_cast<int>(i)));
+                                   return to_array(rgb);
+                               })
         .def_property_readonly("counts", [](const ColourTree& t) { return to_array(t.counts()); })
         .def_property_readonly("total", &ColourTree::total)
         .def(
@@ -104,12 +117,19 @@ void bind_analysis(py::module_& m) {
                 return to_array(colours);
             },
             py::arg("v"), py::arg("k"))
-        .def("__len__", [](const ColourTree& t) { return t.rgb().size(); });
+        .def("__len__", [](const ColourTree& t) { return t.size(); });
+
+    py::class_<LossWeights>(m, "LossWeights")
+        .def(py::init([](double lambda, double k, double convexity, double separation) {
+                 return LossWeights{lambda, k, convexity, separation};
+             }),
+             py::arg("lambda_"), py::arg("k"), py::arg("convexity") = 0.0,
+             py::arg("separation") = 0.0);
 
     m.def(
         "palette_loss",
         [](const ColourTree& colours, const py::object& palette, const py::object& faces,
-           double lambda, double k, double convexity) {
+           const LossWeights& weights) {
             const std::vector<Vec3> v = colours_from(palette, "palette");
             if (v.empty())
                 throw py::value_error("palette: found no colours, expected at least one");
@@ -119,13 +139,12 @@ void bind_analysis(py::module_& m) {
             FrameLoss loss;
             {
                 py::gil_scoped_release release;
-                loss = palette_loss(colours, v, f, {lambda, k, convexity}, &gradient);
+                loss = palette_loss(colours, v, f, weights, &gradient);
             }
-            return py::make_tuple(loss.R, loss.C, loss.D, loss.outside, loss.max_distance,
-                                  to_array(gradient));
+            return py::make_tuple(loss.R, loss.C, shape_of(loss, weights), loss.outside,
+                                  loss.max_distance, to_array(gradient));
         },
-        py::arg("colours"), py::arg("palette"), py::arg("faces"), py::arg("lambda_"), py::arg("k"),
-        py::arg("convexity"));
+        py::arg("colours"), py::arg("palette"), py::arg("faces"), py::arg("weights"));
 
     py::class_<PolytopeLoss>(m, "PolytopeLoss")
         .def(py::init([](const py::list& blocks, const py::object& frames,
@@ -150,20 +169,19 @@ void bind_analysis(py::module_& m) {
         .def(
             "evaluate",
             [](const PolytopeLoss& self, const py::object& vertices, const std::vector<int>& which,
-               double lambda, double k, double convexity, int threads, bool with_gradient) {
+               const LossWeights& weights, int threads, bool with_gradient) {
                 const std::vector<Vec4> v = vertices_from(vertices, "vertices");
                 std::vector<Vec4> gradient;
                 std::vector<FrameLoss> losses;
                 {
                     py::gil_scoped_release release;
-                    losses =
-                        polytope_loss(v, self.blocks, self.frames, which, {lambda, k, convexity},
-                                      threads, with_gradient ? &gradient : nullptr);
+                    losses = polytope_loss(v, self.blocks, self.frames, which, weights, threads,
+                                           with_gradient ? &gradient : nullptr);
                 }
-                return py::make_tuple(loss_rows(losses), to_array(gradient));
+                return py::make_tuple(loss_rows(losses, weights), to_array(gradient));
             },
-            py::arg("vertices"), py::arg("which"), py::arg("lambda_"), py::arg("k"),
-            py::arg("convexity"), py::arg("threads"), py::arg("gradient"));
+            py::arg("vertices"), py::arg("which"), py::arg("weights"), py::arg("threads"),
+            py::arg("gradient"));
 
     m.def(
         "progressive_hull",

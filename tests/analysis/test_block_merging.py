@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from analysis_frames import mixture, stats
-from palette4d.analysis.block_merging import Block, initial_blocks, merge, merge_blocks
+from palette4d.analysis.block_merging import (
+    Block,
+    Merge,
+    initial_blocks,
+    merge_blocks,
+    merge_sequence,
+)
 from palette4d.analysis.frame_hulls import hull_mesh
 from palette4d.analysis.losses import palette_loss
 from palette4d.analysis.options import AnalysisOptions
@@ -46,11 +54,11 @@ def test_initial_blocks_follow_the_links(clip):
 def test_merging_goes_away_from_the_block_that_keeps_its_topology(clip):
     early = Block(0, (hull_mesh(FOUR),), (1.0,))
     late = Block(1, (hull_mesh(FIVE), hull_mesh(FIVE)), (1.0, 1.0))
-    forwards = merge(early, late, clip, LOW, HIGH, OPTIONS)
+    forwards = Merge(early, late, clip, LOW, HIGH, OPTIONS).finish()
     assert (forwards.first, len(forwards.palettes)) == (0, 3)
     assert {len(p.rgb) for p in forwards.palettes} == {4}
     assert forwards.palettes[0] is early.palettes[0]
-    backwards = merge(late, early, clip, LOW, HIGH, OPTIONS)
+    backwards = Merge(late, early, clip, LOW, HIGH, OPTIONS).finish()
     assert (backwards.first, len(backwards.palettes)) == (0, 3)
     assert {len(p.rgb) for p in backwards.palettes} == {5}
     assert backwards.palettes[1:] == late.palettes
@@ -76,3 +84,37 @@ def test_merging_stops_at_eta1(clip):
         seen.append(len(blocks))
     assert seen == sorted(seen, reverse=True)
     assert seen[-1] == 1
+
+
+def test_the_greedy_choice_is_that_of_trying_every_merge(clip):
+    """Merges are followed lazily, by a lower bound; the result is that of following all."""
+    palettes = [hull_mesh(FOUR)] * 3 + [hull_mesh(FIVE)] * 3
+    current = initial_blocks(clip, palettes, [None] * 5, OPTIONS)
+    for total, blocks in merge_sequence(current, clip, LOW, HIGH, OPTIONS):
+        assert total == pytest.approx(sum(b.weighted_loss(6, OPTIONS) for b in blocks))
+        if len(blocks) < len(current):
+            tried = []
+            for i, (a, b) in enumerate(itertools.pairwise(current)):
+                for keep, adopt in ((a, b), (b, a)):
+                    merged = Merge(keep, adopt, clip, LOW, HIGH, OPTIONS).finish()
+                    tried.append([*current[:i], merged, *current[i + 2 :]])
+            best = min(tried, key=lambda c: sum(b.weighted_loss(6, OPTIONS) for b in c))
+            assert [b.first for b in best] == [b.first for b in blocks]
+            for one, other in zip(best, blocks, strict=True):
+                assert one.losses == other.losses
+        current = blocks
+    assert len(current) == 1
+
+
+def test_the_bound_of_an_unfinished_merge_never_falls(clip):
+    early = Block(0, (hull_mesh(FOUR),), (1.0,))
+    late = Block(1, (hull_mesh(FIVE),) * 4, (1.0,) * 4)
+    trial = Merge(early, late, clip, LOW, HIGH, OPTIONS)
+    bounds = [trial.change]
+    while not trial.done:
+        trial.advance()
+        bounds.append(trial.change)
+    assert bounds == sorted(bounds)
+    before = early.weighted_loss(6, OPTIONS) + late.weighted_loss(6, OPTIONS)
+    merged = trial.finish()
+    assert bounds[-1] == pytest.approx(merged.weighted_loss(6, OPTIONS) - before)

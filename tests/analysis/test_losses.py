@@ -12,6 +12,7 @@ from palette4d.analysis.options import AnalysisOptions
 from scipy.optimize import minimize
 from scipy.spatial import ConvexHull
 
+WEIGHTS = _core.LossWeights(50.0, 50.0)
 BOX = np.array(list(itertools.product([0.25, 0.75], repeat=3)))
 
 
@@ -21,10 +22,10 @@ def tree(points, counts=None):
 
 
 def loss(points, palette, counts=None, k=1.0):
-    r, c, d, outside, far, _ = _core.palette_loss(
-        tree(points, counts), np.asarray(palette, float), NO_FACES, 50.0, k, 0.0
+    r, c, shape, outside, far, _ = _core.palette_loss(
+        tree(points, counts), np.asarray(palette, float), NO_FACES, _core.LossWeights(50.0, k)
     )
-    return {"R": r, "C": c, "D": d, "outside": outside, "far": far}
+    return {"R": r, "C": c, "shape": shape, "outside": outside, "far": far}
 
 
 @pytest.mark.parametrize(
@@ -124,12 +125,13 @@ def test_gradient_matches_differences():
     colours = tree(rng.random((500, 3)))
     palette = BOX + rng.normal(0, 0.02, BOX.shape)
     faces = np.array([[0, 1, 2], [1, 3, 2]], np.int32)
+    weights = _core.LossWeights(50.0, 500.0, convexity=0.7, separation=0.6)
 
     def value(x):
-        r, c, d, *_ = _core.palette_loss(colours, x, faces, 50.0, 500.0, 0.7)
-        return 50 * r + c + 0.7 * d
+        r, c, shape, *_ = _core.palette_loss(colours, x, faces, weights)
+        return 50 * r + c + shape
 
-    *_, gradient = _core.palette_loss(colours, palette, faces, 50.0, 500.0, 0.7)
+    *_, gradient = _core.palette_loss(colours, palette, faces, weights)
     for i, c in itertools.product(range(8), range(3)):
         step = np.zeros((8, 3))
         step[i, c] = 1e-6
@@ -155,9 +157,9 @@ def test_refinement_never_worsens_and_stays_in_its_box():
     rng = np.random.default_rng(8)
     options = AnalysisOptions(hull_box=0.05)
     colours = tree(rng.random((2000, 3)) * 0.6 + 0.2)
-    before = _core.palette_loss(colours, BOX, NO_FACES, 50.0, 50.0, 0.0)
+    before = _core.palette_loss(colours, BOX, NO_FACES, WEIGHTS)
     moved = refine_palette(colours, BOX, NO_FACES, np.zeros(3), np.ones(3), options)
-    after = _core.palette_loss(colours, moved, NO_FACES, 50.0, 50.0, 0.0)
+    after = _core.palette_loss(colours, moved, NO_FACES, WEIGHTS)
     assert 50 * after[0] + after[1] < 50 * before[0] + before[1]
     assert np.abs(moved - BOX).max() <= 0.05 + 1e-12
 
@@ -187,8 +189,8 @@ def test_bad_arguments_are_refused():
     with pytest.raises(ValueError, match="positive"):
         tree([[0, 0, 0]], np.array([0.0]))
     with pytest.raises(ValueError, match="shape"):
-        _core.palette_loss(tree([[0, 0, 0]]), np.zeros((4, 2)), NO_FACES, 50.0, 50.0, 0.0)
+        _core.palette_loss(tree([[0, 0, 0]]), np.zeros((4, 2)), NO_FACES, WEIGHTS)
     with pytest.raises(ValueError, match="at least one"):
-        _core.palette_loss(tree([[0, 0, 0]]), np.zeros((0, 3)), NO_FACES, 50.0, 50.0, 0.0)
+        _core.palette_loss(tree([[0, 0, 0]]), np.zeros((0, 3)), NO_FACES, WEIGHTS)
     with pytest.raises(ValueError, match="face"):
-        _core.palette_loss(tree([[0, 0, 0]]), BOX, np.array([[0, 1, 99]]), 50.0, 50.0, 0.0)
+        _core.palette_loss(tree([[0, 0, 0]]), BOX, np.array([[0, 1, 99]]), WEIGHTS)

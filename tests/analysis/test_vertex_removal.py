@@ -10,7 +10,8 @@ from palette4d.analysis.frame_hulls import hull_mesh
 from palette4d.analysis.losses import palette_loss
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Palette
-from palette4d.analysis.vertex_removal import Strands, remove_vertices
+from palette4d.analysis.strands import Strands
+from palette4d.analysis.vertex_removal import THINNED, remove_vertices, thin
 
 FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
 FACES = hull_mesh(FOUR).faces
@@ -108,4 +109,32 @@ def test_nothing_to_remove_in_one_or_two_frames(frames):
     statistics = stats([mixture(p.rgb, i) for i, p in enumerate(palettes)])
     strands = Strands(range(frames), [palettes], [])
     remove_vertices(strands, statistics, AnalysisOptions(eta2=1e6))
+    assert all(strands.alive)
+
+
+def total(frames, palettes, options):
+    pairs = zip(frames, palettes, strict=True)
+    return sum(palette_loss(f.coarse, rgb, options) for f, rgb in pairs)
+
+
+def test_thinning_is_quick_and_bounded():
+    palettes = moving(12, bend=0.5, at=5)
+    frames = stats([mixture(p.rgb, i) for i, p in enumerate(palettes)])
+    options = AnalysisOptions()
+    strands = Strands(range(12), [palettes], [])
+    before = total(frames, strands.position, options)
+    losses = thin(strands, frames, options)
+    assert losses.sum() == pytest.approx(total(frames, strands.position, options))
+    assert losses.sum() <= THINNED * before + 1e-3 * 12
+    left = strands.polytope().vertices
+    assert len(left) <= 10  # of 48; 8 of them stand at the ends
+    assert any(3 <= v[3] <= 7 and v[2] > 0.4 for v in left)  # the bend is kept
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_thinning_one_or_two_frames_changes_nothing(count):
+    palettes = moving(count)
+    frames = stats([mixture(p.rgb, i) for i, p in enumerate(palettes)])
+    strands = Strands(range(count), [palettes], [])
+    thin(strands, frames, AnalysisOptions())
     assert all(strands.alive)

@@ -52,8 +52,8 @@ void check_node(const ColourTree& tree, int index) {
     for (int c = 0; c < 3; ++c) {
         double low = kInf, high = -kInf;
         for (int i = node.begin; i < node.end; ++i) {
-            low = std::min(low, tree.rgb()[static_cast<std::size_t>(i)][c]);
-            high = std::max(high, tree.rgb()[static_cast<std::size_t>(i)][c]);
+            low = std::min(low, tree.rgb(i)[c]);
+            high = std::max(high, tree.rgb(i)[c]);
         }
         CHECK_EQUAL(node.low[c], low);
         CHECK_EQUAL(node.high[c], high);
@@ -131,10 +131,11 @@ TEST(boxes_hold_their_colours_and_counts_stay_with_them) {
             counts.push_back(1 + 100 * rgb.back()[0]);
         }
         const ColourTree tree(rgb, counts);
-        CHECK_EQUAL(tree.rgb().size(), rgb.size());
+        CHECK_EQUAL(tree.size(), rgb.size());
         CHECK_EQUAL(tree.nodes()[0].end, n);
         check_node(tree, 0);
-        std::vector<Vec3> found = tree.rgb();
+        std::vector<Vec3> found;
+        for (int i = 0; i < n; ++i) found.push_back(tree.rgb(i));
         for (std::size_t i = 0; i < found.size(); ++i)
             CHECK_EQUAL(tree.counts()[i], 1 + 100 * found[i][0]);
         std::sort(found.begin(), found.end());

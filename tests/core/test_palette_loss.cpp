@@ -163,7 +163,7 @@ TEST(the_gradient_is_that_of_differences) {
     for (int i = 0; i < 200; ++i) colours.push_back(random.colour());
     // k covers all pixels, so that v_N does not jump.
     const ColourTree tree(colours, std::vector<double>(colours.size(), 1));
-    const LossWeights weights{50, 200, 0.7};
+    const LossWeights weights{50, 200, 0.7, 0.9};
     shapes::Mesh mesh = shapes::dented_cube();
     for (Vec3& v : mesh.rgb)
         for (double& x : v) x = 0.5 + 0.6 * (x - 0.5) + random.uniform(-0.03, 0.03);
@@ -173,10 +173,11 @@ TEST(the_gradient_is_that_of_differences) {
     CHECK_EQUAL(with.R, without.R);
     CHECK_EQUAL(with.C, without.C);
     CHECK_EQUAL(with.D, without.D);
-    CHECK(with.R > 0 && with.D > 0);
+    CHECK_EQUAL(with.S, without.S);
+    CHECK(with.R > 0 && with.D > 0 && with.S > 0);
     const auto value = [&](const std::vector<Vec3>& palette) {
         const FrameLoss loss = palette_loss(tree, palette, mesh.faces, weights, nullptr);
-        return weights.lambda * loss.R + loss.C + weights.convexity * loss.D;
+        return weights.lambda * loss.R + loss.C + weights.convexity * loss.D + loss.S;
     };
     CHECK_EQUAL(gradient.size(), mesh.rgb.size());
     for (std::size_t i = 0; i < gradient.size(); ++i)
@@ -186,6 +187,23 @@ TEST(the_gradient_is_that_of_differences) {
             down[i][c] -= 1e-6;
             CHECK_NEAR(gradient[i][c], (value(up) - value(down)) / 2e-6, 1e-4);
         }
+}
+
+TEST(near_colours_repel_by_hand) {
+    const ColourTree tree({{0.5, 0.5, 0.5}}, {1});
+    const std::vector<Vec3> palette = {{0, 0, 0}, {0.1, 0, 0}, {0.5, 0, 0}, {0.5, 0, 0}};
+    std::vector<Vec3> gradient;
+    const LossWeights off{0, 1}, on{0, 1, 0, 0.2};
+    CHECK_EQUAL(palette_loss(tree, palette, {}, off, nullptr).S, 0.0);
+    std::vector<Vec3> plain;
+    palette_loss(tree, palette, {}, off, &plain);
+    const FrameLoss loss = palette_loss(tree, palette, {}, on, &gradient);
+    // One pair 0.1 apart, one pair that is one colour: (0.2 - d)^2 / 0.4 each.
+    CHECK_NEAR(loss.S, 0.01 / 0.4 + 0.04 / 0.4, 1e-15);
+    CHECK_NEAR(gradient[0][0] - plain[0][0], 0.5, 1e-12);
+    CHECK_NEAR(gradient[1][0] - plain[1][0], -0.5, 1e-12);
+    CHECK_EQUAL(gradient[2][0], plain[2][0]);  // no way to part is better than another
+    CHECK_EQUAL(gradient[3][0], plain[3][0]);
 }
 
 TEST(colours_that_are_not_finite_are_refused) {

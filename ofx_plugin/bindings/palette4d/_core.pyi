@@ -149,17 +149,23 @@ class ColourTree:
         """(m, 3) -> (m, 3) means of the k pixels nearest to each colour (v_N of eq. 3)."""
     def __len__(self) -> int: ...
 
-def palette_loss(
-    colours: ColourTree,
-    palette: ArrayLike,
-    faces: ArrayLike,
-    lambda_: float,
-    k: float,
-    convexity: float,
-) -> tuple[float, float, float, float, float, F64]:
-    """R (eq. 2), C (eq. 3), concavity D, share of pixels outside, largest distance, and gradient.
+class LossWeights:
+    """What the losses weigh: lambda of eq. 4, k of eq. 3, and how a palette should be shaped.
 
-    `palette` is (n, 3); the (n, 3) gradient is that of lambda R + C + convexity D.
+    `convexity` weighs the concavity of the mesh; colours nearer than `separation` repel each other.
+    """
+
+    def __init__(
+        self, lambda_: float, k: float, convexity: float = ..., separation: float = ...
+    ) -> None: ...
+
+def palette_loss(
+    colours: ColourTree, palette: ArrayLike, faces: ArrayLike, weights: LossWeights
+) -> tuple[float, float, float, float, float, F64]:
+    """R (eq. 2), C (eq. 3), shape, share of pixels outside, largest distance, and gradient.
+
+    `palette` is (n, 3); `shape` is what convexity and separation add; the (n, 3) gradient is that
+    of lambda R + C + shape.
     """
 
 class PolytopeLoss:
@@ -176,13 +182,11 @@ class PolytopeLoss:
         self,
         vertices: ArrayLike,
         which: Sequence[int],
-        lambda_: float,
-        k: float,
-        convexity: float,
+        weights: LossWeights,
         threads: int,
         gradient: bool,
     ) -> tuple[F64, F64]:
-        """Rows R, C, D, outside, largest distance of each frame; the summed (N, 4) gradient."""
+        """Rows R, C, shape, outside, largest distance of each frame; the summed (N, 4) gradient."""
 
 def progressive_hull(rgb: ArrayLike, faces: ArrayLike, target: int) -> F64:
     """Simplify a closed convex mesh, (n, 3) and (f, 3), to at most `target` enclosing vertices."""

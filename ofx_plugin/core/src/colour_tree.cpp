@@ -11,7 +11,6 @@
 namespace palette4d {
 namespace {
 
-constexpr int kLeafSize = 12;
 // Squared distances closer than this are ties (8-bit colours differ by far more).
 constexpr double kTie = 1e-12;
 
@@ -42,10 +41,12 @@ ColourTree::ColourTree(std::vector<Vec3> rgb, std::vector<double> counts) {
     std::iota(order.begin(), order.end(), 0);
     nodes_.reserve(4 * rgb.size() / kLeafSize + 4);
     build(0, static_cast<int>(rgb.size()), order, rgb);
-    rgb_.resize(rgb.size());
     counts_.resize(rgb.size());
+    for (int c = 0; c < 3; ++c) {
+        channel_[c].resize(rgb.size());
+        for (std::size_t i = 0; i < order.size(); ++i) channel_[c][i] = rgb[order[i]][c];
+    }
     for (std::size_t i = 0; i < order.size(); ++i) {
-        rgb_[i] = rgb[order[i]];
         counts_[i] = counts[order[i]];
         total_ += counts_[i];
     }
@@ -106,7 +107,8 @@ Vec3 ColourTree::nearest_mean(const Vec3& v, double k) const {
             continue;
         }
         for (int i = node.begin; i < node.end; ++i) {
-            const double dx = rgb_[i][0] - v[0], dy = rgb_[i][1] - v[1], dz = rgb_[i][2] - v[2];
+            const double dx = channel_[0][i] - v[0], dy = channel_[1][i] - v[1],
+                         dz = channel_[2][i] - v[2];
             const double d2 = dx * dx + dy * dy + dz * dz;
             if (d2 > limit + kTie) continue;
             auto at = best.end();
@@ -133,7 +135,7 @@ Vec3 ColourTree::nearest_mean(const Vec3& v, double k) const {
         const bool tie = b.d2 >= last - kTie;
         (tie ? tied : near) += n;
         Vec3& s = tie ? tied_sum : sum;
-        for (int c = 0; c < 3; ++c) s[c] += n * rgb_[b.point][c];
+        for (int c = 0; c < 3; ++c) s[c] += n * channel_[c][b.point];
     }
     const double share = (k - near) / tied;
     return {(sum[0] + share * tied_sum[0]) / k, (sum[1] + share * tied_sum[1]) / k,

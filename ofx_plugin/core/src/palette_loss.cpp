@@ -1,6 +1,7 @@
 #include "palette4d/palette_loss.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -15,11 +16,24 @@ void add(Vec3& a, double s, const Vec3& b) {
 
 constexpr double kFlat = 1e-9;  // a vertex this close to a plane counts as in it
 
+/// A supporting triangle with what a closest point needs: its plane, and its barycentric
+/// coordinates as linear functions of the colour (of corners 1 and 2; corner 0 takes the rest).
 struct Facet {
     Face at;
     Vec3 normal;  // unit, outwards
     double offset;
+    Vec3 slope[2];
+    double start[2];
 };
+
+Facet facet_of(const std::vector<Vec3>& v, const Face& at, const Vec3& normal, double offset) {
+    const Vec3 ab = v[at[1]] - v[at[0]], ac = v[at[2]] - v[at[0]];
+    const Vec3 n = cross(ab, ac);
+    const double scale = 1 / dot(n, n);
+    Facet f{at, normal, offset, {scale * cross(ac, n), scale * cross(n, ab)}, {0, 0}};
+    for (int i = 0; i < 2; ++i) f.start[i] = -dot(f.slope[i], v[at[0]]);
+    return f;
+}
 
 /// All vertex triples that support the hull. Coplanar vertices give overlapping triangles, which
 /// does no harm to a closest point. `solid` is false for flat palettes: then every triple is a
@@ -51,21 +65,20 @@ void build_hull(const std::vector<Vec3>& v, Hull& hull) {
                 }
                 if (low < -kFlat && high > kFlat) continue;
                 if (high > kFlat) {
-                    hull.facets.push_back(
-                        {{i, k, j}, {-normal[0], -normal[1], -normal[2]}, -offset});
+                    hull.facets.push_back(facet_of(v, {i, k, j}, -1 * normal, -offset));
                     hull.solid = true;
                 } else if (low < -kFlat) {
-                    hull.facets.push_back({{i, j, k}, normal, offset});
+                    hull.facets.push_back(facet_of(v, {i, j, k}, normal, offset));
                     hull.solid = true;
                 } else {
-                    hull.facets.push_back({{i, j, k}, normal, offset});
+                    hull.facets.push_back(facet_of(v, {i, j, k}, normal, offset));
                 }
             }
     if (hull.solid || !hull.facets.empty()) return;
     // All on a line (or one colour): the segments between all pairs, as degenerate triangles.
     for (int i = 0; i < n; ++i)
         for (int j = i; j < n; ++j)
-            if (i != j || n == 1) hull.facets.push_back({{i, i, j}, {0, 0, 0}, 0});
+            if (i != j || n == 1) hull.facets.push_back({{i, i, j}, {0, 0, 0}, 0, {}, {}});
 }
 
 struct Closest {
@@ -116,13 +129,20 @@ public:
         std::vector<int> active(hull_.facets.size());
         for (std::size_t i = 0; i < active.size(); ++i) active[i] = static_cast<int>(i);
         active_.push_back(std::move(active));
+        loads_.resize(hull_.facets.size());
         visit(0, 0);
         loss.R = sum_ / colours_.total();
         loss.outside = count_ / colours_.total();
         loss.max_distance = max_;
-        if (gradient_)
-            for (Vec3& g : *gradient_)
-                for (double& x : g) x /= colours_.total();
+        if (!gradient_) return;
+        for (std::size_t i = 0; i < loads_.size(); ++i) {
+            const Facet& f = hull_.facets[i];
+            const Load& load = loads_[i];
+            add((*gradient_)[f.at[0]], load.corner[0] + load.corner[1] - load.all, f.normal);
+            for (int c = 0; c < 2; ++c) add((*gradient_)[f.at[c + 1]], -load.corner[c], f.normal);
+        }
+        for (Vec3& g : *gradient_)
+            for (double& x : g) x /= colours_.total();
     }
 
 private:
@@ -136,9 +156,10 @@ private:
             facets.clear();
             for (int f : from) {
                 const Facet& facet = hull_.facets[f];
+                // The box's corner farthest along the normal.
                 double high = facet.offset;
                 for (int c = 0; c < 3; ++c)
-                    high += facet.normal[c] * (facet.normal[c] > 0 ? node.high[c] : node.low[c]);
+                    high += std::max(facet.normal[c] * node.high[c], facet.normal[c] * node.low[c]);
                 if (high > 0) facets.push_back(f);
             }
             if (facets.empty()) return;
@@ -151,35 +172,95 @@ private:
             visit(right, depth + 1);
             return;
         }
-        for (int i = node.begin; i < node.end; ++i) {
-            const Vec3& p = colours_.rgb()[i];
-            Closest best;
-            for (int f : active_[depth + 1]) {
-                const Facet& facet = hull_.facets[f];
-                // The closest point of a convex body lies on a facet that the point sees.
-                if (hull_.solid && dot(facet.normal, p) + facet.offset <= 0) continue;
-                try_triangle(p, v_, facet.at, best);
+        if (hull_.solid)
+            leaf(node, facets);
+        else
+            for (int i = node.begin; i < node.end; ++i) {
+                const Vec3 p = colours_.rgb(i);
+                Closest best;
+                for (int f : facets) try_triangle(p, v_, hull_.facets[f].at, best);
+                // An empty palette has no facets.
+                if (best.d2 > 0 && std::isfinite(best.d2))
+                    add_colour(colours_.counts()[i], p, best, std::sqrt(best.d2));
             }
-            if (best.d2 == std::numeric_limits<double>::infinity() || best.d2 <= 0) continue;
-            const double d = std::sqrt(best.d2);
-            const double n = colours_.counts()[i];
-            sum_ += n * d;
-            if (d > 1e-6) count_ += n;
-            max_ = std::max(max_, d);
-            if (gradient_) {
-                Vec3 u = p;
-                for (int c = 0; c < 3; ++c) add(u, -best.weight[c], v_[best.at[c]]);
-                for (int c = 0; c < 3; ++c)
-                    add((*gradient_)[best.at[c]], -n * best.weight[c] / d, u);
+    }
+
+    /// The colours of a leaf against the facets that some of them may see. The closest point of a
+    /// convex body lies on a facet that the colour sees; where the colour falls straight onto such
+    /// a facet, that is it.
+    void leaf(const ColourTree::Node& node, const std::vector<int>& facets) {
+        constexpr int kMost = ColourTree::kLeafSize;
+        const int n = node.end - node.begin;
+        const double* const x = colours_.channel(0) + node.begin;
+        const double* const y = colours_.channel(1) + node.begin;
+        const double* const z = colours_.channel(2) + node.begin;
+        const double* const count = colours_.counts().data() + node.begin;
+        std::array<double, kMost> h;          // height above a facet
+        std::array<double, kMost> highest{};  // above any facet that the colour sees
+        std::array<bool, kMost> on_facet{};   // falls straight onto one
+        for (int index : facets) {
+            const Facet& f = hull_.facets[index];
+            double above = 0;
+            for (int i = 0; i < n; ++i) {
+                h[i] = f.normal[0] * x[i] + f.normal[1] * y[i] + f.normal[2] * z[i] + f.offset;
+                highest[i] = std::max(highest[i], h[i]);
+                above = std::max(above, h[i]);
+            }
+            if (above <= 0) continue;
+            for (int i = 0; i < n; ++i) {
+                if (h[i] <= 0 || on_facet[i]) continue;
+                const Vec3 p{x[i], y[i], z[i]};
+                const double b = dot(f.slope[0], p) + f.start[0];
+                const double c = dot(f.slope[1], p) + f.start[1];
+                if (b < 0 || c < 0 || b + c > 1) continue;
+                on_facet[i] = true;
+                add_distance(count[i], h[i]);
+                Load& load = loads_[index];
+                load.all += count[i];
+                load.corner[0] += count[i] * b;
+                load.corner[1] += count[i] * c;
             }
         }
+        for (int i = 0; i < n; ++i) {
+            if (highest[i] <= 0 || on_facet[i]) continue;
+            const Vec3 p{x[i], y[i], z[i]};
+            Closest best;
+            for (int index : facets) {
+                const Facet& f = hull_.facets[index];
+                if (dot(f.normal, p) + f.offset <= 0) continue;
+                for (int e = 0; e < 3; ++e) try_segment(p, v_, f.at[e], f.at[(e + 1) % 3], best);
+            }
+            if (best.d2 > 0) add_colour(count[i], p, best, std::sqrt(best.d2));
+        }
     }
+
+    void add_distance(double n, double d) {
+        sum_ += n * d;
+        if (d > 1e-6) count_ += n;
+        max_ = std::max(max_, d);
+    }
+
+    void add_colour(double n, const Vec3& p, const Closest& closest, double d) {
+        add_distance(n, d);
+        if (!gradient_) return;
+        Vec3 u = p;
+        for (int c = 0; c < 3; ++c) add(u, -closest.weight[c], v_[closest.at[c]]);
+        for (int c = 0; c < 3; ++c) add((*gradient_)[closest.at[c]], -n * closest.weight[c] / d, u);
+    }
+
+    /// What the colours above a facet weigh, in all and on its corners 1 and 2: together with the
+    /// normal, their gradient.
+    struct Load {
+        double all = 0;
+        double corner[2] = {0, 0};
+    };
 
     const ColourTree& colours_;
     const std::vector<Vec3>& v_;
     const Hull& hull_;
     std::vector<Vec3>* gradient_;
     std::vector<std::vector<int>> active_;
+    std::vector<Load> loads_;  // one a facet
     double sum_ = 0, count_ = 0, max_ = 0;
 };
 
@@ -214,6 +295,25 @@ double concavity(const std::vector<Vec3>& v, const std::vector<Face>& faces, dou
     return sum;
 }
 
+/// S of palette_loss.hpp. Colours that are one (a split or a merge) cannot be told which way to
+/// part.
+double closeness(const std::vector<Vec3>& v, double separation, std::vector<Vec3>* gradient) {
+    double sum = 0;
+    for (std::size_t i = 0; i < v.size(); ++i)
+        for (std::size_t j = i + 1; j < v.size(); ++j) {
+            const Vec3 apart = v[j] - v[i];
+            const double d = norm(apart);
+            if (d >= separation) continue;
+            const double missing = separation - d;
+            sum += missing * missing / (2 * separation);
+            if (!gradient || d < 1e-9) continue;
+            const double slope = -missing / separation / d;
+            add((*gradient)[j], slope, apart);
+            add((*gradient)[i], -slope, apart);
+        }
+    return sum;
+}
+
 }  // namespace
 
 FrameLoss palette_loss(const ColourTree& colours, const std::vector<Vec3>& palette,
@@ -237,6 +337,7 @@ FrameLoss palette_loss(const ColourTree& colours, const std::vector<Vec3>& palet
         loss.D = concavity(palette, faces, weights.convexity, gradient);
     else
         loss.D = concavity(palette, faces, 0, nullptr);
+    if (weights.separation > 0) loss.S = closeness(palette, weights.separation, gradient);
     return loss;
 }
 

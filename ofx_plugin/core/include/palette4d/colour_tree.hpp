@@ -13,6 +13,8 @@ namespace palette4d {
 /// carry bounding boxes, so that whole subtrees inside a palette cost one test.
 class ColourTree {
 public:
+    static constexpr int kLeafSize = 16;  ///< most colours of a leaf
+
     struct Node {
         Vec3 low, high;
         int begin, end;   ///< points of the subtree
@@ -27,7 +29,9 @@ public:
     /// matter. Throws std::invalid_argument unless v is finite and k > 0.
     Vec3 nearest_mean(const Vec3& v, double k) const;
 
-    const std::vector<Vec3>& rgb() const { return rgb_; }
+    std::size_t size() const { return counts_.size(); }
+    Vec3 rgb(int i) const { return {channel_[0][i], channel_[1][i], channel_[2][i]}; }
+    const double* channel(int c) const { return channel_[c].data(); }
     const std::vector<double>& counts() const { return counts_; }
     const std::vector<Node>& nodes() const { return nodes_; }
     double total() const { return total_; }
@@ -35,7 +39,7 @@ public:
 private:
     int build(int begin, int end, std::vector<int>& order, const std::vector<Vec3>& rgb);
 
-    std::vector<Vec3> rgb_;
+    std::array<std::vector<double>, 3> channel_;
     std::vector<double> counts_;
     std::vector<Node> nodes_;
     double total_ = 0;

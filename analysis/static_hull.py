@@ -1,0 +1,67 @@
+"""One palette for the whole clip, as section 6.2 compares with: a static, refined RGB hull.
+
+Input: the palette of all frames' pixels taken together. Output: a `SkewPolytope` of one block whose
+colours do not change; each has a vertex at the first and one at the last frame, the two keyframes
+of section 6.2. It is refined against the loss of every frame (eq. 8).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from palette4d import _core
+from palette4d.analysis.objective import refine_jointly
+from palette4d.analysis.options import AnalysisOptions
+from palette4d.analysis.polytope import Palette, Section, SkewPolytope
+from palette4d.analysis.statistics import FINEST_STEP, FrameStatistics
+
+F64 = NDArray[np.float64]
+
+EVALUATIONS = 100
+POOLED_FRAMES = 16  # frames pooled at a time, to keep memory flat
+
+
+def static_polytope(
+    palette: Palette,
+    statistics: Sequence[FrameStatistics],
+    low: F64,
+    high: F64,
+    options: AnalysisOptions,
+) -> SkewPolytope:
+    """Return the palette, refined, as a polytope that does not change with time."""
+    first, last = float(statistics[0].frame), float(statistics[-1].frame)
+    count = len(palette.rgb)
+    # A track of one vertex is a colour that stays: what moves is the palette of all frames.
+    still = SkewPolytope(
+        np.column_stack([palette.rgb, np.full(count, first)]),
+        (Section(first, last, tuple((i,) for i in range(count)), palette.faces),),
+        (),
+    )
+    still, _ = refine_jointly(still, statistics, low, high, options, EVALUATIONS, coarse=True)
+    if first == last:
+        return still
+    ends = still.vertices.copy()
+    ends[:, 3] = last
+    tracks = tuple((i, count + i) for i in range(count))
+    return SkewPolytope(
+        np.vstack([still.vertices, ends]), (Section(first, last, tracks, palette.faces),), ()
+    )
+
+
+def pooled_colours(
+    statistics: Sequence[FrameStatistics], options: AnalysisOptions
+) -> _core.ColourTree:
+    """Return the colours of all frames as one, at most `coarse_colours` of them."""
+    rgb, counts = np.zeros((0, 3)), np.zeros(0)
+    step = FINEST_STEP
+    for start in range(0, len(statistics), POOLED_FRAMES):
+        some = statistics[start : start + POOLED_FRAMES]
+        rgb, counts, step = _core.coarsen_colours(
+            np.vstack([rgb, *(s.coarse.rgb for s in some)]),
+            np.concatenate([counts, *(s.coarse.counts for s in some)]),
+            step,
+            options.coarse_colours,
+        )
+    return _core.ColourTree(rgb, counts)

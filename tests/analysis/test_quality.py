@@ -1,0 +1,137 @@
+"""The report: figures that the losses do not give, by hand-made palettes, and the warnings."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from analysis_frames import ArrayClip, mixture, noise, stats
+from palette4d import _core
+from palette4d.analysis import pipeline, quality, sidecar
+from palette4d.analysis.frame_hulls import hull_mesh
+from palette4d.analysis.losses import palette_loss
+from palette4d.analysis.options import AnalysisOptions
+from palette4d.analysis.polytope import Section, SkewPolytope
+
+FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
+OPTIONS = AnalysisOptions()
+
+
+def in_core(polytope, frames):
+    """The polytope as the core reads it from a sidecar."""
+    clip = {
+        "name": "hand",
+        "source": "hand.####.png",
+        "frames": {"first": frames[0].frame, "last": frames[-1].frame, "step": 1, "skipped": []},
+        "rate": [24, 1],
+        "size": [30, 20],
+        "encoding": "unknown",
+    }
+    document = sidecar.new_document(
+        clip, polytope.fields(), {"stages": [], "options": {}, "versions": {}}
+    )
+    return _core.parse_sidecar(sidecar.dumps(document)).polytope
+
+
+def resting(corners, faces, last=4):
+    """A palette that rests from frame 0 to `last`."""
+    n = len(corners)
+    vertices = np.array([[*c, t] for t in (0.0, last) for c in corners])
+    tracks = tuple((i, n + i) for i in range(n))
+    return SkewPolytope(vertices, (Section(0.0, float(last), tracks, faces),), ())
+
+
+@pytest.fixture
+def frames():
+    return stats([mixture(FOUR, i) for i in range(5)])
+
+
+def test_fits_are_the_frames_own_losses(frames):
+    mesh = hull_mesh(0.5 + 0.9 * (FOUR - 0.5))
+    found = quality.report(in_core(resting(mesh.rgb, mesh.faces), frames), frames, OPTIONS)
+    assert [fit.frame for fit in found.fits] == [0, 1, 2, 3, 4]
+    for fit, frame in zip(found.fits, frames, strict=True):
+        assert pytest.approx(palette_loss(frame.colours, mesh.rgb, OPTIONS)) == fit.L
+        assert fit.outside > 0
+    assert max(fit.L for fit in found.fits) == found.worst.L
+    assert found.median_loss == sorted(fit.L for fit in found.fits)[2]
+    assert found.colours == 4
+    assert (found.splits, found.merges) == (0, 0)
+
+
+def test_look_alikes_are_found_and_named(frames):
+    five = np.vstack([FOUR, [0.92, 0.17, 0.2]])
+    mesh = hull_mesh(five)
+    found = quality.report(in_core(resting(mesh.rgb, mesh.faces), frames), frames, OPTIONS)
+    pairs = itertools.combinations(mesh.rgb, 2)
+    assert found.closest[0] == pytest.approx(min(np.linalg.norm(a - b) for a, b in pairs))
+    (text,) = [w for w in found.warnings() if "tell apart" in w]
+    assert found.closest[2] in text
+    assert found.closest[3] in text
+    assert "--separation" in text
+
+
+def test_strands_of_a_split_are_not_look_alikes(frames):
+    """Colour 3 splits at frame 2; its strands are one colour there, and far apart at the end."""
+    mesh = hull_mesh(FOUR)
+    five = hull_mesh(np.vstack([FOUR, [0.7, 0.7, 0.9]]))
+    parent = [int(np.argmin(np.linalg.norm(mesh.rgb - c, axis=1))) for c in five.rgb]
+    extra = int(np.argmax(np.linalg.norm(mesh.rgb[parent] - five.rgb, axis=1)))
+    split = parent[extra] = int(np.argmin(np.linalg.norm(mesh.rgb - FOUR[3], axis=1)))
+    vertices = [[*c, 0.0] for c in mesh.rgb]
+    vertices += [[*mesh.rgb[split], 2.0]]
+    vertices += [[*c, 4.0] for c in five.rgb]
+    early = tuple((i, 4) if i == split else (i, 5 + parent.index(i)) for i in range(4))
+    late = tuple((4 if p == split else p, 5 + i) for i, p in enumerate(parent))
+    polytope = SkewPolytope(
+        np.array(vertices),
+        (Section(0.0, 2.0, early, mesh.faces), Section(3.0, 4.0, late, five.faces)),
+        (Section(2.0, 3.0, late, five.faces),),
+    )
+    found = quality.report(in_core(polytope, frames), frames, OPTIONS)
+    assert (found.splits, found.merges) == (1, 0)
+    assert found.closest[0] > 0.5
+
+
+def test_dents_and_unused_handles_are_found(frames):
+    cube = np.array(list(itertools.product([0.1, 0.9], repeat=3)))
+    mesh = hull_mesh(np.vstack([cube, [0.5, 0.5, 0.95]]))
+    apex = int(np.argmin(np.linalg.norm(mesh.rgb - [0.5, 0.5, 0.95], axis=1)))
+    dented = mesh.rgb.copy()
+    dented[apex, 2] = 0.5  # a pyramid is missing: 1/3 base times 0.4
+    found = quality.report(in_core(resting(dented, mesh.faces), frames), frames, OPTIONS)
+    assert found.dent[0] == pytest.approx((0.8 * 0.8 * 0.4 / 3) / 0.8**3, rel=1e-6)
+    assert any("dented" in w for w in found.warnings())
+
+    far = np.vstack([FOUR * 0.2, [0.9, 0.9, 0.9]])
+    mesh = hull_mesh(far)
+    dark = stats([mixture(FOUR * 0.2, i) for i in range(5)])
+    found = quality.report(in_core(resting(mesh.rgb, mesh.faces), dark), dark, OPTIONS)
+    handle = found.least_used[0]
+    polytope = in_core(resting(mesh.rgb, mesh.faces), dark)
+    at = polytope.vertex_ids.index(handle)
+    np.testing.assert_allclose(polytope.vertices[at, :3], 0.9, atol=1e-9)
+    assert found.least_used[1] < 0.02
+
+
+def test_a_frame_that_fits_badly_is_named():
+    flash = [mixture(0.3 * FOUR, i) for i in range(9)]
+    flash[4] = noise(4)
+    frames = stats(flash)
+    mesh = hull_mesh(0.3 * FOUR)
+    found = quality.report(in_core(resting(mesh.rgb, mesh.faces, 8), frames), frames, OPTIONS)
+    assert found.worst.frame == 4
+    (text,) = [w for w in found.warnings() if "fit" in w]
+    assert "4" in text
+    assert "--frames" in text
+
+
+def test_the_pipeline_reports_and_stores_the_figures():
+    clip = ArrayClip([mixture(FOUR + 0.01 * i, i) for i in range(5)])
+    document, analysis = pipeline.analyze_clip(clip, AnalysisOptions())
+    last = document["quality"]["stages"][-1]
+    for name, value in analysis.report.figures().items():
+        assert last[name] == value
+    assert last["L"] == pytest.approx(np.mean([fit.L for fit in analysis.report.fits]), abs=1e-6)
+    assert last["farthest_frame"] in clip.frames

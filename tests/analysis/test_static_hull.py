@@ -1,0 +1,53 @@
+"""The static hull of section 6.2: one palette that does not move, refined for all frames."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from analysis_frames import constant, mixture, stats
+from palette4d.analysis.frame_hulls import frame_palette
+from palette4d.analysis.losses import palette_loss
+from palette4d.analysis.options import AnalysisOptions
+from palette4d.analysis.static_hull import POOLED_FRAMES, pooled_colours, static_polytope
+
+FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
+LOW, HIGH = np.zeros(3), np.ones(3)
+OPTIONS = AnalysisOptions()
+
+
+def static(frames):
+    palette = frame_palette(pooled_colours(frames, OPTIONS), LOW, HIGH, OPTIONS)
+    return palette, static_polytope(palette, frames, LOW, HIGH, OPTIONS)
+
+
+def test_colours_do_not_move_and_the_loss_falls():
+    frames = stats([mixture(FOUR + 0.02 * i, i) for i in range(6)], first=100)
+    palette, polytope = static(frames)
+    n = len(palette.rgb)
+    assert len(polytope.vertices) == 2 * n
+    np.testing.assert_array_equal(polytope.vertices[:n, :3], polytope.vertices[n:, :3])
+    assert set(polytope.vertices[:n, 3]) == {100}
+    assert set(polytope.vertices[n:, 3]) == {105}
+    assert len(polytope.blocks) == 1
+
+    def loss(rgb):
+        return np.mean([palette_loss(f.coarse, rgb, OPTIONS) for f in frames])
+
+    assert loss(polytope.vertices[:n, :3]) < loss(palette.rgb)
+
+
+def test_pooling_counts_every_pixel():
+    count = 2 * POOLED_FRAMES + 3
+    frames = stats([mixture(FOUR, i) for i in range(count)])
+    pooled = pooled_colours(frames, OPTIONS)
+    assert pooled.total == pytest.approx(600 * count)
+    assert len(pooled) <= OPTIONS.coarse_colours
+
+
+@pytest.mark.parametrize("frames", [1, 3])
+def test_one_colour(frames):
+    statistics = stats([constant([0.3, 0.4, 0.5])] * frames)
+    _, polytope = static(statistics)
+    assert len(polytope.vertices) == min(frames, 2)
+    for vertex in polytope.vertices:
+        np.testing.assert_allclose(vertex[:3], [0.3, 0.4, 0.5], atol=3e-3)
