@@ -250,7 +250,7 @@ def _print_palette(analysis: Analysis) -> None:
     if x.closest:
         distance, frame, one, other = x.closest
         print(f"; nearest {one} and {other}, {distance:.2f} apart at frame {frame}", end="")
-    print(f"; least used {x.least_used[0]}, up to {x.least_used[1]:.1%} of the picture")
+    print(f"\n{'use':<10} least used {x.least_used[0]}, up to {x.least_used[1]:.1%} of the picture")
     print(f"{'shape':<10} deepest dent {x.dent[0]:.2%} of the convex hull, at frame {x.dent[1]}")
 
 

@@ -34,6 +34,8 @@ def test_writes_a_sidecar_and_a_report(clip, tmp_path, capsys):
     printed = capsys.readouterr().out
     for stage in ("frame_hulls", "block_merging", "vertex_removal", "vertex_refinement"):
         assert stage in printed
+    for line in ("fit ", "handles ", "shape ", "seconds "):
+        assert f"\n{line}" in printed
     document = json.loads(out.read_text())
     assert document["clip"]["rate"] == [24000, 1001]
     assert document["clip"]["frames"]["first"] == 1001
@@ -47,6 +49,9 @@ def test_json_report_and_frames(clip, tmp_path, capsys):
     )
     report = json.loads(capsys.readouterr().out)
     assert report["stages"][-1]["stage"] == "vertex_refinement"
+    assert [fit["frame"] for fit in report["frames"]] == [1002, 1004, 1006]
+    assert report["palette"]["worst_frame"] in (1002, 1004, 1006)
+    assert set(report["seconds"]) >= {"statistics", "frame_hulls", "vertex_refinement"}
     frames = json.loads(out.read_text())["clip"]["frames"]
     assert (frames["first"], frames["last"], frames["step"]) == (1002, 1006, 2)
 
@@ -137,3 +142,35 @@ def test_the_source_is_found_from_the_sidecar(clip, tmp_path, monkeypatch):
     assert cli.main(["analyze", str(clip), "-o", "b.p4d.json", "--quiet"]) == 0
     source = json.loads(Path("b.p4d.json").read_text())["clip"]["source"]
     assert source == str(clip / "shot.####.png")
+
+
+@pytest.mark.parametrize("method", ["paper", "static"])
+def test_other_methods(clip, tmp_path, method, capsys):
+    out = tmp_path / f"{method}.p4d.json"
+    assert cli.main(["analyze", str(clip), "-o", str(out), "--method", method]) == 0
+    document = json.loads(out.read_text())
+    assert document["quality"]["options"]["method"] == method
+    assert cli.main(["info", str(out)]) == 0  # one stage or four, the tables are not torn
+    assert max(map(len, capsys.readouterr().out.splitlines())) < 130
+
+
+def test_few_vertices_are_given_when_asked_for(clip, tmp_path):
+    counts = []
+    for wanted in ("0", "10"):
+        out = tmp_path / f"{wanted}.p4d.json"
+        assert cli.main(["analyze", str(clip), "-o", str(out), "--vertices", wanted]) == 0
+        counts.append(len(json.loads(out.read_text())["polytope"]["vertices"]))
+    assert counts[1] <= 10
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [("--method", "magic"), ("--vertices", "-1"), ("--handle-cost", "nan"), ("--blocks", "0")],
+)
+def test_wrong_options_are_wrong_usage(clip, tmp_path, option, value, capsys):
+    out = tmp_path / "never.p4d.json"
+    with pytest.raises(SystemExit) as stop:
+        cli.main(["analyze", str(clip), "-o", str(out), option, value])
+    assert stop.value.code == 2
+    assert option in capsys.readouterr().err
+    assert not out.exists()

@@ -320,10 +320,15 @@ def run_info(args: argparse.Namespace) -> int:
     return 0
 
 
+STAGE_FIGURES = ("vertices", "blocks", "R", "C", "L", "K", "L_prime", "outside", "max_distance")
+
+
 def _print_stages(stages: list[dict[str, Any]]) -> None:
+    """Print what the stages have in common as a table, and what one of them says alone below."""
     if not stages:
         return
-    names = list(dict.fromkeys(name for stage in stages for name in stage if name != "stage"))
+    every = dict.fromkeys(name for stage in stages for name in stage if name != "stage")
+    names = [n for n in every if n in STAGE_FIGURES or sum(n in stage for stage in stages) > 1]
     rows = [["stage", *names]]
     for stage in stages:
         cells = [stage.get(name, "") for name in names]
@@ -334,6 +339,12 @@ def _print_stages(stages: list[dict[str, Any]]) -> None:
         cells = [row[0].ljust(widths[0])]
         cells += [cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True)]
         print("  ".join(cells).rstrip())
+    alone = {n: v for stage in stages for n, v in stage.items() if n not in (*names, "stage")}
+    if alone:
+        wide = max(map(len, alone))
+        print()
+        for name, value in alone.items():
+            print(f"{name.ljust(wide)}  {_cell(value)}")
 
 
 def _cell(value: Any) -> str:
