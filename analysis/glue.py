@@ -41,11 +41,13 @@ class Glue:
     links : (i, j) pairs, colour i of the first palette to colour j of the second, sorted.
     broken : how many intra-frame edges break topological rule 2 (0 wherever possible).
     consistent : all one-to-one and the same connectivity (section 5.3).
+    complete : whether the search saw every solution; else the links are the best that it met.
     """
 
     links: tuple[tuple[int, int], ...]
     broken: int
     consistent: bool
+    complete: bool = True
 
 
 def glue(first: Palette, second: Palette) -> Glue:
@@ -57,17 +59,21 @@ def glue(first: Palette, second: Palette) -> Glue:
         return Glue(links, 0, n == m and _same_topology(first, second, links))
     hull = hull_pairs(first.rgb, second.rgb)
     everything = np.ones_like(hull)
-    found = _Search(first, second, distance, hull, strict=True).run()
+    search = _Search(first, second, distance, hull, strict=True)
+    found = search.run()
     bound = np.inf if found is None else sum(float(distance[i, j]) for i, j in found[0])
-    shorter = _Search(first, second, distance, everything, strict=True, bound=bound).run()
-    found = shorter or found
+    wider = _Search(first, second, distance, everything, strict=True, bound=bound)
+    found = wider.run() or found
+    complete = search.complete and wider.complete
     if found is not None:
-        return Glue(found[0], 0, n == m and _same_topology(first, second, found[0]))
-    found = _Search(first, second, distance, everything, strict=False).run()
+        same = n == m and _same_topology(first, second, found[0])
+        return Glue(found[0], 0, same, complete)
+    looser = _Search(first, second, distance, everything, strict=False)
+    found = looser.run()
     if found is None:
         links = _nearest_links(distance)
         found = links, _broken_edges(first, second, links)
-    return Glue(found[0], found[1], False)
+    return Glue(found[0], found[1], False, complete and looser.complete)
 
 
 def one_to_one(count: int) -> tuple[tuple[int, int], ...]:
@@ -119,6 +125,7 @@ class _Search:
         self.best_links: tuple[tuple[int, int], ...] | None = None
         self.best_broken = 0
         self.nodes = 0
+        self.complete = True
 
     def _choices(self, v: int, allowed: Bool) -> list[tuple[float, tuple[int, ...]]]:
         """Sets of one to three colours that v may link to; topological rule 1 within each set."""
@@ -165,6 +172,7 @@ class _Search:
     def _descend(self, at: int, cost: float, broken: int) -> None:
         self.nodes += 1
         if self.nodes > MOST_NODES and (self.best_links is not None or self.nodes > 2 * MOST_NODES):
+            self.complete = False
             return
         if at == self.n:
             if not all(self.users):  # inter-degree rule 1

@@ -196,14 +196,19 @@ class _Glued:
         return dataclasses.replace(polytope, transitions=tuple(transitions))
 
     def remarks(self) -> tuple[str, ...]:
-        broken = sum(g.broken > 0 for g in self.between)
-        if not broken:
-            return ()
+        out = []
         boundaries = counted(len(self.between), "block boundary", "block boundaries")
-        return (
-            f"at {broken} of {boundaries} no set of edges obeys topological rule 2; "
-            "the mesh between the two frames is the nearest one",
-        )
+        if broken := sum(g.broken > 0 for g in self.between):
+            out.append(
+                f"at {broken} of {boundaries} no set of edges obeys topological rule 2; "
+                "the mesh between the two frames is the nearest one"
+            )
+        if cut := sum(not g.complete for g in self.between):
+            out.append(
+                f"at {cut} of {boundaries} the search for edges was ended early; a smaller "
+                "--palette-size lets it see every solution"
+            )
+        return tuple(out)
 
 
 class _Static(_Road):

@@ -135,3 +135,14 @@ def test_palettes_of_one_and_two_colours(n, m):
     faces = transition_faces(first, second, found.links)
     assert closed(faces)
     assert len(faces) == (12 if max(n, m) == 8 else 0)
+
+
+def test_a_search_that_is_ended_early_says_so(monkeypatch):
+    first = solid(1, 8)
+    second = hull_mesh(first.rgb + np.random.default_rng(2).normal(0, 0.05, first.rgb.shape))
+    assert glue(first, second).complete
+    monkeypatch.setattr("palette4d.analysis.glue.MOST_NODES", 3)
+    cut = glue(first, second)
+    assert not cut.complete
+    assert {i for i, _ in cut.links} == set(range(len(first.rgb)))  # links all the same
+    assert {j for _, j in cut.links} == set(range(len(second.rgb)))
