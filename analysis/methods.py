@@ -21,6 +21,7 @@ from palette4d.analysis import (
     frame_hulls,
     glue,
     handle_removal,
+    rgbt_hull,
     static_hull,
     statistics,
     vertex_refinement,
@@ -42,6 +43,7 @@ F64 = NDArray[np.float64]
 STAGES = (
     "statistics",
     "static_hull",
+    "rgbt_hull",
     "frame_hulls",
     "glue",
     "block_merging",
@@ -94,7 +96,12 @@ def analyze(
     frames: list[FrameStatistics], options: AnalysisOptions, progress: Progress | None = None
 ) -> Analysis:
     """Run `options.method` on the frames' statistics (at least one frame, in order of time)."""
-    roads: dict[str, type[_Road]] = {"skew": _Skew, "paper": _Paper, "static": _Static}
+    roads: dict[str, type[_Road]] = {
+        "skew": _Skew,
+        "paper": _Paper,
+        "static": _Static,
+        "rgbt": _Rgbt,
+    }
     return roads[options.method](frames, options, progress).run()
 
 
@@ -217,6 +224,22 @@ class _Static(_Road):
     def run(self) -> Analysis:
         polytope = self.static()
         self.measure("static_hull", polytope)
+        return Analysis(polytope, tuple(self.stages), ())
+
+
+class _Rgbt(_Road):
+    """The simplified convex hull in RGB and time (section 6.2)."""
+
+    def run(self) -> Analysis:
+        polytope = rgbt_hull.rgbt_polytope(
+            self.frames,
+            self.low,
+            self.high,
+            self.options,
+            self.options.vertices or rgbt_hull.VERTICES,
+            self.counter("rgbt_hull"),
+        )
+        self.measure("rgbt_hull", polytope)
         return Analysis(polytope, tuple(self.stages), ())
 
 

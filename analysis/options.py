@@ -11,6 +11,7 @@ METHODS = {
     "skew": "a 4D skew polytope; its structure by what each handle is worth (the default)",
     "paper": "the same by the paper's own rules, eta1 and eta2",
     "static": "one palette for the whole clip, the static RGB hull of section 6.2",
+    "rgbt": "the simplified convex hull in RGB and time of section 6.2",
 }
 
 

@@ -13,4 +13,5 @@ PYBIND11_MODULE(_core, module) {
     bind_mvc(module);
     bind_recolour(module);
     bind_analysis(module);
+    bind_rgbt(module);
 }

@@ -194,3 +194,11 @@ def test_bad_arguments_are_refused():
         _core.palette_loss(tree([[0, 0, 0]]), np.zeros((0, 3)), NO_FACES, WEIGHTS)
     with pytest.raises(ValueError, match="face"):
         _core.palette_loss(tree([[0, 0, 0]]), BOX, np.array([[0, 1, 99]]), WEIGHTS)
+
+
+def test_a_colour_in_the_plane_of_several_facets_is_not_outside():
+    """Rounding puts it above a facet whose triangle is elsewhere: it used to count as far away."""
+    a = 0.9999999999999997
+    palette = [[a, 0.9937, a], [1, 0.3645, 0.0069], [1, 0.3586, 0.0204], [a, 1, a], [1, 1, 0.0204]]
+    palette += [[1, 0.9996, 0.0069], [0, 0, 0], [0, 1, 0], [0, 0, 1]]
+    assert loss([[1, 0.498, 0.0588]], palette)["R"] < 1e-9

@@ -144,7 +144,7 @@ def test_the_source_is_found_from_the_sidecar(clip, tmp_path, monkeypatch):
     assert source == str(clip / "shot.####.png")
 
 
-@pytest.mark.parametrize("method", ["paper", "static"])
+@pytest.mark.parametrize("method", ["paper", "static", "rgbt"])
 def test_other_methods(clip, tmp_path, method, capsys):
     out = tmp_path / f"{method}.p4d.json"
     assert cli.main(["analyze", str(clip), "-o", str(out), "--method", method]) == 0

@@ -190,3 +190,11 @@ class PolytopeLoss:
 
 def progressive_hull(rgb: ArrayLike, faces: ArrayLike, target: int) -> F64:
     """Simplify a closed convex mesh, (n, 3) and (f, 3), to at most `target` enclosing vertices."""
+
+def progressive_hull_nd(
+    points: ArrayLike, simplices: ArrayLike, target: int, limits: ArrayLike
+) -> F64:
+    """Simplify a convex hull in 2, 3 or 4 dimensions to at most `target` enclosing vertices.
+
+    (n, d) points, (m, d) facets, (l, d + 1) limits a, b on new vertices: a . x >= b.
+    """

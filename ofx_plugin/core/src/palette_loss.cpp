@@ -14,7 +14,9 @@ void add(Vec3& a, double s, const Vec3& b) {
     for (int c = 0; c < 3; ++c) a[c] += s * b[c];
 }
 
-constexpr double kFlat = 1e-9;  // a vertex this close to a plane counts as in it
+// A vertex or colour this close to a plane counts as in it. By rounding, a colour in the plane of
+// several facets may lie above one whose triangle is elsewhere.
+constexpr double kFlat = 1e-9;
 
 /// A supporting triangle with what a closest point needs: its plane, and its barycentric
 /// coordinates as linear functions of the colour (of corners 1 and 2; corner 0 takes the rest).
@@ -160,7 +162,7 @@ private:
                 double high = facet.offset;
                 for (int c = 0; c < 3; ++c)
                     high += std::max(facet.normal[c] * node.high[c], facet.normal[c] * node.low[c]);
-                if (high > 0) facets.push_back(f);
+                if (high > kFlat) facets.push_back(f);
             }
             if (facets.empty()) return;
         } else {
@@ -206,9 +208,9 @@ private:
                 highest[i] = std::max(highest[i], h[i]);
                 above = std::max(above, h[i]);
             }
-            if (above <= 0) continue;
+            if (above <= kFlat) continue;
             for (int i = 0; i < n; ++i) {
-                if (h[i] <= 0 || on_facet[i]) continue;
+                if (h[i] <= kFlat || on_facet[i]) continue;
                 const Vec3 p{x[i], y[i], z[i]};
                 const double b = dot(f.slope[0], p) + f.start[0];
                 const double c = dot(f.slope[1], p) + f.start[1];
@@ -222,12 +224,12 @@ private:
             }
         }
         for (int i = 0; i < n; ++i) {
-            if (highest[i] <= 0 || on_facet[i]) continue;
+            if (highest[i] <= kFlat || on_facet[i]) continue;
             const Vec3 p{x[i], y[i], z[i]};
             Closest best;
             for (int index : facets) {
                 const Facet& f = hull_.facets[index];
-                if (dot(f.normal, p) + f.offset <= 0) continue;
+                if (dot(f.normal, p) + f.offset <= kFlat) continue;
                 for (int e = 0; e < 3; ++e) try_segment(p, v_, f.at[e], f.at[(e + 1) % 3], best);
             }
             if (best.d2 > 0) add_colour(count[i], p, best, std::sqrt(best.d2));

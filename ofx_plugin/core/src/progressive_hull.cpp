@@ -2,108 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
-#include <optional>
 #include <queue>
 #include <set>
 #include <stdexcept>
 
+#include "linear_program.hpp"
 #include "vec3.hpp"
 
 namespace palette4d {
 namespace {
 
-constexpr double kBound = 4;      // new vertices stay within [-kBound, 1 + kBound]
-constexpr double kSlack = 1e-10;  // a constraint met this closely counts as met
-
-/// a . x >= b
-template <int N>
-struct HalfSpace {
-    std::array<double, N> a;
-    double b;
-};
-
-/// Seidel's incremental linear program: minimise c . x over the half-spaces, within a box.
-/// Constraints are taken in the given order; when one is violated, the optimum lies on its
-/// boundary, which is a program of one dimension less.
-template <int N>
-std::optional<std::array<double, N>> minimise(const std::array<double, N>& c,
-                                              const std::vector<HalfSpace<N>>& constraints,
-                                              const std::array<double, N>& low,
-                                              const std::array<double, N>& high);
-
-template <>
-std::optional<std::array<double, 1>> minimise<1>(const std::array<double, 1>& c,
-                                                 const std::vector<HalfSpace<1>>& constraints,
-                                                 const std::array<double, 1>& low,
-                                                 const std::array<double, 1>& high) {
-    double lo = low[0], hi = high[0];
-    for (const auto& h : constraints) {
-        if (std::abs(h.a[0]) < 1e-13) {
-            if (h.b > kSlack) return std::nullopt;
-        } else if (h.a[0] > 0) {
-            lo = std::max(lo, h.b / h.a[0]);
-        } else {
-            hi = std::min(hi, h.b / h.a[0]);
-        }
-    }
-    if (lo > hi + kSlack) return std::nullopt;
-    return std::array<double, 1>{c[0] >= 0 ? lo : hi};
-}
-
-template <int N>
-std::optional<std::array<double, N>> minimise(const std::array<double, N>& c,
-                                              const std::vector<HalfSpace<N>>& constraints,
-                                              const std::array<double, N>& low,
-                                              const std::array<double, N>& high) {
-    std::array<double, N> x;
-    for (int i = 0; i < N; ++i) x[i] = c[i] >= 0 ? low[i] : high[i];
-    for (std::size_t m = 0; m < constraints.size(); ++m) {
-        const auto& h = constraints[m];
-        double value = -h.b;
-        for (int i = 0; i < N; ++i) value += h.a[i] * x[i];
-        if (value >= -kSlack) continue;
-        // Eliminate the variable with the largest coefficient: x_e = (b - sum a_i x_i) / a_e.
-        int e = 0;
-        for (int i = 1; i < N; ++i)
-            if (std::abs(h.a[i]) > std::abs(h.a[e])) e = i;
-        if (std::abs(h.a[e]) < 1e-13) return std::nullopt;
-        auto project = [&](const std::array<double, N>& a, double b) {
-            HalfSpace<N - 1> out;
-            const double s = a[e] / h.a[e];
-            for (int i = 0, j = 0; i < N; ++i)
-                if (i != e) out.a[j++] = a[i] - s * h.a[i];
-            out.b = b - s * h.b;
-            return out;
-        };
-        std::vector<HalfSpace<N - 1>> rest;
-        for (std::size_t q = 0; q < m; ++q)
-            rest.push_back(project(constraints[q].a, constraints[q].b));
-        std::array<double, N> unit{};
-        unit[e] = 1;
-        rest.push_back(project(unit, low[e]));
-        unit[e] = -1;
-        rest.push_back(project(unit, -high[e]));
-        const HalfSpace<N - 1> objective = project(c, 0);
-        std::array<double, N - 1> sublow, subhigh;
-        for (int i = 0, j = 0; i < N; ++i)
-            if (i != e) {
-                sublow[j] = low[i];
-                subhigh[j++] = high[i];
-            }
-        const auto sub_x = minimise<N - 1>(objective.a, rest, sublow, subhigh);
-        if (!sub_x) return std::nullopt;
-        double sum = h.b;
-        for (int i = 0, j = 0; i < N; ++i)
-            if (i != e) {
-                x[i] = (*sub_x)[j++];
-                sum -= h.a[i] * x[i];
-            }
-        x[e] = sum / h.a[e];
-    }
-    return x;
-}
+constexpr double kBound = 4;  // new vertices stay within [-kBound, 1 + kBound]
 
 class Mesh {
 public:
