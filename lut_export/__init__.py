@@ -1,5 +1,8 @@
-"""Baking: the edit at one time as a lookup table that any OpenColorIO host reads.
+"""Exports: the edit as files that other programs read, each with its distance from the edit stated.
 
-`lattice` samples the edit, `formats` writes it through OpenColorIO, `bake` joins the two and states
-the error of what was written. Sidecars are read through `palette4d._core` only.
+    sidecar -> frame_edit -> shaper, lattice (or cdl) -> writers, formats -> reading -> error
+
+`bake` walks that road for one file, `series` for many frames, `config` for the shots of a show;
+`cli`, `series_cli` and `config_cli` are their verbs. Sidecars are read through `palette4d._core`
+only.
 """

@@ -1,16 +1,12 @@
-"""Bake an edit at one time into a LUT file and state the error of that file.
+"""Bake an edit at one time into a file and state the error of that file.
 
-The error is |a - b| per channel, where a is what OpenColorIO makes of a colour with the file read
-back and b what the core makes of it exactly: mean and largest, over the clip's own colours at that
-time and over the midpoints of the lattice's cells. It therefore contains everything: interpolation,
-the rounding of the file's numbers, and the clamping of colours outside the table's domain.
+`frame_edit` says what the edit does, `shaper` and `lattice` sample it (or `cdl` fits it), `writers`
+and `formats` make a file of it, `reading` reads that back and `error` compares it with the edit.
 """
 
 import hashlib
 import uuid
-from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
-from decimal import ROUND_CEILING, Decimal
 from pathlib import Path
 from typing import Any
 
@@ -18,64 +14,59 @@ import numpy as np
 from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.errors import Palette4dError
+from palette4d.lut_export import cdl as cdls
 from palette4d.lut_export import lattice as lattices
-from palette4d.lut_export.formats import Description, LoadedLut, LutFormat, format_of
+from palette4d.lut_export import shaper as shapers
+from palette4d.lut_export.colour_difference import Viewing, viewing_of
+from palette4d.lut_export.error import Figures, Measure, measure, stated
+from palette4d.lut_export.formats import LutFormat, format_of, with_shaper
+from palette4d.lut_export.frame_edit import FrameEdit, frame_edit, frame_text
+from palette4d.lut_export.reading import LoadedLut, load
+from palette4d.lut_export.shaper import Shaper
+from palette4d.lut_export.writers import Description
 from palette4d.replacing import refuse_existing, replacing
 
 F32 = NDArray[np.float32]
 
-#: Colours that are measured at a time: bounds the memory that a 4K frame or a size of 129 takes.
-CHUNK = 1 << 20
-
 #: The namespace of the tables' ids (RFC 9562, version 5), drawn once for this project.
 NAMESPACE = uuid.UUID("09823ba4-0bc8-43a9-995d-cb9a6abeb5b3")
+
+#: The relative error up to which a table serves for previews.
+PREVIEW_TIER = 0.002
 
 
 @dataclass(frozen=True)
 class BakeOptions:
-    """What to bake: the frame number (real), the lattice's size 2..129, the strength 0..1."""
+    """What to bake.
+
+    Attributes
+    ----------
+    frame : float
+        The time, a frame number.
+    size : int
+        Samples a side, 2..129.
+    strength : float
+        0..1, as in the node.
+    format : str or None
+        A name of `formats.FORMATS`; None: by the extension.
+    shaper : {"auto", "none", "linear", "log"}
+        See `shaper.choose`.
+    domain : (low, high) or None
+        What the shaper covers; None: the frame's colours and the palette's.
+    max_error : float or None
+        The lattice is made larger until the file's error (`BakeResult.error`) is at most this.
+    threads : int
+        0: one a processor; the files do not depend on it.
+    """
 
     frame: float
     size: int = 33
     strength: float = 1.0
-
-
-@dataclass(frozen=True)
-class Difference:
-    """|a - b| over a set of colours.
-
-    Attributes
-    ----------
-    interpolation : str
-        How the file was read.
-    mean, largest : float
-        Over all channels of all colours.
-    """
-
-    interpolation: str
-    mean: float
-    largest: float
-
-
-@dataclass(frozen=True)
-class Measure:
-    """The error over one set of colours.
-
-    Attributes
-    ----------
-    colours : int
-        How many colours were compared.
-    outside_domain : float
-        Share of colours with a channel outside 0..1, which a table without shaper clamps.
-    mean, largest : float
-        Of the worst of `by_interpolation`: holds however a host reads the file.
-    """
-
-    colours: int
-    outside_domain: float
-    mean: float
-    largest: float
-    by_interpolation: tuple[Difference, ...]
+    format: str | None = None
+    shaper: str = "auto"
+    domain: tuple[float, float] | None = None
+    max_error: float | None = None
+    threads: int = 0
 
 
 @dataclass(frozen=True)
@@ -84,210 +75,181 @@ class BakeResult:
 
     Attributes
     ----------
-    midpoints : Measure
-        On the midpoints of the lattice's cells.
+    format : str
+        A name of `formats.FORMATS`.
+    size : int or None
+        Samples a side; None for a CDL.
+    shaper : Shaper
+        With the domain outside of which the file clamps.
+    palette : (low, high)
+        The smallest and largest number of the palette's colours, at any time.
+    cdl : Cdl or None
+        What was fitted, for a CDL.
+    identity : bool
+        Nothing is edited at that time.
+    viewing : str
+        How colours were taken for deltaE.
+    grid : Measure
+        On the dense grid over the domain.
     clip : Measure or None
         On the colours of the clip's frame; None without one.
     clip_frame : int or None
         The frame of the clip that was measured (the nearest to a fractional time).
-    identity : bool
-        Nothing is edited at that time.
+    error : float
+        The largest relative error on the clip's colours, or on the dense grid without a clip: what
+        ``max_error`` and the preview tier are compared with.
     """
 
     output: str
     format: str
+    title: str
     id: str
     sidecar: str
     sidecar_sha256: str
     clip_name: str
     encoding: str
     frame: float
-    size: int
+    size: int | None
     strength: float
-    domain: tuple[float, float]
+    shaper: Shaper
+    palette: tuple[float, float]
+    cdl: cdls.Cdl | None
     rounding: str
     identity: bool
-    midpoints: Measure
+    viewing: str
+    grid: Measure
     clip: Measure | None
     clip_frame: int | None
+    error: float
+    preview_tier: bool
 
     def as_json(self) -> dict[str, Any]:
         """Return the result as plain JSON values."""
         return asdict(self)
 
 
-class _Sums:
-    """Running mean and maximum of |a - b| for each interpolation."""
-
-    def __init__(self, tables: dict[str, LoadedLut]) -> None:
-        self.tables = tables
-        self.total = dict.fromkeys(tables, 0.0)
-        self.largest = dict.fromkeys(tables, 0.0)
-        self.colours = 0
-        self.outside = 0
-
-    def add(self, colours: F32, exact: F32) -> None:
-        """Compare (h, w, 3) colours with their exact replacements."""
-        self.colours += colours[..., 0].size
-        self.outside += int(np.count_nonzero(((colours < 0) | (colours > 1)).any(axis=-1)))
-        for name, table in self.tables.items():
-            difference = np.abs(table.apply(colours).astype(np.float64) - exact)
-            self.total[name] += float(difference.sum())
-            self.largest[name] = max(self.largest[name], float(difference.max()))
-
-    def measure(self) -> Measure:
-        """Return the figures."""
-        differences = tuple(
-            Difference(name, self.total[name] / (3 * self.colours), self.largest[name])
-            for name in self.tables
-        )
-        return Measure(
-            colours=self.colours,
-            outside_domain=self.outside / self.colours,
-            mean=max(d.mean for d in differences),
-            largest=max(d.largest for d in differences),
-            by_interpolation=differences,
-        )
-
-
-def measure(
-    pieces: Iterable[F32],
-    tables: dict[str, LoadedLut],
-    recolourer: _core.Recolourer,
-    strength: float,
-) -> Measure | None:
-    """Compare tables with the exact core on (h, w, 3) float32 pieces; None without any colour.
-
-    Colours with a NaN or an infinity are left out: no table holds them.
-    """
-    sums = _Sums(tables)
-    for piece in pieces:
-        finite = np.isfinite(piece).all(axis=-1)
-        colours = piece if finite.all() else np.ascontiguousarray(piece[finite][None])
-        if colours.size:
-            sums.add(colours, recolourer.apply(colours, strength=strength, threads=0))
-    return sums.measure() if sums.colours else None
-
-
-def _midpoint_pieces(size: int) -> Iterator[F32]:
-    channel = lattices.midpoints(size)
-    step = max(1, CHUNK // max(1, channel.size**2))
-    for first in range(0, channel.size, step):
-        yield lattices.grid(channel, slice(first, first + step))
-
-
-def _image_pieces(image: NDArray[Any]) -> Iterator[F32]:
-    rows = max(1, CHUNK // max(1, image.shape[1]))
-    for first in range(0, image.shape[0], rows):
-        yield np.ascontiguousarray(image[first : first + rows, :, :3], dtype=np.float32)
-
-
-def frame_text(frame: float) -> str:
-    """Return a frame number without needless decimals: 24, 24.5."""
-    return f"{frame:.15g}"
-
-
-def stated(value: float) -> str:
-    """Return an error with three significant digits, rounded up: what is stated must hold.
-
-    >>> stated(0.0123401), stated(0.0), stated(0.5)
-    ('0.0124', '0', '0.5')
-    """
-    if value <= 0:
-        return "0"
-    exact = Decimal(value)
-    step = Decimal(1).scaleb(exact.adjusted() - 2)
-    return f"{float(exact.quantize(step, rounding=ROUND_CEILING)):.3g}"
-
-
-def table_id(sidecar_sha256: str, options: BakeOptions) -> str:
-    """Return the URN of a table: the same for the same sidecar, frame, size and strength."""
-    content = f"{sidecar_sha256} {options.frame!r} {options.size} {options.strength!r}"
-    return uuid.uuid5(NAMESPACE, content).urn
-
-
-def check_options(options: BakeOptions, polytope: _core.Polytope, name: str) -> None:
-    """Refuse what cannot be baked.
+def check_target(path: Path, force: bool) -> None:
+    """Refuse a file that may not be written; see `replacing.refuse_existing`.
 
     Raises
     ------
     Palette4dError
-        The size, the strength or the frame is out of range.
+        Also when `path` is a device or a pipe, which a file would replace.
     """
-    lattices.check_size(options.size)
-    if not 0 <= options.strength <= 1:
-        raise Palette4dError(f"strength {options.strength} is not possible; expected 0 to 1")
-    first, last = polytope.first_frame, polytope.last_frame
-    if not first <= options.frame <= last:
+    if path.exists() and not path.is_file() and not path.is_dir():
         raise Palette4dError(
-            f"frame {frame_text(options.frame)} is outside the clip {name!r}; expected a time from "
-            f"{frame_text(first)} to {frame_text(last)} (fractions are allowed)"
+            f"{path}: found a device or a pipe, expected a file name; use `-o - --format …` and "
+            "let the shell lead the output there"
+        )
+    refuse_existing(path, force)
+
+
+def check_options(options: BakeOptions, format_: LutFormat, sidecar: _core.Sidecar) -> None:
+    """Refuse what cannot be baked, before any frame is read.
+
+    Raises
+    ------
+    Palette4dError
+        Time, size, strength, shaper or domain are out of range or do not go with the format.
+    """
+    frame_edit(sidecar, options.frame, options.strength)
+    if format_.is_cdl:
+        return
+    lattices.check_size(options.size)
+    format_.check_size(options.size)
+    if options.domain is not None:
+        shapers.Shaper("linear", *options.domain)
+        if options.shaper == "none" or not format_.shaper:
+            # Says why the two do not go together.
+            _check_shaper(shapers.Shaper("none", *options.domain), format_)
+    if options.shaper in ("linear", "log"):
+        _check_shaper(shapers.Shaper("log", *(options.domain or (0, 1))), format_)
+
+
+def _check_shaper(shaper: Shaper, format_: LutFormat) -> None:
+    if shaper.kind != "none" and not format_.shaper:
+        raise Palette4dError(
+            f"{format_.title} cannot hold a shaper; choose one of {with_shaper()}, or --shaper none"
         )
 
 
-def _error_lines(midpoints: Measure, clip: Measure | None, clip_frame: int | None) -> list[str]:
-    lines = [
-        f"error |a-b| on the midpoints of the lattice's cells: mean {stated(midpoints.mean)}, "
-        f"largest {stated(midpoints.largest)}"
-    ]
-    if clip is not None:
-        lines.insert(
-            0,
-            f"error |a-b| on the clip's colours at frame {clip_frame}: mean {stated(clip.mean)}, "
-            f"largest {stated(clip.largest)}",
-        )
-    return lines
+def choose_shaper(
+    options: BakeOptions, format_: LutFormat, polytope: _core.Polytope, image: F32 | None
+) -> Shaper:
+    """Return the shaper that the options and the colours ask for.
+
+    The frame's colours decide whether one is needed; where it is, it covers the palette's, too, so
+    that the tables of one clip resemble each other. Without a frame the palette decides.
+    """
+    if options.domain is not None:
+        kind = "log" if options.shaper == "auto" else options.shaper
+        return shapers.Shaper(kind, *options.domain)  # type: ignore[arg-type]
+    low, high = _palette_range(polytope)
+    if image is not None:
+        finite = image[..., :3][np.isfinite(image[..., :3])]
+        if not finite.size or (finite.min() >= 0 and finite.max() <= 1):
+            low, high = 0.0, 1.0
+        else:
+            low, high = min(low, float(finite.min())), max(high, float(finite.max()))
+    if options.shaper == "auto" and not format_.shaper:
+        return shapers.UNSHAPED
+    most = shapers.LARGEST
+    return shapers.choose(options.shaper, max(low, -most), min(high, most))
 
 
-def _describe(
-    sidecar: _core.Sidecar,
-    sidecar_sha256: str,
-    options: BakeOptions,
-    format_: LutFormat,
-    errors: tuple[Measure, Measure | None, int | None] | None,
-) -> Description:
-    clip = sidecar.clip
-    encoding = clip["encoding"] or "the clip's own encoding"
-    frame = frame_text(options.frame)
-    info: dict[str, Any] = {
-        "Clip": clip["name"],
-        "Frame": frame,
-        "Strength": repr(options.strength),
-        "Encoding": encoding,
-        "SidecarSha256": sidecar_sha256,
-        "Domain": "0 1",
-    }
-    lines = [
-        f"clip {clip['name']}, frame {frame}, strength {options.strength:g}, "
-        f"lattice {options.size}",
-        f"sidecar sha256 {sidecar_sha256}",
-    ]
-    if errors is not None:
-        midpoints, on_clip, clip_frame = errors
-        lines += _error_lines(midpoints, on_clip, clip_frame)
-        lines.append(f"errors hold for {' and '.join(format_.interpolations)} interpolation")
-        info["Error"] = {
-            "MidpointsMean": stated(midpoints.mean),
-            "MidpointsLargest": stated(midpoints.largest),
-        }
-        if on_clip is not None:
-            info["Error"] |= {
-                "ClipFrame": clip_frame,
-                "ClipMean": stated(on_clip.mean),
-                "ClipLargest": stated(on_clip.largest),
-            }
-    return Description(
-        identifier=table_id(sidecar_sha256, options),
-        name=f"palette4d {clip['name']} frame {frame}",
-        lines=tuple(lines),
-        input_space=encoding,
-        output_space=encoding,
-        info={"AppRelease": f"palette4d {_core.__version__}", "Palette4D": info},
-    )
+def _palette_range(polytope: _core.Polytope) -> tuple[float, float]:
+    colours = polytope.vertices[:, :3]
+    return float(colours.min()), float(colours.max())
 
 
-def _load(path: Path, format_: LutFormat) -> dict[str, LoadedLut]:
-    return {name: LoadedLut(path, name) for name in format_.interpolations}
+@dataclass(frozen=True)
+class _Job:
+    """What stays the same while a lattice grows."""
+
+    sidecar: _core.Sidecar
+    sidecar_sha256: str
+    options: BakeOptions
+    format: LutFormat
+    edit: FrameEdit
+    shaper: Shaper
+    viewing: Viewing
+    image: F32 | None
+    image_frame: int | None
+
+    def measures(self, readers: dict[str, LoadedLut]) -> tuple[Measure, Measure | None]:
+        """Compare a file that was read on the dense grid and on the clip's colours."""
+        domain = (self.shaper.low, self.shaper.high)
+        threads = self.options.threads
+        dense = lattices.dense_grid(self.shaper)
+        grid = measure(dense, readers, self.edit, self.viewing, domain, threads)
+        assert grid is not None  # the grid's colours are finite
+        if self.image is None:
+            return grid, None
+        return grid, measure(self.image, readers, self.edit, self.viewing, domain, threads)
+
+
+@dataclass(frozen=True)
+class _Content:
+    """What a file holds: a table or a CDL."""
+
+    lattice: lattices.Lattice | None
+    cdl: cdls.Cdl | None
+
+    def identifier(self, job: _Job) -> str:
+        """Return the URN of the content: the same for the same table of the same sidecar."""
+        numbers = repr(self.cdl).encode() if self.lattice is None else self.lattice.values.tobytes()
+        made_from = f"{job.sidecar_sha256} {job.options.frame!r} {job.options.strength!r}"
+        content = hashlib.sha256(f"{made_from} {job.shaper!r} ".encode() + numbers)
+        return uuid.uuid5(NAMESPACE, content.hexdigest()).urn
+
+    def text(self, job: _Job, description: Description) -> str:
+        """Return the file's text."""
+        if self.lattice is None:
+            assert self.cdl is not None
+            shot = f"{job.sidecar.clip['name']}.{frame_text(job.options.frame)}"
+            return cdls.write(self.cdl, job.format.name, shot, description)
+        assert job.format.write is not None
+        return job.format.write(self.lattice, description)
 
 
 def bake(
@@ -306,11 +268,11 @@ def bake(
     sidecar_path : Path
         The sidecar.
     output : Path
-        The file; its extension chooses the format.
+        The file; its extension chooses the format unless the options do.
     options : BakeOptions
-        Time, size and strength.
+        Time, size, strength, shaper and how large an error may be.
     image : (h, w, 3 or 4) float array, optional
-        The clip's frame at that time, to measure the error on.
+        The clip's frame at that time, to choose a shaper by and to measure the error on.
     image_frame : int, optional
         The number of that frame.
     force : bool
@@ -319,67 +281,189 @@ def bake(
     Returns
     -------
     BakeResult
-        The figures hold for the file as OpenColorIO reads it back.
+        The figures hold for the file as OpenColorIO reads it back. The same arguments give the same
+        bytes.
 
     Raises
     ------
     SidecarError
         The sidecar is unusable.
     Palette4dError
-        The frame, size, strength, extension or output cannot be used; nothing was written.
+        The options or the output cannot be used, or the error stays above ``options.max_error``;
+        nothing was written.
     """
-    format_ = format_of(output)
-    refuse_existing(output, force)
+    format_ = format_of(output, options.format)
+    check_target(output, force)
     sidecar = _core.read_sidecar(str(sidecar_path))
-    check_options(options, sidecar.polytope, sidecar.clip["name"])
-    sidecar_sha256 = hashlib.sha256(sidecar_path.read_bytes()).hexdigest()
-    recolourer = lattices.recolourer_at(sidecar, options.frame)
-    table = lattices.build(recolourer, options.size, strength=options.strength)
-
+    check_options(options, format_, sidecar)
+    colours = None if image is None else np.asarray(image[..., :3], dtype=np.float32)
+    shaper = shapers.UNSHAPED
+    if not format_.is_cdl:
+        shaper = choose_shaper(options, format_, sidecar.polytope, colours)
+    job = _Job(
+        sidecar=sidecar,
+        sidecar_sha256=hashlib.sha256(sidecar_path.read_bytes()).hexdigest(),
+        options=options,
+        format=format_,
+        edit=frame_edit(sidecar, options.frame, options.strength),
+        shaper=shaper,
+        viewing=viewing_of(sidecar.clip["encoding"]),
+        image=colours,
+        image_frame=image_frame,
+    )
     with replacing(output, force=force) as temporary:
-        # Written twice: the second time with the error of the first, whose numbers are the same.
-        description = _describe(sidecar, sidecar_sha256, options, format_, None)
-        temporary.write_text(format_.write(table, description), encoding="utf-8", newline="\n")
-        tables = _load(temporary, format_)
-        midpoints = measure(_midpoint_pieces(options.size), tables, recolourer, options.strength)
-        assert midpoints is not None  # a lattice has at least one cell
-        on_clip = None
-        if image is not None:
-            on_clip = measure(_image_pieces(image), tables, recolourer, options.strength)
-
-        errors = (midpoints, on_clip, image_frame)
-        description = _describe(sidecar, sidecar_sha256, options, format_, errors)
-        temporary.write_text(format_.write(table, description), encoding="utf-8", newline="\n")
-        _check_same(_load(temporary, format_), tables, options.size, output)
+        content, readers, grid, clip = _grown(job, temporary)
+        description = _describe(job, content, (grid, clip))
+        if format_.described:
+            # Once more, now with the error, which the numbers do not depend on.
+            _write(temporary, content.text(job, description))
+            _check_same(load(temporary, format_.readings), readers, job, output)
 
     return BakeResult(
         output=str(output),
         format=format_.name,
+        title=format_.title,
         id=description.identifier,
         sidecar=str(sidecar_path),
-        sidecar_sha256=sidecar_sha256,
+        sidecar_sha256=job.sidecar_sha256,
         clip_name=sidecar.clip["name"],
         encoding=sidecar.clip["encoding"],
         frame=float(options.frame),
-        size=options.size,
+        size=None if content.lattice is None else content.lattice.size,
         strength=float(options.strength),
-        domain=(table.low, table.high),
+        shaper=shaper,
+        palette=_palette_range(sidecar.polytope),
+        cdl=content.cdl,
         rounding=format_.rounding,
-        identity=recolourer.identity or options.strength == 0,
-        midpoints=midpoints,
-        clip=on_clip,
-        clip_frame=image_frame if on_clip is not None else None,
+        identity=job.edit.identity,
+        viewing=job.viewing.assumption,
+        grid=grid,
+        clip=clip,
+        clip_frame=image_frame if clip is not None else None,
+        error=_judged(grid, clip),
+        preview_tier=_judged(grid, clip) <= PREVIEW_TIER,
     )
 
 
+def _grown(job: _Job, path: Path) -> tuple[_Content, dict[str, LoadedLut], Measure, Measure | None]:
+    """Write files, larger and larger ones if need be, until the error is small enough."""
+    limit, size = job.options.max_error, job.options.size
+    while True:
+        if job.format.is_cdl:
+            colours = lattices.dense_grid(job.shaper) if job.image is None else job.image
+            content = _Content(None, cdls.fit(job.edit, colours))
+        else:
+            lattice = lattices.build(job.edit, size, job.shaper, job.options.threads)
+            content = _Content(lattice, None)
+        _write(path, content.text(job, _describe(job, content, None)))
+        readers = load(path, job.format.readings)
+        grid, clip = job.measures(readers)
+        if limit is None or _judged(grid, clip) <= limit:
+            return content, readers, grid, clip
+        larger = None if job.format.is_cdl else job.format.larger(size)
+        if larger is None:
+            raise Palette4dError(_too_far(job, size, grid, clip))
+        size = larger
+
+
+def _judged(grid: Measure, clip: Measure | None) -> float:
+    return (grid if clip is None else clip).worst.relative_largest
+
+
+def _too_far(job: _Job, size: int, grid: Measure, clip: Measure | None) -> str:
+    where = "the dense grid" if clip is None else f"the clip's colours at frame {job.image_frame}"
+    what = job.format.title if job.format.is_cdl else f"{job.format.title} with {size} a side"
+    text = (
+        f"the error stays above the limit: found |a-b|/max(|b|,0.1) of up to "
+        f"{stated(_judged(grid, clip))} on {where} with {what}, expected at most "
+        f"{job.options.max_error:g}; nothing was written. "
+    )
+    if clip is not None and clip.outside_domain > 0:
+        return text + (
+            f"{clip.outside_domain:.3%} of the colours are clamped: choose a format with a shaper "
+            f"({with_shaper()}) or a wider --domain"
+        )
+    return text + "Allow a larger error, or use the node or `palette4d render`, which are exact"
+
+
+def _write(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8", newline="\n")
+
+
 def _check_same(
-    written: dict[str, LoadedLut], measured: dict[str, LoadedLut], size: int, output: Path
+    written: dict[str, LoadedLut], measured: dict[str, LoadedLut], job: _Job, output: Path
 ) -> None:
     """Make sure that the file that stays is the table that was measured."""
-    for colours in _midpoint_pieces(size):
-        for name, table in written.items():
-            if not np.array_equal(table.apply(colours), measured[name].apply(colours)):
-                raise Palette4dError(
-                    f"{output}: read back, the file differs from what was measured; "
-                    "nothing was written, please report this"
-                )
+    colours = lattices.dense_grid(job.shaper)
+    for name, table in written.items():
+        if not np.array_equal(table.apply(colours), measured[name].apply(colours)):
+            raise Palette4dError(
+                f"{output}: read back, the file differs from what was measured; "
+                "nothing was written, please report this"
+            )
+
+
+# --------------------------------------------------------------------------- what a file says
+
+
+def figures_text(figures: Figures) -> str:
+    """Return one line of errors."""
+    f = figures
+    return (
+        f"|a-b|/max(|b|,0.1) mean {stated(f.relative_mean)}, largest {stated(f.relative_largest)}; "
+        f"deltaE 2000 mean {stated(f.delta_e_mean)}, largest {stated(f.delta_e_largest)}"
+    )
+
+
+def _figures_info(figures: Figures) -> dict[str, str]:
+    return {
+        "RelativeMean": stated(figures.relative_mean),
+        "RelativeLargest": stated(figures.relative_largest),
+        "DeltaE2000Mean": stated(figures.delta_e_mean),
+        "DeltaE2000Largest": stated(figures.delta_e_largest),
+    }
+
+
+def _describe(
+    job: _Job, content: _Content, errors: tuple[Measure, Measure | None] | None
+) -> Description:
+    clip, options = job.sidecar.clip, job.options
+    encoding = clip["encoding"] or "the clip's own encoding"
+    frame = frame_text(options.frame)
+    info: dict[str, Any] = {
+        "Clip": clip["name"],
+        "Frame": frame,
+        "Strength": repr(options.strength),
+        "Encoding": encoding,
+        "SidecarSha256": job.sidecar_sha256,
+        "Shaper": job.shaper.kind,
+        "Domain": f"{job.shaper.low:g} {job.shaper.high:g}",
+    }
+    what = "CDL" if content.lattice is None else f"lattice {content.lattice.size}"
+    lines = [
+        f"clip {clip['name']}, frame {frame}, strength {options.strength:g}, {what}",
+        f"sidecar sha256 {job.sidecar_sha256}",
+    ]
+    if content.lattice is not None:
+        lines.append(f"shaper {job.shaper.text()}")
+    if errors is not None:
+        grid, on_clip = errors
+        info["Error"] = {}
+        if on_clip is not None:
+            where = f"on the clip's colours at frame {job.image_frame}"
+            lines.append(f"error {where}: {figures_text(on_clip.worst)}")
+            info["Error"]["Clip"] = {"Frame": job.image_frame, **_figures_info(on_clip.worst)}
+        lines.append(f"error on a dense grid: {figures_text(grid.worst)}")
+        info["Error"]["Grid"] = _figures_info(grid.worst)
+        info["Error"]["Colours"] = job.viewing.assumption
+        kind = "values" if job.format.is_cdl else "interpolation"
+        lines.append(f"errors hold for {' and '.join(job.format.readings)} {kind}")
+        lines.append(f"deltaE: {job.viewing.assumption}")
+    return Description(
+        identifier=content.identifier(job),
+        name=f"palette4d {clip['name']} frame {frame}",
+        lines=tuple(lines),
+        input_space=encoding,
+        output_space=encoding,
+        info={"AppRelease": f"palette4d {_core.__version__}", "Palette4D": info},
+    )

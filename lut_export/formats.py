@@ -1,50 +1,23 @@
-"""The files a lattice can be written to, all through OpenColorIO, and reading them back.
+"""The formats of files that an edit can be baked to: names, extensions, what they can hold.
 
-A format is one entry of `FORMATS`; a writer gets a lattice and its `Description` and returns the
-file's text. OpenColorIO does the writing, so that what other programs get is what OpenColorIO's own
-tools would have written.
+Two extensions have two formats each, and the first in `FORMATS` is the default:
+
+- .cube: both dialects are alike as long as no shaper is needed, so every program reads the default,
+  Resolve's; with a shaper only Resolve's dialect can hold it.
+- .3dl: Flame's is the plain table that most programs read; Lustre's has a header of its own.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+import difflib
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from palette4d.errors import Palette4dError
-from palette4d.lut_export.lattice import Lattice
+from palette4d.lut_export.lattice import LARGEST, SMALLEST
+from palette4d.lut_export.writers import Writer, by_baker, by_transforms
 
-F32 = NDArray[np.float32]
-
-#: The names of OpenColorIO's constants, so that this module can be imported without it.
-INTERPOLATIONS = {"linear": "INTERP_LINEAR", "tetrahedral": "INTERP_TETRAHEDRAL"}
-
-
-@dataclass(frozen=True)
-class Description:
-    """What a file says about itself.
-
-    Attributes
-    ----------
-    identifier : str
-        A URN that is the same for the same table.
-    name : str
-        One line: what it is.
-    lines : tuple of str
-        Sentences for a reader, a line each.
-    input_space, output_space : str
-        The encoding of the colours that go in and come out.
-    info : dict
-        Nested names and values for programs; where the format allows them.
-    """
-
-    identifier: str
-    name: str
-    lines: tuple[str, ...] = ()
-    input_space: str = ""
-    output_space: str = ""
-    info: dict[str, Any] = field(default_factory=dict)
+_TEXT = "six decimals, 5e-7"
+_INTEGERS = "12-bit integers from 0 to 1, 1.3e-4"
+_FLOAT = "32-bit float"
 
 
 @dataclass(frozen=True)
@@ -54,184 +27,165 @@ class LutFormat:
     Attributes
     ----------
     name : str
-        For messages and ``--json``.
+        For ``--format`` and ``--json``; a table's is OpenColorIO's own where that is short.
+    title : str
+        For people.
     extension : str
         With the dot, lower case.
-    interpolations : tuple of str
-        How readers may interpolate between nodes: one when the file says which, otherwise all that
-        hosts use; an error is stated for each.
+    readings : tuple of str
+        How hosts may read it, names of `reading.READINGS`; the error is stated for each.
     rounding : str
         The precision of the file's numbers.
-    write : callable
-        (lattice, description) -> the file's text.
+    write : callable or None
+        (lattice, description) -> the file's text; None for a CDL, which holds no table.
+    shaper : bool
+        Whether it can hold a shaper.
+    described : bool
+        Whether it can say what it is: comments or metadata.
+    smallest : int
+        Samples a side.
+    powers : bool
+        Only 2^k + 1 samples a side.
     """
 
     name: str
+    title: str
     extension: str
-    interpolations: tuple[str, ...]
+    readings: tuple[str, ...]
     rounding: str
-    write: Callable[[Lattice, Description], str]
+    write: Writer | None
+    shaper: bool = False
+    described: bool = False
+    smallest: int = SMALLEST
+    powers: bool = False
+
+    @property
+    def is_cdl(self) -> bool:
+        """Whether it holds a colour decision list instead of a table."""
+        return self.write is None
+
+    def check_size(self, size: int) -> None:
+        """Refuse a lattice that the format cannot hold.
+
+        Raises
+        ------
+        Palette4dError
+            With the sizes that it can.
+        """
+        if size < self.smallest or (self.powers and size not in self.sizes()):
+            raise Palette4dError(
+                f"{self.title} cannot hold {size} samples a side; expected "
+                + (", ".join(map(str, self.sizes())) if self.powers else f"{self.smallest} or more")
+            )
+
+    def sizes(self) -> list[int]:
+        """Return the sizes 2^k + 1 that it can hold, rising."""
+        powers = [2**k + 1 for k in range(8)]
+        return [size for size in powers if self.smallest <= size <= LARGEST]
+
+    def larger(self, size: int) -> int | None:
+        """Return the next size with half the spacing, at most the largest; None after that."""
+        return None if size >= LARGEST else min(2 * (size - 1) + 1, LARGEST)
 
 
-def one_line(text: str) -> str:
-    """Return `text` fit for a comment line or an XML value: printable, no line breaks."""
-    kept = "".join(c if c.isprintable() else " " for c in text)
-    return " ".join(kept.split())
-
-
-def _transform(lattice: Lattice) -> Any:
-    import PyOpenColorIO as ocio
-
-    if (lattice.low, lattice.high) != (0.0, 1.0):
-        raise Palette4dError(
-            f"a lattice over {lattice.low}..{lattice.high} needs a shaper, which this format's "
-            "writer does not have; use the domain 0..1"
-        )
-    transform = ocio.Lut3DTransform(gridSize=lattice.size)
-    transform.setInterpolation(ocio.INTERP_TETRAHEDRAL)
-    transform.setData(np.ascontiguousarray(lattice.values, dtype=np.float32).ravel())
-    transform.setFileOutputBitDepth(ocio.BIT_DEPTH_F32)
-    return transform
-
-
-def write_resolve_cube(lattice: Lattice, description: Description) -> str:
-    """Return a Resolve .cube: comment lines, LUT_3D_SIZE, six decimals, red fastest.
-
-    OpenColorIO's baker samples a conversion between two colour spaces; here the conversion is the
-    lattice itself, sampled at its own nodes, where interpolation returns the node's value.
-    """
-    import PyOpenColorIO as ocio
-
-    config = ocio.Config.CreateRaw()
-    # Not "raw": a data space takes part in no conversion and the table would be the identity.
-    config.addColorSpace(ocio.ColorSpace(name="before"))
-    after = ocio.ColorSpace(name="after")
-    after.setTransform(_transform(lattice), ocio.COLORSPACE_DIR_FROM_REFERENCE)
-    config.addColorSpace(after)
-
-    baker = ocio.Baker()
-    baker.setConfig(config)
-    baker.setFormat("resolve_cube")
-    baker.setInputSpace("before")
-    baker.setTargetSpace("after")
-    baker.setCubeSize(lattice.size)
-    metadata = baker.getFormatMetadata()
-    spaces = f"input {description.input_space}, output {description.output_space}"
-    for line in (description.name, *description.lines, spaces, f"id {description.identifier}"):
-        metadata.addChildElement(ocio.METADATA_DESCRIPTION, one_line(line))
-    text: str = baker.bake()
-    return text
-
-
-def write_clf(lattice: Lattice, description: Description) -> str:
-    """Return an Academy/ASC Common LUT Format file: one tetrahedral LUT3D and its metadata."""
-    import PyOpenColorIO as ocio
-
-    transform = _transform(lattice)
-    group = ocio.GroupTransform([transform])
-    metadata = group.getFormatMetadata()
-    metadata.setID(description.identifier)
-    metadata.setName(one_line(description.name))
-    for line in description.lines:
-        metadata.addChildElement(ocio.METADATA_DESCRIPTION, one_line(line))
-    metadata.addChildElement(ocio.METADATA_INPUT_DESCRIPTOR, one_line(description.input_space))
-    metadata.addChildElement(ocio.METADATA_OUTPUT_DESCRIPTOR, one_line(description.output_space))
-    if description.info:
-        metadata.addChildElement(ocio.METADATA_INFO, "")
-        _add_info(_last_child(metadata), description.info)
-    text: str = group.write(
-        formatName="Academy/ASC Common LUT Format", config=ocio.Config.CreateRaw()
-    )
-    return text
-
-
-def _last_child(metadata: Any) -> Any:
-    return list(metadata.getChildElements())[-1]
-
-
-def _add_info(element: Any, info: dict[str, Any]) -> None:
-    for name, value in info.items():
-        if isinstance(value, dict):
-            element.addChildElement(name, "")
-            _add_info(_last_child(element), value)
-        else:
-            element.addChildElement(name, one_line(str(value)))
-
+# Only the transform formats say how to interpolate; with all others hosts offer either.
+_EITHER = ("linear", "tetrahedral")
+_CDL = ("clamped", "not clamped")
 
 FORMATS = (
     LutFormat(
-        name="Resolve .cube",
-        extension=".cube",
-        # The file does not say how to interpolate; hosts offer either.
-        interpolations=("linear", "tetrahedral"),
-        rounding="six decimals, 5e-7",
-        write=write_resolve_cube,
+        "resolve_cube", "Resolve .cube", ".cube", _EITHER, _TEXT, by_baker("resolve_cube"),
+        shaper=True, described=True,
     ),
     LutFormat(
-        name="Academy/ASC Common LUT Format",
-        extension=".clf",
-        interpolations=("tetrahedral",),
-        rounding="32-bit float",
-        write=write_clf,
+        "iridas_cube", "Iridas/Adobe .cube", ".cube", _EITHER, _TEXT, by_baker("iridas_cube"),
+        described=True,
     ),
-)
+    LutFormat(
+        "clf", "Academy/ASC Common LUT Format", ".clf", ("tetrahedral",), _FLOAT,
+        by_transforms("Academy/ASC Common LUT Format"), shaper=True, described=True,
+    ),
+    LutFormat(
+        "ctf", "Color Transform Format", ".ctf", ("tetrahedral",), _FLOAT,
+        by_transforms("Color Transform Format"), shaper=True, described=True,
+    ),
+    LutFormat("spi3d", "Sony Imageworks .spi3d", ".spi3d", _EITHER, _TEXT, by_baker("spi3d")),
+    LutFormat(
+        "cinespace", "Cinespace .csp", ".csp", _EITHER, _TEXT, by_baker("cinespace"),
+        shaper=True, described=True,
+    ),
+    LutFormat(
+        "flame", "Flame .3dl", ".3dl", _EITHER, _INTEGERS, by_baker("flame"),
+        smallest=5, powers=True,
+    ),
+    LutFormat(
+        "lustre", "Lustre .3dl", ".3dl", _EITHER, _INTEGERS, by_baker("lustre"),
+        smallest=5, powers=True,
+    ),
+    LutFormat("houdini", "Houdini .lut", ".lut", _EITHER, _TEXT, by_baker("houdini"), shaper=True),
+    LutFormat("iridas_itx", "Iridas .itx", ".itx", _EITHER, _TEXT, by_baker("iridas_itx")),
+    LutFormat("truelight", "Truelight .cub", ".cub", _EITHER, _TEXT, by_baker("truelight")),
+    LutFormat("cc", "ASC CDL, ColorCorrection", ".cc", _CDL, "double", None, described=True),
+    LutFormat(
+        "ccc", "ASC CDL, ColorCorrectionCollection", ".ccc", _CDL, "double", None, described=True
+    ),
+    LutFormat("cdl", "ASC CDL, ColorDecisionList", ".cdl", _CDL, "double", None, described=True),
+)  # fmt: skip
 
 
-def format_of(path: Path) -> LutFormat:
-    """Return the format that a file name's extension stands for.
+def format_names() -> list[str]:
+    """Return the names that ``--format`` takes."""
+    return [known.name for known in FORMATS]
+
+
+def format_named(name: str) -> LutFormat:
+    """Return the format of a name, or of an extension with or without its dot.
 
     Raises
     ------
     Palette4dError
-        The extension is not known; the message lists those that are.
+        The name is not known; the message lists the near ones, or all.
+    """
+    wanted = name.lower()
+    for known in FORMATS:
+        if wanted in (known.name, known.extension, known.extension[1:]):
+            return known
+    if wanted == "spi1d":
+        raise Palette4dError(
+            "found the format spi1d, which holds a curve a channel; an edit mixes the channels: "
+            "expected a format with a 3D table, such as spi3d"
+        )
+    near = difflib.get_close_matches(wanted, format_names(), n=3, cutoff=0.5)
+    expected = " or ".join(near) if near else ", ".join(format_names())
+    raise Palette4dError(f"found the format {name!r}, expected {expected}")
+
+
+def format_of(path: Path, name: str | None = None) -> LutFormat:
+    """Return the format of a file: the one named, else the one its extension stands for.
+
+    Raises
+    ------
+    Palette4dError
+        The extension is not known, the message lists those that are; or it is not that of the
+        format named.
     """
     extension = path.suffix.lower()
+    if name is not None:
+        named = format_named(name)
+        if extension != named.extension:
+            raise Palette4dError(
+                f"{path}: found the extension {path.suffix!r} for the format {named.name}, "
+                f"expected {named.extension}, by which programs know it"
+            )
+        return named
     for known in FORMATS:
         if known.extension == extension:
             return known
-    listed = ", ".join(f"{f.extension} ({f.name})" for f in FORMATS)
+    listed = ", ".join(dict.fromkeys(known.extension for known in FORMATS))
     found = f"the extension {path.suffix!r}" if path.suffix else "no extension"
     raise Palette4dError(f"{path}: found {found}; expected one of {listed}")
 
 
-class LoadedLut:
-    """A LUT file as OpenColorIO applies it, read anew.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    interpolation : str
-        "linear" or "tetrahedral"; a file that names its own keeps that.
-
-    Raises
-    ------
-    Palette4dError
-        OpenColorIO cannot read the file.
-    """
-
-    def __init__(self, path: Path, interpolation: str) -> None:
-        """Read the file."""
-        import PyOpenColorIO as ocio
-
-        # OpenColorIO remembers files by name: what was at this name before must be forgotten.
-        ocio.ClearAllCaches()
-        transform = ocio.FileTransform(
-            src=str(path.absolute()),
-            interpolation=getattr(ocio, INTERPOLATIONS[interpolation]),
-        )
-        try:
-            # An empty context: with the environment's, a "$HOME" in a folder's name is replaced.
-            processor = ocio.Config.CreateRaw().getProcessor(
-                ocio.Context(), transform, ocio.TRANSFORM_DIR_FORWARD
-            )
-            # Lossless: no step may be replaced by an approximation, the error is the file's own.
-            self._processor = processor.getOptimizedCPUProcessor(ocio.OPTIMIZATION_LOSSLESS)
-        except (ocio.Exception, ocio.ExceptionMissingFile) as error:
-            raise Palette4dError(f"{path}: OpenColorIO cannot read it: {error}") from error
-
-    def apply(self, colours: F32) -> F32:
-        """Return the (…, 3) float32 colours that replace the (…, 3) float32 `colours`."""
-        result = np.array(colours, dtype=np.float32, order="C")
-        self._processor.applyRGB(result.reshape(1, -1, 3))
-        return result
+def with_shaper() -> str:
+    """Return the names of the formats that can hold a shaper."""
+    return ", ".join(known.name for known in FORMATS if known.shaper)

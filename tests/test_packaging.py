@@ -22,6 +22,8 @@ VERBS = (
     "edit",
     "render",
     "bake",
+    "export",
+    "config",
     "plot",
     "install-plugin",
     "sample-clip",

@@ -7,7 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 CORNERS = [(r, g, b) for r in (0.0, 1.0) for g in (0.0, 1.0) for b in (0.0, 1.0)]
 #: Two triangles a side, anticlockwise from outside; corner index 4 r + 2 g + b.
@@ -29,10 +31,12 @@ CUBE_FACES = [
 Edit = Callable[[tuple[float, float, float]], tuple[float, float, float]]
 
 
-def cube_document(edit: Edit | None = None, **clip: Any) -> dict[str, Any]:
-    """A sidecar over frames 0..10 whose palette is the RGB cube; `edit` maps every corner."""
+def cube_document(
+    edit: Edit | None = None, low: float = 0.0, high: float = 1.0, **clip: Any
+) -> dict[str, Any]:
+    """A sidecar over frames 0..10 whose palette is a cube of RGB; `edit` maps every corner."""
     vertices = [
-        {"id": f"v{8 * end + k + 1}", "frame": 10 * end, "rgb": list(rgb)}
+        {"id": f"v{8 * end + k + 1}", "frame": 10 * end, "rgb": [high if c else low for c in rgb]}
         for end in (0, 1)
         for k, rgb in enumerate(CORNERS)
     ]
@@ -76,6 +80,18 @@ def cube_document(edit: Edit | None = None, **clip: Any) -> dict[str, Any]:
 
 
 @pytest.fixture
+def full_grid() -> None:
+    """Ask for the dense grid as it is."""
+
+
+@pytest.fixture(autouse=True)
+def small_grid(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Measure errors on 23^3 colours instead of 67^3, but where a test asks for the full grid."""
+    if "full_grid" not in request.fixturenames:
+        monkeypatch.setattr("palette4d.lut_export.lattice.DENSE", 23)
+
+
+@pytest.fixture
 def write_sidecar(tmp_path: Path) -> Callable[..., Path]:
     """Write `cube_document(edit, **clip)` to a file."""
 
@@ -91,3 +107,23 @@ def write_sidecar(tmp_path: Path) -> Callable[..., Path]:
 def warm_sidecar(write_sidecar: Callable[..., Path]) -> Path:
     """An edit that no affine map equals: white turns warm, the other corners stay."""
     return write_sidecar(lambda c: (1.0, 0.8, 0.55) if c == (1.0, 1.0, 1.0) else c)
+
+
+@pytest.fixture
+def linear_sidecar(write_sidecar: Callable[..., Path]) -> Path:
+    """Scene-linear light from -0.1 to 50; the brightest corner turns warm."""
+
+    def edit(c: tuple[float, float, float]) -> tuple[float, float, float]:
+        return (50.0, 42.0, 30.0) if c == (50.0, 50.0, 50.0) else c
+
+    return write_sidecar(edit, low=-0.1, high=50.0, encoding="ACEScg")
+
+
+@pytest.fixture
+def bright_picture() -> NDArray[np.float32]:
+    """(40, 60, 3) scene-linear light, evenly spread over the stops up to 50, some below 0."""
+    draw = np.random.default_rng(7)
+    light = np.exp2(draw.uniform(-8, np.log2(50), (40, 60, 3)))
+    light[:2] = draw.uniform(-0.1, 0.0, (2, 60, 3))
+    light[2, 0] = 50.0
+    return light.astype(np.float32)

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from palette4d import Palette4dError, SidecarError, _core
 from palette4d.cli import main
 from palette4d.lut_export import lattice as lattices
-from palette4d.lut_export.bake import BakeOptions, bake, stated
-from palette4d.lut_export.formats import LoadedLut
+from palette4d.lut_export.bake import BakeOptions, bake
+from palette4d.lut_export.error import stated
+from palette4d.lut_export.reading import load
 
 F32 = NDArray[np.float32]
 
@@ -33,7 +34,10 @@ def read_back(path: Path, colours: F32, interpolation: ocio.Interpolation) -> F3
 
 def exact(sidecar: Path, frame: float, colours: F32, strength: float = 1.0) -> F32:
     """What the node would make of colours."""
-    recolourer = lattices.recolourer_at(_core.read_sidecar(str(sidecar)), frame)
+    read = _core.read_sidecar(str(sidecar))
+    palette = _core.slice_at(read.polytope, frame)
+    edited = _core.edited_colours(read.polytope, read.edits, palette)
+    recolourer = _core.Recolourer(palette.rgb, edited, palette.faces)
     return recolourer.apply(colours, strength=strength)
 
 
@@ -61,32 +65,38 @@ def test_a_file_read_back_keeps_its_stated_error(
     worst = 0.0
     for reading in readings:
         difference = np.abs(read_back(out, image, reading).astype(np.float64) - want)
-        assert difference.max() <= result.clip.largest + slack
-        assert difference.mean() <= result.clip.mean + slack
+        assert difference.max() <= result.clip.worst.largest + slack
+        assert difference.mean() <= result.clip.worst.mean + slack
         worst = max(worst, float(difference.max()))
     # The statement is no loose bound either.
-    assert worst == pytest.approx(result.clip.largest, abs=slack)
-    assert 0 < result.clip.mean < result.clip.largest < 0.05
+    assert worst == pytest.approx(result.clip.worst.largest, abs=slack)
+    assert 0 < result.clip.worst.mean < result.clip.worst.largest < 0.05
 
 
-def test_midpoint_error_is_what_it_says(warm_sidecar: Path, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("full_grid")
+def test_grid_error_is_what_it_says(warm_sidecar: Path, tmp_path: Path) -> None:
     out = tmp_path / "warm.clf"
     result = bake(warm_sidecar, out, BakeOptions(0.0, 9))
-    channel = ((np.arange(8) + 0.5) / 8).astype(np.float32)
+    channel = ((np.arange(67) + 0.5) / 67).astype(np.float32)
     colours = np.stack(np.meshgrid(channel, channel, channel, indexing="ij"), axis=-1)
     colours = np.ascontiguousarray(colours.reshape(1, -1, 3))
     got = read_back(out, colours, ocio.INTERP_DEFAULT).astype(np.float64)
-    difference = np.abs(got - exact(warm_sidecar, 0.0, colours))
-    assert result.midpoints.colours == 512
-    assert result.midpoints.largest == pytest.approx(difference.max(), abs=1e-6)
-    assert result.midpoints.mean == pytest.approx(difference.mean(), abs=1e-6)
+    want = exact(warm_sidecar, 0.0, colours)
+    difference = np.abs(got - want)
+    assert result.grid.colours == 67**3
+    assert result.grid.worst.largest == pytest.approx(difference.max(), abs=1e-6)
+    assert result.grid.worst.mean == pytest.approx(difference.mean(), abs=1e-6)
+    relative = difference / np.maximum(np.abs(want), 0.1)
+    assert result.grid.worst.relative_largest == pytest.approx(relative.max(), abs=1e-5)
+    assert result.grid.worst.relative_mean == pytest.approx(relative.mean(), abs=1e-6)
+    assert result.error == result.grid.worst.relative_largest
     assert result.clip is None
     assert result.clip_frame is None
 
 
 def test_error_shrinks_with_size(warm_sidecar: Path, tmp_path: Path) -> None:
     means = [
-        bake(warm_sidecar, tmp_path / f"{size}.clf", BakeOptions(0.0, size)).midpoints.mean
+        bake(warm_sidecar, tmp_path / f"{size}.clf", BakeOptions(0.0, size)).grid.worst.mean
         for size in (5, 9, 17, 33)
     ]
     assert means == sorted(means, reverse=True)
@@ -103,13 +113,13 @@ def test_no_edit_is_the_identity(
     colours = random_colours()
     for reading in (ocio.INTERP_DEFAULT, ocio.INTERP_TETRAHEDRAL):
         assert np.abs(read_back(out, colours, reading) - colours).max() <= tolerance
-    assert result.midpoints.largest <= tolerance
+    assert result.grid.worst.largest <= tolerance
 
 
 def test_strength_zero_is_the_identity_and_half_is_half(warm_sidecar: Path, tmp_path: Path) -> None:
     nothing = bake(warm_sidecar, tmp_path / "0.clf", BakeOptions(0.0, 9, strength=0.0))
     assert nothing.identity
-    assert nothing.midpoints.largest < 1e-6
+    assert nothing.grid.worst.largest < 1e-6
     bake(warm_sidecar, tmp_path / "half.clf", BakeOptions(0.0, 9, strength=0.5))
     white = np.ones((1, 1, 3), dtype=np.float32)
     got = read_back(tmp_path / "half.clf", white, ocio.INTERP_DEFAULT)
@@ -182,7 +192,7 @@ def test_clf_metadata(write_sidecar: Callable[..., Path], tmp_path: Path) -> Non
     assert root.findtext(f"{space}OutputDescriptor") == "sRGB"
     descriptions = [e.text or "" for e in root.findall(f"{space}Description")]
     assert any(sha256 in line for line in descriptions)
-    assert any("error |a-b| on the clip's colours at frame 4" in line for line in descriptions)
+    assert any("error on the clip's colours at frame 4: |a-b|" in line for line in descriptions)
     info = root.find(f"{space}Info")
     assert info is not None
     assert info.findtext(f"{space}AppRelease") == f"palette4d {_core.__version__}"
@@ -191,8 +201,10 @@ def test_clf_metadata(write_sidecar: Callable[..., Path], tmp_path: Path) -> Non
     assert ours.findtext(f"{space}Frame") == "4.5"
     assert ours.findtext(f"{space}SidecarSha256") == sha256
     assert result.clip is not None
-    largest = ours.findtext(f"{space}Error/{space}ClipLargest")
-    assert largest == stated(result.clip.largest)
+    largest = ours.findtext(f"{space}Error/{space}Clip/{space}RelativeLargest")
+    assert largest == stated(result.clip.worst.relative_largest)
+    difference = ours.findtext(f"{space}Error/{space}Grid/{space}DeltaE2000Mean")
+    assert difference == stated(result.grid.worst.delta_e_mean)
     lut = root.find(f"{space}LUT3D")
     assert lut is not None
     assert lut.get("interpolation") == "tetrahedral"
@@ -214,7 +226,9 @@ def test_cube_comments(warm_sidecar: Path, tmp_path: Path) -> None:
     text = "\n".join(comments)
     assert "clip cube, frame 1, strength 1, lattice 5" in text
     assert result.sidecar_sha256 in text
-    assert f"largest {stated(result.midpoints.largest)}" in text
+    assert f"largest {stated(result.grid.worst.relative_largest)}" in text
+    assert f"deltaE 2000 mean {stated(result.grid.worst.delta_e_mean)}" in text
+    assert "deltaE: sRGB" in text
     assert result.id in text
 
 
@@ -233,13 +247,16 @@ def test_the_same_bake_gives_the_same_bytes_and_id(warm_sidecar: Path, tmp_path:
 
 def test_smallest_size(warm_sidecar: Path, tmp_path: Path) -> None:
     for name in ("2.cube", "2.clf"):
-        assert bake(warm_sidecar, tmp_path / name, BakeOptions(0.0, 2)).midpoints.colours == 1
+        result = bake(warm_sidecar, tmp_path / name, BakeOptions(0.0, 2))
+        assert result.size == 2
+        assert result.grid.worst.largest > 0.01
 
 
 def test_largest_size(warm_sidecar: Path, tmp_path: Path) -> None:
-    out = tmp_path / "129.cube"
+    out = tmp_path / "129.itx"
     result = bake(warm_sidecar, out, BakeOptions(0.0, 129))
-    assert result.midpoints.colours == 128**3
+    assert result.size == 129
+    assert result.grid.worst.largest < 0.001
     with out.open(encoding="utf-8") as lines:
         assert sum(line[:1].isdigit() for line in lines) == 129**3
 
@@ -248,11 +265,12 @@ def test_colours_outside_the_domain_are_counted(warm_sidecar: Path, tmp_path: Pa
     image = np.full((2, 2, 3), 0.5, dtype=np.float32)
     image[0, 0] = [2.0, 0.5, 0.5]
     image[1, 1] = np.nan
-    result = bake(warm_sidecar, tmp_path / "o.clf", BakeOptions(0.0, 9), image=image, image_frame=0)
+    options = BakeOptions(0.0, 9, shaper="none")
+    result = bake(warm_sidecar, tmp_path / "o.clf", options, image=image, image_frame=0)
     assert result.clip is not None
     assert result.clip.colours == 3
     assert result.clip.outside_domain == pytest.approx(1 / 3)
-    assert result.clip.largest >= 0.9  # the clamp is part of the error
+    assert result.clip.worst.largest >= 0.9  # the clamp is part of the error
 
 
 @pytest.mark.parametrize(
@@ -265,7 +283,7 @@ def test_colours_outside_the_domain_are_counted(warm_sidecar: Path, tmp_path: Pa
         (BakeOptions(-0.5, 9), "a.clf", "from 0 to 10"),
         (BakeOptions(10.01, 9), "a.clf", "from 0 to 10"),
         (BakeOptions(0.0, 9, strength=1.5), "a.clf", "0 to 1"),
-        (BakeOptions(0.0, 9), "a.xyz", r"\.cube .*\.clf"),
+        (BakeOptions(0.0, 9), "a.xyz", r"\.cube.*\.clf.*\.cub"),
         (BakeOptions(0.0, 9), "a", "no extension"),
         (BakeOptions(0.0, 9), "none/a.clf", "no folder"),
     ],
@@ -311,17 +329,17 @@ def test_folder_names_are_taken_as_they_are(name: str, warm_sidecar: Path, tmp_p
     folder = tmp_path / "d$HOME%x% \u00fc #"
     folder.mkdir()
     result = bake(warm_sidecar, folder / name, BakeOptions(0.0, 9))
-    assert 0 < result.midpoints.mean < 0.01
+    assert 0 < result.grid.worst.mean < 0.01
     assert [path.name for path in folder.iterdir()] == [name]
 
 
 def test_a_file_that_is_no_lut(tmp_path: Path) -> None:
     path = tmp_path / "no.cube"
     with pytest.raises(Palette4dError, match="cannot read it"):
-        LoadedLut(path, "linear")
+        load(path, ["linear"])
     path.write_text("nothing", encoding="utf-8")
     with pytest.raises(Palette4dError, match="cannot read it"):
-        LoadedLut(path, "linear")
+        load(path, ["linear"])
 
 
 def test_a_broken_sidecar_is_refused(tmp_path: Path) -> None:
@@ -329,11 +347,6 @@ def test_a_broken_sidecar_is_refused(tmp_path: Path) -> None:
     path.write_text("{", encoding="utf-8")
     with pytest.raises(SidecarError, match=r"broken\.p4d\.json"):
         bake(path, tmp_path / "a.cube", BakeOptions(0.0))
-
-
-@pytest.mark.parametrize("value", [0.0, 1e-12, 0.0123401, 0.5, 0.9999, 3.0, 123.4])
-def test_stated_figures_are_never_too_small(value: float) -> None:
-    assert value <= float(stated(value)) <= value * 1.01
 
 
 class TestCommand:
@@ -370,9 +383,11 @@ class TestCommand:
             read_back(out, image, ocio.INTERP_DEFAULT).astype(np.float64)
             - exact(sidecar, 4.4, image)
         )
-        assert report["clip"]["largest"] == pytest.approx(difference.max(), abs=1e-6)
-        assert report["clip"]["mean"] == pytest.approx(difference.mean(), abs=1e-6)
-        assert printed.err == ""
+        assert report["clip"]["worst"]["largest"] == pytest.approx(difference.max(), abs=1e-6)
+        assert report["clip"]["worst"]["mean"] == pytest.approx(difference.mean(), abs=1e-6)
+        assert "misses the preview tier 0.002" in printed.err
+        assert report["preview_tier"] is False
+        assert report["error"] == report["clip"]["worst"]["relative_largest"]
 
     def test_without_the_clip_it_says_so(
         self, warm_sidecar: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -381,7 +396,7 @@ class TestCommand:
         assert main(["bake", str(warm_sidecar), "--frame", "0", "-o", str(out)]) == 0
         printed = capsys.readouterr()
         assert "--clip" in printed.err
-        assert "lattice's midpoints" in printed.out
+        assert "dense grid, linear" in printed.out
         assert "clip's colours" not in printed.out
         assert "tetrahedral" in printed.out
         assert out.is_file()
@@ -420,6 +435,6 @@ def test_a_real_frame(extension: str, seasons: Path, warm_sidecar: Path, tmp_pat
     assert result.clip is not None
     got = read_back(out, image, ocio.INTERP_DEFAULT)
     difference = np.abs(got.astype(np.float64) - exact(warm_sidecar, 5.0, image))
-    assert difference.max() <= result.clip.largest + 1e-6
-    assert difference.mean() <= result.clip.mean + 1e-6
-    assert result.clip.mean < 1e-3
+    assert difference.max() <= result.clip.worst.largest + 1e-6
+    assert difference.mean() <= result.clip.worst.mean + 1e-6
+    assert result.clip.worst.mean < 1e-3

@@ -21,6 +21,8 @@ VERB_MODULES = (
     "palette4d.edit_cli",
     "palette4d.render",
     "palette4d.lut_export.cli",
+    "palette4d.lut_export.series_cli",
+    "palette4d.lut_export.config_cli",
     "palette4d.plot",
     "palette4d.plugin_install",
 )

@@ -1,0 +1,66 @@
+"""The options that `bake`, `export` and `config` share."""
+
+import argparse
+
+from palette4d.arguments import checked, number, whole
+from palette4d.lut_export.formats import format_named, format_names
+
+
+def add_table_options(parser: argparse.ArgumentParser, default: str | None) -> None:
+    """Add --format, --size, --shaper, --domain, --strength, --max-error and --clip.
+
+    `default` is the format when nothing is said; None: by the extension.
+    """
+    parser.add_argument(
+        "--format",
+        metavar="FORMAT",
+        type=checked(str, format_named),
+        default=default,
+        help=f"{', '.join(format_names())} (default: "
+        + ("by the extension)" if default is None else f"{default})"),
+    )
+    parser.add_argument(
+        "--size",
+        metavar="N",
+        type=whole(2, 129),
+        default=33,
+        help="samples a side: 17, 33, 65 or any from 2 to 129, OpenColorIO's limits (default 33)",
+    )
+    parser.add_argument(
+        "--shaper",
+        choices=("auto", "none", "linear", "log"),
+        default="auto",
+        help="the curve in front of the table that brings numbers beyond 0..1 into it; auto: none "
+        "for colours within 0..1, linear for little more, else log (default auto)",
+    )
+    parser.add_argument(
+        "--domain",
+        metavar=("LOW", "HIGH"),
+        nargs=2,
+        type=number(),
+        help="what the shaper covers (default: the colours of the frame and of the palette)",
+    )
+    parser.add_argument(
+        "--strength",
+        metavar="S",
+        type=number(0, 1),
+        default=1.0,
+        help="0 to 1, as in the node (default 1)",
+    )
+    parser.add_argument(
+        "--max-error",
+        metavar="E",
+        type=number(0),
+        help="make the table larger until its largest |a-b|/max(|b|,0.1) on the clip's colours is "
+        "at most E, or fail and write nothing (0.002 is fit for previews)",
+    )
+    parser.add_argument(
+        "--clip",
+        metavar="CLIP",
+        help="the clip, to state the error on its colours (default: where the sidecar says)",
+    )
+
+
+def domain(args: argparse.Namespace) -> tuple[float, float] | None:
+    """Return --domain as a pair."""
+    return None if args.domain is None else (args.domain[0], args.domain[1])

@@ -1,0 +1,454 @@
+"""An OpenColorIO config with the looks of shots, which change with the frame.
+
+DIR/config.ocio            the config: a copy of a base config, with looks and views added
+DIR/luts/SHOT/SHOT.F.clf   the edit of a shot at each of its frames F, and SHOT.default.clf
+
+There is one look a shot, in the shot's own encoding as process space. Its file transform names the
+file by the context variable FRAME, so that a host that sets it shows the look of the frame it is
+at. The look `palette4d` names the shot by the context variable SHOT, too, and for every view of the
+base there is one more that applies it.
+"""
+
+import copy
+import difflib
+import os
+import re
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from palette4d import _core
+from palette4d.errors import Palette4dError
+from palette4d.lut_export import series
+from palette4d.lut_export.colour_difference import same_encodings
+from palette4d.lut_export.formats import LutFormat, format_named
+from palette4d.replacing import refuse_existing, replacing
+
+#: The oldest of OpenColorIO's configs with camera encodings: read by every host with 2.1 or later.
+BUILT_IN = "ocio://studio-config-v1.0.0_aces-v1.3_ocio-v2.1"
+
+#: The look whose shot and frame are both variables.
+ANY_SHOT = "palette4d"
+
+#: What FRAME is when a host does not set it, and the name of the file for that.
+NO_FRAME = "default"
+
+
+@dataclass(frozen=True)
+class ConfigOptions:
+    """What to write.
+
+    Attributes
+    ----------
+    series : SeriesOptions
+        For every shot; its frames, name and padding are not looked at.
+    choose : callable
+        sidecar -> the frames to bake; the frames between take the nearest of them.
+    base : str or None
+        A config's file, an .ocioz archive or an ``ocio://`` name; None: `BUILT_IN`.
+    names : tuple of str or None
+        The shots' names, in the order of the sidecars; None: the clips'.
+    process_space : str or None
+        For all shots; None: by each sidecar's encoding.
+    force : bool
+        Replace a config that is there, and looks of the same names.
+    """
+
+    series: series.SeriesOptions
+    choose: Callable[[_core.Sidecar], tuple[int, ...]]
+    base: str | None = None
+    names: tuple[str, ...] | None = None
+    process_space: str | None = None
+    force: bool = False
+
+
+@dataclass(frozen=True)
+class Shot:
+    """One look.
+
+    Attributes
+    ----------
+    name : str
+        Of the look, of the files, and for SHOT.
+    process_space : str
+        A colour space of the config.
+    first, last : int
+        The clip's frames, for each of which there is a file.
+    baked : Series
+        The files that were baked; the others are links to the nearest of them.
+    """
+
+    name: str
+    sidecar: str
+    process_space: str
+    first: int
+    last: int
+    baked: series.Series
+
+
+@dataclass(frozen=True)
+class WrittenConfig:
+    """What was written; `views` are (display, view), `notes` what a user should know."""
+
+    path: Path
+    base: str
+    shots: list[Shot]
+    views: list[tuple[str, str]] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+def write_config(
+    sidecars: list[Path],
+    folder: Path,
+    options: ConfigOptions,
+    progress: Callable[[str], Callable[[int, int], None]] | None = None,
+) -> WrittenConfig:
+    """Write a config with a look for each sidecar.
+
+    Parameters
+    ----------
+    sidecars : list of Path
+        The shots.
+    folder : Path
+        Where the config and its tables go.
+    options : ConfigOptions
+        How.
+    progress : callable, optional
+        shot name -> the `progress` of `series.export`.
+
+    Raises
+    ------
+    Palette4dError
+        Two shots of one name, a base that cannot be used or lacks a process space, a config that is
+        there already: nothing was written then. Or a frame could not be baked, or OpenColorIO
+        refuses the result: then there are tables, whole ones, but no config.
+    """
+    import PyOpenColorIO as ocio
+
+    path = folder / "config.ocio"
+    if folder.is_dir():
+        refuse_existing(path, options.force)
+    read = [_core.read_sidecar(str(name)) for name in sidecars]
+    names = _shot_names(sidecars, read, options.names)
+    base = options.base or BUILT_IN
+    config, archive = _load_base(base)
+    spaces = [_process_space(config, base, s, options.process_space) for s in read]
+    if not options.force:
+        _refuse_looks(config, base, [ANY_SHOT, *names])
+    frames = [options.choose(sidecar) for sidecar in read]
+
+    series.make_folder(folder)
+    shots = []
+    format_ = format_named(options.series.bake.format or "clf")
+    for file, sidecar, name, space, chosen in zip(
+        sidecars, read, names, spaces, frames, strict=True
+    ):
+        tables = folder / "luts" / name
+        _remove_links(tables)
+        baked = series.export(
+            file,
+            tables,
+            replace(options.series, frames=chosen, name=name, padding=0, force=options.force),
+            progress(name) if progress else None,
+        )
+        if baked.failed:
+            raise Palette4dError(
+                f"shot {name}: {len(baked.failed)} of {len(chosen)} frames could not be baked; no "
+                f"config was written:\n{series.failures_text(baked.failed)}"
+            )
+        every = series.every(sidecar, 1)
+        _link(tables, name, format_, chosen, every)
+        shots.append(Shot(name, str(file), space, every[0], every[-1], baked))
+
+    notes = _relocate(config, base, archive, folder)
+    views = _add_looks(config, shots, format_, notes)
+    with replacing(path, force=options.force) as temporary:
+        temporary.write_text(config.serialize(), encoding="utf-8", newline="\n")
+        try:
+            _validate(ocio.Config.CreateFromFile(str(temporary)), shots, views)
+        except ocio.Exception as error:
+            raise Palette4dError(
+                f"{path}: OpenColorIO refuses the config: {error}; nothing was written but the "
+                "tables"
+            ) from error
+    return WrittenConfig(path, base, shots, views, notes)
+
+
+# -------------------------------------------------------------------------------------- the shots
+
+
+def _shot_names(
+    sidecars: list[Path], read: list[_core.Sidecar], given: tuple[str, ...] | None
+) -> list[str]:
+    if given is not None:
+        if len(given) != len(sidecars):
+            raise Palette4dError(
+                f"found {len(given)} names for {len(sidecars)} sidecars, expected one for each, in "
+                "the same order"
+            )
+        for name in given:
+            if series.file_safe(name) != name:
+                raise Palette4dError(
+                    f"found the name {name!r}, expected letters, digits, '.', '_' and '-' only, as "
+                    f"in {series.file_safe(name)!r}"
+                )
+        names = list(given)
+    else:
+        names = [series.file_safe(sidecar.clip["name"]) for sidecar in read]
+    for i, name in enumerate(names):
+        # Colour space and look names of OpenColorIO do not differ by case.
+        same = [k for k in range(i) if names[k].lower() == name.lower()]
+        if same:
+            raise Palette4dError(
+                f"two shots have the name {name!r}: {sidecars[same[0]]} and {sidecars[i]}; "
+                "expected one of its own for each look, give them with --names"
+            )
+        if name.lower() == ANY_SHOT:
+            raise Palette4dError(
+                f"{sidecars[i]}: found the shot name {name!r}, which is that of the look for all "
+                "shots; give another with --names"
+            )
+    return names
+
+
+def _remove_links(tables: Path) -> None:
+    """Remove what an earlier config linked; what it baked stays."""
+    if tables.is_dir():
+        for entry in tables.iterdir():
+            if entry.is_symlink():
+                entry.unlink()
+
+
+def _link(
+    tables: Path,
+    name: str,
+    format_: LutFormat,
+    baked: tuple[int, ...],
+    every: tuple[int, ...],
+) -> None:
+    """Give every frame a file: the one that was baked nearest to it, the earlier of two."""
+
+    def file(frame: object) -> str:
+        return f"{name}.{frame}{format_.extension}"
+
+    there = set(baked)
+    middle = min(baked, key=lambda f: (abs(2 * f - every[0] - every[-1]), f))
+    links = {file(NO_FRAME): file(middle)}
+    for frame in every:
+        if frame not in there:
+            links[file(frame)] = file(min(baked, key=lambda f: (abs(f - frame), f)))
+    for link, target in links.items():
+        place = tables / link
+        place.unlink(missing_ok=True)
+        try:
+            place.symlink_to(target)
+        except OSError:
+            # A file system without links.
+            shutil.copyfile(tables / target, place)
+
+
+# --------------------------------------------------------------------------------------- the base
+
+
+def _load_base(base: str) -> tuple[Any, bool]:
+    """Return an editable copy of the base config, and whether it is an archive."""
+    import PyOpenColorIO as ocio
+
+    if base.startswith("ocio://"):
+        known = [f"ocio://{entry[0]}" for entry in ocio.BuiltinConfigRegistry().getBuiltinConfigs()]
+        try:
+            return ocio.Config.CreateFromBuiltinConfig(base), False
+        except ocio.Exception as error:
+            near = difflib.get_close_matches(base, known, n=3, cutoff=0.3) or known
+            raise Palette4dError(
+                f"{base}: OpenColorIO {ocio.__version__} has no such config; expected one such as "
+                f"{' or '.join(near)}"
+            ) from error
+    if not Path(base).is_file():
+        raise Palette4dError(
+            f"{base}: found no config there; expected a config.ocio, an .ocioz archive or a "
+            "built-in ocio:// name"
+        )
+    try:
+        config = ocio.Config.CreateFromFile(base)
+        config.validate()
+    except ocio.Exception as error:
+        raise Palette4dError(
+            f"{base}: OpenColorIO cannot use it as a config: {error}; mend it, or choose another "
+            "with --base"
+        ) from error
+    return config, base.lower().endswith(".ocioz")
+
+
+def _process_space(config: Any, base: str, sidecar: _core.Sidecar, wanted: str | None) -> str:
+    """Return the name of the config's colour space for a sidecar's numbers.
+
+    Looked up by name, alias or role, under every name that the encoding has; then, where the config
+    has the roles for it, among its colour spaces by what they do.
+    """
+    import PyOpenColorIO as ocio
+
+    encoding = str(sidecar.clip["encoding"])
+    if wanted is None and encoding.strip().lower() in ("", "unknown"):
+        raise Palette4dError(
+            f"the sidecar of {sidecar.clip['name']!r} does not say in which encoding its colours "
+            "are; name a colour space of the config with --process-space"
+        )
+    names = [wanted] if wanted is not None else same_encodings(encoding)
+    for name in names:
+        space = config.getColorSpace(name)
+        if space is not None and not space.isData():
+            return str(space.getName())
+    lacking = ""
+    if wanted is None:
+        built_in = ocio.Config.CreateFromBuiltinConfig(BUILT_IN)
+        for name in names:
+            if built_in.getColorSpace(name) is None:
+                continue
+            try:
+                return str(ocio.Config.IdentifyBuiltinColorSpace(config, built_in, name))
+            except ocio.Exception:
+                roles = ("aces_interchange", "scene_linear")
+                missing = [role for role in roles if not config.hasRole(role)]
+                if missing:
+                    lacking = f"; it lacks the role {missing[0]}, by which one could be found"
+                break
+    known = [space.getName() for space in config.getColorSpaces()]
+    near = difflib.get_close_matches(names[0], known, n=4, cutoff=0.3) or known[:8]
+    what = f"colour space {wanted!r}" if wanted is not None else f"colour space for {encoding!r}"
+    raise Palette4dError(
+        f"{base}: found no {what}{lacking}; name one with --process-space, such as "
+        f"{' or '.join(repr(name) for name in near)}"
+    )
+
+
+def _refuse_looks(config: Any, base: str, names: list[str]) -> None:
+    there = {str(name).lower() for name in config.getLookNames()}
+    for name in names:
+        if name.lower() in there:
+            raise Palette4dError(
+                f"{base}: it has a look {name!r} already; give another name with --names, or "
+                "replace it with --force"
+            )
+
+
+def _relocate(config: Any, base: str, archive: bool, folder: Path) -> list[str]:
+    """Let the base's own files be found from the new place; return notes on that."""
+    import PyOpenColorIO as ocio
+
+    notes: list[str] = []
+    own = [str(path) for path in config.getSearchPaths()]
+    if not base.startswith("ocio://"):
+        if archive:
+            ocio.ExtractOCIOZArchive(base, str(folder / "base"))
+            root = "base"
+        else:
+            there = Path(base).absolute().parent
+            root = "" if there == folder.absolute() else str(there)
+        config.clearSearchPaths()
+        for path in own or [""]:
+            absolute = Path(path).is_absolute() or path.startswith(("$", "%"))
+            found = path if absolute or not root else str(Path(root) / path)
+            config.addSearchPath(found or ".")
+        if root and not archive:
+            notes.append(f"the base's own files are still read from {root}")
+        # A list of variables in the config keeps all others of the environment out.
+        if not list(config.getEnvironmentVarNames()):
+            notes += _declare_variables(config)
+    if "luts" not in own:
+        config.addSearchPath("luts")
+    config.setWorkingDir(str(folder.absolute()))
+    return notes
+
+
+def _declare_variables(config: Any) -> list[str]:
+    notes = []
+    used = set(re.findall(r"\$\{?([A-Za-z_][A-Za-z0-9_]*)", config.serialize()))
+    used |= set(re.findall(r"%([A-Za-z_][A-Za-z0-9_]*)%", config.serialize()))
+    for name in sorted(used - {"SHOT", "FRAME"}):
+        config.addEnvironmentVar(name, os.environ.get(name, ""))
+        notes.append(f"the base's variable {name} is now {os.environ.get(name, '')!r} by default")
+    return notes
+
+
+# --------------------------------------------------------------------------------- looks and views
+
+
+def _add_looks(
+    config: Any, shots: list[Shot], format_: LutFormat, notes: list[str]
+) -> list[tuple[str, str]]:
+    """Add the looks, the variables and the views; return the views."""
+    import PyOpenColorIO as ocio
+
+    def look(name: str, shot: str, space: str, description: str) -> Any:
+        transform = ocio.FileTransform(
+            src=f"{shot}/{shot}.${{FRAME}}{format_.extension}",
+            interpolation=ocio.INTERP_DEFAULT if format_.is_cdl else ocio.INTERP_TETRAHEDRAL,
+        )
+        return ocio.Look(
+            name=name, processSpace=space, transform=transform, description=description
+        )
+
+    declared = {str(name) for name in config.getEnvironmentVarNames()}
+    for variable, value in (("SHOT", shots[0].name), ("FRAME", NO_FRAME)):
+        if variable in declared:
+            notes.append(f"the base's default of the variable {variable} is kept")
+        else:
+            config.addEnvironmentVar(variable, value)
+    for shot in shots:
+        text = f"palette4d, frames {shot.first} to {shot.last} by the variable FRAME"
+        config.addLook(look(shot.name, shot.name, shot.process_space, text))
+    spaces = list(dict.fromkeys(shot.process_space for shot in shots))
+    if len(spaces) > 1:
+        notes.append(
+            f"the shots are in {len(spaces)} encodings ({', '.join(spaces)}): there is a look for "
+            f"each shot, but no view and no look {ANY_SHOT} for all of them"
+        )
+        return []
+    text = "palette4d, by the variables SHOT and FRAME"
+    config.addLook(look(ANY_SHOT, "${SHOT}", spaces[0], text))
+    return _add_views(config)
+
+
+def _add_views(config: Any) -> list[tuple[str, str]]:
+    """For every view of colours, not of data, add one with the look of the shot and the frame."""
+    added = []
+    some_active = config.getNumActiveViews() > 0
+    for display in [str(name) for name in config.getDisplays()]:
+        for view in [str(name) for name in config.getViews(display)]:
+            transform = config.getDisplayViewTransformName(display, view)
+            space = config.getDisplayViewColorSpaceName(display, view)
+            space = display if space == "<USE_DISPLAY_NAME>" else space
+            found = config.getColorSpace(space)
+            looks = config.getDisplayViewLooks(display, view)
+            if (found is not None and found.isData()) or ANY_SHOT in looks:
+                continue
+            name = f"{view} + {ANY_SHOT}"
+            with_ours = f"{ANY_SHOT}, {looks}" if looks else ANY_SHOT
+            if transform:
+                config.addDisplayView(display, name, transform, space, with_ours)
+            else:
+                config.addDisplayView(display, name, space, with_ours)
+            if some_active:
+                config.addActiveView(name)
+            added.append((display, name))
+    return added
+
+
+def _validate(config: Any, shots: list[Shot], views: list[tuple[str, str]]) -> None:
+    """Let OpenColorIO validate a config and make what a viewer makes, at each shot's ends."""
+    import PyOpenColorIO as ocio
+
+    config.validate()
+    context = copy.deepcopy(config.getCurrentContext())
+    for shot in shots:
+        space = shot.process_space
+        look = ocio.LookTransform(src=space, dst=space, looks=shot.name)
+        for frame in (str(shot.first), str(shot.last), NO_FRAME):
+            context["SHOT"], context["FRAME"] = shot.name, frame
+            config.getProcessor(context, look, ocio.TRANSFORM_DIR_FORWARD)
+    forward = ocio.TRANSFORM_DIR_FORWARD
+    for display, view in views:
+        config.getProcessor(context, shots[-1].process_space, display, view, forward)

@@ -1,0 +1,211 @@
+"""How far a file is from the exact edit, over a set of colours.
+
+a is what OpenColorIO makes of a colour with the file read back, b what the core makes of it in
+double precision. The error therefore contains everything: interpolation, the rounding of the file's
+numbers, and the clamping of colours outside the table's domain. Three measures are taken of each
+channel or colour, the mean and the largest of each:
+
+- absolute: |a - b| per channel;
+- relative: |a - b| / max(|b|, 0.1) per channel, the measure of CLF's implementation guide;
+- deltaE: CIEDE2000 between the two colours (`colour_difference`).
+"""
+
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from decimal import ROUND_CEILING, Decimal
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from palette4d.lut_export.colour_difference import Viewing, delta_e_2000
+from palette4d.lut_export.frame_edit import FrameEdit
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+#: The denominator of the relative error is at least this.
+FLOOR = 0.1
+
+#: Colours that one thread works on at a time: what fits in a processor's cache.
+PIECE = 1 << 14
+
+#: deltaE is measured on about so many colours of a larger set, evenly spread over it.
+DELTA_E_COLOURS = 1 << 20
+
+
+class Reader(Protocol):
+    """A file that was read back."""
+
+    def apply(self, colours: F32) -> F32:
+        """Return the (n, 3) float32 colours that replace (n, 3) float32 ones."""
+        ...
+
+
+@dataclass(frozen=True)
+class Figures:
+    """Means and maxima over a set of colours: absolute, relative, deltaE 2000."""
+
+    mean: float
+    largest: float
+    relative_mean: float
+    relative_largest: float
+    delta_e_mean: float
+    delta_e_largest: float
+
+
+@dataclass(frozen=True)
+class Measure:
+    """The error over one set of colours.
+
+    Attributes
+    ----------
+    colours : int
+        How many colours were compared.
+    delta_e_colours : int
+        How many of them, evenly spread, with deltaE.
+    outside_domain : float
+        Share of colours with a channel outside the file's domain, where it clamps.
+    worst : Figures
+        The larger of `by_reading`, figure by figure: holds however a host reads the file.
+    by_reading : dict of str to Figures
+        For each way in which hosts read the file.
+    """
+
+    colours: int
+    delta_e_colours: int
+    outside_domain: float
+    worst: Figures
+    by_reading: dict[str, Figures]
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Sums and maxima of a piece: `sums` and `maxima` are (readings, 3)."""
+
+    colours: int
+    delta_e_colours: int
+    outside: int
+    sums: F64
+    maxima: F64
+
+
+def measure(
+    colours: F32,
+    readers: Mapping[str, Reader],
+    edit: FrameEdit,
+    viewing: Viewing,
+    domain: tuple[float, float] = (0.0, 1.0),
+    threads: int = 0,
+) -> Measure | None:
+    """Compare files with the exact core.
+
+    Parameters
+    ----------
+    colours : (h, w, 3 or more) float array
+        What to compare on. Colours with a NaN or an infinity are left out: no table holds them.
+    readers : mapping
+        The file, as each way of reading it makes it.
+    edit : FrameEdit
+        What it should do.
+    viewing : Viewing
+        For deltaE.
+    domain : (low, high)
+        Of the file, for `Measure.outside_domain`.
+    threads : int
+        0: one a processor; the result does not depend on it.
+
+    Returns
+    -------
+    Measure or None
+        None when no colour is finite.
+    """
+    stride = max(1, colours.shape[0] * colours.shape[1] // DELTA_E_COLOURS)
+
+    def work(piece: F32) -> _Part:
+        return _compare(piece, readers, edit, viewing, domain, stride)
+
+    with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
+        parts = list(pool.map(work, _pieces(colours)))
+    count = sum(part.colours for part in parts)
+    if not count:
+        return None
+    seen = sum(part.delta_e_colours for part in parts)
+    # In the order of the pieces, so that the sums do not depend on the threads.
+    total = np.sum([part.sums for part in parts], axis=0) / [3 * count, 3 * count, max(seen, 1)]
+    largest = np.max([part.maxima for part in parts], axis=0)
+    return Measure(
+        colours=count,
+        delta_e_colours=seen,
+        outside_domain=sum(part.outside for part in parts) / count,
+        worst=_figures(total.max(axis=0), largest.max(axis=0)),
+        by_reading={name: _figures(total[i], largest[i]) for i, name in enumerate(readers)},
+    )
+
+
+def _figures(mean: F64, largest: F64) -> Figures:
+    (a, r, e), (most_a, most_r, most_e) = mean.tolist(), largest.tolist()
+    return Figures(a, most_a, r, most_r, e, most_e)
+
+
+def _pieces(colours: NDArray[Any]) -> Iterator[F32]:
+    rows = max(1, PIECE // max(1, colours.shape[1]))
+    for first in range(0, colours.shape[0], rows):
+        piece = np.ascontiguousarray(colours[first : first + rows, :, :3], dtype=np.float32)
+        yield piece.reshape(-1, 3)
+
+
+def _compare(
+    piece: F32,
+    readers: Mapping[str, Reader],
+    edit: FrameEdit,
+    viewing: Viewing,
+    domain: tuple[float, float],
+    stride: int,
+) -> _Part:
+    finite = np.isfinite(piece).all(axis=-1)
+    colours = piece if finite.all() else np.ascontiguousarray(piece[finite])
+    sums, maxima = np.zeros((len(readers), 3)), np.zeros((len(readers), 3))
+    if not colours.size:
+        return _Part(0, 0, 0, sums, maxima)
+    outside = int(((colours < domain[0]) | (colours > domain[1])).any(axis=-1).sum())
+    exact = edit.exact(colours)
+    scale = np.maximum(np.abs(exact), FLOOR)
+    lab = viewing.lab(exact[::stride])
+    for i, reader in enumerate(readers.values()):
+        got = reader.apply(colours).astype(np.float64)
+        absolute = np.abs(got - exact)
+        relative = absolute / scale
+        delta_e = delta_e_2000(lab, viewing.lab(got[::stride]))
+        for k, values in enumerate((absolute, relative, delta_e)):
+            sums[i, k], maxima[i, k] = values.sum(), values.max()
+    return _Part(len(colours), len(lab), outside, sums, maxima)
+
+
+def stated(value: float, digits: int = 3) -> str:
+    """Return an error with three significant digits, rounded up: what is stated must hold.
+
+    >>> stated(0.0123401), stated(0.0), stated(0.5)
+    ('0.0124', '0', '0.5')
+    """
+    if value <= 0:
+        return "0"
+    exact = Decimal(value)
+    step = Decimal(1).scaleb(exact.adjusted() - digits + 1)
+    return f"{float(exact.quantize(step, rounding=ROUND_CEILING)):.{digits}g}"
+
+
+def table(rows: Iterable[tuple[str, Figures]]) -> list[str]:
+    """Return the lines of a table of errors, a row for each (name, figures)."""
+    listed = list(rows)
+    width = max(len(name) for name, _ in listed)
+    lines = [
+        f"{'error':<{width}}  |a-b|/max(|b|,0.1)   deltaE 2000",
+        f"{'':<{width}}  mean      largest    mean      largest",
+    ]
+    for name, f in listed:
+        cells = (f.relative_mean, f.relative_largest, f.delta_e_mean, f.delta_e_largest)
+        mean, largest, e_mean, e_largest = (stated(value) for value in cells)
+        lines.append(f"{name:<{width}}  {mean:<9} {largest:<10} {e_mean:<9} {e_largest}".rstrip())
+    return lines

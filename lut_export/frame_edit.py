@@ -1,0 +1,109 @@
+"""The edit of a sidecar at one time, as a function of colours.
+
+The one place of the bakes that asks the core: whatever samples, fits or measures an edit gets a
+`FrameEdit`.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from palette4d import _core
+from palette4d.errors import Palette4dError
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+
+def frame_text(frame: float) -> str:
+    """Return a frame number without needless decimals: 24, 24.5."""
+    return f"{frame:.15g}"
+
+
+def check_frame(sidecar: _core.Sidecar, frame: float) -> None:
+    """Refuse a time outside the clip.
+
+    Raises
+    ------
+    Palette4dError
+        `frame` is before the first or after the last frame of the palette.
+    """
+    first, last = sidecar.polytope.first_frame, sidecar.polytope.last_frame
+    if not first <= frame <= last:
+        raise Palette4dError(
+            f"frame {frame_text(frame)} is outside the clip {sidecar.clip['name']!r}; expected a "
+            f"time from {frame_text(first)} to {frame_text(last)} (fractions are allowed)"
+        )
+
+
+@dataclass(frozen=True)
+class FrameEdit:
+    """p' = p + strength * sum_i w_i(q(p)) (v'_i - v_i), the recolouring at one time.
+
+    Attributes
+    ----------
+    palette : (n, 3) float64
+        The slice's colours before the edit (eq. 5).
+    edited : (n, 3) float64
+        The same colours after it.
+    faces : (f, 3) int32
+        The slice's triangles.
+    strength : float
+        0 leaves colours alone, 1 is the edit.
+    recolourer : Recolourer
+        The node's own code for the same.
+    """
+
+    palette: F64
+    edited: F64
+    faces: NDArray[np.int32]
+    strength: float
+    recolourer: _core.Recolourer
+
+    @property
+    def identity(self) -> bool:
+        """Whether nothing changes."""
+        return self.recolourer.identity or self.strength == 0
+
+    def apply(self, colours: F32, threads: int = 0) -> F32:
+        """Return what the node makes of (h, w, 3) float32 colours; 0 threads: one a processor."""
+        return self.recolourer.apply(colours, strength=self.strength, threads=threads)
+
+    def exact(self, colours: ArrayLike) -> F64:
+        """Return the (m, 3) float64 replacements of (m, 3) finite colours, nothing rounded."""
+        points = np.asarray(colours, dtype=np.float64)
+        if self.identity:
+            return points
+        weights, _ = _core.palette_weights(points, self.palette, self.faces)
+        return points + self.strength * (weights @ (self.edited - self.palette))
+
+
+def frame_edit(sidecar: _core.Sidecar, frame: float, strength: float = 1.0) -> FrameEdit:
+    """Return the edit of a sidecar at a time.
+
+    Parameters
+    ----------
+    sidecar : Sidecar
+        Palette and edits.
+    frame : float
+        A frame number of the clip; fractions are times between frames.
+    strength : float
+        0..1, as in the node.
+
+    Raises
+    ------
+    Palette4dError
+        The time is outside the clip, or the strength outside 0..1.
+    """
+    check_frame(sidecar, frame)
+    if not 0 <= strength <= 1:
+        raise Palette4dError(f"strength {strength} is not possible; expected 0 to 1")
+    palette = _core.slice_at(sidecar.polytope, frame)
+    edited = _core.edited_colours(sidecar.polytope, sidecar.edits, palette)
+    return FrameEdit(
+        palette=palette.rgb,
+        edited=edited,
+        faces=palette.faces,
+        strength=float(strength),
+        recolourer=_core.Recolourer(palette.rgb, edited, palette.faces),
+    )

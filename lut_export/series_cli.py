@@ -1,0 +1,223 @@
+"""The verb ``palette4d export``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from palette4d.arguments import frame_range, parse_frames, whole
+from palette4d.errors import Palette4dError
+from palette4d.lut_export.arguments import add_table_options, domain
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from palette4d import _core
+    from palette4d.lut_export.series import Series
+
+EPILOG = """\
+Files are named NAME.FRAME.EXTENSION, and NAME.series.json beside them lists them: frame, file,
+hash, id, size, shaper and errors of each. Running the same command again bakes only what is missing
+or does not match its hash; Ctrl-C leaves whole files only.
+
+--stops are the frames at which the edit turns: the times of its colour stops and edited palette
+colours, and of the palette colours beside them, where it begins or has faded.
+
+examples:
+  palette4d export shot010.p4d.json --every 1 -o luts
+  palette4d export shot010.p4d.json --frames 1001-1100x10 -o luts --format clf --max-error 0.02
+  palette4d export shot010.p4d.json --stops -o luts --name shot010_warm --size 65
+"""
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the verb ``export``."""
+    parser = subparsers.add_parser(
+        "export",
+        help="bake many frames: a dated series of LUT files",
+        description="Bake the edit at many frames, a file each, in parallel, with an index.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("sidecar", metavar="SIDECAR", type=Path, help="the sidecar (.p4d.json)")
+    add_frame_choice(parser, required=True)
+    parser.add_argument(
+        "-o", "--output", metavar="DIR", type=Path, required=True, help="the folder for the files"
+    )
+    parser.add_argument("--name", metavar="NAME", help="the files' name (default: the clip's)")
+    parser.add_argument(
+        "--padding",
+        metavar="N",
+        type=whole(0, 12),
+        default=4,
+        help="digits of the frame number in the names (default 4)",
+    )
+    add_table_options(parser, "resolve_cube")
+    add_run_options(parser)
+    parser.add_argument("--json", action="store_true", help="print the index")
+    parser.set_defaults(run=run, usage_error=parser.error)
+
+
+def add_frame_choice(parser: argparse.ArgumentParser, *, required: bool) -> None:
+    """Add --every, --stops and --frames, of which one is chosen."""
+    chosen = parser.add_mutually_exclusive_group(required=required)
+    chosen.add_argument(
+        "--every", metavar="N", type=whole(1, 1_000_000), help="every N-th frame, from the first"
+    )
+    chosen.add_argument("--stops", action="store_true", help="the frames at which the edit turns")
+    chosen.add_argument(
+        "--frames", metavar="RANGE", type=frame_range, help="10, 1-20, 1001-1100x10, 0,12,30"
+    )
+
+
+def add_run_options(parser: argparse.ArgumentParser) -> None:
+    """Add --jobs, --force and --quiet."""
+    parser.add_argument(
+        "--jobs",
+        metavar="N",
+        type=whole(0, 1024),
+        default=0,
+        help="frames baked at a time; 0: one per processor (default)",
+    )
+    parser.add_argument("--force", action="store_true", help="replace files that are there")
+    parser.add_argument("--quiet", action="store_true", help="no progress bar")
+
+
+def chosen_frames(args: argparse.Namespace, sidecar: _core.Sidecar) -> tuple[int, ...]:
+    """Return the frames that --every, --stops or --frames name; all without any of them."""
+    from palette4d.lut_export import series
+
+    if args.stops:
+        return series.stops(sidecar)
+    if args.frames is not None:
+        return series.check_frames(sidecar, tuple(parse_frames(args.frames)))
+    return series.every(sidecar, args.every or 1)
+
+
+def check_domain(args: argparse.Namespace) -> None:
+    """Refuse a --domain that is none, as wrong usage."""
+    if args.domain is not None and not args.domain[0] < args.domain[1]:
+        args.usage_error("argument --domain: expected two numbers, the smaller one first")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Export; print what was written."""
+    from palette4d import _core
+    from palette4d.lut_export import series
+    from palette4d.lut_export.bake import BakeOptions
+    from palette4d.lut_export.formats import format_named
+
+    check_domain(args)
+    sidecar = _core.read_sidecar(str(args.sidecar))
+    options = series.SeriesOptions(
+        frames=chosen_frames(args, sidecar),
+        bake=BakeOptions(
+            frame=0.0,
+            size=args.size,
+            strength=args.strength,
+            format=format_named(args.format).name,
+            shaper=args.shaper,
+            domain=domain(args),
+            max_error=args.max_error,
+        ),
+        name=args.name,
+        padding=args.padding,
+        clip=args.clip,
+        jobs=args.jobs,
+        force=args.force,
+    )
+    done = with_bar(
+        "export",
+        args.quiet,
+        lambda progress: series.export(args.sidecar, args.output, options, progress),
+    )
+    if args.json:
+        print(json.dumps(done.document, indent=2))
+    else:
+        print("\n".join(report(done)))
+    warn(done)
+    if done.failed:
+        raise failures(done)
+    return 0
+
+
+def with_bar(
+    what: str, quiet: bool, work: Callable[[Callable[[int, int], None]], Series]
+) -> Series:
+    """Do `work` with a progress bar of frames."""
+    from tqdm import tqdm
+
+    with tqdm(desc=what, unit="frame", disable=quiet) as bar:
+
+        def progress(done: int, total: int) -> None:
+            if bar.total != total:
+                # What is there already costs no time: the bar starts behind it.
+                bar.total, bar.initial = total, done
+                bar.n = done
+                bar.refresh()
+            bar.update(done - bar.n)
+
+        return work(progress)
+
+
+def report(done: Series) -> list[str]:
+    """Return the lines that say what was written."""
+    from palette4d.lut_export.error import stated
+    from palette4d.wording import counted
+
+    listed = {entry["frame"]: entry for entry in done.document["frames"]}
+    frames = [listed[frame] for frame in sorted([*done.baked, *done.kept])]
+    if not frames:
+        return []
+    folder = done.index.parent
+    lines = [
+        f"{counted(len(frames), 'file')}, {folder / frames[0]['file']} to {frames[-1]['file']}: "
+        f"{len(done.baked)} baked, {len(done.kept)} there already",
+    ]
+    worst = max(frames, key=lambda entry: entry["error"])
+    where = "the clip's colours" if worst["clip"] is not None else "the dense grid"
+    lines.append(
+        f"  largest |a-b|/max(|b|,0.1): {stated(worst['error'])} on {where} of frame "
+        f"{worst['frame']}"
+    )
+    same = [entry["frame"] for entry in frames if entry["identity"]]
+    if same:
+        lines.append(f"  nothing is edited at {counted(len(same), 'frame')} of them")
+    lines.append(f"  index {done.index}")
+    return lines
+
+
+def warn(done: Series) -> None:
+    """Say what a user should know beside the figures."""
+    from palette4d.lut_export.bake import PREVIEW_TIER
+    from palette4d.wording import counted
+
+    entries = done.document["frames"]
+    if any(entry["clip"] is None for entry in entries):
+        print(
+            "palette4d: note: not all of the clip's frames could be read; errors are stated on the "
+            "dense grid for the others (name the clip with --clip)",
+            file=sys.stderr,
+        )
+    missed = [entry for entry in entries if entry["error"] > PREVIEW_TIER]
+    if missed:
+        print(
+            f"palette4d: warning: {counted(len(missed), 'file')} of {len(entries)} "
+            f"{'misses' if len(missed) == 1 else 'miss'} the preview tier {PREVIEW_TIER:g}; "
+            "--size or --max-error make them larger",
+            file=sys.stderr,
+        )
+
+
+def failures(done: Series) -> Palette4dError:
+    """Return the error that lists the frames that could not be baked."""
+    from palette4d.lut_export.series import failures_text
+    from palette4d.wording import counted
+
+    return Palette4dError(
+        f"{counted(len(done.failed), 'frame')} could not be baked; the others are there, and the "
+        f"same command tries only these again:\n{failures_text(done.failed)}"
+    )

@@ -1,0 +1,163 @@
+"""The text of LUT files, written by OpenColorIO, so that others get what its own tools write.
+
+CLF and CTF are written as a list of transforms; the other formats by OpenColorIO's baker, which
+samples a conversion between two colour spaces. Here that conversion is the shaper and the lattice,
+sampled at the lattice's own nodes, where interpolation returns the node's value.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from palette4d.errors import Palette4dError
+from palette4d.lut_export.lattice import Lattice
+
+
+@dataclass(frozen=True)
+class Description:
+    """What a file says about itself.
+
+    Attributes
+    ----------
+    identifier : str
+        A URN that is the same for the same table.
+    name : str
+        One line: what it is.
+    lines : tuple of str
+        Sentences for a reader, a line each.
+    input_space, output_space : str
+        The encoding of the colours that go in and come out.
+    info : dict
+        Nested names and values for programs; where the format allows them.
+    """
+
+    identifier: str
+    name: str
+    lines: tuple[str, ...] = ()
+    input_space: str = ""
+    output_space: str = ""
+    info: dict[str, Any] = field(default_factory=dict)
+
+
+Writer = Callable[[Lattice, Description], str]
+
+
+def one_line(text: str) -> str:
+    """Return `text` fit for a comment line or an XML value: printable, no line breaks."""
+    kept = "".join(c if c.isprintable() else " " for c in text)
+    return " ".join(kept.split())
+
+
+def lut3d(values: Any) -> Any:
+    """Return OpenColorIO's transform of (N, N, N, 3) float32 values, tetrahedral."""
+    import PyOpenColorIO as ocio
+
+    transform = ocio.Lut3DTransform(gridSize=values.shape[0])
+    transform.setInterpolation(ocio.INTERP_TETRAHEDRAL)
+    transform.setData(np.ascontiguousarray(values, dtype=np.float32).ravel())
+    transform.setFileOutputBitDepth(ocio.BIT_DEPTH_F32)
+    return transform
+
+
+def nodes(lattice: Lattice) -> list[Any]:
+    """Return OpenColorIO's transforms of a lattice, discrete: shaper, table, inverse shaper.
+
+    With a log shaper the table holds shaped colours, so that what the edit leaves alone is left
+    alone between nodes, too, however steep the curve.
+    """
+    import PyOpenColorIO as ocio
+
+    shaper = lattice.shaper
+    if shaper.kind == "log":
+        (before,), (after,) = shaper.transforms(), shaper.transforms()
+        after.setDirection(ocio.TRANSFORM_DIR_INVERSE)
+        return [before, lut3d(shaper.forward(lattice.values)), after]
+    if shaper.kind == "linear":
+        domain = ocio.RangeTransform(
+            minInValue=shaper.low, maxInValue=shaper.high, minOutValue=0.0, maxOutValue=1.0
+        )
+        return [domain, lut3d(lattice.values)]
+    return [lut3d(lattice.values)]
+
+
+def by_transforms(format_name: str) -> Writer:
+    """Return a writer of one of OpenColorIO's transform formats, CLF or CTF."""
+
+    def write(lattice: Lattice, description: Description) -> str:
+        import PyOpenColorIO as ocio
+
+        group = ocio.GroupTransform(nodes(lattice))
+        metadata = group.getFormatMetadata()
+        metadata.setID(description.identifier)
+        metadata.setName(one_line(description.name))
+        for line in description.lines:
+            metadata.addChildElement(ocio.METADATA_DESCRIPTION, one_line(line))
+        spaces = (
+            (ocio.METADATA_INPUT_DESCRIPTOR, description.input_space),
+            (ocio.METADATA_OUTPUT_DESCRIPTOR, description.output_space),
+        )
+        for element, space in spaces:
+            metadata.addChildElement(element, one_line(space))
+        if description.info:
+            metadata.addChildElement(ocio.METADATA_INFO, "")
+            _add_info(_last_child(metadata), description.info)
+        text: str = group.write(formatName=format_name, config=ocio.Config.CreateRaw())
+        return text
+
+    return write
+
+
+def _last_child(metadata: Any) -> Any:
+    return list(metadata.getChildElements())[-1]
+
+
+def _add_info(element: Any, info: dict[str, Any]) -> None:
+    for name, value in info.items():
+        if isinstance(value, dict):
+            element.addChildElement(name, "")
+            _add_info(_last_child(element), value)
+        else:
+            element.addChildElement(name, one_line(str(value)))
+
+
+def by_baker(format_name: str) -> Writer:
+    """Return a writer of one of the formats of OpenColorIO's baker."""
+
+    def write(lattice: Lattice, description: Description) -> str:
+        import PyOpenColorIO as ocio
+
+        config = ocio.Config.CreateRaw()
+        # Not "raw": a data space takes part in no conversion and the table would be the identity.
+        config.addColorSpace(ocio.ColorSpace(name="before"))
+        after = ocio.ColorSpace(name="after")
+        steps = [*lattice.shaper.transforms(), lut3d(lattice.values)]
+        after.setTransform(ocio.GroupTransform(steps), ocio.COLORSPACE_DIR_FROM_REFERENCE)
+        config.addColorSpace(after)
+
+        baker = ocio.Baker()
+        if lattice.shaper.kind != "none":
+            shaped = ocio.ColorSpace(name="shaped")
+            shaped.setTransform(
+                ocio.GroupTransform(lattice.shaper.transforms()),
+                ocio.COLORSPACE_DIR_FROM_REFERENCE,
+            )
+            config.addColorSpace(shaped)
+            baker.setShaperSpace("shaped")
+            baker.setShaperSize(lattice.shaper.samples())
+        baker.setConfig(config)
+        baker.setFormat(format_name)
+        baker.setInputSpace("before")
+        baker.setTargetSpace("after")
+        baker.setCubeSize(lattice.size)
+        metadata = baker.getFormatMetadata()
+        spaces = f"input {description.input_space}, output {description.output_space}"
+        for line in (description.name, *description.lines, spaces, f"id {description.identifier}"):
+            metadata.addChildElement(ocio.METADATA_DESCRIPTION, one_line(line))
+        try:
+            text: str = baker.bake()
+        except ocio.Exception as error:
+            raise Palette4dError(f"OpenColorIO cannot write {format_name}: {error}") from error
+        return text
+
+    return write

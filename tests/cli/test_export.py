@@ -1,0 +1,122 @@
+"""The verbs `export` and `config` from the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from palette4d.cli import main
+
+GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
+EDITED, SPLIT = GOLDEN / "v1_edited.p4d.json", GOLDEN / "v1_split.p4d.json"
+
+
+@pytest.fixture(autouse=True)
+def small_grid(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Measure errors on 23^3 colours instead of 67^3 in this process."""
+    monkeypatch.setattr("palette4d.lut_export.lattice.DENSE", 23)
+
+
+def export(*words: object) -> int:
+    return main(["export", str(EDITED), "--size", "5", "--jobs", "1", *map(str, words)])
+
+
+def config(*words: object) -> int:
+    return main(["config", "--size", "5", "--jobs", "1", "--quiet", *map(str, words)])
+
+
+class TestExport:
+    def test_it_says_what_it_wrote(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        assert export("--every", "10", "-o", tmp_path, "--name", "shot") == 0
+        printed = capsys.readouterr()
+        assert f"3 files, {tmp_path}/shot.0000.cube to shot.0020.cube: 3 baked" in printed.out
+        assert "100%" in printed.err  # the bar
+        assert "--clip" in printed.err
+        assert export("--every", "10", "-o", tmp_path, "--name", "shot", "--quiet") == 0
+        printed = capsys.readouterr()
+        assert "0 baked, 3 there already" in printed.out
+        assert "%" not in printed.err.replace("--clip", "")
+
+    def test_json_is_the_index(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        assert export("--frames", "4,9", "-o", tmp_path, "--format", "clf", "--json") == 0
+        printed = json.loads(capsys.readouterr().out)
+        (index,) = tmp_path.glob("*.series.json")
+        assert printed == json.loads(index.read_text("utf-8"))
+        assert [entry["frame"] for entry in printed["frames"]] == [4, 9]
+
+    def test_failures_are_listed_and_the_status_is_1(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        words = ("--frames", "4,5", "--format", "cc", "--max-error", "0", "-o", tmp_path)
+        assert export(*words) == 1
+        err = capsys.readouterr().err
+        assert "palette4d: error: 2 frames could not be baked" in err
+        assert "frame 4: the error stays above the limit" in err
+        assert not list(tmp_path.iterdir())
+
+    @pytest.mark.parametrize(
+        "words",
+        [
+            ("-o", "x"),
+            ("--every", "0", "-o", "x"),
+            ("--every", "2", "--stops", "-o", "x"),
+            ("--frames", "5-1", "-o", "x"),
+            ("--every", "2"),
+            ("--every", "2", "-o", "x", "--format", "jpg"),
+            ("--every", "2", "-o", "x", "--padding", "-1"),
+        ],
+    )
+    def test_wrong_usage(
+        self, words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.chdir(tmp_path)
+        with pytest.raises(SystemExit) as stop:
+            export(*words)
+        assert stop.value.code == 2
+        assert not list(tmp_path.iterdir())
+
+    def test_errors(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        assert export("--frames", "0-99", "-o", tmp_path / "x") == 1
+        assert "frame 21 is outside the clip" in capsys.readouterr().err
+        (tmp_path / "file").write_text("", "utf-8")
+        assert export("--frames", "4", "-o", tmp_path / "file") == 1
+        assert "the folder cannot be made" in capsys.readouterr().err
+        assert main(["export", str(SPLIT), "--stops", "-o", str(tmp_path / "x")]) == 1
+        assert "nothing is edited" in capsys.readouterr().err
+        assert not (tmp_path / "x").exists()
+
+
+class TestConfig:
+    def test_it_says_what_it_wrote(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        show = tmp_path / "show"
+        words = (EDITED, "-o", show, "--every", "10", "--process-space", "srgb_tx")
+        assert config(*words, "--names", "shot010") == 0
+        printed = capsys.readouterr()
+        assert printed.out.startswith(f"{show}/config.ocio: 1 look, added to ocio://")
+        assert "shot010  frames 0 to 20, 3 tables" in printed.out
+        assert f"OCIO={show}/config.ocio SHOT=shot010 FRAME=0" in printed.out
+        assert config(*words, "--names", "shot010") == 1
+        assert "--force" in capsys.readouterr().err
+        assert config(*words, "--names", "shot010", "--force", "--json") == 0
+        report = json.loads(capsys.readouterr().out)
+        assert report["shots"][0]["look"] == "shot010"
+        assert report["shots"][0]["process_space"] == "sRGB - Texture"
+        assert len(report["views"]) > 5
+
+    def test_two_shots_of_one_name(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        words = (EDITED, EDITED, "-o", tmp_path / "show", "--process-space", "srgb_tx")
+        assert config(*words) == 1
+        assert "two shots have the name" in capsys.readouterr().err
+        assert not (tmp_path / "show").exists()
+
+    def test_one_clip_for_two_sidecars(self, tmp_path: Path) -> None:
+        with pytest.raises(SystemExit) as stop:
+            config(EDITED, SPLIT, "-o", tmp_path / "show", "--clip", "x.####.png")
+        assert stop.value.code == 2

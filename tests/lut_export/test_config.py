@@ -1,0 +1,353 @@
+"""Configs: what a viewer shows at several frames, against the core; bases; refusals."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import PyOpenColorIO as ocio
+import pytest
+from numpy.typing import NDArray
+from palette4d import Palette4dError, _core
+from palette4d.lut_export import series
+from palette4d.lut_export.bake import BakeOptions
+from palette4d.lut_export.config import BUILT_IN, ConfigOptions, WrittenConfig, write_config
+from palette4d.lut_export.frame_edit import frame_edit
+from palette4d.lut_export.series import SeriesOptions
+
+F32 = NDArray[np.float32]
+
+
+def growing(path: Path) -> Path:
+    """Let only the end of a cube's sidecar be edited: the edit grows from frame 0 to 10."""
+    document = json.loads(path.read_text("utf-8"))
+    document["edits"]["vertices"] = document["edits"]["vertices"][8:]
+    path.write_text(json.dumps(document), "utf-8")
+    return path
+
+
+@pytest.fixture
+def shot(warm_sidecar: Path) -> Path:
+    return growing(warm_sidecar)
+
+
+@pytest.fixture
+def two_shots(write_sidecar: Callable[..., Path], tmp_path: Path) -> list[Path]:
+    """shot010 turns white warm, shot020 turns it cold."""
+    paths = []
+    for name, white in (("shot010", (1.0, 0.8, 0.55)), ("shot020", (0.6, 0.8, 1.0))):
+        path = growing(
+            write_sidecar(lambda c, w=white: w if c == (1.0, 1.0, 1.0) else c, name=name)
+        )
+        paths.append(path.rename(tmp_path / f"{name}.p4d.json"))
+    return paths
+
+
+def options(step: int = 1, size: int = 9, **changes: object) -> ConfigOptions:
+    return ConfigOptions(
+        series=SeriesOptions(frames=(), bake=BakeOptions(0.0, size, format="clf"), jobs=1),
+        choose=lambda sidecar: series.every(sidecar, step),
+        **changes,  # type: ignore[arg-type]
+    )
+
+
+def colours() -> F32:
+    return np.random.default_rng(3).random((1, 500, 3), dtype=np.float32)
+
+
+def shown(path: Path, variables: dict[str, str], transform: ocio.Transform) -> F32:
+    """What a viewer with these context variables makes of `colours`."""
+    ocio.ClearAllCaches()
+    config = ocio.Config.CreateFromFile(str(path))
+    config.validate()
+    context = config.getCurrentContext()
+    for name, value in variables.items():
+        context[name] = value
+    processor = config.getProcessor(context, transform, ocio.TRANSFORM_DIR_FORWARD)
+    result = colours()
+    processor.getOptimizedCPUProcessor(ocio.OPTIMIZATION_LOSSLESS).applyRGB(result)
+    return result
+
+
+def look(name: str, space: str = "sRGB - Texture") -> ocio.LookTransform:
+    return ocio.LookTransform(src=space, dst=space, looks=name)
+
+
+def core(sidecar: Path, frame: float) -> NDArray[np.float64]:
+    edit = frame_edit(_core.read_sidecar(str(sidecar)), frame)
+    return edit.exact(colours().reshape(-1, 3)).reshape(1, -1, 3)
+
+
+def test_a_viewer_shows_the_look_of_its_frame(two_shots: list[Path], tmp_path: Path) -> None:
+    done = write_config(two_shots, tmp_path / "show", options())
+    assert [s.name for s in done.shots] == ["shot010", "shot020"]
+    assert [s.process_space for s in done.shots] == ["sRGB - Texture"] * 2
+    assert done.notes == []
+    seen = []
+    for frame in (0, 1, 5, 10):
+        for name, sidecar in zip(("shot010", "shot020"), two_shots, strict=True):
+            want = core(sidecar, frame)
+            variables = {"SHOT": name, "FRAME": str(frame)}
+            # The shot's own look needs no SHOT, the look for all shots does.
+            own = shown(done.path, {"FRAME": str(frame)}, look(name))
+            np.testing.assert_allclose(own, want, atol=0.02)
+            any_shot = shown(done.path, variables, look("palette4d"))
+            np.testing.assert_array_equal(any_shot, own)
+            seen.append(own)
+    assert np.abs(seen[0] - colours()).max() < 1e-6  # nothing yet at frame 0
+    assert np.abs(seen[-2] - seen[-1]).max() > 0.2  # the shots differ
+    assert np.abs(seen[-2] - seen[-4]).max() > 0.05  # the frames differ
+
+
+def test_views_apply_the_look(shot: Path, tmp_path: Path) -> None:
+    done = write_config([shot], tmp_path / "show", options(5))
+    assert ("sRGB - Display", "Un-tone-mapped + palette4d") in done.views
+    config = ocio.Config.CreateFromFile(str(done.path))
+    base = ocio.Config.CreateFromBuiltinConfig(BUILT_IN)
+    assert config.getDefaultDisplay() == base.getDefaultDisplay()
+    display = "sRGB - Display"
+    assert config.getDefaultView(display) == base.getDefaultView(display)
+    for view, edited in (("Un-tone-mapped", False), ("Un-tone-mapped + palette4d", True)):
+        got = shown(
+            done.path,
+            {"SHOT": "cube", "FRAME": "10"},
+            ocio.DisplayViewTransform(src="sRGB - Texture", display=display, view=view),
+        )
+        # An sRGB picture on an sRGB display without a tone curve: what is shown are its numbers.
+        want = core(shot, 10) if edited else colours()
+        np.testing.assert_allclose(got, want, atol=0.02)
+        assert (np.abs(got - colours()).max() > 0.1) == edited
+
+
+def test_without_variables_the_middle_is_shown(shot: Path, tmp_path: Path) -> None:
+    done = write_config([shot], tmp_path / "show", options())
+    got = shown(done.path, {}, look("palette4d"))
+    np.testing.assert_array_equal(got, shown(done.path, {"FRAME": "5"}, look("cube")))
+    assert np.abs(got - colours()).max() > 0.01
+
+
+def test_variables_of_the_environment(
+    shot: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a viewer does that is started with OCIO, SHOT and FRAME set."""
+    done = write_config([shot], tmp_path / "show", options(5))
+    monkeypatch.setenv("OCIO", str(done.path))
+    monkeypatch.setenv("SHOT", "cube")
+    monkeypatch.setenv("FRAME", "10")
+    ocio.ClearAllCaches()
+    config = ocio.Config.CreateFromEnv()
+    got = colours()
+    config.getProcessor(look("palette4d")).getDefaultCPUProcessor().applyRGB(got)
+    np.testing.assert_allclose(got, core(shot, 10), atol=0.02)
+    assert np.abs(got - colours()).max() > 0.1
+
+
+def test_frames_between_take_the_nearest_table(shot: Path, tmp_path: Path) -> None:
+    done = write_config([shot], tmp_path / "show", options(4))
+    tables = tmp_path / "show" / "luts" / "cube"
+    baked = sorted(p.name for p in tables.glob("*.clf") if not p.is_symlink())
+    assert baked == ["cube.0.clf", "cube.4.clf", "cube.8.clf"]
+    for frame, nearest in ((1, 0), (2, 0), (3, 4), (6, 4), (7, 8), (10, 8)):
+        got = shown(done.path, {"FRAME": str(frame)}, look("cube"))
+        want = shown(done.path, {"FRAME": str(nearest)}, look("cube"))
+        np.testing.assert_array_equal(got, want)
+    # The folder can be moved: links and paths are relative.
+    moved = (tmp_path / "show").rename(tmp_path / "moved") / "config.ocio"
+    np.testing.assert_array_equal(shown(moved, {"FRAME": "10"}, look("cube")), got)
+
+
+def test_more_tables_replace_links(shot: Path, tmp_path: Path) -> None:
+    write_config([shot], tmp_path / "show", options(4))
+    done = write_config([shot], tmp_path / "show", options(2, force=True))
+    (written,) = done.shots
+    assert (written.baked.kept, written.baked.baked) == ([0, 4, 8], [2, 6, 10])
+    tables = tmp_path / "show" / "luts" / "cube"
+    assert sum(not p.is_symlink() for p in tables.glob("*.clf")) == 6
+    assert len(list(tables.glob("*.clf"))) == 12  # 0 to 10, and the default
+
+
+class TestBase:
+    def own(self, tmp_path: Path, *, environment: bool = False) -> Path:
+        """A small config with a file of its own in a search path."""
+        folder = tmp_path / "base"
+        (folder / "files").mkdir(parents=True)
+        (folder / "files" / "half.spi1d").write_text(
+            "Version 1\nFrom 0.0 1.0\nLength 2\nComponents 1\n{\n0.0\n0.5\n}\n", "utf-8"
+        )
+        config = ocio.Config.CreateRaw()
+        config.addSearchPath("files")
+        if environment:
+            config.addEnvironmentVar("SHOT", "theirs")
+        config.addColorSpace(ocio.ColorSpace(name="srgb_tx"))
+        half = ocio.ColorSpace(name="half")
+        half.setTransform(ocio.FileTransform(src="half.spi1d"), ocio.COLORSPACE_DIR_FROM_REFERENCE)
+        config.addColorSpace(half)
+        config.addDisplayView("screen", "Half", "half", "")
+        path = folder / "config.ocio"
+        path.write_text(config.serialize(), "utf-8")
+        return path
+
+    def test_its_own_files_are_still_found(self, shot: Path, tmp_path: Path) -> None:
+        base = self.own(tmp_path)
+        before = base.read_bytes()
+        done = write_config([shot], tmp_path / "show", options(5, base=str(base)))
+        assert base.read_bytes() == before
+        assert any("still read from" in note for note in done.notes)
+        transform = ocio.DisplayViewTransform(
+            src="srgb_tx", display="screen", view="Half + palette4d"
+        )
+        got = shown(done.path, {"SHOT": "cube", "FRAME": "10"}, transform)
+        np.testing.assert_allclose(got, core(shot, 10) / 2, atol=0.02)
+
+    def test_an_archive(self, shot: Path, tmp_path: Path) -> None:
+        base = ocio.Config.CreateFromFile(str(self.own(tmp_path)))
+        base.archive(str(tmp_path / "base.ocioz"))
+        done = write_config(
+            [shot], tmp_path / "show", options(5, base=str(tmp_path / "base.ocioz"))
+        )
+        assert done.notes == []
+        (tmp_path / "base.ocioz").unlink()
+        (tmp_path / "base").rename(tmp_path / "gone")
+        transform = ocio.DisplayViewTransform(
+            src="srgb_tx", display="screen", view="Half + palette4d"
+        )
+        got = shown(done.path, {"SHOT": "cube", "FRAME": "10"}, transform)
+        np.testing.assert_allclose(got, core(shot, 10) / 2, atol=0.02)
+
+    def test_its_variables_keep_working(
+        self, shot: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        base = self.own(tmp_path)
+        text = base.read_text("utf-8").replace("environment:\n  {}\n", "")
+        assert "environment" not in text
+        base.write_text(text.replace("search_path: files", "search_path: $WHERE"), "utf-8")
+        monkeypatch.setenv("WHERE", str(base.parent / "files"))
+        done = write_config([shot], tmp_path / "show", options(5, base=str(base)))
+        assert any("WHERE" in note for note in done.notes)
+        monkeypatch.delenv("WHERE")
+        got = shown(done.path, {}, ocio.ColorSpaceTransform(src="srgb_tx", dst="half"))
+        np.testing.assert_allclose(got, colours() / 2, atol=1e-6)
+
+    def test_a_declared_variable_is_kept(self, shot: Path, tmp_path: Path) -> None:
+        base = self.own(tmp_path, environment=True)
+        done = write_config([shot], tmp_path / "show", options(5, base=str(base)))
+        assert done.notes[-1] == "the base's default of the variable SHOT is kept"
+        got = shown(done.path, {"SHOT": "cube", "FRAME": "10"}, look("palette4d", "srgb_tx"))
+        np.testing.assert_allclose(got, core(shot, 10), atol=0.02)
+
+    def test_found_by_what_it_does(self, shot: Path, tmp_path: Path) -> None:
+        """No name says sRGB, but the roles lead there."""
+        config = ocio.Config.CreateFromBuiltinConfig(BUILT_IN)
+        space = config.getColorSpace("srgb_tx")
+        config.removeColorSpace("sRGB - Texture")
+        for alias in list(space.getAliases()):
+            space.removeAlias(alias)
+        space.setName("monitor stuff")
+        for role in ("color_picking", "matte_paint"):
+            config.setRole(role, "monitor stuff")
+        config.addColorSpace(space)
+        base = tmp_path / "base.ocio"
+        base.write_text(config.serialize(), "utf-8")
+        done = write_config([shot], tmp_path / "show", options(5, base=str(base)))
+        assert done.shots[0].process_space == "monitor stuff"
+
+
+def test_shots_in_two_encodings(write_sidecar: Callable[..., Path], tmp_path: Path) -> None:
+    paths = []
+    for name, encoding in (("a", "sRGB"), ("b", "ACEScct")):
+        path = write_sidecar(lambda c: (c[0], c[1] * 0.8, c[2]), name=name, encoding=encoding)
+        paths.append(path.rename(tmp_path / f"{name}.p4d.json"))
+    done = write_config(paths, tmp_path / "show", options(10))
+    assert [s.process_space for s in done.shots] == ["sRGB - Texture", "ACEScct"]
+    assert done.views == []
+    assert any("2 encodings" in note for note in done.notes)
+    for name, path, space in zip("ab", paths, ("sRGB - Texture", "ACEScct"), strict=True):
+        got = shown(done.path, {"FRAME": "10"}, look(name, space))
+        np.testing.assert_allclose(got, core(path, 10), atol=1e-5)
+
+
+class TestRefusals:
+    def refused(
+        self, sidecars: list[Path], tmp_path: Path, word: str, chosen: ConfigOptions | None = None
+    ) -> None:
+        before = sorted(tmp_path.rglob("*"))
+        with pytest.raises(Palette4dError, match=word):
+            write_config(sidecars, tmp_path / "show", chosen or options())
+        assert sorted(tmp_path.rglob("*")) == before
+
+    def test_two_shots_of_one_name(self, two_shots: list[Path], tmp_path: Path) -> None:
+        copy = tmp_path / "copy.p4d.json"
+        copy.write_bytes(two_shots[0].read_bytes())
+        self.refused([two_shots[0], copy], tmp_path, "two shots have the name 'shot010'.*--names")
+        self.refused(two_shots, tmp_path, "two shots", options(names=("a", "A")))
+        self.refused(two_shots, tmp_path, "1 names for 2", options(names=("a",)))
+        self.refused(two_shots, tmp_path, "expected letters", options(names=("a", "b/c")))
+        self.refused(two_shots, tmp_path, "for all shots", options(names=("a", "palette4d")))
+
+    def test_names_mend_it(self, two_shots: list[Path], tmp_path: Path) -> None:
+        copies = [two_shots[0], tmp_path / "copy.p4d.json"]
+        copies[1].write_bytes(two_shots[0].read_bytes())
+        done = write_config(copies, tmp_path / "show", options(10, names=("a", "b")))
+        assert [s.name for s in done.shots] == ["a", "b"]
+
+    def test_no_such_base(self, shot: Path, tmp_path: Path) -> None:
+        self.refused([shot], tmp_path, "found no config there", options(base="no.ocio"))
+        self.refused([shot], tmp_path, "has no such config", options(base="ocio://no"))
+        self.refused([shot], tmp_path, "cannot use it as a config", options(base=str(shot)))
+
+    def test_a_base_without_the_space_and_the_roles(self, shot: Path, tmp_path: Path) -> None:
+        config = ocio.Config.CreateRaw()
+        config.addColorSpace(ocio.ColorSpace(name="film log"))
+        base = tmp_path / "base.ocio"
+        base.write_text(config.serialize(), "utf-8")
+        word = "no colour space for 'sRGB'; it lacks the role.*--process-space.*film log"
+        self.refused([shot], tmp_path, word, options(base=str(base)))
+        self.refused(
+            [shot],
+            tmp_path,
+            "no colour space 'film lgo'.*'film log'",
+            options(base=str(base), process_space="film lgo"),
+        )
+        chosen = options(10, base=str(base), process_space="film log")
+        assert write_config([shot], tmp_path / "s", chosen).shots[0].process_space == "film log"
+
+    def test_an_unknown_encoding(self, write_sidecar: Callable[..., Path], tmp_path: Path) -> None:
+        self.refused([write_sidecar(encoding="")], tmp_path, "does not say in which encoding")
+        self.refused([write_sidecar(encoding="MyLog")], tmp_path, "no colour space for 'MyLog'")
+
+    def test_a_config_that_is_there(self, shot: Path, tmp_path: Path) -> None:
+        (tmp_path / "show").mkdir()
+        (tmp_path / "show" / "config.ocio").write_text("mine", "utf-8")
+        self.refused([shot], tmp_path, "--force")
+
+    def test_a_look_that_is_there(self, shot: Path, tmp_path: Path) -> None:
+        first = write_config([shot], tmp_path / "first", options(10))
+        self.refused([shot], tmp_path, "has a look", options(base=str(first.path)))
+
+    def test_a_frame_that_fails_leaves_no_config(self, shot: Path, tmp_path: Path) -> None:
+        chosen = ConfigOptions(
+            series=SeriesOptions(
+                frames=(), bake=BakeOptions(0.0, 5, format="cc", max_error=1e-9), jobs=1
+            ),
+            choose=lambda sidecar: (0, 10),
+        )
+        with pytest.raises(Palette4dError, match="1 of 2 frames could not be baked"):
+            write_config([shot], tmp_path / "show", chosen)
+        assert not (tmp_path / "show" / "config.ocio").exists()
+
+
+def test_adding_to_itself(two_shots: list[Path], tmp_path: Path) -> None:
+    """A show grows: the second shot joins the config that the first is in."""
+    first = write_config(two_shots[:1], tmp_path / "show", options(10))
+    second: WrittenConfig = write_config(
+        two_shots[1:], tmp_path / "show", options(10, base=str(first.path), force=True)
+    )
+    for name, sidecar in zip(("shot010", "shot020"), two_shots, strict=True):
+        got = shown(second.path, {"SHOT": name, "FRAME": "10"}, look("palette4d"))
+        np.testing.assert_allclose(got, core(sidecar, 10), atol=0.02)
+        np.testing.assert_array_equal(got, shown(second.path, {"FRAME": "10"}, look(name)))
+    views = list(ocio.Config.CreateFromFile(str(second.path)).getViews("sRGB - Display"))
+    assert len(views) == len(set(views))
+    assert not any(view.count("palette4d") > 1 for view in views)
