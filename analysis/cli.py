@@ -96,6 +96,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         action="store_true",
         help="pass over missing and unreadable frames instead of stopping at the first",
     )
+    parser.add_argument(
+        "--allow-cuts",
+        action="store_true",
+        help="analyse a clip with sudden cuts as one shot instead of stopping",
+    )
     edits = parser.add_mutually_exclusive_group()
     edits.add_argument(
         "--keep-edits",
@@ -170,7 +175,7 @@ def run(args: argparse.Namespace) -> int:
     )
     show = _Bars(hidden=args.quiet or args.json)
     try:
-        document, analysis = pipeline.analyze_clip(clip, options, show)
+        document, analysis = pipeline.analyze_clip(clip, options, show, allow_cuts=args.allow_cuts)
     finally:
         show.close()
     document["clip"]["source"] = _beside(document["clip"]["source"], args.output)

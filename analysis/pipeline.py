@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from palette4d import _core
-from palette4d.analysis import methods, quality, sidecar, statistics
+from palette4d.analysis import cuts, methods, quality, sidecar, statistics
 from palette4d.analysis.clip_base import describe, even_step
 from palette4d.analysis.methods import Analysis, Progress
 from palette4d.analysis.options import AnalysisOptions
@@ -23,7 +23,11 @@ if TYPE_CHECKING:
 
 
 def analyze_clip(
-    clip: Clip, options: AnalysisOptions, progress: Progress | None = None
+    clip: Clip,
+    options: AnalysisOptions,
+    progress: Progress | None = None,
+    *,
+    allow_cuts: bool = False,
 ) -> tuple[dict[str, Any], Analysis]:
     """Analyse a clip and return its sidecar document (not yet written) and the analysis.
 
@@ -32,8 +36,8 @@ def analyze_clip(
     Raises
     ------
     Palette4dError
-        When a frame cannot be read, the frames are not evenly spaced (a sidecar has one step), or
-        no frame has a pixel to go by.
+        When a frame cannot be read, the frames are not evenly spaced (a sidecar has one step), no
+        frame has a pixel to go by, or the clip has sudden cuts and `allow_cuts` is not set.
     """
     step = even_step(clip.frames)
     if not step:
@@ -50,6 +54,10 @@ def analyze_clip(
         tell("statistics", len(gathered), len(clip.frames))
     skipped = set(clip.skipped)
     usable, remarks = _usable(clip.frames, dict(zip(numbers, gathered, strict=True)), skipped)
+    if found := cuts.find_cuts(usable):
+        if not allow_cuts:
+            raise Palette4dError(f"{clip.source}: {cuts.refusal(clip.frames, found)}")
+        remarks.append(cuts.remark(found))
     analysis = methods.analyze(usable, options, tell)
     document = sidecar.new_document(
         {

@@ -174,3 +174,21 @@ def test_wrong_options_are_wrong_usage(clip, tmp_path, option, value, capsys):
     assert stop.value.code == 2
     assert option in capsys.readouterr().err
     assert not out.exists()
+
+
+def test_a_cut_is_refused_and_the_shots_are_named(tmp_path, capsys):
+    folder = tmp_path / "cut"
+    folder.mkdir()
+    for i in range(12):
+        rgb = CORNERS + 0.005 * i if i < 7 else 1 - 0.3 * CORNERS
+        write_image(folder / f"cut.{1001 + i}.png", mixture(rgb, i))
+    out = tmp_path / "cut.p4d.json"
+    assert cli.main(["analyze", str(folder), "-o", str(out)]) == 1
+    message = capsys.readouterr().err
+    assert "1008" in message
+    assert "--frames 1001-1007" in message
+    assert "--frames 1008-1012" in message
+    assert not out.exists()
+    assert cli.main(["analyze", str(folder), "-o", str(out), "--frames", "1008-1012"]) == 0
+    assert cli.main(["analyze", str(folder), "-o", str(out), "--allow-cuts"]) == 0
+    assert "spans 1 sudden cut" in capsys.readouterr().err

@@ -1,0 +1,166 @@
+"""Sudden cuts, found from the frames' colours alone: a palette must not span one (section 7.1).
+
+Input: the frames' statistics. Output: the frame numbers with which new shots begin.
+
+The measure is the share of pixels whose colour has no counterpart in the other frame: one minus the
+intersection of two histograms over a grid of `CELLS` cells a channel. Each pixel is shared out
+among the eight cells around it, so that a small shift of all colours (exposure, fading, grain) is a
+small difference. The grid is even in the square root of a colour, which serves encoded pictures and
+linear light alike, and widens above 1.
+
+The difference of a frame from the one before is a cut when
+
+- at least `LEAST_DIFFERENCE` of the pixels have changed: a title or a banner changes less,
+- it is `LEAST_RATIO` times what goes on around it, the second largest of the `AROUND` differences
+  before or of those after (beside the clip's end, twice that of the one side there is): a pan, a
+  fade, a time lapse or flicker change all the time,
+- and no frames around it agree over a gap of one or two frames, as they do around a flash.
+
+Dissolves are changes in time that a palette can follow, and are not looked for. A cut between
+pictures of the same colours is not seen, and does no harm. Two frames alone show no cut: nothing
+says how fast the clip changes. A change of light in one frame that stays, such as a lamp switched
+on, is a cut to a palette too. `docs/clips.md` has the figures on which the limits stand.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections import deque
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from palette4d.analysis.statistics import FrameStatistics
+from palette4d.wording import counted
+
+F64 = NDArray[np.float64]
+
+LEAST_DIFFERENCE = 0.15
+LEAST_RATIO = 3.0
+# Differences below this are noise: a still picture must not make any change look large.
+NOISE = 0.01
+# Around a flash the frames agree again: they differ by at most this share of the jump.
+AGREEMENT = 0.5
+LONGEST_FLASH = 2
+AROUND = 5
+
+CELLS = 12
+# Cells from 0 to 1; those above reach to about 60.
+CELLS_TO_ONE = 7
+ABOVE_ONE = 0.15
+
+MOST_SHOWN = 8
+
+
+def find_cuts(statistics: Sequence[FrameStatistics]) -> list[int]:
+    """Return the numbers of the frames that begin a new shot, rising; none for a single shot.
+
+    Costs under a millisecond a frame, whatever the resolution: the coarse colours are looked at.
+    """
+    count = len(statistics)
+    # gaps[d][i] is the difference of frame i + d from frame i.
+    gaps: dict[int, list[float]] = {d: [] for d in range(1, LONGEST_FLASH + 2)}
+    recent: deque[F64] = deque(maxlen=LONGEST_FLASH + 1)
+    for frame in statistics:
+        here = histogram(frame.coarse.rgb, frame.coarse.counts)
+        for d, before in enumerate(reversed(recent), start=1):
+            gaps[d].append(difference(before, here))
+        recent.append(here)
+    return [statistics[i].frame for i in range(1, count) if _is_cut(gaps, i)]
+
+
+def _is_cut(gaps: dict[int, list[float]], at: int) -> bool:
+    """Whether a shot begins with frame `at`, an index from 1."""
+    jumps = gaps[1]
+    jump = jumps[at - 1]
+    if jump < LEAST_DIFFERENCE:
+        return False
+    if jump < LEAST_RATIO * max(_activity(jumps, at - 1), NOISE):
+        return False
+    for length in range(1, LONGEST_FLASH + 1):
+        # The flash lies between `start` and `start + length + 1`; the jump is one of its edges.
+        for start in range(at - 1 - length, at):
+            if 0 <= start < len(gaps[length + 1]) and (gaps[length + 1][start] <= AGREEMENT * jump):
+                return False
+    return True
+
+
+def _activity(jumps: list[float], place: int) -> float:
+    """Return how much the frames change around a jump; infinite where there are no others."""
+    before, after = jumps[max(0, place - AROUND) : place], jumps[place + 1 : place + 1 + AROUND]
+    if before and after:
+        return max(_usual(before), _usual(after))
+    return 2 * _usual(before or after)
+
+
+def _usual(jumps: list[float]) -> float:
+    """Return the second largest of several jumps: the largest may be another cut, and repeated
+    frames (pulldown, animation on twos) leave only two of five that say how fast the clip moves."""
+    ordered = sorted(jumps)
+    return ordered[-2] if len(ordered) > 2 else max(ordered, default=np.inf)
+
+
+def histogram(rgb: F64, counts: F64) -> F64:
+    """Return (CELLS^3,) shares of pixels of (n, 3) colours with (n,) counts; they sum to 1."""
+    places = np.clip(CELLS_TO_ONE * _eased(rgb), 0, CELLS - 1)
+    cells = np.minimum(places.astype(np.int64), CELLS - 2)
+    upper = places - cells
+    shares = np.stack([1 - upper, upper])  # (2, n, 3)
+    out = np.zeros(CELLS**3)
+    for corner in itertools.product((0, 1), repeat=3):
+        weight = counts * np.prod([shares[c, :, i] for i, c in enumerate(corner)], axis=0)
+        r, g, b = (cells[:, i] + c for i, c in enumerate(corner))
+        out += np.bincount((r * CELLS + g) * CELLS + b, weight, minlength=CELLS**3)
+    return out / out.sum()
+
+
+def _eased(colours: F64) -> F64:
+    """Square roots up to 1, where a difference shows alike in darks and lights; logarithms above.
+
+    Colours below 0 count as 0.
+    """
+    positive = np.maximum(colours, 0)
+    above = 1 + ABOVE_ONE * np.log(np.maximum(positive, 1))
+    eased: F64 = np.where(positive <= 1, np.sqrt(positive), above)
+    return eased
+
+
+def difference(one: F64, other: F64) -> float:
+    """Return the share of pixels, 0 to 1, that one histogram has and the other has not."""
+    return float(1 - np.minimum(one, other).sum())
+
+
+def refusal(frames: Sequence[int], cuts: Sequence[int]) -> str:
+    """Say that the clip of evenly spaced `frames` has `cuts`, and what to analyse apart."""
+    shots = [f"--frames {shot}" for shot in _shots(frames, cuts)]
+    return (
+        f"found {counted(len(cuts), 'sudden cut')}: a new shot begins at {_places(cuts)}; expected "
+        "one shot, since a palette is followed through time and must not span a cut. Analyse each "
+        f"shot apart ({_some(shots)}), or give --allow-cuts to analyse all as one."
+    )
+
+
+def remark(cuts: Sequence[int]) -> str:
+    """Say that the palette spans `cuts` that the user allowed."""
+    what = counted(len(cuts), "sudden cut", "sudden cuts")
+    return f"the palette spans {what}, at {_places(cuts)}: expect a loose fit beside them"
+
+
+def _places(cuts: Sequence[int]) -> str:
+    return f"frame{'s' * (len(cuts) != 1)} {_some([str(cut) for cut in cuts])}"
+
+
+def _some(texts: Sequence[str]) -> str:
+    return ", ".join(texts[:MOST_SHOWN]) + (", …" if len(texts) > MOST_SHOWN else "")
+
+
+def _shots(frames: Sequence[int], cuts: Sequence[int]) -> list[str]:
+    """Return the range of frames of each shot, as `--frames` reads it."""
+    step = frames[1] - frames[0]
+    bounds = [frames[0], *cuts, frames[-1] + step]
+    out = []
+    for first, end in itertools.pairwise(bounds):
+        last = end - step
+        by = f"x{step}" if step != 1 and first != last else ""
+        out.append(f"{first}-{last}{by}" if first != last else f"{first}")
+    return out
