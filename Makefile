@@ -25,7 +25,7 @@ PIP := -m pip --quiet --disable-pip-version-check
 # Folders are listed too, so that a removed file counts as a change.
 SOURCES := pyproject.toml README.md LICENSE $(shell find ofx_plugin analysis lut_export \
 	! -name '__pycache__*' ! -name '*.pyc')
-CXX_FILES = $(shell find ofx_plugin tests -name '*.cpp' -o -name '*.hpp' -o -name '*.h')
+CXX_FILES = $(shell find ofx_plugin tests -name '*.cpp' -o -name '*.hpp' -o -name '*.h' -o -name '*.inl')
 
 .PHONY: help demo test install dev wheel lint style types build-cpp build-sanitize test-cpp \
 	test-sanitize test-py format clean compiler

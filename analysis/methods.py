@@ -304,6 +304,10 @@ class _Skew(_Road):
         if self.stages[-1].losses.L_prime > reference:
             self.stages.pop()
             polytope, remarks = self.refined(static), ()
+        if self.stages[-1].losses.L_prime > reference:  # what keeps its shape cost too much
+            self.stages.pop()
+            polytope = static
+            self.measure("vertex_refinement", static)
         return Analysis(polytope, tuple(self.stages), remarks)
 
     def configurations(self) -> list[list[Block]]:

@@ -1,6 +1,10 @@
 // Recolouring of float32 images for Python.
 #include <limits>
 #include <memory>
+#include <string>
+#include <vector>
+
+#include <pybind11/stl.h>
 
 #include "arrays.hpp"
 #include "binders.hpp"
@@ -66,8 +70,25 @@ bool overlap(const py::array& a, const py::array& b) {
     return x.first < y.second && y.first < x.second;
 }
 
+Precision precision_from(const std::string& name) {
+    if (name == "single") return Precision::kSingle;
+    if (name == "double") return Precision::kDouble;
+    throw py::value_error("precision: found '" + name + "', expected 'single' or 'double'");
+}
+
+InstructionSet instructions_from(const std::string& name) {
+    std::string names = "'best'";
+    if (name == name_of(InstructionSet::kBest)) return InstructionSet::kBest;
+    for (const InstructionSet set : instruction_sets()) {
+        if (name == name_of(set)) return set;
+        names += std::string(", '") + name_of(set) + "'";
+    }
+    throw py::value_error("instructions: found '" + name + "', expected one of " + names);
+}
+
 py::array apply(const Recolourer& self, const py::array& image, double strength, bool premultiplied,
-                int threads, const py::object& out) {
+                int threads, const py::object& out, const std::string& precision,
+                const std::string& instructions) {
     require_image(image, "image");
     py::array result;
     if (out.is_none()) {
@@ -90,7 +111,8 @@ py::array apply(const Recolourer& self, const py::array& image, double strength,
     }
     const auto in_view = view_of<ConstImageView>(image, static_cast<const float*>(image.data()));
     const auto out_view = view_of<ImageView>(result, static_cast<float*>(result.mutable_data()));
-    const RecolourOptions options{strength, premultiplied, threads};
+    const RecolourOptions options{strength, premultiplied, threads, precision_from(precision),
+                                  instructions_from(instructions)};
     {
         const py::gil_scoped_release unlocked;
         self.apply(in_view, out_view, options);
@@ -115,5 +137,14 @@ void bind_recolour(py::module_& module) {
                                "No colour is edited: apply() copies bit for bit.")
         .def("apply", &apply, py::arg("image"), py::kw_only(), py::arg("strength") = 1.0,
              py::arg("premultiplied") = false, py::arg("threads") = 1, py::arg("out") = py::none(),
+             py::arg("precision") = "double", py::arg("instructions") = "best",
              "(h, w, 3 or 4) float32 in and out; threads 0 means one per processor.");
+    module.def(
+        "instruction_sets",
+        [] {
+            std::vector<std::string> names;
+            for (const InstructionSet set : instruction_sets()) names.emplace_back(name_of(set));
+            return names;
+        },
+        "Those that Recolourer.apply() can use here, slowest first.");
 }

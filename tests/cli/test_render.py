@@ -52,7 +52,9 @@ def by_core(frame: float, pixels: np.ndarray, *, strength: float = 1.0, premulti
     edited = _core.edited_colours(sidecar.polytope, sidecar.edits, palette)
     assert not np.array_equal(edited, palette.rgb)
     recolourer = _core.Recolourer(palette.rgb, edited, palette.faces)
-    return recolourer.apply(pixels, strength=strength, premultiplied=premultiplied, threads=1)
+    return recolourer.apply(
+        pixels, strength=strength, premultiplied=premultiplied, threads=1, precision="single"
+    )
 
 
 @pytest.mark.parametrize("threads", [0, 1, 3])

@@ -126,7 +126,7 @@ TEST(the_image_loop_is_the_one_colour_function) {
     const Recolourer recolourer = cube_recolourer();
     const Image image = noise(31, 9, 3, 3);
     Image result(31, 9, 3);
-    recolourer.apply(image.in(), result.out(), {0.7, false, 1});
+    recolourer.apply(image.in(), result.out(), {0.7, false, 1, Precision::kDouble});
     int changed = 0;
     for (std::size_t i = 0; i < image.data.size(); i += 3) {
         const Vec3 p{image.data[i], image.data[i + 1], image.data[i + 2]};

@@ -47,7 +47,7 @@ def recolour(
     recolourer = _core.Recolourer(cut.rgb, edited, cut.faces)
     top = np.float32(np.iinfo(image.dtype).max)
     values = image.astype(np.float32) / top
-    return np.clip(recolourer.apply(values, strength=strength), 0, 1)
+    return np.clip(recolourer.apply(values, strength=strength, precision="single"), 0, 1)
 
 
 @dataclass

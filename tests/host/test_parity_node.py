@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 from parity.cases import (
     DOCUMENTS,
     EDITED,
-    PICTURE_TOLERANCE,
+    FAST_TOLERANCE,
     UNEDITED,
     frames_of,
     picture,
     same_bits,
     times_of,
 )
-from parity.implementations import CORE, REFERENCE
+from parity.implementations import FAST, REFERENCE
 
 Picture = NDArray[np.float32]  # (h, w, 3 or 4)
 SHAPES = [(3, False), (4, False), (4, True)]  # channels, premultiplied
@@ -92,9 +92,9 @@ def test_the_node_recolours_as_the_core_and_the_reference(
         for strength in (1.0, 0.4):
             arguments = image, document, frame, strength, premultiplied
             found = node.recolour(*arguments)
-            assert same_bits(found, CORE.recolour(*arguments)).all(), f"frame {frame}"
+            assert same_bits(found, FAST.recolour(*arguments)).all(), f"frame {frame}"
             expected = REFERENCE.recolour(*arguments)
-            np.testing.assert_allclose(found, expected, **PICTURE_TOLERANCE)
+            np.testing.assert_allclose(found, expected, **FAST_TOLERANCE)
             changed |= not same_bits(found, image).all()
     assert changed
 
@@ -105,7 +105,7 @@ def test_at_beside_and_between_all_that_happens_the_node_is_the_core(node: Node,
     for time in filter(math.isfinite, frames_of(name)):
         frame = hosts_frame(document, time)
         found = node.recolour(image, document, frame)
-        assert same_bits(found, CORE.recolour(image, document, frame)).all(), f"frame {frame}"
+        assert same_bits(found, FAST.recolour(image, document, frame)).all(), f"frame {frame}"
 
 
 @pytest.mark.parametrize(("channels", "premultiplied"), SHAPES)

@@ -46,9 +46,12 @@ def through_the_core(
     edited = _core.edited_colours(sidecar.polytope, sidecar.edits, cut)
     recolourer = _core.Recolourer(cut.rgb, edited, cut.faces)
     if image.dtype == np.float32:
-        return recolourer.apply(image, strength=strength, premultiplied=premultiplied).tobytes()
+        return recolourer.apply(
+            image, strength=strength, premultiplied=premultiplied, precision="single"
+        ).tobytes()
     values = image.astype(np.float32) / np.float32(255)
-    result = np.clip(recolourer.apply(values, strength=strength), 0, 1) * np.float32(255)
+    moved = recolourer.apply(values, strength=strength, precision="single")
+    result = np.clip(moved, 0, 1) * np.float32(255)
     return np.floor(result.astype(np.float64) + 0.5).astype(np.uint8).tobytes()
 
 

@@ -237,6 +237,9 @@ UNEDITED = [name for name in DOCUMENTS if name not in EDITED]
 #: either way, and the weights' own rounding.
 PICTURE_TOLERANCE = {"rtol": 1.3e-7, "atol": 3e-8}
 
+#: The same for what computes in float32 wherever that is within 1e-4 (`Precision::kSingle`).
+FAST_TOLERANCE = {"rtol": 1.3e-7, "atol": 1e-4}
+
 NUDGE = 1e-6
 
 

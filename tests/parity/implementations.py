@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -95,9 +95,12 @@ class Reference:
 
 
 class Core:
-    """The compiled core through its bindings."""
+    """The compiled core through its bindings, recolouring in one of its precisions."""
 
-    name = "_core"
+    def __init__(self, precision: Literal["single", "double"], instructions: str = "best") -> None:
+        self.name = f"_core {precision}"
+        self.precision: Literal["single", "double"] = precision
+        self.instructions = instructions
 
     @staticmethod
     def sidecar(document: Document) -> _core.Sidecar:
@@ -141,9 +144,18 @@ class Core:
         cut = _core.slice_at(sidecar.polytope, frame)
         edited = _core.edited_colours(sidecar.polytope, sidecar.edits, cut)
         recolourer = _core.Recolourer(cut.rgb, edited, cut.faces)
-        return recolourer.apply(image, strength=strength, premultiplied=premultiplied)
+        return recolourer.apply(
+            image,
+            strength=strength,
+            premultiplied=premultiplied,
+            precision=self.precision,
+            instructions=self.instructions,
+        )
 
 
 REFERENCE: Implementation = Reference()
-CORE: Implementation = Core()
-IMPLEMENTATIONS: list[Implementation] = [REFERENCE, CORE]
+#: Double precision throughout: the bakes.
+CORE: Implementation = Core("double")
+#: Many colours at a time: the node and `palette4d render`.
+FAST: Implementation = Core("single")
+IMPLEMENTATIONS: list[Implementation] = [REFERENCE, CORE, FAST]

@@ -114,6 +114,7 @@ def recoloured(
         strength=options.strength,
         premultiplied=premultiplied and pixels.shape[2] == 4,
         threads=options.threads,
+        precision="single",
     )
 
 

@@ -28,6 +28,13 @@ public:
 
     const std::vector<Vec3>& rgb() const { return rgb_; }
     const std::vector<Face>& faces() const { return faces_; }
+    /// What the block kernels' plans are made of (recolour_plan.hpp).
+    bool convex() const { return convex_; }
+    bool flat() const { return flat_; }
+    double extent() const { return extent_; }
+    bool degenerate(std::size_t face) const { return planes_[face].degenerate; }
+    const Vec3& normal(std::size_t face) const { return planes_[face].normal; }
+    const std::vector<std::size_t>& skin() const { return skin_; }
 
     /// mean_value_coordinates() of mvc.hpp; a p that is not finite gives NaN weights.
     void mean_value(const Vec3& p, double* weights, Workspace& workspace) const;
