@@ -1,0 +1,277 @@
+"""What do the paper's experiments give with this program, and what does its own method give?
+
+Sections 6.1 and 6.2 on a clip, by the real command: Table 1 (alpha and eta1), Table 2 (beta),
+figure 8 (eta2), figure 9 (vertex refinement), and the comparison of methods. The paper's rules are
+`--method paper` with this program's own terms off; its defaults stand beside them. Of the paper's
+clips only SEASONS can be had; the rows of its other clips are the paper's numbers, for orientation.
+
+    python benchmarks/bench_paper.py CLIP [--evaluator PROGRAM] [--out DIR]
+
+Prints Markdown; `--out` takes the timelines of figures 8 and 9 and of the comparison (PNG).
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import evaluator
+import numpy as np
+from evaluator import PAPER_RULES, Figures, Runs, TimedPalette, say, table
+from palette4d import _core
+from palette4d.analysis.clip import open_clip
+from palette4d.analysis.options import METHODS
+
+MERGING_ALONE = ("--eta2", "1", "--refinement-cycles", "0")
+UNREFINED = ("--refinement-cycles", "0")
+
+ALPHAS, ETA1S = (5, 10, 15), (1.5, 3.5, 6.0)
+BETAS = (0, 1, 2, 5)
+ETA2S = (1.5, 3.0, 6.0)
+
+# The paper's own numbers: blocks at first, then for each alpha and eta1; mean palette size.
+TABLE_1 = {
+    "FOREST": (61, 3, 1, 1, 3, 2, 1, 5, 2, 1),
+    "STREET": (75, 8, 3, 1, 12, 3, 2, 13, 4, 2),
+    "CLOUD": (77, 1, 1, 1, 2, 1, 1, 5, 1, 1),
+    "NIGHT": (74, 1, 1, 1, 6, 3, 1, 6, 2, 1),
+    "WATER": (98, 5, 2, 1, 9, 3, 2, 12, 5, 2),
+}
+TABLE_2 = {
+    "FOREST": (8.0, 7.4, 7.4, 7.4),
+    "STREET": (8.0, 8.0, 8.0, 8.0),
+    "CLOUD": (8.0, 7.0, 7.0, 7.0),
+    "NIGHT": (7.0, 7.0, 6.6, 6.6),
+    "WATER": (7.4, 7.0, 7.0, 7.0),
+}
+FIGURE_8 = {1.5: 26, 3.0: 20, 6.0: 18}  # vertices, PLAYGROUND
+# Section 6.2's compactness of SEASONS; no clip but that one has numbers here and frames.
+COMPACTNESS = {"paper": 0.036, "static": 0.0649, "rgbt": 0.2635}
+
+
+def row_of(report: dict[str, Any], stage: str) -> dict[str, Any]:
+    """Return what a report says of a stage."""
+    return next(row for row in report["stages"] if row["stage"] == stage)
+
+
+def merged(runs: Runs, alpha: float, eta1: float, beta: float) -> dict[str, Any]:
+    """Return the report of an analysis that hardly goes on after block merging."""
+    weights = ("--alpha", str(alpha), "--eta1", str(eta1), "--beta", str(beta))
+    return runs(*PAPER_RULES, *MERGING_ALONE, *weights)
+
+
+def table_1(runs: Runs, name: str) -> str:
+    """Blocks left after merging."""
+    cells: list[Any] = []
+    for alpha in ALPHAS:
+        for eta1 in ETA1S:
+            report = merged(runs, alpha, eta1, 1)
+            cells.append(row_of(report, "block_merging")["blocks"])
+    first = row_of(report, "frame_hulls")["blocks"]
+    header = ["clip", "at first", *(f"α {a}, η₁ {e}" for a in ALPHAS for e in ETA1S)]
+    rows = [[f"**{name}**, this program", first, *cells]]
+    rows += [[f"{clip}, the paper", *values] for clip, values in TABLE_1.items()]
+    return "### Table 1: blocks left after merging\n\n" + table(header, rows)
+
+
+def table_2(runs: Runs, name: str) -> str:
+    """Mean palette size after merging."""
+    cells = []
+    for beta in BETAS:
+        report = merged(runs, 10, 3.5, beta)
+        cells.append(f"{report['palette']['colours_a_frame']:.2f}")
+    header = ["clip", *(f"β {b}" for b in BETAS)]
+    rows = [[f"**{name}**, this program", *cells]]
+    rows += [[f"{clip}, the paper", *values] for clip, values in TABLE_2.items()]
+    return "### Table 2: mean palette size after merging\n\n" + table(header, rows)
+
+
+def figure_8_options() -> dict[str, tuple[str, ...]]:
+    """Return the analyses of figures 8 and 9 by name."""
+    out = {}
+    for eta2 in ETA2S:
+        out[f"η₂ {eta2}, not refined"] = (*PAPER_RULES, "--eta2", str(eta2), *UNREFINED)
+        out[f"η₂ {eta2}"] = (*PAPER_RULES, "--eta2", str(eta2))
+    return out
+
+
+def comparison_options() -> dict[str, tuple[str, ...]]:
+    """Return the methods of section 6.2 by name; those that this version has."""
+    out: dict[str, tuple[str, ...]] = {
+        "skew": (),
+        "paper": (*PAPER_RULES, "--eta2", "3.0"),
+        "static": ("--method", "static"),
+    }
+    if "rgbt" in METHODS:
+        out["rgbt"] = ("--method", "rgbt")
+    return out
+
+
+METHOD_NAMES = {
+    "skew": "skew polytope, this program's default",
+    "paper": "skew polytope, the paper's rules",
+    "static": "static RGB hull, refined",
+    "rgbt": "convex hull in RGB and time",
+}
+
+
+def figure_8(figures: dict[str, Figures], outside: str) -> str:
+    """Vertices and losses for each eta2, before and after refinement: figures 8 and 9."""
+    rows = []
+    for eta2 in ETA2S:
+        for suffix, words in ((", not refined", "before"), ("", "after")):
+            x = figures[f"η₂ {eta2}{suffix}"]
+            rows.append(
+                [
+                    f"{eta2}",
+                    words,
+                    x.vertices,
+                    *evaluator.fit_cells(x),
+                    evaluator.outside_cell(x),
+                    f"{x.farthest:.3f}",
+                    evaluator.share(x.dent),
+                    FIGURE_8[eta2],
+                ]
+            )
+    header = ["η₂", "refinement", "vertices", *evaluator.FIT_HEADER, outside, "farthest"]
+    header += ["deepest dent", "vertices, PLAYGROUND, the paper"]
+    return "### Figures 8 and 9: η₂, and vertex refinement\n\n" + table(header, rows)
+
+
+def comparison(
+    figures: dict[str, Figures], pooled: dict[str, float], is_seasons: bool, outside: str
+) -> str:
+    """Section 6.2's comparison."""
+    header = ["method", "vertices", "colours a frame", *evaluator.FIT_HEADER, outside]
+    header += ["farthest", "nearest colours", "deepest dent", "C against all frames"]
+    if is_seasons:
+        header.append("the paper's C")
+    rows = []
+    for name in comparison_options():
+        x = figures[name]
+        row: list[Any] = [METHOD_NAMES[name], x.vertices, f"{x.colours:.1f}"]
+        row += [*evaluator.fit_cells(x), evaluator.outside_cell(x), f"{x.farthest:.3f}"]
+        row += [f"{x.closest:.3f}", evaluator.share(x.dent), f"{pooled[name]:.4f}"]
+        if is_seasons:
+            row.append(COMPACTNESS.get(name))
+        rows.append(row)
+    return "### Section 6.2: methods\n\n" + table(header, rows)
+
+
+def pooled_compactness(
+    clip: str, frames: str | None, palettes: dict[str, TimedPalette]
+) -> dict[str, float]:
+    """Eq. 3 with the 4D vertices against the pixels of all frames together.
+
+    What the paper's figures come close to; every other column measures eq. 3 frame by frame.
+    """
+    rgb, counts = np.zeros((0, 3)), np.zeros(0)
+    for _, image in open_clip(clip, frames=frames).iter_colours():
+        new, many, _ = evaluator.distinct_colours(image)
+        rgb, counts = evaluator.merged_colours(
+            np.vstack([rgb, new]), np.concatenate([counts, many])
+        )
+    tree = _core.ColourTree(rgb, counts)
+    out = {}
+    for name, palette in palettes.items():
+        colours = palette.vertices[:, :3]
+        gaps = colours - tree.nearest_mean(colours, evaluator.K_PIXELS)
+        out[name] = float(np.linalg.norm(gaps, axis=1).mean())
+    return out
+
+
+def draw_timelines(sidecars: Sequence[tuple[str, Path]], output: Path, width: int = 860) -> None:
+    """Draw the timelines of some sidecars above each other."""
+    import matplotlib.style
+    from matplotlib.figure import Figure
+    from palette4d.plotting import layout, style, timeline
+
+    room, margin, points = 30.0, 14.0, 800.0
+    read = [(title, _core.read_sidecar(str(path))) for title, path in sidecars]
+    palettes = [timeline.Palette.of(sidecar) for _, sidecar in read]
+    layouts = [layout.arrange(p.frames, p.rgb, p.edges) for p in palettes]
+    panels = [
+        timeline.Frame(
+            left=margin,
+            right=points - margin,
+            top=0.0,
+            first=p.first,
+            last=p.last,
+            rows=rows.row_count,
+            row_height=min(33.0, 500.0 / rows.row_count),
+        )
+        for p, rows in zip(palettes, layouts, strict=True)
+    ]
+    height = sum(room + panel.height for panel in panels) + margin
+    with matplotlib.style.context("default"), matplotlib.rc_context(style.RC):
+        figure = Figure(figsize=(points / 72, height / 72), facecolor=style.PAGE)
+        axes = figure.add_axes((0, 0, 1, 1))
+        axes.set_xlim(0, points)
+        axes.set_ylim(0, height)
+        axes.set_axis_off()
+        axes.set_autoscale_on(False)
+        top = height
+        for (title, sidecar), palette, rows, panel in zip(
+            read, palettes, layouts, panels, strict=True
+        ):
+            axes.text(margin, top - 18, title, fontsize=10, color=style.BRIGHT, va="center")
+            panel.top = top - room
+            top = panel.bottom
+            timeline.draw(axes, palette, rows, panel, str(sidecar.clip["encoding"]))
+        figure.savefig(output, dpi=width / (points / 72), facecolor=style.PAGE)
+    say(f"wrote {output}")
+
+
+def title(words: str, x: Figures) -> str:
+    """Return a timeline's heading."""
+    return f"{words}: {x.vertices} vertices, L {x.L:.4f}, K {x.K:.2f}"
+
+
+def main() -> None:
+    """Run the experiments."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    evaluator.add_arguments(parser)
+    parser.add_argument("--out", metavar="DIR", type=Path, help="write the timelines here")
+    args = parser.parse_args()
+    started = time.perf_counter()
+    with tempfile.TemporaryDirectory() as folder:
+        runs = Runs(args.clip, args.frames, Path(folder))
+        name = open_clip(args.clip, frames=args.frames).name
+        is_seasons = name.lower() == "seasons" and args.frames is None
+        texts = [table_1(runs, name), table_2(runs, name)]
+        chosen = figure_8_options() | comparison_options()
+        palettes = {words: runs.palette(*options) for words, options in chosen.items()}
+        figures = evaluator.measure(args.clip, palettes, args.evaluator, args.frames)
+        methods = {words: palettes[words] for words in comparison_options()}
+        pooled = pooled_compactness(args.clip, args.frames, methods)
+        outside = evaluator.outside_header(figures.values())
+        texts += [figure_8(figures, outside), comparison(figures, pooled, is_seasons, outside)]
+        if args.out:
+            args.out.mkdir(parents=True, exist_ok=True)
+
+            def drawn(names: dict[str, str], file: str) -> None:
+                draw_timelines(
+                    [
+                        (title(words, figures[key]), runs.path(*chosen[key]))
+                        for key, words in names.items()
+                    ],
+                    args.out / file,
+                )
+
+            drawn({f"η₂ {e}": f"η₂ = {e}" for e in ETA2S}, "figure_8.png")
+            # Where most stops are left, refinement has most to do.
+            drawn(
+                {"η₂ 1.5": "with vertex refinement", "η₂ 1.5, not refined": "without"},
+                "figure_9.png",
+            )
+            drawn({key: METHOD_NAMES[key] for key in methods}, "methods.png")
+    print("\n".join(texts))
+    say(f"{time.perf_counter() - started:.0f} s in all")
+
+
+if __name__ == "__main__":
+    main()
