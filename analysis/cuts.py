@@ -12,8 +12,8 @@ The difference of a frame from the one before is a cut when
 
 - at least `LEAST_DIFFERENCE` of the pixels have changed: a title or a banner changes less,
 - it is `LEAST_RATIO` times what goes on around it, the second largest of the `AROUND` differences
-  before or of those after (beside the clip's end, twice that of the one side there is): a pan, a
-  fade, a time lapse or flicker change all the time,
+  before or of those after (twice that with fewer than `SURE` on a side, beside the clip's ends): a
+  pan, a fade, a time lapse or flicker change all the time,
 - and no frames around it agree over a gap of one or two frames, as they do around a flash.
 
 Dissolves are changes in time that a palette can follow, and are not looked for. A cut between
@@ -43,6 +43,8 @@ NOISE = 0.01
 AGREEMENT = 0.5
 LONGEST_FLASH = 2
 AROUND = 5
+# So many differences on both sides say enough.
+SURE = 3
 
 CELLS = 12
 # Cells from 0 to 1; those above reach to about 60.
@@ -88,16 +90,17 @@ def _is_cut(gaps: dict[int, list[float]], at: int) -> bool:
 def _activity(jumps: list[float], place: int) -> float:
     """Return how much the frames change around a jump; infinite where there are no others."""
     before, after = jumps[max(0, place - AROUND) : place], jumps[place + 1 : place + 1 + AROUND]
-    if before and after:
-        return max(_usual(before), _usual(after))
-    return 2 * _usual(before or after)
+    if not before and not after:
+        return np.inf
+    activity = max(_usual(side) for side in (before, after) if side)
+    return activity if min(len(before), len(after)) >= SURE else 2 * activity
 
 
 def _usual(jumps: list[float]) -> float:
     """Return the second largest of several jumps: the largest may be another cut, and repeated
     frames (pulldown, animation on twos) leave only two of five that say how fast the clip moves."""
     ordered = sorted(jumps)
-    return ordered[-2] if len(ordered) > 2 else max(ordered, default=np.inf)
+    return ordered[-2] if len(ordered) > 2 else ordered[-1]
 
 
 def histogram(rgb: F64, counts: F64) -> F64:
@@ -111,7 +114,8 @@ def histogram(rgb: F64, counts: F64) -> F64:
         weight = counts * np.prod([shares[c, :, i] for i, c in enumerate(corner)], axis=0)
         r, g, b = (cells[:, i] + c for i, c in enumerate(corner))
         out += np.bincount((r * CELLS + g) * CELLS + b, weight, minlength=CELLS**3)
-    return out / out.sum()
+    shares_of_cells: F64 = out / out.sum()
+    return shares_of_cells
 
 
 def _eased(colours: F64) -> F64:
