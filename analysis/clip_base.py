@@ -1,7 +1,7 @@
 """What a clip is: frame numbers, a rate, a size, and pixels that are read one frame at a time.
 
 `clip.py` opens one, `clip_images.py` and `clip_movie.py` implement it. Memory holds one frame,
-however long the clip.
+however long the clip; the analysis, which only counts pixels, reads strips of one (`Clip.fills`).
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import abc
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -17,14 +17,24 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from palette4d import _core
 from palette4d.errors import Palette4dError
 
 F32 = NDArray[np.float32]
+
+Fill = Callable[[_core.ColourBinner], None]
+"""Hands a frame's pixels over to a binner; FrameError when the frame is bad."""
 
 LEAST_ALPHA = np.float32(1 / 255)
 """Below it a pixel does not show in 8 bit."""
 
 DEFAULT_RATE = Fraction(24)
+
+COUNTED_PIXELS = 4_000_000
+"""Of larger frames the analysis counts every n-th row, so that about as many pixels are left."""
+
+STRIP_BYTES = 32 << 20
+"""Most bytes of the strips in which frames are read for counting."""
 
 
 class ClipError(Palette4dError):
@@ -111,6 +121,19 @@ class Clip(abc.ABC):
     def file(self, frame: int) -> Path:
         """File that holds a frame, whether it exists or not."""
 
+    @abc.abstractmethod
+    def fills(self, frames: Sequence[int]) -> Iterator[tuple[int, Fill]]:
+        """For each of the frames, in order: its number and what fills a binner with its colours.
+
+        They are the colours that a recolouring sees (`straight_colours`), and may be binned in any
+        thread, each with a binner of its own. What is iterated over must be consumed in order.
+        """
+
+    @property
+    def row_step(self) -> int:
+        """Every how many rows are counted: 1 up to 6 million pixels, 8 for 8K."""
+        return max(1, round(self.width * self.height / COUNTED_PIXELS))
+
     def iter_images(self) -> Iterator[Image]:
         """Read the frames in order, one at a time.
 
@@ -126,15 +149,12 @@ class Clip(abc.ABC):
             except FrameError:
                 if not self.skip_bad_frames:
                     raise
-                self._skip(frame)
+                self.skip(frame)
                 continue
             good += 1
             yield image
         if not good:
-            raise FrameError(
-                f"{self.source}: found none readable of {named(self.frames)}; "
-                "expected at least one good frame. Run without --skip-bad-frames to see the cause."
-            )
+            raise self.none_readable()
 
     def iter_frames(self) -> Iterator[tuple[int, F32]]:
         """(frame number, (h, w, 3 or 4) float32 pixels), in order, one frame at a time."""
@@ -174,10 +194,18 @@ class Clip(abc.ABC):
             np.divide(pixels[..., :3], divisor, out=colours, where=seen)
         return colours
 
-    def _skip(self, frame: int) -> None:
+    def skip(self, frame: int) -> None:
+        """List a bad frame in `skipped`."""
         if frame not in self.skipped:
             self.skipped.append(frame)
             self.skipped.sort()
+
+    def none_readable(self) -> FrameError:
+        """Return the error that says that no frame is good."""
+        return FrameError(
+            f"{self.source}: found none readable of {named(self.frames)}; "
+            "expected at least one good frame. Run without --skip-bad-frames to see the cause."
+        )
 
 
 def even_step(numbers: Sequence[int]) -> int:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import collections.abc
+import functools
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -9,11 +12,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from palette4d import _core
 from palette4d.analysis.clip_base import (
     DEFAULT_RATE,
     F32,
+    STRIP_BYTES,
     Clip,
     ClipError,
+    Fill,
     FrameError,
     Image,
     as_rate,
@@ -43,6 +49,8 @@ CARRIED = (
     "Make",
     "Model",
 )
+#: Rows that are decompressed together in one file format or another (256 in a DWAB EXR).
+_CHUNK = 256
 _RATE_NAMES = ("FramesPerSecond", "dpx:FrameRate", "dpx:TemporalFrameRate")
 _DEPTHS = {"uint": "uint32", "int": "int32"}
 # OpenImageIO's names for what people call sRGB and so on; other names pass as they are.
@@ -71,10 +79,33 @@ class ImageClip(Clip):
 
     def load(self, frame: int) -> Image:
         """Read one frame; FrameError when it is missing, unreadable, or of another size."""
-        path = self.sequence.path(frame)
+        header, pixels = read_image(self._path(frame), f"frame {frame}")
+        self._check(header, frame)
+        return Image(frame, pixels, header.metadata)
+
+    def fills(self, frames: collections.abc.Sequence[int]) -> Iterator[tuple[int, Fill]]:
+        """For each frame its number and what reads and bins it, in strips."""
+        for frame in frames:
+            yield frame, functools.partial(self._fill, frame)
+
+    def _fill(self, frame: int, binner: _core.ColourBinner) -> None:
+        path, what = self._path(frame), f"frame {frame}"
+        source, spec = _open(path, what)
+        self._check(_header(path, spec, _channel_choice(spec)), frame)
+        _bin_image(source, path, what, binner, self.row_step, self.has_alpha)
+        if self.has_alpha and 0 < binner.transparent == binner.pixels + binner.ignored:
+            # Nothing shows: an unused alpha channel, see `straight_colours`.
+            binner.clear()
+            _bin_image(_open(path, what)[0], path, what, binner, self.row_step, False)
+
+    def _path(self, frame: int) -> Path:
         if frame not in self.sequence.files:
             raise _missing(self.sequence, [frame])
-        header, pixels = read_image(path, f"frame {frame}")
+        return self.sequence.path(frame)
+
+    def _check(self, header: Header, frame: int) -> None:
+        """Refuse a frame unlike the first."""
+        path = self.sequence.path(frame)
         if (header.width, header.height) != (self.width, self.height):
             raise FrameError(
                 f"{path}: frame {frame} is {header.width}x{header.height} pixels, expected "
@@ -87,7 +118,6 @@ class ImageClip(Clip):
                 f"{_channels(self)} as in the frames before. Mend the clip, take a range "
                 "with --frames, or leave such frames out with --skip-bad-frames."
             )
-        return Image(frame, pixels, header.metadata)
 
 
 @dataclass(frozen=True)
@@ -228,6 +258,68 @@ def read_image(path: Path, what: str = "the image") -> tuple[Header, F32]:
     pixels = _in_display_window(pixels, spec)
     pixels = _upright(pixels, spec.get_int_attribute("Orientation", 1))
     return _header(path, spec, chosen), np.ascontiguousarray(pixels)
+
+
+def _bin_image(
+    source: Any, path: Path, what: str, binner: _core.ColourBinner, row_step: int, alpha: bool
+) -> None:
+    """Bin every `row_step`-th row of an image, of which memory holds a strip."""
+    spec = source.spec()
+    chosen = _channel_choice(spec)[: 4 if alpha else 3]
+    premultiplied = alpha and not spec.get_int_attribute("oiio:UnassociatedAlpha", 0)
+    left, right = max(spec.full_x - spec.x, 0), spec.full_x + spec.full_width - spec.x
+    below = spec.full_y + spec.full_height  # the first row under the display window
+    rows = 0
+    for top, stored in _strips(source, spec, path, what, min(chosen), max(chosen) + 1):
+        # Rows are counted from the middle of the first step of the display window.
+        first = max(top, spec.full_y)
+        first += (spec.full_y + row_step // 2 - first) % row_step
+        strip = stored[first - top : max(below - top, 0) : row_step, left : max(right, 0)]
+        if chosen != list(range(chosen[0], chosen[0] + stored.shape[2])):
+            strip = strip[..., [channel - min(chosen) for channel in chosen]]
+        if strip.dtype not in (np.uint8, np.uint16, np.float32):
+            strip = _scaled(strip, 0)
+        if strip.size:
+            binner.add(strip, bits=_bits(spec) or 16, premultiplied=premultiplied)
+            rows += strip.shape[0]
+    # The display window beyond the data is black.
+    height = len(range(row_step // 2, spec.full_height, row_step))
+    width = max(min(right, spec.width) - left, 0) if rows else 0
+    for count, length in ((rows, spec.full_width - width), (height - rows, spec.full_width)):
+        if count > 0 and length > 0:
+            black = np.zeros((1, length, len(chosen)), strip.dtype)
+            binner.add(
+                np.broadcast_to(black, (count, length, len(chosen))), premultiplied=premultiplied
+            )
+
+
+def _strips(
+    source: Any, spec: Any, path: Path, what: str, first: int, last: int
+) -> Iterator[tuple[int, NDArray[Any]]]:
+    """(y of its first row, (rows, w, c) samples) of strips of the channels `first` to `last`."""
+    part = source.current_subimage()
+    samples = "float" if str(spec.format) in ("half", "double") else spec.format
+    row = spec.width * (last - first) * spec.format.size()
+    rows = max(STRIP_BYTES // max(row, 1), 1)
+    if rows > _CHUNK:
+        rows -= rows % _CHUNK
+    if spec.tile_width:
+        rows = max(rows - rows % spec.tile_height, spec.tile_height)
+    bottom = spec.y + spec.height
+    for top in range(spec.y, bottom, rows):
+        end = min(top + rows, bottom)
+        if spec.tile_width:
+            right = spec.x + spec.width
+            strip = source.read_tiles(part, 0, spec.x, right, top, end, 0, 1, first, last, samples)
+        else:
+            strip = source.read_scanlines(part, 0, top, end, 0, first, last, samples)
+        problem = source.geterror()
+        # JPEG returns grey pixels together with an error: both count.
+        if strip is None or problem:
+            source.close()
+            raise _unreadable(path, what, problem)
+        yield top, np.asarray(strip)
+    source.close()
 
 
 def _unreadable(path: Path, what: str, problem: str) -> FrameError:

@@ -8,7 +8,8 @@ others do); FFV1 and VP9 conceal it, and FFmpeg passes no word of it on.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import functools
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -18,11 +19,14 @@ import av
 import numpy as np
 from av.error import FFmpegError
 from numpy.typing import NDArray
+from palette4d import _core
 from palette4d.analysis.clip_base import (
     DEFAULT_RATE,
     F32,
+    STRIP_BYTES,
     Clip,
     ClipError,
+    Fill,
     FrameError,
     Image,
     describe,
@@ -57,6 +61,8 @@ _LUMA = {
 }
 _FULL_RANGE = 2
 _PLANAR_DEPTHS = (8, 9, 10, 12, 14, 16)
+#: How the names of Y'CbCr layouts start.
+_LUMA_CHROMA = ("yuv", "nv", "p0", "p2", "p4", "yuyv", "uyvy", "yvyu", "y2", "xv", "v")
 
 
 @dataclass
@@ -78,6 +84,19 @@ class MovieClip(Clip):
 
     def load(self, frame: int) -> Image:
         """Decode one picture; FrameError when it is damaged, missing or of another size."""
+        picture = self._picture(frame)
+        return Image(frame, _upright(picture_pixels(picture), picture))
+
+    def fills(self, frames: Sequence[int]) -> Iterator[tuple[int, Fill]]:
+        """Decode the frames in order; binning one may go on while the next is decoded."""
+        for frame in frames:
+            try:
+                fill: Fill = functools.partial(_bin_picture, self._picture(frame), self.row_step)
+            except FrameError as error:
+                fill = functools.partial(_fail, error)
+            yield frame, fill
+
+    def _picture(self, frame: int) -> av.VideoFrame:
         picture = self._find(frame)
         if picture is None:
             why = f" ({self._problem})" if self._problem else ""
@@ -86,16 +105,16 @@ class MovieClip(Clip):
                 "frames. Bring a good copy, choose a range with --frames, or leave such frames "
                 "out with --skip-bad-frames."
             )
-        pixels = _upright(picture_pixels(picture), picture)
-        if pixels.shape != (self.height, self.width, 4 if self.has_alpha else 3):
-            height, width, channels = pixels.shape
+        shape = _shape(picture)
+        if shape != (self.height, self.width, 4 if self.has_alpha else 3):
+            height, width, channels = shape
             raise FrameError(
                 f"{self.path}: frame {frame} is {width}x{height} pixels with {channels} channels, "
                 f"expected {self.width}x{self.height} with {4 if self.has_alpha else 3} as in the "
                 "frames before. Choose a range with --frames, or leave such frames out with "
                 "--skip-bad-frames."
             )
-        return Image(frame, pixels)
+        return picture
 
     def _find(self, frame: int) -> av.VideoFrame | None:
         if self._decoder is None or frame < self._next:
@@ -192,7 +211,7 @@ def open_movie(
             "Bring a whole copy, choose a range with --frames, or leave such frames out with "
             "--skip-bad-frames."
         )
-    pixels = _upright(picture_pixels(first), first)
+    height, width, channels = _shape(first)
     notes = []
     if stamps is not None and base is not None and _varies(stamps, base, own_rate):
         notes.append(f"{path}: the frame rate varies; frames are counted, their times are not used")
@@ -202,10 +221,10 @@ def open_movie(
         source=str(path),
         frames=wanted,
         rate=rate or (Fraction(own_rate) if own_rate else DEFAULT_RATE),
-        width=pixels.shape[1],
-        height=pixels.shape[0],
+        width=width,
+        height=height,
         encoding=_encoding(first),
-        has_alpha=pixels.shape[2] == 4,
+        has_alpha=channels == 4,
         premultiplied=False,
         depth="float" if bits == 32 else f"uint{max(bits, 8)}",
         skip_bad_frames=skip_bad_frames,
@@ -298,6 +317,92 @@ def _upright(pixels: F32, picture: av.VideoFrame) -> F32:
     return np.ascontiguousarray(np.rot90(pixels, turns)) if turns else pixels
 
 
+def _fail(error: FrameError, binner: _core.ColourBinner) -> None:
+    """Stand in for the filling of a bad frame."""
+    raise error
+
+
+def _shape(picture: av.VideoFrame) -> tuple[int, int, int]:
+    """(h, w, 3 or 4) of its pixels, upright."""
+    turned = round(picture.rotation / 90) % 2
+    size = (picture.width, picture.height) if turned else (picture.height, picture.width)
+    return (*size, 4 if _has_alpha(picture) else 3)
+
+
+def _has_alpha(picture: av.VideoFrame) -> bool:
+    layout = picture.format
+    return layout.has_palette or any(component.is_alpha for component in layout.components)
+
+
+def _bits(picture: av.VideoFrame) -> int:
+    return max(component.bits for component in picture.format.components)
+
+
+def _bin_picture(picture: av.VideoFrame, row_step: int, binner: _core.ColourBinner) -> None:
+    """Bin every `row_step`-th row of a picture, with the colours of `picture_pixels`."""
+    picture = _thinned(picture, row_step)
+    how = _luma_chroma(picture)
+    if how is not None and not how.alpha:
+        luma, blue, red = _planes_of(how.planar, how.samples)
+        red_weight, blue_weight = _LUMA[how.matrix]
+        binner.add_luma_chroma(
+            luma,
+            blue,
+            red,
+            red_weight=red_weight,
+            blue_weight=blue_weight,
+            bits=how.bits,
+            full_range=how.full_range,
+        )
+        return
+    packed, convert = _packed(picture), _converter(picture)
+    strip = max(STRIP_BYTES // (16 * picture.width), 1)
+    for channels in (4, 3) if _has_alpha(picture) else (3,):
+        binner.clear()
+        for top in range(0, picture.height, strip):
+            rows = slice(top, top + strip)
+            pixels = convert(rows) if packed is None else packed[rows]
+            binner.add(pixels[..., :channels])
+        # Nothing shows: an unused alpha channel, see `Clip.straight_colours`.
+        if binner.transparent < binner.pixels + binner.ignored:
+            break
+
+
+def _thinned(picture: av.VideoFrame, row_step: int) -> av.VideoFrame:
+    """Every `row_step`-th row, where the layout's planes allow it: chroma that is halved from row
+    to row (4:2:0) becomes that of 4:2:2, from the nearest row."""
+    if row_step == 1 or picture.format.has_palette:
+        return picture
+    rows = np.arange(row_step // 2, picture.height, row_step)
+    layout = picture.format.name.replace("420p", "422p")
+    thin = av.VideoFrame(picture.width, len(rows), layout)
+    widths = [plane.width for plane in picture.planes]
+    if any(plane.height != len(rows) for plane in thin.planes) or widths != [
+        plane.width for plane in thin.planes
+    ]:
+        return picture
+    thin.colorspace, thin.color_range = _matrix(picture), picture.color_range
+    for source, target in zip(picture.planes, thin.planes, strict=True):
+        lines = _plane(source, np.uint8, source.line_size, source.height)
+        fitted = np.zeros((len(rows), target.line_size), np.uint8)
+        length = min(source.line_size, target.line_size)
+        fitted[:, :length] = lines[rows * source.height // picture.height, :length]
+        target.update(fitted.tobytes())
+    return thin
+
+
+@dataclass(frozen=True)
+class _LumaChroma:
+    """A Y'CbCr picture at full chroma resolution, and how it becomes R'G'B'."""
+
+    planar: av.VideoFrame
+    samples: type
+    bits: int
+    matrix: int
+    full_range: bool
+    alpha: bool
+
+
 def picture_pixels(picture: av.VideoFrame) -> F32:
     """(h, w, 3 or 4) float32 R'G'B'(A) in 0..1 of a decoded picture, alpha straight.
 
@@ -305,30 +410,41 @@ def picture_pixels(picture: av.VideoFrame) -> F32:
     576 lines and Rec.601 below where it states none, limited range likewise); libswscale, which
     rounds on the way, only brings chroma to full size. Float formats are not clamped.
     """
+    return _converter(picture)(slice(None))
+
+
+def _packed(picture: av.VideoFrame) -> NDArray[np.uint8] | None:
+    """(h, w, 3 or 4) samples of R'G'B' of up to 8 bits; None for everything else."""
     layout = picture.format
-    components = layout.components
-    bits = max(component.bits for component in components)
-    alpha = any(component.is_alpha for component in components)
+    if not (layout.is_rgb or layout.has_palette) or _bits(picture) > 8:
+        return None
+    packed = _to(picture, "rgba" if _has_alpha(picture) else "rgb24").to_ndarray()
+    return np.asarray(packed, np.uint8)
+
+
+def _converter(picture: av.VideoFrame) -> Callable[[slice], F32]:
+    """Return a function from rows to their pixels, see `picture_pixels`."""
+    layout = picture.format
+    bits = _bits(picture)
+    alpha = any(component.is_alpha for component in layout.components)
     name = layout.name
     if bits == 32 and name.startswith("gbr"):
-        return _planes(_to(picture, "gbrapf32le" if alpha else "gbrpf32le"), np.float32, "gbr")
+        planar = _to(picture, "gbrapf32le" if alpha else "gbrpf32le")
+        return lambda rows: _planes(planar, np.float32, "gbr", rows)
     if name.startswith(("gray", "ya")) and bits in (8, 10, 12, 14, 16):
         return _grey(picture, bits, alpha)
-    if layout.is_rgb or layout.has_palette:
-        if bits <= 8:
-            packed = _to(picture, "rgba" if alpha or layout.has_palette else "rgb24").to_ndarray()
-            return packed.astype(np.float32) / np.float32(255)
-        if bits in _PLANAR_DEPTHS and not (alpha and bits == 9):
-            planar = _to(picture, f"gbr{'a' if alpha else ''}p{bits}le")
-            return _planes(planar, np.uint16, "gbr") / np.float32((1 << bits) - 1)
-    elif name.startswith(("yuv", "nv", "p0", "p2", "p4", "yuyv", "uyvy", "yvyu", "y2", "xv", "v")):
-        matrix = int(picture.colorspace)
-        if matrix == _UNSPECIFIED:
-            matrix = 1 if picture.height > 576 else 5
-        if matrix in _LUMA and bits in _PLANAR_DEPTHS and not (alpha and bits == 14):
-            return _from_luma_chroma(picture, bits, alpha, matrix)
+    packed = _packed(picture)
+    if packed is not None:
+        return lambda rows: packed[rows].astype(np.float32) / np.float32(255)
+    if layout.is_rgb and bits in _PLANAR_DEPTHS and not (alpha and bits == 9):
+        planar = _to(picture, f"gbr{'a' if alpha else ''}p{bits}le")
+        largest = np.float32((1 << bits) - 1)
+        return lambda rows: _planes(planar, np.uint16, "gbr", rows) / largest
+    how = _luma_chroma(picture)
+    if how is not None:
+        return functools.partial(_from_luma_chroma, how)
     wide = _to(picture, "rgba64le" if alpha else "rgb48le").to_ndarray()
-    return wide.astype(np.float32) / np.float32(65535)
+    return lambda rows: wide[rows].astype(np.float32) / np.float32(65535)
 
 
 def _to(picture: av.VideoFrame, layout: str) -> av.VideoFrame:
@@ -354,56 +470,90 @@ def _plane(plane: Any, dtype: type, width: int, height: int) -> NDArray[Any]:
     return samples[: row * height].reshape(height, row)[:, :width]
 
 
-def _planes(picture: av.VideoFrame, dtype: type, order: str) -> F32:
-    """Planes as (h, w, c) float32; `order` names the first three, "gbr" comes out as RGB."""
-    planes = [_plane(plane, dtype, picture.width, picture.height) for plane in picture.planes]
+def _planes_of(picture: av.VideoFrame, dtype: type) -> list[NDArray[Any]]:
+    return [_plane(plane, dtype, picture.width, picture.height) for plane in picture.planes]
+
+
+def _planes(picture: av.VideoFrame, dtype: type, order: str, rows: slice) -> F32:
+    """Rows as (h, w, c) float32; `order` names the first three planes, "gbr" comes out as RGB."""
+    planes = _planes_of(picture, dtype)
     if order == "gbr":
         planes[:3] = [planes[2], planes[0], planes[1]]
-    return np.stack([plane.astype(np.float32) for plane in planes], axis=-1)
+    return np.stack([plane[rows].astype(np.float32) for plane in planes], axis=-1)
 
 
-def _grey(picture: av.VideoFrame, bits: int, alpha: bool) -> F32:
+def _grey(picture: av.VideoFrame, bits: int, alpha: bool) -> Callable[[slice], F32]:
     """Grey, full range unless limited range is stated, as three equal channels."""
     suffix = "" if bits == 8 else f"{bits}le"
-    largest = (1 << bits) - 1
-    if alpha:
-        packed = _plane(
-            _to(picture, f"ya{bits}{'le' if bits > 8 else ''}").planes[0],
-            np.uint8 if bits == 8 else np.uint16,
-            picture.width * 2,
-            picture.height,
-        )
-        values = packed.reshape(picture.height, picture.width, 2).astype(np.float32)
-    else:
-        values = _planes(_to(picture, f"gray{suffix}"), np.uint8 if bits == 8 else np.uint16, "y")
-    values /= np.float32(largest)
-    if int(picture.color_range) == 1:
-        unit = np.float32(1 << (bits - 8)) / np.float32(largest)
-        values[..., 0] = np.clip((values[..., 0] - 16 * unit) / (219 * unit), 0, 1)
-    return np.ascontiguousarray(values[..., [0, 0, 0, 1] if alpha else [0, 0, 0]])
+    samples: type = np.uint8 if bits == 8 else np.uint16
+    largest = np.float32((1 << bits) - 1)
+    planar = _to(picture, f"ya{bits}{suffix[-2:]}" if alpha else f"gray{suffix}")
+
+    def convert(rows: slice) -> F32:
+        if alpha:
+            packed = _plane(planar.planes[0], samples, planar.width * 2, planar.height)
+            pairs = packed.reshape(planar.height, planar.width, 2)
+            values = pairs[rows].astype(np.float32)
+        else:
+            values = _planes(planar, samples, "y", rows)
+        values /= largest
+        if int(picture.color_range) == 1:
+            unit = np.float32(1 << (bits - 8)) / largest
+            values[..., 0] = np.clip((values[..., 0] - 16 * unit) / (219 * unit), 0, 1)
+        return np.ascontiguousarray(values[..., [0, 0, 0, 1] if alpha else [0, 0, 0]])
+
+    return convert
 
 
-def _from_luma_chroma(picture: av.VideoFrame, bits: int, alpha: bool, matrix: int) -> F32:
-    """Y'CbCr -> R'G'B' in floating point (ITU-T H.273, section 8.3), clamped to 0..1."""
+def _luma_chroma(picture: av.VideoFrame) -> _LumaChroma | None:
+    """Bring Y'CbCr of a known matrix to full chroma resolution; None for everything else."""
+    name, bits = picture.format.name, _bits(picture)
+    alpha = any(component.is_alpha for component in picture.format.components)
+    matrix = _matrix(picture)
+    if (
+        not name.startswith(_LUMA_CHROMA)
+        or picture.format.is_rgb
+        or matrix not in _LUMA
+        or bits not in _PLANAR_DEPTHS
+        or (alpha and bits == 14)
+    ):
+        return None
     depth = "" if bits == 8 else f"{bits}le"
-    planar = _to(picture, f"yuv{'a' if alpha else ''}444p{depth}")
-    samples = _planes(planar, np.uint8 if bits == 8 else np.uint16, "yuv")
-    unit = float(1 << (bits - 8))
-    if int(picture.color_range) == _FULL_RANGE:
-        largest = float((1 << bits) - 1)
+    return _LumaChroma(
+        planar=_to(picture, f"yuv{'a' if alpha else ''}444p{depth}"),
+        samples=np.uint8 if bits == 8 else np.uint16,
+        bits=bits,
+        matrix=matrix,
+        full_range=int(picture.color_range) == _FULL_RANGE,
+        alpha=alpha,
+    )
+
+
+def _matrix(picture: av.VideoFrame) -> int:
+    """Matrix coefficients; where none are stated, by the number of lines."""
+    stated = int(picture.colorspace)
+    return (1 if picture.height > 576 else 5) if stated == _UNSPECIFIED else stated
+
+
+def _from_luma_chroma(how: _LumaChroma, rows: slice) -> F32:
+    """Y'CbCr -> R'G'B' in floating point (ITU-T H.273, section 8.3), clamped to 0..1."""
+    samples = _planes(how.planar, how.samples, "yuv", rows)
+    unit = float(1 << (how.bits - 8))
+    if how.full_range:
+        largest = float((1 << how.bits) - 1)
         luma = samples[..., 0] / np.float32(largest)
         chroma = (samples[..., 1:3] - np.float32(128 * unit)) / np.float32(largest)
     else:
         luma = (samples[..., 0] - np.float32(16 * unit)) / np.float32(219 * unit)
         chroma = (samples[..., 1:3] - np.float32(128 * unit)) / np.float32(224 * unit)
-    red_weight, blue_weight = _LUMA[matrix]
+    red_weight, blue_weight = _LUMA[how.matrix]
     green_weight = 1 - red_weight - blue_weight
-    out = np.empty((picture.height, picture.width, samples.shape[2]), np.float32)
+    out = np.empty_like(samples)
     out[..., 0] = luma + np.float32(2 * (1 - red_weight)) * chroma[..., 1]
     out[..., 2] = luma + np.float32(2 * (1 - blue_weight)) * chroma[..., 0]
     out[..., 1] = (
         luma - np.float32(red_weight) * out[..., 0] - np.float32(blue_weight) * out[..., 2]
     ) / np.float32(green_weight)
-    if alpha:
-        out[..., 3] = samples[..., 3] / np.float32((1 << bits) - 1)
+    if how.alpha:
+        out[..., 3] = samples[..., 3] / np.float32((1 << how.bits) - 1)
     return np.clip(out, 0, 1, out=out)

@@ -165,7 +165,7 @@ class _Road:
 
     def static(self) -> SkewPolytope:
         """Return the static palette of section 6.2."""
-        pooled = static_hull.pooled_colours(self.frames, self.options)
+        pooled = statistics.pooled([f.coarse for f in self.frames], self.options.coarse_colours)
         palette = frame_hulls.frame_palette(pooled, self.low, self.high, self.options)
         polytope = static_hull.static_polytope(
             palette, self.frames, self.low, self.high, self.options

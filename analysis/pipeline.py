@@ -31,7 +31,8 @@ def analyze_clip(
 ) -> tuple[dict[str, Any], Analysis]:
     """Analyse a clip and return its sidecar document (not yet written) and the analysis.
 
-    Frames are read one at a time; what is kept of each is bounded, whatever its resolution.
+    Frames are read one after the other; what is kept of them is bounded, whatever their resolution
+    and number.
 
     Raises
     ------
@@ -46,14 +47,12 @@ def analyze_clip(
             "from frames with one step between them; expected a range such as 1-10 or 1-10x3"
         )
     tell = progress or (lambda stage, done, total: None)
-    gathered: list[FrameStatistics | None] = []
-    numbers: list[int] = []
-    for number, image in clip.iter_colours():
-        numbers.append(number)
-        gathered.append(statistics.gather(number, image, options))
-        tell("statistics", len(gathered), len(clip.frames))
+    gathered = statistics.gather_clip(
+        clip, options, lambda done, total: tell("statistics", done, total)
+    )
     skipped = set(clip.skipped)
-    usable, remarks = _usable(clip.frames, dict(zip(numbers, gathered, strict=True)), skipped)
+    usable, remarks = _usable(clip.frames, gathered.frames)
+    remarks = [*gathered.remarks, *remarks]
     if found := cuts.find_cuts(usable):
         if not allow_cuts:
             raise Palette4dError(f"{clip.source}: {cuts.refusal(clip.frames, found)}")
@@ -95,7 +94,7 @@ def _versions() -> dict[str, str]:
 
 
 def _usable(
-    frames: Iterable[int], gathered: dict[int, FrameStatistics | None], skipped: set[int]
+    frames: Iterable[int], gathered: dict[int, FrameStatistics | None]
 ) -> tuple[list[FrameStatistics], list[str]]:
     """Return statistics of the frames that have pixels; the clip's ends are always there.
 

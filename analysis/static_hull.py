@@ -11,16 +11,14 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d import _core
 from palette4d.analysis.objective import refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Palette, Section, SkewPolytope
-from palette4d.analysis.statistics import FINEST_STEP, FrameStatistics
+from palette4d.analysis.statistics import FrameStatistics
 
 F64 = NDArray[np.float64]
 
 EVALUATIONS = 100
-POOLED_FRAMES = 16  # frames pooled at a time, to keep memory flat
 
 
 def static_polytope(
@@ -48,20 +46,3 @@ def static_polytope(
     return SkewPolytope(
         np.vstack([still.vertices, ends]), (Section(first, last, tracks, palette.faces),), ()
     )
-
-
-def pooled_colours(
-    statistics: Sequence[FrameStatistics], options: AnalysisOptions
-) -> _core.ColourTree:
-    """Return the colours of all frames as one, at most `coarse_colours` of them."""
-    rgb, counts = np.zeros((0, 3)), np.zeros(0)
-    step = FINEST_STEP
-    for start in range(0, len(statistics), POOLED_FRAMES):
-        some = statistics[start : start + POOLED_FRAMES]
-        rgb, counts, step = _core.coarsen_colours(
-            np.vstack([rgb, *(s.coarse.rgb for s in some)]),
-            np.concatenate([counts, *(s.coarse.counts for s in some)]),
-            step,
-            options.coarse_colours,
-        )
-    return _core.ColourTree(rgb, counts)

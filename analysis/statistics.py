@@ -1,24 +1,50 @@
 """Colour statistics of a frame: what the analysis keeps of its pixels.
 
-Input: an (h, w, 3 or 4) float32 image. Output: weighted colours in a k-d tree, of bounded size, so
-that memory does not grow with resolution. Pixels that are not finite or have alpha 0 do not count.
-The losses of section 3 measured on a frame with no more distinct 8-bit colours than `colours` are
-exact.
+Input: a clip, or an image. Output: for each frame weighted colours in k-d trees, of bounded size,
+so that memory grows neither with resolution nor, beyond `MOST_COLOURS`, with the number of frames.
+Pixels that are not finite or have an alpha below 1/255 do not count.
+
+The losses of section 3 measured on a frame of 8-bit colours of which no more than the kept number
+differ are exact. Else the colours are a sample (`colour_sample.hpp`), dense where the colours of
+the frame end; its error is measured by the tests.
 """
 
 from __future__ import annotations
 
+import collections
+import concurrent.futures
 import dataclasses
+import functools
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from palette4d import _core
+from palette4d.analysis.clip_base import Fill, FrameError
+from palette4d.analysis.losses import thread_count
 from palette4d.analysis.options import AnalysisOptions
+from palette4d.wording import counted
 
-FINEST_STEP = 1 / 255  # 8-bit colours stay apart; finer differences do not matter to a palette
+if TYPE_CHECKING:
+    from palette4d.analysis.clip import Clip
 
+MOST_COLOURS = 8_000_000
+"""Colours kept of a clip, all frames together: less than 400 MB."""
 
-MOST_STEPS = 2**19  # bins from 0 to the largest colour, what the core's bin numbers hold
+MOST_FRAMES = 3000
+"""Of a clip with more frames only every n-th is analysed: a palette is linear in time anyway."""
+
+FEWEST_COLOURS, FEWEST_COARSE = 2048, 1024
+"""Colours kept of a frame, however many frames there are."""
+
+MEMORY, MOST_WORKERS = 400 << 20, 8
+"""Bytes for frames that are read at the same time, and how many that may be."""
+
+TABLE = 64 << 20
+"""Most bytes of a binner's table."""
+
+Progress = Callable[[int, int], None]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -29,7 +55,7 @@ class FrameStatistics:
     ----------
     frame : the frame number.
     colours : the colours the losses are measured on.
-    coarse : fewer, wider bins, for the stages that only compare alternatives.
+    coarse : fewer of them, for the stages that only compare alternatives.
     low, high : (3,) float64 the colours' bounding box.
     pixels, ignored : how many pixels count, and how many do not.
     """
@@ -43,29 +69,153 @@ class FrameStatistics:
     ignored: int
 
 
+@dataclasses.dataclass(frozen=True)
+class ClipStatistics:
+    """The statistics of a clip's frames, by their number; None where no pixel counts.
+
+    remarks says what was left out to stay within bounds. Bad frames are listed by the clip.
+    """
+
+    frames: dict[int, FrameStatistics | None]
+    remarks: tuple[str, ...]
+
+
 def gather(
     frame: int, image: NDArray[np.float32], options: AnalysisOptions
 ) -> FrameStatistics | None:
     """Return the statistics of an (h, w, 3 or 4) image, or None when no pixel counts."""
-    step = max(FINEST_STEP, _largest(image) / MOST_STEPS)
-    rgb, counts, step, ignored = _core.bin_colours(image, step, options.colours)
-    if len(rgb) == 0:
-        return None
-    fine = _core.ColourTree(rgb, counts)
-    coarse = fine
-    if len(rgb) > options.coarse_colours:
-        rgb, counts, _ = _core.coarsen_colours(rgb, counts, step, options.coarse_colours)
-        coarse = _core.ColourTree(rgb, counts)
-    points = fine.rgb
-    return FrameStatistics(
-        frame, fine, coarse, points.min(axis=0), points.max(axis=0), round(fine.total), ignored
+    binner = _core.ColourBinner()
+    binner.add(image)
+    return _taken(frame, binner, options.colours, options.coarse_colours, image[..., 0].size)
+
+
+def gather_clip(
+    clip: Clip, options: AnalysisOptions, progress: Progress | None = None
+) -> ClipStatistics:
+    """Read a clip's frames, one after the other, and keep their statistics.
+
+    Frames are read and binned side by side in `options.threads` threads, as far as memory allows;
+    the result does not depend on it.
+
+    Raises
+    ------
+    FrameError
+        For the first bad frame, or, with `Clip.skip_bad_frames`, when every frame is bad.
+    """
+    chosen = chosen_frames(clip.frames)
+    colours, coarse = budget(len(chosen), options)
+    report = progress or (lambda done, total: None)
+    pixels = clip.width * clip.height
+    found: dict[int, FrameStatistics | None] = {}
+
+    def taken(number: int, fill: Fill, binner: _core.ColourBinner) -> FrameStatistics | None:
+        try:
+            fill(binner)
+            return _taken(number, binner, colours, coarse, pixels)
+        finally:
+            binner.clear()
+
+    workers = min(
+        thread_count(options), MOST_WORKERS, max(1, MEMORY // (TABLE + 12 * pixels)), len(chosen)
+    )
+    results = _in_order(clip.fills(chosen), taken, workers)
+    for done, (number, result) in enumerate(results, start=1):
+        try:
+            found[number] = result()
+        except FrameError:
+            if not clip.skip_bad_frames:
+                raise
+            clip.skip(number)
+        report(done, len(chosen))
+    if not found:
+        raise clip.none_readable()
+    return ClipStatistics(found, tuple(_remarks(clip.frames, chosen)))
+
+
+def chosen_frames(frames: Sequence[int]) -> list[int]:
+    """Return all frames, or, of very many, every n-th and the last."""
+    step = -(-(len(frames) - 1) // (MOST_FRAMES - 1)) if len(frames) > MOST_FRAMES else 1
+    chosen = list(frames[::step])
+    return chosen if chosen[-1] == frames[-1] else [*chosen, frames[-1]]
+
+
+def budget(frames: int, options: AnalysisOptions) -> tuple[int, int]:
+    """Return how many colours and coarse colours are kept of each of so many frames."""
+    share = MOST_COLOURS / (frames * (options.colours + options.coarse_colours))
+    if share >= 1:
+        return options.colours, options.coarse_colours
+    return (
+        min(options.colours, max(FEWEST_COLOURS, int(share * options.colours))),
+        min(options.coarse_colours, max(FEWEST_COARSE, int(share * options.coarse_colours))),
     )
 
 
-def _largest(image: NDArray[np.float32]) -> float:
-    """Return the largest finite magnitude among an image's colours."""
-    colours = np.abs(image[..., :3])
-    return float(np.max(colours, initial=0.0, where=np.isfinite(colours)))
+def pooled(trees: Sequence[_core.ColourTree], most: int) -> _core.ColourTree:
+    """Return the colours of several trees as one, at most `most` of them."""
+    binner = _core.ColourBinner()
+    for tree in trees:
+        binner.add_colours(tree.rgb, tree.counts)
+    taken = binner.take(most, most)
+    assert taken is not None  # a tree has at least one colour
+    return taken[0]
+
+
+def _taken(
+    frame: int, binner: _core.ColourBinner, colours: int, coarse: int, pixels: int
+) -> FrameStatistics | None:
+    """Take a frame's colours; where not all of its `pixels` were looked at, those stand for all."""
+    looked_at = binner.pixels + binner.ignored
+    scale = pixels / looked_at if looked_at else 1.0
+    count, ignored = round(scale * binner.pixels), round(scale * binner.ignored)
+    taken = binner.take(colours, coarse, scale)
+    if taken is None:
+        return None
+    fine, few, low, high = taken
+    return FrameStatistics(frame, fine, few, low, high, count, ignored)
+
+
+def _in_order(
+    fills: Iterator[tuple[int, Fill]],
+    taken: Callable[[int, Fill, _core.ColourBinner], FrameStatistics | None],
+    workers: int,
+) -> Iterator[tuple[int, Callable[[], FrameStatistics | None]]]:
+    """(number, what returns or raises its result) of each frame, in order."""
+    if workers == 1:
+        binner = _core.ColourBinner()
+        for number, fill in fills:
+            yield number, functools.partial(taken, number, fill, binner)
+        return
+    idle = collections.deque(_core.ColourBinner() for _ in range(workers))
+
+    def work(number: int, fill: Fill) -> FrameStatistics | None:
+        binner = idle.pop()
+        try:
+            return taken(number, fill, binner)
+        finally:
+            idle.append(binner)
+
+    pool = concurrent.futures.ThreadPoolExecutor(workers, "palette4d-read")
+    waiting: collections.deque[tuple[int, concurrent.futures.Future[FrameStatistics | None]]]
+    waiting = collections.deque()
+    try:
+        for number, fill in fills:
+            waiting.append((number, pool.submit(work, number, fill)))
+            if len(waiting) > workers:  # one is ready to be taken up
+                number, future = waiting.popleft()
+                yield number, future.result
+        for number, future in waiting:
+            yield number, future.result
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _remarks(frames: Sequence[int], chosen: Sequence[int]) -> Iterator[str]:
+    if len(chosen) < len(frames):
+        step = frames.index(chosen[1])
+        yield (
+            f"the clip has {counted(len(frames), 'frame')}: one in {step} and the last are "
+            f"analysed, {len(chosen)} in all; in between, colours are taken to change evenly"
+        )
 
 
 def gamut_box(

@@ -22,9 +22,15 @@ class ArrayClip:
         self.rate = Fraction(24)
         self.height, self.width = frames[0].shape[:2]
         self.skipped: list[int] = []
+        self.skip_bad_frames = False
 
     def iter_colours(self):
         yield from zip(self.frames, self.images, strict=True)
+
+    def fills(self, frames):
+        for number in frames:
+            image = self.images[self.frames.index(number)]
+            yield number, lambda binner, image=image: binner.add(image)
 
 
 def noise(seed: int, scale: float = 1.0, offset: float = 0.0, size: tuple[int, int] = (20, 30)):

@@ -49,45 +49,6 @@ struct PolytopeLoss {
 }  // namespace
 
 void bind_analysis(py::module_& m) {
-    m.def(
-        "bin_colours",
-        [](const py::array_t<float>& image, double step, std::size_t most) {
-            if (image.ndim() != 3)
-                throw py::value_error("image: found shape " + shape_text(image) +
-                                      ", expected three dimensions, (h, w, 3 or 4)");
-            py::array_t<float> packed = image;
-            if (image.strides(2) != static_cast<py::ssize_t>(sizeof(float)) ||
-                image.strides(1) != image.shape(2) * static_cast<py::ssize_t>(sizeof(float)))
-                packed = py::array_t<float, py::array::c_style | py::array::forcecast>(image);
-            ColourBins bins;
-            {
-                const float* data = packed.data();
-                const auto h = static_cast<int>(packed.shape(0));
-                const auto w = static_cast<int>(packed.shape(1));
-                const auto c = static_cast<int>(packed.shape(2));
-                const py::ssize_t stride = packed.strides(0);
-                py::gil_scoped_release release;
-                bins = bin_colours(data, w, h, c, stride, step, most);
-            }
-            return py::make_tuple(to_array(bins.rgb), to_array(bins.counts), bins.step,
-                                  bins.ignored);
-        },
-        py::arg("image"), py::arg("step"), py::arg("most"));
-
-    m.def(
-        "coarsen_colours",
-        [](const py::object& rgb, const py::object& counts, double step, std::size_t most) {
-            const std::vector<Vec3> v = colours_from(rgb, "rgb");
-            const std::vector<double> n = numbers_from(counts, "counts");
-            ColourBins bins;
-            {
-                py::gil_scoped_release release;
-                bins = coarsen_colours(v, n, step, most);
-            }
-            return py::make_tuple(to_array(bins.rgb), to_array(bins.counts), bins.step);
-        },
-        py::arg("rgb"), py::arg("counts"), py::arg("step"), py::arg("most"));
-
     py::class_<ColourTree, std::shared_ptr<ColourTree>>(m, "ColourTree")
         .def(py::init([](const py::object& rgb, const py::object& counts) {
                  std::vector<Vec3> v = colours_from(rgb, "rgb");

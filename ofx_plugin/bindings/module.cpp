@@ -13,5 +13,6 @@ PYBIND11_MODULE(_core, module) {
     bind_mvc(module);
     bind_recolour(module);
     bind_analysis(module);
+    bind_bins(module);
     bind_rgbt(module);
 }

@@ -8,7 +8,8 @@ from analysis_frames import constant, mixture, stats
 from palette4d.analysis.frame_hulls import frame_palette
 from palette4d.analysis.losses import palette_loss
 from palette4d.analysis.options import AnalysisOptions
-from palette4d.analysis.static_hull import POOLED_FRAMES, pooled_colours, static_polytope
+from palette4d.analysis.static_hull import static_polytope
+from palette4d.analysis.statistics import pooled
 
 FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
 LOW, HIGH = np.zeros(3), np.ones(3)
@@ -16,7 +17,8 @@ OPTIONS = AnalysisOptions()
 
 
 def static(frames):
-    palette = frame_palette(pooled_colours(frames, OPTIONS), LOW, HIGH, OPTIONS)
+    colours = pooled([f.coarse for f in frames], OPTIONS.coarse_colours)
+    palette = frame_palette(colours, LOW, HIGH, OPTIONS)
     return palette, static_polytope(palette, frames, LOW, HIGH, OPTIONS)
 
 
@@ -37,11 +39,11 @@ def test_colours_do_not_move_and_the_loss_falls():
 
 
 def test_pooling_counts_every_pixel():
-    count = 2 * POOLED_FRAMES + 3
+    count = 35
     frames = stats([mixture(FOUR, i) for i in range(count)])
-    pooled = pooled_colours(frames, OPTIONS)
-    assert pooled.total == pytest.approx(600 * count)
-    assert len(pooled) <= OPTIONS.coarse_colours
+    colours = pooled([f.coarse for f in frames], OPTIONS.coarse_colours)
+    assert colours.total == pytest.approx(600 * count)
+    assert len(colours) <= OPTIONS.coarse_colours
 
 
 @pytest.mark.parametrize("frames", [1, 3])

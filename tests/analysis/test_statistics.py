@@ -1,34 +1,43 @@
-"""Colour bins: exact for 8 bit, bounded for everything, blind to what is no colour."""
+"""Colour statistics: exact for few colours, bounded for everything, their error on a real clip."""
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
-from analysis_frames import noise
+from analysis_frames import ArrayClip, noise
+from clip_files import grey_levels, write_image
 from palette4d import _core
+from palette4d.analysis import frame_hulls, statistics
+from palette4d.analysis.clip import FrameError, open_clip
+from palette4d.analysis.losses import palette_loss
 from palette4d.analysis.options import AnalysisOptions
-from palette4d.analysis.statistics import gamut_box, gather
+from palette4d.analysis.statistics import budget, chosen_frames, gamut_box, gather, gather_clip
+
+
+def same(a: _core.ColourTree, b: _core.ColourTree) -> bool:
+    return np.array_equal(a.rgb, b.rgb) and np.array_equal(a.counts, b.counts)
 
 
 def test_8_bit_colours_stay_exact():
     levels = np.random.default_rng(1).integers(0, 256, (40, 50, 3))
-    image = (levels / 255).astype(np.float32)
-    rgb, counts, step, ignored = _core.bin_colours(image, 1 / 255, 10**6)
+    found = gather(3, (levels / 255).astype(np.float32), AnalysisOptions(coarse_colours=500))
     expected, times = np.unique(levels.reshape(-1, 3), axis=0, return_counts=True)
-    order = np.lexsort(np.round(rgb * 255).T[::-1])
-    np.testing.assert_allclose(rgb[order], expected / 255, atol=1e-7)
-    np.testing.assert_array_equal(counts[order], times)
-    assert step == 1 / 255
-    assert ignored == 0
+    order = np.lexsort(np.round(found.colours.rgb * 255).T[::-1])
+    np.testing.assert_allclose(found.colours.rgb[order], expected / 255, atol=1e-7)
+    np.testing.assert_array_equal(found.colours.counts[order], times)
+    np.testing.assert_allclose(found.low, levels.min(axis=(0, 1)) / 255, atol=1e-7)
+    np.testing.assert_allclose(found.high, levels.max(axis=(0, 1)) / 255, atol=1e-7)
+    assert len(found.coarse) <= 500
+    assert found.coarse.total == found.colours.total == found.pixels == 2000
 
 
-def test_bins_are_bounded_and_keep_sums():
-    image = noise(2, size=(200, 200))
-    rgb, counts, step, _ = _core.bin_colours(image, 1 / 255, 1000)
-    assert len(rgb) <= 1000
-    assert step > 1 / 255
-    assert counts.sum() == 40000
-    np.testing.assert_allclose(counts @ rgb, image.reshape(-1, 3).astype(float).sum(axis=0))
+def test_colours_are_bounded():
+    found = gather(0, noise(2, size=(200, 200)), AnalysisOptions(colours=1000, coarse_colours=100))
+    assert 800 < len(found.colours) <= 1000
+    assert 80 < len(found.coarse) <= 100
+    assert found.colours.total == found.coarse.total == found.pixels == 40000
 
 
 def test_what_is_no_colour_does_not_count():
@@ -42,24 +51,6 @@ def test_what_is_no_colour_does_not_count():
     assert gather(7, np.full((4, 4, 3), np.nan, np.float32), AnalysisOptions()) is None
 
 
-@pytest.mark.parametrize("view", [np.s_[::-1], np.s_[:, ::2], np.s_[::3, 5:]])
-def test_any_strides(view):
-    image = noise(4)[view]
-    rgb, counts, *_ = _core.bin_colours(image, 1 / 255, 10**6)
-    packed = _core.bin_colours(np.ascontiguousarray(image), 1 / 255, 10**6)
-    np.testing.assert_array_equal(rgb, packed[0])
-    np.testing.assert_array_equal(counts, packed[1])
-
-
-def test_bad_images_are_refused():
-    with pytest.raises(ValueError, match="dimensions"):
-        _core.bin_colours(np.zeros((4, 4), np.float32), 0.1, 10)
-    with pytest.raises(ValueError, match="channels"):
-        _core.bin_colours(np.zeros((4, 4, 2), np.float32), 0.1, 10)
-    with pytest.raises(ValueError, match="positive width"):
-        _core.bin_colours(np.zeros((4, 4, 3), np.float32), 0.0, 10)
-
-
 def test_gamut_grows_only_for_colours_outside():
     inside = gather(0, noise(5), AnalysisOptions())
     outside = gather(1, noise(6, 3, -1), AnalysisOptions())
@@ -68,3 +59,143 @@ def test_gamut_grows_only_for_colours_outside():
     low, high = gamut_box([inside, outside])
     assert low.max() < -0.9
     assert high.min() > 1.9
+
+
+def test_trees_are_pooled():
+    options = AnalysisOptions()
+    images = [noise(seed, size=(60, 60)) for seed in range(3)]
+    trees = [gather(0, image, options).colours for image in images]
+    whole = statistics.pooled(trees, 10**6)
+    assert whole.total == 3 * 3600
+    np.testing.assert_allclose(
+        whole.counts @ whole.rgb, np.sum(images, axis=(0, 1, 2), dtype=float), rtol=1e-6
+    )
+    few = statistics.pooled(trees, 1000)
+    assert 800 < len(few) <= 1000
+    assert few.total == 3 * 3600
+
+
+@pytest.mark.parametrize("rows", [1, 3])
+def test_threads_do_not_change_the_statistics(tmp_path, monkeypatch, rows):
+    monkeypatch.setattr("palette4d.analysis.clip_base.COUNTED_PIXELS", 90 * 120 // rows)
+    generator = np.random.default_rng(8)
+    for frame in range(12):
+        write_image(tmp_path / f"a.{frame}.png", generator.integers(0, 256, (90, 120, 3), np.uint8))
+    options = AnalysisOptions(colours=900, coarse_colours=300)
+    done = []
+    runs = [
+        gather_clip(
+            open_clip(str(tmp_path)),
+            dataclasses.replace(options, threads=threads),
+            lambda *at: done.append(at),
+        )
+        for threads in (1, 2, 7)
+    ]
+    assert done == [(n, 12) for n in range(1, 13)] * 3
+    for run in runs:
+        assert list(run.frames) == list(range(12))
+        assert run.remarks == ()
+        for number, found in run.frames.items():
+            first = runs[0].frames[number]
+            assert same(found.colours, first.colours)
+            assert same(found.coarse, first.coarse)
+            assert found.frame == number
+            assert found.pixels == 90 * 120
+            assert found.colours.total == pytest.approx(90 * 120)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_bad_frames_are_skipped_or_end_the_reading(tmp_path, threads):
+    folder = grey_levels(tmp_path, range(1, 9))
+    (folder / "clip.0004.png").unlink()
+    path = folder / "clip.0006.png"
+    path.write_bytes(path.read_bytes()[:60])
+    options = AnalysisOptions(threads=threads)
+    clip = open_clip(str(folder), skip_bad_frames=True)
+    found = gather_clip(clip, options)
+    assert list(found.frames) == [1, 2, 3, 5, 7, 8]
+    assert clip.skipped == [4, 6]
+    with pytest.raises(FrameError, match="frame 6 cannot be read"):
+        gather_clip(open_clip(str(folder), frames="5-8"), options)
+    for frame in folder.iterdir():
+        if frame.name != "clip.0001.png":
+            frame.write_bytes(b"no picture")
+    with pytest.raises(FrameError, match="none readable of frames 2-8"):
+        gather_clip(open_clip(str(folder), frames="2-8", skip_bad_frames=True), options)
+
+
+def test_frames_without_a_colour_are_none():
+    blank = np.full((20, 30, 3), np.nan, np.float32)
+    found = gather_clip(ArrayClip([noise(1), blank, noise(2)], first=5), AnalysisOptions())
+    assert [number for number, one in found.frames.items() if one is None] == [6]
+
+
+def test_every_nth_frame_of_very_many():
+    assert chosen_frames([7]) == [7]
+    assert chosen_frames(range(10, 3010)) == list(range(10, 3010))
+    for count in (3001, 4444, 100_001):
+        frames = range(5, 5 + 2 * count, 2)
+        chosen = chosen_frames(frames)
+        assert len(chosen) <= statistics.MOST_FRAMES
+        assert (chosen[0], chosen[-1]) == (frames[0], frames[-1])
+        gaps = set(np.diff(chosen[:-1]))
+        assert len(gaps) == 1
+        assert 0 < chosen[-1] - chosen[-2] <= gaps.pop()
+
+
+def test_leaving_frames_out_is_said(monkeypatch):
+    monkeypatch.setattr(statistics, "MOST_FRAMES", 4)
+    found = gather_clip(ArrayClip([noise(i) for i in range(9)], first=0), AnalysisOptions())
+    assert list(found.frames) == [0, 3, 6, 8]
+    assert len(found.remarks) == 1
+    assert "9 frames: one in 3 and the last are analysed, 4 in all" in found.remarks[0]
+
+
+def test_colours_kept_of_a_clip_are_bounded(monkeypatch):
+    options = AnalysisOptions(colours=16384, coarse_colours=4096)
+    assert budget(50, options) == (16384, 4096)
+    for frames in (400, 1600, 3000):
+        colours, coarse = budget(frames, options)
+        assert colours >= statistics.FEWEST_COLOURS
+        assert coarse >= statistics.FEWEST_COARSE
+        assert frames * (colours + coarse) < 1.2 * statistics.MOST_COLOURS
+    assert budget(3000, AnalysisOptions(colours=100, coarse_colours=64)) == (100, 64)
+    monkeypatch.setattr(statistics, "MOST_COLOURS", 4000)
+    monkeypatch.setattr(statistics, "FEWEST_COLOURS", 64)
+    found = gather_clip(ArrayClip([noise(i, size=(90, 90)) for i in range(4)]), options)
+    assert all(700 < len(one.colours) <= 800 for one in found.frames.values())
+
+
+@pytest.fixture(scope="module")
+def palettes(seasons):
+    """Refined hulls of some frames, with all colours of these."""
+    options = AnalysisOptions()
+    clip, out = open_clip(str(seasons)), []
+    for number, fill in clip.fills(clip.frames[::7]):
+        binner = _core.ColourBinner()
+        fill(binner)
+        everything, coarse, *_ = binner.take(10**9, 4096)
+        palette = frame_hulls.frame_palette(coarse, np.zeros(3), np.ones(3), options)
+        out.append((number, palette.rgb, everything))
+    return clip, out
+
+
+@pytest.mark.parametrize(
+    ("colours", "mean", "most"),
+    [(AnalysisOptions().colours, 0.0005, 0.002), (16384, 0.001, 0.003), (4096, 0.003, 0.008)],
+)
+def test_the_sample_is_as_good_as_all_pixels(palettes, colours, mean, most):
+    """The loss L of a palette on the sample against that on all pixels, SEASONS being 0.1."""
+    options = AnalysisOptions()
+    clip, frames = palettes
+    errors = []
+    for number, rgb, everything in frames:
+        binner = _core.ColourBinner()
+        ((_, fill),) = clip.fills([number])
+        fill(binner)
+        sample = binner.take(colours, 64)[0]
+        assert len(sample) <= colours < len(everything)
+        assert sample.total == everything.total == 696 * 380
+        errors.append(palette_loss(sample, rgb, options) - palette_loss(everything, rgb, options))
+    assert abs(np.mean(errors)) < mean
+    assert np.abs(errors).max() < most

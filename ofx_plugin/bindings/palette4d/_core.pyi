@@ -128,17 +128,53 @@ class Recolourer:
 def instruction_sets() -> list[str]:
     """Return the instruction sets that `Recolourer.apply` can use here, slowest first."""
 
-def bin_colours(image: NDArray[np.float32], step: float, most: int) -> tuple[F64, F64, float, int]:
-    """Gather an (h, w, 3 or 4) float32 image's pixels in bins of width `step`.
+class ColourBinner:
+    """Gathers a frame's pixels, strip by strip, to a bounded number of colours.
 
-    Returns (n, 3) mean colours, (n,) pixel counts, the width of the bins, which is doubled until at
-    most `most` are left, and how many pixels do not count (not finite, or alpha 0).
+    8-bit samples are told apart exactly; others fall into cells 1/255 wide (wider beyond 0..1),
+    which keep their means. What is not finite or has an alpha below 1/255 does not count. A frame's
+    samples are of one kind. Methods may be called in any thread, in one at a time.
     """
 
-def coarsen_colours(
-    rgb: ArrayLike, counts: ArrayLike, step: float, most: int
-) -> tuple[F64, F64, float]:
-    """Do the same for (n, 3) colours with (n,) counts; returns colours, counts, width."""
+    def __init__(self) -> None: ...
+    def add(self, image: NDArray[Any], *, bits: int = ..., premultiplied: bool = ...) -> None:
+        """Add (h, w, 3 or 4) uint8, uint16 or float32 pixels.
+
+        Integers are taken over their largest value; `bits` says how many of a uint16's upper bits
+        are in use. `premultiplied` colours are divided by alpha.
+        """
+    def add_luma_chroma(
+        self,
+        luma: NDArray[Any],
+        blue: NDArray[Any],
+        red: NDArray[Any],
+        *,
+        red_weight: float,
+        blue_weight: float,
+        bits: int,
+        full_range: bool,
+    ) -> None:
+        """Add (h, w) planes Y', Cb, Cr, uint8 or uint16; the colours are clamped to 0..1."""
+    def add_colours(self, rgb: ArrayLike, counts: ArrayLike) -> None:
+        """Add (n, 3) colours with (n,) counts."""
+    @property
+    def pixels(self) -> float:
+        """How many pixels count."""
+    @property
+    def ignored(self) -> float:
+        """How many do not."""
+    @property
+    def transparent(self) -> float:
+        """How many of those are ignored for their alpha."""
+    def take(
+        self, colours: int, coarse: int, scale: float = ...
+    ) -> tuple[ColourTree, ColourTree, F64, F64] | None:
+        """Return at most so many colours, fewer coarse ones, and their (3,) box, low and high.
+
+        None when no pixel counts. Counts are multiplied by `scale`. The frame is forgotten.
+        """
+    def clear(self) -> None:
+        """Forget the frame."""
 
 class ColourTree:
     """Weighted colours in a k-d tree: what the losses are measured on."""
