@@ -25,7 +25,8 @@ USE_FRAMES = 12
 # What is worth a warning.
 BAD_FRAME = 4.0  # times the median frame's L ...
 BAD_L = 0.3  # ... and at least this, or the clip's mean
-LOOKALIKE = 0.06  # RGB distance of two handles
+LOOKALIKE = 0.06  # RGB distance of two handles ...
+NARROW = 4 * LOOKALIKE  # ... in frames whose colours extend farther than this
 DENT = 0.05  # share of its convex hull that a slice lacks
 UNUSED = 0.001  # largest mean weight of a handle in any frame
 
@@ -48,7 +49,8 @@ class Report:
     ----------
     fits : one a frame, in order of time.
     closest : the least distance of two handles at one time (colours in the middle of a split or
-        merge do not count), its frame and the two nearest vertices' ids; None with one colour.
+        merge do not count, nor do frames that are nearly of one colour, such as black ones), its
+        frame and the two nearest vertices' ids; None where there are no two.
     least_used : the handle of least use and its largest mean weight (eq. 7) in any frame.
     dent : the largest share of its convex hull that a slice lacks, and its frame.
     splits, merges : vertices where a colour becomes several, or several one.
@@ -180,6 +182,8 @@ def _closest(
     best: tuple[float, int, str, str] | None = None
     ids = polytope.vertex_ids
     for cut, frame in zip(slices, statistics, strict=True):
+        if np.max(frame.high - frame.low) < NARROW:
+            continue
         gaps = np.linalg.norm(cut.rgb[:, None] - cut.rgb[None], axis=2)
         # Colours that come from one vertex, or go to one, are meant to be close there.
         related = (cut.ends[:, None, 0] == cut.ends[None, :, 0]) | (

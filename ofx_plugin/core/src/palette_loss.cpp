@@ -316,6 +316,15 @@ double closeness(const std::vector<Vec3>& v, double separation, std::vector<Vec3
     return sum;
 }
 
+/// How far apart colours should stay in this frame: where its own colours are all near each other,
+/// as in black, palette colours pushed farther apart would leave them.
+double separation_within(const ColourTree& colours, double separation) {
+    const ColourTree::Node& all = colours.nodes()[0];
+    double extent = 0;
+    for (int c = 0; c < 3; ++c) extent = std::max(extent, all.high[c] - all.low[c]);
+    return std::min(separation, extent / 4);
+}
+
 }  // namespace
 
 FrameLoss palette_loss(const ColourTree& colours, const std::vector<Vec3>& palette,
@@ -339,7 +348,8 @@ FrameLoss palette_loss(const ColourTree& colours, const std::vector<Vec3>& palet
         loss.D = concavity(palette, faces, weights.convexity, gradient);
     else
         loss.D = concavity(palette, faces, 0, nullptr);
-    if (weights.separation > 0) loss.S = closeness(palette, weights.separation, gradient);
+    const double separation = separation_within(colours, weights.separation);
+    if (separation > 0) loss.S = closeness(palette, separation, gradient);
     return loss;
 }
 
