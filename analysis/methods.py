@@ -24,6 +24,7 @@ from palette4d.analysis import (
     rgbt_hull,
     static_hull,
     statistics,
+    stop_insertion,
     vertex_refinement,
     vertex_removal,
 )
@@ -298,8 +299,11 @@ class _Skew(_Road):
         steps = [c.removed for c in candidates]
         chosen = candidates[steps.index(handle_removal.choose(steps, self.options))]
         self.measure("block_merging", chosen.merged)
-        self.measure("vertex_removal", chosen.removed.polytope)
-        polytope = self.refined(chosen.removed.polytope)
+        removed = stop_insertion.insert_stops(
+            chosen.removed, self.frames, self.low, self.high, self.options
+        )
+        self.measure("vertex_removal", removed.polytope)
+        polytope = self.refined(removed.polytope)
         remarks = chosen.remarks
         if self.stages[-1].losses.L_prime > reference:
             self.stages.pop()

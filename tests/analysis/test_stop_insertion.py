@@ -1,0 +1,96 @@
+"""Stops for colours that are there for a moment only."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from analysis_frames import mixture, stats
+from palette4d.analysis.frame_hulls import hull_mesh
+from palette4d.analysis.handle_removal import Step
+from palette4d.analysis.objective import Objective
+from palette4d.analysis.options import AnalysisOptions
+from palette4d.analysis.polytope import Section, SkewPolytope
+from palette4d.analysis.stop_insertion import insert_stops
+
+FIVE = np.array(
+    [[0.1, 0.1, 0.1], [0.6, 0.2, 0.2], [0.2, 0.6, 0.2], [0.2, 0.2, 0.6], [0.6, 0.6, 0.55]]
+)
+LIGHT = np.array([1.0, 1.0, 0.9])
+LOW, HIGH = np.zeros(3), np.ones(3)
+FRAMES = 21
+
+
+def rest(count=FRAMES):
+    """A polytope whose colours do not move, a little larger than the five."""
+    mesh = hull_mesh(0.37 + 1.02 * (FIVE - 0.37))
+    n = len(mesh.rgb)
+    vertices = np.array([[*c, t] for t in (0.0, count - 1.0) for c in mesh.rgb])
+    tracks = tuple((i, n + i) for i in range(n))
+    return SkewPolytope(vertices, (Section(0.0, count - 1.0, tracks, mesh.faces),), ())
+
+
+def clip(lit):
+    """Mixtures of the five; a light on 30 of 900 pixels in the frames `lit`."""
+    pictures = []
+    for t in range(FRAMES):
+        picture = mixture(FIVE, t, 900)
+        if t in lit:
+            picture.reshape(-1, 3)[:30] = LIGHT
+        pictures.append(picture)
+    return stats(pictures)
+
+
+def step_of(polytope, frames, options):
+    value, _ = Objective(polytope, frames, options, 1.0, coarse=True)(
+        polytope.vertices, list(range(len(frames)))
+    )
+    return Step(polytope, value)
+
+
+def colours_at(polytope, time):
+    tracks = [polytope.vertices[list(t)] for t in polytope.blocks[0].tracks]
+    return np.array([[np.interp(time, t[:, 3], t[:, c]) for c in range(3)] for t in tracks])
+
+
+@pytest.mark.parametrize("lit", [(10,), (9, 10, 11), (3, 16)])
+def test_a_light_gets_a_stop(lit):
+    options, frames = AnalysisOptions(), clip(lit)
+    before = step_of(rest(), frames, options)
+    after = insert_stops(before, frames, LOW, HIGH, options)
+    added = len(after.polytope.vertices) - len(before.polytope.vertices)
+    assert 1 <= added <= 3 * len(lit)
+    assert after.value < before.value
+    assert after.value == pytest.approx(step_of(after.polytope, frames, options).value, abs=1e-9)
+    for t in lit:
+        nearest = np.linalg.norm(colours_at(after.polytope, t) - LIGHT, axis=1).min()
+        assert nearest < 0.3 < np.linalg.norm(colours_at(before.polytope, t) - LIGHT, axis=1).min()
+    # What is already there keeps its place.
+    np.testing.assert_array_equal(
+        after.polytope.vertices[: len(before.polytope.vertices)], before.polytope.vertices
+    )
+    # And far from the light nothing has changed much.
+    dark = [t for t in range(FRAMES) if min(abs(t - at) for at in lit) > 4]
+    for t in dark:
+        moved = np.abs(colours_at(after.polytope, t) - colours_at(before.polytope, t)).max()
+        assert moved < 0.1
+
+
+def test_frames_that_fit_alike_get_none():
+    options, frames = AnalysisOptions(), clip(())
+    before = step_of(rest(), frames, options)
+    assert insert_stops(before, frames, LOW, HIGH, options).polytope is before.polytope
+
+
+def test_never_more_vertices_than_asked_for():
+    options, frames = AnalysisOptions(vertices=len(rest().vertices)), clip((10,))
+    before = step_of(rest(), frames, options)
+    assert insert_stops(before, frames, LOW, HIGH, options).polytope is before.polytope
+
+
+@pytest.mark.parametrize("lit", [(0,), (FRAMES - 1,)])
+def test_the_clips_ends_have_stops_already(lit):
+    """There is no room for another; nothing may break."""
+    options, frames = AnalysisOptions(), clip(lit)
+    before = step_of(rest(), frames, options)
+    after = insert_stops(before, frames, LOW, HIGH, options)
+    assert after.value <= before.value
