@@ -43,8 +43,8 @@ def insert_stops(
 ) -> Step:
     """Return the polytope with stops for its worst frames.
 
-    `statistics` are all of the clip's frames; `step.value` is on them. With `options.vertices` there
-    are never more than so many.
+    `statistics` are all of the clip's frames; `step.value` is on them. With `options.vertices`
+    there are never more than so many.
     """
     polytope, value = step.polytope, step.value
     hopeless: set[int] = set()
