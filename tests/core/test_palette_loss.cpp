@@ -160,7 +160,11 @@ TEST(only_dents_are_concave) {
 TEST(the_gradient_is_that_of_differences) {
     shapes::Random random(2);
     std::vector<Vec3> colours;
-    for (int i = 0; i < 200; ++i) colours.push_back(random.colour());
+    // Four times as far apart as the palette, so that its colours count as near each other.
+    for (int i = 0; i < 200; ++i) {
+        colours.push_back(random.colour());
+        for (double& x : colours.back()) x = 0.5 + 4 * (x - 0.5);
+    }
     // k covers all pixels, so that v_N does not jump.
     const ColourTree tree(colours, std::vector<double>(colours.size(), 1));
     const LossWeights weights{50, 200, 0.7, 0.9};
@@ -190,7 +194,7 @@ TEST(the_gradient_is_that_of_differences) {
 }
 
 TEST(near_colours_repel_by_hand) {
-    const ColourTree tree({{0.5, 0.5, 0.5}}, {1});
+    const ColourTree tree({{0, 0.5, 0.5}, {1, 0.5, 0.5}}, {1, 1});
     const std::vector<Vec3> palette = {{0, 0, 0}, {0.1, 0, 0}, {0.5, 0, 0}, {0.5, 0, 0}};
     std::vector<Vec3> gradient;
     const LossWeights off{0, 1}, on{0, 1, 0, 0.2};
@@ -204,6 +208,19 @@ TEST(near_colours_repel_by_hand) {
     CHECK_NEAR(gradient[1][0] - plain[1][0], -0.5, 1e-12);
     CHECK_EQUAL(gradient[2][0], plain[2][0]);  // no way to part is better than another
     CHECK_EQUAL(gradient[3][0], plain[3][0]);
+}
+
+TEST(colours_of_a_nearly_plain_frame_may_be_near_each_other) {
+    const std::vector<Vec3> palette = {{0.1, 0, 0}, {0.15, 0, 0}, {0.5, 0, 0}};
+    const LossWeights weights{0, 1, 0, 0.2};
+    const auto repulsion = [&](double extent) {
+        const ColourTree tree({{0.1, 0, 0}, {0.1, extent, 0}}, {1, 1});
+        return palette_loss(tree, palette, {}, weights, nullptr).S;
+    };
+    CHECK_NEAR(repulsion(1), 0.15 * 0.15 / 0.4, 1e-15);
+    CHECK_NEAR(repulsion(0.4), 0.05 * 0.05 / 0.2, 1e-15);  // a quarter of the extent: 0.1
+    CHECK_EQUAL(repulsion(0.16), 0.0);
+    CHECK_EQUAL(repulsion(0), 0.0);
 }
 
 TEST(colours_that_are_not_finite_are_refused) {
