@@ -17,8 +17,14 @@ typedef struct OfxParamSetStruct* OfxParamSetHandle;
 #define kOfxTypeParameter "OfxTypeParameter"
 #define kOfxTypeParameterInstance "OfxTypeParameterInstance"
 
+#define kOfxParamTypeInteger "OfxParamTypeInteger"
 #define kOfxParamTypeDouble "OfxParamTypeDouble"
+#define kOfxParamTypeBoolean "OfxParamTypeBoolean"
+#define kOfxParamTypeChoice "OfxParamTypeChoice"
+#define kOfxParamTypeRGB "OfxParamTypeRGB"
 #define kOfxParamTypeString "OfxParamTypeString"
+#define kOfxParamTypeGroup "OfxParamTypeGroup"
+#define kOfxParamTypePushButton "OfxParamTypePushButton"
 
 #define kOfxParamPropType "OfxParamPropType"
 #define kOfxParamPropAnimates "OfxParamPropAnimates"
@@ -45,7 +51,10 @@ typedef struct OfxParamSetStruct* OfxParamSetHandle;
 #define kOfxParamStringIsSingleLine "OfxParamStringIsSingleLine"
 #define kOfxParamStringIsMultiLine "OfxParamStringIsMultiLine"
 #define kOfxParamStringIsFilePath "OfxParamStringIsFilePath"
+#define kOfxParamStringIsDirectoryPath "OfxParamStringIsDirectoryPath"
 #define kOfxParamStringIsLabel "OfxParamStringIsLabel"
+#define kOfxParamPropChoiceOption "OfxParamPropChoiceOption"
+#define kOfxParamPropGroupOpen "OfxParamPropGroupOpen"
 
 typedef struct OfxParameterSuiteV1 {
     OfxStatus (*paramDefine)(OfxParamSetHandle params, const char* type, const char* name,
@@ -54,12 +63,13 @@ typedef struct OfxParameterSuiteV1 {
                                 OfxPropertySetHandle* properties);
     OfxStatus (*paramSetGetPropertySet)(OfxParamSetHandle params, OfxPropertySetHandle* properties);
     OfxStatus (*paramGetPropertySet)(OfxParamHandle param, OfxPropertySetHandle* properties);
-    /* Values travel as pointers to the parameter's type (double*, char**) … */
+    /* Values travel as pointers to the parameter's type (double*, char**; int* for integers,
+       booleans and choices; three double* for RGB) … */
     OfxStatus (*paramGetValue)(OfxParamHandle param, ...);
     OfxStatus (*paramGetValueAtTime)(OfxParamHandle param, OfxTime time, ...);
     OfxStatus (*paramGetDerivative)(OfxParamHandle param, OfxTime time, ...);
     OfxStatus (*paramGetIntegral)(OfxParamHandle param, OfxTime time1, OfxTime time2, ...);
-    /* … and are set by value (double, const char*). */
+    /* … and are set by value (double, const char*, int; three doubles). */
     OfxStatus (*paramSetValue)(OfxParamHandle param, ...);
     OfxStatus (*paramSetValueAtTime)(OfxParamHandle param, OfxTime time, ...);
     OfxStatus (*paramGetNumKeys)(OfxParamHandle param, unsigned int* count);

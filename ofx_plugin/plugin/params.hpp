@@ -1,6 +1,7 @@
 // The node's parameters. Their names are saved in users' projects: they never change.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 
@@ -25,14 +26,25 @@ public:
     /// At a time: the one way that is allowed while rendering.
     std::optional<std::string> string_at(const char* name, OfxTime time) const;
     std::optional<double> double_at(const char* name, OfxTime time) const;
+    /// Integers, choices (the option's number) and booleans (0 or 1).
+    std::optional<int> int_at(const char* name, OfxTime time) const;
+    std::optional<std::array<double, 3>> rgb_at(const char* name, OfxTime time) const;
     /// Without a time: for actions other than rendering.
     std::optional<std::string> string_now(const char* name) const;
+    std::optional<double> double_now(const char* name) const;
+    std::optional<int> int_now(const char* name) const;
+    std::optional<std::array<double, 3>> rgb_now(const char* name) const;
     /// For instance changes only, never while rendering.
     bool set_string(const char* name, const std::string& value) const;
+    bool set_int(const char* name, int value) const;
+    bool set_rgb(const char* name, const std::array<double, 3>& value) const;
+    /// An instance's parameter's own properties (label, secret, enabled, hint).
+    Properties properties(const char* name) const;
 
 private:
     OfxParamHandle find(const char* name) const;
 
+    const Suites& suites_;
     const OfxParameterSuiteV1* suite_;
     OfxParamSetHandle set_ = nullptr;
 };

@@ -168,46 +168,6 @@ std::string binary_of(const std::string& bundle) {
     throw std::runtime_error(bundle + ": no .ofx file inside");
 }
 
-void require(bool condition, const std::string& what) {
-    if (!condition) Host::get().fault("described: " + what);
-}
-
-/// What a host's author would check in a description.
-void check_descriptor(const OfxImageEffectStruct& effect) {
-    const OfxPropertySetStruct& p = effect.properties;
-    for (const char* name : {kOfxPropLabel, kOfxImageEffectPluginPropGrouping,
-                             kOfxImageEffectPluginRenderThreadSafety}) {
-        require(!p.text(name).empty(), std::string("no ") + name);
-    }
-    for (const char* name :
-         {kOfxImageEffectPropSupportedContexts, kOfxImageEffectPropSupportedPixelDepths}) {
-        require(p.has(name), std::string("no ") + name);
-    }
-    for (const char* name : {kOfxImageEffectSimpleSourceClipName, kOfxImageEffectOutputClipName}) {
-        const auto clip = effect.clips.find(name);
-        require(clip != effect.clips.end(), std::string("no clip ") + name);
-        if (clip == effect.clips.end()) continue;
-        require(clip->second->properties.has(kOfxImageEffectPropSupportedComponents),
-                std::string("no components of clip ") + name);
-    }
-    for (const auto& [name, param] : effect.params.params) {
-        const OfxPropertySetStruct& q = param->properties;
-        require(!q.text(kOfxPropLabel).empty(), name + " has no label");
-        require(!q.text(kOfxParamPropHint).empty(), name + " has no hint");
-        if (param->type != kOfxParamTypeDouble) continue;
-        for (const char* range : {kOfxParamPropMin, kOfxParamPropMax, kOfxParamPropDisplayMin,
-                                  kOfxParamPropDisplayMax, kOfxParamPropDefault}) {
-            require(q.has(range), name + " has no " + range);
-        }
-        const double initial = q.number(kOfxParamPropDefault);
-        require(q.number(kOfxParamPropMin) <= q.number(kOfxParamPropDisplayMin) &&
-                    q.number(kOfxParamPropDisplayMin) <= initial &&
-                    initial <= q.number(kOfxParamPropDisplayMax) &&
-                    q.number(kOfxParamPropDisplayMax) <= q.number(kOfxParamPropMax),
-                name + "'s ranges are not nested around its default");
-    }
-}
-
 }  // namespace
 
 Plugin::Plugin(const std::string& bundle) {
@@ -280,6 +240,21 @@ std::unique_ptr<Instance> Plugin::create(const std::string& context) {
 
 // ---------------------------------------------------------------- instance
 
+namespace {
+
+Value initial_value(const OfxParamStruct& param) {
+    const OfxPropertySetStruct& p = param.properties;
+    if (param.type == kOfxParamTypeString) return p.text(kOfxParamPropDefault);
+    if (param.type == kOfxParamTypeDouble) return p.number(kOfxParamPropDefault);
+    if (param.type == kOfxParamTypeRGB) {
+        return Colour{p.number(kOfxParamPropDefault, 0), p.number(kOfxParamPropDefault, 1),
+                      p.number(kOfxParamPropDefault, 2)};
+    }
+    return static_cast<int>(p.number(kOfxParamPropDefault));
+}
+
+}  // namespace
+
 Instance::Instance(Plugin& plugin, const OfxImageEffectStruct& descriptor,
                    const std::string& context)
     : plugin_(plugin), effect_(false) {
@@ -300,11 +275,7 @@ Instance::Instance(Plugin& plugin, const OfxImageEffectStruct& descriptor,
         const OfxParamStruct& param = *descriptor.params.params.at(name);
         auto copy = std::make_unique<OfxParamStruct>(param);
         copy->properties.kind = kParam;
-        if (param.type == kOfxParamTypeDouble) {
-            copy->value = param.properties.number(kOfxParamPropDefault);
-        } else {
-            copy->value = param.properties.text(kOfxParamPropDefault);
-        }
+        copy->value = initial_value(param);
         copy->on_set = [this](const std::string& set) { tell(set); };
         effect_.params.params[name] = std::move(copy);
         effect_.params.order.push_back(name);
@@ -332,10 +303,14 @@ void Instance::set(const std::string& param, Value value) {
         if (!Host::get().refused()) throw std::runtime_error("no parameter " + param);
         return;
     }
+    // A test's own slip: a value of another type would be read as something that it is not.
+    if (found->second->value.index() != value.index()) {
+        throw std::runtime_error("a value of the wrong type for " + param);
+    }
     found->second->value = std::move(value);
 }
 
-void Instance::animate(const std::string& param, std::map<double, double> keys) {
+void Instance::animate(const std::string& param, std::map<double, Value> keys) {
     effect_.params.params.at(param)->keys = std::move(keys);
 }
 
@@ -384,6 +359,14 @@ OfxStatus Instance::sync() {
 std::string Instance::text(const std::string& param) {
     const auto found = effect_.params.params.find(param);
     return found == effect_.params.params.end() ? "" : std::get<std::string>(found->second->value);
+}
+
+const Value& Instance::value(const std::string& param) {
+    return effect_.params.params.at(param)->value;
+}
+
+const OfxPropertySetStruct& Instance::properties(const std::string& param) {
+    return effect_.params.params.at(param)->properties;
 }
 
 namespace {

@@ -4,6 +4,7 @@
 // badly itself: leave out suites, functions and properties, and refuse any single call.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -42,7 +43,8 @@ enum Kind : unsigned {
     kOutArgs = 1024,
 };
 
-using Value = std::variant<int, double, std::string, void*>;
+using Colour = std::array<double, 3>;
+using Value = std::variant<int, double, std::string, void*, Colour>;
 
 }  // namespace strict
 
@@ -69,8 +71,9 @@ struct OfxPropertySetStruct {
 struct OfxParamStruct {
     std::string type, name;
     OfxPropertySetStruct properties;
-    strict::Value value;
-    std::map<double, double> keys;  ///< linear between keys; empty: `value` at all times
+    strict::Value value{};
+    /// Doubles or colours, linear between keys; empty: `value` at all times.
+    std::map<double, strict::Value> keys{};
     std::function<void(const std::string& name)> on_set{};  ///< the plugin has set an instance's
 };
 
@@ -226,6 +229,9 @@ SuiteTable message_suite_v2();
 
 // ---------------------------------------------------------------- plugins and instances
 
+/// Notes what a host's author would find wrong with a description as a fault.
+void check_descriptor(const OfxImageEffectStruct& effect);
+
 class Instance;
 
 /// A bundle's binary and its first plugin.
@@ -260,7 +266,7 @@ public:
     OfxStatus create();
     OfxStatus destroy();
     void set(const std::string& param, Value value);  ///< no action is sent
-    void animate(const std::string& param, std::map<double, double> keys);
+    void animate(const std::string& param, std::map<double, Value> keys);
     OfxStatus changed(const std::string& param);
     /// Any instance change: `type` is kOfxTypeParameter or kOfxTypeClip, or empty for the time.
     OfxStatus changed(const std::string& type, const std::string& name, const std::string& reason);
@@ -270,6 +276,9 @@ public:
     int settings() const { return settings_; }
     OfxStatus sync();
     std::string text(const std::string& param);
+    const Value& value(const std::string& param);
+    /// A property that the plugin has set on an instance's parameter.
+    const OfxPropertySetStruct& properties(const std::string& param);
     /// kOfxStatOK: the clip's name and time are filled in.
     OfxStatus is_identity(double time, std::string& clip, double& clip_time);
     OfxStatus clip_preferences(bool& frame_varying);

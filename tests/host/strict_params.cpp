@@ -9,6 +9,17 @@ namespace {
 
 std::mutex g_mutex;
 
+const std::set<std::string>& known_types() {
+    static const std::set<std::string> types = {
+        kOfxParamTypeInteger, kOfxParamTypeDouble, kOfxParamTypeBoolean, kOfxParamTypeChoice,
+        kOfxParamTypeRGB,     kOfxParamTypeString, kOfxParamTypeGroup,   kOfxParamTypePushButton};
+    return types;
+}
+
+bool has_value(const OfxParamStruct& param) {
+    return param.type != kOfxParamTypeGroup && param.type != kOfxParamTypePushButton;
+}
+
 bool rendering() { return activity().action == kOfxImageEffectActionRender; }
 
 OfxStatus define(OfxParamSetHandle set, const char* type, const char* name,
@@ -24,7 +35,7 @@ OfxStatus define(OfxParamSetHandle set, const char* type, const char* name,
         host.fault("paramDefine: only while describing in a context");
         return kOfxStatFailed;
     }
-    if (type != std::string(kOfxParamTypeDouble) && type != std::string(kOfxParamTypeString)) {
+    if (!known_types().count(type)) {
         host.fault(std::string("paramDefine: a type unknown to this host: ") + type);
         return kOfxStatErrUnknown;
     }
@@ -33,7 +44,7 @@ OfxStatus define(OfxParamSetHandle set, const char* type, const char* name,
         return kOfxStatErrExists;
     }
     auto param = std::make_unique<OfxParamStruct>(
-        OfxParamStruct{type, name, OfxPropertySetStruct(kParamDescriptor), 0.0, {}});
+        OfxParamStruct{type, name, OfxPropertySetStruct(kParamDescriptor)});
     param->properties.put(kOfxPropType, std::string(kOfxTypeParameter));
     param->properties.put(kOfxParamPropType, std::string(type));
     param->properties.put(kOfxPropName, std::string(name));
@@ -77,26 +88,39 @@ OfxStatus param_properties(OfxParamHandle param, OfxPropertySetHandle* propertie
     return kOfxStatOK;
 }
 
-double at_time(const OfxParamStruct& param, double time) {
-    if (param.keys.empty()) return std::get<double>(param.value);
+double mixed(double a, double b, double w) { return (1 - w) * a + w * b; }
+Colour mixed(const Colour& a, const Colour& b, double w) {
+    return {mixed(a[0], b[0], w), mixed(a[1], b[1], w), mixed(a[2], b[2], w)};
+}
+
+/// Doubles and colours may be animated.
+template <typename T>
+T at_time(const OfxParamStruct& param, double time) {
+    if (param.keys.empty()) return std::get<T>(param.value);
     const auto after = param.keys.lower_bound(time);
-    if (after == param.keys.end()) return param.keys.rbegin()->second;
-    if (after == param.keys.begin() || after->first == time) return after->second;
+    if (after == param.keys.end()) return std::get<T>(param.keys.rbegin()->second);
+    if (after == param.keys.begin() || after->first == time) return std::get<T>(after->second);
     const auto before = std::prev(after);
-    const double w = (time - before->first) / (after->first - before->first);
-    return (1 - w) * before->second + w * after->second;
+    return mixed(std::get<T>(before->second), std::get<T>(after->second),
+                 (time - before->first) / (after->first - before->first));
 }
 
 OfxStatus read(OfxParamHandle param, double time, va_list arguments) {
-    if (!param) {
-        Host::get().fault("a parameter's value asked for without a parameter");
+    if (!param || !has_value(*param)) {
+        Host::get().fault("a value asked for without a parameter, or of one that has none");
         return kOfxStatErrBadHandle;
     }
     const std::lock_guard<std::mutex> lock(g_mutex);
     if (param->type == kOfxParamTypeDouble) {
-        *va_arg(arguments, double*) = at_time(*param, time);
-    } else {
+        *va_arg(arguments, double*) = at_time<double>(*param, time);
+    } else if (param->type == kOfxParamTypeString) {
         *va_arg(arguments, char**) = lend(std::get<std::string>(param->value));
+    } else if (param->type == kOfxParamTypeRGB) {
+        for (const double component : at_time<Colour>(*param, time)) {
+            *va_arg(arguments, double*) = component;
+        }
+    } else {
+        *va_arg(arguments, int*) = std::get<int>(param->value);
     }
     return kOfxStatOK;
 }
@@ -132,15 +156,24 @@ OfxStatus set_value(OfxParamHandle param, ...) {
         Host::get().fault("paramSetValue: not allowed in " + action);
         return kOfxStatFailed;
     }
-    if (!param) return kOfxStatErrBadHandle;
+    if (!param || !has_value(*param)) {
+        Host::get().fault("paramSetValue: no parameter, or one without a value");
+        return kOfxStatErrBadHandle;
+    }
     va_list arguments;
     va_start(arguments, param);
     {
         const std::lock_guard<std::mutex> lock(g_mutex);
         if (param->type == kOfxParamTypeDouble) {
             param->value = va_arg(arguments, double);
-        } else {
+        } else if (param->type == kOfxParamTypeString) {
             param->value = std::string(va_arg(arguments, const char*));
+        } else if (param->type == kOfxParamTypeRGB) {
+            Colour colour;
+            for (double& component : colour) component = va_arg(arguments, double);
+            param->value = colour;
+        } else {
+            param->value = va_arg(arguments, int);
         }
     }
     va_end(arguments);
@@ -179,6 +212,7 @@ SuiteTable parameter_suite() {
             sizeof kSuite,
             {{"paramDefine", offsetof(S, paramDefine)},
              {"paramGetHandle", offsetof(S, paramGetHandle)},
+             {"paramGetPropertySet", offsetof(S, paramGetPropertySet)},
              {"paramGetValue", offsetof(S, paramGetValue)},
              {"paramGetValueAtTime", offsetof(S, paramGetValueAtTime)},
              {"paramSetValue", offsetof(S, paramSetValue)}}};

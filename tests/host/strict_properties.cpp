@@ -108,6 +108,8 @@ const std::map<std::string, Rule>& rules() {
         {kOfxParamPropDoubleType, {kString, 1, kAnyParam, kParamDescriptor}},
         {kOfxParamPropStringMode, {kString, 1, kAnyParam, kParamDescriptor}},
         {kOfxParamPropStringFilePathExists, {kInt, 1, kAnyParam, kParamDescriptor}},
+        {kOfxParamPropChoiceOption, {kString, 0, kAnyParam, kParamDescriptor | kParam}},
+        {kOfxParamPropGroupOpen, {kInt, 1, kAnyParam, kParamDescriptor}},
     };
     return table;
 }
@@ -118,6 +120,27 @@ const std::set<std::string>& typed_by_param() {
                                                 kOfxParamPropMax, kOfxParamPropDisplayMin,
                                                 kOfxParamPropDisplayMax};
     return names;
+}
+
+/// Those that only parameters of some types have.
+const std::map<std::string, std::set<std::string>>& types_with() {
+    static const std::set<std::string> valued = {kOfxParamTypeInteger, kOfxParamTypeDouble,
+                                                 kOfxParamTypeBoolean, kOfxParamTypeChoice,
+                                                 kOfxParamTypeRGB,     kOfxParamTypeString};
+    static const std::map<std::string, std::set<std::string>> types = {
+        {kOfxParamPropIncrement, {kOfxParamTypeDouble, kOfxParamTypeRGB}},
+        {kOfxParamPropDigits, {kOfxParamTypeDouble, kOfxParamTypeRGB}},
+        {kOfxParamPropDoubleType, {kOfxParamTypeDouble}},
+        {kOfxParamPropStringMode, {kOfxParamTypeString}},
+        {kOfxParamPropStringFilePathExists, {kOfxParamTypeString}},
+        {kOfxParamPropChoiceOption, {kOfxParamTypeChoice}},
+        {kOfxParamPropGroupOpen, {kOfxParamTypeGroup}},
+        {kOfxParamPropAnimates, valued},
+        {kOfxParamPropCanUndo, valued},
+        {kOfxParamPropPersistant, valued},
+        {kOfxParamPropEvaluateOnChange, valued},
+    };
+    return types;
 }
 
 std::mutex g_sets_mutex;
@@ -145,8 +168,11 @@ int type_of(OfxPropertySetHandle set, const std::string& name, bool writing, con
             return -1;
         }
         const std::string param = set->text(kOfxParamPropType);
-        if (param == kOfxParamTypeDouble) return kDouble;
-        if (param == kOfxParamTypeString && name == kOfxParamPropDefault) return kString;
+        const bool initial = name == kOfxParamPropDefault;
+        if (param == kOfxParamTypeDouble || param == kOfxParamTypeRGB) return kDouble;
+        if (param == kOfxParamTypeInteger) return kInt;
+        if (param == kOfxParamTypeString && initial) return kString;
+        if ((param == kOfxParamTypeBoolean || param == kOfxParamTypeChoice) && initial) return kInt;
         host.fault(call + ": not a property of a " + param);
         return -1;
     }
@@ -164,19 +190,18 @@ int type_of(OfxPropertySetHandle set, const std::string& name, bool writing, con
         return -1;
     }
     const std::string param = set->kind & kAnyParam ? set->text(kOfxParamPropType) : "";
-    const bool of_double = name == kOfxParamPropIncrement || name == kOfxParamPropDigits ||
-                           name == kOfxParamPropDoubleType;
-    const bool of_string =
-        name == kOfxParamPropStringMode || name == kOfxParamPropStringFilePathExists;
-    if ((of_double && param != kOfxParamTypeDouble) ||
-        (of_string && param != kOfxParamTypeString)) {
+    const auto types = types_with().find(name);
+    if (!param.empty() && types != types_with().end() && !types->second.count(param)) {
         host.fault(call + ": not a property of a " + param);
         return -1;
     }
     return rule->second.type;
 }
 
-int dimension_of(const std::string& name) {
+int dimension_of(OfxPropertySetHandle set, const std::string& name) {
+    if (typed_by_param().count(name)) {
+        return set->text(kOfxParamPropType) == kOfxParamTypeRGB ? 3 : 1;
+    }
     const auto rule = rules().find(name);
     return rule == rules().end() ? 1 : rule->second.dimension;
 }
@@ -200,7 +225,7 @@ OfxStatus check(OfxPropertySetHandle set, const char* name, int index, bool writ
         host.fault(call + ": it is of type " + kTypeNames[known]);
         return kOfxStatErrValue;
     }
-    const int dimension = dimension_of(name);
+    const int dimension = dimension_of(set, name);
     if (index < 0 || (dimension > 0 && index >= dimension)) {
         host.fault(call + ": index " + std::to_string(index) + " is out of range");
         return kOfxStatErrBadIndex;

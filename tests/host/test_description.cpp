@@ -144,7 +144,7 @@ TEST(identity_is_reported) {
     CHECK(!identity(2.5));
     instance->set("strength", 0.0);
     CHECK(identity(2.5));
-    instance->animate("strength", {{0, 0}, {10, 1}});
+    instance->animate("strength", {{0, 0.0}, {10, 1.0}});
     CHECK(identity(0));
     CHECK(!identity(0.25));
     instance->animate("strength", {});

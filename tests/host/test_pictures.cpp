@@ -132,7 +132,7 @@ TEST(times_offsets_and_strengths) {
         compare(*node.instance, node.parsed, layout, layout, layout.bounds, 3,
                 strength > 0 ? 1 : 0);
     }
-    node.instance->animate("strength", {{0, 0}, {4, 1}});
+    node.instance->animate("strength", {{0, 0.0}, {4, 1.0}});
     compare(*node.instance, node.parsed, layout, layout, layout.bounds, 1, 0.25);
     node.instance->animate("strength", {});
     node.instance->set("strength", 1.0);
