@@ -52,7 +52,7 @@ OfxStatus dispatch(const char* action, OfxImageEffectHandle effect, OfxPropertyS
         return kOfxStatOK;
     }
     if (is(kOfxActionSyncPrivateData)) {
-        update_status(host, effect);
+        update_instance(host, effect);
         return kOfxStatOK;
     }
     return kOfxStatReplyDefault;

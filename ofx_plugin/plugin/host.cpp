@@ -106,4 +106,11 @@ void Properties::set_strings(const char* name, std::initializer_list<const char*
     for (const char* value : values) index += set_string(name, value, index);
 }
 
+void Properties::set_doubles(const char* name, std::initializer_list<double> values) const {
+    int index = 0;
+    for (const double value : values) {
+        if (!set_double(name, value, index++)) return;
+    }
+}
+
 }  // namespace palette4d::plugin

@@ -51,6 +51,8 @@ public:
     bool set_pointer(const char* name, void* value, int index = 0) const;
     /// Sets a property of several values. One that is refused is left out, not left open.
     void set_strings(const char* name, std::initializer_list<const char*> values) const;
+    /// The same for numbers whose place counts: nothing is set after one that is refused.
+    void set_doubles(const char* name, std::initializer_list<double> values) const;
 
 private:
     const OfxPropertySuiteV1* suite_;

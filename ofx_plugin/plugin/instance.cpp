@@ -3,10 +3,11 @@
 #include <cstring>
 #include <map>
 #include <optional>
-#include <sstream>
 
+#include "handles.hpp"
 #include "params.hpp"
 #include "sidecar_cache.hpp"
+#include "status.hpp"
 
 namespace palette4d::plugin {
 namespace {
@@ -44,29 +45,6 @@ void show(const Suites& suites, OfxImageEffectHandle effect, const std::string& 
     }
 }
 
-std::string counted(std::size_t count, const char* one, const char* many) {
-    return std::to_string(count) + " " + (count == 1 ? one : many);
-}
-
-std::string describe(const Sidecar& sidecar) {
-    std::size_t edits = sidecar.edits.stops.size();
-    for (const std::optional<Vec3>& rgb : sidecar.edits.vertex_rgb) edits += rgb.has_value();
-    const ClipInfo& clip = sidecar.clip;
-    std::ostringstream text;
-    text.imbue(std::locale::classic());
-    text << clip.name << ": frames " << clip.first << "-" << clip.last << " at "
-         << static_cast<double>(clip.rate_num) / static_cast<double>(clip.rate_den) << " fps, "
-         << counted(sidecar.polytope.vertices().size(), "palette vertex", "palette vertices")
-         << ", " << counted(edits, "edit", "edits");
-    return text.str();
-}
-
-std::string status_of(const std::string& path) {
-    if (path.empty()) return "No sidecar chosen";
-    const SidecarResult result = load_sidecar(path);
-    return result.loaded ? describe(result.loaded->sidecar()) : result.problem;
-}
-
 }  // namespace
 
 void create_instance(const Suites& suites, OfxImageEffectHandle effect) {
@@ -76,7 +54,7 @@ void create_instance(const Suites& suites, OfxImageEffectHandle effect) {
         // A host that never destroyed an instance may use its address again: begin afresh.
         all.instances[effect] = std::make_shared<Instance>();
     }
-    update_status(suites, effect);
+    update_instance(suites, effect);
 }
 
 void destroy_instance(OfxImageEffectHandle effect) {
@@ -85,9 +63,9 @@ void destroy_instance(OfxImageEffectHandle effect) {
     all.instances.erase(effect);
 }
 
-void update_status(const Suites& suites, OfxImageEffectHandle effect) {
-    // A host tells of the new status from within the call that sets it. Hosts that do so without
-    // saying what changed, and do not give back the text they were given, would go round for ever.
+void update_instance(const Suites& suites, OfxImageEffectHandle effect, const std::string& param) {
+    // A host tells of a new value from within the call that sets it. Hosts that do so without
+    // saying what changed, and do not give back what they were given, would go round for ever.
     thread_local bool updating = false;
     if (updating) return;
     struct Guard {
@@ -96,17 +74,24 @@ void update_status(const Suites& suites, OfxImageEffectHandle effect) {
         ~Guard() { flag = false; }
     } const guard(updating);
     const Params params(suites, effect);
-    const std::string text = status_of(params.string_now(kParamSidecar).value_or(""));
+    const std::string path = params.string_now(kParamSidecar).value_or("");
+    const SidecarResult result = path.empty() ? SidecarResult{} : load_sidecar(path);
+    const Sidecar* sidecar = result.loaded ? &result.loaded->sidecar() : nullptr;
+    if (!param.empty()) handle_changed(params, sidecar, param);
+    show_handles(params, sidecar);
+    const std::string text = status_of(result, !path.empty(), handles_in_use(params));
     if (params.string_now(kParamStatus) != text) params.set_string(kParamStatus, text);
 }
 
 void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const Properties& args) {
     const std::optional<std::string> name = args.get_string(kOfxPropName);
     const std::optional<std::string> reason = args.get_string(kOfxPropChangeReason);
-    // The plugin itself sets nothing but the status.
+    // The user cannot change the status: the plugin hears of its own setting.
     if (name && *name == kParamStatus) return;
     if (reason && *reason == kOfxChangePluginEdited) return;
-    update_status(suites, effect);
+    // A colour that follows its keyframes is not an edit.
+    const bool by_user = reason && *reason == kOfxChangeUserEdited;
+    update_instance(suites, effect, by_user ? name.value_or("") : "");
 }
 
 void report(const Suites& suites, OfxImageEffectHandle effect, const std::string& problem) {

@@ -19,10 +19,13 @@ struct Instance {
 /// renders, it only repeats its messages.
 void create_instance(const Suites& suites, OfxImageEffectHandle effect);
 void destroy_instance(OfxImageEffectHandle effect);
-/// Says in the parameter `status` what the instance's sidecar is or what is wrong with it. The
-/// standard lets a plugin set parameters while an instance is created, changed (begin and end
-/// included) or synchronised, and at no other time: not while rendering, nor in PurgeCaches.
-void update_status(const Suites& suites, OfxImageEffectHandle effect);
+/// Brings the parameters that the plugin sets up to date: the status says what the instance's
+/// sidecar is or what is wrong with it, and the handles show those of the sidecar. `param` is what
+/// the user changed, if anything. The standard lets a plugin set parameters while an instance is
+/// created, changed (begin and end included) or synchronised, and at no other time: not while
+/// rendering, nor in PurgeCaches.
+void update_instance(const Suites& suites, OfxImageEffectHandle effect,
+                     const std::string& param = "");
 /// kOfxActionInstanceChanged, its Begin and its End: whatever changed, the time and the clips
 /// included, the sidecar may have changed on disk since the last look at it.
 void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const Properties& args);

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <exception>
 #include <new>
+#include <utility>
 
+#include "handles.hpp"
 #include "params.hpp"
 #include "sidecar_cache.hpp"
 
@@ -36,7 +38,9 @@ Look look_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time) {
         return look;
     }
     try {
-        look.recolourer = result.loaded->recolourer_at(frame);
+        EditsAt edits = edits_at(params, result.loaded->sidecar(), time);
+        look.note = std::move(edits.note);
+        look.recolourer = result.loaded->recolourer_at(frame, edits.edits);
     } catch (const std::bad_alloc&) {
         throw;
     } catch (const std::exception& error) {

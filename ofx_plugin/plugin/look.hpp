@@ -16,6 +16,8 @@ struct Look {
     double strength = 1;
     /// Why the picture passes through although a sidecar was asked for; empty when all is well.
     std::string problem;
+    /// What else the user should know; empty when all is well.
+    std::string note;
 };
 
 /// The sidecar frame shown at a host's time: the host's frame 0 is the clip's first frame.

@@ -77,13 +77,11 @@ Properties ParamDefiner::choice(const ParamText& about, std::initializer_list<co
 Properties ParamDefiner::colour(const ParamText& about, const std::array<double, 3>& initial,
                                 double min, double max) const {
     const Properties param = define(kOfxParamTypeRGB, about);
-    for (int i = 0; i < 3; ++i) {
-        param.set_double(kOfxParamPropDefault, initial[static_cast<std::size_t>(i)], i);
-        param.set_double(kOfxParamPropMin, min, i);
-        param.set_double(kOfxParamPropMax, max, i);
-        param.set_double(kOfxParamPropDisplayMin, 0, i);
-        param.set_double(kOfxParamPropDisplayMax, 1, i);
-    }
+    param.set_doubles(kOfxParamPropDefault, {initial[0], initial[1], initial[2]});
+    param.set_doubles(kOfxParamPropMin, {min, min, min});
+    param.set_doubles(kOfxParamPropMax, {max, max, max});
+    param.set_doubles(kOfxParamPropDisplayMin, {0, 0, 0});
+    param.set_doubles(kOfxParamPropDisplayMax, {1, 1, 1});
     param.set_int(kOfxParamPropAnimates, 1);
     return param;
 }

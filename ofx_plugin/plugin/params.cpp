@@ -1,5 +1,6 @@
 #include "params.hpp"
 
+#include "handles.hpp"
 #include "param_define.hpp"
 
 namespace palette4d::plugin {
@@ -11,7 +12,7 @@ constexpr double kLargestOffset = 4e6;
 }  // namespace
 
 void define_params(const Suites& suites, OfxParamSetHandle params) {
-    const ParamDefiner define(suites, params);
+    ParamDefiner define(suites, params);
     define
         .text({kParamSidecar, "Sidecar",
                "The clip's palette and its edits, a file made by 'palette4d analyze'. Read again "
@@ -26,6 +27,8 @@ void define_params(const Suites& suites, OfxParamSetHandle params) {
          "Frames added to the host's time before the palette is looked up: the host's frame 0 "
          "shows the analysed clip's first frame plus this."},
         {0, -kLargestOffset, kLargestOffset, -1000, 1000}, 1, 2, false);
+
+    define_handle_params(define);
 
     const Properties status =
         define.text({kParamStatus, "Status", "What was loaded, or what is wrong with the sidecar."},
@@ -138,6 +141,13 @@ std::optional<std::array<double, 3>> Params::rgb_now(const char* name) const {
         return std::nullopt;
     }
     return value;
+}
+
+bool Params::animated(const char* name) const {
+    unsigned int keys = 0;
+    const OfxParamHandle param = find(name);
+    return param && suite_->paramGetNumKeys &&
+           suite_->paramGetNumKeys(param, &keys) == kOfxStatOK && keys > 0;
 }
 
 bool Params::set_string(const char* name, const std::string& value) const {

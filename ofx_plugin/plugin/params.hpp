@@ -34,6 +34,8 @@ public:
     std::optional<double> double_now(const char* name) const;
     std::optional<int> int_now(const char* name) const;
     std::optional<std::array<double, 3>> rgb_now(const char* name) const;
+    /// Whether the host has keyframes for it.
+    bool animated(const char* name) const;
     /// For instance changes only, never while rendering.
     bool set_string(const char* name, const std::string& value) const;
     bool set_int(const char* name, int value) const;

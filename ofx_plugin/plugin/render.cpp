@@ -74,7 +74,7 @@ OfxStatus is_identity(const Suites& suites, OfxImageEffectHandle effect, const P
     if (!time) return kOfxStatReplyDefault;
     const Look look = look_at(suites, effect, *time);
     // With a problem there is something to render: the message.
-    if (look.recolourer || !look.problem.empty()) return kOfxStatReplyDefault;
+    if (look.recolourer || !look.problem.empty() || !look.note.empty()) return kOfxStatReplyDefault;
     report(suites, effect, "");
     if (!out_args.set_string(kOfxPropName, kOfxImageEffectSimpleSourceClipName)) {
         return kOfxStatReplyDefault;
@@ -108,7 +108,7 @@ OfxStatus render(const Suites& suites, OfxImageEffectHandle effect, const Proper
         copy(in, out, window);
         throw;
     }
-    report(suites, effect, look.problem);
+    report(suites, effect, look.problem.empty() ? look.note : look.problem);
     // Depths and layouts that the node did not ask for pass through too.
     if (!look.recolourer || in.depth == Depth::kOther || in.channels < 3) {
         copy(in, out, window);

@@ -1,5 +1,6 @@
 #include "sidecar_cache.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <exception>
@@ -162,7 +163,17 @@ std::shared_ptr<Entry> entry_of(const std::string& key) {
 
 LoadedSidecar::LoadedSidecar(Sidecar sidecar) : sidecar_(std::move(sidecar)) {}
 
-std::shared_ptr<const Recolourer> LoadedSidecar::recolourer_at(double frame) {
+bool operator<(const AppliedEdits& a, const AppliedEdits& b) {
+    if (a.sidecar != b.sidecar) return a.sidecar < b.sidecar;
+    return std::lexicographical_compare(a.host.begin(), a.host.end(), b.host.begin(), b.host.end(),
+                                        [](const HandleColour& x, const HandleColour& y) {
+                                            return x.handle != y.handle ? x.handle < y.handle
+                                                                        : x.rgb < y.rgb;
+                                        });
+}
+
+std::shared_ptr<const Recolourer> LoadedSidecar::recolourer_at(double frame,
+                                                               const AppliedEdits& edits) {
     const Polytope& polytope = sidecar_.polytope;
     // All of the time before the clip is its first frame, all after it the last.
     if (frame < polytope.first_frame()) frame = polytope.first_frame();
@@ -171,24 +182,30 @@ std::shared_ptr<const Recolourer> LoadedSidecar::recolourer_at(double frame) {
     std::shared_ptr<Prepared> prepared;
     {
         const std::lock_guard<std::mutex> lock(mutex_);
-        std::shared_ptr<Prepared>& slot = frames_[frame];
-        if (slot) {
-            recent_.remove(frame);
+        const auto [at, is_new] = frames_.try_emplace(Key{frame, edits});
+        if (is_new) {
+            at->second = std::make_shared<Prepared>();
         } else {
-            slot = std::make_shared<Prepared>();
+            recent_.remove(&at->first);
         }
-        prepared = slot;
-        recent_.push_front(frame);
+        prepared = at->second;
+        recent_.push_front(&at->first);
         while (recent_.size() > kMaxFrames) {
-            frames_.erase(recent_.back());
+            const Key* oldest = recent_.back();
             recent_.pop_back();
+            frames_.erase(frames_.find(*oldest));
         }
     }
     // Only threads that want this very frame wait for it.
     const std::lock_guard<std::mutex> lock(prepared->building);
     if (!prepared->recolourer) {
         Slice slice = slice_at(polytope, frame);
-        std::vector<Vec3> edited = edited_colours(polytope, sidecar_.edits, slice);
+        std::vector<Vec3> edited =
+            edits.sidecar && edits.host.empty()
+                ? edited_colours(polytope, sidecar_.edits, slice)
+                : edited_colours(polytope,
+                                 with_colours(polytope, sidecar_.edits, edits.sidecar, edits.host),
+                                 slice);
         prepared->recolourer = std::make_shared<const Recolourer>(
             std::move(slice.rgb), std::move(edited), std::move(slice.faces));
     }

@@ -8,11 +8,21 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <utility>
+#include <vector>
 
+#include "palette4d/handles.hpp"
 #include "palette4d/recolour.hpp"
 #include "palette4d/sidecar.hpp"
 
 namespace palette4d::plugin {
+
+/// Which edits apply to a frame: the sidecar's own, and new colours of handles over them.
+struct AppliedEdits {
+    bool sidecar = true;
+    std::vector<HandleColour> host;  ///< finite, by ascending handle, each once
+};
+bool operator<(const AppliedEdits& a, const AppliedEdits& b);
 
 /// One version of one sidecar file, immutable but for its cache of prepared frames.
 class LoadedSidecar {
@@ -21,18 +31,20 @@ public:
 
     const Sidecar& sidecar() const { return sidecar_; }
     /// The prepared palette at a sidecar frame (finite; clamped to the clip). Threads that ask for
-    /// the same frame share one, built once. Throws what slicing throws.
-    std::shared_ptr<const Recolourer> recolourer_at(double frame);
+    /// the same frame with the same edits share one, built once. Throws what slicing throws, and
+    /// std::invalid_argument for a handle that is not there.
+    std::shared_ptr<const Recolourer> recolourer_at(double frame, const AppliedEdits& edits = {});
 
 private:
+    using Key = std::pair<double, AppliedEdits>;
     struct Prepared {
         std::mutex building;
         std::shared_ptr<const Recolourer> recolourer;
     };
     const Sidecar sidecar_;
     std::mutex mutex_;
-    std::map<double, std::shared_ptr<Prepared>> frames_;
-    std::list<double> recent_;  ///< keys of frames_, latest first
+    std::map<Key, std::shared_ptr<Prepared>> frames_;
+    std::list<const Key*> recent_;  ///< keys of frames_, latest first
 };
 
 /// Either a sidecar or the sentence that says why there is none.

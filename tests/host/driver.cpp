@@ -22,6 +22,7 @@ constexpr const char* kUsage =
     "  --depth float|byte       (float)\n"
     "  --strength S             (1)\n"
     "  --offset F               parameter frameOffset (0)\n"
+    "  --set NAME=VALUE         any parameter, as often as wanted: a number, a text, or R,G,B\n"
     "  --premultiplied 0|1      (0)\n"
     "  --padding BYTES          after each row (0)\n"
     "  --upside-down 0|1        negative rowBytes (0)\n"
@@ -32,6 +33,7 @@ constexpr const char* kUsage =
     "prints the status line, and the persistent message if there is one; exit status 3: faults\n";
 
 using Options = std::map<std::string, std::string>;
+using Settings = std::vector<std::string>;
 
 std::vector<char> read(const std::string& path) {
     std::ifstream file(path, std::ios::binary);
@@ -39,7 +41,31 @@ std::vector<char> read(const std::string& path) {
     return {std::istreambuf_iterator<char>(file), {}};
 }
 
-int render(const std::vector<std::string>& names, const Options& options) {
+/// Sets a parameter from NAME=VALUE, as its type has it.
+void set(strict::Instance& instance, const std::string& setting) {
+    const std::size_t equals = setting.find('=');
+    if (equals == std::string::npos) {
+        throw std::runtime_error("--set: found " + setting + ", expected NAME=VALUE");
+    }
+    const std::string name = setting.substr(0, equals), value = setting.substr(equals + 1);
+    const strict::Value& now = instance.value(name);
+    if (std::holds_alternative<int>(now)) {
+        instance.set(name, std::stoi(value));
+    } else if (std::holds_alternative<double>(now)) {
+        instance.set(name, std::stod(value));
+    } else if (std::holds_alternative<strict::Colour>(now)) {
+        strict::Colour colour{};
+        if (std::sscanf(value.c_str(), "%lf,%lf,%lf", &colour[0], &colour[1], &colour[2]) != 3) {
+            throw std::runtime_error("--set: found " + value + ", expected R,G,B");
+        }
+        instance.set(name, colour);
+    } else {
+        instance.set(name, value);
+    }
+}
+
+int render(const std::vector<std::string>& names, const Options& options,
+           const Settings& settings) {
     const auto get = [&](const char* name, const char* initial) {
         const auto found = options.find(name);
         return found == options.end() ? std::string(initial) : found->second;
@@ -85,6 +111,7 @@ int render(const std::vector<std::string>& names, const Options& options) {
         instance->set("sidecar", names[1]);
         instance->set("strength", std::stod(get("strength", "1")));
         instance->set("frameOffset", std::stod(get("offset", "0")));
+        for (const std::string& setting : settings) set(*instance, setting);
         instance->changed("sidecar");
         const int tile = std::max(1, std::stoi(get("tile", "1000000000")));
         for (long ty = y; ty < layout.bounds.y2; ty += tile) {
@@ -117,8 +144,11 @@ int render(const std::vector<std::string>& names, const Options& options) {
 int main(int argc, char** argv) {
     std::vector<std::string> names;
     Options options;
+    Settings settings;
     for (int i = 2; i < argc; ++i) {
-        if (std::strncmp(argv[i], "--", 2) == 0 && i + 1 < argc) {
+        if (std::strcmp(argv[i], "--set") == 0 && i + 1 < argc) {
+            settings.emplace_back(argv[++i]);
+        } else if (std::strncmp(argv[i], "--", 2) == 0 && i + 1 < argc) {
             options[argv[i] + 2] = argv[i + 1];
             ++i;
         } else {
@@ -130,7 +160,7 @@ int main(int argc, char** argv) {
         return 2;
     }
     try {
-        return render(names, options);
+        return render(names, options, settings);
     } catch (const std::exception& error) {
         std::cerr << "strict_host: " << error.what() << "\n";
         return 1;

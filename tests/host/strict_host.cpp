@@ -340,7 +340,7 @@ OfxStatus Instance::bracket(const char* action, const std::string& reason) {
 // Hosts built on the standard's host library do the same: the plugin hears of its own setting
 // before the call that sets returns. It may not answer that with another setting.
 void Instance::tell(const std::string& param) {
-    ++settings_;
+    ++settings_[param];
     if (telling_) {
         Host::get().fault("paramSetValue: in answer to the plugin's own setting");
         return;

@@ -273,7 +273,7 @@ public:
     /// kOfxActionBeginInstanceChanged or its End.
     OfxStatus bracket(const char* action, const std::string& reason);
     /// How often the plugin has set a parameter.
-    int settings() const { return settings_; }
+    int settings(const std::string& param) { return settings_[param]; }
     OfxStatus sync();
     std::string text(const std::string& param);
     const Value& value(const std::string& param);
@@ -289,7 +289,7 @@ private:
     Plugin& plugin_;
     OfxImageEffectStruct effect_;
     bool created_ = false;
-    int settings_ = 0;
+    std::map<std::string, int> settings_;
     bool telling_ = false;  ///< the plugin is being told of its own setting
 
     void tell(const std::string& param);

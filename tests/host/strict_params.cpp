@@ -188,7 +188,12 @@ OfxStatus unexpected(const char* function) {
 OfxStatus derivative(OfxParamHandle, OfxTime, ...) { return unexpected("paramGetDerivative"); }
 OfxStatus integral(OfxParamHandle, OfxTime, OfxTime, ...) { return unexpected("paramGetIntegral"); }
 OfxStatus set_at(OfxParamHandle, OfxTime, ...) { return unexpected("paramSetValueAtTime"); }
-OfxStatus num_keys(OfxParamHandle, unsigned int*) { return unexpected("paramGetNumKeys"); }
+OfxStatus num_keys(OfxParamHandle param, unsigned int* count) {
+    const Call call("paramGetNumKeys");
+    if (call.refused() || !param || !count) return kOfxStatFailed;
+    *count = static_cast<unsigned int>(param->keys.size());
+    return kOfxStatOK;
+}
 OfxStatus key_time(OfxParamHandle, unsigned int, OfxTime*) { return unexpected("paramGetKeyTime"); }
 OfxStatus key_index(OfxParamHandle, OfxTime, int, int*) { return unexpected("paramGetKeyIndex"); }
 OfxStatus delete_key(OfxParamHandle, OfxTime) { return unexpected("paramDeleteKey"); }
@@ -215,7 +220,8 @@ SuiteTable parameter_suite() {
              {"paramGetPropertySet", offsetof(S, paramGetPropertySet)},
              {"paramGetValue", offsetof(S, paramGetValue)},
              {"paramGetValueAtTime", offsetof(S, paramGetValueAtTime)},
-             {"paramSetValue", offsetof(S, paramSetValue)}}};
+             {"paramSetValue", offsetof(S, paramSetValue)},
+             {"paramGetNumKeys", offsetof(S, paramGetNumKeys)}}};
 }
 
 }  // namespace strict

@@ -155,15 +155,15 @@ TEST(the_status_follows_the_file) {
     for (const Way& way : ways) {
         // Every step changes the text: it is set once, and a second poke leaves it alone.
         const auto expect = [&](const std::string& begin, const std::string& end) {
-            const int before = node.settings();
+            const int before = node.settings("status");
             CHECK(way.poke() == kOfxStatOK);
             const std::string text = node.text("status");
             EXPECT(text.find(begin) == 0 && text.find(end) != std::string::npos,
                    std::string(way.words) + ": expected " + begin + " … " + end + ", got " + text);
-            CHECK(node.settings() == before + 1);
+            CHECK(node.settings("status") == before + 1);
             CHECK(way.poke() == kOfxStatOK);
             CHECK(node.text("status") == text);
-            CHECK(node.settings() == before + 1);
+            CHECK(node.settings("status") == before + 1);
         };
         write("clip.p4d.json", plain);
         expect(good, "0 edits");
@@ -185,7 +185,7 @@ TEST(the_status_is_set_only_where_it_may_be) {
     node.set("sidecar", sidecar());
     CHECK(node.changed("sidecar") == kOfxStatOK);
     const std::string old = node.text("status");
-    const int before = node.settings();
+    const int before = node.settings("status");
     write("clip.p4d.json", sidecar_text(false));
     scene.render();
     std::string clip;
@@ -205,10 +205,10 @@ TEST(the_status_is_set_only_where_it_may_be) {
     CHECK(node.changed(kOfxTypeParameter, "status", kOfxChangeUserEdited) == kOfxStatOK);
     CHECK(node.bracket(kOfxActionEndInstanceChanged, kOfxChangePluginEdited) == kOfxStatOK);
     CHECK(node.text("status") == old);
-    CHECK(node.settings() == before);
+    CHECK(node.settings("status") == before);
     CHECK(node.changed("strength") == kOfxStatOK);
     CHECK(node.text("status").find("0 edits") != std::string::npos);
-    CHECK(node.settings() == before + 1);
+    CHECK(node.settings("status") == before + 1);
 }
 
 TEST(a_host_that_says_nothing_of_a_change_is_answered_once) {
@@ -220,9 +220,9 @@ TEST(a_host_that_says_nothing_of_a_change_is_answered_once) {
     Host::get().configure(config);
     Scene scene;
     for (int i = 0; i < 3; ++i) {
-        const int before = scene.instance->settings();
+        const int before = scene.instance->settings("status");
         CHECK(scene.instance->changed("strength") == kOfxStatOK);
-        CHECK(scene.instance->settings() == before + 1);
+        CHECK(scene.instance->settings("status") == before + 1);
     }
 }
 

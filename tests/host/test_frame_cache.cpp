@@ -43,6 +43,20 @@ TEST(threads_and_tiles_share_what_is_prepared_for_a_frame) {
         EXPECT(built.size() == 1, "prepared " + std::to_string(built.size()) + " times, not once");
         all.insert(built.begin(), built.end());
     }
+    // Edits of the host are of a frame's essence, whichever way they were put together.
+    using palette4d::plugin::AppliedEdits;
+    const auto loaded = load_sidecar(path).loaded;
+    const auto red = loaded->recolourer_at(11.25, AppliedEdits{true, {{3, {1, 0, 0}}}});
+    CHECK(red == loaded->recolourer_at(11.25, AppliedEdits{true, {{3, {1, 0, 0}}}}));
+    std::set<const Recolourer*> different = {red.get(), seen[0][0][0].get()};
+    for (const AppliedEdits& edits :
+         {AppliedEdits{false, {}}, AppliedEdits{false, {{3, {1, 0, 0}}}},
+          AppliedEdits{true, {{4, {1, 0, 0}}}}, AppliedEdits{true, {{3, {1, 0, 1e-9}}}},
+          AppliedEdits{true, {{3, {1, 0, 0}}, {4, {1, 0, 0}}}}}) {
+        different.insert(loaded->recolourer_at(11.25, edits).get());
+    }
+    CHECK(different.size() == 7);
+    CHECK(loaded->recolourer_at(11.25) == seen[0][0][0]);
     // Frames do not share, and a purge forgets.
     CHECK(all.size() == kFrames);
     palette4d::plugin::purge_sidecars();

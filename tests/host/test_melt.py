@@ -169,6 +169,39 @@ def test_frame_offset(scene: Scene, sidecar: _core.Sidecar, offset: float) -> No
     scene.check(frames, sidecar, offset=offset)
 
 
+def edited_too(scene: Scene, **colours: tuple[float, float, float]) -> _core.Sidecar:
+    """The scene's sidecar with more vertices edited, or edited otherwise."""
+    document = json.loads(path_of(scene).read_text())
+    edits = [e for e in document["edits"]["vertices"] if e["vertex"] not in colours]
+    edits += [{"vertex": name, "rgb": list(rgb)} for name, rgb in colours.items()]
+    document["edits"]["vertices"] = edits
+    path = scene.folder / "edited too.p4d.json"
+    path.write_text(json.dumps(document), encoding="utf-8")
+    return _core.read_sidecar(str(path))
+
+
+def test_handles_set_in_melt(scene: Scene, sidecar: _core.Sidecar) -> None:
+    # The second handle in order is a1; the 15th is b6, which the sidecar edits too.
+    colours = {"handle02": "#3366cc", "handle02On": 1, "handle15": "#ff9900", "handle15On": 1}
+    frames, said = scene.render(sidecar=path_of(scene), **colours)
+    expected = edited_too(scene, a1=(0.2, 0.4, 0.8), b6=(1.0, 0.6, 0.0))
+    assert "persistent" not in said
+    scene.check(frames, expected)
+    # Not in use, they are nothing: neither melt's own idea of their colours, nor one that is set.
+    unused = {**colours, "handle02On": 0, "handle15On": 0}
+    frames, _ = scene.render(sidecar=path_of(scene), **unused)
+    scene.check(frames, sidecar)
+    frames, _ = scene.render(sidecar=path_of(scene), editsFrom="Host", **unused)
+    assert scene.unchanged(frames)
+
+
+def test_a_handle_named_by_its_id_in_melt(scene: Scene, sidecar: _core.Sidecar) -> None:
+    frames, _ = scene.render(
+        sidecar=path_of(scene), handle32="#00ff00", handle32On=1, handle32Id="b1"
+    )
+    scene.check(frames, edited_too(scene, b1=(0.0, 1.0, 0.0)))
+
+
 def test_without_a_sidecar_the_picture_passes(scene: Scene) -> None:
     frames, said = scene.render()
     assert scene.unchanged(frames)

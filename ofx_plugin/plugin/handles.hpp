@@ -1,0 +1,42 @@
+// The palette's handles as parameters of the host: a fixed pool, since a host knows the parameters
+// before any sidecar. A slot holds a colour, whether it is in use (a host's idea of a colour's
+// default is its own, so that no colour can stand for "not set"), and the id of its handle; without
+// an id, slot n is the nth handle of the sidecar.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "param_define.hpp"
+#include "params.hpp"
+#include "sidecar_cache.hpp"
+
+namespace palette4d::plugin {
+
+inline constexpr int kHandleSlots = 32;
+
+/// The options of kParamEditsFrom, in order.
+enum class EditsFrom { kSidecar, kHost, kBoth };
+inline constexpr const char* kParamEditsFrom = "editsFrom";
+inline constexpr const char* kParamResetHandles = "resetHandles";
+
+void define_handle_params(ParamDefiner& define);
+
+/// Which edits apply at a time of the host, its keyframes included.
+struct EditsAt {
+    AppliedEdits edits;
+    std::string note;  ///< names a slot whose handle the sidecar does not have; else empty
+};
+EditsAt edits_at(const Params& params, const Sidecar& sidecar, OfxTime time);
+
+/// How many slots are in use, outside of rendering.
+int handles_in_use(const Params& params);
+/// For instance changes only. Labels the slots after the sidecar's handles, hides those that it has
+/// no handle for, and gives slots that are not in use their handle's colour, so that they begin
+/// from there. Without a sidecar all stay as they are.
+void show_handles(const Params& params, const Sidecar* sidecar);
+/// For instance changes by the user. A colour that is changed comes into use; a slot that comes
+/// into use keeps its handle's id, whatever the sidecar's order will be. True when it set anything.
+bool handle_changed(const Params& params, const Sidecar* sidecar, const std::string& name);
+
+}  // namespace palette4d::plugin

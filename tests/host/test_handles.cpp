@@ -1,0 +1,232 @@
+// The palette's handles as parameters of the host.
+#include <limits>
+
+#include "harness.hpp"
+
+using namespace strict;
+using namespace test;
+
+namespace {
+
+struct Graded {
+    Plugin plugin{bundle()};
+    std::string path = sidecar();
+    palette4d::Sidecar parsed = palette4d::read_sidecar(path);
+    std::unique_ptr<Instance> node = plugin.create();
+    Layout layout;
+    Picture source{layout};
+    Graded() {
+        fill(source);
+        choose(path);
+    }
+    void choose(const std::string& chosen) {
+        node->set("sidecar", chosen);
+        CHECK(node->changed("sidecar") == kOfxStatOK);
+    }
+    std::vector<unsigned char> render(double time) {
+        Picture output(layout);
+        CHECK(node->render(time, &source, output, layout.bounds) == kOfxStatOK);
+        return output.pixels(layout.bounds);
+    }
+    /// What the core makes of the sidecar with these edits.
+    std::vector<unsigned char> expected(const palette4d::Edits& edits, double time) const {
+        palette4d::Sidecar other = parsed;
+        other.edits = edits;
+        return recoloured(other, 10 + time, source, layout.bounds);
+    }
+    void use(const std::string& slot, const Colour& colour) {
+        node->set(slot, colour);
+        node->set(slot + "On", 1);
+    }
+};
+
+bool secret(Instance& node, const std::string& param) {
+    return node.properties(param).number(kOfxParamPropSecret) != 0;
+}
+
+}  // namespace
+
+TEST(unused_handles_leave_the_sidecars_edits_alone) {
+    Graded graded;
+    // Whatever colour a host thinks up for a parameter that nobody set.
+    for (const double level : {0.0, 1.0, 0.5, -7.0, std::numeric_limits<double>::quiet_NaN()}) {
+        for (int slot = 1; slot <= 32; ++slot) {
+            const std::string name = "handle" + std::string(slot < 10 ? "0" : "");
+            graded.node->set(name + std::to_string(slot), Colour{level, level, level});
+        }
+        CHECK(graded.render(3) == graded.expected(graded.parsed.edits, 3));
+    }
+}
+
+TEST(a_handle_of_the_host_overrides_the_sidecars_edit) {
+    Graded graded;
+    palette4d::Edits edits = graded.parsed.edits;
+    graded.use("handle02", {0.9, 0.1, 0.4});  // v1, which the sidecar edits too
+    edits.vertex_rgb[1] = palette4d::Vec3{0.9, 0.1, 0.4};
+    graded.use("handle17", {0.1, 0.2, 0.3});  // the sidecar's stop, after its 16 vertices
+    edits.stops[0].rgb = {0.1, 0.2, 0.3};
+    graded.use("handle05", {-0.5, 1.75, 0.25});
+    edits.vertex_rgb[4] = palette4d::Vec3{-0.5, 1.75, 0.25};
+    for (const double time : {0.0, 2.5, 5.0, 9.0}) {
+        CHECK(graded.render(time) == graded.expected(edits, time));
+        CHECK(graded.render(time) != graded.expected(graded.parsed.edits, time));
+    }
+    // Sidecar: as if nothing were set here.
+    graded.node->set("editsFrom", 0);
+    CHECK(graded.render(5) == graded.expected(graded.parsed.edits, 5));
+    // Host: what is set here alone; a stop that is not has gone.
+    graded.node->set("editsFrom", 1);
+    palette4d::Edits alone;
+    alone.vertex_rgb.resize(16);
+    alone.vertex_rgb[1] = edits.vertex_rgb[1];
+    alone.vertex_rgb[4] = edits.vertex_rgb[4];
+    alone.stops = edits.stops;
+    CHECK(graded.render(5) == graded.expected(alone, 5));
+    graded.node->set("handle17On", 0);
+    alone.stops.clear();
+    CHECK(graded.render(5) == graded.expected(alone, 5));
+    // And with none in use there is nothing to do, and the host hears so.
+    graded.node->set("handle02On", 0);
+    graded.node->set("handle05On", 0);
+    std::string clip;
+    double time = 0;
+    CHECK(graded.node->is_identity(5, clip, time) == kOfxStatOK);
+    CHECK(graded.render(5) == graded.source.pixels(graded.layout.bounds));
+}
+
+TEST(keyframes_of_a_handle_are_read_at_the_time_of_the_render) {
+    Graded graded;
+    graded.use("handle01", {0, 0, 0});
+    graded.node->animate("handle01", {{0, Colour{0.1, 0.1, 0.1}}, {8, Colour{0.9, 0.5, 0.1}}});
+    std::vector<unsigned char> before;
+    for (const double time : {0.0, 2.0, 4.0, 6.5, 8.0, 9.0}) {
+        const double w = std::min(time / 8, 1.0);
+        palette4d::Edits edits = graded.parsed.edits;
+        edits.vertex_rgb[0] = palette4d::Vec3{(1 - w) * 0.1 + w * 0.9, (1 - w) * 0.1 + w * 0.5,
+                                              (1 - w) * 0.1 + w * 0.1};
+        CHECK(graded.render(time) == graded.expected(edits, time));
+        // Nothing that was prepared for another time or another colour is shown.
+        CHECK(graded.render(time) != before);
+        before = graded.render(time);
+    }
+}
+
+TEST(one_sidecar_two_instances_two_grades) {
+    Graded graded;
+    const auto other = graded.plugin.create();
+    other->set("sidecar", graded.path);
+    other->set("handle03", Colour{1, 0, 1});
+    other->set("handle03On", 1);
+    palette4d::Edits edits = graded.parsed.edits;
+    edits.vertex_rgb[2] = palette4d::Vec3{1, 0, 1};
+    for (int round = 0; round < 3; ++round) {
+        Picture output(graded.layout);
+        CHECK(other->render(2, &graded.source, output, graded.layout.bounds) == kOfxStatOK);
+        CHECK(output.pixels(graded.layout.bounds) == graded.expected(edits, 2));
+        CHECK(graded.render(2) == graded.expected(graded.parsed.edits, 2));
+    }
+}
+
+TEST(handles_show_what_the_sidecar_holds) {
+    Graded graded;
+    Instance& node = *graded.node;
+    CHECK(node.properties("handle01").text(kOfxPropLabel) == "v0, frame 10");
+    CHECK(node.properties("handle16").text(kOfxPropLabel) == "v15, frame 20");
+    CHECK(node.properties("handle17").text(kOfxPropLabel) == "s1, stop at 15");
+    for (const char* name : {"handle01", "handle17On", "handle09Id"}) CHECK(!secret(node, name));
+    for (const char* name : {"handle18", "handle18On", "handle32Id"}) CHECK(secret(node, name));
+    // They begin from the colours that they have: the palette's, or the sidecar's edit.
+    CHECK(std::get<Colour>(node.value("handle01")) == (Colour{0.1, 0.1, 0.1}));
+    CHECK(std::get<Colour>(node.value("handle02")) == (Colour{0.2, 0.7, 0.1}));
+    CHECK(std::get<Colour>(node.value("handle17")) == (Colour{0.5, 0.5, 0.9}));
+    CHECK(std::get<int>(node.value("handle02On")) == 0);
+    // An edit on the command line moves those that are not in use.
+    graded.use("handle01", {0.3, 0.3, 0.3});
+    write("clip.p4d.json", sidecar_text(false));
+    CHECK(node.changed("strength") == kOfxStatOK);
+    CHECK(std::get<Colour>(node.value("handle01")) == (Colour{0.3, 0.3, 0.3}));
+    CHECK(std::get<Colour>(node.value("handle02")) == (Colour{0.9, 0.1, 0.1}));
+    CHECK(secret(node, "handle17"));
+    CHECK(node.text("status").find("0 edits, 1 handle here") != std::string::npos);
+    // Again, nothing is new: nothing is set.
+    const int before = node.settings("handle02");
+    CHECK(node.changed("strength") == kOfxStatOK);
+    CHECK(node.settings("handle02") == before);
+    // Without a sidecar nothing is lost.
+    graded.choose("");
+    CHECK(std::get<int>(node.value("handle01On")) == 1);
+}
+
+TEST(changing_a_colour_brings_it_into_use) {
+    Graded graded;
+    Instance& node = *graded.node;
+    node.set("handle02", Colour{1, 1, 0});
+    // The host's own interpolation of keys is no edit, nor is the plugin's own setting.
+    CHECK(node.changed(kOfxTypeParameter, "handle02", kOfxChangeTime) == kOfxStatOK);
+    CHECK(std::get<int>(node.value("handle02On")) == 0);
+    node.set("handle02", Colour{1, 1, 0});
+    CHECK(node.changed("handle02") == kOfxStatOK);
+    CHECK(std::get<int>(node.value("handle02On")) == 1);
+    CHECK(std::get<Colour>(node.value("handle02")) == (Colour{1, 1, 0}));
+    // It holds on to its handle from now on.
+    CHECK(node.text("handle02Id") == "v1");
+    palette4d::Edits edits = graded.parsed.edits;
+    edits.vertex_rgb[1] = palette4d::Vec3{1, 1, 0};
+    CHECK(graded.render(1) == graded.expected(edits, 1));
+    // Out of use: the palette's colour again.
+    node.set("handle02On", 0);
+    CHECK(node.changed("handle02On") == kOfxStatOK);
+    CHECK(std::get<Colour>(node.value("handle02")) == (Colour{0.2, 0.7, 0.1}));
+    CHECK(graded.render(1) == graded.expected(graded.parsed.edits, 1));
+    // All of them.
+    graded.use("handle02", {1, 1, 0});
+    graded.use("handle03", {1, 1, 0});
+    CHECK(node.changed("resetHandles") == kOfxStatOK);
+    CHECK(std::get<int>(node.value("handle03On")) == 0);
+    CHECK(node.text("handle02Id").empty());
+    CHECK(graded.render(1) == graded.expected(graded.parsed.edits, 1));
+}
+
+TEST(keyframes_of_a_handle_out_of_use_are_kept) {
+    Graded graded;
+    graded.node->animate("handle04", {{0, Colour{0, 0, 0}}, {9, Colour{1, 1, 1}}});
+    const int before = graded.node->settings("handle04");
+    write("clip.p4d.json", sidecar_text(false));
+    CHECK(graded.node->changed("strength") == kOfxStatOK);
+    CHECK(graded.node->settings("handle04") == before);
+}
+
+TEST(a_slot_may_name_any_handle) {
+    Graded graded;
+    Instance& node = *graded.node;
+    node.set("handle30Id", std::string("v11"));
+    CHECK(node.changed("handle30Id") == kOfxStatOK);
+    CHECK(node.properties("handle30").text(kOfxPropLabel) == "v11, frame 20");
+    CHECK(!secret(node, "handle30"));
+    graded.use("handle30", {0.4, 0.5, 0.6});
+    palette4d::Edits edits = graded.parsed.edits;
+    edits.vertex_rgb[11] = palette4d::Vec3{0.4, 0.5, 0.6};
+    CHECK(graded.render(8) == graded.expected(edits, 8));
+    // Two slots for one handle: the last counts.
+    node.set("handle31Id", std::string("v11"));
+    graded.use("handle31", {0.7, 0.1, 0.1});
+    edits.vertex_rgb[11] = palette4d::Vec3{0.7, 0.1, 0.1};
+    CHECK(graded.render(8) == graded.expected(edits, 8));
+    // One that is not there: the rest of the grade holds, and a message says so.
+    node.set("handle31Id", std::string("v99"));
+    edits.vertex_rgb[11] = palette4d::Vec3{0.4, 0.5, 0.6};
+    CHECK(graded.render(8) == graded.expected(edits, 8));
+    CHECK(node.effect().persistent_message.find("'v99'") != std::string::npos);
+    node.set("handle31On", 0);
+    CHECK(graded.render(8) == graded.expected(edits, 8));
+    CHECK(node.effect().persistent_message.empty());
+}
+
+TEST(colours_that_are_none_are_left_out) {
+    Graded graded;
+    const double infinity = std::numeric_limits<double>::infinity();
+    for (const double odd : {std::numeric_limits<double>::quiet_NaN(), infinity, -infinity, 1e30}) {
+        graded.use("handle01", {0.5, odd, 0.5});
+        CHECK(graded.render(2) == graded.expected(graded.parsed.edits, 2));
+    }
+}
