@@ -12,9 +12,9 @@ bool define_clip(const Suites& suites, OfxImageEffectHandle effect, const char* 
         return false;
     }
     const Properties clip(suites, handle);
-    // RGBA first: hosts that know one layout only take the first.
+    // RGBA first: hosts that know one layout only take the first. Alpha alone passes through.
     clip.set_strings(kOfxImageEffectPropSupportedComponents,
-                     {kOfxImageComponentRGBA, kOfxImageComponentRGB});
+                     {kOfxImageComponentRGBA, kOfxImageComponentRGB, kOfxImageComponentAlpha});
     clip.set_int(kOfxImageEffectPropSupportsTiles, 1);
     clip.set_int(kOfxImageEffectPropTemporalClipAccess, 0);
     return true;

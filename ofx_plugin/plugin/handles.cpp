@@ -130,6 +130,14 @@ EditsAt edits_at(const Params& params, const Sidecar& sidecar, OfxTime time) {
     return result;
 }
 
+int handle_at(const Params& params, const Sidecar& sidecar, int slot, OfxTime time) {
+    if (slot < 1) return -1;
+    const auto index = static_cast<std::size_t>(slot - 1);
+    std::string id;
+    if (slot <= kHandleSlots) id = params.string_at(slots()[index].id.c_str(), time).value_or("");
+    return handle_of(sidecar, index, id);
+}
+
 int handles_in_use(const Params& params) {
     if (params.int_now(kParamEditsFrom) == static_cast<int>(EditsFrom::kSidecar)) return 0;
     int count = 0;

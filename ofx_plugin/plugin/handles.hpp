@@ -29,6 +29,9 @@ struct EditsAt {
 };
 EditsAt edits_at(const Params& params, const Sidecar& sidecar, OfxTime time);
 
+/// The place in handles_of() of a slot's handle (counted from 1; beyond the slots, the sidecar's
+/// nth), or -1.
+int handle_at(const Params& params, const Sidecar& sidecar, int slot, OfxTime time);
 /// How many slots are in use, outside of rendering.
 int handles_in_use(const Params& params);
 /// For instance changes only. Labels the slots after the sidecar's handles, hides those that it has

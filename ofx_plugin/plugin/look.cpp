@@ -1,12 +1,13 @@
 #include "look.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <exception>
 #include <new>
+#include <tuple>
 #include <utility>
 
 #include "handles.hpp"
+#include "palette4d/handles.hpp"
 #include "params.hpp"
 #include "sidecar_cache.hpp"
 
@@ -16,14 +17,49 @@ double sidecar_frame(const ClipInfo& clip, OfxTime host_time, double frame_offse
     return static_cast<double>(clip.first) + host_time + frame_offset;
 }
 
+namespace {
+
+/// Prepares what the output asks for. Throws what slicing throws.
+void prepare(Look& look, const Params& params, LoadedSidecar& loaded, double frame, OfxTime time) {
+    Drawing& drawing = look.drawing;
+    const OutputSettings& settings = drawing.settings;
+    const Sidecar& sidecar = loaded.sidecar();
+    look.passes = false;
+    if (settings.output == Output::kOutside) {
+        drawing.recolourer = loaded.surface_at(frame);
+        return;
+    }
+    if (settings.output == Output::kWeight) {
+        const int handle = handle_at(params, sidecar, settings.weight_of, time);
+        if (handle < 0) {
+            look.passes = true;
+            look.problem = std::string(kParamWeightOf) + ": the sidecar has no handle " +
+                           std::to_string(settings.weight_of) + ", expected one of its " +
+                           std::to_string(handles_of(sidecar.polytope, sidecar.edits).size());
+            return;
+        }
+        drawing.recolourer = loaded.weight_at(frame, handle);
+        return;
+    }
+    EditsAt edits = edits_at(params, sidecar, time);
+    look.note = std::move(edits.note);
+    drawing.recolourer = loaded.recolourer_at(frame, edits.edits);
+    if (drawing.recolourer->identity() || settings.strength == 0) drawing.recolourer = nullptr;
+    if (settings.output == Output::kPalette) {
+        std::tie(drawing.original, drawing.edited) = loaded.palette_at(frame, edits.edits);
+    } else {
+        look.passes = !drawing.recolourer;
+    }
+}
+
+}  // namespace
+
 Look look_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time) {
     Look look;
     const Params params(suites, effect);
     const std::string path = params.string_at(kParamSidecar, time).value_or("");
     if (path.empty()) return look;
-    // Not every host keeps a parameter inside its range.
-    const double strength = params.double_at(kParamStrength, time).value_or(1);
-    look.strength = strength > 0 ? std::min(strength, 1.0) : 0.0;
+    look.drawing.settings = output_settings_at(params, time);
     const double offset = params.double_at(kParamFrameOffset, time).value_or(0);
 
     const SidecarResult result = load_sidecar(path);
@@ -31,23 +67,20 @@ Look look_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time) {
         look.problem = result.problem;
         return look;
     }
-    if (look.strength == 0) return look;
+    if (look.drawing.settings.passes()) return look;
     const double frame = sidecar_frame(result.loaded->sidecar().clip, time, offset);
     if (!std::isfinite(frame)) {
         look.problem = path + ": the host's time and frameOffset give no frame; expected numbers";
         return look;
     }
     try {
-        EditsAt edits = edits_at(params, result.loaded->sidecar(), time);
-        look.note = std::move(edits.note);
-        look.recolourer = result.loaded->recolourer_at(frame, edits.edits);
+        prepare(look, params, *result.loaded, frame, time);
     } catch (const std::bad_alloc&) {
         throw;
     } catch (const std::exception& error) {
+        look.passes = true;
         look.problem = path + ": frame " + std::to_string(frame) + ": " + error.what();
-        return look;
     }
-    if (look.recolourer->identity()) look.recolourer = nullptr;
     return look;
 }
 

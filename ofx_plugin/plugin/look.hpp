@@ -1,19 +1,18 @@
-// What a node does to one moment of its clip: parameters and time in, a prepared palette out.
+// What a node does to one moment of its clip: parameters and time in, what is to be drawn out.
 #pragma once
 
-#include <memory>
 #include <string>
 
 #include "host.hpp"
-#include "palette4d/recolour.hpp"
+#include "outputs.hpp"
 #include "palette4d/sidecar.hpp"
 
 namespace palette4d::plugin {
 
 struct Look {
-    /// Null when the picture passes through unchanged.
-    std::shared_ptr<const Recolourer> recolourer;
-    double strength = 1;
+    /// The picture passes through unchanged.
+    bool passes = true;
+    Drawing drawing;
     /// Why the picture passes through although a sidecar was asked for; empty when all is well.
     std::string problem;
     /// What else the user should know; empty when all is well.

@@ -1,6 +1,7 @@
 #include "params.hpp"
 
 #include "handles.hpp"
+#include "outputs.hpp"
 #include "param_define.hpp"
 
 namespace palette4d::plugin {
@@ -28,6 +29,7 @@ void define_params(const Suites& suites, OfxParamSetHandle params) {
          "shows the analysed clip's first frame plus this."},
         {0, -kLargestOffset, kLargestOffset, -1000, 1000}, 1, 2, false);
 
+    define_output_params(define);
     define_handle_params(define);
 
     const Properties status =

@@ -43,36 +43,17 @@ void recolour_bytes(const Image& in, const Image& out, const OfxRectI& area,
     const int width = area.x2 - area.x1;
     const std::size_t row = static_cast<std::size_t>(width) * static_cast<std::size_t>(in.channels);
     const int rows_at_once = static_cast<int>(std::max<std::size_t>(1, kChunkFloats / row));
+    const auto stride = static_cast<std::ptrdiff_t>(row * sizeof(float));
     std::vector<float> floats;
     for (int y = area.y1; y < area.y2; y += rows_at_once) {
         const int rows = std::min(rows_at_once, area.y2 - y);
+        const OfxRectI chunk = {area.x1, y, area.x2, y + rows};
         floats.resize(row * static_cast<std::size_t>(rows));
-        float* to = floats.data();
-        for (int r = 0; r < rows; ++r) {
-            const auto* from = reinterpret_cast<const std::uint8_t*>(in.at(area.x1, y + r));
-            for (std::size_t i = 0; i < row; ++i) *to++ = static_cast<float>(from[i]) / 255.0f;
-        }
-        const auto stride = static_cast<std::ptrdiff_t>(row * sizeof(float));
+        read_floats(in, chunk, floats.data());
         recolourer.apply({floats.data(), width, rows, in.channels, stride},
                          {floats.data(), width, rows, in.channels, stride}, options);
-        const float* from = floats.data();
-        for (int r = 0; r < rows; ++r) {
-            auto* bytes = reinterpret_cast<std::uint8_t*>(out.at(area.x1, y + r));
-            for (std::size_t i = 0; i < row; ++i) bytes[i] = to_byte(*from++);
-        }
+        write_floats(floats.data(), out, chunk);
     }
-}
-
-/// Clears what `covered` leaves of `area`.
-void clear_around(const Image& out, const OfxRectI& area, const OfxRectI& covered) {
-    if (is_empty(covered)) {
-        clear(out, area);
-        return;
-    }
-    clear(out, {area.x1, area.y1, area.x2, covered.y1});
-    clear(out, {area.x1, covered.y2, area.x2, area.y2});
-    clear(out, {area.x1, covered.y1, covered.x1, covered.y2});
-    clear(out, {covered.x2, covered.y1, area.x2, covered.y2});
 }
 
 }  // namespace
@@ -86,6 +67,8 @@ std::optional<Image> read_image(const Properties& image, const Properties& clip)
     Image result;
     result.data = static_cast<char*>(*data);
     result.bounds = *bounds;
+    result.definition = image.get_rect(kOfxImagePropRegionOfDefinition).value_or(*bounds);
+    if (is_empty(result.definition)) result.definition = *bounds;
     result.row_bytes = *row_bytes;
     const std::string depth = either(image, clip, kOfxImageEffectPropPixelDepth);
     result.depth = depth == kOfxBitDepthByte    ? Depth::kByte
@@ -111,6 +94,43 @@ OfxRectI intersect(const OfxRectI& a, const OfxRectI& b) {
 }
 
 bool is_empty(const OfxRectI& rect) { return rect.x1 >= rect.x2 || rect.y1 >= rect.y2; }
+
+void read_floats(const Image& image, const OfxRectI& area, float* to) {
+    const std::size_t row =
+        static_cast<std::size_t>(area.x2 - area.x1) * static_cast<std::size_t>(image.channels);
+    for (int y = area.y1; y < area.y2; ++y, to += row) {
+        if (image.depth == Depth::kFloat) {
+            std::memcpy(to, image.at(area.x1, y), row * sizeof(float));
+            continue;
+        }
+        const auto* from = reinterpret_cast<const std::uint8_t*>(image.at(area.x1, y));
+        for (std::size_t i = 0; i < row; ++i) to[i] = static_cast<float>(from[i]) / 255.0f;
+    }
+}
+
+void write_floats(const float* from, const Image& image, const OfxRectI& area) {
+    const std::size_t row =
+        static_cast<std::size_t>(area.x2 - area.x1) * static_cast<std::size_t>(image.channels);
+    for (int y = area.y1; y < area.y2; ++y, from += row) {
+        if (image.depth == Depth::kFloat) {
+            std::memcpy(image.at(area.x1, y), from, row * sizeof(float));
+            continue;
+        }
+        auto* bytes = reinterpret_cast<std::uint8_t*>(image.at(area.x1, y));
+        for (std::size_t i = 0; i < row; ++i) bytes[i] = to_byte(from[i]);
+    }
+}
+
+void clear_around(const Image& out, const OfxRectI& area, const OfxRectI& covered) {
+    if (is_empty(covered)) {
+        clear(out, area);
+        return;
+    }
+    clear(out, {area.x1, area.y1, area.x2, covered.y1});
+    clear(out, {area.x1, covered.y2, area.x2, area.y2});
+    clear(out, {area.x1, covered.y1, covered.x1, covered.y2});
+    clear(out, {covered.x2, covered.y1, area.x2, covered.y2});
+}
 
 bool same_format(const Image& a, const Image& b) {
     return a.depth == b.depth && a.channels == b.channels && a.pixel_bytes == b.pixel_bytes;

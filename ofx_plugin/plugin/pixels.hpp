@@ -1,4 +1,4 @@
-// The pixels of OFX images: where they lie, and the three things that are done to rows of them.
+// The pixels of OFX images: where they lie, and what is done to rows of them.
 // Rows count upwards from bounds.y1; row_bytes is signed and may hold padding.
 #pragma once
 
@@ -21,6 +21,8 @@ struct Image {
     int channels = 0;
     int pixel_bytes = 0;
     bool premultiplied = false;  ///< only ever for four channels
+    /// The whole picture, of which bounds may be a part; bounds where the host does not tell.
+    OfxRectI definition{};
 
     char* at(int x, int y) const {
         return data + (static_cast<std::ptrdiff_t>(y) - bounds.y1) * row_bytes +
@@ -37,6 +39,13 @@ bool is_empty(const OfxRectI& rect);
 /// The two hold the same pixels in the same layout, so that one can be copied to the other.
 bool same_format(const Image& a, const Image& b);
 
+/// The pixels of an area within the bounds, bytes or floats, row after row without gaps. Bytes are
+/// byte / 255, and come back rounded and clamped.
+void read_floats(const Image& image, const OfxRectI& area, float* to);
+void write_floats(const float* from, const Image& image, const OfxRectI& area);
+
+/// Transparent black, over what `covered` leaves of `area`.
+void clear_around(const Image& out, const OfxRectI& area, const OfxRectI& covered);
 /// Transparent black.
 void clear(const Image& out, const OfxRectI& area);
 /// Copies what `in` covers of `area`; the rest becomes transparent black.

@@ -49,15 +49,13 @@ private:
     std::optional<Image> pixels_;
 };
 
-/// Recolours the window; on an exception the source is copied instead, and the exception goes on.
-OfxStatus recolour_window(const Suites& suites, OfxImageEffectHandle effect, const Image& in,
-                          const Image& out, const OfxRectI& window, const Look& look) {
+/// Draws the window; on an exception the source is copied instead, and the exception goes on.
+OfxStatus draw_window(const Suites& suites, OfxImageEffectHandle effect, const Image& in,
+                      const Image& out, const OfxRectI& window, const Look& look) {
     try {
         for_each_band(
             suites, window.y1, window.y2,
-            [&](int y1, int y2) {
-                recolour(in, out, {window.x1, y1, window.x2, y2}, *look.recolourer, look.strength);
-            },
+            [&](int y1, int y2) { draw(in, out, {window.x1, y1, window.x2, y2}, look.drawing); },
             [&] { return suites.effect->abort && suites.effect->abort(effect) != 0; });
     } catch (...) {
         copy(in, out, window);
@@ -74,7 +72,7 @@ OfxStatus is_identity(const Suites& suites, OfxImageEffectHandle effect, const P
     if (!time) return kOfxStatReplyDefault;
     const Look look = look_at(suites, effect, *time);
     // With a problem there is something to render: the message.
-    if (look.recolourer || !look.problem.empty() || !look.note.empty()) return kOfxStatReplyDefault;
+    if (!look.passes || !look.problem.empty() || !look.note.empty()) return kOfxStatReplyDefault;
     report(suites, effect, "");
     if (!out_args.set_string(kOfxPropName, kOfxImageEffectSimpleSourceClipName)) {
         return kOfxStatReplyDefault;
@@ -110,11 +108,21 @@ OfxStatus render(const Suites& suites, OfxImageEffectHandle effect, const Proper
     }
     report(suites, effect, look.problem.empty() ? look.note : look.problem);
     // Depths and layouts that the node did not ask for pass through too.
-    if (!look.recolourer || in.depth == Depth::kOther || in.channels < 3) {
+    if (look.passes || in.depth == Depth::kOther || in.channels < 3) {
         copy(in, out, window);
         return kOfxStatOK;
     }
-    return recolour_window(suites, effect, in, out, window, look);
+    look.drawing.picture = out.definition;
+    // A host that takes the node into a LUT asks for colours alone, whatever lies where.
+    if (in_args.get_string(kOfxImageEffectPropNoSpatialAwareness) == "true" &&
+        look.drawing.settings.output == Output::kPalette) {
+        look.drawing.settings.output = Output::kRecoloured;
+        if (!look.drawing.recolourer) {
+            copy(in, out, window);
+            return kOfxStatOK;
+        }
+    }
+    return draw_window(suites, effect, in, out, window, look);
 }
 
 }  // namespace palette4d::plugin

@@ -10,6 +10,8 @@
 #include <optional>
 #include <utility>
 
+#include "palette4d/lineage.hpp"
+
 namespace palette4d::plugin {
 namespace {
 
@@ -142,6 +144,15 @@ void refresh(Entry& entry, const fs::path& path, const std::string& name) {
     entry.result = {nullptr, name + ": " + problem};
 }
 
+std::vector<Vec3> edited_at(const Sidecar& sidecar, const Slice& slice, const AppliedEdits& edits) {
+    const Polytope& polytope = sidecar.polytope;
+    if (edits.sidecar && edits.host.empty()) {
+        return edited_colours(polytope, sidecar.edits, slice);
+    }
+    return edited_colours(polytope,
+                          with_colours(polytope, sidecar.edits, edits.sidecar, edits.host), slice);
+}
+
 std::shared_ptr<Entry> entry_of(const std::string& key) {
     Cache& all = cache();
     const std::lock_guard<std::mutex> lock(all.mutex);
@@ -174,15 +185,35 @@ bool operator<(const AppliedEdits& a, const AppliedEdits& b) {
 
 std::shared_ptr<const Recolourer> LoadedSidecar::recolourer_at(double frame,
                                                                const AppliedEdits& edits) {
-    const Polytope& polytope = sidecar_.polytope;
+    return prepared({frame, Purpose::kEdit, 0, edits});
+}
+
+std::shared_ptr<const Recolourer> LoadedSidecar::weight_at(double frame, int handle) {
+    return prepared({frame, Purpose::kWeight, handle, {}});
+}
+
+std::shared_ptr<const Recolourer> LoadedSidecar::surface_at(double frame) {
+    return prepared({frame, Purpose::kSurface, 0, {}});
+}
+
+std::pair<std::vector<Vec3>, std::vector<Vec3>> LoadedSidecar::palette_at(
+    double frame, const AppliedEdits& edits) const {
+    Slice slice = slice_at(sidecar_.polytope, frame);
+    return {slice.rgb, edited_at(sidecar_, slice, edits)};
+}
+
+std::shared_ptr<const Recolourer> LoadedSidecar::prepared(const Key& wanted) {
+    Key key = wanted;
+    double& frame = std::get<double>(key);
     // All of the time before the clip is its first frame, all after it the last.
+    const Polytope& polytope = sidecar_.polytope;
     if (frame < polytope.first_frame()) frame = polytope.first_frame();
     if (frame > polytope.last_frame()) frame = polytope.last_frame();
 
     std::shared_ptr<Prepared> prepared;
     {
         const std::lock_guard<std::mutex> lock(mutex_);
-        const auto [at, is_new] = frames_.try_emplace(Key{frame, edits});
+        const auto [at, is_new] = frames_.try_emplace(key);
         if (is_new) {
             at->second = std::make_shared<Prepared>();
         } else {
@@ -198,18 +229,26 @@ std::shared_ptr<const Recolourer> LoadedSidecar::recolourer_at(double frame,
     }
     // Only threads that want this very frame wait for it.
     const std::lock_guard<std::mutex> lock(prepared->building);
-    if (!prepared->recolourer) {
-        Slice slice = slice_at(polytope, frame);
-        std::vector<Vec3> edited =
-            edits.sidecar && edits.host.empty()
-                ? edited_colours(polytope, sidecar_.edits, slice)
-                : edited_colours(polytope,
-                                 with_colours(polytope, sidecar_.edits, edits.sidecar, edits.host),
-                                 slice);
-        prepared->recolourer = std::make_shared<const Recolourer>(
-            std::move(slice.rgb), std::move(edited), std::move(slice.faces));
-    }
+    if (!prepared->recolourer) prepared->recolourer = prepare(key);
     return prepared->recolourer;
+}
+
+std::shared_ptr<const Recolourer> LoadedSidecar::prepare(const Key& key) const {
+    const auto& [frame, purpose, handle, edits] = key;
+    Slice slice = slice_at(sidecar_.polytope, frame);
+    std::vector<Vec3> edited;
+    switch (purpose) {
+        case Purpose::kEdit:
+            edited = edited_at(sidecar_, slice, edits);
+            break;
+        case Purpose::kWeight:
+            edited = weight_reader(slice, Lineage(sidecar_.polytope, sidecar_.edits, handle));
+            break;
+        case Purpose::kSurface:
+            edited = surface_reader(slice);
+            break;
+    }
+    return std::make_shared<const Recolourer>(std::move(slice.rgb), edited, std::move(slice.faces));
 }
 
 SidecarResult load_sidecar(const std::string& path) {

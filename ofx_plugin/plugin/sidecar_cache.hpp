@@ -8,6 +8,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -34,13 +35,25 @@ public:
     /// the same frame with the same edits share one, built once. Throws what slicing throws, and
     /// std::invalid_argument for a handle that is not there.
     std::shared_ptr<const Recolourer> recolourer_at(double frame, const AppliedEdits& edits = {});
+    /// Likewise: it adds the weight of a handle's lineage to the first channel (lineage.hpp).
+    std::shared_ptr<const Recolourer> weight_at(double frame, int handle);
+    /// Likewise: it adds the closest colour of the palette (lineage.hpp).
+    std::shared_ptr<const Recolourer> surface_at(double frame);
+    /// The palette's colours at a frame: original and edited.
+    std::pair<std::vector<Vec3>, std::vector<Vec3>> palette_at(double frame,
+                                                               const AppliedEdits& edits) const;
 
 private:
-    using Key = std::pair<double, AppliedEdits>;
+    /// What a prepared palette is for.
+    enum class Purpose { kEdit, kWeight, kSurface };
+    using Key = std::tuple<double, Purpose, int, AppliedEdits>;
     struct Prepared {
         std::mutex building;
         std::shared_ptr<const Recolourer> recolourer;
     };
+    std::shared_ptr<const Recolourer> prepared(const Key& key);
+    std::shared_ptr<const Recolourer> prepare(const Key& key) const;
+
     const Sidecar sidecar_;
     std::mutex mutex_;
     std::map<Key, std::shared_ptr<Prepared>> frames_;

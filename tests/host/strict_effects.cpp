@@ -67,7 +67,9 @@ OfxStatus clip_properties(OfxImageClipHandle clip, OfxPropertySetHandle* set) {
 }
 
 std::string components(int channels) {
-    return channels == 4 ? kOfxImageComponentRGBA : kOfxImageComponentRGB;
+    return channels == 4   ? kOfxImageComponentRGBA
+           : channels == 3 ? kOfxImageComponentRGB
+                           : kOfxImageComponentAlpha;
 }
 
 void put_rect(OfxPropertySetStruct& set, const char* name, const OfxRectI& rect) {

@@ -414,6 +414,7 @@ OfxStatus Instance::render(double time, const Picture* source, Picture& output,
     const Activity before = activity();
     activity() = {"", false, &output, source, &images};
     OfxPropertySetStruct in = render_arguments(time, window);
+    for (const auto& [name, value] : extra_arguments) in.put(name, value);
     const OfxStatus status = plugin_.call(kOfxImageEffectActionRender, &effect_, &in, nullptr);
     activity() = before;
 

@@ -284,6 +284,8 @@ public:
     OfxStatus clip_preferences(bool& frame_varying);
     /// Renders `window`; null source: the host has no picture. Checks images and guards afterwards.
     OfxStatus render(double time, const Picture* source, Picture& output, const OfxRectI& window);
+    /// What the next renders' arguments say besides the ordinary.
+    std::map<std::string, Value> extra_arguments;
 
 private:
     Plugin& plugin_;

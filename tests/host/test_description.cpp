@@ -33,6 +33,7 @@ TEST(node_describes_itself) {
             const OfxPropertySetStruct& c = clip->properties;
             CHECK(c.text(kOfxImageEffectPropSupportedComponents, 0) == kOfxImageComponentRGBA);
             CHECK(c.text(kOfxImageEffectPropSupportedComponents, 1) == kOfxImageComponentRGB);
+            CHECK(c.text(kOfxImageEffectPropSupportedComponents, 2) == kOfxImageComponentAlpha);
         }
         // Saved in projects: none of these names may ever go.
         const auto& order = effect->params.order;

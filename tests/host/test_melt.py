@@ -202,6 +202,34 @@ def test_a_handle_named_by_its_id_in_melt(scene: Scene, sidecar: _core.Sidecar) 
     scene.check(frames, edited_too(scene, b1=(0.0, 1.0, 0.0)))
 
 
+def test_a_weight_as_a_matte_in_melt(scene: Scene, sidecar: _core.Sidecar) -> None:
+    # The fourth handle in order is a3, which becomes b3: track 3 of the box.
+    frames, said = scene.render(sidecar=path_of(scene), output="Weight of a handle", weightOf=4)
+    assert "persistent" not in said
+    expected = []
+    for index, image in enumerate(scene.clip):
+        cut = _core.slice_at(sidecar.polytope, sidecar.clip["first"] + index)
+        points = image.reshape(-1, 3) / float(np.iinfo(image.dtype).max)
+        weights, _ = _core.palette_weights(points, cut.rgb, cut.faces)
+        matte = np.clip(weights[:, 3], 0, 1).reshape(image.shape[:2])
+        expected.append(np.repeat(matte[..., None], 3, axis=-1).astype(np.float32))
+    assert np.ptp(expected[0]) > 0.2
+    for frame, wanted in zip(frames, expected, strict=True):
+        top = float(np.iinfo(frame.dtype).max)
+        assert np.abs(frame[..., :3] / top - wanted).max() <= 2e-4 + 0.51 / top
+
+
+def test_the_palette_and_the_mix_in_melt(scene: Scene, sidecar: _core.Sidecar) -> None:
+    graded, _ = scene.render(sidecar=path_of(scene))
+    frames, _ = scene.render(sidecar=path_of(scene), output="Palette")
+    strip = scene.clip[0].shape[0] // 8
+    for frame, whole in zip(frames, graded, strict=True):
+        assert np.array_equal(frame[:-strip], whole[:-strip])
+        assert len(np.unique(frame[-1, :, :3], axis=0)) == 8
+    frames, _ = scene.render(sidecar=path_of(scene), mix=0)
+    assert scene.unchanged(frames)
+
+
 def test_without_a_sidecar_the_picture_passes(scene: Scene) -> None:
     frames, said = scene.render()
     assert scene.unchanged(frames)
