@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "handles.hpp"
+#include "host_time.hpp"
 #include "params.hpp"
 #include "sidecar_cache.hpp"
 #include "status.hpp"
@@ -45,6 +46,15 @@ void show(const Suites& suites, OfxImageEffectHandle effect, const std::string& 
     }
 }
 
+/// The time that the host shows: `time`, or what it last said.
+std::optional<OfxTime> last_time(OfxImageEffectHandle effect, std::optional<OfxTime> time) {
+    const std::shared_ptr<Instance> instance = find(effect);
+    if (!instance) return time;
+    const std::lock_guard<std::mutex> lock(instance->mutex);
+    if (time) instance->time = time;
+    return instance->time;
+}
+
 }  // namespace
 
 void create_instance(const Suites& suites, OfxImageEffectHandle effect) {
@@ -63,7 +73,8 @@ void destroy_instance(OfxImageEffectHandle effect) {
     all.instances.erase(effect);
 }
 
-void update_instance(const Suites& suites, OfxImageEffectHandle effect, const std::string& param) {
+void update_instance(const Suites& suites, OfxImageEffectHandle effect, const std::string& param,
+                     std::optional<OfxTime> time) {
     // A host tells of a new value from within the call that sets it. Hosts that do so without
     // saying what changed, and do not give back what they were given, would go round for ever.
     thread_local bool updating = false;
@@ -79,7 +90,14 @@ void update_instance(const Suites& suites, OfxImageEffectHandle effect, const st
     const Sidecar* sidecar = result.loaded ? &result.loaded->sidecar() : nullptr;
     if (!param.empty()) handle_changed(params, sidecar, param);
     show_handles(params, sidecar);
-    const std::string text = status_of(result, !path.empty(), handles_in_use(params));
+    std::string shown;
+    time = last_time(effect, time);
+    if (sidecar && time) {
+        const TimeSettings settings = time_settings_at(params, *time);
+        shown =
+            words_of(*time, frame_at(sidecar->clip, settings, host_clip(suites, effect), *time));
+    }
+    const std::string text = status_of(result, !path.empty(), handles_in_use(params), shown);
     if (params.string_now(kParamStatus) != text) params.set_string(kParamStatus, text);
 }
 
@@ -91,7 +109,8 @@ void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const P
     if (reason && *reason == kOfxChangePluginEdited) return;
     // A colour that follows its keyframes is not an edit.
     const bool by_user = reason && *reason == kOfxChangeUserEdited;
-    update_instance(suites, effect, by_user ? name.value_or("") : "");
+    update_instance(suites, effect, by_user ? name.value_or("") : "",
+                    args.get_double(kOfxPropTime));
 }
 
 void report(const Suites& suites, OfxImageEffectHandle effect, const std::string& problem) {

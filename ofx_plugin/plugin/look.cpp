@@ -7,15 +7,12 @@
 #include <utility>
 
 #include "handles.hpp"
+#include "host_time.hpp"
 #include "palette4d/handles.hpp"
 #include "params.hpp"
 #include "sidecar_cache.hpp"
 
 namespace palette4d::plugin {
-
-double sidecar_frame(const ClipInfo& clip, OfxTime host_time, double frame_offset) {
-    return static_cast<double>(clip.first) + host_time + frame_offset;
-}
 
 namespace {
 
@@ -60,7 +57,6 @@ Look look_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time) {
     const std::string path = params.string_at(kParamSidecar, time).value_or("");
     if (path.empty()) return look;
     look.drawing.settings = output_settings_at(params, time);
-    const double offset = params.double_at(kParamFrameOffset, time).value_or(0);
 
     const SidecarResult result = load_sidecar(path);
     if (!result.loaded) {
@@ -68,18 +64,22 @@ Look look_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time) {
         return look;
     }
     if (look.drawing.settings.passes()) return look;
-    const double frame = sidecar_frame(result.loaded->sidecar().clip, time, offset);
-    if (!std::isfinite(frame)) {
-        look.problem = path + ": the host's time and frameOffset give no frame; expected numbers";
+    const FrameAt at = frame_at(result.loaded->sidecar().clip, time_settings_at(params, time),
+                                host_clip(suites, effect), time);
+    if (!std::isfinite(at.frame)) {
+        look.problem = path +
+                       ": the host's time and the node's parameters of time give no frame; "
+                       "expected numbers";
         return look;
     }
+    if (at.passes) return look;
     try {
-        prepare(look, params, *result.loaded, frame, time);
+        prepare(look, params, *result.loaded, at.frame, time);
     } catch (const std::bad_alloc&) {
         throw;
     } catch (const std::exception& error) {
         look.passes = true;
-        look.problem = path + ": frame " + std::to_string(frame) + ": " + error.what();
+        look.problem = path + ": frame " + std::to_string(at.frame) + ": " + error.what();
     }
     return look;
 }

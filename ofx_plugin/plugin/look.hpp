@@ -19,9 +19,6 @@ struct Look {
     std::string note;
 };
 
-/// The sidecar frame shown at a host's time: the host's frame 0 is the clip's first frame.
-double sidecar_frame(const ClipInfo& clip, OfxTime host_time, double frame_offset);
-
 /// The look of an instance at a time. Reads parameters in the way allowed while rendering. Problems
 /// are in the result; throws std::bad_alloc only.
 Look look_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time);

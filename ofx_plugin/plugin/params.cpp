@@ -1,17 +1,11 @@
 #include "params.hpp"
 
 #include "handles.hpp"
+#include "host_time.hpp"
 #include "outputs.hpp"
 #include "param_define.hpp"
 
 namespace palette4d::plugin {
-namespace {
-
-// A clip of four million frames is 48 hours at 24 frames a second; Resolve wants finite ranges.
-constexpr double kLargestOffset = 4e6;
-
-}  // namespace
-
 void define_params(const Suites& suites, OfxParamSetHandle params) {
     ParamDefiner define(suites, params);
     define
@@ -20,25 +14,21 @@ void define_params(const Suites& suites, OfxParamSetHandle params) {
                "whenever it changes."},
               kOfxParamStringIsFilePath)
         .set_int(kOfxParamPropStringFilePathExists, 1);
-    define.number({kParamStrength, "Strength",
-                   "How much of the edit is applied: 0 is the original picture, 1 the edit."},
-                  {1, 0, 1, 0, 1}, 0.01, 3, true);
-    define.number(
-        {kParamFrameOffset, "Frame offset",
-         "Frames added to the host's time before the palette is looked up: the host's frame 0 "
-         "shows the analysed clip's first frame plus this."},
-        {0, -kLargestOffset, kLargestOffset, -1000, 1000}, 1, 2, false);
-
-    define_output_params(define);
-    define_handle_params(define);
-
     const Properties status =
-        define.text({kParamStatus, "Status", "What was loaded, or what is wrong with the sidecar."},
+        define.text({kParamStatus, "Status",
+                     "What was loaded, which of its frames is shown, or what is wrong with the "
+                     "sidecar."},
                     kOfxParamStringIsLabel, "No sidecar chosen");
     status.set_int(kOfxParamPropEnabled, 0);
     status.set_int(kOfxParamPropPersistant, 0);
     status.set_int(kOfxParamPropEvaluateOnChange, 0);
     status.set_int(kOfxParamPropCanUndo, 0);
+    define.number({kParamStrength, "Strength",
+                   "How much of the edit is applied: 0 is the original picture, 1 the edit."},
+                  {1, 0, 1, 0, 1}, 0.01, 3, true);
+    define_output_params(define);
+    define_handle_params(define);
+    define_time_params(define);
 }
 
 Params::Params(const Suites& suites, OfxImageEffectHandle effect)

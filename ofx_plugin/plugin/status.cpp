@@ -26,13 +26,15 @@ std::string describe(const Sidecar& sidecar) {
 
 }  // namespace
 
-std::string status_of(const SidecarResult& result, bool chosen, int handles) {
+std::string status_of(const SidecarResult& result, bool chosen, int handles,
+                      const std::string& shown) {
     if (!chosen) return "No sidecar chosen";
     if (!result.loaded) return result.problem;
     std::string text = describe(result.loaded->sidecar());
     if (handles > 0) {
         text += ", " + counted(static_cast<std::size_t>(handles), "handle", "handles") + " here";
     }
+    if (!shown.empty()) text += "; " + shown;
     return text;
 }
 

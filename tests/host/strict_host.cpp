@@ -326,7 +326,7 @@ OfxStatus Instance::changed(const std::string& type, const std::string& name,
         in.put(kOfxPropName, name);
     }
     in.put(kOfxPropChangeReason, reason);
-    in.put(kOfxPropTime, 0.0);
+    in.put(kOfxPropTime, shown_time);
     in.put_all(kOfxImageEffectPropRenderScale, {1.0, 1.0});
     return plugin_.call(kOfxActionInstanceChanged, &effect_, &in, nullptr);
 }

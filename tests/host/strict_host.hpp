@@ -268,6 +268,7 @@ public:
     void set(const std::string& param, Value value);  ///< no action is sent
     void animate(const std::string& param, std::map<double, Value> keys);
     OfxStatus changed(const std::string& param);
+    double shown_time = 0;  ///< that changes tell
     /// Any instance change: `type` is kOfxTypeParameter or kOfxTypeClip, or empty for the time.
     OfxStatus changed(const std::string& type, const std::string& name, const std::string& reason);
     /// kOfxActionBeginInstanceChanged or its End.

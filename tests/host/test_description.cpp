@@ -85,7 +85,8 @@ TEST(status_says_what_was_loaded) {
     CHECK(instance->text("status") == "No sidecar chosen");
     instance->set("sidecar", sidecar());
     CHECK(instance->changed("sidecar") == kOfxStatOK);
-    CHECK(instance->text("status") == "box: frames 10-20 at 24 fps, 16 palette vertices, 3 edits");
+    CHECK(instance->text("status") ==
+          "box: frames 10-20 at 24 fps, 16 palette vertices, 3 edits; time 0 is frame 10");
     instance->set("sidecar", (folder() / "gone.p4d.json").u8string());
     CHECK(instance->changed("sidecar") == kOfxStatOK);
     CHECK(instance->text("status").find("gone.p4d.json") != std::string::npos);

@@ -129,7 +129,7 @@ TEST(the_status_follows_the_file) {
     const std::string good = "box: frames 10-20 at 24 fps, 16 palette vertices, ";
     node.set("sidecar", path);
     CHECK(node.changed("sidecar") == kOfxStatOK);
-    CHECK(node.text("status") == good + "3 edits");
+    CHECK(node.text("status") == good + "3 edits; time 0 is frame 10");
     struct Way {
         const char* words;
         std::function<OfxStatus()> poke;

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from host.scene import RATE, SERVICE, Image, Scene, read_image
+from host.scene import RATE, SERVICE, Image, Scene, read_image, recolour
 from palette4d import _core
 
 # Corners 0..7 count in red, green, blue bits; anticlockwise from outside.
@@ -167,6 +167,22 @@ def test_keyframed_strength(scene: Scene, sidecar: _core.Sidecar) -> None:
 def test_frame_offset(scene: Scene, sidecar: _core.Sidecar, offset: float) -> None:
     frames, _ = scene.render(sidecar=path_of(scene), frameOffset=offset)
     scene.check(frames, sidecar, offset=offset)
+
+
+def test_speed_and_the_ends_of_the_clip(scene: Scene, sidecar: _core.Sidecar) -> None:
+    frames, said = scene.render(sidecar=path_of(scene), speed=0.5, inPoint=2)
+    assert "persistent" not in said
+    first = sidecar.clip["first"]
+    expected = [
+        recolour(sidecar, first + 2 + index / 2, image[..., :3])
+        for index, image in enumerate(scene.clip)
+    ]
+    scene.check_against(frames, expected)
+    # Four frames in, the clip is over after six.
+    frames, _ = scene.render(sidecar=path_of(scene), inPoint=4, after="Pass through")
+    for index, image in enumerate(scene.clip):
+        passed = np.array_equal(frames[index][..., :3], image[..., :3])
+        assert passed == (index >= 6), f"frame {index}"
 
 
 def edited_too(scene: Scene, **colours: tuple[float, float, float]) -> _core.Sidecar:
