@@ -4,10 +4,10 @@
 #include <map>
 #include <optional>
 
+#include "files.hpp"
 #include "handles.hpp"
 #include "host_time.hpp"
 #include "params.hpp"
-#include "sidecar_cache.hpp"
 #include "status.hpp"
 
 namespace palette4d::plugin {
@@ -85,9 +85,9 @@ void update_instance(const Suites& suites, OfxImageEffectHandle effect, const st
         ~Guard() { flag = false; }
     } const guard(updating);
     const Params params(suites, effect);
-    const std::string path = params.string_now(kParamSidecar).value_or("");
-    const SidecarResult result = path.empty() ? SidecarResult{} : load_sidecar(path);
-    const Sidecar* sidecar = result.loaded ? &result.loaded->sidecar() : nullptr;
+    const Chosen chosen = chosen_sidecar(params, std::nullopt);
+    const Sidecar* sidecar = chosen.result.loaded ? &chosen.result.loaded->sidecar() : nullptr;
+    const std::string copy = keep_files(params, chosen, param);
     if (!param.empty()) handle_changed(params, sidecar, param);
     show_handles(params, sidecar);
     std::string shown;
@@ -97,7 +97,7 @@ void update_instance(const Suites& suites, OfxImageEffectHandle effect, const st
         shown =
             words_of(*time, frame_at(sidecar->clip, settings, host_clip(suites, effect), *time));
     }
-    const std::string text = status_of(result, !path.empty(), handles_in_use(params), shown);
+    const std::string text = status_of(chosen, handles_in_use(params), copy, shown);
     if (params.string_now(kParamStatus) != text) params.set_string(kParamStatus, text);
 }
 

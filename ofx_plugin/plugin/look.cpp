@@ -6,6 +6,7 @@
 #include <tuple>
 #include <utility>
 
+#include "files.hpp"
 #include "handles.hpp"
 #include "host_time.hpp"
 #include "palette4d/handles.hpp"
@@ -54,15 +55,15 @@ void prepare(Look& look, const Params& params, LoadedSidecar& loaded, double fra
 Look look_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time) {
     Look look;
     const Params params(suites, effect);
-    const std::string path = params.string_at(kParamSidecar, time).value_or("");
-    if (path.empty()) return look;
-    look.drawing.settings = output_settings_at(params, time);
-
-    const SidecarResult result = load_sidecar(path);
+    const Chosen chosen = chosen_sidecar(params, time);
+    if (!chosen.any) return look;
+    const SidecarResult& result = chosen.result;
+    const std::string& path = chosen.path;
     if (!result.loaded) {
         look.problem = result.problem;
         return look;
     }
+    look.drawing.settings = output_settings_at(params, time);
     if (look.drawing.settings.passes()) return look;
     const FrameAt at = frame_at(result.loaded->sidecar().clip, time_settings_at(params, time),
                                 host_clip(suites, effect), time);

@@ -1,5 +1,6 @@
 #include "params.hpp"
 
+#include "files.hpp"
 #include "handles.hpp"
 #include "host_time.hpp"
 #include "outputs.hpp"
@@ -8,12 +9,8 @@
 namespace palette4d::plugin {
 void define_params(const Suites& suites, OfxParamSetHandle params) {
     ParamDefiner define(suites, params);
-    define
-        .text({kParamSidecar, "Sidecar",
-               "The clip's palette and its edits, a file made by 'palette4d analyze'. Read again "
-               "whenever it changes."},
-              kOfxParamStringIsFilePath)
-        .set_int(kOfxParamPropStringFilePathExists, 1);
+    define_file_params(define);
+
     const Properties status =
         define.text({kParamStatus, "Status",
                      "What was loaded, which of its frames is shown, or what is wrong with the "

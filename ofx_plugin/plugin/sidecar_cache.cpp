@@ -21,6 +21,7 @@ using Clock = fs::file_time_type::clock;
 constexpr std::size_t kMaxFrames =
     32;  ///< prepared frames a sidecar: more than a machine's threads
 constexpr std::size_t kMaxSidecars = 32;
+constexpr std::size_t kMaxTexts = 8;
 // File systems store times as coarsely as two seconds (FAT): younger files may change unseen.
 constexpr auto kSettled = std::chrono::seconds(3);
 
@@ -47,6 +48,7 @@ struct Entry {
 struct Cache {
     std::mutex mutex;
     std::map<std::string, std::shared_ptr<Entry>> entries;
+    std::list<std::pair<std::string, SidecarResult>> texts;  ///< those that projects carry
     std::uint64_t uses = 0;
 };
 
@@ -97,10 +99,20 @@ std::optional<std::string> text_of(const fs::path& path, std::uintmax_t expected
     return text;
 }
 
+/// 64-bit FNV-1a in hexadecimal digits, and the length.
+std::string revision_of(const std::string& text) {
+    std::uint64_t hash = 0xcbf29ce484222325u;
+    for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
+    std::string digits;
+    for (int shift = 60; shift >= 0; shift -= 4) digits += "0123456789abcdef"[hash >> shift & 15];
+    return digits + "-" + std::to_string(text.size());
+}
+
 SidecarResult parse(const std::string& text, const std::string& path) {
     SidecarResult result;
     try {
-        result.loaded = std::make_shared<LoadedSidecar>(parse_sidecar(text, path));
+        result.loaded =
+            std::make_shared<LoadedSidecar>(parse_sidecar(text, path), revision_of(text));
     } catch (const std::bad_alloc&) {
         throw;
     } catch (const std::exception& error) {
@@ -172,7 +184,8 @@ std::shared_ptr<Entry> entry_of(const std::string& key) {
 
 }  // namespace
 
-LoadedSidecar::LoadedSidecar(Sidecar sidecar) : sidecar_(std::move(sidecar)) {}
+LoadedSidecar::LoadedSidecar(Sidecar sidecar, std::string revision)
+    : sidecar_(std::move(sidecar)), revision_(std::move(revision)) {}
 
 bool operator<(const AppliedEdits& a, const AppliedEdits& b) {
     if (a.sidecar != b.sidecar) return a.sidecar < b.sidecar;
@@ -268,11 +281,38 @@ SidecarResult load_sidecar(const std::string& path) {
     }
 }
 
+SidecarResult load_sidecar_text(const std::string& text, const std::string& name) {
+    Cache& all = cache();
+    {
+        const std::lock_guard<std::mutex> lock(all.mutex);
+        for (const auto& [known, result] : all.texts) {
+            if (known == text) return result;
+        }
+    }
+    const SidecarResult result = parse(text, name);
+    const std::lock_guard<std::mutex> lock(all.mutex);
+    for (const auto& [known, other] : all.texts) {
+        if (known == text) return other;  // another thread was quicker: share what it prepares
+    }
+    all.texts.emplace_front(text, result);
+    if (all.texts.size() > kMaxTexts) all.texts.pop_back();
+    return result;
+}
+
+std::optional<std::string> sidecar_text(const std::string& path) {
+    std::string problem;
+    const fs::path file = fs::u8path(path);
+    const std::optional<Stamp> stamp = stamp_of(file, problem);
+    return stamp ? text_of(file, stamp->bytes) : std::nullopt;
+}
+
 void purge_sidecars() {
     Cache& all = cache();
     std::map<std::string, std::shared_ptr<Entry>> dropped;
+    std::list<std::pair<std::string, SidecarResult>> texts;
     const std::lock_guard<std::mutex> lock(all.mutex);
     dropped.swap(all.entries);
+    texts.swap(all.texts);
 }
 
 }  // namespace palette4d::plugin

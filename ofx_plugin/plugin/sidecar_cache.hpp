@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -28,9 +29,11 @@ bool operator<(const AppliedEdits& a, const AppliedEdits& b);
 /// One version of one sidecar file, immutable but for its cache of prepared frames.
 class LoadedSidecar {
 public:
-    explicit LoadedSidecar(Sidecar sidecar);
+    /// `revision` tells one content from another.
+    LoadedSidecar(Sidecar sidecar, std::string revision);
 
     const Sidecar& sidecar() const { return sidecar_; }
+    const std::string& revision() const { return revision_; }
     /// The prepared palette at a sidecar frame (finite; clamped to the clip). Threads that ask for
     /// the same frame with the same edits share one, built once. Throws what slicing throws, and
     /// std::invalid_argument for a handle that is not there.
@@ -55,6 +58,7 @@ private:
     std::shared_ptr<const Recolourer> prepare(const Key& key) const;
 
     const Sidecar sidecar_;
+    const std::string revision_;
     std::mutex mutex_;
     std::map<Key, std::shared_ptr<Prepared>> frames_;
     std::list<const Key*> recent_;  ///< keys of frames_, latest first
@@ -70,6 +74,11 @@ struct SidecarResult {
 /// file written within the last seconds its content, since a clock tick may hide a second write).
 /// Unusable files give a problem, never an exception but std::bad_alloc.
 SidecarResult load_sidecar(const std::string& path);
+
+/// The same for text already in memory; `name` stands for the file in problems.
+SidecarResult load_sidecar_text(const std::string& text, const std::string& name);
+/// A file's text as it is now; empty when it cannot be read or is larger than a sidecar may be.
+std::optional<std::string> sidecar_text(const std::string& path);
 
 /// Forgets everything that nobody uses at the moment.
 void purge_sidecars();

@@ -26,14 +26,15 @@ std::string describe(const Sidecar& sidecar) {
 
 }  // namespace
 
-std::string status_of(const SidecarResult& result, bool chosen, int handles,
+std::string status_of(const Chosen& chosen, int handles, const std::string& copy,
                       const std::string& shown) {
-    if (!chosen) return "No sidecar chosen";
-    if (!result.loaded) return result.problem;
-    std::string text = describe(result.loaded->sidecar());
+    if (!chosen.any) return "No sidecar chosen";
+    if (!chosen.result.loaded) return chosen.result.problem;
+    std::string text = describe(chosen.result.loaded->sidecar());
     if (handles > 0) {
         text += ", " + counted(static_cast<std::size_t>(handles), "handle", "handles") + " here";
     }
+    if (!copy.empty()) text += "; " + copy;
     if (!shown.empty()) text += "; " + shown;
     return text;
 }

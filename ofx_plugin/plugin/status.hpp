@@ -3,14 +3,13 @@
 
 #include <string>
 
-#include "params.hpp"
-#include "sidecar_cache.hpp"
+#include "files.hpp"
 
 namespace palette4d::plugin {
 
-/// What was loaded, or what is wrong; `handles` are in use in the host, and `shown` says which
-/// frame is shown, if that is known.
-std::string status_of(const SidecarResult& result, bool chosen, int handles,
+/// What was loaded, or what is wrong. `handles` are in use in the host; `copy` says what there is
+/// to say of the project's copy, and `shown` which frame is shown: empty for nothing.
+std::string status_of(const Chosen& chosen, int handles, const std::string& copy,
                       const std::string& shown);
 
 }  // namespace palette4d::plugin

@@ -38,8 +38,9 @@ TEST(node_describes_itself) {
         // Saved in projects: none of these names may ever go.
         const auto& order = effect->params.order;
         for (const char* name :
-             {"sidecar", "strength", "frameOffset", "editsFrom", "resetHandles", "handle01",
-              "handle01On", "handle01Id", "handle32", "handle32On", "handle32Id", "status"}) {
+             {"sidecar", "clipFolder", "reload", "embed", "embedded", "revision", "strength",
+              "frameOffset", "editsFrom", "resetHandles", "handle01", "handle01On", "handle01Id",
+              "handle32", "handle32On", "handle32Id", "status"}) {
             EXPECT(std::count(order.begin(), order.end(), name) == 1, std::string("no ") + name);
         }
         const auto& params = effect->params.params;

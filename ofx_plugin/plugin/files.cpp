@@ -1,0 +1,89 @@
+#include "files.hpp"
+
+#include "palette4d/sidecar.hpp"
+#include "paths.hpp"
+
+namespace palette4d::plugin {
+namespace {
+
+void set_text(const Params& params, const char* name, const std::string& text) {
+    const auto now = params.string_now(name);
+    if (now && *now != text) params.set_string(name, text);
+}
+
+}  // namespace
+
+void define_file_params(ParamDefiner& define) {
+    define
+        .text({kParamSidecar, "Sidecar",
+               "The clip's palette and its edits, a file made by 'palette4d analyze'. ~ and "
+               "environment variables may stand in it. Read again whenever it changes."},
+              kOfxParamStringIsFilePath)
+        .set_int(kOfxParamPropStringFilePathExists, 1);
+    define
+        .text({kParamClipFolder, "Clip's folder",
+               "Where a relative sidecar is, and where one that was moved is looked for by its "
+               "name. Filled in when a sidecar is chosen whose clip is there."},
+              kOfxParamStringIsDirectoryPath)
+        .set_int(kOfxParamPropStringFilePathExists, 0);
+    define.button({kParamReload, "Reload", "Looks at the sidecar's file again, now."});
+    define.flag({kParamEmbed, "Embed",
+                 "Keeps a copy of the sidecar in the project, for use where there is no file."},
+                false);
+    for (const char* name : {kParamEmbedded, kParamRevision}) {
+        const Properties hidden = define.text(
+            {name, name == kParamEmbedded ? "Embedded sidecar" : "Revision", "Kept by the node."},
+            name == kParamEmbedded ? kOfxParamStringIsMultiLine : kOfxParamStringIsSingleLine);
+        hidden.set_int(kOfxParamPropSecret, 1);
+        hidden.set_int(kOfxParamPropCanUndo, 0);
+    }
+}
+
+Chosen chosen_sidecar(const Params& params, std::optional<OfxTime> time) {
+    const auto text = [&](const char* name) {
+        return (time ? params.string_at(name, *time) : params.string_now(name)).value_or("");
+    };
+    Chosen chosen;
+    const std::string given = text(kParamSidecar);
+    chosen.any = !given.empty();
+    if (!chosen.any) return chosen;
+    const std::string folder = text(kParamClipFolder);
+    if (const auto found = find_file(given, folder)) {
+        chosen.path = *found;
+        chosen.result = load_sidecar(chosen.path);
+        return chosen;
+    }
+    const std::string copy = text(kParamEmbedded);
+    if (!copy.empty()) {
+        chosen.embedded = true;
+        chosen.path = given;
+        chosen.result = load_sidecar_text(copy, given + " (the project's copy)");
+        return chosen;
+    }
+    // It says what is wrong.
+    chosen.path = expanded(given);
+    chosen.result = load_sidecar(chosen.path);
+    return chosen;
+}
+
+std::string keep_files(const Params& params, const Chosen& chosen, const std::string& param) {
+    const LoadedSidecar* loaded = chosen.result.loaded.get();
+    if (loaded) set_text(params, kParamRevision, loaded->revision());
+    if (loaded && !chosen.embedded && param == kParamSidecar) {
+        const std::string folder = clip_folder(chosen.path, loaded->sidecar().clip.source);
+        if (!folder.empty()) set_text(params, kParamClipFolder, folder);
+    }
+    if (params.int_now(kParamEmbed).value_or(0) == 0) {
+        set_text(params, kParamEmbedded, "");
+        return "";
+    }
+    if (chosen.embedded) return "the project's copy, since there is no file";
+    if (!loaded) return "";
+    const std::optional<std::string> file = sidecar_text(chosen.path);
+    if (!file) return "";
+    set_text(params, kParamEmbedded, *file);
+    return params.string_now(kParamEmbedded) == file ? "a copy is in the project"
+                                                     : "the host does not keep a copy of it";
+}
+
+}  // namespace palette4d::plugin

@@ -1,0 +1,113 @@
+#include "paths.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cstdlib>
+#include <vector>
+
+namespace palette4d::plugin {
+namespace {
+
+namespace fs = std::filesystem;
+
+#if defined(_WIN32)
+constexpr char kSeparator = ';';
+constexpr const char* kHome = "USERPROFILE";
+#else
+constexpr char kSeparator = ':';
+constexpr const char* kHome = "HOME";
+#endif
+
+bool in_name(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; }
+
+/// The end of a variable that starts at `at`, and its name; an empty name for none.
+std::size_t variable_at(const std::string& path, std::size_t at, std::string& name) {
+    name.clear();
+    std::size_t begin = at + 1, end = begin;
+    const bool braced = path[at] == '$' && begin < path.size() && path[begin] == '{';
+    if (braced) end = ++begin;
+    while (end < path.size() && in_name(path[end])) ++end;
+    const char close = braced ? '}' : '%';
+    const bool closed = path[at] == '$' && !braced;
+    if (!closed && (end >= path.size() || path[end] != close)) return at + 1;
+    name = path.substr(begin, end - begin);
+    return closed ? end : end + 1;
+}
+
+bool is_file(const fs::path& path) {
+    std::error_code error;
+    return fs::is_regular_file(path, error);
+}
+
+std::vector<fs::path> search_folders(const std::string& folder) {
+    std::vector<fs::path> folders;
+    if (!folder.empty()) folders.push_back(fs::u8path(expanded(folder)));
+    const char* list = std::getenv(kSearchPath);
+    std::string rest = list ? list : "";
+    while (!rest.empty()) {
+        const std::size_t end = std::min(rest.find(kSeparator), rest.size());
+        if (end > 0) folders.push_back(fs::u8path(expanded(rest.substr(0, end))));
+        rest.erase(0, end + 1);
+    }
+    return folders;
+}
+
+}  // namespace
+
+std::string expanded(const std::string& path) {
+    std::string result, name;
+    std::size_t at = 0;
+    if (!path.empty() && path[0] == '~' &&
+        (path.size() == 1 || path[1] == '/' || path[1] == '\\')) {
+        if (const char* home = std::getenv(kHome)) {
+            result = home;
+            at = 1;
+        }
+    }
+    while (at < path.size()) {
+        const char c = path[at];
+        if (c != '$' && c != '%') {
+            result += c;
+            ++at;
+            continue;
+        }
+        const std::size_t end = variable_at(path, at, name);
+        const char* value = name.empty() ? nullptr : std::getenv(name.c_str());
+        if (value) {
+            result += value;
+            at = end;
+        } else {
+            result += c;
+            ++at;
+        }
+    }
+    return result;
+}
+
+std::optional<std::string> find_file(const std::string& path, const std::string& folder) {
+    const fs::path given = fs::u8path(expanded(path));
+    if (given.empty()) return std::nullopt;
+    if (given.is_absolute() && is_file(given)) return given.u8string();
+    const std::vector<fs::path> folders = search_folders(folder);
+    if (given.is_relative()) {
+        for (const fs::path& base : folders) {
+            if (is_file(base / given)) return (base / given).u8string();
+        }
+        if (is_file(given)) return given.u8string();
+    }
+    for (const fs::path& base : folders) {
+        if (is_file(base / given.filename())) return (base / given.filename()).u8string();
+    }
+    return std::nullopt;
+}
+
+std::string clip_folder(const std::string& path, const std::string& source) {
+    std::error_code error;
+    const fs::path sidecar = fs::absolute(fs::u8path(path), error);
+    if (error || source.empty()) return "";
+    const fs::path frames = (sidecar.parent_path() / fs::u8path(source)).lexically_normal();
+    const fs::path folder = frames.parent_path();
+    return fs::is_directory(folder, error) ? folder.u8string() : "";
+}
+
+}  // namespace palette4d::plugin

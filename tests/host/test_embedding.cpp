@@ -1,0 +1,127 @@
+// What a project keeps of its sidecar: a copy, the clip's folder, and the revision.
+#include "harness.hpp"
+
+using namespace strict;
+using namespace test;
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Project {
+    Plugin plugin{bundle()};
+    std::unique_ptr<Instance> node = plugin.create();
+    palette4d::Sidecar parsed = palette4d::parse_sidecar(sidecar_text(), "");
+    Layout layout;
+    Picture source{layout};
+    Project() { fill(source); }
+    void choose(const std::string& path) {
+        node->set("sidecar", path);
+        CHECK(node->changed("sidecar") == kOfxStatOK);
+    }
+    std::vector<unsigned char> render(Instance& instance) {
+        Picture output(layout);
+        CHECK(instance.render(4, &source, output, layout.bounds) == kOfxStatOK);
+        return output.pixels(layout.bounds);
+    }
+    std::vector<unsigned char> edited() const {
+        return recoloured(parsed, 14, source, layout.bounds);
+    }
+    std::vector<unsigned char> unchanged() const { return source.pixels(layout.bounds); }
+    bool says(const std::string& words) {
+        return node->text("status").find(words) != std::string::npos;
+    }
+};
+
+}  // namespace
+
+TEST(an_embedded_sidecar_travels_with_the_project) {
+    Project project;
+    const std::string path = sidecar();
+    project.choose(path);
+    CHECK(project.node->text("embedded").empty());
+    project.node->set("embed", 1);
+    CHECK(project.node->changed("embed") == kOfxStatOK);
+    CHECK(project.node->text("embedded") == sidecar_text());
+    CHECK(project.says("a copy is in the project"));
+    CHECK(project.render(*project.node) == project.edited());
+    // On another machine: the project's parameters, and no file.
+    fs::remove(path);
+    const auto there = project.plugin.create();
+    for (const char* name : {"sidecar", "embedded", "embed", "clipFolder"}) {
+        there->set(name, project.node->value(name));
+    }
+    CHECK(project.render(*there) == project.edited());
+    CHECK(there->effect().persistent_message.empty());
+    CHECK(there->sync() == kOfxStatOK);
+    CHECK(there->text("status").find("the project's copy") != std::string::npos);
+    CHECK(there->text("embedded") == sidecar_text());
+    // A file that is there counts, and its copy follows.
+    const std::string plain = sidecar_text(false);
+    write("clip.p4d.json", plain);
+    CHECK(project.render(*there) == project.unchanged());
+    CHECK(there->changed("strength") == kOfxStatOK);
+    CHECK(there->text("embedded") == plain);
+    // Not embedded any more: gone.
+    there->set("embed", 0);
+    CHECK(there->changed("embed") == kOfxStatOK);
+    CHECK(there->text("embedded").empty());
+    fs::remove(path);
+    CHECK(project.render(*there) == project.unchanged());
+    CHECK(!there->effect().persistent_message.empty());
+}
+
+TEST(a_broken_copy_is_said_to_be_one) {
+    Project project;
+    project.node->set("sidecar", std::string("/nowhere/at.all"));
+    for (const std::string& text : {std::string("no JSON"), sidecar_text().substr(0, 300)}) {
+        project.node->set("embedded", text);
+        CHECK(project.render(*project.node) == project.unchanged());
+        const std::string& said = project.node->effect().persistent_message;
+        EXPECT(said.find("the project's copy") != std::string::npos, said);
+    }
+    // More copies than are remembered, each its own.
+    for (int i = 0; i < 20; ++i) {
+        project.node->set("embedded",
+                          sidecar_text() + std::string(static_cast<std::size_t>(i), ' '));
+        CHECK(project.render(*project.node) == project.edited());
+    }
+}
+
+TEST(the_clips_folder_is_filled_in) {
+    Project project;
+    fs::create_directories(folder() / "frames");
+    std::string text = sidecar_text();
+    const std::string source = "box.####.exr";
+    text.replace(text.find(source), source.size(), "../frames/" + source);
+    fs::create_directories(folder() / "sidecars");
+    const std::string path = write("sidecars/s.p4d.json", text);
+    project.choose(path);
+    CHECK(project.node->text("clipFolder") == (folder() / "frames").u8string());
+    // Moved beside the clip: found there.
+    fs::rename(folder() / "sidecars" / "s.p4d.json", folder() / "frames" / "s.p4d.json");
+    CHECK(project.render(*project.node) == project.edited());
+    // What the user says stays until another sidecar is chosen.
+    project.node->set("clipFolder", std::string("/elsewhere"));
+    CHECK(project.node->changed("clipFolder") == kOfxStatOK);
+    CHECK(project.node->text("clipFolder") == "/elsewhere");
+}
+
+TEST(the_revision_follows_the_content) {
+    // A host keeps frames by the parameters: when the content changes, so does one of them.
+    Project project;
+    const std::string path = sidecar();
+    project.choose(path);
+    const std::string first = project.node->text("revision");
+    CHECK(!first.empty());
+    CHECK(project.node->changed("reload") == kOfxStatOK);
+    CHECK(project.node->text("revision") == first);
+    CHECK(project.node->settings("revision") == 1);
+    write("clip.p4d.json", sidecar_text(false));
+    CHECK(project.node->changed("reload") == kOfxStatOK);
+    CHECK(project.node->text("revision") != first);
+    CHECK(project.says("0 edits"));
+    write("clip.p4d.json", sidecar_text());
+    CHECK(project.node->changed("reload") == kOfxStatOK);
+    CHECK(project.node->text("revision") == first);
+}

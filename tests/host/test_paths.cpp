@@ -1,0 +1,133 @@
+// Where a sidecar is: ~, variables, relative and moved files.
+#include <cstdlib>
+
+#include "../../ofx_plugin/plugin/paths.hpp"
+#include "harness.hpp"
+
+using namespace strict;
+using namespace test;
+using palette4d::plugin::clip_folder;
+using palette4d::plugin::expanded;
+using palette4d::plugin::find_file;
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A variable of the environment for as long as it lives.
+class Variable {
+public:
+    Variable(const char* name, const std::string& value) : name_(name) {
+        const char* before = std::getenv(name);
+        if (before) before_ = before;
+        set(value.c_str());
+    }
+    ~Variable() { set(before_ ? before_->c_str() : nullptr); }
+    Variable(const Variable&) = delete;
+    Variable& operator=(const Variable&) = delete;
+
+private:
+    void set(const char* value) {
+#if defined(_WIN32)
+        _putenv_s(name_, value ? value : "");
+#else
+        if (value) {
+            setenv(name_, value, 1);
+        } else {
+            unsetenv(name_);
+        }
+#endif
+    }
+    const char* name_;
+    std::optional<std::string> before_;
+};
+
+std::string in_folder(const std::string& name) { return (folder() / name).u8string(); }
+
+}  // namespace
+
+TEST(home_and_variables_expand) {
+    const Variable home("HOME", "/home/grete"), profile("USERPROFILE", "/home/grete");
+    const Variable show("P4D_SHOW", "/shows/öl"), empty("P4D_EMPTY", "");
+    CHECK(expanded("~") == "/home/grete");
+    CHECK(expanded("~/a.json") == "/home/grete/a.json");
+    CHECK(expanded("$P4D_SHOW/x") == "/shows/öl/x");
+    CHECK(expanded("${P4D_SHOW}x%P4D_SHOW%") == "/shows/ölx/shows/öl");
+    CHECK(expanded("a$P4D_EMPTY/b") == "a/b");
+    // What is no variable stands for itself.
+    for (const char* same :
+         {"", "a~b", "~grete/x", "/a/~/b", "$", "100%", "%", "%%", "a$/b", "${}", "${P4D_SHOW",
+          "$P4D_NONE/x", "${P4D_NONE}", "%P4D_NONE%", "50% of %P"}) {
+        EXPECT(expanded(same) == same, std::string(same) + " became " + expanded(same));
+    }
+}
+
+TEST(files_are_found_where_they_are_and_where_they_went) {
+    const Variable search("PALETTE4D_PATH", "");
+    fs::create_directories(folder() / "clip" / "sub");
+    fs::create_directories(folder() / "other");
+    const std::string beside = write("clip/a.p4d.json", "x"),
+                      deep = write("clip/sub/b.p4d.json", "");
+    CHECK(find_file(beside, "") == beside);
+    CHECK(find_file(beside, in_folder("other")) == beside);
+    CHECK(find_file("sub/b.p4d.json", in_folder("clip")) == deep);
+    CHECK(find_file("a.p4d.json", in_folder("clip")) == beside);
+    // Moved: a file of its name beside the clip.
+    CHECK(find_file("/old/place/a.p4d.json", in_folder("clip")) == beside);
+    CHECK(find_file("gone/a.p4d.json", in_folder("clip")) == beside);
+    CHECK(!find_file("/old/place/c.p4d.json", in_folder("clip")));
+    CHECK(!find_file("/old/place/a.p4d.json", in_folder("other")));
+    CHECK(!find_file("", in_folder("clip")));
+    CHECK(!find_file(in_folder("clip"), ""));  // a folder is no file
+    const Variable show("P4D_SHOW", folder().u8string());
+    CHECK(find_file("$P4D_SHOW/clip/a.p4d.json", "") == beside);
+    CHECK(find_file("a.p4d.json", "${P4D_SHOW}/clip") == beside);
+    CHECK(!find_file("b.p4d.json", ""));
+    const Variable two("PALETTE4D_PATH", in_folder("other") + ":" + in_folder("clip/sub") + ":");
+    CHECK(find_file("b.p4d.json", "") == deep);
+    CHECK(find_file("/old/b.p4d.json", "") == deep);
+}
+
+TEST(the_folder_of_a_clip) {
+    fs::create_directories(folder() / "frames");
+    const std::string path = in_folder("s.p4d.json");
+    const std::string frames = in_folder("frames");
+    CHECK(clip_folder(path, "frames/f.####.exr") == frames);
+    CHECK(clip_folder(path, frames + "/f.####.exr") == frames);
+    CHECK(clip_folder(in_folder("frames/s.p4d.json"), "f.####.exr") == frames);
+    CHECK(clip_folder(in_folder("frames/s.p4d.json"), "../f.####.exr") == folder().u8string());
+    CHECK(clip_folder(path, "nowhere/f.####.exr").empty());
+    CHECK(clip_folder(path, "").empty());
+}
+
+TEST(the_node_finds_its_sidecar) {
+    const Variable search("PALETTE4D_PATH", "");
+    Plugin plugin(bundle());
+    const auto node = plugin.create();
+    const Layout layout;
+    Picture source(layout);
+    fill(source);
+    fs::create_directories(folder() / "clip");
+    const palette4d::Sidecar parsed = palette4d::parse_sidecar(sidecar_text(), "");
+    write("clip/clip.p4d.json", sidecar_text());
+    const auto check = [&] {
+        Picture output(layout);
+        CHECK(node->render(3, &source, output, layout.bounds) == kOfxStatOK);
+        CHECK(output.pixels(layout.bounds) == recoloured(parsed, 13, source, layout.bounds));
+    };
+    node->set("clipFolder", in_folder("clip"));
+    for (const char* path :
+         {"clip.p4d.json", "/moved/away/clip.p4d.json", "../clip/clip.p4d.json"}) {
+        node->set("sidecar", std::string(path));
+        check();
+    }
+    const Variable show("P4D_SHOW", folder().u8string());
+    node->set("clipFolder", std::string());
+    node->set("sidecar", std::string("$P4D_SHOW/clip/clip.p4d.json"));
+    check();
+    // A missing one is named as it was looked for.
+    node->set("sidecar", std::string("$P4D_SHOW/none.p4d.json"));
+    Picture output(layout);
+    CHECK(node->render(3, &source, output, layout.bounds) == kOfxStatOK);
+    CHECK(node->effect().persistent_message.find(in_folder("none.p4d.json")) != std::string::npos);
+}
