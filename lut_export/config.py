@@ -25,6 +25,7 @@ from palette4d.lut_export import series
 from palette4d.lut_export.colour_difference import same_encodings
 from palette4d.lut_export.formats import LutFormat, format_named
 from palette4d.replacing import refuse_existing, replacing
+from palette4d.wording import counted, file_safe
 
 #: The oldest of OpenColorIO's configs with camera encodings: read by every host with 2.1 or later.
 BUILT_IN = "ocio://studio-config-v1.0.0_aces-v1.3_ocio-v2.1"
@@ -103,7 +104,7 @@ def write_config(
     sidecars: list[Path],
     folder: Path,
     options: ConfigOptions,
-    progress: Callable[[str], Callable[[int, int], None]] | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> WrittenConfig:
     """Write a config with a look for each sidecar.
 
@@ -116,7 +117,7 @@ def write_config(
     options : ConfigOptions
         How.
     progress : callable, optional
-        shot name -> the `progress` of `series.export`.
+        Called with (frames done, frames in all), the first time before any is baked.
 
     Raises
     ------
@@ -140,27 +141,21 @@ def write_config(
     frames = [options.choose(sidecar) for sidecar in read]
 
     series.make_folder(folder)
-    shots = []
     format_ = format_named(options.series.bake.format or "clf")
-    for file, sidecar, name, space, chosen in zip(
-        sidecars, read, names, spaces, frames, strict=True
+    requests = []
+    for file, name, chosen in zip(sidecars, names, frames, strict=True):
+        _remove_links(folder / "luts" / name)
+        one = replace(options.series, frames=chosen, name=name, padding=0, force=options.force)
+        requests.append(series.Request(file, folder / "luts" / name, one))
+    baked = series.export_all(requests, options.series.workers, progress)
+    _refuse_failed(names, baked)
+    shots = []
+    for request, sidecar, name, space, made in zip(
+        requests, read, names, spaces, baked, strict=True
     ):
-        tables = folder / "luts" / name
-        _remove_links(tables)
-        baked = series.export(
-            file,
-            tables,
-            replace(options.series, frames=chosen, name=name, padding=0, force=options.force),
-            progress(name) if progress else None,
-        )
-        if baked.failed:
-            raise Palette4dError(
-                f"shot {name}: {len(baked.failed)} of {len(chosen)} frames could not be baked; no "
-                f"config was written:\n{series.failures_text(baked.failed)}"
-            )
         every = series.every(sidecar, 1)
-        _link(tables, name, format_, chosen, every)
-        shots.append(Shot(name, str(file), space, every[0], every[-1], baked))
+        _link(request.folder, name, format_, request.options.frames, every)
+        shots.append(Shot(name, str(request.sidecar), space, every[0], every[-1], made))
 
     notes = _relocate(config, base, archive, folder)
     views = _add_looks(config, shots, format_, notes)
@@ -189,14 +184,14 @@ def _shot_names(
                 "the same order"
             )
         for name in given:
-            if series.file_safe(name) != name:
+            if file_safe(name) != name:
                 raise Palette4dError(
                     f"found the name {name!r}, expected letters, digits, '.', '_' and '-' only, as "
-                    f"in {series.file_safe(name)!r}"
+                    f"in {file_safe(name)!r}"
                 )
         names = list(given)
     else:
-        names = [series.file_safe(sidecar.clip["name"]) for sidecar in read]
+        names = [file_safe(sidecar.clip["name"]) for sidecar in read]
     for i, name in enumerate(names):
         # Colour space and look names of OpenColorIO do not differ by case.
         same = [k for k in range(i) if names[k].lower() == name.lower()]
@@ -211,6 +206,19 @@ def _shot_names(
                 "shots; give another with --names"
             )
     return names
+
+
+def _refuse_failed(names: list[str], baked: list[series.Series]) -> None:
+    failed = [
+        f"shot {name}, {counted(len(made.failed), 'frame')}:\n{series.failures_text(made.failed)}"
+        for name, made in zip(names, baked, strict=True)
+        if made.failed
+    ]
+    if failed:
+        raise Palette4dError(
+            "not all frames could be baked; no config was written, and the same command tries "
+            "only these again:\n" + "\n".join(failed)
+        )
 
 
 def _remove_links(tables: Path) -> None:

@@ -14,11 +14,11 @@ from palette4d.lut_export.series_cli import (
     add_run_options,
     check_domain,
     chosen_frames,
+    with_bar,
 )
+from palette4d.workers import Workers
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from palette4d.lut_export.config import WrittenConfig
 
 EPILOG = """\
@@ -82,7 +82,6 @@ def run(args: argparse.Namespace) -> int:
     from palette4d.lut_export.config import ConfigOptions, write_config
     from palette4d.lut_export.formats import format_named
     from palette4d.lut_export.series import SeriesOptions
-    from tqdm import tqdm
 
     check_domain(args)
     if args.clip is not None and len(args.sidecars) > 1:
@@ -100,7 +99,7 @@ def run(args: argparse.Namespace) -> int:
                 max_error=args.max_error,
             ),
             clip=args.clip,
-            jobs=args.jobs,
+            workers=Workers(args.jobs, args.cluster),
         ),
         choose=lambda sidecar: chosen_frames(args, sidecar),
         base=args.base,
@@ -108,25 +107,11 @@ def run(args: argparse.Namespace) -> int:
         process_space=args.process_space,
         force=args.force,
     )
-    bars: list[tqdm] = []
-
-    def progress(name: str) -> Callable[[int, int], None]:
-        bar = tqdm(desc=name, unit="frame", disable=args.quiet)
-        bars.append(bar)
-
-        def show(done: int, total: int) -> None:
-            bar.total = total
-            bar.update(done - bar.n)
-            if done == total:
-                bar.close()
-
-        return show
-
-    try:
-        done = write_config(args.sidecars, args.output, options, progress)
-    finally:
-        for bar in bars:
-            bar.close()
+    done = with_bar(
+        "config",
+        args.quiet,
+        lambda progress: write_config(args.sidecars, args.output, options, progress),
+    )
     if args.json:
         print(json.dumps(as_json(done), indent=2))
     else:

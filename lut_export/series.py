@@ -1,52 +1,42 @@
 """A dated series: the edit at many frames, a file each, and an index of them.
 
-The index (``NAME.series.json``, docs/exports.md) says from which state of the sidecar and with
-which options each file was made and what its hash is. So a series can be interrupted and resumed:
-what is there and matches is left alone, and nothing that does not match is replaced unasked.
+The index says from which state of the sidecar and with which options each file was made and what
+its hash is. So a series can be interrupted and resumed: what is there and matches is left alone,
+and nothing that does not match is replaced unasked.
+
+Frames are baked in other processes or on other machines; what they make comes back to this one,
+which alone writes in the folder.
 """
 
-import contextlib
-import functools
 import hashlib
-import itertools
-import json
 import math
-import multiprocessing
-import os
-import re
-import signal
 import tempfile
 import time
-from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from palette4d import _core
 from palette4d.errors import Palette4dError
-from palette4d.lut_export.bake import BakeOptions, BakeResult, bake, check_options, check_target
+from palette4d.lut_export.bake import BakeOptions, bake, check_options, check_target
 from palette4d.lut_export.formats import format_named
 from palette4d.lut_export.frame_edit import frame_text
+from palette4d.lut_export.series_index import (
+    Entry,
+    document_of,
+    entry_of,
+    header_of,
+    read_index,
+    write_index,
+)
 from palette4d.replacing import replacing
 from palette4d.source_clip import frame_colours
-from palette4d.wording import counted
-
-SCHEMA, VERSION = "palette4d.series", 1
+from palette4d.wording import file_safe
+from palette4d.workers import Failed, Workers
 
 #: Seconds between two writings of the index while frames are baked.
 INDEX_EVERY = 2.0
-
-Entry = dict[str, Any]
-
-#: What differs when these parts of an index do.
-_CHANGED = {
-    "schema": "another program",
-    "version": "another version of the index",
-    "generator": "another version of palette4d",
-    "options": "other options",
-}
 
 
 @dataclass(frozen=True)
@@ -65,8 +55,8 @@ class SeriesOptions:
         Digits of the frame numbers in the names.
     clip : str or None
         The clip, for shapers and errors; None: where the sidecar says.
-    jobs : int
-        Processes; 0: one a processor.
+    workers : Workers
+        Who bakes.
     force : bool
         Replace files that differ.
     """
@@ -76,7 +66,7 @@ class SeriesOptions:
     name: str | None = None
     padding: int = 4
     clip: str | None = None
-    jobs: int = 0
+    workers: Workers = field(default_factory=Workers)
     force: bool = False
 
 
@@ -108,20 +98,26 @@ class FrameTask:
     """One file to bake; can be sent to another process or machine."""
 
     sidecar: Path
-    folder: Path
     file: str
     options: BakeOptions
     clip: str | None
-    force: bool
 
 
-def file_safe(name: str) -> str:
-    """Return a name fit for files, looks and OpenColorIO's variables: letters, digits, . _ -.
+@dataclass(frozen=True)
+class Baked:
+    """One file that was baked: its entry of the index and its content."""
 
-    >>> file_safe("shot 010/a+b"), file_safe("-x")
-    ('shot_010_a_b', 'x')
-    """
-    return re.sub(r"[^A-Za-z0-9._-]+", "_", name).strip("-.") or "clip"
+    entry: Entry
+    data: bytes
+
+
+@dataclass(frozen=True)
+class Request:
+    """A series to export: from which sidecar, to which folder, how."""
+
+    sidecar: Path
+    folder: Path
+    options: SeriesOptions
 
 
 def every(sidecar: _core.Sidecar, step: int) -> tuple[int, ...]:
@@ -197,28 +193,35 @@ def file_name(name: str, frame: int, padding: int, extension: str) -> str:
 
 
 def export(
-    sidecar_path: Path,
+    sidecar: Path,
     folder: Path,
     options: SeriesOptions,
     progress: Callable[[int, int], None] | None = None,
 ) -> Series:
-    """Bake frames into a folder.
+    """Bake frames into a folder; see `export_all`."""
+    return export_all([Request(sidecar, folder, options)], options.workers, progress)[0]
+
+
+def export_all(
+    requests: Sequence[Request],
+    workers: Workers,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Series]:
+    """Bake the frames of several series together.
 
     Parameters
     ----------
-    sidecar_path : Path
-        The sidecar.
-    folder : Path
-        Where the files go; made when it is missing.
-    options : SeriesOptions
-        What to bake.
+    requests : sequence of Request
+        What to bake; folders are made when they are missing. Their own `workers` are not looked at.
+    workers : Workers
+        Who bakes; a sidecar is read where they are.
     progress : callable, optional
         Called with (frames done, frames in all), the first time before any is baked.
 
     Returns
     -------
-    Series
-        Also when frames failed: what could be baked was.
+    list of Series
+        One for each request, also when frames failed: what could be baked was.
 
     Raises
     ------
@@ -226,237 +229,129 @@ def export(
         Nothing can be baked, or files that differ are there and `force` is false; then nothing was
         written.
     KeyboardInterrupt
-        Ctrl-C; the files that are there are whole, and the index lists them.
+        Ctrl-C; the files that are there are whole, and the indexes list them.
     """
-    sidecar = _core.read_sidecar(str(sidecar_path))
-    assert options.bake.format is not None
-    format_ = format_named(options.bake.format)
-    frames = check_frames(sidecar, options.frames)
-    for frame in frames[:1]:
-        check_options(replace(options.bake, frame=float(frame)), format_, sidecar)
-    name = _checked_name(options.name) if options.name else file_safe(sidecar.clip["name"])
-    index_path = folder / f"{name}.series.json"
-    header = _header(sidecar, sidecar_path, options.bake)
-    known = _read_index(index_path, header, options.force)
+    exports = [_Export(request) for request in requests]
+    for one in exports:
+        make_folder(one.request.folder)
+    tell = progress or (lambda done, total: None)
+    total = sum(len(one.request.options.frames) for one in exports)
 
-    names = {f: file_name(name, f, options.padding, format_.extension) for f in frames}
-    kept = [f for f in frames if _matches(folder / names[f], known.get(f))]
-    todo = [f for f in frames if f not in set(kept)]
-    _refuse_changed(folder, names, todo, known, options.force)
-    make_folder(folder)
-    jobs = min(options.jobs or os.cpu_count() or 1, max(1, len(todo)))
-    threads = max(1, (os.cpu_count() or 1) // jobs)
-    tasks = {
-        f: FrameTask(
-            sidecar=sidecar_path,
-            folder=folder,
-            file=names[f],
-            options=replace(options.bake, frame=float(f), threads=threads),
-            clip=options.clip,
-            force=options.force,
-        )
-        for f in todo
-    }
-    entries = {f: entry for f, entry in known.items() if f not in tasks}
-    baked: list[int] = []
-    failed: dict[int, str] = {}
-    report = progress or (lambda done, total: None)
-    report(len(kept), len(frames))
-    written = time.monotonic()
+    def take(key: tuple[int, int], outcome: Baked | Failed) -> None:
+        which, frame = key
+        exports[which].take(frame, outcome)
+        tell(sum(one.done for one in exports), total)
 
-    def take(frame: int, outcome: Entry | str) -> None:
-        nonlocal written
-        if isinstance(outcome, str):
-            failed[frame] = outcome
-        else:
-            entries[frame] = outcome
-            baked.append(frame)
-        report(len(kept) + len(baked) + len(failed), len(frames))
-        if entries and time.monotonic() - written > INDEX_EVERY:
-            _write_index(index_path, header, entries)
-            written = time.monotonic()
-
+    tell(sum(one.done for one in exports), total)
+    tasks = {(i, f): task for i, one in enumerate(exports) for f, task in one.tasks.items()}
     try:
-        _run(tasks, jobs, take)
+        workers.run(bake_frame, tasks, take)
     finally:
-        if entries and (baked or not index_path.exists()):
-            _write_index(index_path, header, entries)
-    return Series(
-        index=index_path,
-        document=_document(header, entries),
-        baked=sorted(baked),
-        kept=kept,
-        failed=dict(sorted(failed.items())),
-    )
+        for one in exports:
+            one.finish()
+    return [one.series() for one in exports]
 
 
-def bake_frame(task: FrameTask) -> Entry:
-    """Bake one file of a series and return its entry of the index.
+class _Export:
+    """A series on its way: what is to do, and what came of it."""
 
-    A file that is there already is left alone when it has the same bytes.
+    def __init__(self, request: Request) -> None:
+        """Refuse what can be refused before the first frame is baked."""
+        self.request, options = request, request.options
+        sidecar = _core.read_sidecar(str(request.sidecar))
+        assert options.bake.format is not None
+        format_ = format_named(options.bake.format)
+        frames = check_frames(sidecar, options.frames)
+        for frame in frames[:1]:
+            check_options(replace(options.bake, frame=float(frame)), format_, sidecar)
+        name = _checked_name(options.name) if options.name else file_safe(sidecar.clip["name"])
+        self.index = request.folder / f"{name}.series.json"
+        self.header = header_of(sidecar, request.sidecar, options.bake)
+        known = read_index(self.index, self.header, options.force)
+        names = {f: file_name(name, f, options.padding, format_.extension) for f in frames}
+        self.kept = [f for f in frames if _matches(request.folder / names[f], known.get(f))]
+        todo = [f for f in frames if f not in set(self.kept)]
+        _refuse_changed(request.folder, names, todo, known, options.force)
+        # Absolute: other processes may run elsewhere.
+        clip = None if options.clip is None else str(Path.cwd() / options.clip)
+        self.tasks = {
+            f: FrameTask(
+                sidecar=request.sidecar.absolute(),
+                file=names[f],
+                options=replace(options.bake, frame=float(f)),
+                clip=clip,
+            )
+            for f in todo
+        }
+        self.entries = {f: entry for f, entry in known.items() if f not in self.tasks}
+        self.baked: list[int] = []
+        self.failed: dict[int, str] = {}
+        self.written = time.monotonic()
+
+    @property
+    def done(self) -> int:
+        """How many frames are there, or failed."""
+        return len(self.kept) + len(self.baked) + len(self.failed)
+
+    def take(self, frame: int, outcome: Baked | Failed) -> None:
+        """Write a file that was baked; note what failed."""
+        if isinstance(outcome, Failed):
+            self.failed[frame] = outcome.text
+            return
+        target = self.request.folder / self.tasks[frame].file
+        try:
+            _put(target, outcome.data, self.request.options.force)
+        except Palette4dError as error:
+            self.failed[frame] = str(error)
+            return
+        self.entries[frame] = outcome.entry
+        self.baked.append(frame)
+        if time.monotonic() - self.written > INDEX_EVERY:
+            write_index(self.index, self.header, self.entries)
+            self.written = time.monotonic()
+
+    def finish(self) -> None:
+        """Write the index."""
+        if self.entries and (self.baked or not self.index.exists()):
+            write_index(self.index, self.header, self.entries)
+
+    def series(self) -> Series:
+        """Return what was exported."""
+        return Series(
+            index=self.index,
+            document=document_of(self.header, self.entries),
+            baked=sorted(self.baked),
+            kept=self.kept,
+            failed=dict(sorted(self.failed.items())),
+        )
+
+
+def bake_frame(task: FrameTask, threads: int) -> Baked:
+    """Bake one file of a series, aside.
 
     Raises
     ------
     Palette4dError
-        It cannot be baked, or what is there differs and may not be replaced.
+        It cannot be baked.
     """
     sidecar = _core.read_sidecar(str(task.sidecar))
-    frame = task.options.frame
-    image, number = frame_colours(task.sidecar, sidecar.clip, frame, task.clip)
-    target = task.folder / task.file
-    if not target.exists() or task.force:
-        result = bake(
-            task.sidecar, target, task.options, image=image, image_frame=number, force=task.force
-        )
-        return _entry(target, result)
+    image, number = frame_colours(task.sidecar, sidecar.clip, task.options.frame, task.clip)
     with tempfile.TemporaryDirectory(prefix="palette4d-") as scratch:
-        again = Path(scratch) / task.file
-        result = bake(task.sidecar, again, task.options, image=image, image_frame=number)
-        if again.read_bytes() != target.read_bytes():
-            raise Palette4dError(
-                f"{target}: another file is there already; use --force to replace it"
-            )
-    return _entry(target, result)
+        path = Path(scratch) / task.file
+        options = replace(task.options, threads=threads)
+        result = bake(task.sidecar, path, options, image=image, image_frame=number)
+        return Baked(entry_of(path, result), path.read_bytes())
 
 
-def _run(tasks: dict[int, FrameTask], jobs: int, take: Callable[[int, Entry | str], None]) -> None:
-    """Call `take` with each frame's entry, or what kept it from being written, as they are done."""
-    if jobs == 1:
-        for frame, task in tasks.items():
-            take(frame, _outcome(functools.partial(bake_frame, task)))
+def _put(target: Path, data: bytes, force: bool) -> None:
+    """Write a file, whole; one that is there already is left alone when it has the same bytes."""
+    if target.is_file() and target.read_bytes() == data:
         return
-    # Spawned, not forked: the libraries here have threads of their own.
-    pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"))
-    left = iter(tasks.items())
-    running: dict[Future[Entry], int] = {}
-    try:
-        while True:
-            # No more than are worked on, so that Ctrl-C waits for those alone. It goes to all
-            # processes: the workers, who inherit this, finish the file they are at.
-            with _without_interrupts():
-                for frame, task in itertools.islice(left, jobs - len(running)):
-                    running[pool.submit(bake_frame, task)] = frame
-            if not running:
-                break
-            done, _ = wait(running, return_when=FIRST_COMPLETED)
-            for future in sorted(done, key=lambda f: running[f]):
-                take(running.pop(future), _outcome(future.result))
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-        # After Ctrl-C: what was finished meanwhile.
-        for future, frame in running.items():
-            if not future.cancelled():
-                take(frame, _outcome(future.result))
-
-
-def _outcome(call: Callable[[], Entry]) -> Entry | str:
-    try:
-        return call()
-    except (Palette4dError, OSError) as error:
-        return str(error)
-    except BrokenProcessPool:
-        return (
-            "its process was ended from outside (too little memory?); run the same command again, "
-            "with fewer --jobs"
-        )
-
-
-@contextlib.contextmanager
-def _without_interrupts() -> Iterator[None]:
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-# ------------------------------------------------------------------------------------- the index
-
-
-def _header(sidecar: _core.Sidecar, path: Path, options: BakeOptions) -> dict[str, Any]:
-    clip = sidecar.clip
-    settings = asdict(options)
-    for own in ("frame", "threads"):
-        del settings[own]
-    settings["domain"] = None if options.domain is None else list(options.domain)
-    return {
-        "schema": SCHEMA,
-        "version": VERSION,
-        "generator": f"palette4d {_core.__version__}",
-        "sidecar": {
-            "file": path.name,
-            "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
-        },
-        "clip": {
-            "name": clip["name"],
-            "first": clip["first"],
-            "last": clip["last"],
-            "rate": list(clip["rate"]),
-            "encoding": clip["encoding"],
-        },
-        "options": settings,
-    }
-
-
-def _entry(path: Path, result: BakeResult) -> Entry:
-    clip = None if result.clip is None else asdict(result.clip.worst)
-    return {
-        "frame": int(result.frame),
-        "file": path.name,
-        "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
-        "id": result.id,
-        "identity": result.identity,
-        "size": result.size,
-        "shaper": asdict(result.shaper),
-        "error": result.error,
-        "clip": clip,
-        "grid": asdict(result.grid.worst),
-    }
-
-
-def _document(header: dict[str, Any], entries: dict[int, Entry]) -> dict[str, Any]:
-    return {**header, "frames": [entries[frame] for frame in sorted(entries)]}
-
-
-def _write_index(path: Path, header: dict[str, Any], entries: dict[int, Entry]) -> None:
-    lines = [json.dumps(entry) for entry in _document(header, entries)["frames"]]
-    head = json.dumps(header, indent=2).removesuffix("\n}")
-    text = head + ',\n  "frames": [\n    ' + ",\n    ".join(lines) + "\n  ]\n}\n"
-    with replacing(path, force=True) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
-
-
-def _read_index(path: Path, header: dict[str, Any], force: bool) -> dict[int, Entry]:
-    """Return the entries of an earlier export with the same sidecar and options."""
-    if not path.exists():
-        return {}
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-        entries = {int(entry["frame"]): entry for entry in document["frames"]}
-        known = {key: document[key] for key in header}
-        if not all(isinstance(entry["sha256"], str) for entry in entries.values()):
-            raise TypeError
-    except (ValueError, KeyError, TypeError) as error:
-        if force:
-            return {}
-        raise Palette4dError(
-            f"{path}: found no index of a series that can be read, expected the one that an "
-            "earlier export wrote; use --force to replace it, or another folder"
-        ) from error
-    changed = [word for key, word in _CHANGED.items() if known[key] != header[key]]
-    if known["sidecar"].get("sha256") != header["sidecar"]["sha256"]:
-        changed.append("another state of the sidecar")
-    if not changed:
-        return entries
-    if not force:
-        raise Palette4dError(
-            f"{path}: it lists a series of {counted(len(entries), 'file')} that was made with "
-            f"{' and '.join(changed)}; use --force to replace it, or choose another folder"
-        )
-    return {}
+    if target.exists() and not force:
+        raise Palette4dError(f"{target}: another file is there already; use --force to replace it")
+    check_target(target, force)
+    with replacing(target, force=force) as temporary:
+        temporary.write_bytes(data)
 
 
 def _matches(path: Path, entry: Entry | None) -> bool:

@@ -6,17 +6,20 @@ import argparse
 import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from palette4d.arguments import frame_range, parse_frames, whole
 from palette4d.errors import Palette4dError
 from palette4d.lut_export.arguments import add_table_options, domain
+from palette4d.workers import Workers, add_options
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from palette4d import _core
     from palette4d.lut_export.series import Series
+
+Done = TypeVar("Done")
 
 EPILOG = """\
 Files are named NAME.FRAME.EXTENSION, and NAME.series.json beside them lists them: frame, file,
@@ -74,14 +77,8 @@ def add_frame_choice(parser: argparse.ArgumentParser, *, required: bool) -> None
 
 
 def add_run_options(parser: argparse.ArgumentParser) -> None:
-    """Add --jobs, --force and --quiet."""
-    parser.add_argument(
-        "--jobs",
-        metavar="N",
-        type=whole(0, 1024),
-        default=0,
-        help="frames baked at a time; 0: one per processor (default)",
-    )
+    """Add --jobs, --cluster, --force and --quiet."""
+    add_options(parser, "frames")
     parser.add_argument("--force", action="store_true", help="replace files that are there")
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
 
@@ -126,7 +123,7 @@ def run(args: argparse.Namespace) -> int:
         name=args.name,
         padding=args.padding,
         clip=args.clip,
-        jobs=args.jobs,
+        workers=Workers(args.jobs, args.cluster),
         force=args.force,
     )
     done = with_bar(
@@ -144,9 +141,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def with_bar(
-    what: str, quiet: bool, work: Callable[[Callable[[int, int], None]], Series]
-) -> Series:
+def with_bar(what: str, quiet: bool, work: Callable[[Callable[[int, int], None]], Done]) -> Done:
     """Do `work` with a progress bar of frames."""
     from tqdm import tqdm
 

@@ -16,6 +16,7 @@ from palette4d.lut_export.bake import BakeOptions
 from palette4d.lut_export.config import BUILT_IN, ConfigOptions, WrittenConfig, write_config
 from palette4d.lut_export.frame_edit import frame_edit
 from palette4d.lut_export.series import SeriesOptions
+from palette4d.workers import Workers
 
 F32 = NDArray[np.float32]
 
@@ -47,7 +48,9 @@ def two_shots(write_sidecar: Callable[..., Path], tmp_path: Path) -> list[Path]:
 
 def options(step: int = 1, size: int = 9, **changes: object) -> ConfigOptions:
     return ConfigOptions(
-        series=SeriesOptions(frames=(), bake=BakeOptions(0.0, size, format="clf"), jobs=1),
+        series=SeriesOptions(
+            frames=(), bake=BakeOptions(0.0, size, format="clf"), workers=Workers(1)
+        ),
         choose=lambda sidecar: series.every(sidecar, step),
         **changes,  # type: ignore[arg-type]
     )
@@ -329,11 +332,11 @@ class TestRefusals:
     def test_a_frame_that_fails_leaves_no_config(self, shot: Path, tmp_path: Path) -> None:
         chosen = ConfigOptions(
             series=SeriesOptions(
-                frames=(), bake=BakeOptions(0.0, 5, format="cc", max_error=1e-9), jobs=1
+                frames=(), bake=BakeOptions(0.0, 5, format="cc", max_error=1e-9), workers=Workers(1)
             ),
             choose=lambda sidecar: (0, 10),
         )
-        with pytest.raises(Palette4dError, match="1 of 2 frames could not be baked"):
+        with pytest.raises(Palette4dError, match="shot cube, 1 frame:"):
             write_config([shot], tmp_path / "show", chosen)
         assert not (tmp_path / "show" / "config.ocio").exists()
 

@@ -21,6 +21,7 @@ from palette4d.lut_export import series
 from palette4d.lut_export.bake import BakeOptions
 from palette4d.lut_export.frame_edit import frame_edit
 from palette4d.lut_export.series import SeriesOptions, export
+from palette4d.workers import Workers
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
 EDITED = GOLDEN / "v1_edited.p4d.json"
@@ -28,7 +29,7 @@ EDITED = GOLDEN / "v1_edited.p4d.json"
 
 def options(*frames: int, jobs: int = 1, **changes: object) -> SeriesOptions:
     bake = BakeOptions(0.0, 5, format="resolve_cube")
-    return SeriesOptions(frames=frames, bake=replace(bake, **changes), jobs=jobs)  # type: ignore[arg-type]
+    return SeriesOptions(frames=frames, bake=replace(bake, **changes), workers=Workers(jobs))  # type: ignore[arg-type]
 
 
 def state(folder: Path) -> dict[str, tuple[bytes, int]]:

@@ -1,0 +1,112 @@
+"""The index of a dated series, ``NAME.series.json`` (docs/exports.md)."""
+
+import hashlib
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from palette4d import _core
+from palette4d.errors import Palette4dError
+from palette4d.lut_export.bake import BakeOptions, BakeResult
+from palette4d.replacing import replacing
+from palette4d.wording import counted
+
+SCHEMA, VERSION = "palette4d.series", 1
+
+Entry = dict[str, Any]
+
+#: What differs when these parts of an index do.
+_CHANGED = {
+    "schema": "another program",
+    "version": "another version of the index",
+    "generator": "another version of palette4d",
+    "options": "other options",
+}
+
+
+def header_of(sidecar: _core.Sidecar, path: Path, options: BakeOptions) -> dict[str, Any]:
+    """Return what an index says of all its files: the sidecar's state and the options."""
+    clip = sidecar.clip
+    settings = asdict(options)
+    for own in ("frame", "threads"):
+        del settings[own]
+    settings["domain"] = None if options.domain is None else list(options.domain)
+    return {
+        "schema": SCHEMA,
+        "version": VERSION,
+        "generator": f"palette4d {_core.__version__}",
+        "sidecar": {
+            "file": path.name,
+            "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
+        },
+        "clip": {
+            "name": clip["name"],
+            "first": clip["first"],
+            "last": clip["last"],
+            "rate": list(clip["rate"]),
+            "encoding": clip["encoding"],
+        },
+        "options": settings,
+    }
+
+
+def entry_of(path: Path, result: BakeResult) -> Entry:
+    """Return what an index says of one file."""
+    clip = None if result.clip is None else asdict(result.clip.worst)
+    return {
+        "frame": int(result.frame),
+        "file": path.name,
+        "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
+        "id": result.id,
+        "identity": result.identity,
+        "size": result.size,
+        "shaper": asdict(result.shaper),
+        "error": result.error,
+        "clip": clip,
+        "grid": asdict(result.grid.worst),
+    }
+
+
+def document_of(header: dict[str, Any], entries: dict[int, Entry]) -> dict[str, Any]:
+    """Return an index, its entries in rising order."""
+    return {**header, "frames": [entries[frame] for frame in sorted(entries)]}
+
+
+def write_index(path: Path, header: dict[str, Any], entries: dict[int, Entry]) -> None:
+    """Replace an index, whole; a line an entry."""
+    lines = [json.dumps(entry) for entry in document_of(header, entries)["frames"]]
+    head = json.dumps(header, indent=2).removesuffix("\n}")
+    text = head + ',\n  "frames": [\n    ' + ",\n    ".join(lines) + "\n  ]\n}\n"
+    with replacing(path, force=True) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def read_index(path: Path, header: dict[str, Any], force: bool) -> dict[int, Entry]:
+    """Return the entries of an earlier export with the same sidecar and options."""
+    if not path.exists():
+        return {}
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+        entries = {int(entry["frame"]): entry for entry in document["frames"]}
+        known = {key: document[key] for key in header}
+        if not all(isinstance(entry["sha256"], str) for entry in entries.values()):
+            raise TypeError
+    except (ValueError, KeyError, TypeError) as error:
+        if force:
+            return {}
+        raise Palette4dError(
+            f"{path}: found no index of a series that can be read, expected the one that an "
+            "earlier export wrote; use --force to replace it, or another folder"
+        ) from error
+    changed = [word for key, word in _CHANGED.items() if known[key] != header[key]]
+    if known["sidecar"].get("sha256") != header["sidecar"]["sha256"]:
+        changed.append("another state of the sidecar")
+    if not changed:
+        return entries
+    if not force:
+        raise Palette4dError(
+            f"{path}: it lists a series of {counted(len(entries), 'file')} that was made with "
+            f"{' and '.join(changed)}; use --force to replace it, or choose another folder"
+        )
+    return {}

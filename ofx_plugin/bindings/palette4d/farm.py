@@ -1,0 +1,186 @@
+"""Many pieces of work on a farm: the workers of a Dask scheduler, or some on this machine.
+
+A worker that dies costs its pieces another try elsewhere, and nothing else: results come back to
+this process, which alone writes files. The workers need the same palette4d, and see the clips and
+sidecars under the same paths.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import concurrent.futures
+import contextlib
+import logging
+import re
+import threading
+import uuid
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from palette4d import _core
+from palette4d.errors import Palette4dError
+from palette4d.pool import Failed, Key, Result, Task, outcome, without_interrupts
+
+LOCAL = re.compile(r"local:([1-9][0-9]{0,2})")
+
+#: Seconds to wait for a scheduler to answer, and for the first worker to come.
+ANSWERS_WITHIN = 15
+WORKERS_WITHIN = 120
+
+
+def check_address(text: str) -> str:
+    """Return an address of --cluster: `local:N` or that of a scheduler.
+
+    Raises
+    ------
+    Palette4dError
+        It is neither.
+    """
+    if LOCAL.fullmatch(text) or re.fullmatch(r"([a-z]+://)?[^/:\s]+:[0-9]+", text):
+        if text.startswith("local:") and not LOCAL.fullmatch(text):
+            raise Palette4dError(f"found {text!r}, expected local:N with N workers from 1 to 999")
+        return text
+    raise Palette4dError(
+        f"found {text!r}, expected local:N for N workers on this machine, or a Dask scheduler's "
+        "address such as tcp://farm.example:8786"
+    )
+
+
+def run(
+    address: str,
+    work: Callable[[Task, int], Result],
+    tasks: Mapping[Key, Task],
+    take: Callable[[Key, Result | Failed], None],
+) -> None:
+    """Work on each task on a farm, and call `take` with each outcome as it is done.
+
+    Parameters
+    ----------
+    address : str
+        As `check_address` takes it.
+    work, tasks, take
+        As in `pool.run`; a worker works at one piece at a time, with all threads it has.
+
+    Raises
+    ------
+    Palette4dError
+        Dask is not installed, no scheduler answers, it has no worker, or one with another
+        palette4d.
+    """
+    if not tasks:
+        return
+    with _connected(check_address(address)) as client:
+        from distributed import as_completed
+
+        keys = {}
+        futures = []
+        for key, task in tasks.items():
+            name = f"palette4d-{uuid.uuid4().hex}"
+            keys[name] = key
+            futures.append(client.submit(_piece, work, task, key=name, pure=False))
+        _check_workers(client, address)
+        try:
+            for future in as_completed(futures, loop=client.loop):
+                take(keys[future.key], _outcome(future))
+        finally:
+            with contextlib.suppress(Exception):  # the scheduler may have gone
+                client.cancel(futures)
+
+
+# One piece at a time in a process: a worker's threads are used inside of a piece.
+_at_work = threading.Lock()
+
+
+def _piece(work: Callable[[Task, int], Result], task: Task) -> Result:
+    """Do one piece of work on a worker."""
+    from distributed import get_worker
+
+    with _at_work:
+        return work(task, max(1, get_worker().state.nthreads))
+
+
+def _version() -> str:
+    """Return the version of palette4d on a worker."""
+    return _core.__version__
+
+
+def _outcome(future: Any) -> Any:
+    from distributed import KilledWorker
+
+    try:
+        return outcome(future.result)
+    except KilledWorker:
+        return Failed(
+            "every worker that tried it was ended from outside (too little memory?); run the same "
+            "command again, on workers with more"
+        )
+    except (concurrent.futures.CancelledError, asyncio.CancelledError):
+        return Failed("the farm's scheduler went away; run the same command again")
+
+
+@contextlib.contextmanager
+def _connected(address: str) -> Iterator[Any]:
+    """Yield a client of the scheduler at an address, or of one of our own."""
+    try:
+        import distributed
+    except ImportError as error:
+        raise Palette4dError(
+            "--cluster needs Dask, which is not installed; run: pip install 'palette4d[farm]'"
+        ) from error
+    local = LOCAL.fullmatch(address)
+    if not local:
+        with _client(distributed, address, f"no Dask scheduler answers at {address}") as client:
+            yield client
+        return
+    # The workers inherit that Ctrl-C does not end them: this process does.
+    with without_interrupts():
+        cluster = distributed.LocalCluster(
+            n_workers=int(local[1]),
+            threads_per_worker=1,
+            processes=True,
+            host="127.0.0.1",
+            dashboard_address=None,
+            memory_limit=0,
+            silence_logs=logging.CRITICAL,
+        )
+    with cluster, _client(distributed, cluster, "the local workers cannot be reached") as client:
+        yield client
+
+
+@contextlib.contextmanager
+def _client(distributed: Any, target: Any, otherwise: str) -> Iterator[Any]:
+    try:
+        client = distributed.Client(target, timeout=ANSWERS_WITHIN, set_as_default=False)
+    except (OSError, TimeoutError, ValueError) as error:
+        raise Palette4dError(
+            f"{otherwise} ({error}); start one with `dask scheduler` and workers with `dask "
+            "worker`, check the address, or use --cluster local:N"
+        ) from error
+    with client:
+        yield client
+
+
+def _check_workers(client: Any, address: str) -> None:
+    """Wait for the first worker, and refuse workers with another palette4d."""
+    try:
+        client.wait_for_workers(1, timeout=WORKERS_WITHIN)
+    except TimeoutError as error:
+        raise Palette4dError(
+            f"the scheduler at {address} has had no worker for {WORKERS_WITHIN} seconds; start "
+            f"some with `dask worker {address}`"
+        ) from error
+    try:
+        found = client.run(_version, on_error="return")
+    except Exception as error:
+        raise Palette4dError(f"the workers at {address} cannot be asked: {error}") from error
+    for worker, version in sorted(found.items()):
+        if isinstance(version, ImportError):
+            raise Palette4dError(
+                f"the worker {worker} cannot import palette4d ({version}); install "
+                f"palette4d {_core.__version__} where it runs"
+            )
+        if isinstance(version, str) and version != _core.__version__:
+            raise Palette4dError(
+                f"the worker {worker} has palette4d {version}, expected {_core.__version__} as "
+                "here, so that results are the same; install that where it runs"
+            )
