@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import itertools
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,16 +59,23 @@ def find_cuts(statistics: Sequence[FrameStatistics]) -> list[int]:
 
     Costs under a millisecond a frame, whatever the resolution: the coarse colours are looked at.
     """
-    count = len(statistics)
+    return find_cuts_of(
+        (frame.frame, histogram(frame.coarse.rgb, frame.coarse.counts)) for frame in statistics
+    )
+
+
+def find_cuts_of(histograms: Iterable[tuple[int, F64]]) -> list[int]:
+    """Return the same for frame numbers with `histogram`s, of which few are held at a time."""
+    numbers = []
     # gaps[d][i] is the difference of frame i + d from frame i.
     gaps: dict[int, list[float]] = {d: [] for d in range(1, LONGEST_FLASH + 2)}
     recent: deque[F64] = deque(maxlen=LONGEST_FLASH + 1)
-    for frame in statistics:
-        here = histogram(frame.coarse.rgb, frame.coarse.counts)
+    for number, here in histograms:
         for d, before in enumerate(reversed(recent), start=1):
             gaps[d].append(difference(before, here))
         recent.append(here)
-    return [statistics[i].frame for i in range(1, count) if _is_cut(gaps, i)]
+        numbers.append(number)
+    return [numbers[i] for i in range(1, len(numbers)) if _is_cut(gaps, i)]
 
 
 def _is_cut(gaps: dict[int, list[float]], at: int) -> bool:
