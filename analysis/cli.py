@@ -13,6 +13,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from palette4d.analysis import show_cli
 from palette4d.analysis.options import METHODS, AnalysisOptions
 from palette4d.arguments import checked, frame_range, number, whole
 from palette4d.wording import counted
@@ -28,7 +29,9 @@ is that frame's palette (Du, Lei, Xu, Tan and Gingold 2021), and write it to a s
 CLIP is an image sequence (shot.####.exr, shot.%04d.png, shot.1001-1100x2#.dpx, or a folder that
 holds one), a single image, or a movie file. The clip should be one shot: a palette must not span a
 cut.
+
 """
+DESCRIPTION += show_cli.DESCRIPTION
 
 EPILOG = """\
 example:
@@ -36,6 +39,7 @@ example:
   palette4d analyze plates/ --frames 1001-1100x2 -o plates.p4d.json
   palette4d analyze take3.mov -o take3.p4d.json --vertices 16      fewer handles, looser fit
 """
+EPILOG += show_cli.EPILOG
 
 # option, metavar, field, help
 PAPER_OPTIONS = (
@@ -83,7 +87,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("clip", metavar="CLIP", help="image sequence, folder, image or movie file")
-    parser.add_argument("-o", "--output", required=True, metavar="OUT.p4d.json", type=Path)
+    parser.add_argument(
+        "-o",
+        "--output",
+        required=True,
+        metavar="OUT",
+        type=Path,
+        help="the sidecar, OUT.p4d.json; for many shots a folder",
+    )
     parser.add_argument(
         "--frames",
         metavar="A-B[xN]",
@@ -142,7 +153,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
                 default=default,
                 help=f"{text} (default {default:g})",
             )
-    parser.set_defaults(run=run)
+    show_cli.add_options(parser)
+    parser.set_defaults(run=run, usage_error=parser.error)
 
 
 def _check(field: str) -> Callable[[float], AnalysisOptions]:
@@ -167,8 +179,11 @@ def run(args: argparse.Namespace) -> int:
     from palette4d.analysis import pipeline, sidecar
     from palette4d.analysis.clip import open_clip
 
+    many = show_cli.is_show(args)
     fields = {field.name for field in dataclasses.fields(AnalysisOptions)}
     options = AnalysisOptions(**{k: v for k, v in vars(args).items() if k in fields})
+    if many:
+        return show_cli.run(args, options)
     sidecar.check_target(args.output, on_edits=args.on_edits)
     clip = open_clip(
         args.clip, frames=args.frames, rate=args.rate, skip_bad_frames=args.skip_bad_frames
