@@ -11,6 +11,9 @@ from typing import Any
 from palette4d.analysis.timeline_files import library
 from palette4d.errors import Palette4dError
 
+#: Of a frame: times in double precision are no surer.
+ROUNDING = 1e-3
+
 
 def shown(clip: Any) -> tuple[Any, Any] | None:
     """Return where in the edit a clip begins, and the range of media that the edit shows.
@@ -78,15 +81,15 @@ def _with_speed(clip: Any, shown: Any) -> Any:
             "followed; expected 0 (a freeze frame) or more. Render it, or analyse its media "
             "apart"
         )
-    # The in-point stays what it is; time counts from there.
+    # The in-point stays what it is; time counts from there, in whole frames.
     origin = clip.trimmed_range().start_time
     rate = shown.duration.rate
-    start = origin.value_rescaled_to(rate) + speed * (
-        shown.start_time.value_rescaled_to(rate) - origin.value_rescaled_to(rate)
-    )
-    length = max(1.0, speed * (shown.duration.value - 1) + 1)
+    begin = origin.value_rescaled_to(rate)
+    start = begin + speed * (shown.start_time.value_rescaled_to(rate) - begin)
+    last = start + speed * (shown.duration.value - 1)
+    first, end = math.floor(start + ROUNDING), math.floor(last + ROUNDING) + 1
     return opentime.TimeRange(
-        opentime.RationalTime(start, rate), opentime.RationalTime(length, rate)
+        opentime.RationalTime(first, rate), opentime.RationalTime(max(1, end - first), rate)
     )
 
 

@@ -37,6 +37,20 @@ def _of_movie(clip: Clip) -> str | None:
 def _of_image(clip: Clip) -> str | None:
     for name, _, value in clip.load(clip.frames[0]).metadata:
         if name == "smpte:TimeCode":
-            found = _TIMECODE.search(str(value))
-            return found[0] if found else None
+            return _decoded(int(value[0]))
     return None
+
+
+def _decoded(word: int) -> str:
+    """Return the text of SMPTE ST 12's 32 bits: two decimal digits a byte, with flags between.
+
+    >>> _decoded(0x10215203), _decoded(0x00000043)
+    ('10:21:52:03', '00:00:00;03')
+    """
+    hours, minutes, seconds, frames = (word >> 24, word >> 16, word >> 8, word)
+    drop = ";" if frames & 0x40 else ":"
+
+    def digits(byte: int, tens: int) -> str:
+        return f"{(byte >> 4) & tens}{byte & 15}"
+
+    return f"{digits(hours, 3)}:{digits(minutes, 7)}:{digits(seconds, 7)}{drop}{digits(frames, 3)}"

@@ -232,8 +232,9 @@ class _Reader:
         start *= rate / Fraction(used.start_time.rate).limit_denominator(1001)
         length = Fraction(used.duration.value).limit_denominator(10**6)
         length *= rate / Fraction(used.duration.rate).limit_denominator(1001)
-        first = math.floor(start + Fraction(1, 1000))
-        last = max(first, math.ceil(start + length - Fraction(1, 1000)) - 1)
+        rounding = Fraction(edit_time.ROUNDING).limit_denominator(1000)
+        first = math.floor(start + rounding)
+        last = max(first, math.ceil(start + length - rounding) - 1)
         offset = self.offset(reference, opened, first, last, rate)
         return first + offset, last + offset
 
@@ -256,9 +257,19 @@ class _Reader:
         low, high = opened.frames[0], opened.frames[-1]
         if not opened.is_movie and low <= first <= last <= high:
             return 0  # a sequence's numbers are the media's time
-        if begins is None and (text := start_timecode(opened)) is not None:
-            begins = round(self.otio.opentime.from_timecode(text, float(rate)).value)
+        if begins is None:
+            begins = self.stated(opened, rate)
         return 0 if begins is None else low - begins
+
+    def stated(self, opened: Clip, rate: Fraction) -> int | None:
+        """Return the frame count of the timecode with which a clip's files say that they begin."""
+        text = start_timecode(opened)
+        if text is None:
+            return None
+        try:
+            return round(self.otio.opentime.from_timecode(text, float(rate)).value)
+        except ValueError:  # a rate that timecodes do not have
+            return None
 
 
 def _rate(timeline: Any) -> float:

@@ -34,6 +34,7 @@ between are links to the nearest table.
 examples:
   palette4d config shot010.p4d.json shot020.p4d.json -o show
   palette4d config shot010.p4d.json -o show --base /configs/aces/config.ocio --every 5
+  palette4d config shots/edit.shots.json -o show --every 5
   OCIO=show/config.ocio SHOT=shot010 FRAME=1001 VIEWER frame.1001.exr
 """
 
@@ -48,7 +49,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
-        "sidecars", metavar="SIDECAR", type=Path, nargs="+", help="the sidecars, one a shot"
+        "sidecars",
+        metavar="SIDECAR",
+        type=Path,
+        nargs="+",
+        help="the sidecars, one a shot, or the manifest of a show (.shots.json)",
     )
     parser.add_argument(
         "-o", "--output", metavar="DIR", type=Path, required=True, help="the folder to write"
@@ -78,13 +83,15 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Write the config; print what is in it."""
+    from palette4d.lut_export import show_export
     from palette4d.lut_export.bake import BakeOptions
     from palette4d.lut_export.config import ConfigOptions, write_config
     from palette4d.lut_export.formats import format_named
     from palette4d.lut_export.series import SeriesOptions
 
     check_domain(args)
-    if args.clip is not None and len(args.sidecars) > 1:
+    sidecars, remarks = show_export.sidecars(args.sidecars)
+    if args.clip is not None and len(sidecars) > 1:
         args.usage_error("--clip names one clip; with several sidecars each must name its own")
     options = ConfigOptions(
         series=SeriesOptions(
@@ -101,7 +108,7 @@ def run(args: argparse.Namespace) -> int:
             clip=args.clip,
             workers=Workers(args.jobs, args.cluster),
         ),
-        choose=lambda sidecar: chosen_frames(args, sidecar),
+        choose=lambda sidecar: chosen_frames(args, sidecar, show=len(sidecars) > 1),
         base=args.base,
         names=None if args.names is None else tuple(args.names.split(",")),
         process_space=args.process_space,
@@ -110,13 +117,13 @@ def run(args: argparse.Namespace) -> int:
     done = with_bar(
         "config",
         args.quiet,
-        lambda progress: write_config(args.sidecars, args.output, options, progress),
+        lambda progress: write_config(sidecars, args.output, options, progress),
     )
     if args.json:
         print(json.dumps(as_json(done), indent=2))
     else:
         print("\n".join(report(done)))
-    for note in done.notes:
+    for note in [*remarks, *done.notes]:
         print(f"palette4d: note: {note}", file=sys.stderr)
     return 0
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from palette4d import _core
-    from palette4d.lut_export.series import Series
+    from palette4d.lut_export.series import Series, SeriesOptions
 
 Done = TypeVar("Done")
 
@@ -26,6 +27,10 @@ Files are named NAME.FRAME.EXTENSION, and NAME.series.json beside them lists the
 hash, id, size, shaper and errors of each. Running the same command again bakes only what is missing
 or does not match its hash; Ctrl-C leaves whole files only.
 
+For a whole show give its manifest (NAME.shots.json, which `palette4d analyze` wrote): each shot's
+files go to a folder of its name. --otio writes a copy of the edit in which the metadata of each
+clip (its member "palette4d") names the shot's sidecar and files.
+
 --stops are the frames at which the edit turns: the times of its colour stops and edited palette
 colours, and of the palette colours beside them, where it begins or has faded.
 
@@ -33,6 +38,8 @@ examples:
   palette4d export shot010.p4d.json --every 1 -o luts
   palette4d export shot010.p4d.json --frames 1001-1100x10 -o luts --format clf --max-error 0.02
   palette4d export shot010.p4d.json --stops -o luts --name shot010_warm --size 65
+  palette4d export shots/edit.shots.json --every 10 -o luts --otio edit_luts.otio
+  palette4d export shots/edit.shots.json --stops -o luts --cluster tcp://farm:8786
 """
 
 
@@ -45,7 +52,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("sidecar", metavar="SIDECAR", type=Path, help="the sidecar (.p4d.json)")
+    parser.add_argument(
+        "sidecar",
+        metavar="SIDECAR",
+        type=Path,
+        help="the sidecar (.p4d.json), or the manifest of a show (.shots.json)",
+    )
     add_frame_choice(parser, required=True)
     parser.add_argument(
         "-o", "--output", metavar="DIR", type=Path, required=True, help="the folder for the files"
@@ -60,6 +72,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     add_table_options(parser, "resolve_cube")
     add_run_options(parser)
+    parser.add_argument(
+        "--otio",
+        metavar="OUT.otio",
+        type=Path,
+        help="write the edit of a show with references to its files",
+    )
     parser.add_argument("--json", action="store_true", help="print the index")
     parser.set_defaults(run=run, usage_error=parser.error)
 
@@ -83,10 +101,17 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
 
 
-def chosen_frames(args: argparse.Namespace, sidecar: _core.Sidecar) -> tuple[int, ...]:
-    """Return the frames that --every, --stops or --frames name; all without any of them."""
+def chosen_frames(
+    args: argparse.Namespace, sidecar: _core.Sidecar, *, show: bool = False
+) -> tuple[int, ...]:
+    """Return the frames that --every, --stops or --frames name; all without any of them.
+
+    In a show, --stops is the first frame of a shot that is not edited.
+    """
     from palette4d.lut_export import series
 
+    if args.stops and show and not (sidecar.edits.vertex_rgb or sidecar.edits.stops):
+        return series.every(sidecar, 1)[:1]
     if args.stops:
         return series.stops(sidecar)
     if args.frames is not None:
@@ -103,14 +128,16 @@ def check_domain(args: argparse.Namespace) -> None:
 def run(args: argparse.Namespace) -> int:
     """Export; print what was written."""
     from palette4d import _core
+    from palette4d.analysis.manifest import is_manifest
     from palette4d.lut_export import series
     from palette4d.lut_export.bake import BakeOptions
     from palette4d.lut_export.formats import format_named
 
     check_domain(args)
-    sidecar = _core.read_sidecar(str(args.sidecar))
+    show = is_manifest(args.sidecar)
+    _check_show(args, show)
     options = series.SeriesOptions(
-        frames=chosen_frames(args, sidecar),
+        frames=(),
         bake=BakeOptions(
             frame=0.0,
             size=args.size,
@@ -126,18 +153,57 @@ def run(args: argparse.Namespace) -> int:
         workers=Workers(args.jobs, args.cluster),
         force=args.force,
     )
+    if show:
+        return _run_show(args, options)
+    sidecar = _core.read_sidecar(str(args.sidecar))
+    chosen = replace(options, frames=chosen_frames(args, sidecar))
     done = with_bar(
         "export",
         args.quiet,
-        lambda progress: series.export(args.sidecar, args.output, options, progress),
+        lambda progress: series.export(args.sidecar, args.output, chosen, progress),
     )
     if args.json:
         print(json.dumps(done.document, indent=2))
     else:
         print("\n".join(report(done)))
-    warn(done)
+    warn([done])
     if done.failed:
         raise failures(done)
+    return 0
+
+
+def _check_show(args: argparse.Namespace, show: bool) -> None:
+    """Refuse options that do not go with a manifest, or only with one, as wrong usage."""
+    if not show:
+        if args.otio is not None:
+            args.usage_error("--otio needs the manifest of a show (.shots.json)")
+        return
+    for option, value, why in (
+        ("--name", args.name, "each shot has its own"),
+        ("--clip", args.clip, "each shot has its own"),
+        ("--frames", args.frames, "each shot has its own; use --every or --stops"),
+    ):
+        if value is not None:
+            args.usage_error(f"{option} does not go with the manifest of a show: {why}")
+
+
+def _run_show(args: argparse.Namespace, options: SeriesOptions) -> int:
+    from palette4d.lut_export import show_export
+
+    done = show_export.export(
+        args,
+        options,
+        lambda sidecar: chosen_frames(args, sidecar, show=True),
+        lambda work: with_bar("export", args.quiet, work),
+    )
+    if args.json:
+        print(show_export.as_json(done))
+    else:
+        for one in done:
+            print("\n".join(report(one)))
+    warn(done)
+    if error := show_export.failures(done):
+        raise error
     return 0
 
 
@@ -185,12 +251,12 @@ def report(done: Series) -> list[str]:
     return lines
 
 
-def warn(done: Series) -> None:
+def warn(done: list[Series]) -> None:
     """Say what a user should know beside the figures."""
     from palette4d.lut_export.bake import PREVIEW_TIER
     from palette4d.wording import counted
 
-    entries = done.document["frames"]
+    entries = [entry for one in done for entry in one.document["frames"]]
     if any(entry["clip"] is None for entry in entries):
         print(
             "palette4d: note: not all of the clip's frames could be read; errors are stated on the "

@@ -14,6 +14,10 @@ from av.video.reformatter import ColorRange, Colorspace
 from numpy.typing import NDArray
 
 
+class TimeCode(int):
+    """The 32 bits of a SMPTE timecode, to be written as such."""
+
+
 def write_image(
     path: Path,
     pixels: NDArray[Any],
@@ -42,6 +46,8 @@ def write_image(
         if isinstance(value, Fraction):
             rational = (value.numerator, value.denominator)
             spec.attribute(key, oiio.TypeDesc("rational"), rational)
+        elif isinstance(value, TimeCode):
+            spec.attribute(key, oiio.TypeTimeCode, (int(value), 0))
         else:
             spec.attribute(key, value)
     path.parent.mkdir(parents=True, exist_ok=True)
