@@ -267,7 +267,7 @@ class _Reader:
         if text is None:
             return None
         try:
-            return round(self.otio.opentime.from_timecode(text, float(rate)).value)
+            return int(self.otio.opentime.from_timecode(text, float(rate)).to_frames())
         except ValueError:  # a rate that timecodes do not have
             return None
 

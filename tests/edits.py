@@ -28,10 +28,12 @@ def sequence(folder: Path, name: str, first: int, count: int, scene: Any = lands
     return folder / f"{name}.####.png"
 
 
-def movie(path: Path, count: int, *, timecode: str = "", cut: int | None = None) -> Path:
+def movie(
+    path: Path, count: int, *, timecode: str = "", cut: int | None = None, scene: Any = landscape
+) -> Path:
     """Write a movie; with `cut`, another picture from that frame on."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    pictures = [picture(i, landscape if cut is None or i < cut else harbour) for i in range(count)]
+    pictures = [picture(i, scene if cut is None or i < cut else harbour) for i in range(count)]
 
     def prepare(stream: Any) -> None:
         if timecode:

@@ -15,6 +15,7 @@ import re
 import threading
 import uuid
 from collections.abc import Callable, Iterator, Mapping
+from multiprocessing import resource_tracker
 from typing import Any
 
 from palette4d import _core
@@ -82,6 +83,7 @@ def run(
         try:
             for future in as_completed(futures, loop=client.loop):
                 take(keys[future.key], _outcome(future))
+                future.release()  # what it brought may be large
         finally:
             with contextlib.suppress(Exception):  # the scheduler may have gone
                 client.cancel(futures)
@@ -132,7 +134,9 @@ def _connected(address: str) -> Iterator[Any]:
         with _client(distributed, address, f"no Dask scheduler answers at {address}") as client:
             yield client
         return
-    # The workers inherit that Ctrl-C does not end them: this process does.
+    # The workers inherit that Ctrl-C does not end them: this process does. What Python starts with
+    # the first process lets Ctrl-C through again, so that it is started before.
+    resource_tracker.ensure_running()
     with without_interrupts():
         cluster = distributed.LocalCluster(
             n_workers=int(local[1]),
