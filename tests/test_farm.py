@@ -18,6 +18,7 @@ from palette4d import cli
 from palette4d import farm as farms
 from palette4d.errors import Palette4dError
 from palette4d.workers import Workers
+from pieces import piece
 
 GOLDEN = Path(__file__).resolve().parent / "golden" / "sidecars"
 EDITED = GOLDEN / "v1_edited.p4d.json"
@@ -146,7 +147,7 @@ class TestRefusals:
         started = time.monotonic()
         # Port 9 (discard) of loopback: nobody listens there.
         with pytest.raises(Palette4dError, match=r"no Dask scheduler answers at 127\.0\.0\.1:9"):
-            Workers(cluster="127.0.0.1:9").run(abs_of, {0: -1}, lambda key, outcome: None)
+            Workers(cluster="127.0.0.1:9").run(piece, {0: 1}, lambda key, outcome: None)
         assert time.monotonic() - started < 30
 
     def test_no_worker_and_another_version(
@@ -155,12 +156,12 @@ class TestRefusals:
         with farm(tmp_path / "farm", workers=0) as made:
             monkeypatch.setattr(farms, "WORKERS_WITHIN", 0.5)
             with pytest.raises(Palette4dError, match=r"no worker for 0\.5 seconds"):
-                Workers(cluster=made.address).run(abs_of, {0: -1}, lambda key, outcome: None)
+                Workers(cluster=made.address).run(piece, {0: 1}, lambda key, outcome: None)
             monkeypatch.setattr(farms, "WORKERS_WITHIN", 120)
             made.add_worker("w0")
             monkeypatch.setattr("palette4d._core.__version__", "99.0")
             with pytest.raises(Palette4dError, match=r"has palette4d .*, expected 99\.0"):
-                Workers(cluster=made.address).run(abs_of, {0: -1}, lambda key, outcome: None)
+                Workers(cluster=made.address).run(piece, {0: 1}, lambda key, outcome: None)
 
     def test_without_dask_the_error_says_what_to_install(self, tmp_path: Path) -> None:
         program = (
@@ -188,8 +189,3 @@ class TestRefusals:
     def test_good_addresses(self) -> None:
         for text in ("local:1", "local:64", "tcp://farm:8786", "tls://10.0.0.1:8786", "farm:8786"):
             assert farms.check_address(text) == text
-
-
-def abs_of(value: int, threads: int) -> int:
-    """A small piece of work."""
-    return abs(value) * min(threads, 1)

@@ -1,0 +1,73 @@
+"""Shots: names, splitting at cuts, handles that end at cuts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from edits import movie, picture, sequence
+from palette4d.analysis import shots
+from palette4d.analysis.clip import open_clip
+from palette4d.analysis.shots import Shot
+from palette4d.errors import Palette4dError
+
+
+def shot(name: str, first: int = 0, last: int = 9) -> Shot:
+    return Shot(name, "a.mov", first, last, (first, last))
+
+
+def test_names_are_unlike_and_stay() -> None:
+    named, changed = shots.numbered([shot("A"), shot("a", 5), shot("B"), shot("A", 5)])
+    assert [one.name for one in named] == ["A", "a_f5", "B", "A_f5_2"]
+    assert changed == ["a_f5", "A_f5_2"]
+    # Another shot in between leaves the names of the others alone.
+    more, _ = shots.numbered([shot("A"), shot("A", 3), shot("a", 5), shot("B")])
+    assert [one.name for one in more] == ["A", "A_f3", "a_f5", "B"]
+
+
+def test_a_movie_is_split_at_its_cut(tmp_path: Path) -> None:
+    told: list[tuple[int, int]] = []
+    clip = open_clip(str(movie(tmp_path / "a b.mov", 10, cut=6)))
+    found = shots.detect(clip, lambda done, total: told.append((done, total)))
+    assert [(one.name, one.frames, one.count) for one in found] == [
+        ("a_b_s001", "0-5", 6),
+        ("a_b_s002", "6-9", 4),
+    ]
+    assert told == [(i, 10) for i in range(1, 11)]
+
+
+def test_bad_frames_are_passed_over(tmp_path: Path) -> None:
+    pattern = sequence(tmp_path, "a", 1, 8)
+    (tmp_path / "a.0004.png").unlink()
+    clip = open_clip(str(pattern), skip_bad_frames=True)
+    assert [one.frames for one in shots.detect(clip)] == ["1-8"]
+
+
+def test_frames_that_are_not_even_are_refused(tmp_path: Path) -> None:
+    pattern = sequence(tmp_path, "a", 1, 8)
+    with pytest.raises(Palette4dError, match="not evenly spaced"):
+        shots.detect(open_clip(str(pattern), frames="1,2,4"))
+
+
+@pytest.mark.parametrize(
+    ("asked", "used", "left"),
+    [
+        ((0, 9), (1, 4), (0, 5)),
+        ((0, 9), (7, 8), (6, 9)),
+        ((2, 7), (3, 5), (2, 5)),
+        ((2, 7), (6, 7), (6, 7)),
+        ((0, 9), (4, 7), (0, 9)),  # the cut is inside of what is shown
+        ((0, 9), (0, 9), (0, 9)),
+    ],
+)
+def test_handles_end_at_cuts(
+    asked: tuple[int, int], used: tuple[int, int], left: tuple[int, int], tmp_path: Path
+) -> None:
+    path = movie(tmp_path / "a.mov", 10, cut=6)
+    one = Shot("a", str(path), *asked, used=used)
+    found = shots.trimmed(one, open_clip(str(path), frames=one.frames))
+    assert (found.first, found.last) == left
+
+
+def test_the_pictures_differ() -> None:
+    assert (picture(0) != picture(1)).any()

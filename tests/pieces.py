@@ -1,0 +1,19 @@
+"""Small pieces of work, in a module that the processes of a pool can import."""
+
+from __future__ import annotations
+
+import os
+import signal
+
+from palette4d.errors import Palette4dError
+
+
+def piece(value: int, threads: int) -> tuple[int, int]:
+    """Square a number; refuse 3, fall over 4, and let 5 end the process."""
+    if value == 3:
+        raise Palette4dError("three is refused")
+    if value == 4:
+        raise ZeroDivisionError
+    if value == 5:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return value * value, threads
