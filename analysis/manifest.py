@@ -121,7 +121,7 @@ def _row(entry: Entry) -> dict[str, Any]:
         "sidecar": entry.sidecar,
         "clip": shot.clip,
         "asked": [shot.first, shot.last],
-        "frames": None if entry.frames is None else list(entry.frames),
+        **({} if entry.frames is None else {"frames": list(entry.frames)}),
         "step": shot.step,
         "used": list(shot.used),
     }
@@ -165,7 +165,7 @@ def read(path: Path) -> Manifest:
             options=dict(document["options"]),
             entries=tuple(_entry(row) for row in document["shots"]),
         )
-    except (KeyError, TypeError, ValueError, ZeroDivisionError) as error:
+    except (AttributeError, KeyError, TypeError, ValueError, ZeroDivisionError) as error:
         raise Palette4dError(
             f"{path}: the manifest is broken ({type(error).__name__}: {error}){_MEND}"
         ) from error
@@ -180,7 +180,7 @@ def _entry(row: dict[str, Any]) -> Entry:
         place = Place(str(edit["track"]), str(edit["record"]), tuple(map(int, edit["path"])))
     first, last = map(int, row["asked"])
     used_first, used_last = map(int, row["used"])
-    if row["status"] not in (DONE, FAILED, TO_DO):
+    if row["status"] not in (DONE, FAILED, TO_DO) or (row["status"] == DONE) != ("frames" in row):
         raise ValueError(f"status {row['status']!r}")
     name = str(row["name"])
     if row["sidecar"] != f"{name}.p4d.json" or "/" in name:
@@ -188,7 +188,7 @@ def _entry(row: dict[str, Any]) -> Entry:
     shot = Shot(
         name, str(row["clip"]), first, last, (used_first, used_last), int(row["step"]), place
     )
-    frames = row["frames"]
+    frames = row.get("frames")
     return Entry(
         shot=shot,
         status=row["status"],

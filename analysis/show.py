@@ -161,7 +161,8 @@ def analyse(
 
     tell(*run.progress())
     try:
-        options.workers.run(analyse_shot, run.tasks, take)
+        # A shot may take minutes: Ctrl-C does not wait for it.
+        options.workers.run(analyse_shot, run.tasks, take, patient=False)
     finally:
         run.save()
     return run.show()

@@ -1,7 +1,7 @@
-"""Write the field table of docs/sidecar.md from the JSON Schema.
+"""Write the field tables of docs/sidecar.md and docs/shots.md from the JSON Schemas.
 
-python docs/sidecar_fields.py            writes the table into the page
-python docs/sidecar_fields.py --check    exits 1 when the page is not up to date
+python docs/sidecar_fields.py            writes the tables into the pages
+python docs/sidecar_fields.py --check    exits 1 when a page is not up to date
 """
 
 import json
@@ -10,8 +10,12 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
+SCHEMAS = ROOT / "ofx_plugin" / "bindings" / "palette4d"
 PAGE = ROOT / "docs" / "sidecar.md"
-SCHEMA = ROOT / "ofx_plugin" / "bindings" / "palette4d" / "sidecar_v1.schema.json"
+PAGES = {
+    PAGE: SCHEMAS / "sidecar_v1.schema.json",
+    ROOT / "docs" / "shots.md": SCHEMAS / "shots_v1.schema.json",
+}
 BEGIN = "<!-- begin: written by python docs/sidecar_fields.py -->"
 END = "<!-- end: written by python docs/sidecar_fields.py -->"
 
@@ -73,6 +77,8 @@ def _type(schema: Node, node: Node) -> str:
 def _range(schema: Node, node: Node) -> str:
     if "const" in node:
         return f"`{json.dumps(node['const'])}`"
+    if "enum" in node:
+        return ", ".join(f"`{json.dumps(value)}`" for value in node["enum"])
     if node.get("type") == "array":
         item = node["prefixItems"][0] if "prefixItems" in node else node["items"]
         inner = _range(schema, _resolved(schema, item))
@@ -96,15 +102,17 @@ def written(page: str, schema: Node) -> str:
 
 
 def main() -> int:
-    """Write or check the page."""
-    page = PAGE.read_text(encoding="utf-8")
-    new = written(page, json.loads(SCHEMA.read_text(encoding="utf-8")))
-    if "--check" in sys.argv[1:]:
-        if new != page:
-            print(f"{PAGE} is not up to date; run: python docs/sidecar_fields.py", file=sys.stderr)
-        return int(new != page)
-    PAGE.write_text(new, encoding="utf-8")
-    return 0
+    """Write or check the pages."""
+    late = 0
+    for path, schema in PAGES.items():
+        page = path.read_text(encoding="utf-8")
+        new = written(page, json.loads(schema.read_text(encoding="utf-8")))
+        if "--check" not in sys.argv[1:]:
+            path.write_text(new, encoding="utf-8")
+        elif new != page:
+            print(f"{path} is not up to date; run: python docs/sidecar_fields.py", file=sys.stderr)
+            late = 1
+    return late
 
 
 if __name__ == "__main__":

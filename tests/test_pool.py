@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 
 import pytest
 from palette4d import pool
@@ -39,3 +40,16 @@ def test_a_process_that_is_ended_fails_its_piece() -> None:
     failed = [outcome for outcome in found.values() if isinstance(outcome, Failed)]
     assert found[1] in failed
     assert all("ended from outside" in one.text for one in failed)
+
+
+def test_ctrl_c_waits_until_an_outcome_is_taken() -> None:
+    taken = []
+
+    def take(key: int, found: object) -> None:
+        signal.raise_signal(signal.SIGINT)
+        taken.append(key)
+
+    with pytest.raises(KeyboardInterrupt):
+        pool.run(piece, {0: 1, 1: 2}, take, 1)
+    assert taken == [0]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

@@ -40,7 +40,7 @@ def manifest(folder: Path) -> dict[str, Any]:
 
 
 def shots(folder: Path) -> list[tuple[str, str, list[int] | None]]:
-    return [(s["name"], s["status"], s["frames"]) for s in manifest(folder)["shots"]]
+    return [(s["name"], s["status"], s.get("frames")) for s in manifest(folder)["shots"]]
 
 
 def sidecar(folder: Path, name: str) -> dict[str, Any]:

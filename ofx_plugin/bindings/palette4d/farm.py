@@ -20,7 +20,7 @@ from typing import Any
 
 from palette4d import _core
 from palette4d.errors import Palette4dError
-from palette4d.pool import Failed, Key, Result, Task, outcome, without_interrupts
+from palette4d.pool import Failed, Key, Result, Task, later_interrupts, outcome, without_interrupts
 
 LOCAL = re.compile(r"local:([1-9][0-9]{0,2})")
 
@@ -82,7 +82,9 @@ def run(
         _check_workers(client, address)
         try:
             for future in as_completed(futures, loop=client.loop):
-                take(keys[future.key], _outcome(future))
+                found = _outcome(future)
+                with later_interrupts():
+                    take(keys[future.key], found)
                 future.release()  # what it brought may be large
         finally:
             with contextlib.suppress(Exception):  # the scheduler may have gone

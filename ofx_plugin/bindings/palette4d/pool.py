@@ -5,6 +5,7 @@ import itertools
 import multiprocessing
 import os
 import signal
+import threading
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -30,6 +31,8 @@ def run(
     tasks: Mapping[Key, Task],
     take: Callable[[Key, Result | Failed], None],
     jobs: int = 0,
+    *,
+    patient: bool = True,
 ) -> None:
     """Work on each task, several at a time, and call `take` with each outcome as it is done.
 
@@ -44,24 +47,32 @@ def run(
         `OSError`, or a process that was ended from outside.
     jobs : int
         Processes; 0: one a processor; with 1 all is done in this process.
+    patient : bool
+        After Ctrl-C, let the pieces that are worked on be done and told; else they are dropped.
 
     Raises
     ------
     KeyboardInterrupt
-        Ctrl-C, once the pieces that were worked on are done and told.
+        Ctrl-C.
     """
+
+    def told(key: Key, found: Result | Failed) -> None:
+        with later_interrupts():
+            take(key, found)
+
     processors = os.cpu_count() or 1
     jobs = min(jobs or processors, max(1, len(tasks)))
     threads = max(1, processors // jobs)
     if jobs == 1:
         for key, task in tasks.items():
-            take(key, outcome(work, task, threads))
+            told(key, outcome(work, task, threads))
         return
     # Spawned, not forked: the libraries here have threads of their own.
     pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"))
     left = iter(tasks.items())
     order = {key: i for i, key in enumerate(tasks)}
     running: dict[Future[Result], Key] = {}
+    others = set(multiprocessing.active_children())
     try:
         while True:
             # No more than are worked on, so that Ctrl-C waits for those alone. It goes to all
@@ -73,13 +84,18 @@ def run(
                 break
             done, _ = wait(running, return_when=FIRST_COMPLETED)
             for future in sorted(done, key=lambda f: order[running[f]]):
-                take(running.pop(future), outcome(future.result))
+                told(running.pop(future), outcome(future.result))
+    except KeyboardInterrupt:
+        if not patient:
+            for process in set(multiprocessing.active_children()) - others:
+                process.terminate()
+        raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
         # After Ctrl-C: what was finished meanwhile.
         for future, key in running.items():
-            if not future.cancelled():
-                take(key, outcome(future.result))
+            if not future.cancelled() and (patient or not future.exception()):
+                told(key, outcome(future.result))
 
 
 def _submitted(
@@ -104,6 +120,22 @@ def outcome(call: Callable[..., Result], *arguments: object) -> Result | Failed:
             "its process was ended from outside (too little memory?); run the same command again, "
             "with fewer --jobs"
         )
+
+
+@contextlib.contextmanager
+def later_interrupts() -> Iterator[None]:
+    """Let Ctrl-C wait for the body's end: what is being written is written and noted."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    held: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, frame: held.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+        if held and callable(before):
+            before(held[0], None)
 
 
 @contextlib.contextmanager

@@ -31,12 +31,14 @@ class Workers:
         work: Callable[[Task, int], Result],
         tasks: Mapping[Key, Task],
         take: Callable[[Key, Result | Failed], None],
+        *,
+        patient: bool = True,
     ) -> None:
         """Work on each task and call `take` with each outcome: see `pool.run` and `farm.run`."""
         if self.cluster is not None:
             farm.run(self.cluster, work, tasks, take)
         else:
-            pool.run(work, tasks, take, self.jobs)
+            pool.run(work, tasks, take, self.jobs, patient=patient)
 
 
 def add_options(parser: argparse.ArgumentParser | argparse._ArgumentGroup, what: str) -> None:
