@@ -101,7 +101,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         type=frame_range,
         help="only these frames, evenly spaced (1001-1100x2)",
     )
-    parser.add_argument("--rate", metavar="N/D", type=_rate, help="frames a second (24000/1001)")
+    parser.add_argument(
+        "--rate",
+        metavar="N/D",
+        type=_rate,
+        help="frames a second (24000/1001); of an EDL's timecodes (default 24)",
+    )
     parser.add_argument(
         "--skip-bad-frames",
         action="store_true",
@@ -137,6 +142,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         default=defaults.method,
         help="; ".join(f"{name}: {text}" for name, text in METHODS.items()),
     )
+    show_cli.add_options(parser)
     for title, table in (
         ("how many handles", HANDLE_OPTIONS),
         ("options of the paper", PAPER_OPTIONS),
@@ -153,7 +159,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
                 default=default,
                 help=f"{text} (default {default:g})",
             )
-    show_cli.add_options(parser)
     parser.set_defaults(run=run, usage_error=parser.error)
 
 

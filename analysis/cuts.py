@@ -147,7 +147,16 @@ def refusal(frames: Sequence[int], cuts: Sequence[int]) -> str:
     return (
         f"found {counted(len(cuts), 'sudden cut')}: a new shot begins at {_places(cuts)}; expected "
         "one shot, since a palette is followed through time and must not span a cut. Analyse each "
-        f"shot apart ({_some(shots)}), or give --allow-cuts to analyse all as one."
+        f"shot apart ({_some(shots)}; --detect-shots does all), or give --allow-cuts to analyse "
+        "all as one."
+    )
+
+
+def refusal_inside(cuts: Sequence[int]) -> str:
+    """Say that there are `cuts` inside of what an edit shows as one clip."""
+    return (
+        f"found {counted(len(cuts), 'sudden cut')} inside of what the edit shows: a new shot "
+        f"begins at {_places(cuts)}; expected one shot. Blade the edit there, or give --allow-cuts"
     )
 
 

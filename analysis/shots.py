@@ -155,17 +155,26 @@ def cuts_of(clip: Clip, progress: Callable[[int, int], None] | None = None) -> l
 
 
 def trimmed(shot: Shot, clip: Clip) -> Shot:
-    """Return a shot whose handles end at the media's cuts.
+    """Return a shot of an edit whose handles end at the media's cuts.
 
-    Cuts inside of what the edit shows are left to the analysis, which refuses them.
+    Parameters
+    ----------
+    shot : Shot
+        The shot.
+    clip : Clip
+        Its media, over the shot's frames.
+
+    Raises
+    ------
+    Palette4dError
+        There is a cut inside of what the edit shows.
     """
-    if (shot.first, shot.last) == shot.used:
-        return shot
     starts = cuts_of(clip)
-    before = [cut for cut in starts if cut <= shot.used[0]]
-    after = [cut for cut in starts if cut > shot.used[1]]
+    first, last = shot.used
+    if inside := [cut for cut in starts if first < cut <= last]:
+        raise Palette4dError(cuts.refusal_inside(inside))
     return dataclasses.replace(
         shot,
-        first=max([shot.first, *before]),
-        last=min([shot.last, *(cut - shot.step for cut in after)]),
+        first=max([shot.first, *(cut for cut in starts if cut <= first)]),
+        last=min([shot.last, *(cut - shot.step for cut in starts if cut > last)]),
     )

@@ -302,9 +302,9 @@ def analyse_shot(task: ShotTask, threads: int) -> Analysed:
     options = task.options
     shot = task.shot
     remarks: list[str] = []
-    if (shot.first, shot.last) != shot.used and not options.allow_cuts:
-        clip = _open(task, shot)
-        shot = trimmed(shot, clip)
+    # A shot of a movie is what lies between its cuts: there is nothing to look for again.
+    if shot.place is not None and not options.allow_cuts:
+        shot = trimmed(shot, _open(task, shot))
         if shot != task.shot:
             remarks.append(
                 f"the media cuts inside of the handles: frames {shot.frames} are analysed instead "
@@ -312,10 +312,8 @@ def analyse_shot(task: ShotTask, threads: int) -> Analysed:
             )
     clip = _open(task, shot)
     analysis_options = dataclasses.replace(options.analysis, threads=threads)
-    # A shot of a movie is what lies between its cuts: there is nothing to look for again.
-    allow = options.allow_cuts or shot.place is None
     try:
-        document, analysis = pipeline.analyze_clip(clip, analysis_options, allow_cuts=allow)
+        document, analysis = pipeline.analyze_clip(clip, analysis_options, allow_cuts=True)
     except (Palette4dError, OSError):
         raise
     except Exception as error:  # one shot must not end a night's work

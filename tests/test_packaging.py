@@ -86,6 +86,7 @@ def test_package_comes_from_the_wheel(wheel: Path) -> None:
         "palette4d/analysis/__init__.py",
         "palette4d/lut_export/__init__.py",
         "palette4d/sidecar_v1.schema.json",
+        "palette4d/shots_v1.schema.json",
     ],
 )
 def test_wheel_holds(name: str, wheel_names: list[str]) -> None:
@@ -197,7 +198,8 @@ def test_help_is_quick_to_load() -> None:
     """The heavy libraries load only in the verbs that need them."""
     program = (
         "import sys, palette4d.cli as cli; cli.build_parser(); "
-        "print(*sorted({'matplotlib', 'OpenImageIO', 'PyOpenColorIO', 'nlopt', 'av', 'scipy'} "
+        "print(*sorted({'matplotlib', 'OpenImageIO', 'PyOpenColorIO', 'nlopt', 'av', 'scipy', "
+        "'distributed', 'opentimelineio'} "
         "& {name.partition('.')[0] for name in sys.modules}))"
     )
     done = subprocess.run(

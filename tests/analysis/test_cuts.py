@@ -213,9 +213,9 @@ def test_the_refusal_names_ranges_that_the_command_reads():
     text = cuts.refusal(frames_of_clip, [1009, 1019])
     assert "2 sudden cuts" in text
     assert "frames 1009, 1019" in text
-    assert "--frames 1001-1007x2, --frames 1009-1017x2, --frames 1019)" in text
+    assert "--frames 1001-1007x2, --frames 1009-1017x2, --frames 1019; --detect-shots" in text
     assert "--allow-cuts" in text
-    assert "--frames 0-4, --frames 5-9)" in cuts.refusal(range(10), [5])
+    assert "--frames 0-4, --frames 5-9;" in cuts.refusal(range(10), [5])
     many = cuts.refusal(range(100), list(range(5, 100, 5)))
     assert many.count("--frames") == 8
     assert "19 sudden cuts" in many

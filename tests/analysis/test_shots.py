@@ -56,8 +56,6 @@ def test_frames_that_are_not_even_are_refused(tmp_path: Path) -> None:
         ((0, 9), (7, 8), (6, 9)),
         ((2, 7), (3, 5), (2, 5)),
         ((2, 7), (6, 7), (6, 7)),
-        ((0, 9), (4, 7), (0, 9)),  # the cut is inside of what is shown
-        ((0, 9), (0, 9), (0, 9)),
     ],
 )
 def test_handles_end_at_cuts(
@@ -67,6 +65,13 @@ def test_handles_end_at_cuts(
     one = Shot("a", str(path), *asked, used=used)
     found = shots.trimmed(one, open_clip(str(path), frames=one.frames))
     assert (found.first, found.last) == left
+
+
+@pytest.mark.parametrize("used", [(4, 7), (0, 9), (5, 6)])
+def test_a_cut_inside_of_what_is_shown_is_refused(used: tuple[int, int], tmp_path: Path) -> None:
+    path = movie(tmp_path / "a.mov", 10, cut=6)
+    with pytest.raises(Palette4dError, match=r"begins at frame 6; .* Blade the edit there"):
+        shots.trimmed(Shot("a", str(path), 0, 9, used), open_clip(str(path)))
 
 
 def test_the_pictures_differ() -> None:
