@@ -1,5 +1,6 @@
 #include "describe.hpp"
 
+#include "colour.hpp"
 #include "params.hpp"
 
 namespace palette4d::plugin {
@@ -55,6 +56,7 @@ OfxStatus describe(const Suites& suites, OfxImageEffectHandle effect) {
     node.set_string(kOfxImageEffectPropCPURenderSupported, "true");
     // One pixel's result depends on that pixel only: a host may take the node into a LUT.
     node.set_string(kOfxImageEffectPropNoSpatialAwareness, "true");
+    describe_colour(node);
     return kOfxStatOK;
 }
 
@@ -72,7 +74,9 @@ OfxStatus describe_in_context(const Suites& suites, OfxImageEffectHandle effect)
     return kOfxStatOK;
 }
 
-OfxStatus clip_preferences(const Properties& out_args) {
+OfxStatus clip_preferences(const Suites& suites, OfxImageEffectHandle effect,
+                           const Properties& out_args) {
+    prefer_colour(suites, effect, out_args);
     return out_args.set_int(kOfxImageEffectFrameVarying, 1) ? kOfxStatOK : kOfxStatReplyDefault;
 }
 

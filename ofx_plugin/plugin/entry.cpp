@@ -4,6 +4,7 @@
 #include <memory>
 #include <new>
 
+#include "colour.hpp"
 #include "describe.hpp"
 #include "host.hpp"
 #include "instance.hpp"
@@ -35,7 +36,10 @@ OfxStatus dispatch(const char* action, OfxImageEffectHandle effect, OfxPropertyS
 
     if (is(kOfxImageEffectActionRender)) return render(host, effect, in);
     if (is(kOfxImageEffectActionIsIdentity)) return is_identity(host, effect, in, out);
-    if (is(kOfxImageEffectActionGetClipPreferences)) return clip_preferences(out);
+    if (is(kOfxImageEffectActionGetClipPreferences)) {
+        return clip_preferences(host, effect, out);
+    }
+    if (is(kOfxImageEffectActionGetOutputColourspace)) return output_colour(out);
     if (is(kOfxActionDescribe)) return describe(host, effect);
     if (is(kOfxImageEffectActionDescribeInContext)) return describe_in_context(host, effect);
     if (is(kOfxActionCreateInstance)) {
@@ -79,7 +83,7 @@ OfxPlugin g_plugin = {kOfxImageEffectPluginApi,
                       kOfxImageEffectPluginApiVersion,
                       "org.palette4d.Palette4D",
                       1,
-                      0,
+                      1,
                       &remember_host,
                       &main_entry};
 

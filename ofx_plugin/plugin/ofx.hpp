@@ -15,3 +15,26 @@
 #ifndef kOfxImageEffectPropNoSpatialAwareness
 #define kOfxImageEffectPropNoSpatialAwareness "OfxImageEffectPropNoSpatialAwareness"
 #endif
+
+// From OFX 1.5: headers of older SDKs lack all of it, and those of newer ones bring a configuration
+// of some thousand lines along that is not needed here.
+#if defined(__has_include)
+#if __has_include("ofxColour.h")
+#define OFX_NO_DEFAULT_COLORSPACE_HEADER
+#include "ofxColour.h"
+#endif
+#endif
+#ifndef kOfxImageEffectPropColourManagementStyle
+#define kOfxImageEffectPropColourManagementStyle "OfxImageEffectPropColourManagementStyle"
+#define kOfxImageEffectColourManagementNone "OfxImageEffectColourManagementNone"
+#define kOfxImageEffectColourManagementBasic "OfxImageEffectColourManagementBasic"
+#define kOfxImageEffectColourManagementFull "OfxImageEffectColourManagementFull"
+#define kOfxImageEffectPropColourManagementAvailableConfigs \
+    "OfxImageEffectPropColourManagementAvailableConfigs"
+#define kOfxImageClipPropColourspace "OfxImageClipPropColourspace"
+#define kOfxImageClipPropPreferredColourspaces "OfxImageClipPropPreferredColourspaces"
+#define kOfxImageEffectActionGetOutputColourspace "OfxImageEffectActionGetOutputColourspace"
+#endif
+#ifndef kOfxConfigIdentifier
+#define kOfxConfigIdentifier "ofx-native-v1.5_aces-v1.3_ocio-v2.3"
+#endif

@@ -395,12 +395,24 @@ OfxStatus Instance::is_identity(double time, std::string& clip, double& clip_tim
     return status;
 }
 
+OfxStatus Instance::clip_preferences(OfxPropertySetStruct& out) {
+    out.put(kOfxImageEffectFrameVarying, 0);
+    return plugin_.call(kOfxImageEffectActionGetClipPreferences, &effect_, nullptr, &out);
+}
+
 OfxStatus Instance::clip_preferences(bool& frame_varying) {
     OfxPropertySetStruct out(kOutArgs);
-    out.put(kOfxImageEffectFrameVarying, 0);
-    const OfxStatus status =
-        plugin_.call(kOfxImageEffectActionGetClipPreferences, &effect_, nullptr, &out);
+    const OfxStatus status = clip_preferences(out);
     frame_varying = out.number(kOfxImageEffectFrameVarying) != 0;
+    return status;
+}
+
+OfxStatus Instance::output_colourspace(std::string& name) {
+    OfxPropertySetStruct in(kInArgs), out(kOutArgs);
+    in.put_all(kOfxImageClipPropPreferredColourspaces, {std::string("ofx_scene_linear")});
+    const OfxStatus status =
+        plugin_.call(kOfxImageEffectActionGetOutputColourspace, &effect_, &in, &out);
+    name = out.text(kOfxImageClipPropColourspace);
     return status;
 }
 

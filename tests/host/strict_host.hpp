@@ -17,6 +17,7 @@
 #include <variant>
 #include <vector>
 
+#include "ofxColour.h"
 #include "ofxCore.h"
 #include "ofxImageEffect.h"
 #include "ofxMemory.h"
@@ -283,6 +284,10 @@ public:
     /// kOfxStatOK: the clip's name and time are filled in.
     OfxStatus is_identity(double time, std::string& clip, double& clip_time);
     OfxStatus clip_preferences(bool& frame_varying);
+    /// All that GetClipPreferences says.
+    OfxStatus clip_preferences(OfxPropertySetStruct& out);
+    /// kOfxImageEffectActionGetOutputColourspace.
+    OfxStatus output_colourspace(std::string& name);
     /// Renders `window`; null source: the host has no picture. Checks images and guards afterwards.
     OfxStatus render(double time, const Picture* source, Picture& output, const OfxRectI& window);
     /// What the next renders' arguments say besides the ordinary.

@@ -11,7 +11,7 @@ TEST(node_describes_itself) {
     CHECK(plugin.ofx().pluginApi == std::string(kOfxImageEffectPluginApi));
     CHECK(plugin.ofx().apiVersion == 1);
     CHECK(plugin.ofx().pluginIdentifier == std::string("org.palette4d.Palette4D"));
-    CHECK(plugin.ofx().pluginVersionMajor == 1 && plugin.ofx().pluginVersionMinor == 0);
+    CHECK(plugin.ofx().pluginVersionMajor == 1 && plugin.ofx().pluginVersionMinor == 1);
     CHECK(plugin.load() == kOfxStatOK);
     for (const char* context : {kOfxImageEffectContextFilter, kOfxImageEffectContextGeneral}) {
         const auto effect = plugin.describe(context);
@@ -29,6 +29,10 @@ TEST(node_describes_itself) {
         CHECK(p.number(kOfxImageEffectPropSupportsMultiResolution) == 1);
         CHECK(p.text("OfxImageEffectPropCPURenderSupported") == "true");
         CHECK(p.text("OfxImageEffectPropNoSpatialAwareness") == "true");
+        CHECK(p.text(kOfxImageEffectPropColourManagementStyle) ==
+              kOfxImageEffectColourManagementFull);
+        CHECK(p.text(kOfxImageEffectPropColourManagementAvailableConfigs) ==
+              "ofx-native-v1.5_aces-v1.3_ocio-v2.3");
         for (const auto& [name, clip] : effect->clips) {
             const OfxPropertySetStruct& c = clip->properties;
             CHECK(c.text(kOfxImageEffectPropSupportedComponents, 0) == kOfxImageComponentRGBA);
