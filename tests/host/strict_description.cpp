@@ -49,6 +49,10 @@ void check_param(const OfxImageEffectStruct& effect, const std::string& name,
         check_ranges(name, q, 1);
     } else if (param.type == kOfxParamTypeRGB) {
         check_ranges(name, q, 3);
+    } else if (param.type == kOfxParamTypeString) {
+        // Animated unless it says otherwise.
+        const bool animates = !q.has(kOfxParamPropAnimates) || q.number(kOfxParamPropAnimates) != 0;
+        require(!animates || Host::get().config().animates_strings, name + " animates a text");
     } else if (param.type == kOfxParamTypeChoice) {
         require(q.has(kOfxParamPropChoiceOption), name + " has no options");
         if (!q.has(kOfxParamPropChoiceOption)) return;

@@ -104,7 +104,7 @@ OfxStatus get_image(OfxImageClipHandle clip, OfxTime, const OfxRectD*,
     set->put(kOfxImageEffectPropPreMultiplication, layout.premultiplication);
     set->put(kOfxImagePropField, std::string(kOfxImageFieldNone));
     set->put(kOfxImagePropPixelAspectRatio, 1.0);
-    set->put_all(kOfxImageEffectPropRenderScale, {1.0, 1.0});
+    set->put_all(kOfxImageEffectPropRenderScale, {layout.scale, layout.scale});
     set->put(kOfxImagePropUniqueIdentifier, std::string("picture"));
     *image = set.get();
     now.images->insert(set.release());

@@ -48,6 +48,9 @@ void Host::configure(Config config) {
     config_ = std::move(config);
     calls_ = 0;
     refused_ = false;
+    properties_.put_all(kOfxPropAPIVersion, {1, config_.api_minor});
+    properties_.put(kOfxImageEffectPropSupportsTiles, int{config_.tiles});
+    properties_.put(kOfxImageEffectPropSupportsMultiResolution, int{config_.multi_resolution});
 }
 
 void Host::fault(const std::string& what) {
@@ -222,8 +225,7 @@ std::unique_ptr<OfxImageEffectStruct> Plugin::describe(const std::string& contex
         return nullptr;
     }
     const Config& config = Host::get().config();
-    if (!Host::get().refused() && config.null_functions.empty() &&
-        config.missing_properties.empty()) {
+    if (!Host::get().refused() && !config.incomplete) {
         check_descriptor(*effect);
     }
     return effect;
@@ -269,12 +271,23 @@ Instance::Instance(Plugin& plugin, const OfxImageEffectStruct& descriptor,
         copy->properties.put(kOfxImageEffectPropComponents, std::string(kOfxImageComponentRGBA));
         copy->properties.put(kOfxImageEffectPropPreMultiplication,
                              std::string(kOfxImageUnPreMultiplied));
+        const Config& config = Host::get().config();
+        if (name == kOfxImageEffectSimpleSourceClipName && config.frame_range.size() == 2) {
+            copy->properties.put_all(kOfxImageEffectPropFrameRange,
+                                     {config.frame_range[0], config.frame_range[1]});
+        }
+        if (config.frame_rate > 0) {
+            copy->properties.put(kOfxImageEffectPropFrameRate, config.frame_rate);
+        }
         effect_.clips[name] = std::move(copy);
     }
     for (const std::string& name : descriptor.params.order) {
         const OfxParamStruct& param = *descriptor.params.params.at(name);
         auto copy = std::make_unique<OfxParamStruct>(param);
         copy->properties.kind = kParam;
+        // Not a property of the standard: nobody can ask for it.
+        copy->properties.put(" described as secret",
+                             static_cast<int>(copy->properties.number(kOfxParamPropSecret)));
         copy->value = initial_value(param);
         copy->on_set = [this](const std::string& set) { tell(set); };
         effect_.params.params[name] = std::move(copy);
@@ -418,6 +431,18 @@ OfxStatus Instance::output_colourspace(std::string& name) {
 
 OfxStatus Instance::render(double time, const Picture* source, Picture& output,
                            const OfxRectI& window) {
+    if (!twice) return render_once(time, source, output, window);
+    Picture again = output;
+    const OfxStatus second = render_once(time, source, again, window);
+    const OfxStatus status = render_once(time, source, output, window);
+    if (status != second || again.storage() != output.storage()) {
+        Host::get().fault("render: not the same twice");
+    }
+    return status;
+}
+
+OfxStatus Instance::render_once(double time, const Picture* source, Picture& output,
+                                const OfxRectI& window) {
     Host& host = Host::get();
     const std::vector<unsigned char> source_before =
         source ? source->storage() : std::vector<unsigned char>();
@@ -426,6 +451,7 @@ OfxStatus Instance::render(double time, const Picture* source, Picture& output,
     const Activity before = activity();
     activity() = {"", false, &output, source, &images};
     OfxPropertySetStruct in = render_arguments(time, window);
+    in.put_all(kOfxImageEffectPropRenderScale, {output.layout().scale, output.layout().scale});
     for (const auto& [name, value] : extra_arguments) in.put(name, value);
     const OfxStatus status = plugin_.call(kOfxImageEffectActionRender, &effect_, &in, nullptr);
     activity() = before;

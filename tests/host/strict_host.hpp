@@ -120,6 +120,7 @@ struct Layout {
     std::ptrdiff_t padding = 0;  ///< bytes after each row
     bool upside_down = false;    ///< negative rowBytes
     std::string premultiplication = kOfxImageUnPreMultiplied;
+    double scale = 1;  ///< the render scale that it is at
 
     int width() const { return bounds.x2 - bounds.x1; }
     int height() const { return bounds.y2 - bounds.y1; }
@@ -155,8 +156,15 @@ struct Config {
     std::set<std::string> missing_suites;      ///< "OfxMessageSuite/2"
     std::set<std::string> null_functions;      ///< "propSetString", "setPersistentMessage", …
     std::set<std::string> missing_properties;  ///< answered with kOfxStatErrUnknown
-    long refused_call = -1;                    ///< this call of a suite, counted from 0, fails
+    bool incomplete = false;  ///< descriptions cannot be whole, and are not checked
+    long refused_call = -1;   ///< this call of a suite, counted from 0, fails
     unsigned processors = 4;
+    int api_minor = 4;  ///< of the standard's version 1 that the host says it has
+    bool tiles = true, multi_resolution = true;
+    bool animates_strings = true;       ///< else a text that animates is a fault
+    bool secret_stays = false;          ///< what was described as secret is never shown
+    std::vector<double> frame_range{};  ///< of the source, as instances report it; empty: not
+    double frame_rate = 0;              ///< likewise; 0: not
 };
 
 /// The process' one host. Change its configuration only while no plugin runs.
@@ -292,6 +300,8 @@ public:
     OfxStatus render(double time, const Picture* source, Picture& output, const OfxRectI& window);
     /// What the next renders' arguments say besides the ordinary.
     std::map<std::string, Value> extra_arguments;
+    /// Every render is done twice, and a difference is a fault.
+    bool twice = false;
 
 private:
     Plugin& plugin_;
@@ -301,6 +311,8 @@ private:
     bool telling_ = false;  ///< the plugin is being told of its own setting
 
     void tell(const std::string& param);
+    OfxStatus render_once(double time, const Picture* source, Picture& output,
+                          const OfxRectI& window);
 };
 
 }  // namespace strict

@@ -248,6 +248,10 @@ OfxStatus set_one(const char* function, OfxPropertySetHandle set, const char* na
     const OfxStatus status = check(set, name, index, true, type, function);
     if (status != kOfxStatOK) return status;
     const std::lock_guard<std::mutex> lock(g_values_mutex);
+    if (Host::get().config().secret_stays && set->kind == kParam &&
+        name == std::string(kOfxParamPropSecret) && set->number(" described as secret") != 0) {
+        return kOfxStatOK;  // and nothing comes of it
+    }
     std::vector<Value>& values = set->values[name];
     if (static_cast<std::size_t>(index) > values.size()) {
         Host::get().fault(std::string(function) + "(" + name + "): leaves a gap before index " +

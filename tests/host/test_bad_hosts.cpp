@@ -132,6 +132,7 @@ TEST(null_functions_one_by_one) {
         for (const auto& [function, offset] : table.functions) {
             Config config;
             config.null_functions = {function};
+            config.incomplete = true;
             Host::get().configure(config);
             OfxStatus status = kOfxStatFailed;
             // A host without functions to define parameters has none to set: not the node's fault.
@@ -168,6 +169,7 @@ TEST(missing_properties_one_by_one) {
                              "OfxImageEffectPropCPURenderSupported"}) {
         Config config;
         config.missing_properties = {name};
+        config.incomplete = true;
         Host::get().configure(config);
         OfxStatus status = kOfxStatFailed;
         const auto pixels = live(plugin, pictures, status);
@@ -179,6 +181,7 @@ TEST(missing_properties_one_by_one) {
                              kOfxImageEffectPropPixelDepth, kOfxImageEffectPropComponents}) {
         Config config;
         config.missing_properties = {name};
+        config.incomplete = true;
         Host::get().configure(config);
         OfxStatus status = kOfxStatFailed;
         const auto pixels = live(plugin, pictures, status);
