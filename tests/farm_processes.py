@@ -25,8 +25,8 @@ def wait_for(what: Callable[[], object], why: str) -> None:
 class Farm:
     """A scheduler, on a port that the system chose, and its workers."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path, environment: dict[str, str]) -> None:
+        self.folder, self.environment = folder, environment
         self.file = folder / "scheduler.json"
         self.scheduler = self._start("dask_scheduler", "--port", "0", "--dashboard-address", ":0")
         wait_for(self._there, "the scheduler")
@@ -39,7 +39,7 @@ class Farm:
             return bool(json.loads(self.file.read_text())["address"])
         return False
 
-    def _start(self, program: str, *words: str) -> subprocess.Popen[bytes]:
+    def _start(self, program: str, *words: str, **more: str) -> subprocess.Popen[bytes]:
         log = self.folder / f"{program}.log"
         command = [sys.executable, "-m", f"distributed.cli.{program}", *words]
         with log.open("ab") as out:
@@ -49,14 +49,18 @@ class Farm:
                 stderr=out,
                 stdin=subprocess.DEVNULL,
                 cwd=self.folder,
-                env={**os.environ, "DASK_TEMPORARY_DIRECTORY": str(self.folder)},
+                env={
+                    **os.environ,
+                    "DASK_TEMPORARY_DIRECTORY": str(self.folder),
+                    **self.environment,
+                    **more,
+                },
             )
 
-    def add_worker(self, name: str) -> None:
-        """Start a worker of one thread, without anybody who would start it again."""
-        self.workers[name] = self._start(
-            "dask_worker", "--no-nanny", "--no-dashboard", "--nthreads", "1", "--name", name
-        )
+    def add_worker(self, name: str, threads: int = 1, **more: str) -> None:
+        """Start a worker, without anybody who would start it again; with more of an environment."""
+        words = ["--no-nanny", "--no-dashboard", "--nthreads", str(threads), "--name", name]
+        self.workers[name] = self._start("dask_worker", *words, **more)
 
     def kill(self, process: subprocess.Popen[bytes]) -> None:
         """End a process as the system does when memory runs out."""
@@ -74,10 +78,10 @@ class Farm:
 
 
 @contextlib.contextmanager
-def farm(folder: Path, workers: int) -> Iterator[Farm]:
-    """Start a farm; nothing of it outlives the block."""
+def farm(folder: Path, workers: int, **environment: str) -> Iterator[Farm]:
+    """Start a farm, with more of an environment; nothing of it outlives the block."""
     folder.mkdir()
-    made = Farm(folder)
+    made = Farm(folder, environment)
     try:
         for i in range(workers):
             made.add_worker(f"w{i}")

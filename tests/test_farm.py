@@ -17,7 +17,7 @@ from farm_processes import Farm, farm, wait_for
 from palette4d import cli
 from palette4d import farm as farms
 from palette4d.errors import Palette4dError
-from palette4d.workers import Workers
+from palette4d.workers import Failed, Workers
 from pieces import piece
 
 GOLDEN = Path(__file__).resolve().parent / "golden" / "sidecars"
@@ -139,6 +139,16 @@ def test_ctrl_c_ends_the_local_workers(edit: Path, tmp_path: Path) -> None:
     assert not [path for path in out.iterdir() if path.name.startswith(".")]
 
 
+def test_a_worker_with_several_threads_does_one_piece_at_a_time(tmp_path: Path) -> None:
+    path = os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
+    with farm(tmp_path / "farm", workers=0, PYTHONPATH=path) as made:
+        made.add_worker("wide", threads=3)
+        found: dict[int, object] = {}
+        tasks = {i: i for i in (1, 2, 3, 6)}
+        Workers(cluster=made.address).run(piece, tasks, found.__setitem__)
+    assert found == {1: (1, 3), 2: (4, 3), 3: Failed("three is refused"), 6: (36, 3)}
+
+
 class TestRefusals:
     """What is said when there is no farm."""
 
@@ -150,18 +160,27 @@ class TestRefusals:
             Workers(cluster="127.0.0.1:9").run(piece, {0: 1}, lambda key, outcome: None)
         assert time.monotonic() - started < 30
 
-    def test_no_worker_and_another_version(
+    def test_other_and_missing_palette4d_and_no_worker(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
+        (tmp_path / "sitecustomize.py").write_text("import sys; sys.modules['palette4d'] = None\n")
+        path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
         with farm(tmp_path / "farm", workers=0) as made:
-            monkeypatch.setattr(farms, "WORKERS_WITHIN", 0.5)
-            with pytest.raises(Palette4dError, match=r"no worker for 0\.5 seconds"):
-                Workers(cluster=made.address).run(piece, {0: 1}, lambda key, outcome: None)
-            monkeypatch.setattr(farms, "WORKERS_WITHIN", 120)
-            made.add_worker("w0")
-            monkeypatch.setattr("palette4d._core.__version__", "99.0")
-            with pytest.raises(Palette4dError, match=r"has palette4d .*, expected 99\.0"):
-                Workers(cluster=made.address).run(piece, {0: 1}, lambda key, outcome: None)
+
+            def work() -> None:
+                Workers(cluster=made.address).run(piece, {0: 1}, lambda key, found: None)
+
+            with monkeypatch.context() as patch:
+                patch.setattr(farms, "WORKERS_WITHIN", 0.5)
+                with pytest.raises(Palette4dError, match=r"no worker for 0\.5 seconds"):
+                    work()
+            with monkeypatch.context() as patch:
+                patch.setattr("palette4d._core.__version__", "99.0")
+                with pytest.raises(Palette4dError, match=r"has palette4d .*, expected 99\.0"):
+                    work()
+            made.add_worker("bare", PYTHONPATH=path)
+            with pytest.raises(Palette4dError, match=r"the worker .* cannot import palette4d"):
+                work()
 
     def test_without_dask_the_error_says_what_to_install(self, tmp_path: Path) -> None:
         program = (

@@ -1,8 +1,8 @@
 """Many pieces of work on a farm: the workers of a Dask scheduler, or some on this machine.
 
 A worker that dies costs its pieces another try elsewhere, and nothing else: results come back to
-this process, which alone writes files. The workers need the same palette4d, and see the clips and
-sidecars under the same paths.
+this process, which alone writes files. Scheduler and workers need the same palette4d, and the
+workers see the clips and sidecars under the same paths.
 """
 
 from __future__ import annotations
@@ -73,6 +73,7 @@ def run(
     with _connected(check_address(address)) as client:
         from distributed import as_completed
 
+        _check_scheduler(client, address)
         keys = {}
         futures = []
         for key, task in tasks.items():
@@ -104,7 +105,7 @@ def _piece(work: Callable[[Task, int], Result], task: Task) -> Result:
 
 
 def _version() -> str:
-    """Return the version of palette4d on a worker."""
+    """Return the version of palette4d where this is run."""
     return _core.__version__
 
 
@@ -154,6 +155,20 @@ def _connected(address: str) -> Iterator[Any]:
 
 
 @contextlib.contextmanager
+def _without_log() -> Iterator[None]:
+    """Keep Dask's log from standard error: what matters is told with the piece it concerns."""
+    loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
+    before = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        for logger, level in zip(loggers, before, strict=True):
+            logger.setLevel(level)
+
+
+@contextlib.contextmanager
 def _client(distributed: Any, target: Any, otherwise: str) -> Iterator[Any]:
     try:
         client = distributed.Client(target, timeout=ANSWERS_WITHIN, set_as_default=False)
@@ -162,7 +177,7 @@ def _client(distributed: Any, target: Any, otherwise: str) -> Iterator[Any]:
             f"{otherwise} ({error}); start one with `dask scheduler` and workers with `dask "
             "worker`, check the address, or use --cluster local:N"
         ) from error
-    with client:
+    with _without_log(), client:
         yield client
 
 
@@ -175,18 +190,27 @@ def _check_workers(client: Any, address: str) -> None:
             f"the scheduler at {address} has had no worker for {WORKERS_WITHIN} seconds; start "
             f"some with `dask worker {address}`"
         ) from error
+    for worker, found in sorted(client.run(_version, on_error="return").items()):
+        _check_version(f"the worker {worker}", found)
+
+
+def _check_scheduler(client: Any, address: str) -> None:
+    """Refuse a scheduler with another palette4d: it, too, must know what is sent."""
     try:
-        found = client.run(_version, on_error="return")
-    except Exception as error:
-        raise Palette4dError(f"the workers at {address} cannot be asked: {error}") from error
-    for worker, version in sorted(found.items()):
-        if isinstance(version, ImportError):
-            raise Palette4dError(
-                f"the worker {worker} cannot import palette4d ({version}); install "
-                f"palette4d {_core.__version__} where it runs"
-            )
-        if isinstance(version, str) and version != _core.__version__:
-            raise Palette4dError(
-                f"the worker {worker} has palette4d {version}, expected {_core.__version__} as "
-                "here, so that results are the same; install that where it runs"
-            )
+        found: object = client.run_on_scheduler(_version)
+    except Exception as error:  # whatever the scheduler's import raised
+        found = error
+    _check_version(f"the scheduler at {address}", found)
+
+
+def _check_version(who: str, found: object) -> None:
+    if isinstance(found, Exception):
+        raise Palette4dError(
+            f"{who} cannot import palette4d ({found}); install palette4d {_core.__version__} where "
+            "it runs"
+        )
+    if found != _core.__version__:
+        raise Palette4dError(
+            f"{who} has palette4d {found}, expected {_core.__version__} as here, so that results "
+            "are the same; install that where it runs"
+        )
