@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from palette4d.analysis import cuts, statistics
 from palette4d.analysis.clip import open_clip
 from palette4d.analysis.options import AnalysisOptions
+from palette4d.analysis.shots import BINS
 
 Frames = list[NDArray[np.uint8]]
 Case = tuple[str, Frames, list[int]]
@@ -35,8 +36,8 @@ LARGEST = 320  # pixels across: what the detectors reduce to themselves
 
 
 def ours(frames: Frames) -> list[int]:
-    """Return palette4d's cuts."""
-    options = AnalysisOptions()
+    """Return palette4d's cuts, as --detect-shots finds them."""
+    options = AnalysisOptions(colours=BINS, coarse_colours=BINS)
     gathered = [
         statistics.gather(i, frame.astype(np.float32) / 255, options)
         for i, frame in enumerate(frames)

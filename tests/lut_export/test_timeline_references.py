@@ -208,8 +208,11 @@ class TestSeries:
         assert stop.value.code == 2
 
     def test_nothing_analysed(self, show: Path, capsys: pytest.CaptureFixture[str]) -> None:
-        text = show.read_text("utf-8").replace('"done"', '"to do"')
-        show.write_text(text, "utf-8")
+        document = json.loads(show.read_text("utf-8"))
+        for shot in document["shots"]:
+            shot["status"] = "to do"
+            shot.pop("frames", None)
+        show.write_text(json.dumps(document), "utf-8")
         assert export(show, "-o", "luts") == 1
         assert "none of its 3 shots is analysed" in capsys.readouterr().err
         assert not Path("luts").exists()
