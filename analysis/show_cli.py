@@ -153,6 +153,8 @@ def _of_edit(args: argparse.Namespace) -> tuple[Source, list[Shot], list[str]]:
     edit = timeline.shots_of(document, folder, args.handles or 0)
     shots, renamed = numbered(edit.shots)
     notes = [f"not analysed: {note}" for note in edit.notes]
+    if path.suffix.lower() == ".edl" and args.rate is None:
+        notes.append("an EDL does not say its rate: 24 frames a second were taken (--rate)")
     if renamed:
         some = ", ".join(renamed[:8]) + (", …" if len(renamed) > 8 else "")
         notes.append(

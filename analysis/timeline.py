@@ -76,7 +76,7 @@ def shots_of(document: Document, folder: media.Folder | None = None, handles: in
             + "; expected at least one clip with media on a video track"
         )
     return Edit(
-        name=file_safe(timeline.name or path.stem),
+        name=file_safe(path.stem),
         rate=reader.rate,
         shots=tuple(reader.shots),
         notes=tuple(reader.notes()),

@@ -210,6 +210,19 @@ class TestEdits:
         # The sidecar's own rate is the media's.
         assert sidecar(out, "take")["clip"]["rate"] == [24, 1]
 
+    def test_an_edl_without_a_rate_is_told(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        movie(tmp_path / "take.mov", 12)
+        path = tmp_path / "reel_2.edl"
+        path.write_text(
+            "TITLE: another\n\n001 TAKE V C 00:00:00:05 00:00:00:10 10:00:00:00 10:00:00:05\n"
+            "* FROM CLIP NAME: take\n"
+        )
+        assert analyze(path, tmp_path / "out", "--media", str(tmp_path)) == 0
+        assert "24 frames a second were taken" in capsys.readouterr().err
+        assert (tmp_path / "out" / "reel_2.shots.json").is_file()
+
     def test_relative_names_stay_relative(
         self, edit: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
