@@ -18,8 +18,8 @@ struct LossWeights {
 
 /// What one frame contributes. R, C as in the paper; D is the concavity of the triangle mesh: the
 /// sum over its edges of six times the volume by which the two faces fold inwards (0 when convex).
-/// S is the sum over pairs of colours nearer than s, at distance d, of (s - d)^2 / 2s: a distance, as
-/// R and C are; s is the separation, at most a quarter of the extent of the frame's own colours.
+/// S is the sum over pairs of colours nearer than s, at distance d, of (s - d)^2 / 2s: a distance,
+/// as R and C are; s is the separation, at most a quarter of the extent of the frame's own colours.
 struct FrameLoss {
     double R = 0;
     double C = 0;
