@@ -22,6 +22,7 @@ from palette4d.analysis.manifest import DONE, FAILED, TO_DO, Entry, Manifest
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.shots import Shot, trimmed
 from palette4d.errors import Palette4dError
+from palette4d.replacing import make_folder
 from palette4d.wording import counted
 from palette4d.workers import Failed, Workers
 
@@ -145,12 +146,7 @@ def analyse(
         Ctrl-C; the sidecars that are there are whole, and the manifest lists them.
     """
     _check_only(shots, options.only)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise Palette4dError(
-            f"{folder}: the folder cannot be made: {error.strerror}; choose another"
-        ) from error
+    make_folder(folder)
     run = _Run(source, shots, folder, options)
     run.save()  # early: what cannot be written is refused before hours of work
     tell = progress or (lambda done, total, words: None)
@@ -218,7 +214,9 @@ class _Run:
         """Refuse a sidecar that may not be replaced."""
         target = self.folder / entry.sidecar
         sidecar.check_target(target, on_edits=self.options.on_edits)
-        if target.exists() and before is None and not self.options.anew:
+        if before is not None or self.options.anew or not target.exists():
+            return
+        if sidecar.load(target)["clip"]["source"] != entry.shot.clip:
             raise Palette4dError(
                 f"{target}: a sidecar of another clip is there already; choose another folder, or "
                 "replace it with --anew"

@@ -24,7 +24,7 @@ from palette4d.errors import Palette4dError
 from palette4d.lut_export import series
 from palette4d.lut_export.colour_difference import same_encodings
 from palette4d.lut_export.formats import LutFormat, format_named
-from palette4d.replacing import refuse_existing, replacing
+from palette4d.replacing import make_folder, refuse_existing, replacing
 from palette4d.wording import counted, file_safe
 
 #: The oldest of OpenColorIO's configs with camera encodings: read by every host with 2.1 or later.
@@ -140,7 +140,7 @@ def write_config(
         _refuse_looks(config, base, [ANY_SHOT, *names])
     frames = [options.choose(sidecar) for sidecar in read]
 
-    series.make_folder(folder)
+    make_folder(folder)
     format_ = format_named(options.series.bake.format or "clf")
     requests = []
     for file, name, chosen in zip(sidecars, names, frames, strict=True):

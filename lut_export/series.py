@@ -30,7 +30,7 @@ from palette4d.lut_export.series_index import (
     read_index,
     write_index,
 )
-from palette4d.replacing import replacing
+from palette4d.replacing import make_folder, replacing
 from palette4d.source_clip import frame_colours
 from palette4d.wording import file_safe
 from palette4d.workers import Failed, Workers
@@ -378,22 +378,6 @@ def _checked_name(name: str) -> str:
             f"{file_safe(name)!r}"
         )
     return name
-
-
-def make_folder(folder: Path) -> None:
-    """Make a folder and those above it.
-
-    Raises
-    ------
-    Palette4dError
-        It cannot be made.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise Palette4dError(
-            f"{folder}: the folder cannot be made: {error.strerror}; choose another"
-        ) from error
 
 
 def failures_text(failed: dict[int, str]) -> str:

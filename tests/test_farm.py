@@ -19,6 +19,7 @@ from palette4d import farm as farms
 from palette4d.errors import Palette4dError
 from palette4d.workers import Failed, Workers
 from pieces import piece
+from without_module import run_without
 
 GOLDEN = Path(__file__).resolve().parent / "golden" / "sidecars"
 EDITED = GOLDEN / "v1_edited.p4d.json"
@@ -183,20 +184,8 @@ class TestRefusals:
                 work()
 
     def test_without_dask_the_error_says_what_to_install(self, tmp_path: Path) -> None:
-        program = (
-            "import sys; sys.modules['distributed'] = None\n"
-            "from palette4d.cli import main\n"
-            f"sys.exit(main(['export', {str(EDITED)!r}, '--every', '9', '-o', 'out', "
-            "'--cluster', 'local:2']))"
-        )
-        done = subprocess.run(
-            [sys.executable, "-c", program],
-            capture_output=True,
-            text=True,
-            timeout=120,
-            cwd=tmp_path,
-            check=False,
-        )
+        words = ["export", str(EDITED), "--every", "9", "-o", "out", "--cluster", "local:2"]
+        done = run_without("distributed", tmp_path, *words)
         assert done.returncode == 1
         assert "pip install 'palette4d[farm]'" in done.stderr
 

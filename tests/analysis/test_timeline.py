@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from fractions import Fraction
 from pathlib import Path
 
@@ -28,6 +26,7 @@ from palette4d.analysis import timeline as timelines
 from palette4d.analysis import timeline_files
 from palette4d.analysis.media import Folder
 from palette4d.errors import Palette4dError
+from without_module import run_without
 
 
 @pytest.fixture
@@ -376,19 +375,7 @@ class TestFiles:
             edit(collection, tmp_path)
 
     def test_without_opentimelineio_the_error_says_what_to_install(self, tmp_path: Path) -> None:
-        program = (
-            "import sys; sys.modules['opentimelineio'] = None\n"
-            "from palette4d.cli import main\n"
-            "sys.exit(main(['analyze', 'edit.otio', '-o', 'out']))"
-        )
-        done = subprocess.run(
-            [sys.executable, "-c", program],
-            capture_output=True,
-            text=True,
-            timeout=120,
-            cwd=tmp_path,
-            check=False,
-        )
+        done = run_without("opentimelineio", tmp_path, "analyze", "edit.otio", "-o", "out")
         assert done.returncode == 1
         assert "pip install 'palette4d[timeline]'" in done.stderr
         assert not list(tmp_path.iterdir())

@@ -288,6 +288,20 @@ class TestAgain:
         assert analyze(other, out, "--detect-shots", "--anew") == 0
         assert sidecar(out, "rushes_s001")["clip"]["source"] == str(other)
 
+    def test_a_new_version_of_an_edit(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        take = external(str(movie(tmp_path / "take.mov", 30)))
+        out = tmp_path / "shots"
+        for name, items in (
+            ("v1", (clip("A", take, 0, 5), clip("B", take, 10, 5), clip("C", take, 20, 5))),
+            ("v2", (clip("A", take, 0, 5), clip("C", take, 20, 5), clip("B", take, 12, 5))),
+        ):
+            assert analyze(save(timeline(*items), tmp_path / f"{name}.otio"), out) == 0
+        assert "1 analysed, 2 there already" in capsys.readouterr().out.partition("wrote")[2]
+        document = json.loads((out / "v2.shots.json").read_text("utf-8"))
+        assert [shot["frames"] for shot in document["shots"]] == [[0, 4], [20, 24], [12, 16]]
+
     def test_processes_give_the_same_bytes(self, cut_movie: Path, tmp_path: Path) -> None:
         for jobs in ("1", "2"):
             assert analyze(cut_movie, tmp_path / jobs, "--detect-shots", "--jobs", jobs) == 0

@@ -25,6 +25,22 @@ def refuse_existing(path: Path, force: bool) -> None:
         raise Palette4dError(f"{path}: the file exists already; use --force to replace it")
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder and those above it.
+
+    Raises
+    ------
+    Palette4dError
+        It cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise Palette4dError(
+            f"{folder}: the folder cannot be made: {error.strerror}; choose another"
+        ) from error
+
+
 @contextmanager
 def replacing(path: Path, *, force: bool = False) -> Generator[Path]:
     """Yield a temporary name beside `path`, with its suffix; rename it when the body succeeds.
