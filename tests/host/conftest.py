@@ -28,13 +28,22 @@ def melt() -> Path:
     pytest.skip(reason)
 
 
+def built(repo_root: Path, name: str) -> Path:
+    """What the C++ tests' build made for the tests of the host (in $PALETTE4D_BUILD_DIR)."""
+    build = Path(os.environ.get("PALETTE4D_BUILD_DIR") or repo_root / "build" / "cmake" / "test")
+    path = build / "tests" / "host" / name
+    if not path.exists():
+        pytest.skip(f"{name} is not built: no {path} (make test-cpp, or PALETTE4D_BUILD_DIR)")
+    return path
+
+
 @pytest.fixture(scope="session")
 def strict_host(repo_root: Path) -> Path:
-    """The strict host's driver, built with the C++ tests (in $PALETTE4D_BUILD_DIR)."""
-    build = Path(os.environ.get("PALETTE4D_BUILD_DIR") or repo_root / "build" / "cmake" / "test")
-    driver = build / "tests" / "host" / "strict_host"
-    if not driver.exists():
-        pytest.skip(
-            f"the strict host is not built: no {driver} (make test-cpp, or PALETTE4D_BUILD_DIR)"
-        )
-    return driver
+    """The strict host's driver."""
+    return built(repo_root, "strict_host")
+
+
+@pytest.fixture(scope="session")
+def idle_bundle(repo_root: Path) -> Path:
+    """The bundle of an effect that does nothing, org.palette4d.tests.Idle."""
+    return built(repo_root, "Idle.ofx.bundle")
