@@ -1,0 +1,66 @@
+// Any bytes at all as a sidecar, and what the node does with those that pass for one. Built with
+// Clang's -fsanitize=fuzzer (PALETTE4D_LIBFUZZER) it is a libFuzzer target; otherwise mutate.cpp
+// drives it, with any compiler.
+#include <cstdint>
+#include <new>
+#include <stdexcept>
+#include <string>
+
+#include "fuzz_sidecar.hpp"
+#include "palette4d/handles.hpp"
+#include "palette4d/lineage.hpp"
+#include "palette4d/recolour.hpp"
+#include "palette4d/sidecar.hpp"
+
+namespace {
+
+using namespace palette4d;
+
+/// A frame of a sidecar that was accepted: whatever it holds, nothing may come of it but numbers.
+void use(const Sidecar& sidecar, double frame) {
+    const Slice slice = slice_at(sidecar.polytope, frame);
+    const std::vector<Handle> handles = handles_of(sidecar.polytope, sidecar.edits);
+    const Lineage lineage(sidecar.polytope, sidecar.edits, static_cast<int>(handles.size()) - 1);
+    const Recolourer edit(slice.rgb, edited_colours(sidecar.polytope, sidecar.edits, slice),
+                          slice.faces);
+    const Recolourer weight(slice.rgb, weight_reader(slice, lineage), slice.faces);
+    const float pixels[3][4] = {{0.2f, 0.4f, 0.6f, 1}, {-1, 7, 0.5f, 0.5f}, {0, 0, 0, 0}};
+    float result[3][4];
+    for (const Recolourer* recolourer : {&edit, &weight}) {
+        RecolourOptions options;
+        options.premultiplied = true;
+        recolourer->apply({pixels[0], 3, 1, 4, sizeof pixels}, {result[0], 3, 1, 4, sizeof result},
+                          options);
+    }
+}
+
+}  // namespace
+
+std::string outcome_of(const std::uint8_t* data, std::size_t size) {
+    const std::string text(reinterpret_cast<const char*>(data), size);
+    try {
+        const Sidecar sidecar = parse_sidecar(text, "fuzz");
+        const double first = sidecar.polytope.first_frame(), last = sidecar.polytope.last_frame();
+        for (const double part : {0.0, 0.31, 0.5, 1.0, 2.0}) {
+            try {
+                use(sidecar, first + part * (last - first));
+            } catch (const std::invalid_argument&) {
+                // The node says so and passes the picture through.
+            }
+        }
+        return "accepted";
+    } catch (const SidecarError& error) {
+        // Which check it was: what was expected, without its numbers and names.
+        std::string kind;
+        for (const char c : error.expected().substr(0, 24)) {
+            if (c == '"') break;
+            if (c < '0' || c > '9') kind += c;
+        }
+        return kind;
+    }
+}
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+    outcome_of(data, size);
+    return 0;
+}
