@@ -124,6 +124,43 @@ def test_a_project_keeps_handles_and_keyframes(
     assert np.abs(frames[4][..., :3] / top - project_clip[4][..., :3] / top).mean() > 0.002
 
 
+def test_a_project_rendered_from_another_folder(
+    scene: Scene, project_clip: list[Image], sidecars: tuple[_core.Sidecar, _core.Sidecar]
+) -> None:
+    """docs/hosts/melt.md: a sidecar below the project's folder is stored as a relative path."""
+    elsewhere = scene.folder.parent / "elsewhere"
+    elsewhere.mkdir(exist_ok=True)
+    absolute = str(scene.folder / "first.p4d.json")
+
+    def rendered(stored: str, **environment: str) -> tuple[list[Image], str]:
+        scene.run(*CLIP, "-attach", SERVICE, f"sidecar={stored}", "-consumer", "xml:moved.mlt")
+        done = subprocess.run(
+            [str(scene.melt), str(scene.folder / "moved.mlt"), *consumer(scene)],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            cwd=elsewhere,
+            env={**os.environ, "OFX_PLUGIN_PATH": str(scene.plugins), **environment},
+            check=True,
+        )
+        return [read_image(path) for path in sorted(elsewhere.glob("out_*.png"))], done.stderr
+
+    frames, said = rendered(absolute)
+    assert "first.p4d.json: the file does not exist" in said
+    for found, passed in zip(frames, project_clip, strict=True):
+        assert np.array_equal(found[..., :3], passed[..., :3])
+    for frames, said in (
+        rendered(absolute, PALETTE4D_PATH=str(scene.folder)),
+        rendered("/" + absolute),
+        rendered("$P4D_CLIP/first.p4d.json", P4D_CLIP=str(scene.folder)),
+    ):
+        assert "persistent" not in said
+        top = float(np.iinfo(scene.clip[0].dtype).max)
+        for index, (found, image) in enumerate(zip(frames, project_clip, strict=True)):
+            wanted = recolour(sidecars[0], 100 + index, image[..., :3])
+            assert np.abs(found[..., :3] / top - wanted).max() <= 0.51 / top, f"frame {index}"
+
+
 def peak_memory(scene: Scene, bundle: Path, count: int, threads: int, *effect: str) -> int:
     """KiB that melt takes at most for `count` frames through an effect."""
     form, _ = DEPTHS["8bit" if scene.clip[0].dtype == np.uint8 else "16bit"]

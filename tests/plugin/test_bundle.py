@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 import re
 import struct
 import sys
@@ -108,6 +109,21 @@ def test_asks_for_glibc_versions_alone(binary: Path) -> None:
     assert elf.versions
     assert [version for version in elf.versions if not version.startswith("GLIBC_")] == []
     assert not elf.text_relocations
+
+
+def test_the_readme_states_the_glibc_floor(binary: Path, repo_root: Path) -> None:
+    readme = (repo_root / "README.md").read_text(encoding="utf-8")
+    stated = re.search(r"runs with glibc (\d+)\.(\d+) or later", readme)
+    assert stated, "README.md does not state the node's glibc floor"
+    floor = int(stated[1]), int(stated[2])
+    here = tuple(int(part) for part in platform.libc_ver()[1].split(".")[:2])
+    if here > (2, 36):
+        pytest.skip("the README's figure is that of a node built on Debian 12 (glibc 2.36)")
+    needed = [
+        tuple(int(part) for part in version.removeprefix("GLIBC_").split(".")[:2])
+        for version in read_elf(binary).versions
+    ]
+    assert max(needed) <= floor
 
 
 def test_the_reader_sees_what_a_library_exports() -> None:
