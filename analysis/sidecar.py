@@ -36,7 +36,9 @@ LOCK_SECONDS = 10.0
 # Member order in the file; what is not named here keeps the document's order.
 _ORDER: dict[str, tuple[str, ...]] = {
     "": ("schema", "version", "generator", "clip", "polytope", "quality", "edits", "extra"),
-    "/clip": ("name", "source", "frames", "rate", "size", "encoding"),
+    "/clip": ("name", "source", "frames", "rate", "size", "encoding", "conversion"),
+    "/clip/conversion": ("input_space", "config", "error", "steps"),
+    "/clip/conversion/steps/*": ("kind", "direction"),
     "/clip/frames": ("first", "last", "step", "skipped"),
     "/polytope": ("vertices", "edges", "blocks", "transitions"),
     "/polytope/vertices/*": ("id", "frame", "rgb"),
@@ -55,6 +57,8 @@ _ORDER: dict[str, tuple[str, ...]] = {
 _SPREAD = {
     "",
     "/clip",
+    "/clip/conversion",
+    "/clip/conversion/steps",
     "/polytope",
     "/polytope/vertices",
     "/polytope/edges",
@@ -97,7 +101,8 @@ def new_document(
     ----------
     clip : mapping
         ``name``, ``source``, ``frames`` (``first``, ``last``, ``step``, ``skipped``), ``rate``
-        (numerator, denominator), ``size`` (width, height in pixels), ``encoding``.
+        (numerator, denominator), ``size`` (width, height in pixels), ``encoding``; with
+        ``conversion`` the document is of version 2, which older readers refuse.
     polytope : mapping
         ``vertices``, ``edges``, ``blocks``, ``transitions`` as in `docs/sidecar.md`.
     quality : mapping, optional
@@ -110,9 +115,9 @@ def new_document(
         `save` does that.
     """
     quality = quality or {}
-    document = {
+    document: Document = {
         "schema": SCHEMA,
-        "version": _core.SIDECAR_VERSION,
+        "version": 2 if "conversion" in clip else 1,
         "generator": f"palette4d {_core.__version__}",
         "clip": clip,
         "polytope": polytope,

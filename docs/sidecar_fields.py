@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parent.parent
 SCHEMAS = ROOT / "ofx_plugin" / "bindings" / "palette4d"
 PAGE = ROOT / "docs" / "sidecar.md"
 PAGES = {
-    PAGE: SCHEMAS / "sidecar_v1.schema.json",
+    PAGE: SCHEMAS / "sidecar_v2.schema.json",
     ROOT / "docs" / "shots.md": SCHEMAS / "shots_v1.schema.json",
 }
 BEGIN = "<!-- begin: written by python docs/sidecar_fields.py -->"
@@ -61,6 +61,8 @@ def _type(schema: Node, node: Node) -> str:
     node = _resolved(schema, node)
     if "const" in node:
         return "text" if isinstance(node["const"], str) else "integer"
+    if "anyOf" in node:
+        return "object"
     kind = node["type"]
     if kind == "array":
         if "prefixItems" in node:

@@ -8,6 +8,7 @@
 
 #include "arrays.hpp"
 #include "binders.hpp"
+#include "palette4d/colour_conversion.hpp"
 #include "palette4d/recolour.hpp"
 
 using namespace palette4d;
@@ -88,7 +89,7 @@ InstructionSet instructions_from(const std::string& name) {
 
 py::array apply(const Recolourer& self, const py::array& image, double strength, bool premultiplied,
                 int threads, const py::object& out, const std::string& precision,
-                const std::string& instructions) {
+                const std::string& instructions, const ColourConversion* conversion) {
     require_image(image, "image");
     py::array result;
     if (out.is_none()) {
@@ -115,7 +116,11 @@ py::array apply(const Recolourer& self, const py::array& image, double strength,
                                   instructions_from(instructions)};
     {
         const py::gil_scoped_release unlocked;
-        self.apply(in_view, out_view, options);
+        if (conversion) {
+            apply_converted(self, *conversion, in_view, out_view, options);
+        } else {
+            self.apply(in_view, out_view, options);
+        }
     }
     return result;
 }
@@ -138,6 +143,7 @@ void bind_recolour(py::module_& module) {
         .def("apply", &apply, py::arg("image"), py::kw_only(), py::arg("strength") = 1.0,
              py::arg("premultiplied") = false, py::arg("threads") = 1, py::arg("out") = py::none(),
              py::arg("precision") = "double", py::arg("instructions") = "best",
+             py::arg("conversion") = py::none(),
              "(h, w, 3 or 4) float32 in and out; threads 0 means one per processor.");
     module.def(
         "instruction_sets",

@@ -113,7 +113,11 @@ void bind_sidecar(py::module_& module) {
             py::return_value_policy::reference_internal)
         .def_property_readonly(
             "edits", [](const BoundSidecar& self) { return &self.edits; },
-            py::return_value_policy::reference_internal);
+            py::return_value_policy::reference_internal)
+        .def_property_readonly("conversion", [](const BoundSidecar& self) {
+            // Shared with the sidecar, and never written to.
+            return std::const_pointer_cast<palette4d::ClipConversion>(self.sidecar.conversion);
+        });
 
     module.def(
         "read_sidecar",

@@ -8,6 +8,7 @@ PYBIND11_MODULE(_core, module) {
     module.attr("__version__") = PALETTE4D_VERSION;
     bind_errors(module);
     bind_polytope(module);
+    bind_conversion(module);
     bind_sidecar(module);
     bind_slice(module);
     bind_mvc(module);

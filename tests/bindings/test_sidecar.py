@@ -15,7 +15,7 @@ import pytest
 from palette4d import Palette4dError, SidecarError, _core
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
-FILES = sorted(GOLDEN.glob("v1_*.p4d.json"))
+FILES = sorted(GOLDEN.glob("v*_*.p4d.json"))
 
 Document = dict[str, Any]
 
@@ -33,7 +33,7 @@ def refusal(document: Document | str | bytes) -> SidecarError:
 
 
 def test_there_is_a_corpus() -> None:
-    assert len(FILES) >= 10
+    assert len(FILES) >= 12
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
@@ -41,7 +41,8 @@ def test_golden_files_arrive_unchanged(path: Path) -> None:
     document = json.loads(path.read_text(encoding="utf-8"))
     read = _core.read_sidecar(path)
     clip, polytope = document["clip"], document["polytope"]
-    assert read.version == 1
+    assert read.version == int(path.name[1])
+    assert (read.conversion is None) == (read.version == 1)
     assert read.clip == {
         "name": clip["name"],
         "source": clip["source"],
@@ -253,7 +254,7 @@ def test_free_members_are_free(path: tuple[str | int, ...], value: Any) -> None:
 
 BROKEN: list[tuple[str, Callable[[Document], None], str]] = [
     ("schema", _put("schema", value="palette4d.palette"), "/schema"),
-    ("newer version", _put("version", value=2), "/version"),
+    ("newer version", _put("version", value=3), "/version"),
     ("version 0", _put("version", value=0), "/version"),
     ("fractional version", _put("version", value=1.25), "/version"),
     ("first after last", _put("clip", "frames", "first", value=21), "/clip/frames/last"),
@@ -358,7 +359,7 @@ def test_broken_documents(change: Callable[[Document], None], where: str) -> Non
 
 def test_newer_version_asks_for_an_update() -> None:
     document = golden("tetrahedron")
-    document["version"] = 2
+    document["version"] = 3
     document["something new"] = {}
     assert "written by a newer palette4d" in str(refusal(document))
     assert "update" in str(refusal(document))

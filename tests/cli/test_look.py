@@ -15,7 +15,7 @@ from palette4d.analysis import sidecar
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
 EDITED = str(GOLDEN / "v1_edited.p4d.json")
-FILES = sorted(GOLDEN.glob("v1_*.p4d.json"))
+FILES = sorted(GOLDEN.glob("v*_*.p4d.json"))
 
 
 def run(*arguments: str) -> subprocess.CompletedProcess[str]:

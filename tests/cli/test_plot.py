@@ -14,7 +14,7 @@ from palette4d.cli import main
 from palette4d.plotting import figure, layout, style, timeline
 
 GOLDEN = Path(__file__).resolve().parent.parent / "golden" / "sidecars"
-ALL_GOLDEN = sorted(GOLDEN.glob("v1_*.p4d.json"))
+ALL_GOLDEN = sorted(GOLDEN.glob("v*_*.p4d.json"))
 
 
 def pixels(path: Path) -> NDArray[np.uint8]:

@@ -81,13 +81,15 @@ TEST(every_golden_file_is_read) {
     for (const auto& entry : std::filesystem::directory_iterator(golden_folder())) {
         if (!holds(entry.path().filename().string(), ".p4d.json")) continue;
         const Sidecar sidecar = read_sidecar(entry.path().u8string());
-        CHECK_EQUAL(sidecar.version, 1);
+        const bool second = holds(entry.path().filename().string(), "v2_");
+        CHECK_EQUAL(sidecar.version, second ? 2 : 1);
+        CHECK_EQUAL(sidecar.conversion != nullptr, second);
         CHECK_EQUAL(sidecar.polytope.first_frame(), static_cast<double>(sidecar.clip.first));
         CHECK_EQUAL(sidecar.polytope.last_frame(), static_cast<double>(sidecar.clip.last));
         CHECK_EQUAL(sidecar.edits.vertex_rgb.size(), sidecar.polytope.vertices().size());
         ++count;
     }
-    CHECK(count >= 10);
+    CHECK(count >= 12);
 }
 
 TEST(values_arrive_unchanged) {
@@ -137,7 +139,7 @@ TEST(broken_documents_are_refused_where_they_are_broken) {
     };
     const std::vector<Case> cases = {
         {"palette4d.sidecar", "something.else", "/schema"},
-        {"\"version\": 1", "\"version\": 2", "/version"},
+        {"\"version\": 1", "\"version\": 3", "/version"},
         {"\"version\": 1", "\"version\": 1.5", "/version"},
         {"\"version\": 1", "\"version\": true", "/version"},
         {"\"version\": 1", "\"versions\": 1", "/version"},
@@ -181,7 +183,7 @@ TEST(broken_documents_are_refused_where_they_are_broken) {
 
 TEST(a_newer_version_asks_for_an_update) {
     const SidecarError problem =
-        refused(replaced(golden("tetrahedron"), "\"version\": 1", "\"version\": 2, \"new\": {}"));
+        refused(replaced(golden("tetrahedron"), "\"version\": 1", "\"version\": 3, \"new\": {}"));
     CHECK(holds(problem.what(), "written by a newer palette4d"));
     CHECK(holds(problem.what(), "update"));
 }

@@ -272,3 +272,71 @@ def recolour(
                 if moved[channel] != 0:
                     result[y, x, channel] = np.float32(p[channel] + moved[channel])
     return result
+
+
+# Conversions -------------------------------------------------------------------------------------
+
+
+def log_curve(step: Document, channel: int, x: float) -> float:
+    """The log step of docs/sidecar.md, forward."""
+    names = ("log_slope", "log_offset", "linear_slope", "linear_offset", "start", "below")
+    slope, offset, inner, shift, start, below = (step[name][channel] for name in names)
+    at = max(x, start)
+    y = slope * np.log(inner * at + shift) / np.log(step["base"]) + offset
+    return float(y + below * min(x - start, 0))
+
+
+def gamma_curve(step: Document, channel: int, x: float) -> float:
+    """The gamma step, forward."""
+    gamma, offset = step["gamma"][channel], step["offset"][channel]
+    if step["negative"] == "mirror" and x < 0:
+        return -gamma_curve(step, channel, -x)
+    if offset == 0:
+        return float(x if x < 0 else x**gamma)
+    turn = offset / (gamma - 1)
+    if x > turn:
+        return float(((x + offset) / (1 + offset)) ** gamma)
+    # The tangent in the turn passes through 0: its slope is y / x there.
+    return float(x * ((turn + offset) / (1 + offset)) ** gamma / turn)
+
+
+def sampled_curve(step: Document, channel: int, x: float) -> float:
+    """The curve step, forward."""
+    curve = step["curves"][channel % len(step["curves"])]
+    i = int(np.clip(np.searchsorted(curve["x"], x), 1, len(curve["x"]) - 1))
+    (x0, x1), (y0, y1) = curve["x"][i - 1 : i + 1], curve["y"][i - 1 : i + 1]
+    return float(y0 + (x - x0) / (x1 - x0) * (y1 - y0))
+
+
+CURVES = {"log": log_curve, "gamma": gamma_curve, "curve": sampled_curve}
+
+
+def curve_inverse(step: Document, channel: int, y: float) -> float:
+    """By bisection: nothing is assumed of a curve but that it rises."""
+    curve = CURVES[step["kind"]]
+    low, high = -1.0, 1.0
+    while curve(step, channel, low) > y:
+        low *= 2
+    while curve(step, channel, high) < y:
+        high *= 2
+    for _ in range(200):
+        middle = (low + high) / 2
+        if curve(step, channel, middle) < y:
+            low = middle
+        else:
+            high = middle
+    return (low + high) / 2
+
+
+def convert(steps: list[Document], colour: ArrayLike, back: bool = False) -> F64:
+    """(3,) numbers of the clip -> (3,) of the palette, or back."""
+    at = np.asarray(colour, float)
+    for step in reversed(steps) if back else steps:
+        if step["kind"] == "matrix":
+            matrix, offset = np.array(step["matrix"]), np.array(step["offset"])
+            at = np.linalg.solve(matrix, at - offset) if back else matrix @ at + offset
+            continue
+        forward = (step["direction"] == "forward") != back
+        curve = CURVES[step["kind"]] if forward else curve_inverse
+        at = np.array([curve(step, c, at[c]) for c in range(3)])
+    return at

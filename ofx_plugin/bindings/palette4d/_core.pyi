@@ -46,6 +46,31 @@ class Edits:
     def stops(self) -> list[dict[str, Any]]:
         """id, edge (its id), frame, rgb."""
 
+class ColourConversion:
+    """A chain of matrices and curves; see docs/sidecar.md."""
+
+    def __init__(self, steps: str, name: str = ...) -> None:
+        """From the JSON text of the steps; SidecarError when they are no such chain."""
+    @property
+    def identity(self) -> bool: ...
+    def to_palette(self, colours: ArrayLike) -> F64:
+        """(..., 3) clip numbers -> (..., 3) float64 palette numbers."""
+    def to_clip(self, colours: ArrayLike) -> F64:
+        """(..., 3) palette numbers -> (..., 3) float64 clip numbers."""
+
+class ClipConversion:
+    """How a sidecar's clip becomes what its palette is in."""
+
+    @property
+    def input_space(self) -> str: ...
+    @property
+    def config(self) -> str: ...
+    @property
+    def error(self) -> float:
+        """The largest difference from OpenColorIO that the analysis measured."""
+    @property
+    def steps(self) -> ColourConversion: ...
+
 class Sidecar:
     """A validated sidecar file."""
 
@@ -58,6 +83,9 @@ class Sidecar:
     def polytope(self) -> Polytope: ...
     @property
     def edits(self) -> Edits: ...
+    @property
+    def conversion(self) -> ClipConversion | None:
+        """None where the palette is in the clip's own numbers."""
 
 class Slice:
     """The polyhedral palette at one time (eq. 5)."""
@@ -116,13 +144,15 @@ class Recolourer:
         out: NDArray[np.float32] | None = ...,
         precision: Literal["single", "double"] = ...,
         instructions: str = ...,
+        conversion: ColourConversion | None = ...,
     ) -> F32:
         """(h, w, 3 or 4) float32 in and out; threads 0 means one per processor.
 
         Pixels must be packed within a row, rows may lie anywhere (``image[::-1]``, a crop); `out`
         may be `image` itself. `precision` "single" is what the node and `palette4d render` use:
         some twenty times as fast as "double" (the default) and within 1e-4 of it. `instructions`
-        is "best" or one of `instruction_sets`; the result is the same.
+        is "best" or one of `instruction_sets`; the result is the same. With a `conversion` the
+        image is in the clip's numbers, and the palette in those that it leads to.
         """
 
 def instruction_sets() -> list[str]:

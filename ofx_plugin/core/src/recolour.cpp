@@ -1,57 +1,22 @@
 #include "palette4d/recolour.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
-#include <exception>
 #include <limits>
 #include <mutex>
 #include <stdexcept>
 #include <string>
-#include <system_error>
-#include <thread>
 #include <utility>
 
+#include "image_rows.hpp"
 #include "kernel_choice.hpp"
 #include "recolour_plan.hpp"
 #include "split.hpp"
 #include "vec3.hpp"
 
 namespace palette4d {
-namespace {
-
-const float* row_of(const ConstImageView& view, int y) {
-    return reinterpret_cast<const float*>(reinterpret_cast<const char*>(view.data) +
-                                          view.row_bytes * y);
-}
-float* row_of(const ImageView& view, int y) {
-    return reinterpret_cast<float*>(reinterpret_cast<char*>(view.data) + view.row_bytes * y);
-}
-
-template <class View>
-void check_view(const View& view, const char* name) {
-    const std::string what = std::string("recolour: the ") + name + " image ";
-    if (view.channels != 3 && view.channels != 4) {
-        throw std::invalid_argument(what + "has " + std::to_string(view.channels) +
-                                    " channels; expected 3 or 4");
-    }
-    if (view.width < 0 || view.height < 0) {
-        throw std::invalid_argument(what + "is " + std::to_string(view.width) + " by " +
-                                    std::to_string(view.height) + "; expected no negative size");
-    }
-    if (view.width == 0 || view.height == 0) return;
-    if (view.data == nullptr) throw std::invalid_argument(what + "has no data");
-    const auto row = static_cast<std::ptrdiff_t>(sizeof(float)) * view.width * view.channels;
-    if (view.height > 1 && std::abs(view.row_bytes) < row) {
-        throw std::invalid_argument(what + "has rows " + std::to_string(view.row_bytes) +
-                                    " bytes apart; expected at least " + std::to_string(row));
-    }
-}
-
-}  // namespace
-
 Recolourer::Recolourer(std::vector<Vec3> original, const std::vector<Vec3>& edited,
                        std::vector<Face> faces)
     : body_(std::move(original), std::move(faces)) {
@@ -419,81 +384,37 @@ RecolourCounts Recolourer::apply(const ConstImageView& in, const ImageView& out,
                                  const RecolourOptions& given) const {
     RecolourOptions options = given;
     options.premultiplied = options.premultiplied && in.channels == 4;
-    check_view(in, "input");
-    check_view(out, "output");
-    if (in.width != out.width || in.height != out.height || in.channels != out.channels) {
-        const auto size = [](const auto& view) {
-            return std::to_string(view.width) + " by " + std::to_string(view.height) + " with " +
-                   std::to_string(view.channels) + " channels";
-        };
-        throw std::invalid_argument("recolour: the output image is " + size(out) +
-                                    "; expected that of the input image, " + size(in));
-    }
-    if (!std::isfinite(options.strength)) {
-        throw std::invalid_argument("recolour: the strength is not finite");
-    }
-    if (options.threads < 0) {
-        throw std::invalid_argument("recolour: " + std::to_string(options.threads) +
-                                    " threads; expected 0 (one per processor) or more");
-    }
+    check_recolouring(in, out, options);
     resolved(options.instructions);
     if (in.width == 0 || in.height == 0) return {};
 
     if (identity_ || displaced_.empty() || options.strength == 0) {
-        const std::size_t bytes = sizeof(float) * static_cast<std::size_t>(in.width) *
-                                  static_cast<std::size_t>(in.channels);
-        for (int y = 0; y < in.height; ++y) {
-            if (row_of(in, y) != row_of(out, y)) std::memmove(row_of(out, y), row_of(in, y), bytes);
-        }
+        copy_rows(in, out);
         return {};
     }
 
-    int threads = options.threads;
-    if (threads == 0) threads = static_cast<int>(std::thread::hardware_concurrency());
-    threads = std::clamp(threads, 1, in.height);
-
-    std::atomic<int> next{0};
-    std::exception_ptr problem;
     RecolourCounts counts;
     std::mutex guard;
-    const auto rows = [&](auto& recolour) {
-        for (int y = next++; y < in.height; y = next++) {
-            recolour.row(row_of(in, y), row_of(out, y), in.width, in.channels);
-        }
-    };
-    const auto work = [&] {
-        try {
-            RecolourCounts mine;
-            if (options.precision == Precision::kDouble) {
-                OneByOne one_by_one(*this, options);
-                rows(one_by_one);
-                mine.one = one_by_one.count();
-            } else {
-                const auto pipeline = std::make_unique<Pipeline>(*this, options);
-                rows(*pipeline);
-                pipeline->finish();
-                mine = pipeline->counts();
+    share_rows(in.height, options.threads, [&](const NextRow& next) {
+        const auto rows = [&](auto& recolour) {
+            for (int y = next(); y >= 0; y = next()) {
+                recolour.row(row_of(in, y), row_of(out, y), in.width, in.channels);
             }
-            const std::lock_guard<std::mutex> lock(guard);
-            counts.single += mine.single;
-            counts.twofold += mine.twofold;
-            counts.one += mine.one;
-        } catch (...) {
-            const std::lock_guard<std::mutex> lock(guard);
-            if (!problem) problem = std::current_exception();
-            next = in.height;
+        };
+        RecolourCounts mine;
+        if (options.precision == Precision::kDouble) {
+            OneByOne one_by_one(*this, options);
+            rows(one_by_one);
+            mine.one = one_by_one.count();
+        } else {
+            const auto pipeline = std::make_unique<Pipeline>(*this, options);
+            rows(*pipeline);
+            pipeline->finish();
+            mine = pipeline->counts();
         }
-    };
-    std::vector<std::thread> helpers;
-    helpers.reserve(static_cast<std::size_t>(threads - 1));
-    try {
-        for (int i = 1; i < threads; ++i) helpers.emplace_back(work);
-    } catch (const std::system_error&) {
-        // No more threads to be had: those that run share the rows.
-    }
-    work();
-    for (std::thread& helper : helpers) helper.join();
-    if (problem) std::rethrow_exception(problem);
+        const std::lock_guard<std::mutex> lock(guard);
+        counts += mine;
+    });
     return counts;
 }
 

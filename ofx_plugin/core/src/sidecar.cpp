@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <initializer_list>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <unordered_map>
@@ -30,6 +31,11 @@ constexpr std::int64_t kMaxFrame = 1'000'000'000;
 constexpr std::int64_t kMaxRate = 2'147'483'647;
 constexpr std::int64_t kMaxSize = 1'000'000;
 constexpr std::size_t kMaxIdLength = 64;
+/// Of a conversion; a curve over all half floats has 63 488 samples.
+constexpr std::size_t kMaxSteps = 64;
+constexpr std::size_t kMaxSamples = 100'000;
+/// Numbers of a conversion: what scene-linear light of half floats needs, with room.
+constexpr double kMaxConversion = 1e9;
 constexpr std::size_t kShownText = 60;
 
 /// The length of the well-formed UTF-8 sequence at text[at], 0 when there is none.
@@ -431,8 +437,123 @@ void read_head(const Cursor& root, Sidecar& sidecar) {
     root.member("extra").require_object();
 }
 
-ClipInfo read_clip(const Cursor& clip) {
-    clip.require_members({"name", "source", "frames", "rate", "size", "encoding"});
+bool read_flag(const Cursor& where) {
+    const std::string text = where.text();
+    if (text != "forward" && text != "inverse") where.wrong("\"forward\" or \"inverse\"");
+    return text == "inverse";
+}
+
+Vec3 read_three(const Cursor& where) {
+    if (where.list("3 numbers, for r, g and b") != 3) where.wrong("a list of 3 numbers");
+    Vec3 result{};
+    for (std::size_t i = 0; i < 3; ++i) {
+        result[i] = where.element(i).number(kMaxConversion, "a number");
+    }
+    return result;
+}
+
+std::vector<double> read_samples(const Cursor& where) {
+    const std::size_t count = where.list("numbers");
+    if (count > kMaxSamples) {
+        where.wrong("at most " + std::to_string(kMaxSamples) + " numbers");
+    }
+    std::vector<double> result(count);
+    for (std::size_t i = 0; i < count; ++i) {
+        result[i] = where.element(i).number(kMaxConversion, "a number");
+    }
+    return result;
+}
+
+ConversionStep read_step(const Cursor& step) {
+    step.require_object();
+    const Cursor kind = step.member("kind");
+    const std::string name = kind.text();
+    if (name == "matrix") {
+        step.require_members({"kind", "matrix", "offset"});
+        MatrixStep result{};
+        const Cursor rows = step.member("matrix");
+        if (rows.list("3 rows") != 3) rows.wrong("a list of 3 rows");
+        for (std::size_t r = 0; r < 3; ++r) {
+            const Vec3 row = read_three(rows.element(r));
+            for (std::size_t c = 0; c < 3; ++c) result.matrix[3 * r + c] = row[c];
+        }
+        result.offset = read_three(step.member("offset"));
+        return result;
+    }
+    if (name == "log") {
+        step.require_members({"kind", "direction", "base", "log_slope", "log_offset",
+                              "linear_slope", "linear_offset", "start", "below"});
+        LogStep result{};
+        result.base = step.member("base").number(kMaxConversion, "a number");
+        result.log_slope = read_three(step.member("log_slope"));
+        result.log_offset = read_three(step.member("log_offset"));
+        result.linear_slope = read_three(step.member("linear_slope"));
+        result.linear_offset = read_three(step.member("linear_offset"));
+        result.start = read_three(step.member("start"));
+        result.below = read_three(step.member("below"));
+        result.inverse = read_flag(step.member("direction"));
+        return result;
+    }
+    if (name == "gamma") {
+        step.require_members({"kind", "direction", "gamma", "offset", "negative"});
+        const Cursor negative = step.member("negative");
+        const std::string how = negative.text();
+        if (how != "line" && how != "mirror") negative.wrong("\"line\" or \"mirror\"");
+        return GammaStep{read_three(step.member("gamma")), read_three(step.member("offset")),
+                         how == "mirror", read_flag(step.member("direction"))};
+    }
+    if (name == "curve") {
+        step.require_members({"kind", "direction", "curves"});
+        CurveStep result{};
+        const Cursor curves = step.member("curves");
+        const std::size_t count = curves.list("1 curve or 3");
+        if (count != 1 && count != 3) curves.wrong("a list of 1 curve or 3");
+        for (std::size_t i = 0; i < count; ++i) {
+            const Cursor curve = curves.element(i);
+            curve.require_members({"x", "y"});
+            result.curves.push_back(
+                {read_samples(curve.member("x")), read_samples(curve.member("y"))});
+        }
+        result.inverse = read_flag(step.member("direction"));
+        return result;
+    }
+    kind.wrong("\"matrix\", \"log\", \"gamma\" or \"curve\"");
+}
+
+ColourConversion read_steps(const Cursor& steps, const std::string& file,
+                            const std::string& pointer) {
+    const std::size_t count = steps.list("steps");
+    if (count > kMaxSteps) steps.wrong("at most " + std::to_string(kMaxSteps) + " steps");
+    std::vector<ConversionStep> result;
+    for (std::size_t i = 0; i < count; ++i) result.push_back(read_step(steps.element(i)));
+    try {
+        return ColourConversion(std::move(result));
+    } catch (const ConversionProblem& problem) {
+        throw SidecarError(file, pointer + '/' + std::to_string(problem.step()) + problem.member(),
+                           problem.found(), problem.expected());
+    }
+}
+
+std::shared_ptr<const ClipConversion> read_conversion(const Cursor& where,
+                                                      const std::string& file) {
+    where.require_members({"input_space", "config", "error", "steps"});
+    auto result = std::make_shared<ClipConversion>();
+    result->input_space = where.member("input_space").text();
+    result->config = where.member("config").text();
+    const Cursor error = where.member("error");
+    result->error = error.number(1, "a number");
+    if (result->error < 0) error.wrong("a number from 0");
+    result->steps = read_steps(where.member("steps"), file, "/clip/conversion/steps");
+    return result;
+}
+
+ClipInfo read_clip(const Cursor& clip, int version) {
+    if (version < 2) {
+        clip.require_members({"name", "source", "frames", "rate", "size", "encoding"});
+    } else {
+        clip.require_members(
+            {"name", "source", "frames", "rate", "size", "encoding", "conversion"});
+    }
     ClipInfo info;
     info.name = clip.member("name").text();
     info.source = clip.member("source").text();
@@ -645,7 +766,10 @@ Sidecar parse_sidecar(const std::string& text, const std::string& name) {
     const Cursor root(tree, name);
     Sidecar sidecar;
     read_head(root, sidecar);
-    sidecar.clip = read_clip(root.member("clip"));
+    sidecar.clip = read_clip(root.member("clip"), sidecar.version);
+    if (sidecar.version >= 2) {
+        sidecar.conversion = read_conversion(root.member("clip").member("conversion"), name);
+    }
     Index vertex_index;
     Index edge_index;
     std::set<std::string> taken;
@@ -655,6 +779,11 @@ Sidecar parse_sidecar(const std::string& text, const std::string& name) {
     sidecar.edits =
         read_edits(root.member("edits"), sidecar.polytope, vertex_index, edge_index, taken);
     return sidecar;
+}
+
+ColourConversion parse_conversion(const std::string& text, const std::string& name) {
+    const Json tree = json_tree(text, name);
+    return read_steps(Cursor(tree, name), name, "");
 }
 
 Sidecar read_sidecar(const std::string& path) {

@@ -50,6 +50,13 @@ struct RecolourCounts {
     long long single = 0;   ///< many at a time in float
     long long twofold = 0;  ///< many at a time in double
     long long one = 0;      ///< by PaletteBody
+
+    RecolourCounts& operator+=(const RecolourCounts& other) {
+        single += other.single;
+        twofold += other.twofold;
+        one += other.one;
+        return *this;
+    }
 };
 
 struct RecolourPlan;

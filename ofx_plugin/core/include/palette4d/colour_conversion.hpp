@@ -1,0 +1,92 @@
+// From a clip's numbers to those that its palette is found in, and back: a chain of matrices and
+// monotone curves, so that neither the node nor a renderer needs a colour management library.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <stdexcept>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "palette4d/recolour.hpp"
+
+namespace palette4d {
+
+/// y = matrix x + offset; rows follow each other, the matrix has an inverse.
+struct MatrixStep {
+    std::array<double, 9> matrix;
+    Vec3 offset;
+};
+
+/// For each channel y = log_slope log_base(linear_slope x + linear_offset) + log_offset where x is
+/// above `start`, and from there down a straight line of slope `below`. The camera logs of CLF.
+struct LogStep {
+    double base;
+    Vec3 log_slope, log_offset, linear_slope, linear_offset, start, below;
+    bool inverse;  ///< from y to x
+};
+
+/// For each channel y = ((x + offset) / (1 + offset))^gamma, and below x = offset / (gamma - 1) the
+/// tangent through 0. Without an offset y = x^gamma. Negative numbers go on along the straight line
+/// (without an offset y = x), or mirrored: y(-x) = -y(x).
+struct GammaStep {
+    Vec3 gamma, offset;
+    bool mirrored;
+    bool inverse;  ///< from y to x
+};
+
+/// Samples of a curve, both strictly rising, straight in between and beyond the ends.
+struct SampledCurve {
+    std::vector<double> x, y;
+};
+struct CurveStep {
+    std::vector<SampledCurve> curves;  ///< one for all channels, or three
+    bool inverse;                      ///< from y to x
+};
+
+using ConversionStep = std::variant<MatrixStep, LogStep, GammaStep, CurveStep>;
+
+/// A step that has no inverse or is no curve: which member, what was found and expected.
+class ConversionProblem : public std::invalid_argument {
+public:
+    ConversionProblem(std::size_t step, std::string member, std::string found,
+                      std::string expected);
+    std::size_t step() const { return step_; }
+    const std::string& member() const { return member_; }
+    const std::string& found() const { return found_; }
+    const std::string& expected() const { return expected_; }
+
+private:
+    std::size_t step_;
+    std::string member_, found_, expected_;
+};
+
+/// The chain; continuous, invertible, defined for every number. Immutable.
+class ColourConversion {
+public:
+    ColourConversion() = default;  ///< changes nothing
+    /// Throws ConversionProblem.
+    explicit ColourConversion(std::vector<ConversionStep> steps);
+
+    const std::vector<ConversionStep>& steps() const { return steps_; }
+    bool identity() const { return steps_.empty(); }
+    /// The palette's numbers of the clip's, which must be finite. Not finite only beyond 1e30.
+    Vec3 to_palette(const Vec3& clip) const;
+    /// And back.
+    Vec3 to_clip(const Vec3& palette) const;
+
+private:
+    std::vector<ConversionStep> steps_;
+    std::vector<MatrixStep> inverses_;  ///< of the matrices among the steps, in their order
+};
+
+/// Recolours a picture in the clip's numbers with a palette that was found in others. A colour that
+/// the edit does not move keeps its bits; what is moved goes to the palette's numbers and back in
+/// double precision, so that nothing jumps where an edit begins. Colours with a NaN or an infinity
+/// pass. As Recolourer::apply otherwise.
+RecolourCounts apply_converted(const Recolourer& recolourer, const ColourConversion& conversion,
+                               const ConstImageView& in, const ImageView& out,
+                               const RecolourOptions& options);
+
+}  // namespace palette4d
