@@ -38,6 +38,8 @@ example:
   palette4d analyze shot010.####.exr -o shot010.p4d.json
   palette4d analyze plates/ --frames 1001-1100x2 -o plates.p4d.json
   palette4d analyze take3.mov -o take3.p4d.json --vertices 16      fewer handles, looser fit
+  palette4d analyze cg.####.exr -o cg.p4d.json --input-space ACEScg     found in ACEScct
+  palette4d analyze a.####.dpx -o a.p4d.json --input-space 'ARRI LogC4'  found in LogC4 itself
 """
 EPILOG += show_cli.EPILOG
 
@@ -117,6 +119,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         action="store_true",
         help="analyse a clip with sudden cuts as one shot instead of stopping",
     )
+    _add_space_options(parser)
     edits = parser.add_mutually_exclusive_group()
     edits.add_argument(
         "--keep-edits",
@@ -162,6 +165,33 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.set_defaults(run=run, usage_error=parser.error)
 
 
+def _add_space_options(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group(
+        "colour spaces",
+        "Without any of these, and without $OCIO, the palette is found in the numbers of the "
+        "clip's files. Names, aliases and roles of an OpenColorIO config; docs/colour_spaces.md "
+        "says how to choose.",
+    )
+    group.add_argument(
+        "--input-space",
+        metavar="SPACE",
+        help="what the clip's numbers are (default: by the config's file rules and what the files "
+        "say)",
+    )
+    group.add_argument(
+        "--palette-space",
+        metavar="SPACE",
+        help="what the palette is found and edited in (default: for scene-linear clips the "
+        "config's log encoding, ACEScct as a rule; else the input space)",
+    )
+    group.add_argument(
+        "--ocio-config",
+        metavar="CONFIG",
+        help="a config.ocio, .ocioz or ocio:// name (default: $OCIO, else OpenColorIO's built-in "
+        "studio config)",
+    )
+
+
 def _check(field: str) -> Callable[[float], AnalysisOptions]:
     """Return a function that refuses a value out of the option's range."""
     return lambda value: AnalysisOptions(**{field: value})  # type: ignore[arg-type]
@@ -181,7 +211,7 @@ def _rate(text: str) -> Fraction:
 
 def run(args: argparse.Namespace) -> int:
     """Run `palette4d analyze`."""
-    from palette4d.analysis import pipeline, sidecar
+    from palette4d.analysis import colour_space, pipeline, sidecar
     from palette4d.analysis.clip import open_clip
 
     many = show_cli.is_show(args)
@@ -193,19 +223,26 @@ def run(args: argparse.Namespace) -> int:
     clip = open_clip(
         args.clip, frames=args.frames, rate=args.rate, skip_bad_frames=args.skip_bad_frames
     )
+    spaces = colour_space.spaces_of(
+        clip, colour_space.SpaceOptions(args.input_space, args.palette_space, args.ocio_config)
+    )
+    clip = colour_space.converted(clip, spaces)
     show = _Bars(hidden=args.quiet or args.json)
     try:
         document, analysis = pipeline.analyze_clip(clip, options, show, allow_cuts=args.allow_cuts)
     finally:
         show.close()
     document["clip"]["source"] = _beside(document["clip"]["source"], args.output)
+    beyond = colour_space.record(document, clip, spaces)
     sidecar.save(document, args.output, on_edits=args.on_edits)
-    for remark in (*_skipped(clip), *analysis.remarks):
+    for remark in (*_skipped(clip), *beyond, *analysis.remarks):
         print(f"palette4d: note: {remark}", file=sys.stderr)
     if args.json:
         print(json.dumps(_machine_report(args.output, analysis, show), indent=2))
     elif not args.quiet:
         _print_report(args.output, clip, analysis, show)
+        if where := colour_space.described(spaces):
+            print(f"{'colours':<10} {where}")
     return 0
 
 

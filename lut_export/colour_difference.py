@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from palette4d.ocio_config import SAME_ENCODINGS, same_encodings
 
 F64 = NDArray[np.float64]
 
@@ -22,42 +23,6 @@ _XYZ = np.array(
     ]
 )
 _WHITE = _XYZ.sum(axis=1)
-
-#: The names of one encoding in files and in OpenColorIO configs of different years.
-SAME_ENCODINGS = (
-    (
-        "sRGB",
-        "srgb_tx",
-        "srgb_texture",
-        "srgb_rec709_scene",
-        "sRGB - Texture",
-        "Utility - sRGB - Texture",
-        "Output - sRGB",
-    ),
-    (
-        "Rec.709",
-        "Rec709",
-        "g24_rec709",
-        "g24_rec709_scene",
-        "rec709_display",
-        "Gamma 2.4 Rec.709 - Texture",
-        "Utility - Rec.709 - Display",
-        "Output - Rec.709",
-    ),
-    ("g22_rec709", "g22_rec709_scene", "Gamma 2.2 Rec.709 - Texture"),
-    (
-        "lin_rec709",
-        "Linear",
-        "lin_rec709_scene",
-        "lin_srgb",
-        "Linear Rec.709 (sRGB)",
-        "Utility - Linear - Rec.709",
-        "Utility - Linear - sRGB",
-    ),
-    ("ACEScg", "lin_ap1", "lin_ap1_scene", "ACES - ACEScg"),
-    ("ACES2065-1", "lin_ap0", "lin_ap0_scene", "ACES - ACES2065-1"),
-    ("ACEScct", "acescct_ap1", "acescct_ap1_scene", "ACES - ACEScct"),
-)
 
 
 @dataclass(frozen=True)
@@ -96,18 +61,6 @@ def viewing_of(encoding: str) -> Viewing:
         found, linear = converted
         return Viewing(f"{found} by OpenColorIO's studio config, D65", linear)
     return Viewing(f"encoding {encoding!r} unknown, taken as sRGB, D65", srgb_to_linear)
-
-
-def same_encodings(encoding: str) -> list[str]:
-    """Return the names under which files and configs know an encoding, its own first.
-
-    >>> same_encodings("lin_ap1")[:2]
-    ['lin_ap1', 'ACEScg']
-    """
-    for names in SAME_ENCODINGS:
-        if encoding.strip().lower() in (name.lower() for name in names):
-            return [encoding, *names]
-    return [encoding]
 
 
 def _by_opencolorio(names: list[str]) -> tuple[str, Callable[[F64], F64]] | None:

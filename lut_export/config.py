@@ -22,13 +22,10 @@ from typing import Any
 from palette4d import _core
 from palette4d.errors import Palette4dError
 from palette4d.lut_export import series
-from palette4d.lut_export.colour_difference import same_encodings
 from palette4d.lut_export.formats import LutFormat, format_named
+from palette4d.ocio_config import BUILT_IN, load_config, same_encodings
 from palette4d.replacing import make_folder, refuse_existing, replacing
 from palette4d.wording import counted, file_safe
-
-#: The oldest of OpenColorIO's configs with camera encodings: read by every host with 2.1 or later.
-BUILT_IN = "ocio://studio-config-v1.0.0_aces-v1.3_ocio-v2.1"
 
 #: The look whose shot and frame are both variables.
 ANY_SHOT = "palette4d"
@@ -262,32 +259,7 @@ def _link(
 
 def _load_base(base: str) -> tuple[Any, bool]:
     """Return an editable copy of the base config, and whether it is an archive."""
-    import PyOpenColorIO as ocio
-
-    if base.startswith("ocio://"):
-        known = [f"ocio://{entry[0]}" for entry in ocio.BuiltinConfigRegistry().getBuiltinConfigs()]
-        try:
-            return ocio.Config.CreateFromBuiltinConfig(base), False
-        except ocio.Exception as error:
-            near = difflib.get_close_matches(base, known, n=3, cutoff=0.3) or known
-            raise Palette4dError(
-                f"{base}: OpenColorIO {ocio.__version__} has no such config; expected one such as "
-                f"{' or '.join(near)}"
-            ) from error
-    if not Path(base).is_file():
-        raise Palette4dError(
-            f"{base}: found no config there; expected a config.ocio, an .ocioz archive or a "
-            "built-in ocio:// name"
-        )
-    try:
-        config = ocio.Config.CreateFromFile(base)
-        config.validate()
-    except ocio.Exception as error:
-        raise Palette4dError(
-            f"{base}: OpenColorIO cannot use it as a config: {error}; mend it, or choose another "
-            "with --base"
-        ) from error
-    return config, base.lower().endswith(".ocioz")
+    return load_config(base, "--base"), base.lower().endswith(".ocioz")
 
 
 def _process_space(config: Any, base: str, sidecar: _core.Sidecar, wanted: str | None) -> str:

@@ -50,7 +50,7 @@ example:
   palette4d edit clip.p4d.json reset v12
   palette4d edit clip.p4d.json reset
 
-Colours are R G B, R,G,B or #rrggbb, in the clip's own encoding; R G B may lie outside 0..1.
+Colours are R G B, R,G,B or #rrggbb, in the palette's own numbers; R G B may lie outside 0..1.
 `palette4d info` lists the ids.
 """
 
@@ -270,6 +270,7 @@ def info_of(document: Document) -> dict[str, Any]:
         "rate": clip["rate"],
         "size": clip["size"],
         "encoding": clip["encoding"],
+        "input_space": clip.get("conversion", {}).get("input_space"),
         "generator": document["generator"],
         "version": document["version"],
         "vertices": len(polytope["vertices"]),
@@ -304,7 +305,9 @@ def run_info(args: argparse.Namespace) -> int:
     skipped = f", {len(info['skipped'])} skipped" if info["skipped"] else ""
     print(f"clip      {info['name']}  ({info['source']})")
     print(f"frames    {first} to {last}{step}{skipped}, {numerator / denominator:g} per second")
-    print(f"picture   {info['size'][0]} x {info['size'][1]}, {info['encoding']}")
+    found_in = f", palette in {info['encoding']}" if info["input_space"] else ""
+    colours = info["input_space"] or info["encoding"]
+    print(f"picture   {info['size'][0]} x {info['size'][1]}, {colours}{found_in}")
     print(
         f"palette   {counted(info['vertices'], 'vertex', 'vertices')}, "
         f"{counted(info['edges'], 'edge')}, {counted(info['blocks'], 'block')}: "

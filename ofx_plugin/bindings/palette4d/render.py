@@ -29,7 +29,8 @@ DESCRIPTION = """\
 Recolour the frames of a clip with the edits of a sidecar, by the same code as the OpenFX node.
 Frame numbers are kept: frame 1017 of the clip is recoloured with the palette at time 1017 and
 written as frame 1017. Movies count from 0. Where nothing is edited a picture keeps its exact
-values.
+values. Where the palette was found in another colour space than the clip's, pixels go there and
+back; what is not edited keeps its exact values all the same.
 
 EXR is written as 32-bit float (or half with --half), PNG with 8 bits for an 8-bit source and 16 for
 others, TIFF likewise or as 32-bit float for a float source; --bits chooses."""
@@ -76,6 +77,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         metavar="S",
         help="0 the original, 1 the edit (1)",
     )
+    parser.add_argument(
+        "--space",
+        choices=("input", "palette"),
+        default="input",
+        help="what the clip's numbers are: as those that were analysed, or the palette's own "
+        "(default input)",
+    )
     parser.add_argument("--half", action="store_true", help="EXR with 16-bit float")
     parser.add_argument(
         "--bits", type=int, choices=(8, 16, 32), help="bits a sample of PNG (8, 16) or TIFF"
@@ -93,10 +101,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 @dataclass(frozen=True)
 class RenderOptions:
-    """How to recolour: strength is 0 (original) to 1 (edit), threads 0 means one per processor."""
+    """How to recolour: strength is 0 (original) to 1 (edit), threads 0 means one per processor.
+
+    in_palette_space: the pixels are in the palette's numbers already.
+    """
 
     strength: float = 1.0
     threads: int = 0
+    in_palette_space: bool = False
 
 
 def recoloured(
@@ -115,6 +127,9 @@ def recoloured(
         premultiplied=premultiplied and pixels.shape[2] == 4,
         threads=options.threads,
         precision="single",
+        conversion=None
+        if sidecar.conversion is None or options.in_palette_space
+        else sidecar.conversion.steps,
     )
 
 
@@ -130,7 +145,7 @@ def run(args: argparse.Namespace) -> int:
     _check_outputs(clip, pattern, args)
     _warn(clip, sidecar)
     make_folder(pattern.folder)
-    options = RenderOptions(args.strength, args.threads)
+    options = RenderOptions(args.strength, args.threads, args.space == "palette")
     written = render(sidecar, clip, pattern, samples, options, quiet=args.quiet)
     first, last = pattern.path(written[0]), pattern.path(written[-1])
     what = (
