@@ -9,14 +9,17 @@ first, where a stop of light has the same length everywhere.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import os
-from collections.abc import Iterator
+import threading
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d.analysis.clip_base import Clip, Image
+from palette4d import _core
+from palette4d.analysis.clip_base import Clip, Fill, FrameError, Image
 from palette4d.conversion_steps import TOLERANCE, Comparison, Conversion, conversion
 from palette4d.errors import Palette4dError
 from palette4d.ocio_config import chosen_config, colour_space, same_encodings
@@ -146,6 +149,7 @@ class ConvertedClip(Clip):
         self.encoding = spaces.palette_space
         self._clip = clip
         self._chain = spaces.conversion.chain
+        self._lock = threading.Lock()
         self.comparison = Comparison(
             spaces.config, spaces.input_space, spaces.palette_space, self._chain
         )
@@ -162,13 +166,37 @@ class ConvertedClip(Clip):
         """As the clip itself."""
         return self._clip.iter_images()
 
+    def fills(self, frames: Sequence[int]) -> Iterator[tuple[int, Fill]]:
+        """For each frame its number and what bins it; movies are decoded in order, images there."""
+        for frame in frames:
+            fill: Fill = functools.partial(self._fill, frame)
+            if self.is_movie:
+                try:
+                    fill = functools.partial(self._bin, self._clip.load(frame).pixels)
+                except FrameError as error:
+                    fill = functools.partial(_fail, error)
+            yield frame, fill
+
+    def _fill(self, frame: int, binner: _core.ColourBinner) -> None:
+        self._bin(self._clip.load(frame).pixels, binner)
+
+    def _bin(self, pixels: F32, binner: _core.ColourBinner) -> None:
+        rows = pixels[self.row_step // 2 :: self.row_step]
+        binner.add(np.ascontiguousarray(self.straight_colours(rows)))
+
     def straight_colours(self, pixels: F32) -> F32:
         """(h, w, 3) float32 straight colours in the palette's numbers."""
         colours = self._clip.straight_colours(pixels)
         flat = colours.reshape(-1, 3)
         some = flat[:: max(1, len(flat) // COMPARED)]
-        self.comparison.add(some[np.isfinite(some).all(axis=1)])
+        with self._lock:
+            self.comparison.add(some[np.isfinite(some).all(axis=1)])
         return self._chain.to_palette(colours).astype(np.float32)
+
+
+def _fail(error: FrameError, binner: _core.ColourBinner) -> None:
+    """Stand in for the filling of a bad frame."""
+    raise error
 
 
 _CLIP_FIELDS = tuple(field.name for field in dataclasses.fields(Clip))

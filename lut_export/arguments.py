@@ -64,3 +64,21 @@ def add_table_options(parser: argparse.ArgumentParser, default: str | None) -> N
 def domain(args: argparse.Namespace) -> tuple[float, float] | None:
     """Return --domain as a pair."""
     return None if args.domain is None else (args.domain[0], args.domain[1])
+
+
+def add_space_options(parser: argparse.ArgumentParser) -> None:
+    """Add --space and --ocio-config."""
+    parser.add_argument(
+        "--space",
+        metavar="SPACE",
+        default="input",
+        help="what the file takes and returns: input, the clip's numbers (default); palette, those "
+        "that the palette is in; or a colour space such as ACES2065-1. In .clf and .ctf the "
+        "conversion stands beside the table as transforms of its own",
+    )
+    parser.add_argument(
+        "--ocio-config",
+        metavar="CONFIG",
+        help="the config that knows SPACE: a config.ocio, .ocioz or ocio:// name (default: the one "
+        "that the sidecar names, else $OCIO, else OpenColorIO's built-in studio config)",
+    )

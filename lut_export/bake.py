@@ -5,14 +5,16 @@ and `formats` make a file of it, `reading` reads that back and `error` compares 
 """
 
 import hashlib
+import json
 import uuid
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from palette4d import _core
+from palette4d.conversion_steps import Step
 from palette4d.errors import Palette4dError
 from palette4d.lut_export import cdl as cdls
 from palette4d.lut_export import lattice as lattices
@@ -23,6 +25,7 @@ from palette4d.lut_export.formats import LutFormat, format_of, with_shaper
 from palette4d.lut_export.frame_edit import FrameEdit, frame_edit, frame_text
 from palette4d.lut_export.reading import LoadedLut, load
 from palette4d.lut_export.shaper import Shaper
+from palette4d.lut_export.spaces import INPUT, BakeSpace, space_of
 from palette4d.lut_export.writers import Description
 from palette4d.replacing import refuse_existing, replacing
 
@@ -57,6 +60,10 @@ class BakeOptions:
         The lattice is made larger until the file's error (`BakeResult.error`) is at most this.
     threads : int
         0: one a processor; the files do not depend on it.
+    space : str
+        What the file takes and returns: "input" (the clip's numbers), "palette", or a colour space.
+    ocio_config : str or None
+        The config that knows `space`; None: see `spaces.space_of`.
     """
 
     frame: float
@@ -67,6 +74,8 @@ class BakeOptions:
     domain: tuple[float, float] | None = None
     max_error: float | None = None
     threads: int = 0
+    space: str = INPUT
+    ocio_config: str | None = None
 
 
 @dataclass(frozen=True)
@@ -81,8 +90,13 @@ class BakeResult:
         Samples a side; None for a CDL.
     shaper : Shaper
         With the domain outside of which the file clamps.
+    encoding : str
+        The colour space that the file takes and returns.
+    conversion : str or None
+        The way to the palette's own numbers and where it stands; None without one.
     palette : (low, high)
-        The smallest and largest number of the palette's colours, at any time.
+        The smallest and largest number of the palette's colours, at any time, in the numbers of the
+        domain.
     cdl : Cdl or None
         What was fitted, for a CDL.
     identity : bool
@@ -108,6 +122,7 @@ class BakeResult:
     sidecar_sha256: str
     clip_name: str
     encoding: str
+    conversion: str | None
     frame: float
     size: int | None
     strength: float
@@ -174,17 +189,18 @@ def _check_shaper(shaper: Shaper, format_: LutFormat) -> None:
 
 
 def choose_shaper(
-    options: BakeOptions, format_: LutFormat, polytope: _core.Polytope, image: F32 | None
+    options: BakeOptions, format_: LutFormat, palette: NDArray[Any], image: F32 | None
 ) -> Shaper:
     """Return the shaper that the options and the colours ask for.
 
     The frame's colours decide whether one is needed; where it is, it covers the palette's, too, so
-    that the tables of one clip resemble each other. Without a frame the palette decides.
+    that the tables of one clip resemble each other. Without a frame the palette decides. `palette`
+    holds the (n, 3) colours of the whole palette, in the same numbers as `image`.
     """
     if options.domain is not None:
         kind = "log" if options.shaper == "auto" else options.shaper
         return shapers.Shaper(kind, *options.domain)  # type: ignore[arg-type]
-    low, high = _palette_range(polytope)
+    low, high = float(palette.min()), float(palette.max())
     if image is not None:
         finite = image[..., :3][np.isfinite(image[..., :3])]
         if not finite.size or (finite.min() >= 0 and finite.max() <= 1):
@@ -197,11 +213,6 @@ def choose_shaper(
     return shapers.choose(options.shaper, max(low, -most), min(high, most))
 
 
-def _palette_range(polytope: _core.Polytope) -> tuple[float, float]:
-    colours = polytope.vertices[:, :3]
-    return float(colours.min()), float(colours.max())
-
-
 @dataclass(frozen=True)
 class _Job:
     """What stays the same while a lattice grows."""
@@ -210,22 +221,41 @@ class _Job:
     sidecar_sha256: str
     options: BakeOptions
     format: LutFormat
+    space: BakeSpace
     edit: FrameEdit
     shaper: Shaper
     viewing: Viewing
     image: F32 | None
     image_frame: int | None
 
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """The conversion beside the table; empty where the table is one of the space itself."""
+        return self.space.steps if self.format.discrete else ()
+
+    @property
+    def conversion(self) -> str | None:
+        """What goes on beside the edit, None for nothing."""
+        if not self.space.steps:
+            return None
+        where = "beside the table, as transforms" if self.steps else "within the table"
+        return f"{self.space.name} to {self.sidecar.clip['encoding']} and back {where}"
+
+    def dense(self) -> F32:
+        """Return the dense grid's colours in the file's space."""
+        grid = lattices.dense_grid(self.shaper)
+        return self.space.of_palette(grid).astype(np.float32) if self.steps else grid
+
     def measures(self, readers: dict[str, LoadedLut]) -> tuple[Measure, Measure | None]:
         """Compare a file that was read on the dense grid and on the clip's colours."""
         domain = (self.shaper.low, self.shaper.high)
         threads = self.options.threads
-        dense = lattices.dense_grid(self.shaper)
-        grid = measure(dense, readers, self.edit, self.viewing, domain, threads)
+        shaped = self.space.to_palette if self.steps else None
+        grid = measure(self.dense(), readers, self.edit, self.viewing, domain, threads, shaped)
         assert grid is not None  # the grid's colours are finite
         if self.image is None:
             return grid, None
-        return grid, measure(self.image, readers, self.edit, self.viewing, domain, threads)
+        return grid, measure(self.image, readers, self.edit, self.viewing, domain, threads, shaped)
 
 
 @dataclass(frozen=True)
@@ -239,6 +269,8 @@ class _Content:
         """Return the URN of the content: the same for the same table of the same sidecar."""
         numbers = repr(self.cdl).encode() if self.lattice is None else self.lattice.values.tobytes()
         made_from = f"{job.sidecar_sha256} {job.options.frame!r} {job.options.strength!r}"
+        if job.space.steps:
+            made_from += f" {job.space.name} {json.dumps(job.steps)}"
         content = hashlib.sha256(f"{made_from} {job.shaper!r} ".encode() + numbers)
         return uuid.uuid5(NAMESPACE, content.hexdigest()).urn
 
@@ -296,18 +328,29 @@ def bake(
     check_target(output, force)
     sidecar = _core.read_sidecar(str(sidecar_path))
     check_options(options, format_, sidecar)
-    colours = None if image is None else np.asarray(image[..., :3], dtype=np.float32)
+    space = space_of(sidecar_path, sidecar, options.space, options.ocio_config)
+    colours = None
+    if image is not None:
+        colours = space.of_clip(np.asarray(image[..., :3], dtype=np.float32))
+    palette: NDArray[Any] = sidecar.polytope.vertices[:, :3]
+    in_palette = bool(space.steps) and format_.discrete
     shaper = shapers.UNSHAPED
+    if not in_palette:
+        palette = space.of_palette(palette)
     if not format_.is_cdl:
-        shaper = choose_shaper(options, format_, sidecar.polytope, colours)
+        seen = colours
+        if in_palette and colours is not None:
+            seen = space.to_palette(colours)
+        shaper = choose_shaper(options, format_, palette, seen)
     job = _Job(
         sidecar=sidecar,
         sidecar_sha256=hashlib.sha256(sidecar_path.read_bytes()).hexdigest(),
         options=options,
         format=format_,
-        edit=frame_edit(sidecar, options.frame, options.strength),
+        space=space,
+        edit=frame_edit(sidecar, options.frame, options.strength, space.chain),
         shaper=shaper,
-        viewing=viewing_of(sidecar.clip["encoding"]),
+        viewing=viewing_of(space.name),
         image=colours,
         image_frame=image_frame,
     )
@@ -327,12 +370,13 @@ def bake(
         sidecar=str(sidecar_path),
         sidecar_sha256=job.sidecar_sha256,
         clip_name=sidecar.clip["name"],
-        encoding=sidecar.clip["encoding"],
+        encoding=space.name,
+        conversion=job.conversion,
         frame=float(options.frame),
         size=None if content.lattice is None else content.lattice.size,
         strength=float(options.strength),
         shaper=shaper,
-        palette=_palette_range(sidecar.polytope),
+        palette=(float(palette.min()), float(palette.max())),
         cdl=content.cdl,
         rounding=format_.rounding,
         identity=job.edit.identity,
@@ -350,10 +394,12 @@ def _grown(job: _Job, path: Path) -> tuple[_Content, dict[str, LoadedLut], Measu
     limit, size = job.options.max_error, job.options.size
     while True:
         if job.format.is_cdl:
-            colours = lattices.dense_grid(job.shaper) if job.image is None else job.image
+            colours = job.dense() if job.image is None else job.image
             content = _Content(None, cdls.fit(job.edit, colours))
         else:
-            lattice = lattices.build(job.edit, size, job.shaper, job.options.threads)
+            # In a list of transforms the table is one of the palette's numbers.
+            edit = replace(job.edit, conversion=None) if job.steps else job.edit
+            lattice = lattices.build(edit, size, job.shaper, job.options.threads, job.steps)
             content = _Content(lattice, None)
         _write(path, content.text(job, _describe(job, content, None)))
         readers = load(path, job.format.readings)
@@ -394,7 +440,7 @@ def _check_same(
     written: dict[str, LoadedLut], measured: dict[str, LoadedLut], job: _Job, output: Path
 ) -> None:
     """Make sure that the file that stays is the table that was measured."""
-    colours = lattices.dense_grid(job.shaper)
+    colours = job.dense()
     for name, table in written.items():
         if not np.array_equal(table.apply(colours), measured[name].apply(colours)):
             raise Palette4dError(
@@ -428,7 +474,7 @@ def _describe(
     job: _Job, content: _Content, errors: tuple[Measure, Measure | None] | None
 ) -> Description:
     clip, options = job.sidecar.clip, job.options
-    encoding = clip["encoding"] or "the clip's own encoding"
+    encoding = job.space.name or "the clip's own encoding"
     frame = frame_text(options.frame)
     info: dict[str, Any] = {
         "Clip": clip["name"],
@@ -440,6 +486,8 @@ def _describe(
         "Domain": f"{job.shaper.low:g} {job.shaper.high:g}",
     }
     what = "CDL" if content.lattice is None else f"lattice {content.lattice.size}"
+    if job.conversion is not None:
+        info["Conversion"] = job.conversion
     lines = [
         f"clip {clip['name']}, frame {frame}, strength {options.strength:g}, {what}",
         f"sidecar sha256 {job.sidecar_sha256}",

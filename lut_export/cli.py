@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from palette4d.arguments import number
-from palette4d.lut_export.arguments import add_table_options, domain
+from palette4d.lut_export.arguments import add_space_options, add_table_options, domain
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -44,6 +44,7 @@ examples:
   palette4d bake seasons.p4d.json --frame 40 -o autumn.clf --clip seasons/ --max-error 0.005
   palette4d bake seasons.p4d.json --frame 40 -o - --format spi3d > autumn.spi3d
   palette4d bake seasons.p4d.json --frame 40 -o autumn.cc
+  palette4d bake cg.p4d.json --frame 1010 -o look.clf --space ACES2065-1     an ACES look transform
 """
 
 
@@ -73,6 +74,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="the file, OUT.cube and so on; - for standard output, with --format",
     )
     add_table_options(parser, None)
+    add_space_options(parser)
     parser.add_argument("--force", action="store_true", help="replace an existing file")
     parser.add_argument(
         "--json",
@@ -107,6 +109,8 @@ def run(args: argparse.Namespace) -> int:
         shaper=args.shaper,
         domain=domain(args),
         max_error=args.max_error,
+        space=args.space,
+        ocio_config=args.ocio_config,
     )
     sidecar = _core.read_sidecar(str(args.sidecar))
     check_options(options, format_, sidecar)
@@ -176,6 +180,8 @@ def report(result: BakeResult) -> Iterator[str]:
             yield f"  {label:<10} {' '.join(f'{value:g}' for value in values)}"
     elif result.shaper.kind != "none":
         yield f"  shaper {result.shaper.text()}"
+    if result.conversion is not None:
+        yield f"  takes and returns {result.encoding}; {result.conversion}"
     rows: list[tuple[str, Figures]] = []
     for where, found in (
         (f"clip's colours at frame {result.clip_frame}", result.clip),

@@ -23,6 +23,7 @@ from palette4d import _core
 from palette4d.errors import Palette4dError
 from palette4d.lut_export import series
 from palette4d.lut_export.formats import LutFormat, format_named
+from palette4d.lut_export.spaces import PALETTE
 from palette4d.ocio_config import BUILT_IN, load_config, same_encodings
 from palette4d.replacing import make_folder, refuse_existing, replacing
 from palette4d.wording import counted, file_safe
@@ -139,10 +140,19 @@ def write_config(
 
     make_folder(folder)
     format_ = format_named(options.series.bake.format or "clf")
+    # OpenColorIO itself converts to a look's process space.
+    in_palette = replace(options.series.bake, space=PALETTE)
     requests = []
     for file, name, chosen in zip(sidecars, names, frames, strict=True):
         _remove_links(folder / "luts" / name)
-        one = replace(options.series, frames=chosen, name=name, padding=0, force=options.force)
+        one = replace(
+            options.series,
+            bake=in_palette,
+            frames=chosen,
+            name=name,
+            padding=0,
+            force=options.force,
+        )
         requests.append(series.Request(file, folder / "luts" / name, one))
     baked = series.export_all(requests, options.series.workers, progress)
     _refuse_failed(names, baked)

@@ -11,7 +11,7 @@ channel or colour, the mean and the largest of each:
 """
 
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from decimal import ROUND_CEILING, Decimal
@@ -98,6 +98,7 @@ def measure(
     viewing: Viewing,
     domain: tuple[float, float] = (0.0, 1.0),
     threads: int = 0,
+    shaped: Callable[[F32], F32] | None = None,
 ) -> Measure | None:
     """Compare files with the exact core.
 
@@ -115,6 +116,8 @@ def measure(
         Of the file, for `Measure.outside_domain`.
     threads : int
         0: one a processor; the result does not depend on it.
+    shaped : callable, optional
+        From colours to the numbers that the domain is one of.
 
     Returns
     -------
@@ -124,7 +127,7 @@ def measure(
     stride = max(1, colours.shape[0] * colours.shape[1] // DELTA_E_COLOURS)
 
     def work(piece: F32) -> _Part:
-        return _compare(piece, readers, edit, viewing, domain, stride)
+        return _compare(piece, readers, edit, viewing, domain, stride, shaped)
 
     with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         parts = list(pool.map(work, _pieces(colours)))
@@ -163,13 +166,15 @@ def _compare(
     viewing: Viewing,
     domain: tuple[float, float],
     stride: int,
+    shaped: Callable[[F32], F32] | None,
 ) -> _Part:
     finite = np.isfinite(piece).all(axis=-1)
     colours = piece if finite.all() else np.ascontiguousarray(piece[finite])
     sums, maxima = np.zeros((len(readers), 3)), np.zeros((len(readers), 3))
     if not colours.size:
         return _Part(0, 0, 0, sums, maxima)
-    outside = int(((colours < domain[0]) | (colours > domain[1])).any(axis=-1).sum())
+    numbers = colours if shaped is None else shaped(colours)
+    outside = int(((numbers < domain[0]) | (numbers > domain[1])).any(axis=-1).sum())
     exact = edit.exact(colours)
     scale = np.maximum(np.abs(exact), FLOOR)
     lab = viewing.lab(exact[::stride])

@@ -42,6 +42,8 @@ class LutFormat:
         Whether it can hold a shaper.
     described : bool
         Whether it can say what it is: comments or metadata.
+    discrete : bool
+        Whether it holds a list of transforms, and with it a conversion beside the table.
     smallest : int
         Samples a side.
     powers : bool
@@ -56,6 +58,7 @@ class LutFormat:
     write: Writer | None
     shaper: bool = False
     described: bool = False
+    discrete: bool = False
     smallest: int = SMALLEST
     powers: bool = False
 
@@ -103,11 +106,12 @@ FORMATS = (
     ),
     LutFormat(
         "clf", "Academy/ASC Common LUT Format", ".clf", ("tetrahedral",), _FLOAT,
-        by_transforms("Academy/ASC Common LUT Format"), shaper=True, described=True,
+        by_transforms("Academy/ASC Common LUT Format"),
+        shaper=True, described=True, discrete=True,
     ),
     LutFormat(
         "ctf", "Color Transform Format", ".ctf", ("tetrahedral",), _FLOAT,
-        by_transforms("Color Transform Format"), shaper=True, described=True,
+        by_transforms("Color Transform Format"), shaper=True, described=True, discrete=True,
     ),
     LutFormat("spi3d", "Sony Imageworks .spi3d", ".spi3d", _EITHER, _TEXT, by_baker("spi3d")),
     LutFormat(

@@ -52,6 +52,8 @@ class FrameEdit:
         0 leaves colours alone, 1 is the edit.
     recolourer : Recolourer
         The node's own code for the same.
+    conversion : ColourConversion or None
+        From the colours' numbers to the palette's; None where they are the same.
     """
 
     palette: F64
@@ -59,6 +61,7 @@ class FrameEdit:
     faces: NDArray[np.int32]
     strength: float
     recolourer: _core.Recolourer
+    conversion: _core.ColourConversion | None = None
 
     @property
     def identity(self) -> bool:
@@ -67,18 +70,30 @@ class FrameEdit:
 
     def apply(self, colours: F32, threads: int = 0) -> F32:
         """Return what the node makes of (h, w, 3) float32 colours; 0 threads: one a processor."""
-        return self.recolourer.apply(colours, strength=self.strength, threads=threads)
+        return self.recolourer.apply(
+            colours, strength=self.strength, threads=threads, conversion=self.conversion
+        )
 
     def exact(self, colours: ArrayLike) -> F64:
         """Return the (m, 3) float64 replacements of (m, 3) finite colours, nothing rounded."""
         points = np.asarray(colours, dtype=np.float64)
         if self.identity:
             return points
-        weights, _ = _core.palette_weights(points, self.palette, self.faces)
-        return points + self.strength * (weights @ (self.edited - self.palette))
+        at = points if self.conversion is None else self.conversion.to_palette(points)
+        weights, _ = _core.palette_weights(at, self.palette, self.faces)
+        step = self.strength * (weights @ (self.edited - self.palette))
+        if self.conversion is None:
+            return points + step
+        moved = (step != 0).any(axis=1, keepdims=True)
+        return np.where(moved, self.conversion.to_clip(at + step), points)
 
 
-def frame_edit(sidecar: _core.Sidecar, frame: float, strength: float = 1.0) -> FrameEdit:
+def frame_edit(
+    sidecar: _core.Sidecar,
+    frame: float,
+    strength: float = 1.0,
+    conversion: _core.ColourConversion | None = None,
+) -> FrameEdit:
     """Return the edit of a sidecar at a time.
 
     Parameters
@@ -89,6 +104,8 @@ def frame_edit(sidecar: _core.Sidecar, frame: float, strength: float = 1.0) -> F
         A frame number of the clip; fractions are times between frames.
     strength : float
         0..1, as in the node.
+    conversion : ColourConversion, optional
+        From the numbers that the edit is to be a function of to the palette's.
 
     Raises
     ------
@@ -106,4 +123,5 @@ def frame_edit(sidecar: _core.Sidecar, frame: float, strength: float = 1.0) -> F
         faces=palette.faces,
         strength=float(strength),
         recolourer=_core.Recolourer(palette.rgb, edited, palette.faces),
+        conversion=conversion,
     )

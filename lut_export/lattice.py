@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from palette4d.conversion_steps import Step
 from palette4d.errors import Palette4dError
 from palette4d.lut_export.frame_edit import FrameEdit
 from palette4d.lut_export.shaper import UNSHAPED, Shaper
@@ -36,10 +37,14 @@ class Lattice:
         reorders.
     shaper : Shaper
         What lies between the clip's numbers and the lattice's 0..1.
+    steps : tuple of dict
+        A conversion that goes before the shaper, and whose inverse goes after the lattice
+        (`spaces`), where the format can hold both.
     """
 
     values: F32
     shaper: Shaper = UNSHAPED
+    steps: tuple[Step, ...] = ()
 
     @property
     def size(self) -> int:
@@ -79,7 +84,13 @@ def dense_grid(shaper: Shaper) -> F32:
     return grid(shaper.inverse((np.arange(DENSE) + 0.5) / DENSE).astype(np.float32))
 
 
-def build(edit: FrameEdit, size: int, shaper: Shaper = UNSHAPED, threads: int = 0) -> Lattice:
+def build(
+    edit: FrameEdit,
+    size: int,
+    shaper: Shaper = UNSHAPED,
+    threads: int = 0,
+    steps: tuple[Step, ...] = (),
+) -> Lattice:
     """Sample an edit.
 
     Parameters
@@ -92,6 +103,8 @@ def build(edit: FrameEdit, size: int, shaper: Shaper = UNSHAPED, threads: int = 
         The domain.
     threads : int
         0: one a processor; the result does not depend on it.
+    steps : tuple of dict
+        See `Lattice.steps`; the edit is one of the colours that they lead to.
 
     Raises
     ------
@@ -100,4 +113,4 @@ def build(edit: FrameEdit, size: int, shaper: Shaper = UNSHAPED, threads: int = 
     """
     check_size(size)
     values = edit.apply(grid(samples(size, shaper)), threads)
-    return Lattice(values.reshape(size, size, size, 3), shaper)
+    return Lattice(values.reshape(size, size, size, 3), shaper, steps)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from palette4d.arguments import frame_range, parse_frames, whole
 from palette4d.errors import Palette4dError
-from palette4d.lut_export.arguments import add_table_options, domain
+from palette4d.lut_export.arguments import add_space_options, add_table_options, domain
 from palette4d.workers import Workers, add_options
 
 if TYPE_CHECKING:
@@ -71,6 +71,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="digits of the frame number in the names (default 4)",
     )
     add_table_options(parser, "resolve_cube")
+    add_space_options(parser)
     add_run_options(parser)
     parser.add_argument(
         "--otio",
@@ -146,6 +147,8 @@ def run(args: argparse.Namespace) -> int:
             shaper=args.shaper,
             domain=domain(args),
             max_error=args.max_error,
+            space=args.space,
+            ocio_config=args.ocio_config,
         ),
         name=args.name,
         padding=args.padding,

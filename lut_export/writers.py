@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from palette4d.errors import Palette4dError
 from palette4d.lut_export.lattice import Lattice
+from palette4d.lut_export.spaces import transforms
 
 
 @dataclass(frozen=True)
@@ -61,11 +62,18 @@ def lut3d(values: Any) -> Any:
 
 
 def nodes(lattice: Lattice) -> list[Any]:
-    """Return OpenColorIO's transforms of a lattice, discrete: shaper, table, inverse shaper.
+    """Return OpenColorIO's transforms of a lattice, discrete.
+
+    They are: conversion, shaper, table, inverse shaper, inverse conversion.
 
     With a log shaper the table holds shaped colours, so that what the edit leaves alone is left
     alone between nodes, too, however steep the curve.
     """
+    before, after = transforms(lattice.steps)
+    return [*before, *_table(lattice), *after]
+
+
+def _table(lattice: Lattice) -> list[Any]:
     import PyOpenColorIO as ocio
 
     shaper = lattice.shaper

@@ -142,6 +142,8 @@ def plot(
     moments, missing = [], []
     for frame in chosen:
         image, _ = frame_colours(sidecar_path, sidecar.clip, frame, clip)
+        if image is not None and sidecar.conversion is not None:
+            image = sidecar.conversion.steps.to_palette(image).astype("float32")
         moments.append(pages.moment(sidecar, frame, image))
         if image is None:
             missing.append(f"{frame:g}")

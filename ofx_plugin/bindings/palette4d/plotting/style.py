@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from palette4d import _core
+
 F64 = NDArray[np.float64]
 
 PAGE = "#202020"
@@ -42,9 +44,12 @@ _LINEAR = ("linear", "lin_", "acescg", "aces2065", "scene")
 def shown(rgb: NDArray[np.floating], encoding: str) -> F64:
     """Return colours as a screen shows them: (…, 3) in the clip's encoding -> (…, 3) in 0..1.
 
-    Display encodings are shown as they are; scene-linear ones get the sRGB curve. Both are clamped.
+    Display encodings are shown as they are; scene-linear ones get the sRGB curve, and logs that
+    OpenColorIO knows are brought to sRGB. All are clamped.
     """
     values = np.nan_to_num(np.asarray(rgb, dtype=np.float64), nan=0.0)
+    if (display := _from_log(encoding)) is not None:
+        return np.clip(display.to_palette(values), 0.0, 1.0)
     values = np.clip(values, 0.0, 1.0)
     if any(word in encoding.lower() for word in _LINEAR):
         low = values <= 0.0031308
@@ -52,6 +57,25 @@ def shown(rgb: NDArray[np.floating], encoding: str) -> F64:
             low, 12.92 * values, 1.055 * np.maximum(values, 1e-9) ** (1 / 2.4) - 0.055
         )
     return np.clip(values, 0.0, 1.0)
+
+
+@cache
+def _from_log(encoding: str) -> _core.ColourConversion | None:
+    """Return the way from a log encoding to sRGB; None for other encodings."""
+    from palette4d.conversion_steps import ConversionError, conversion
+    from palette4d.ocio_config import BUILT_IN, load_config, same_encodings
+
+    if any(word in encoding.lower() for word in (*_LINEAR, "srgb")):
+        return None
+    config = load_config(BUILT_IN, "")
+    for name in same_encodings(encoding):
+        space = config.getColorSpace(name)
+        if space is not None and space.getEncoding() == "log":
+            try:
+                return conversion(config, str(space.getName()), "sRGB - Texture").chain
+            except ConversionError:
+                return None
+    return None
 
 
 @cache

@@ -1,0 +1,173 @@
+"""In which colour space a baked file takes and returns colours.
+
+A sidecar's palette is in one colour space, its clip in another or in the same, and a file may be
+asked for in a third. Formats that hold a list of transforms (CLF, CTF) get the table in the
+palette's numbers, and the conversion before it and after it as transforms of their own; all others
+hold one table from numbers of the space to numbers of the space.
+"""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from palette4d import _core
+from palette4d.conversion_steps import Step, conversion
+from palette4d.errors import Palette4dError
+from palette4d.ocio_config import chosen_config, colour_space, load_config, same_encodings
+
+F32 = NDArray[np.float32]
+
+#: The words for the spaces that every sidecar has.
+INPUT, PALETTE = "input", "palette"
+
+
+@dataclass(frozen=True)
+class BakeSpace:
+    """The colour space of a file.
+
+    Attributes
+    ----------
+    name : str
+        For its metadata.
+    steps : tuple of dict
+        From there to the palette's numbers; empty where they are the same.
+    chain : ColourConversion or None
+        The same, to be applied; None for no steps.
+    clip : ColourConversion or None
+        From the clip's numbers to the palette's.
+    """
+
+    name: str
+    steps: tuple[Step, ...] = ()
+    chain: _core.ColourConversion | None = None
+    clip: _core.ColourConversion | None = None
+
+    def of_clip(self, colours: F32) -> F32:
+        """(h, w, 3) float32 colours of the clip as they are in this space."""
+        if self.chain is self.clip:
+            return colours
+        palette = colours if self.clip is None else self.clip.to_palette(colours)
+        return self.of_palette(palette).astype(np.float32)
+
+    def of_palette(self, colours: NDArray[Any]) -> NDArray[Any]:
+        """(..., 3) colours in the palette's numbers as they are in this space."""
+        return colours if self.chain is None else self.chain.to_clip(colours)
+
+    def to_palette(self, colours: F32) -> F32:
+        """(..., 3) colours in this space as they are in the palette's numbers."""
+        return colours if self.chain is None else self.chain.to_palette(colours).astype(np.float32)
+
+
+def space_of(
+    sidecar_path: Path, sidecar: _core.Sidecar, wanted: str, config_name: str | None
+) -> BakeSpace:
+    """Return the space of a name.
+
+    Parameters
+    ----------
+    sidecar_path, sidecar : Path, Sidecar
+        The file, and what is in it.
+    wanted : str
+        "input" (the clip's numbers), "palette", or a colour space of the config.
+    config_name : str or None
+        None: the config that the sidecar names, else ``$OCIO``, else the built-in one.
+
+    Raises
+    ------
+    Palette4dError
+        The config cannot be used or lacks one of the spaces; the way between them is no chain of
+        matrices and curves.
+    """
+    encoding = str(sidecar.clip["encoding"])
+    own = sidecar.conversion
+    clip = None if own is None or own.steps.identity else own.steps
+    if wanted == PALETTE or (wanted == INPUT and clip is None):
+        return BakeSpace(encoding, clip=clip)
+    if wanted == INPUT:
+        assert own is not None
+        document = json.loads(sidecar_path.read_bytes())
+        steps = document["clip"]["conversion"]["steps"]
+        return BakeSpace(own.input_space, tuple(steps), clip, clip)
+    if config_name is None and own is not None:
+        config, config_name = load_config(own.config, "--ocio-config"), own.config
+    else:
+        config, config_name = chosen_config(config_name)
+    name = str(colour_space(config, config_name, wanted, "--space").getName())
+    palette = _named(config, config_name, encoding)
+    if name == palette:
+        return BakeSpace(name, clip=clip)
+    made = conversion(config, name, palette)
+    if not made.steps:
+        return BakeSpace(name, clip=clip)
+    return BakeSpace(name, tuple(made.steps), made.chain, clip)
+
+
+def _named(config: Any, config_name: str, encoding: str) -> str:
+    for name in same_encodings(encoding):
+        space = config.getColorSpace(name)
+        if space is not None and not space.isData():
+            return str(space.getName())
+    raise Palette4dError(
+        f"the sidecar's palette is in {encoding!r}, which {config_name} does not know, so that "
+        "there is no way to another space; analyse with --input-space, or name the config that "
+        "knows it with --ocio-config"
+    )
+
+
+def transforms(steps: tuple[Step, ...]) -> tuple[list[Any], list[Any]]:
+    """Return OpenColorIO's transforms of the steps, and those of the way back."""
+    there = [_transform(step, back=False) for step in steps]
+    return there, [_transform(step, back=True) for step in reversed(steps)]
+
+
+def _transform(step: Step, back: bool) -> Any:
+    import PyOpenColorIO as ocio
+
+    inverse = (step.get("direction") == "inverse") != back
+    direction = ocio.TRANSFORM_DIR_INVERSE if inverse else ocio.TRANSFORM_DIR_FORWARD
+    if step["kind"] == "matrix":
+        matrix: Any = np.eye(4)
+        offset: Any = np.zeros(4)
+        matrix[:3, :3], offset[:3] = step["matrix"], step["offset"]
+        if back:
+            matrix = np.linalg.inv(matrix)
+            offset = -matrix @ offset
+        return ocio.MatrixTransform(matrix.ravel(), offset)
+    if step["kind"] == "log":
+        return ocio.LogCameraTransform(
+            linSideBreak=step["start"],
+            base=step["base"],
+            logSideSlope=step["log_slope"],
+            logSideOffset=step["log_offset"],
+            linSideSlope=step["linear_slope"],
+            linSideOffset=step["linear_offset"],
+            linearSlope=step["below"],
+            direction=direction,
+        )
+    if step["kind"] == "gamma" and not any(step["offset"]):
+        style = ocio.NEGATIVE_MIRROR if step["negative"] == "mirror" else ocio.NEGATIVE_PASS_THRU
+        return ocio.ExponentTransform([*step["gamma"], 1.0], style, direction)
+    if step["kind"] == "gamma" and all(step["offset"]):
+        style = ocio.NEGATIVE_MIRROR if step["negative"] == "mirror" else ocio.NEGATIVE_LINEAR
+        return ocio.ExponentWithLinearTransform(
+            [*step["gamma"], 1.0], [*step["offset"], 0.0], style, direction
+        )
+    return _table(step, back)
+
+
+def _table(step: Step, back: bool) -> Any:
+    """Return a table over all half floats: the spacing of floats suits every curve."""
+    import PyOpenColorIO as ocio
+
+    chain = _core.ColourConversion(json.dumps([step]))
+    at = np.arange(65536, dtype=np.uint16).view(np.float16).astype(np.float64)
+    largest = float(np.finfo(np.float16).max)
+    ramp = np.repeat(np.nan_to_num(at, nan=0, posinf=largest, neginf=-largest)[:, None], 3, axis=1)
+    values = chain.to_clip(ramp) if back else chain.to_palette(ramp)
+    table = ocio.Lut1DTransform(length=65536, inputHalfDomain=True)
+    table.setFileOutputBitDepth(ocio.BIT_DEPTH_F32)
+    table.setData(np.clip(values, -3e38, 3e38).astype(np.float32).ravel())
+    return table
