@@ -116,11 +116,7 @@ py::array apply(const Recolourer& self, const py::array& image, double strength,
                                   instructions_from(instructions)};
     {
         const py::gil_scoped_release unlocked;
-        if (conversion) {
-            apply_converted(self, *conversion, in_view, out_view, options);
-        } else {
-            self.apply(in_view, out_view, options);
-        }
+        apply_converted(self, conversion, in_view, out_view, options);
     }
     return result;
 }

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import PyOpenColorIO as ocio
 import pytest
-from clip_files import write_image
+from clip_files import write_image, write_movie
 from palette4d import _core, ocio_config
 from palette4d.analysis import sidecar as sidecars
 from palette4d.analysis.clip import open_clip
@@ -368,3 +368,71 @@ def test_configs_that_cannot_be_used(
     monkeypatch.setenv("OCIO", str(tmp_path / "gone.ocio"))
     with pytest.raises(Palette4dError, match=r"\$OCIO"):
         chosen(linear_clip)
+
+
+# ------------------------------------------------------------------------ logs, displays, movies
+
+
+@pytest.mark.parametrize(
+    ("space", "extension", "samples"),
+    [("ARRI LogC4", "exr", "half"), ("S-Log3 S-Gamut3.Cine", "exr", "float"),
+     ("sRGB - Texture", "png", "uint16")],
+)  # fmt: skip
+def test_other_encodings_in_a_common_palette_space(
+    tmp_path: Path, space: str, extension: str, samples: str
+) -> None:
+    """Camera logs and displays, palettes in ACEScct: as OpenColorIO there, our edit, and back."""
+    from palette4d.render import RenderOptions, recoloured
+
+    config = ocio_config.load_config(STUDIO, "test")
+    for frame in (1, 2):
+        light = np.clip(scene(frame), 0, 1 if extension == "png" else None)
+        encoded = through(config, "Linear Rec.709 (sRGB)", space, light).reshape(light.shape)
+        if samples == "uint16":
+            encoded = np.round(np.clip(encoded, 0, 1) * 65535).astype(np.uint16)
+        write_image(tmp_path / f"c.{frame:04d}.{extension}", encoded, samples)
+    clip, output = str(tmp_path / f"c.####.{extension}"), tmp_path / "c.p4d.json"
+    assert analyse(clip, output, "--input-space", space)["version"] == 1
+    document = analyse(clip, output, "--input-space", space, "--palette-space", "ACEScct")
+    assert (document["version"], document["clip"]["encoding"]) == (2, "ACEScct")
+    document["edits"]["vertices"] = [
+        {"vertex": document["polytope"]["vertices"][0]["id"], "rgb": [0.5, 0.2, 0.4]}
+    ]
+    read = sidecars.validate(document)
+    image = open_clip(clip).read(1)
+    found = recoloured(read, 1, image, False, RenderOptions())
+    cut = _core.slice_at(read.polytope, 1)
+    recolourer = _core.Recolourer(
+        cut.rgb, _core.edited_colours(read.polytope, read.edits, cut), cut.faces
+    )
+    own = through(config, space, "ACEScct", image).reshape(image.shape)
+    moved = recolourer.apply(own, precision="single")
+    wanted = through(config, "ACEScct", space, moved).reshape(image.shape)
+    np.testing.assert_allclose(found, wanted, rtol=2e-4, atol=2e-4)
+    assert np.abs(found - image).max() > 0.02
+    untouched = (moved == own).all(axis=-1)
+    assert np.array_equal(found[untouched], image[untouched])
+
+
+def test_bad_frames_and_movies(linear_clip: str, tmp_path: Path, capsys: Any) -> None:
+    Path(linear_clip.replace("####", "0002")).write_bytes(b"no picture")
+    output = tmp_path / "cg.p4d.json"
+    arguments = ["analyze", linear_clip, "-o", str(output), "--quiet", "--input-space", "ACEScg"]
+    assert main(arguments) == 1
+    assert "frame 2" in capsys.readouterr().err
+    assert main([*arguments, "--skip-bad-frames"]) == 0
+    document = json.loads(output.read_text(encoding="utf-8"))
+    assert document["clip"]["frames"]["skipped"] == [2]
+
+    grey = [np.full((32, 48, 3), 40 * level, np.uint8) for level in (1, 2)]
+    movie = write_movie(tmp_path / "m.mkv", "ffv1", "bgr0", grey, "rgb24")
+    document = analyse(
+        str(movie), tmp_path / "m.p4d.json",
+        "--input-space", "g24_rec709_tx", "--palette-space", "ACEScct", "--allow-cuts",
+    )  # fmt: skip
+    assert document["version"] == 2
+    # Grey 40 and 80 of 255 by a power of 2.4, in ACEScct.
+    wanted = (np.log2((np.array([40, 80]) / 255) ** 2.4) + 9.72) / 17.52
+    rgb = np.array([vertex["rgb"] for vertex in document["polytope"]["vertices"]])
+    assert np.abs(rgb.min() - wanted[0]) < 0.01
+    assert np.abs(rgb.max() - wanted[1]) < 0.01

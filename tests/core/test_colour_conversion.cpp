@@ -31,6 +31,7 @@ GammaStep mirrored() { return {{2.2, 2.4, 1.8}, three(0), true, true}; }
 CurveStep sampled() { return {{{{-1, 0, 0.5, 2}, {-2, 0.1, 0.3, 5}}}, false}; }
 
 ColourConversion chain() { return ColourConversion({mixing(), acescct()}); }
+const ColourConversion kChain = chain();
 
 template <class Step>
 void there_and_back(Step step) {
@@ -124,7 +125,7 @@ TEST(without_an_edit_every_bit_passes) {
     Image image{4, 3, {50, -0.3f, 1e-42f, -0.0f, kNan, 1, kInf, 0, 0, 0.18f, 0.2f, 65504}};
     const Image before = image;
     const Recolourer same(cube().rgb, cube().rgb, cube().faces);
-    apply_converted(same, chain(), image.in(), image.out(), {});
+    apply_converted(same, &kChain, image.in(), image.out(), {});
     CHECK(std::memcmp(image.data.data(), before.data.data(), 48) == 0);
 }
 
@@ -134,7 +135,7 @@ TEST(it_is_the_recolouring_between_two_conversions) {
     const Recolourer recolourer = moved_cube();
     RecolourOptions options;
     options.precision = Precision::kDouble;
-    apply_converted(recolourer, chain(), image.in(), image.out(), options);
+    apply_converted(recolourer, &kChain, image.in(), image.out(), options);
     for (std::size_t i = 0; i < 4; ++i) {
         const Vec3 p{before.data[3 * i], before.data[3 * i + 1], before.data[3 * i + 2]};
         const Vec3 expected =
@@ -151,15 +152,15 @@ TEST(alpha_is_divided_by_and_odd_pixels_pass) {
     RecolourOptions options;
     options.premultiplied = true;
     Image straight{1, 4, {0.4f, 0.3f, 0.2f, 1}}, half{1, 4, {0.2f, 0.15f, 0.1f, 0.5f}};
-    apply_converted(recolourer, chain(), straight.in(), straight.out(), options);
-    apply_converted(recolourer, chain(), half.in(), half.out(), options);
+    apply_converted(recolourer, &kChain, straight.in(), straight.out(), options);
+    apply_converted(recolourer, &kChain, half.in(), half.out(), options);
     CHECK(straight.data[0] != 0.4f);
     for (std::size_t c = 0; c < 3; ++c) CHECK_NEAR(half.data[c], straight.data[c] / 2, 1e-7);
     CHECK_EQUAL(half.data[3], 0.5f);
 
     Image odd{4, 4, {0.1f, 0.2f, 0.3f, 0, kNan, 0, 0, 1, 0, kInf, 0, 1, 0.1f, 0.2f, 0.3f, kInf}};
     const Image before = odd;
-    apply_converted(recolourer, chain(), odd.in(), odd.out(), options);
+    apply_converted(recolourer, &kChain, odd.in(), odd.out(), options);
     CHECK(std::memcmp(odd.data.data(), before.data.data(), 64) == 0);
 }
 
@@ -169,11 +170,11 @@ TEST(threads_and_pieces_do_not_show) {
     for (float& x : one.data) x = static_cast<float>(random.uniform(-0.1, 3));
     Image many = one;
     const Recolourer recolourer = moved_cube();
-    apply_converted(recolourer, chain(), one.in(), one.out(), {});
+    apply_converted(recolourer, &kChain, one.in(), one.out(), {});
     RecolourOptions options;
     options.threads = 3;
     const std::ptrdiff_t row = 100 * 3 * static_cast<std::ptrdiff_t>(sizeof(float));
-    apply_converted(recolourer, chain(), {many.data.data(), 100, 400, 3, row},
+    apply_converted(recolourer, &kChain, {many.data.data(), 100, 400, 3, row},
                     {many.data.data(), 100, 400, 3, row}, options);
     CHECK(std::memcmp(one.data.data(), many.data.data(), one.data.size() * sizeof(float)) == 0);
 }

@@ -47,25 +47,7 @@ bool inverted(const MatrixStep& step, MatrixStep& result) {
     return true;
 }
 
-double log_forward(const LogStep& s, std::size_t c, double x) {
-    const double scale = s.log_slope[c] / std::log2(s.base);
-    const auto curve = [&](double at) {
-        return scale * std::log2(s.linear_slope[c] * at + s.linear_offset[c]) + s.log_offset[c];
-    };
-    if (x > s.start[c]) return curve(x);
-    return curve(s.start[c]) + s.below[c] * (x - s.start[c]);
-}
-
-double log_backward(const LogStep& s, std::size_t c, double y) {
-    const double scale = s.log_slope[c] / std::log2(s.base);
-    const double turn =
-        scale * std::log2(s.linear_slope[c] * s.start[c] + s.linear_offset[c]) + s.log_offset[c];
-    if (y <= turn) return s.start[c] + (y - turn) / s.below[c];
-    const double exponent = std::min((y - s.log_offset[c]) / scale, kLargestExponent);
-    return (std::exp2(exponent) - s.linear_offset[c]) / s.linear_slope[c];
-}
-
-/// Where the straight line ends, and its slope.
+/// Where the straight line of a gamma ends, and its slope.
 struct Toe {
     double end, slope;
 };
@@ -74,22 +56,6 @@ Toe toe_of(double gamma, double offset) {
     if (offset == 0) return {0, 1};
     const double end = offset / (gamma - 1);
     return {end, gamma / (1 + offset) * std::pow((end + offset) / (1 + offset), gamma - 1)};
-}
-
-double gamma_curve(const GammaStep& s, std::size_t c, double x) {
-    if (s.mirrored && x < 0) return -gamma_curve(s, c, -x);
-    const double offset = s.offset[c];
-    const Toe toe = toe_of(s.gamma[c], offset);
-    if (x <= toe.end) return toe.slope * x;
-    return std::pow((x + offset) / (1 + offset), s.gamma[c]);
-}
-
-double gamma_inverse(const GammaStep& s, std::size_t c, double y) {
-    if (s.mirrored && y < 0) return -gamma_inverse(s, c, -y);
-    const double offset = s.offset[c];
-    const Toe toe = toe_of(s.gamma[c], offset);
-    if (y <= toe.slope * toe.end) return y / toe.slope;
-    return (1 + offset) * std::pow(y, 1 / s.gamma[c]) - offset;
 }
 
 double interpolated(const std::vector<double>& x, const std::vector<double>& y, double at) {
@@ -101,24 +67,6 @@ double interpolated(const std::vector<double>& x, const std::vector<double>& y, 
 double along(const CurveStep& s, std::size_t c, double at, bool backward) {
     const SampledCurve& curve = s.curves[s.curves.size() == 1 ? 0 : c];
     return backward ? interpolated(curve.y, curve.x, at) : interpolated(curve.x, curve.y, at);
-}
-
-/// One step of three curves, in its own direction or against it.
-Vec3 curved(const ConversionStep& step, const Vec3& x, bool against) {
-    Vec3 y{};
-    for (std::size_t c = 0; c < 3; ++c) {
-        if (const auto* log = std::get_if<LogStep>(&step)) {
-            y[c] =
-                log->inverse != against ? log_backward(*log, c, x[c]) : log_forward(*log, c, x[c]);
-        } else if (const auto* gamma = std::get_if<GammaStep>(&step)) {
-            y[c] = gamma->inverse != against ? gamma_inverse(*gamma, c, x[c])
-                                             : gamma_curve(*gamma, c, x[c]);
-        } else {
-            const CurveStep& curve = std::get<CurveStep>(step);
-            y[c] = along(curve, c, x[c], curve.inverse != against);
-        }
-    }
-    return y;
 }
 
 class Checker {
@@ -203,35 +151,90 @@ ConversionProblem::ConversionProblem(std::size_t step, std::string member, std::
       found_(std::move(found)),
       expected_(std::move(expected)) {}
 
+double ColourConversion::log_forward(const LogStep& s, const Prepared& at, std::size_t c,
+                                     double x) {
+    if (x <= s.start[c]) return at.turn[c] + s.below[c] * (x - s.start[c]);
+    return at.scale[c] * std::log2(s.linear_slope[c] * x + s.linear_offset[c]) + s.log_offset[c];
+}
+
+double ColourConversion::log_backward(const LogStep& s, const Prepared& at, std::size_t c,
+                                      double y) {
+    if (y <= at.turn[c]) return s.start[c] + (y - at.turn[c]) / s.below[c];
+    const double exponent = std::min((y - s.log_offset[c]) / at.scale[c], kLargestExponent);
+    return (std::exp2(exponent) - s.linear_offset[c]) / s.linear_slope[c];
+}
+
+double ColourConversion::gamma_forward(const GammaStep& s, const Prepared& at, std::size_t c,
+                                       double x) {
+    if (s.mirrored && x < 0) return -gamma_forward(s, at, c, -x);
+    if (x <= at.turn[c]) return at.scale[c] * x;
+    return std::pow((x + s.offset[c]) / (1 + s.offset[c]), s.gamma[c]);
+}
+
+double ColourConversion::gamma_backward(const GammaStep& s, const Prepared& at, std::size_t c,
+                                        double y) {
+    if (s.mirrored && y < 0) return -gamma_backward(s, at, c, -y);
+    if (y <= at.scale[c] * at.turn[c]) return y / at.scale[c];
+    return (1 + s.offset[c]) * std::pow(y, 1 / s.gamma[c]) - s.offset[c];
+}
+
+Vec3 ColourConversion::curved(const ConversionStep& step, const Prepared& at, const Vec3& x,
+                              bool against) {
+    Vec3 y{};
+    if (const auto* log = std::get_if<LogStep>(&step)) {
+        const auto curve = log->inverse != against ? log_backward : log_forward;
+        for (std::size_t c = 0; c < 3; ++c) y[c] = curve(*log, at, c, x[c]);
+    } else if (const auto* gamma = std::get_if<GammaStep>(&step)) {
+        const auto curve = gamma->inverse != against ? gamma_backward : gamma_forward;
+        for (std::size_t c = 0; c < 3; ++c) y[c] = curve(*gamma, at, c, x[c]);
+    } else {
+        const CurveStep& curve = std::get<CurveStep>(step);
+        for (std::size_t c = 0; c < 3; ++c) y[c] = along(curve, c, x[c], curve.inverse != against);
+    }
+    return y;
+}
+
 ColourConversion::ColourConversion(std::vector<ConversionStep> steps) : steps_(std::move(steps)) {
     for (std::size_t i = 0; i < steps_.size(); ++i) {
         std::visit(Checker(i), steps_[i]);
+        Prepared prepared;
         if (const auto* matrix = std::get_if<MatrixStep>(&steps_[i])) {
-            MatrixStep inverse{};
-            if (!inverted(*matrix, inverse)) {
+            if (!inverted(*matrix, prepared.inverse)) {
                 throw ConversionProblem(i, "/matrix", "a matrix without an inverse",
                                         "one whose rows do not depend on each other");
             }
-            inverses_.push_back(inverse);
+        } else if (const auto* log = std::get_if<LogStep>(&steps_[i])) {
+            for (std::size_t c = 0; c < 3; ++c) {
+                prepared.scale[c] = log->log_slope[c] / std::log2(log->base);
+                const double inner = log->linear_slope[c] * log->start[c] + log->linear_offset[c];
+                prepared.turn[c] = prepared.scale[c] * std::log2(inner) + log->log_offset[c];
+            }
+        } else if (const auto* gamma = std::get_if<GammaStep>(&steps_[i])) {
+            for (std::size_t c = 0; c < 3; ++c) {
+                const Toe toe = toe_of(gamma->gamma[c], gamma->offset[c]);
+                prepared.scale[c] = toe.slope;
+                prepared.turn[c] = toe.end;
+            }
         }
+        prepared_.push_back(prepared);
     }
 }
 
 Vec3 ColourConversion::to_palette(const Vec3& clip) const {
     Vec3 at = clip;
-    for (const ConversionStep& step : steps_) {
-        const auto* matrix = std::get_if<MatrixStep>(&step);
-        at = matrix ? product(*matrix, at) : curved(step, at, false);
+    for (std::size_t i = 0; i < steps_.size(); ++i) {
+        const auto* matrix = std::get_if<MatrixStep>(&steps_[i]);
+        at = matrix ? product(*matrix, at) : curved(steps_[i], prepared_[i], at, false);
     }
     return at;
 }
 
 Vec3 ColourConversion::to_clip(const Vec3& palette) const {
     Vec3 at = palette;
-    std::size_t matrix = inverses_.size();
     for (std::size_t i = steps_.size(); i-- > 0;) {
-        at = std::holds_alternative<MatrixStep>(steps_[i]) ? product(inverses_[--matrix], at)
-                                                           : curved(steps_[i], at, true);
+        at = std::holds_alternative<MatrixStep>(steps_[i])
+                 ? product(prepared_[i].inverse, at)
+                 : curved(steps_[i], prepared_[i], at, true);
     }
     return at;
 }

@@ -95,10 +95,10 @@ private:
 
 }  // namespace
 
-RecolourCounts apply_converted(const Recolourer& recolourer, const ColourConversion& conversion,
+RecolourCounts apply_converted(const Recolourer& recolourer, const ColourConversion* conversion,
                                const ConstImageView& in, const ImageView& out,
                                const RecolourOptions& options) {
-    if (conversion.identity()) return recolourer.apply(in, out, options);
+    if (!conversion || conversion->identity()) return recolourer.apply(in, out, options);
     check_recolouring(in, out, options);
     if (in.width == 0 || in.height == 0) return {};
     if (recolourer.identity() || options.strength == 0) {
@@ -109,7 +109,7 @@ RecolourCounts apply_converted(const Recolourer& recolourer, const ColourConvers
     RecolourCounts counts;
     std::mutex guard;
     share_rows(in.height, options.threads, [&](const NextRow& next) {
-        Piece piece(recolourer, conversion, options);
+        Piece piece(recolourer, *conversion, options);
         for (int y = next(); y >= 0; y = next()) {
             piece.row(row_of(in, y), row_of(out, y), in.width, in.channels, divide);
         }

@@ -77,15 +77,27 @@ public:
     Vec3 to_clip(const Vec3& palette) const;
 
 private:
+    /// What a step needs at every colour and what follows from it alone.
+    struct Prepared {
+        MatrixStep inverse{};  ///< of a matrix
+        Vec3 scale{}, turn{};  ///< of a log: to log2, and y at the start; of a gamma: of its line
+    };
+    static double log_forward(const LogStep& s, const Prepared& at, std::size_t c, double x);
+    static double log_backward(const LogStep& s, const Prepared& at, std::size_t c, double y);
+    static double gamma_forward(const GammaStep& s, const Prepared& at, std::size_t c, double x);
+    static double gamma_backward(const GammaStep& s, const Prepared& at, std::size_t c, double y);
+    /// One step of three curves, in its own direction or against it.
+    static Vec3 curved(const ConversionStep& step, const Prepared& at, const Vec3& x, bool against);
+
     std::vector<ConversionStep> steps_;
-    std::vector<MatrixStep> inverses_;  ///< of the matrices among the steps, in their order
+    std::vector<Prepared> prepared_;  ///< one a step
 };
 
 /// Recolours a picture in the clip's numbers with a palette that was found in others. A colour that
 /// the edit does not move keeps its bits; what is moved goes to the palette's numbers and back in
 /// double precision, so that nothing jumps where an edit begins. Colours with a NaN or an infinity
-/// pass. As Recolourer::apply otherwise.
-RecolourCounts apply_converted(const Recolourer& recolourer, const ColourConversion& conversion,
+/// pass. As Recolourer::apply otherwise, and just that without a conversion (null).
+RecolourCounts apply_converted(const Recolourer& recolourer, const ColourConversion* conversion,
                                const ConstImageView& in, const ImageView& out,
                                const RecolourOptions& options);
 
