@@ -436,3 +436,36 @@ def test_bad_frames_and_movies(linear_clip: str, tmp_path: Path, capsys: Any) ->
     rgb = np.array([vertex["rgb"] for vertex in document["polytope"]["vertices"]])
     assert np.abs(rgb.min() - wanted[0]) < 0.01
     assert np.abs(rgb.max() - wanted[1]) < 0.01
+
+
+def test_colours_beyond_an_encoding_s_end_are_told_and_come_back(
+    tmp_path: Path, capsys: Any
+) -> None:
+    """Canon's log ends at code 1, where OpenColorIO clamps: our curves go on."""
+    from palette4d.render import RenderOptions, recoloured
+
+    codes = np.random.default_rng(6).uniform(0.1, 1.2, (24, 32, 3)).astype(np.float32)
+    write_image(tmp_path / "c.0001.exr", codes, "float")
+    output = tmp_path / "c.p4d.json"
+    spaces = ["--input-space", "CanonLog3 CinemaGamut D55", "--palette-space", "ACEScct"]
+    document = analyse(str(tmp_path / "c.0001.exr"), output, *spaces)
+    note = capsys.readouterr().err
+    assert "of the clip's colours lie beyond what OpenColorIO brings back" in note
+    read = _core.read_sidecar(output)
+    assert read.conversion is not None
+    own = read.conversion.steps.to_palette(codes)
+    np.testing.assert_allclose(read.conversion.steps.to_clip(own), codes, atol=1e-9)
+    document["edits"]["vertices"] = [
+        {"vertex": vertex["id"], "rgb": [value + 0.01 for value in vertex["rgb"]]}
+        for vertex in document["polytope"]["vertices"]
+    ]
+    moved = recoloured(sidecars.validate(document), 1, codes, False, RenderOptions())
+    assert np.isfinite(moved).all()
+    assert 0 < np.median(np.abs(moved - codes)) < 0.05
+
+
+def test_an_archive_that_is_none(linear_clip: str, tmp_path: Path) -> None:
+    broken = tmp_path / "broken.ocioz"
+    broken.write_bytes(b"PK no archive")
+    with pytest.raises(Palette4dError, match=r"broken\.ocioz.*cannot use it as a config"):
+        chosen(linear_clip, ocio_config=str(broken))
