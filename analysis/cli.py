@@ -168,9 +168,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def _add_space_options(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group(
         "colour spaces",
-        "Without any of these, and without $OCIO, the palette is found in the numbers of the "
-        "clip's files. Names, aliases and roles of an OpenColorIO config; docs/colour_spaces.md "
-        "says how to choose.",
+        "Without any of these, and without $OCIO, the palette is found in the numbers of the\n"
+        "clip's files. Names, aliases and roles of an OpenColorIO config;\n"
+        "docs/colour_spaces.md says how to choose.",
     )
     group.add_argument(
         "--input-space",

@@ -242,10 +242,12 @@ def test_a_scene_linear_clip_end_to_end(linear_clip: str, tmp_path: Path) -> Non
     assert document["quality"]["stages"][-1]["L"] < 1
 
 
-def test_hulls_in_linear_light_are_useless(linear_clip: str, tmp_path: Path) -> None:
+def test_hulls_in_linear_light_are_useless(linear_clip: str, tmp_path: Path, capsys: Any) -> None:
     """The same clip, the same options: what the docs claim."""
     log = analyse(linear_clip, tmp_path / "log.p4d.json", "--input-space", "ACEScg")
+    assert "scene-linear" not in capsys.readouterr().err
     linear = analyse(linear_clip, tmp_path / "lin.p4d.json")
+    assert "say what it is with --input-space" in capsys.readouterr().err
     assert linear["version"] == 1
     worse = linear["quality"]["stages"][-1]["L"] / log["quality"]["stages"][-1]["L"]
     assert worse > 5
