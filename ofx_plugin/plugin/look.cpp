@@ -23,6 +23,10 @@ void prepare(Look& look, const Params& params, LoadedSidecar& loaded, double fra
     const OutputSettings& settings = drawing.settings;
     const Sidecar& sidecar = loaded.sidecar();
     look.passes = false;
+    if (sidecar.conversion && !settings.in_palette_space) {
+        // Shares its ownership: a sidecar may be read anew while this is drawn.
+        drawing.conversion = {sidecar.conversion, &sidecar.conversion->steps};
+    }
     if (settings.output == Output::kOutside) {
         drawing.recolourer = loaded.surface_at(frame);
         return;

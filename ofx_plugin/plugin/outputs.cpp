@@ -69,8 +69,9 @@ void mix_in_source(const Rows& rows, double mix) {
     }
 }
 
-/// The colours without their alpha: (pixels, 3), NaN where they have none.
-std::vector<float> straight_colours(const Rows& rows) {
+/// The colours without their alpha, in the palette's numbers: (pixels, 3), NaN where they have
+/// none.
+std::vector<float> straight_colours(const Rows& rows, const ColourConversion* conversion) {
     std::vector<float> straight(rows.pixels * 3);
     for (std::size_t i = 0; i < rows.pixels; ++i) {
         const float* from = rows.source + i * rows.channels;
@@ -78,6 +79,10 @@ std::vector<float> straight_colours(const Rows& rows) {
         for (std::size_t c = 0; c < 3; ++c) {
             straight[i * 3 + c] = alpha != 0 ? from[c] / alpha : std::nanf("");
         }
+        float* colour = &straight[i * 3];
+        if (!conversion || !finite(colour)) continue;
+        const Vec3 converted = conversion->to_palette({colour[0], colour[1], colour[2]});
+        for (std::size_t c = 0; c < 3; ++c) colour[c] = static_cast<float>(converted[c]);
     }
     return straight;
 }
@@ -108,7 +113,7 @@ double matte_of(const float* colour, const float* read, const Drawing& drawing) 
 }
 
 void draw_matte(const Rows& rows, const Drawing& drawing) {
-    const std::vector<float> straight = straight_colours(rows);
+    const std::vector<float> straight = straight_colours(rows, drawing.conversion.get());
     std::vector<float> read(straight.size());
     const auto width = static_cast<int>(rows.pixels);
     const auto stride = static_cast<std::ptrdiff_t>(straight.size() * sizeof(float));
@@ -142,7 +147,8 @@ void draw_strip(float* row, int x1, int x2, int y, std::size_t channels, const D
     const auto count = static_cast<std::int64_t>(colours.size());
     for (int x = std::max(x1, picture.x1); x < std::min(x2, picture.x2); ++x) {
         const std::int64_t column = (static_cast<std::int64_t>(x) - picture.x1) * count / width;
-        const Vec3& colour = colours[static_cast<std::size_t>(column)];
+        const Vec3& own = colours[static_cast<std::size_t>(column)];
+        const Vec3 colour = drawing.conversion ? drawing.conversion->to_clip(own) : own;
         float* to = row + static_cast<std::size_t>(x - x1) * channels;
         for (std::size_t c = 0; c < 3; ++c) to[c] = static_cast<float>(colour[c]);
         if (channels == 4) to[3] = 1;
@@ -162,8 +168,9 @@ void draw_rows(const Rows& rows, const Drawing& drawing) {
         const auto stride =
             static_cast<std::ptrdiff_t>(rows.pixels * rows.channels * sizeof(float));
         if (drawing.recolourer) {
-            drawing.recolourer->apply({rows.source, width, 1, channels, stride},
-                                      {rows.result, width, 1, channels, stride}, options);
+            apply_converted(*drawing.recolourer, drawing.conversion.get(),
+                            {rows.source, width, 1, channels, stride},
+                            {rows.result, width, 1, channels, stride}, options);
         } else {
             std::copy_n(rows.source, rows.pixels * rows.channels, rows.result);
         }
@@ -200,6 +207,12 @@ void define_output_params(ParamDefiner& define) {
                    "Whose weights of red, green and blue make up lightness: choose the primaries "
                    "of the picture's encoding."},
                   {"Rec.709", "Rec.2020", "P3", "ACES AP1", "Rec.601"});
+    define.choice({kParamPictureIn, "Picture is in",
+                   "Input space: the numbers of the clip that was analysed, such as scene-linear "
+                   "light; the sidecar knows the way to the palette's and back. Palette space: the "
+                   "palette's own numbers, such as ACEScct, as a host that converts by itself has "
+                   "them. Without a conversion in the sidecar both are the same."},
+                  {"Input space", "Palette space"});
     define.number({kParamMix, "Mix", "What is put out (1) or the source (0), or in between."},
                   {1, 0, 1, 0, 1}, 0.01, 3, true);
     define.end_group();
@@ -221,6 +234,7 @@ OutputSettings output_settings_at(const Params& params, OfxTime time) {
     const auto& weights =
         kLightness[of > 0 && of < static_cast<int>(std::size(kLightness)) ? of : 0];
     settings.lightness = {weights[0], weights[1], weights[2]};
+    settings.in_palette_space = params.int_at(kParamPictureIn, time).value_or(0) == 1;
     settings.mix = clamped(params.double_at(kParamMix, time), 1, 0, 1);
     return settings;
 }
@@ -228,7 +242,7 @@ OutputSettings output_settings_at(const Params& params, OfxTime time) {
 void draw(const Image& in, const Image& out, const OfxRectI& area, const Drawing& drawing) {
     const OutputSettings& settings = drawing.settings;
     if (settings.output == Output::kRecoloured && settings.keep == 0 && settings.mix == 1) {
-        recolour(in, out, area, *drawing.recolourer, settings.strength);
+        recolour(in, out, area, *drawing.recolourer, drawing.conversion.get(), settings.strength);
         return;
     }
     const OfxRectI covered = intersect(area, in.bounds);

@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "palette4d/colour_conversion.hpp"
 #include "palette4d/recolour.hpp"
 #include "param_define.hpp"
 #include "params.hpp"
@@ -21,18 +22,20 @@ inline constexpr const char* kParamOutsideReach = "outsideReach";
 inline constexpr const char* kParamKeepLightness = "keepLightness";
 inline constexpr const char* kParamLightnessOf = "lightnessOf";
 inline constexpr const char* kParamMix = "mix";
+inline constexpr const char* kParamPictureIn = "pictureIn";
 
 void define_output_params(ParamDefiner& define);
 
 struct OutputSettings {
     Output output = Output::kRecoloured;
-    int weight_of = 1;        ///< a slot of the handles, counted from 1; beyond them a handle
-    bool in_alpha = false;    ///< mattes multiply alpha instead of being a grey picture
-    double reach = 0.05;      ///< distance from the palette at which a colour is all outside
-    double strength = 1;      ///< 0 to 1
-    double keep = 0;          ///< of the source's lightness, 0 to 1
-    Vec3 lightness{0, 0, 0};  ///< weights of red, green and blue; they sum to 1
-    double mix = 1;           ///< 0 the source, 1 what is put out
+    int weight_of = 1;              ///< a slot of the handles, counted from 1; beyond them a handle
+    bool in_alpha = false;          ///< mattes multiply alpha instead of being a grey picture
+    double reach = 0.05;            ///< distance from the palette at which a colour is all outside
+    double strength = 1;            ///< 0 to 1
+    double keep = 0;                ///< of the source's lightness, 0 to 1
+    Vec3 lightness{0, 0, 0};        ///< weights of red, green and blue; they sum to 1
+    double mix = 1;                 ///< 0 the source, 1 what is put out
+    bool in_palette_space = false;  ///< the picture has the palette's numbers already
 
     /// The source comes out, whatever else is set.
     bool passes() const { return mix == 0 || (output == Output::kRecoloured && strength == 0); }
@@ -45,6 +48,8 @@ struct Drawing {
     /// Of the edit, of the weight (weight_reader()) or of the surface (surface_reader()), as the
     /// output asks; null where the picture keeps its colours.
     std::shared_ptr<const Recolourer> recolourer;
+    /// From the picture's numbers to the palette's; null where they are the same.
+    std::shared_ptr<const ColourConversion> conversion;
     /// For Output::kPalette: the slice's colours before and after the edit, and the whole picture,
     /// at whose foot they stand.
     std::vector<Vec3> original, edited;

@@ -39,7 +39,8 @@ std::uint8_t to_byte(float value) {
 }
 
 void recolour_bytes(const Image& in, const Image& out, const OfxRectI& area,
-                    const Recolourer& recolourer, const RecolourOptions& options) {
+                    const Recolourer& recolourer, const ColourConversion* conversion,
+                    const RecolourOptions& options) {
     const int width = area.x2 - area.x1;
     const std::size_t row = static_cast<std::size_t>(width) * static_cast<std::size_t>(in.channels);
     const int rows_at_once = static_cast<int>(std::max<std::size_t>(1, kChunkFloats / row));
@@ -50,8 +51,8 @@ void recolour_bytes(const Image& in, const Image& out, const OfxRectI& area,
         const OfxRectI chunk = {area.x1, y, area.x2, y + rows};
         floats.resize(row * static_cast<std::size_t>(rows));
         read_floats(in, chunk, floats.data());
-        recolourer.apply({floats.data(), width, rows, in.channels, stride},
-                         {floats.data(), width, rows, in.channels, stride}, options);
+        apply_converted(recolourer, conversion, {floats.data(), width, rows, in.channels, stride},
+                        {floats.data(), width, rows, in.channels, stride}, options);
         write_floats(floats.data(), out, chunk);
     }
 }
@@ -155,7 +156,7 @@ void copy(const Image& in, const Image& out, const OfxRectI& area) {
 }
 
 void recolour(const Image& in, const Image& out, const OfxRectI& area, const Recolourer& recolourer,
-              double strength) {
+              const ColourConversion* conversion, double strength) {
     const OfxRectI covered = intersect(area, in.bounds);
     clear_around(out, area, covered);
     if (is_empty(covered)) return;
@@ -164,16 +165,17 @@ void recolour(const Image& in, const Image& out, const OfxRectI& area, const Rec
     options.premultiplied = in.premultiplied;
     options.threads = 1;  // the rows are shared among the host's threads already
     if (in.depth == Depth::kByte) {
-        recolour_bytes(in, out, covered, recolourer, options);
+        recolour_bytes(in, out, covered, recolourer, conversion, options);
         return;
     }
     const int width = covered.x2 - covered.x1;
     const int height = covered.y2 - covered.y1;
-    recolourer.apply({reinterpret_cast<const float*>(in.at(covered.x1, covered.y1)), width, height,
-                      in.channels, in.row_bytes},
-                     {reinterpret_cast<float*>(out.at(covered.x1, covered.y1)), width, height,
-                      out.channels, out.row_bytes},
-                     options);
+    apply_converted(recolourer, conversion,
+                    {reinterpret_cast<const float*>(in.at(covered.x1, covered.y1)), width, height,
+                     in.channels, in.row_bytes},
+                    {reinterpret_cast<float*>(out.at(covered.x1, covered.y1)), width, height,
+                     out.channels, out.row_bytes},
+                    options);
 }
 
 }  // namespace palette4d::plugin

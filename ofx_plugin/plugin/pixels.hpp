@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "host.hpp"
+#include "palette4d/colour_conversion.hpp"
 #include "palette4d/recolour.hpp"
 
 namespace palette4d::plugin {
@@ -52,7 +53,8 @@ void clear(const Image& out, const OfxRectI& area);
 void copy(const Image& in, const Image& out, const OfxRectI& area);
 /// Recolours what `in` covers of `area`; the rest becomes transparent black. Bytes are recoloured
 /// as byte / 255 and come back rounded and clamped.
+/// `conversion`: from the picture's numbers to the palette's; null where they are the same.
 void recolour(const Image& in, const Image& out, const OfxRectI& area, const Recolourer& recolourer,
-              double strength);
+              const ColourConversion* conversion, double strength);
 
 }  // namespace palette4d::plugin

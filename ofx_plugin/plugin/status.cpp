@@ -21,6 +21,9 @@ std::string describe(const Sidecar& sidecar) {
          << static_cast<double>(clip.rate_num) / static_cast<double>(clip.rate_den) << " fps, "
          << counted(sidecar.polytope.vertices().size(), "palette vertex", "palette vertices")
          << ", " << counted(edits, "edit", "edits");
+    if (sidecar.conversion) {
+        text << "; " << sidecar.conversion->input_space << ", palette in " << clip.encoding;
+    }
     return text.str();
 }
 

@@ -53,7 +53,8 @@ std::string sidecar(const std::string& name = "clip.p4d.json", bool edited = tru
 void fill(strict::Picture& picture, unsigned seed = 1, bool odd_values = true);
 
 /// What the core makes of an area of a picture: float or byte pixels without gaps. Bytes go through
-/// byte / 255, and come back rounded and clamped. `frame` is the sidecar's.
+/// byte / 255, and come back rounded and clamped. `frame` is the sidecar's, and so is the
+/// conversion.
 std::vector<unsigned char> recoloured(const palette4d::Sidecar& sidecar, double frame,
                                       const strict::Picture& picture, const OfxRectI& area,
                                       double strength = 1);

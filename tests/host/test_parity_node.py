@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from palette4d import _core
+from palette4d.render import RenderOptions, recoloured
 from parity.cases import (
     DOCUMENTS,
     EDITED,
@@ -28,6 +30,7 @@ from parity.cases import (
 from parity.implementations import FAST, REFERENCE
 
 Picture = NDArray[np.float32]  # (h, w, 3 or 4)
+GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
 SHAPES = [(3, False), (4, False), (4, True)]  # channels, premultiplied
 
 
@@ -106,6 +109,24 @@ def test_at_beside_and_between_all_that_happens_the_node_is_the_core(node: Node,
         frame = hosts_frame(document, time)
         found = node.recolour(image, document, frame)
         assert same_bits(found, FAST.recolour(image, document, frame)).all(), f"frame {frame}"
+
+
+@pytest.mark.parametrize(("channels", "premultiplied"), SHAPES)
+def test_the_node_converts_as_render_does(node: Node, channels: int, premultiplied: bool) -> None:
+    """Scene-linear light from below 0 to 50, a palette in ACEScct: every bit is the same."""
+    text = (GOLDEN / "v2_scene_linear.p4d.json").read_text(encoding="utf-8")
+    sidecar = _core.parse_sidecar(text, "golden")
+    random = np.random.default_rng(7)
+    image = np.exp2(random.uniform(-9, 5.6, (20, 30, channels))).astype(np.float32)
+    image[:3, :, :3] -= 0.1
+    if channels == 4:
+        image[..., 3] = random.uniform(0, 1, (20, 30)).astype(np.float32)
+    for frame in (3.0, 6.25, 12.0):
+        found = node.recolour(image, json.loads(text), frame, 0.8, premultiplied)
+        expected = recoloured(sidecar, frame, image, premultiplied, RenderOptions(0.8))
+        assert same_bits(found, expected).all()
+        assert np.isfinite(found).all()
+    assert not same_bits(node.recolour(image, json.loads(text), 6.0), image).all()
 
 
 @pytest.mark.parametrize(("channels", "premultiplied"), SHAPES)
