@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "files.hpp"
+#include "outputs.hpp"
 
 namespace palette4d::plugin {
 namespace {
@@ -90,10 +91,13 @@ void prefer_colour(const Suites& suites, OfxImageEffectHandle effect, const Prop
     const auto style =
         Properties(suites, handle).get_string(kOfxImageEffectPropColourManagementStyle);
     if (!style || style->empty() || *style == kOfxImageEffectColourManagementNone) return;
-    const Chosen chosen = chosen_sidecar(Params(suites, effect), std::nullopt);
+    const Params params(suites, effect);
+    const Chosen chosen = chosen_sidecar(params, std::nullopt);
     if (!chosen.result.loaded) return;
+    const Sidecar& sidecar = chosen.result.loaded->sidecar();
+    const bool converts = sidecar.conversion && params.int_now(kParamPictureIn).value_or(0) != 1;
     const std::vector<std::string> wanted =
-        colourspaces_of(chosen.result.loaded->sidecar().clip.encoding);
+        colourspaces_of(converts ? sidecar.conversion->input_space : sidecar.clip.encoding);
     const std::string name = std::string(kOfxImageClipPropPreferredColourspaces) + "_" +
                              kOfxImageEffectSimpleSourceClipName;
     // The basic style knows the generic spaces alone.

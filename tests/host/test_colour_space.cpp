@@ -12,7 +12,7 @@ namespace {
 
 /// Scene-linear light with other primaries to a log in which the palette's box lies.
 constexpr const char* kConversion = R"("encoding": "ACEScct", "conversion": {
-  "input_space": "light", "config": "test.ocio", "error": 0, "steps": [
+  "input_space": "ACEScg", "config": "test.ocio", "error": 0, "steps": [
     {"kind": "matrix", "matrix": [[0.9, 0.1, 0], [0.05, 0.9, 0.05], [0, 0.1, 0.9]],
      "offset": [0, 0, 0]},
     {"kind": "log", "direction": "forward", "base": 2,
@@ -181,5 +181,18 @@ TEST(the_status_names_both_spaces) {
     Node node;
     CHECK(node.instance->changed("sidecar") == kOfxStatOK);
     const std::string status = node.instance->text("status");
-    EXPECT(status.find("light, palette in ACEScct") != std::string::npos, status);
+    EXPECT(status.find("ACEScg, palette in ACEScct") != std::string::npos, status);
+}
+
+TEST(a_host_that_negotiates_colour_is_asked_for_what_the_picture_is_to_be_in) {
+    constexpr const char* kWanted = "OfxImageClipPropPreferredColourspaces_Source";
+    Node node;
+    node.instance->effect().properties.put(kOfxImageEffectPropColourManagementStyle,
+                                           std::string(kOfxImageEffectColourManagementFull));
+    for (const bool palette : {false, true}) {
+        node.instance->set("pictureIn", palette ? 1 : 0);
+        OfxPropertySetStruct out(kOutArgs);
+        CHECK(node.instance->clip_preferences(out) == kOfxStatOK);
+        CHECK(out.text(kWanted, 0) == (palette ? "ACEScct" : "ACEScg"));
+    }
 }
