@@ -15,9 +15,10 @@ from pathlib import Path
 from typing import Any
 
 from palette4d import _core
+from palette4d.analysis import colour_space, pipeline, sidecar
 from palette4d.analysis import manifest as manifests
-from palette4d.analysis import pipeline, sidecar
 from palette4d.analysis.clip import open_clip
+from palette4d.analysis.colour_space import SpaceOptions
 from palette4d.analysis.manifest import DONE, FAILED, TO_DO, Entry, Manifest
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.shots import Shot, trimmed
@@ -35,6 +36,8 @@ class ShowOptions:
     ----------
     analysis : AnalysisOptions
         For every shot.
+    spaces : SpaceOptions
+        What the clips' numbers are, and what the palettes are found in.
     rate : Fraction or None
         Frames a second of image sequences.
     skip_bad_frames, allow_cuts : bool
@@ -50,6 +53,7 @@ class ShowOptions:
     """
 
     analysis: AnalysisOptions
+    spaces: SpaceOptions = dataclasses.field(default_factory=SpaceOptions)
     rate: Fraction | None = None
     skip_bad_frames: bool = False
     allow_cuts: bool = False
@@ -172,15 +176,17 @@ class _Run:
     ) -> None:
         self.folder, self.options = folder, options
         self.path = manifests.path_of(folder, source.name)
-        known = _known(self.path)
+        before = manifests.read(self.path) if self.path.exists() else None
+        known = {} if before is None else {entry.shot.name: entry for entry in before.entries}
         here = os.path.relpath(source.file, folder.absolute())
         self.manifest = Manifest(
             source=Path(here if not Path(source.file).is_absolute() else source.file).as_posix(),
             source_sha256=source.sha256,
             rate=source.rate,
-            options=options.analysis.recorded(),
+            options=options.analysis.recorded() | _asked(options.spaces),
             entries=(),
         )
+        self.same_options = before is not None and before.options == self.manifest.options
         self.entries: dict[str, Entry] = {}
         self.tasks: dict[str, ShotTask] = {}
         self.kept: list[str] = []
@@ -235,7 +241,8 @@ class _Run:
         if before and before.frames and _media(before.shot) == _media(shot):
             expected.add(before.frames)
         same = (
-            found in expected
+            (self.same_options if before else not self.options.spaces.asked)
+            and found in expected
             and clip["source"] == shot.clip
             and clip["frames"]["step"] == shot.step
             and document["generator"] == f"palette4d {_core.__version__}"
@@ -309,6 +316,8 @@ def analyse_shot(task: ShotTask, threads: int) -> Analysed:
                 f"of {task.shot.frames}"
             )
     clip = _open(task, shot)
+    spaces = colour_space.spaces_of(clip, options.spaces)
+    clip = colour_space.converted(clip, spaces)
     analysis_options = dataclasses.replace(options.analysis, threads=threads)
     try:
         document, analysis = pipeline.analyze_clip(clip, analysis_options, allow_cuts=True)
@@ -319,6 +328,7 @@ def analyse_shot(task: ShotTask, threads: int) -> Analysed:
             f"the analysis ended with {type(error).__name__}: {error}; please report this"
         ) from error
     document["clip"]["name"] = shot.name
+    remarks += colour_space.record(document, clip, spaces)
     if clip.skipped:
         remarks.append(f"{counted(len(clip.skipped), 'bad frame')} skipped: {clip.skipped}")
     return Analysed(document, (*remarks, *analysis.remarks))
@@ -333,6 +343,11 @@ def _open(task: ShotTask, shot: Shot) -> Any:
     )
 
 
+def _asked(spaces: SpaceOptions) -> dict[str, str | None]:
+    """Return what a manifest notes of the colour spaces that were asked for."""
+    return dataclasses.asdict(spaces) if spaces.asked else {}
+
+
 def _media(shot: Shot) -> tuple[object, ...]:
     """Return what of a shot its palette depends on."""
     return shot.clip, shot.first, shot.last, shot.used, shot.step
@@ -345,10 +360,3 @@ def _check_only(shots: list[Shot], only: Collection[str]) -> None:
         raise Palette4dError(
             f"--only: there is no shot {unknown[0]!r}; expected names such as {some}"
         )
-
-
-def _known(path: Path) -> dict[str, Entry]:
-    """Return the entries of an earlier run."""
-    if not path.exists():
-        return {}
-    return {entry.shot.name: entry for entry in manifests.read(path).entries}

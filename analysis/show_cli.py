@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,6 +17,7 @@ from palette4d.wording import counted
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from palette4d.analysis.colour_space import SpaceOptions
     from palette4d.analysis.options import AnalysisOptions
     from palette4d.analysis.shots import Shot
     from palette4d.analysis.show import Show, Source
@@ -116,6 +118,7 @@ def run(args: argparse.Namespace, options: AnalysisOptions) -> int:
         source, shots, notes = _of_movie(args, hidden)
     show_options = show.ShowOptions(
         analysis=options,
+        spaces=_spaces(args),
         rate=None if is_timeline(args.clip) else args.rate,
         skip_bad_frames=args.skip_bad_frames,
         allow_cuts=args.allow_cuts,
@@ -140,6 +143,16 @@ def run(args: argparse.Namespace, options: AnalysisOptions) -> int:
     if failed := failures(done):
         raise Palette4dError(failed)
     return 0
+
+
+def _spaces(args: argparse.Namespace) -> SpaceOptions:
+    """Return the colour spaces with the config by name: workers may run elsewhere."""
+    from palette4d.analysis.colour_space import SpaceOptions
+
+    config = args.ocio_config or os.environ.get("OCIO") or None
+    if config is not None and Path(config).is_file():
+        config = str(Path(config).absolute())
+    return SpaceOptions(args.input_space, args.palette_space, config)
 
 
 def _of_edit(args: argparse.Namespace) -> tuple[Source, list[Shot], list[str]]:

@@ -342,6 +342,45 @@ class TestAgain:
         assert not [p for p in out.iterdir() if p.name.startswith(".")]
 
 
+class TestColourSpaces:
+    """--input-space and its like, for every shot."""
+
+    def test_each_shot_has_its_conversion(self, cut_movie: Path, tmp_path: Path) -> None:
+        out = tmp_path / "shots"
+        words = ("--detect-shots", "--input-space", "ACEScg")
+        assert analyze(cut_movie, out, *words) == 0
+        alone = tmp_path / "alone.p4d.json"
+        verb = ["analyze", str(cut_movie), "--frames", "6-9", "-o", str(alone), *QUICK]
+        assert cli.main([*verb, "--input-space", "ACEScg"]) == 0
+        other = json.loads(alone.read_text("utf-8"))
+        other["clip"]["name"] = "rushes_s002"
+        assert sidecar(out, "rushes_s002") == other
+        assert other["clip"]["conversion"]["input_space"] == "ACEScg"
+        assert manifest(out)["options"]["input_space"] == "ACEScg"
+
+    def test_another_space_is_another_palette(
+        self, cut_movie: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        out = tmp_path / "shots"
+        for words, done in (
+            (("--input-space", "ACEScg"), "2 analysed, 0 there"),
+            (("--input-space", "ACEScg"), "0 analysed, 2 there"),
+            ((), "2 analysed, 0 there"),
+            ((), "0 analysed, 2 there"),
+        ):
+            assert analyze(cut_movie, out, "--detect-shots", *words) == 0
+            assert done in capsys.readouterr().out
+        assert "conversion" not in sidecar(out, "rushes_s001")["clip"]
+
+    def test_an_unknown_space_fails_each_shot(
+        self, cut_movie: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        out = tmp_path / "shots"
+        assert analyze(cut_movie, out, "--detect-shots", "--input-space", "ACEScgg") == 1
+        assert "ACEScg" in capsys.readouterr().err
+        assert [status for _, status, _ in shots(out)] == ["failed", "failed"]
+
+
 class TestRefusals:
     """What cannot be done is said, and leaves nothing."""
 

@@ -11,6 +11,7 @@ import asyncio
 import concurrent.futures
 import contextlib
 import logging
+import os
 import re
 import threading
 import uuid
@@ -74,12 +75,13 @@ def run(
         from distributed import as_completed
 
         _check_scheduler(client, address)
+        config = os.environ.get("OCIO")
         keys = {}
         futures = []
         for key, task in tasks.items():
             name = f"palette4d-{uuid.uuid4().hex}"
             keys[name] = key
-            futures.append(client.submit(_piece, work, task, key=name, pure=False))
+            futures.append(client.submit(_piece, work, task, config, key=name, pure=False))
         _check_workers(client, address)
         try:
             for future in as_completed(futures, loop=client.loop):
@@ -96,12 +98,20 @@ def run(
 _at_work = threading.Lock()
 
 
-def _piece(work: Callable[[Task, int], Result], task: Task) -> Result:
-    """Do one piece of work on a worker."""
+def _piece(work: Callable[[Task, int], Result], task: Task, config: str | None) -> Result:
+    """Do one piece of work on a worker, with $OCIO as it is where the command runs."""
     from distributed import get_worker
 
     with _at_work:
-        return work(task, max(1, get_worker().state.nthreads))
+        before = os.environ.pop("OCIO", None)
+        try:
+            if config is not None:
+                os.environ["OCIO"] = config
+            return work(task, max(1, get_worker().state.nthreads))
+        finally:
+            os.environ.pop("OCIO", None)
+            if before is not None:
+                os.environ["OCIO"] = before
 
 
 def _version() -> str:
