@@ -47,13 +47,38 @@ def consumer(scene: Scene) -> tuple[str, ...]:
     )
 
 
-def frames_of(scene: Scene, said: subprocess.CompletedProcess[str]) -> list[Image]:
-    files = sorted(scene.folder.glob("out_*.png"))
-    assert len(files) == len(scene.clip), said.stderr
-    assert "persistent" not in said.stderr
-    frames = [read_image(path) for path in files]
-    for path in files:
-        path.unlink()
+def render(
+    scene: Scene, *words: str, folder: Path | None = None, **environment: str
+) -> tuple[list[Image], str]:
+    """The frames that melt writes into a folder (the scene's), and what it said.
+
+    On a busy machine melt now and then ends, without a word, before its first frame: asked again.
+    """
+    folder = folder or scene.folder
+    for _ in range(4):
+        for old in folder.glob("out_*.png"):
+            old.unlink()
+        done = subprocess.run(
+            [str(scene.melt), *words, *consumer(scene)],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            cwd=folder,
+            env={**os.environ, "OFX_PLUGIN_PATH": str(scene.plugins), **environment},
+            timeout=300,
+            check=True,
+        )
+        files = sorted(folder.glob("out_*.png"))
+        if files:
+            break
+    assert len(files) == len(scene.clip), done.stderr
+    return [read_image(path) for path in files], done.stderr
+
+
+def without_a_message(rendered: tuple[list[Image], str]) -> list[Image]:
+    frames, said = rendered
+    assert "persistent" not in said
     return frames
 
 
@@ -82,14 +107,14 @@ GRADES += ("-attach", SERVICE, "sidecar=second.p4d.json")
 def project_clip(scene: Scene) -> list[Image]:
     """What melt makes of the clip in a project without any effect: it passes through 4:2:2."""
     scene.run(*CLIP, "-consumer", "xml:plain.mlt")
-    return frames_of(scene, scene.run("plain.mlt", *consumer(scene)))
+    return without_a_message(render(scene, "plain.mlt"))
 
 
 def test_several_nodes_in_a_chain(
     scene: Scene, sidecars: tuple[_core.Sidecar, _core.Sidecar]
 ) -> None:
-    said = scene.run(*CLIP, *GRADES, *consumer(scene))
-    check_chain(scene.clip, frames_of(scene, said), sidecars)
+    frames = without_a_message(render(scene, *CLIP, *GRADES))
+    check_chain(scene.clip, frames, sidecars)
 
 
 def test_a_project_on_disk(
@@ -97,8 +122,8 @@ def test_a_project_on_disk(
 ) -> None:
     scene.run(*CLIP, *GRADES, "-consumer", "xml:show.mlt")
     assert (scene.folder / "show.mlt").read_text().count(f">{SERVICE}<") == 2
-    said = scene.run("show.mlt", *consumer(scene))
-    check_chain(project_clip, frames_of(scene, said), sidecars)
+    frames = without_a_message(render(scene, "show.mlt"))
+    check_chain(project_clip, frames, sidecars)
 
 
 def test_a_project_keeps_handles_and_keyframes(
@@ -111,7 +136,7 @@ def test_a_project_keeps_handles_and_keyframes(
         *(f"strength=0=0;{last}=1", "handle07=#ffcc00", "handle07On=1", "editsFrom=Host"),
         *("-consumer", "xml:keyed.mlt"),
     )
-    frames = frames_of(scene, scene.run("keyed.mlt", *consumer(scene)))
+    frames = without_a_message(render(scene, "keyed.mlt"))
     document = json.loads(path.read_text())
     document["edits"] = {"vertices": [{"vertex": "a6", "rgb": [1.0, 0.8, 0.0]}], "stops": []}
     path = scene.folder / "by hand.p4d.json"
@@ -134,16 +159,7 @@ def test_a_project_rendered_from_another_folder(
 
     def rendered(stored: str, **environment: str) -> tuple[list[Image], str]:
         scene.run(*CLIP, "-attach", SERVICE, f"sidecar={stored}", "-consumer", "xml:moved.mlt")
-        done = subprocess.run(
-            [str(scene.melt), str(scene.folder / "moved.mlt"), *consumer(scene)],
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            cwd=elsewhere,
-            env={**os.environ, "OFX_PLUGIN_PATH": str(scene.plugins), **environment},
-            check=True,
-        )
-        return [read_image(path) for path in sorted(elsewhere.glob("out_*.png"))], done.stderr
+        return render(scene, str(scene.folder / "moved.mlt"), folder=elsewhere, **environment)
 
     frames, said = rendered(absolute)
     assert "first.p4d.json: the file does not exist" in said
