@@ -247,7 +247,8 @@ def test_the_command_refuses_cuts(kind, starts, tmp_path, capsys):
     assert not out.exists()
     for start in starts:
         assert str(start) in message
-    ranges = [word.rstrip("),") for word in message.split() if word[:1].isdigit() and "-" in word]
+    words = [word.rstrip("),;") for word in message.split()]
+    ranges = [word for word in words if word[:1].isdigit() and "-" in word]
     assert len(ranges) == len(starts) + 1
     for part in ranges:  # what the message names can be analysed
         arguments = ["analyze", spec, "-o", str(out), "--quiet", "--frames", part]
