@@ -312,6 +312,12 @@ class _Skew(_Road):
             self.stages.pop()
             polytope = static
             self.measure("vertex_refinement", static)
+        if 0 < self.options.vertices < len(polytope.vertices):
+            remarks = (
+                *remarks,
+                f"the palette has {len(polytope.vertices)} vertices, not {self.options.vertices}: "
+                "its colours have two each, and a smaller --palette-size means fewer colours",
+            )
         return Analysis(polytope, tuple(self.stages), remarks)
 
     def configurations(self) -> list[list[Block]]:

@@ -26,8 +26,8 @@ USE_FRAMES = 12
 BAD_FRAME = 4.0  # times the median frame's L ...
 BAD_L = 0.3  # ... and at least this, or the clip's mean
 LOOKALIKE = 0.06  # RGB distance of two handles ...
-NARROW = 4 * LOOKALIKE  # ... in frames whose colours extend farther than this
 DENT = 0.05  # share of its convex hull that a slice lacks
+NARROW = 4 * LOOKALIKE  # frames whose colours extend less than this, such as black ones: neither
 UNUSED = 0.001  # largest mean weight of a handle in any frame
 
 
@@ -52,7 +52,8 @@ class Report:
         merge do not count, nor do frames that are nearly of one colour, such as black ones), its
         frame and the two nearest vertices' ids; None where there are no two.
     least_used : the handle of least use and its largest mean weight (eq. 7) in any frame.
-    dent : the largest share of its convex hull that a slice lacks, and its frame.
+    dent : the largest share of its convex hull that a slice lacks, and its frame (frames that are
+        nearly of one colour do not count).
     splits, merges : vertices where a colour becomes several, or several one.
     colours : palette colours of a frame, on average.
     """
@@ -139,7 +140,10 @@ def report(
     """Measure a polytope on the clip's frames."""
     slices = [_core.slice_at(polytope, float(s.frame)) for s in statistics]
     fits = tuple(_fit(cut, s, options) for cut, s in zip(slices, statistics, strict=True))
-    dents = [(_dent(cut), s.frame) for cut, s in zip(slices, statistics, strict=True)]
+    dents = [
+        (0.0 if _narrow(s) else _dent(cut), s.frame)
+        for cut, s in zip(slices, statistics, strict=True)
+    ]
     sources, targets = np.unique(polytope.edges[:, 0]), np.unique(polytope.edges[:, 1])
     out_degree = np.bincount(polytope.edges[:, 0], minlength=len(polytope.vertices))
     in_degree = np.bincount(polytope.edges[:, 1], minlength=len(polytope.vertices))
@@ -159,6 +163,10 @@ def _fit(cut: _core.Slice, frame: FrameStatistics, options: AnalysisOptions) -> 
         frame.colours, cut.rgb, NO_FACES, loss_weights(options)
     )
     return FrameFit(frame.frame, options.lambda_ * r + c, outside, farthest)
+
+
+def _narrow(frame: FrameStatistics) -> bool:
+    return float(np.max(frame.high - frame.low)) < NARROW
 
 
 def _dent(cut: _core.Slice) -> float:
@@ -182,7 +190,7 @@ def _closest(
     best: tuple[float, int, str, str] | None = None
     ids = polytope.vertex_ids
     for cut, frame in zip(slices, statistics, strict=True):
-        if np.max(frame.high - frame.low) < NARROW:
+        if _narrow(frame):
             continue
         gaps = np.linalg.norm(cut.rgb[:, None] - cut.rgb[None], axis=2)
         # Colours that come from one vertex, or go to one, are meant to be close there.
@@ -211,8 +219,9 @@ def _least_used(
     chosen |= {int(np.argmin(np.abs(times - t))) for t in polytope.vertices[:, 3]}
     for at in sorted(chosen):
         cut, colours = slices[at], statistics[at].coarse
-        if len(cut.faces) == 0:
-            return polytope.vertex_ids[0], 1.0  # a line or a point: every colour is needed
+        if len(cut.faces) == 0:  # a line or a point: every colour is needed
+            use[cut.ends] = 1.0
+            continue
         weights, _ = _core.palette_weights(colours.rgb, cut.rgb, cut.faces)
         mean = colours.counts @ weights / colours.total
         here = np.zeros(len(use))

@@ -29,6 +29,10 @@ from palette4d.wording import counted
 if TYPE_CHECKING:
     from palette4d.analysis.clip import Clip
 
+TRIM_EVERY = 50_000_000
+"""Pixels after which freed memory is given back: glibc keeps what frames of changing sizes leave
+between the colours that stay."""
+
 MOST_COLOURS = 8_000_000
 """Colours kept of a clip, all frames together: less than 400 MB."""
 
@@ -126,6 +130,8 @@ def gather_clip(
             if not clip.skip_bad_frames:
                 raise
             clip.skip(number)
+        if done % max(1, TRIM_EVERY // pixels) == 0:
+            _core.return_memory()
         report(done, len(chosen))
     if not found:
         raise clip.none_readable()

@@ -2,6 +2,9 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include <algorithm>
 #include <cmath>
@@ -132,6 +135,13 @@ py::object take_trees(ColourBinner& self, std::size_t colours, std::size_t coars
 }  // namespace
 
 void bind_bins(py::module_& m) {
+    m.def("return_memory", [] {
+#ifdef __GLIBC__
+        py::gil_scoped_release release;
+        malloc_trim(0);
+#endif
+    });
+
     py::class_<ColourBinner>(m, "ColourBinner")
         .def(py::init<>())
         .def("add", &add_image, py::arg("image"), py::kw_only(), py::arg("bits") = 16,

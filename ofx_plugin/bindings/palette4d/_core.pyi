@@ -158,6 +158,9 @@ class Recolourer:
 def instruction_sets() -> list[str]:
     """Return the instruction sets that `Recolourer.apply` can use here, slowest first."""
 
+def return_memory() -> None:
+    """Give freed memory back to the system, where the C library keeps it (glibc)."""
+
 class ColourBinner:
     """Gathers a frame's pixels, strip by strip, to a bounded number of colours.
 
