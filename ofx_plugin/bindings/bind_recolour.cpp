@@ -9,6 +9,7 @@
 #include "arrays.hpp"
 #include "binders.hpp"
 #include "palette4d/colour_conversion.hpp"
+#include "palette4d/lattice.hpp"
 #include "palette4d/recolour.hpp"
 
 using namespace palette4d;
@@ -87,7 +88,9 @@ InstructionSet instructions_from(const std::string& name) {
     throw py::value_error("instructions: found '" + name + "', expected one of " + names);
 }
 
-py::array apply(const Recolourer& self, const py::array& image, double strength, bool premultiplied,
+/// By a Recolourer or a Lattice.
+template <class Self>
+py::array apply(const Self& self, const py::array& image, double strength, bool premultiplied,
                 int threads, const py::object& out, const std::string& precision,
                 const std::string& instructions, const ColourConversion* conversion) {
     require_image(image, "image");
@@ -124,7 +127,7 @@ py::array apply(const Recolourer& self, const py::array& image, double strength,
 }  // namespace
 
 void bind_recolour(py::module_& module) {
-    py::class_<Recolourer>(
+    py::class_<Recolourer, std::shared_ptr<Recolourer>>(
         module, "Recolourer",
         "One frame's recolouring: p' = p + strength * sum_i w_i(q) (v'_i - v_i).")
         .def(py::init(
@@ -136,11 +139,37 @@ void bind_recolour(py::module_& module) {
              py::arg("original"), py::arg("edited"), py::arg("faces"))
         .def_property_readonly("identity", &Recolourer::identity,
                                "No colour is edited: apply() copies bit for bit.")
-        .def("apply", &apply, py::arg("image"), py::kw_only(), py::arg("strength") = 1.0,
-             py::arg("premultiplied") = false, py::arg("threads") = 1, py::arg("out") = py::none(),
-             py::arg("precision") = "double", py::arg("instructions") = "best",
-             py::arg("conversion") = py::none(),
+        .def("apply", &apply<Recolourer>, py::arg("image"), py::kw_only(),
+             py::arg("strength") = 1.0, py::arg("premultiplied") = false, py::arg("threads") = 1,
+             py::arg("out") = py::none(), py::arg("precision") = "double",
+             py::arg("instructions") = "best", py::arg("conversion") = py::none(),
              "(h, w, 3 or 4) float32 in and out; threads 0 means one per processor.");
+    py::class_<Lattice>(module, "Lattice",
+                        "One frame's recolouring by interpolation where that is exact enough.")
+        .def(py::init([](const std::shared_ptr<Recolourer>& recolourer) {
+                 return std::make_unique<Lattice>(recolourer);
+             }),
+             py::arg("recolourer").none(false))
+        .def("apply", &apply<Lattice>, py::arg("image"), py::kw_only(), py::arg("strength") = 1.0,
+             py::arg("premultiplied") = false, py::arg("threads") = 1, py::arg("out") = py::none(),
+             py::arg("precision") = "single", py::arg("instructions") = "best",
+             py::arg("conversion") = py::none(), "As Recolourer.apply().")
+        .def_property_readonly("largest_error", &Lattice::largest_error,
+                               "Of (interpolated - exact) / max(|exact|, 0.1), as seen so far.")
+        .def_property_readonly(
+            "size",
+            [](const Lattice& self) {
+                const Lattice::Size size = self.size();
+                py::dict result;
+                result["cells"] = size.cells;
+                result["cut"] = size.cut;
+                result["parts"] = size.parts;
+                result["exact"] = size.exact;
+                result["colours"] = size.colours;
+                return result;
+            },
+            "What it holds at the moment.");
+    module.attr("LATTICE_TOLERANCE") = Lattice::kTolerance;
     module.def(
         "instruction_sets",
         [] {

@@ -297,3 +297,37 @@ def test_the_interpreter_runs_on_while_an_image_is_recoloured(
         longest, last = max(longest, now - last), now
     total = time.perf_counter() - started
     assert longest < 0.6 * total
+
+
+# Lattice ------------------------------------------------------------------------------------------
+
+
+def test_a_lattice_is_made_while_it_is_used(recolourer: _core.Recolourer) -> None:
+    lattice = _core.Lattice(recolourer)
+    assert lattice.largest_error == 0
+    assert set(lattice.size.values()) == {0}
+    image = np.random.default_rng(1).uniform(0.2, 0.3, (40, 90, 3)).astype(np.float32)
+    exact = recolourer.apply(image, precision="single")
+    found = lattice.apply(image, threads=2)
+    size = lattice.size
+    assert size["cells"] > 0
+    assert size["colours"] > 8 * size["cells"]
+    again = lattice.apply(image)
+    assert same_bits(again, found).all()
+    assert lattice.size["cells"] == size["cells"]
+    error = (np.abs(found - exact) / np.maximum(np.abs(exact), 0.1)).max()
+    assert 0 < error <= _core.LATTICE_TOLERANCE
+    assert 0 < lattice.largest_error <= _core.LATTICE_TOLERANCE
+    place = image.copy()
+    lattice.apply(place, out=place)
+    assert same_bits(place, found).all()
+
+
+def test_a_lattice_refuses_what_recolouring_refuses(recolourer: _core.Recolourer) -> None:
+    lattice = _core.Lattice(recolourer)
+    with pytest.raises(ValueError, match=r"expected float32"):
+        lattice.apply(np.zeros((2, 2, 3)))  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="strength is not finite"):
+        lattice.apply(np.zeros((2, 2, 3), np.float32), strength=float("nan"))
+    with pytest.raises(TypeError):
+        _core.Lattice(None)  # type: ignore[arg-type]

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <memory>
 #include <vector>
 
 #include "check.hpp"
@@ -177,6 +178,87 @@ TEST(threads_and_pieces_do_not_show) {
     apply_converted(recolourer, &kChain, {many.data.data(), 100, 400, 3, row},
                     {many.data.data(), 100, 400, 3, row}, options);
     CHECK(std::memcmp(one.data.data(), many.data.data(), one.data.size() * sizeof(float)) == 0);
+}
+
+TEST(a_lattice_recolours_between_two_conversions_too) {
+    Random random(6);
+    Image image{40000, 3, {}};
+    for (int i = 0; i < image.width; ++i) {
+        const Vec3 colour = chain().to_clip(random.colour(-0.05, 1.05));
+        for (const double x : colour) image.data.push_back(static_cast<float>(x));
+    }
+    Image exact = image, found = image;
+    std::vector<Vec3> edited = cube().rgb;
+    edited[7] = {1.2, 0.7, 0.9};
+    edited[1] = {0.1, 0.2, 0.6};
+    const auto recolourer = std::make_shared<Recolourer>(cube().rgb, edited, cube().faces);
+    const Lattice lattice(recolourer);
+    apply_converted(*recolourer, &kChain, image.in(), exact.out(), {});
+    const LatticeCounts counts = apply_converted(lattice, &kChain, image.in(), found.out(), {});
+    CHECK_EQUAL(counts.interpolated + counts.exact, 40000LL);
+    CHECK(counts.interpolated > 2 * counts.exact);
+    CHECK(found.data != exact.data);
+    const auto palette = [](const Image& of, std::size_t i) {
+        return kChain.to_palette({of.data[i], of.data[i + 1], of.data[i + 2]});
+    };
+    for (std::size_t i = 0; i < image.data.size(); i += 3) {
+        const Vec3 a = palette(found, i), b = palette(exact, i);
+        for (std::size_t c = 0; c < 3; ++c) {
+            // And what the clip's numbers lose as floats.
+            CHECK_NEAR(a[c], b[c], Lattice::kTolerance * std::max(std::abs(b[c]), 0.1) + 2e-5);
+        }
+    }
+    Image many = image;
+    RecolourOptions options;
+    options.threads = 3;
+    const std::ptrdiff_t row = 100 * 3 * static_cast<std::ptrdiff_t>(sizeof(float));
+    apply_converted(lattice, &kChain, {many.data.data(), 100, 400, 3, row},
+                    {many.data.data(), 100, 400, 3, row}, options);
+    CHECK(std::memcmp(many.data.data(), found.data.data(), many.data.size() * sizeof(float)) == 0);
+    // Without a conversion it is the lattice itself.
+    Image plain = image, straight = image;
+    lattice.apply(image.in(), plain.out(), {});
+    apply_converted(lattice, nullptr, image.in(), straight.out(), {});
+    CHECK(std::memcmp(plain.data.data(), straight.data.data(), plain.data.size() * 4) == 0);
+}
+
+TEST(what_a_lattice_does_not_move_keeps_its_bits_between_conversions) {
+    // Nearest to a face whose colours stay where they are, in numbers that are not exact.
+    std::vector<Vec3> edited = cube().rgb;
+    std::vector<float> colours;
+    for (std::size_t i = 0; i < edited.size(); ++i) {
+        if (edited[i][0] == 1) edited[i][2] *= 0.7;
+    }
+    Random random(7);
+    for (int i = 0; i < 3000; ++i) {
+        Vec3 colour = random.colour(0.1, 0.9);
+        if (i % 2) colour[0] = -0.04;
+        for (const double x : chain().to_clip(colour)) colours.push_back(static_cast<float>(x));
+        colours.push_back(i % 2 ? 0.7f : 1.0f);
+    }
+    const auto recolourer = std::make_shared<Recolourer>(cube().rgb, edited, cube().faces);
+    const Lattice lattice(recolourer);
+    Image image{3000, 4, colours};
+    apply_converted(lattice, &kChain, image.in(), image.out(), {});
+    int moved = 0;
+    for (std::size_t i = 0; i < 3000; ++i) {
+        const bool same = std::memcmp(&image.data[4 * i], &colours[4 * i], 16) == 0;
+        if (i % 2) CHECK(same);
+        moved += !same;
+    }
+    CHECK(moved > 1400);
+
+    Image odd{4, 4, {0.1f, 0.2f, 0.3f, 0, kNan, 0, 0, 1, 0, kInf, 0, 1, 0.1f, 0.2f, 0.3f, kInf}};
+    const Image before = odd;
+    RecolourOptions options;
+    options.premultiplied = true;
+    apply_converted(lattice, &kChain, odd.in(), odd.out(), options);
+    CHECK(std::memcmp(odd.data.data(), before.data.data(), 64) == 0);
+    Image one{1, 4, {0.4f, 0.3f, 0.2f, 1}}, half{1, 4, {0.2f, 0.15f, 0.1f, 0.5f}};
+    apply_converted(lattice, &kChain, one.in(), one.out(), options);
+    apply_converted(lattice, &kChain, half.in(), half.out(), options);
+    CHECK(one.data[2] != 0.2f);
+    for (std::size_t c = 0; c < 3; ++c) CHECK_NEAR(half.data[c], one.data[c] / 2, 1e-7);
 }
 
 TEST(what_has_no_way_back_is_refused) {

@@ -123,6 +123,12 @@ class Core:
         cut = _core.slice_at(sidecar.polytope, frame)
         return _core.edited_colours(sidecar.polytope, sidecar.edits, cut)
 
+    def recolourer(self, document: Document, frame: float) -> _core.Recolourer:
+        sidecar = self.sidecar(document)
+        cut = _core.slice_at(sidecar.polytope, frame)
+        edited = _core.edited_colours(sidecar.polytope, sidecar.edits, cut)
+        return _core.Recolourer(cut.rgb, edited, cut.faces)
+
     def mvc(self, points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> F64:
         return _core.mean_value_coordinates(points, rgb, faces)
 
@@ -140,11 +146,7 @@ class Core:
         strength: float = 1.0,
         premultiplied: bool = False,
     ) -> NDArray[np.float32]:
-        sidecar = self.sidecar(document)
-        cut = _core.slice_at(sidecar.polytope, frame)
-        edited = _core.edited_colours(sidecar.polytope, sidecar.edits, cut)
-        recolourer = _core.Recolourer(cut.rgb, edited, cut.faces)
-        return recolourer.apply(
+        return self.recolourer(document, frame).apply(
             image,
             strength=strength,
             premultiplied=premultiplied,
@@ -153,9 +155,31 @@ class Core:
         )
 
 
+class Lattice(Core):
+    """The compiled core's interpolation; all but the pictures is as in `Core`."""
+
+    def __init__(self, instructions: str = "best") -> None:
+        super().__init__("single", instructions)
+        self.name = "_core lattice"
+
+    def recolour(
+        self,
+        image: NDArray[np.float32],
+        document: Document,
+        frame: float,
+        strength: float = 1.0,
+        premultiplied: bool = False,
+    ) -> NDArray[np.float32]:
+        return _core.Lattice(self.recolourer(document, frame)).apply(
+            image, strength=strength, premultiplied=premultiplied, instructions=self.instructions
+        )
+
+
 REFERENCE: Implementation = Reference()
 #: Double precision throughout: the bakes.
 CORE: Implementation = Core("double")
 #: Many colours at a time: the node and `palette4d render`.
 FAST: Implementation = Core("single")
+#: Within _core.LATTICE_TOLERANCE: the node where pictures play.
+LATTICE: Implementation = Lattice()
 IMPLEMENTATIONS: list[Implementation] = [REFERENCE, CORE, FAST]

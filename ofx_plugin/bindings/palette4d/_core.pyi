@@ -155,6 +155,40 @@ class Recolourer:
         image is in the clip's numbers, and the palette in those that it leads to.
         """
 
+class Lattice:
+    """One frame's recolouring by tetrahedral interpolation where that is exact enough.
+
+    Made while it is used, by any number of threads: cells are halved where they err, and what errs
+    still, or lies outside, is recoloured as `Recolourer.apply` does.
+    """
+
+    def __init__(self, recolourer: Recolourer) -> None: ...
+    def apply(
+        self,
+        image: NDArray[np.float32],
+        *,
+        strength: float = ...,
+        premultiplied: bool = ...,
+        threads: int = ...,
+        out: NDArray[np.float32] | None = ...,
+        precision: Literal["single", "double"] = ...,
+        instructions: str = ...,
+        conversion: ColourConversion | None = ...,
+    ) -> F32:
+        """As `Recolourer.apply`; all is exact with precision "double" or strength beyond 0 to 1.
+
+        With a `conversion`, `LATTICE_TOLERANCE` is of the palette's numbers.
+        """
+    @property
+    def largest_error(self) -> float:
+        """Largest abs(interpolated - exact) / max(abs(exact), 0.1) seen so far, at strength 1."""
+    @property
+    def size(self) -> dict[str, int]:
+        """Cells looked at, cut, parts looked at, exact parts, colours evaluated exactly."""
+
+LATTICE_TOLERANCE: float
+"""What `Lattice.largest_error` is held against."""
+
 def instruction_sets() -> list[str]:
     """Return the instruction sets that `Recolourer.apply` can use here, slowest first."""
 

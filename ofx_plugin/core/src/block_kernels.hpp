@@ -5,6 +5,8 @@
 
 #include <cstddef>
 
+#include "lattice_kernels.hpp"
+
 namespace palette4d {
 
 /// A rotation; the last row is the direction of the rays that tell the inside of a body. No edge of
@@ -114,6 +116,7 @@ int scratch_size(const Plan<T>& plan) {
 struct KernelSet {
     Kernels<float> single;
     Kernels<double> twofold;
+    LatticeKernels lattice;
 };
 
 // Null where the source was compiled for a processor without these instructions.

@@ -414,9 +414,4 @@ void move(Block<T>& block, int count, T strength, bool premultiplied) {
     }
 }
 
-constexpr palette4d::KernelSet kKernels = {
-    {&classify<float>, &mean_value<float>, &closest<float>, &move<float>},
-    {&classify<double>, &mean_value<double>, &closest<double>, &move<double>},
-};
-
 }  // namespace

@@ -5,6 +5,9 @@
 #include "lanes.hpp"
 //
 #include "block_kernels.inl"
+#include "lattice_kernels.inl"
+
+PALETTE4D_KERNEL_SET
 
 namespace palette4d {
 const KernelSet* portable_kernels() { return &kKernels; }

@@ -14,12 +14,16 @@ namespace {
 /// Pixels that are converted before they are recoloured together.
 constexpr std::size_t kPiece = 16384;
 
-/// A thread's work: pixels are gathered, recoloured as a row of their own, and written.
+const Recolourer& edit_of(const Recolourer& recolourer) { return recolourer; }
+const Recolourer& edit_of(const Lattice& lattice) { return lattice.recolourer(); }
+
+/// A thread's work: pixels are gathered, recoloured as a row of their own by a Recolourer or a
+/// Lattice, and written.
+template <class Way, class Counts>
 class Piece {
 public:
-    Piece(const Recolourer& recolourer, const ColourConversion& conversion,
-          const RecolourOptions& options)
-        : recolourer_(recolourer), conversion_(conversion), options_(options) {
+    Piece(const Way& way, const ColourConversion& conversion, const RecolourOptions& options)
+        : way_(way), conversion_(conversion), options_(options) {
         options_.threads = 1;
         options_.premultiplied = false;
         pixels_.reserve(kPiece);
@@ -48,8 +52,8 @@ public:
         after_.resize(before_.size());
         const int count = static_cast<int>(pixels_.size());
         const auto bytes = static_cast<std::ptrdiff_t>(before_.size() * sizeof(float));
-        counts_ += recolourer_.apply({before_.data(), count, 1, 3, bytes},
-                                     {after_.data(), count, 1, 3, bytes}, options_);
+        counts_ += way_.apply({before_.data(), count, 1, 3, bytes},
+                              {after_.data(), count, 1, 3, bytes}, options_);
         for (std::size_t i = 0; i < pixels_.size(); ++i) {
             Vec3 at = pixels_[i].exact;
             bool moved = false;
@@ -65,7 +69,7 @@ public:
         before_.clear();
     }
 
-    const RecolourCounts& counts() const { return counts_; }
+    const Counts& counts() const { return counts_; }
 
 private:
     struct Pixel {
@@ -85,31 +89,29 @@ private:
         }
     }
 
-    const Recolourer& recolourer_;
+    const Way& way_;
     const ColourConversion& conversion_;
     RecolourOptions options_;
     std::vector<Pixel> pixels_;
     std::vector<float> before_, after_;
-    RecolourCounts counts_;
+    Counts counts_;
 };
 
-}  // namespace
-
-RecolourCounts apply_converted(const Recolourer& recolourer, const ColourConversion* conversion,
-                               const ConstImageView& in, const ImageView& out,
-                               const RecolourOptions& options) {
-    if (!conversion || conversion->identity()) return recolourer.apply(in, out, options);
+template <class Counts, class Way>
+Counts apply_between(const Way& way, const ColourConversion* conversion, const ConstImageView& in,
+                     const ImageView& out, const RecolourOptions& options) {
+    if (!conversion || conversion->identity()) return way.apply(in, out, options);
     check_recolouring(in, out, options);
     if (in.width == 0 || in.height == 0) return {};
-    if (recolourer.identity() || options.strength == 0) {
+    if (edit_of(way).identity() || options.strength == 0) {
         copy_rows(in, out);
         return {};
     }
     const bool divide = options.premultiplied && in.channels == 4;
-    RecolourCounts counts;
+    Counts counts;
     std::mutex guard;
     share_rows(in.height, options.threads, [&](const NextRow& next) {
-        Piece piece(recolourer, *conversion, options);
+        Piece<Way, Counts> piece(way, *conversion, options);
         for (int y = next(); y >= 0; y = next()) {
             piece.row(row_of(in, y), row_of(out, y), in.width, in.channels, divide);
         }
@@ -118,6 +120,20 @@ RecolourCounts apply_converted(const Recolourer& recolourer, const ColourConvers
         counts += piece.counts();
     });
     return counts;
+}
+
+}  // namespace
+
+RecolourCounts apply_converted(const Recolourer& recolourer, const ColourConversion* conversion,
+                               const ConstImageView& in, const ImageView& out,
+                               const RecolourOptions& options) {
+    return apply_between<RecolourCounts>(recolourer, conversion, in, out, options);
+}
+
+LatticeCounts apply_converted(const Lattice& lattice, const ColourConversion* conversion,
+                              const ConstImageView& in, const ImageView& out,
+                              const RecolourOptions& options) {
+    return apply_between<LatticeCounts>(lattice, conversion, in, out, options);
 }
 
 }  // namespace palette4d

@@ -56,6 +56,7 @@ void check_recolouring(const ConstImageView& in, const ImageView& out,
         throw std::invalid_argument("recolour: " + std::to_string(options.threads) +
                                     " threads; expected 0 (one per processor) or more");
     }
+    resolved(options.instructions);
 }
 
 void copy_rows(const ConstImageView& in, const ImageView& out) {

@@ -87,6 +87,29 @@ PALETTE4D_INLINE Lanes<T> abs(const Lanes<T>& a) {
     PALETTE4D_EACH r.at[lane] = std::abs(a.at[lane]);
     return r;
 }
+/// Towards zero; below 2^24.
+template <class T>
+PALETTE4D_INLINE Lanes<T> truncated(const Lanes<T>& a) {
+    Lanes<T> r;
+    PALETTE4D_EACH r.at[lane] = static_cast<T>(static_cast<int>(a.at[lane]));
+    return r;
+}
+PALETTE4D_INLINE void store_whole(int* to, const Lanes<float>& a) {
+    for (int lane = 0; lane < Lanes<float>::kCount; ++lane) to[lane] = static_cast<int>(a.at[lane]);
+}
+PALETTE4D_INLINE Lanes<float> load_whole(const int* from) {
+    Lanes<float> r;
+    for (int lane = 0; lane < Lanes<float>::kCount; ++lane) {
+        r.at[lane] = static_cast<float>(from[lane]);
+    }
+    return r;
+}
+/// Of so many times 16 bytes.
+PALETTE4D_INLINE void store_offsets(unsigned* to, const Lanes<float>& a) {
+    for (int lane = 0; lane < Lanes<float>::kCount; ++lane) {
+        to[lane] = 16u * static_cast<unsigned>(static_cast<int>(a.at[lane]));
+    }
+}
 template <class T>
 PALETTE4D_INLINE Lanes<T> select(const LaneMask<T>& m, const Lanes<T>& a, const Lanes<T>& b) {
     Lanes<T> r;
@@ -159,6 +182,27 @@ PALETTE4D_INLINE Lanes<T> load(const T* from) {
 template <class T>
 PALETTE4D_INLINE void store(T* to, Lanes<T> a) {
     std::memcpy(to, &a.v, sizeof a.v);
+}
+/// Towards zero; below 2^24.
+template <class T>
+PALETTE4D_INLINE Lanes<T> truncated(Lanes<T> a) {
+    using Whole = typename Lanes<T>::Integers;
+    return {
+        __builtin_convertvector(__builtin_convertvector(a.v, Whole), typename Lanes<T>::Vector)};
+}
+PALETTE4D_INLINE void store_whole(int* to, Lanes<float> a) {
+    const auto whole = __builtin_convertvector(a.v, Lanes<float>::Integers);
+    std::memcpy(to, &whole, sizeof whole);
+}
+PALETTE4D_INLINE Lanes<float> load_whole(const int* from) {
+    Lanes<float>::Integers whole;
+    std::memcpy(&whole, from, sizeof whole);
+    return {__builtin_convertvector(whole, Lanes<float>::Vector)};
+}
+/// Of so many times 16 bytes.
+PALETTE4D_INLINE void store_offsets(unsigned* to, Lanes<float> a) {
+    const auto whole = __builtin_convertvector(a.v, Lanes<float>::Integers) << 4;
+    std::memcpy(to, &whole, sizeof whole);
 }
 template <class T>
 PALETTE4D_INLINE Lanes<T> select(LaneMask<T> m, Lanes<T> a, Lanes<T> b) {

@@ -10,6 +10,7 @@
 #include <string>
 #include <utility>
 
+#include "exact_worker.hpp"
 #include "image_rows.hpp"
 #include "kernel_choice.hpp"
 #include "recolour_plan.hpp"
@@ -123,7 +124,8 @@ private:
 class Recolourer::Pipeline {
 public:
     Pipeline(const Recolourer& recolourer, const RecolourOptions& options)
-        : one_by_one_(recolourer, options),
+        : divide_(options.premultiplied),
+          one_by_one_(recolourer, options),
           twofold_(recolourer.plan_->twofold, kernels_of(options.instructions).twofold, options,
                    one_by_one_),
           single_(recolourer.plan_->single, kernels_of(options.instructions).single, options,
@@ -140,6 +142,17 @@ public:
             } else {
                 single_.run<4>(in + at, out + at, count);
             }
+        }
+    }
+
+    void pixel(const float* from, float* to, int channels) {
+        if (channels == 4) to[3] = from[3];
+        // NaN where one is not finite: 0 times infinity is no number.
+        if (0 * from[0] + 0 * from[1] + 0 * from[2] == 0 &&
+            (!divide_ || (from[3] != 0 && std::isfinite(from[3])))) {
+            single_.recolour(from, to);
+        } else {
+            for (int c = 0; c < 3; ++c) to[c] = from[c];
         }
     }
 
@@ -354,6 +367,7 @@ private:
         long long count_ = 0;
     };
 
+    const bool divide_;
     OneByOne one_by_one_;
     Stage<double, OneByOne> twofold_;
     Stage<float, Stage<double, OneByOne>> single_;
@@ -385,7 +399,6 @@ RecolourCounts Recolourer::apply(const ConstImageView& in, const ImageView& out,
     RecolourOptions options = given;
     options.premultiplied = options.premultiplied && in.channels == 4;
     check_recolouring(in, out, options);
-    resolved(options.instructions);
     if (in.width == 0 || in.height == 0) return {};
 
     if (identity_ || displaced_.empty() || options.strength == 0) {
@@ -417,5 +430,17 @@ RecolourCounts Recolourer::apply(const ConstImageView& in, const ImageView& out,
     });
     return counts;
 }
+
+ExactWorker::ExactWorker(const Recolourer& recolourer, const RecolourOptions& options)
+    : pipeline_(std::make_unique<Recolourer::Pipeline>(recolourer, options)) {}
+ExactWorker::~ExactWorker() = default;
+void ExactWorker::row(const float* from, float* to, int width, int channels) {
+    pipeline_->row(from, to, width, channels);
+}
+void ExactWorker::pixel(const float* from, float* to, int channels) {
+    pipeline_->pixel(from, to, channels);
+}
+void ExactWorker::finish() { pipeline_->finish(); }
+RecolourCounts ExactWorker::counts() const { return pipeline_->counts(); }
 
 }  // namespace palette4d

@@ -9,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "palette4d/lattice.hpp"
 #include "palette4d/recolour.hpp"
 
 namespace palette4d {
@@ -100,5 +101,11 @@ private:
 RecolourCounts apply_converted(const Recolourer& recolourer, const ColourConversion* conversion,
                                const ConstImageView& in, const ImageView& out,
                                const RecolourOptions& options);
+/// Likewise by a lattice of displacements in the palette's numbers. What it does not move, since
+/// the nodes around do not move, keeps its bits too; Lattice::kTolerance is of the palette's
+/// numbers.
+LatticeCounts apply_converted(const Lattice& lattice, const ColourConversion* conversion,
+                              const ConstImageView& in, const ImageView& out,
+                              const RecolourOptions& options);
 
 }  // namespace palette4d

@@ -74,6 +74,9 @@ public:
 
     /// No colour of this slice is edited: apply() copies bit for bit.
     bool identity() const { return identity_; }
+    /// Some colour moves; else apply() copies as well.
+    bool moves() const { return !displaced_.empty(); }
+    const std::vector<Vec3>& original() const { return body_.rgb(); }
     /// One colour, in double precision. A colour with a NaN or an infinity is returned as it is.
     Vec3 displaced(const Vec3& p, double strength) const;
     /// `in` and `out` have the same size and channels; they may be the same memory. Rows are shared
@@ -84,6 +87,7 @@ public:
                          const RecolourOptions& options) const;
 
 private:
+    friend class ExactWorker;
     class OneByOne;  ///< a thread's work in double precision
     class Pipeline;  ///< a thread's work many colours at a time
 

@@ -1,0 +1,61 @@
+// The application of a lattice of displacements to 64 pixels at a time. Plain data and pointers
+// only, as block_kernels.hpp.
+#pragma once
+
+#include <cstddef>
+
+namespace palette4d {
+
+/// A cube of cells spans the domain. A cell that is too coarse is cut in half along each axis, and
+/// its eight parts where they are too coarse, and so on: the nodes of each such cut (a brick)
+/// follow those of the cells in memory. Cells, parts and nodes are numbered with blue running
+/// fastest; the number of a part is its brick's, counted from the cells on.
+constexpr int kLatticeSide = 36;  ///< cells along each axis
+constexpr int kLatticeCuts = 2;   ///< most of a cell
+constexpr int kLatticeCells = kLatticeSide * kLatticeSide * kLatticeSide;
+constexpr int kLatticeNodes = (kLatticeSide + 1) * (kLatticeSide + 1) * (kLatticeSide + 1);
+constexpr int kBrickParts = 8;
+constexpr int kBrickNodes = 27;
+/// Numbers: the cells, what lies outside of the domain, the parts.
+constexpr int kLatticeOutside = kLatticeCells;
+constexpr int kLatticeFirstPart = kLatticeCells + 1;
+/// What a cell or a part is; from kLatticeBrick on, it is cut into parts: brick (state - that).
+constexpr int kLatticeBrick = 4;
+
+struct LatticeDomain {
+    float low[3], high[3];
+    float scale[3];  ///< cells a unit
+};
+
+struct LatticeBlock {
+    static constexpr int kSize = 64;
+    alignas(64) float colour[3][kSize];  ///< straight
+    alignas(64) float within[3][kSize];  ///< place in the cell, 0 to 1
+    alignas(64) float first[kSize];      ///< the cell's first node
+    alignas(64) float cut[kSize];        ///< 1 in a brick, 0 in an uncut cell
+    alignas(64) int number[kSize];       ///< of the cell or part
+    alignas(64) int state[kSize];        ///< its state
+    /// Nodes of the tetrahedron around the colour, in bytes from the first of all.
+    alignas(64) unsigned corner[4][kSize];
+    alignas(64) float weight[4][kSize];
+};
+
+/// The kernels of one instruction set. Each pixel's result depends on it alone.
+struct LatticeKernels {
+    /// Where `count` pixels of 3 or 4 channels lie: colour, within, first, cut, number. Colours are
+    /// divided by alpha where premultiplied; alpha that cannot be divided by is outside.
+    void (*locate)(const LatticeDomain& domain, LatticeBlock& block, const float* from,
+                   int channels, int count, bool premultiplied);
+    /// Where `state` is a brick's, from the cell or part to the brick's part: within, first, cut,
+    /// number.
+    void (*descend)(LatticeBlock& block, int count);
+    /// Tetrahedral interpolation there: corner, weight.
+    void (*weigh)(LatticeBlock& block, int count);
+    /// In `to`, what the pixels `begin` to `end` - 1 of the `count` of `from` become at a strength;
+    /// channels that do not move keep their bits. `nodes` are 4 numbers each, the last is 0.
+    void (*blend)(const float* nodes, const LatticeBlock& block, int begin, int end,
+                  const float* from, float* to, int channels, int count, float strength,
+                  bool premultiplied);
+};
+
+}  // namespace palette4d

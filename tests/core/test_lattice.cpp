@@ -1,0 +1,312 @@
+#include "palette4d/lattice.hpp"
+
+#include <cstring>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+#include <thread>
+
+#include "check.hpp"
+#include "shapes.hpp"
+
+using namespace palette4d;
+using namespace shapes;
+
+namespace {
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInf = std::numeric_limits<float>::infinity();
+
+/// A packed image, and views of it.
+struct Image {
+    int width, height, channels;
+    std::vector<float> data;
+    Image(int w, int h, int c)
+        : width(w), height(h), channels(c), data(static_cast<std::size_t>(w) * h * c) {}
+    std::ptrdiff_t row() const {
+        return static_cast<std::ptrdiff_t>(sizeof(float)) * width * channels;
+    }
+    ConstImageView in() const { return {data.data(), width, height, channels, row()}; }
+    ImageView out() { return {data.data(), width, height, channels, row()}; }
+};
+
+bool same_bits(const std::vector<float>& a, const std::vector<float>& b) {
+    return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
+}
+
+/// Colours around a few, as in a picture: some in the middle, some far outside, gradients between.
+Image picture(int width, int height, int channels, std::uint64_t seed, double low = -0.05,
+              double high = 1.05) {
+    Image image(width, height, channels);
+    Random random(seed);
+    const Vec3 ends[4] = {random.colour(low, high), random.colour(low, high),
+                          random.colour(low, high), random.colour(low, high)};
+    for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < width; ++x) {
+            float* pixel = &image.data[(static_cast<std::size_t>(y) * width + x) * channels];
+            const double u = (x + 0.5) / width, v = (y + 0.5) / height;
+            for (std::size_t c = 0; c < 3; ++c) {
+                const double smooth = (1 - u) * ((1 - v) * ends[0][c] + v * ends[1][c]) +
+                                      u * ((1 - v) * ends[2][c] + v * ends[3][c]);
+                pixel[c] = static_cast<float>(smooth + random.uniform(-0.03, 0.03));
+            }
+            if (channels == 4) pixel[3] = static_cast<float>(random.uniform(0.05, 1));
+        }
+    }
+    return image;
+}
+
+struct Edited {
+    Mesh mesh;
+    std::vector<Vec3> colours;
+    std::shared_ptr<const Recolourer> recolourer() const {
+        return std::make_shared<Recolourer>(mesh.rgb, colours, mesh.faces);
+    }
+};
+
+/// A third of a palette's colours moved.
+Edited edited(Mesh mesh, std::uint64_t seed) {
+    Random random(seed);
+    std::vector<Vec3> colours = mesh.rgb;
+    for (std::size_t i = 0; i < colours.size(); i += 3) {
+        const Vec3 step = random.colour(-0.3, 0.3);
+        for (std::size_t c = 0; c < 3; ++c) colours[i][c] += step[c];
+    }
+    return {std::move(mesh), std::move(colours)};
+}
+
+std::vector<Edited> palettes() {
+    Random random(5);
+    std::vector<Edited> all{edited(tetrahedron(), 1), edited(cube(), 2), edited(dented_cube(), 3),
+                            edited(flat_square(), 4), edited(flat_triangle(), 5)};
+    for (int i = 0; i < 4; ++i) all.push_back(edited(random_convex(random, 6 + 5 * i), 6 + i));
+    return all;
+}
+
+/// The largest |a - b| / max(|b|, 0.1) of the colours.
+double difference(const Image& a, const Image& b) {
+    double worst = 0;
+    for (std::size_t i = 0; i < a.data.size(); ++i) {
+        const double exact = b.data[i];
+        const double found = std::abs(a.data[i] - exact) / std::max(std::abs(exact), 0.1);
+        worst = found <= worst ? worst : found;
+    }
+    return worst;
+}
+
+}  // namespace
+
+TEST(pictures_are_within_the_tolerance_of_the_exact_ones) {
+    long long interpolated = 0, exact = 0;
+    int seed = 20;
+    for (const Edited& palette : palettes()) {
+        const auto recolourer = palette.recolourer();
+        const Lattice lattice(recolourer);
+        CHECK_EQUAL(lattice.largest_error(), 0.0);
+        for (const int channels : {3, 4}) {
+            for (const double strength : {1.0, 0.3}) {
+                const Image image = picture(301, 83, channels, ++seed);
+                Image expected(301, 83, channels), found(301, 83, channels);
+                recolourer->apply(image.in(), expected.out(), {strength});
+                const LatticeCounts counts = lattice.apply(image.in(), found.out(), {strength});
+                CHECK_EQUAL(counts.interpolated + counts.exact, 301LL * 83);
+                interpolated += counts.interpolated;
+                exact += counts.exact;
+                CHECK(difference(found, expected) <= Lattice::kTolerance);
+            }
+        }
+        CHECK(lattice.largest_error() > 0 && lattice.largest_error() <= Lattice::kTolerance);
+        const Lattice::Size size = lattice.size();
+        CHECK(size.cells > 0 && size.parts <= 8 * size.cut && size.exact <= size.parts);
+    }
+    // Both ways were taken, the fast one by most.
+    CHECK(exact > 0);
+    CHECK(interpolated > 2 * exact);
+}
+
+TEST(instruction_sets_threads_tiles_and_what_was_asked_before_do_not_show) {
+    const Edited palette = edited(dented_cube(), 3);
+    const auto recolourer = palette.recolourer();
+    for (const int channels : {3, 4}) {
+        const Image image = picture(517, 61, channels, 7);
+        Image expected(517, 61, channels);
+        RecolourOptions options{0.8, channels == 4, 1};
+        Lattice(recolourer).apply(image.in(), expected.out(), options);
+        for (const InstructionSet set : instruction_sets()) {
+            Image found(517, 61, channels);
+            options.instructions = set;
+            Lattice(recolourer).apply(image.in(), found.out(), options);
+            CHECK(same_bits(found.data, expected.data));
+        }
+        options.instructions = InstructionSet::kBest;
+        for (const int threads : {2, 8, 0}) {
+            const Lattice lattice(recolourer);
+            options.threads = threads;
+            for (int again = 0; again < 2; ++again) {
+                Image found(517, 61, channels);
+                lattice.apply(image.in(), found.out(), options);
+                CHECK(same_bits(found.data, expected.data));
+            }
+        }
+        // Tiles from the last to the first, after a picture of something else.
+        const Lattice lattice(recolourer);
+        const Image other = picture(200, 50, channels, 8);
+        Image nobody(200, 50, channels), found(517, 61, channels);
+        lattice.apply(other.in(), nobody.out(), options);
+        constexpr int kTile = 37;
+        for (int x = 517 / kTile * kTile; x >= 0; x -= kTile) {
+            const int width = std::min(kTile, 517 - x);
+            ConstImageView in = image.in();
+            ImageView out = found.out();
+            in.data += x * channels;
+            out.data += x * channels;
+            in.width = out.width = width;
+            lattice.apply(in, out, options);
+        }
+        CHECK(same_bits(found.data, expected.data));
+    }
+}
+
+TEST(threads_of_a_host_share_one_lattice) {
+    const auto recolourer = edited(cube(), 9).recolourer();
+    const Image image = picture(400, 64, 4, 11);
+    Image expected(400, 64, 4), found(400, 64, 4);
+    Lattice(recolourer).apply(image.in(), expected.out(), {1.0, true});
+    const Lattice lattice(recolourer);
+    std::vector<std::thread> threads;
+    for (int t = 0; t < 8; ++t) {
+        threads.emplace_back([&, t] {
+            ConstImageView in = image.in();
+            ImageView out = found.out();
+            in.data += t * 8 * 400 * 4;
+            out.data += t * 8 * 400 * 4;
+            in.height = out.height = 8;
+            lattice.apply(in, out, {1.0, true});
+        });
+    }
+    for (std::thread& thread : threads) thread.join();
+    CHECK(same_bits(found.data, expected.data));
+}
+
+TEST(what_lies_outside_or_is_no_number_has_the_exact_bits) {
+    const auto recolourer = edited(cube(), 12).recolourer();
+    const Lattice lattice(recolourer);
+    Image image = picture(96, 20, 4, 13, 3, 5);  // far outside
+    const float odd[] = {kNan, kInf, -kInf, 3e38f, -3e38f, 1e30f};
+    for (std::size_t i = 0; i < 60; ++i) image.data[i * 7] = odd[i % 6];
+    for (std::size_t i = 0; i < 20; ++i) image.data[400 + 4 * i + 3] = odd[i % 6];
+    for (std::size_t i = 0; i < 20; ++i) image.data[800 + 4 * i + 3] = i % 2 ? 0.0f : -0.0f;
+    for (const bool premultiplied : {false, true}) {
+        // Premultiplied by what keeps colours outside, and by nothing at all.
+        Image expected(96, 20, 4), found(96, 20, 4);
+        recolourer->apply(image.in(), expected.out(), {1.0, premultiplied});
+        const LatticeCounts counts = lattice.apply(image.in(), found.out(), {1.0, premultiplied});
+        CHECK_EQUAL(counts.interpolated, 0LL);
+        CHECK(same_bits(found.data, expected.data));
+    }
+}
+
+TEST(a_palette_beyond_the_unit_cube_widens_the_lattice) {
+    Mesh mesh = cube();
+    for (Vec3& colour : mesh.rgb) {
+        for (double& x : colour) x = 4 * x - 1;
+    }
+    const auto recolourer = edited(mesh, 14).recolourer();
+    const Lattice lattice(recolourer);
+    const Image image = picture(200, 60, 3, 15, -1, 3);
+    Image expected(200, 60, 3), found(200, 60, 3);
+    recolourer->apply(image.in(), expected.out(), {});
+    const LatticeCounts counts = lattice.apply(image.in(), found.out(), {});
+    CHECK(counts.interpolated > 0);
+    CHECK(difference(found, expected) <= Lattice::kTolerance);
+}
+
+TEST(without_an_edit_every_bit_passes) {
+    const auto same = std::make_shared<Recolourer>(cube().rgb, cube().rgb, cube().faces);
+    const Lattice lattice(same);
+    Image image = picture(50, 9, 4, 16);
+    image.data[0] = kNan;
+    image.data[4] = -0.0f;
+    Image found(50, 9, 4);
+    lattice.apply(image.in(), found.out(), {1.0, true});
+    CHECK(same_bits(found.data, image.data));
+    CHECK_EQUAL(lattice.size().colours, 0LL);
+    Image off(50, 9, 4);
+    Lattice(edited(cube(), 17).recolourer()).apply(image.in(), off.out(), {0.0});
+    CHECK(same_bits(off.data, image.data));
+}
+
+TEST(channels_that_do_not_move_keep_their_bits) {
+    std::vector<Vec3> colours = cube().rgb;
+    for (Vec3& colour : colours) colour[0] *= 0.5;
+    const auto recolourer = std::make_shared<Recolourer>(cube().rgb, colours, cube().faces);
+    const Lattice lattice(recolourer);
+    Image image = picture(300, 40, 3, 18);
+    image.data[4] = -0.0f;
+    Image found(300, 40, 3);
+    lattice.apply(image.in(), found.out(), {});
+    int moved = 0;
+    for (std::size_t i = 0; i < image.data.size(); i += 3) {
+        CHECK(std::memcmp(&found.data[i + 1], &image.data[i + 1], 2 * sizeof(float)) == 0);
+        moved += found.data[i] != image.data[i];
+    }
+    CHECK(moved > 10000);
+}
+
+TEST(a_strength_beyond_0_to_1_and_double_precision_are_exact) {
+    const auto recolourer = edited(cube(), 19).recolourer();
+    const Lattice lattice(recolourer);
+    const Image image = picture(70, 30, 3, 20);
+    for (const double strength : {1.5, -0.5}) {
+        Image expected(70, 30, 3), found(70, 30, 3);
+        recolourer->apply(image.in(), expected.out(), {strength});
+        CHECK_EQUAL(lattice.apply(image.in(), found.out(), {strength}).interpolated, 0LL);
+        CHECK(same_bits(found.data, expected.data));
+    }
+    Image expected(70, 30, 3), found(70, 30, 3);
+    const RecolourOptions options{1, false, 1, Precision::kDouble};
+    recolourer->apply(image.in(), expected.out(), options);
+    lattice.apply(image.in(), found.out(), options);
+    CHECK(same_bits(found.data, expected.data));
+}
+
+TEST(rows_may_be_padded_upside_down_or_the_same_memory) {
+    const auto recolourer = edited(cube(), 21).recolourer();
+    const Lattice lattice(recolourer);
+    for (const int channels : {3, 4}) {
+        for (const int width : {1, 63, 64, 65, 131}) {
+            const Image image = picture(width, 7, channels, 22);
+            Image expected(width, 7, channels);
+            lattice.apply(image.in(), expected.out(), {});
+            const std::size_t row = static_cast<std::size_t>(width * channels), padded = row + 3;
+            std::vector<float> in(padded * 7, 7.0f), out(padded * 7, 9.0f);
+            for (std::size_t y = 0; y < 7; ++y) {
+                std::copy_n(&image.data[y * row], row, &in[(6 - y) * padded]);
+            }
+            const auto stride = -static_cast<std::ptrdiff_t>(padded * sizeof(float));
+            lattice.apply({&in[6 * padded], width, 7, channels, stride},
+                          {&out[6 * padded], width, 7, channels, stride}, {1, false, 3});
+            for (std::size_t y = 0; y < 7; ++y) {
+                const float* found = &out[(6 - y) * padded];
+                CHECK(std::memcmp(found, &expected.data[y * row], row * sizeof(float)) == 0);
+                for (std::size_t x = row; x < padded; ++x) CHECK_EQUAL(found[x], 9.0f);
+            }
+            Image place = image;
+            lattice.apply(place.in(), place.out(), {1, false, 2});
+            CHECK(same_bits(place.data, expected.data));
+        }
+    }
+}
+
+TEST(what_is_wrong_is_said) {
+    CHECK_THROWS(std::invalid_argument, Lattice(nullptr));
+    const Lattice lattice(edited(cube(), 23).recolourer());
+    Image image(4, 4, 3), small(4, 3, 3);
+    CHECK_THROWS(std::invalid_argument, lattice.apply(image.in(), small.out(), {}));
+    CHECK_THROWS(std::invalid_argument,
+                 lattice.apply(image.in(), image.out(), {static_cast<double>(kNan)}));
+    Image empty(0, 0, 3);
+    CHECK_EQUAL(lattice.apply(empty.in(), empty.out(), {}).exact, 0LL);
+}
+
+int main() { return check::run_all(); }
