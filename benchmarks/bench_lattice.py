@@ -1,0 +1,226 @@
+"""How fast and how close is the lattice on real frames, against exact mode and OpenColorIO?
+
+    python benchmarks/bench_lattice.py SIDECAR CLIP [SIDECAR CLIP ...] [--frames 5,32,42,49]
+
+Every frame is scaled to 3840x2160 in float (OpenImageIO, Lanczos: it overshoots, as filters do) and
+recoloured three ways, each by one thread and by two: exactly; by a lattice that is made for it, the
+making included, as each frame of a clip that plays needs it; by a lattice that is there already, as
+where palette and edit stay. The peer is OpenColorIO's CPU processor with a 3D LUT, tetrahedral, the
+best of its optimisations, on the same float picture, of three and of four channels; its LUT is
+there already. The error is measured on every pixel, by the CLF finishing-tier measure.
+
+Rates are medians of several runs in million pixels a second; all run in turn. `thread` columns are
+of one thread's own processor time, which suffers less when others use the machine; two threads are
+held against the clock and, in brackets, against the processor time of both.
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+import PyOpenColorIO as ocio
+from numpy.typing import NDArray
+from palette4d import _core
+
+F32 = NDArray[np.float32]
+WIDTH, HEIGHT = 3840, 2160
+#: 24 frames a second.
+WANTED = 24 * WIDTH * HEIGHT / 1e6
+OPTIMISATIONS = ("NONE", "LOSSLESS", "VERY_GOOD", "DEFAULT", "DRAFT", "ALL")
+
+
+def scaled(pixels: F32) -> F32:
+    """Return an (h, w, 3 or more) picture as (HEIGHT, WIDTH, 3) float32."""
+    spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, oiio.FLOAT)
+    source = oiio.ImageBuf(spec)
+    source.set_pixels(spec.roi, np.ascontiguousarray(pixels[:, :, :3]))
+    roi = oiio.ROI(0, WIDTH, 0, HEIGHT, 0, 1, 0, 3)
+    result = oiio.ImageBufAlgo.resize(source, filtername="lanczos3", roi=roi)
+    return np.ascontiguousarray(result.get_pixels(oiio.FLOAT))
+
+
+def with_alpha(image: F32) -> F32:
+    """Return the picture with an opaque fourth channel."""
+    return np.concatenate([image, np.ones((*image.shape[:2], 1), np.float32)], axis=2)
+
+
+def best_processor(recolourer: _core.Recolourer, size: int, image: F32) -> ocio.CPUProcessor:
+    """Return OpenColorIO's tetrahedral LUT of so many nodes a side, the fastest of its kinds."""
+    samples = np.linspace(0, 1, size, dtype=np.float32)
+    grid = np.stack(np.meshgrid(samples, samples, samples, indexing="ij"), axis=-1)
+    table = recolourer.apply(np.ascontiguousarray(grid.reshape(size, -1, 3)), precision="single")
+    lut = ocio.Lut3DTransform(size)
+    lut.setInterpolation(ocio.INTERP_TETRAHEDRAL)
+    lut.setData(table.reshape(-1))
+    processor = ocio.Config.CreateRaw().getProcessor(lut)
+    found = []
+    for name in OPTIMISATIONS:
+        candidate = processor.getOptimizedCPUProcessor(getattr(ocio, f"OPTIMIZATION_{name}"))
+        taken = []
+        for _ in range(3):
+            scratch = image.copy()
+            started = time.thread_time()
+            candidate.applyRGBA(scratch)
+            taken.append(time.thread_time() - started)
+        found.append((statistics.median(taken), len(found), candidate))
+    return min(found)[2]
+
+
+def rates(
+    runs: int, works: dict[str, Callable[[], object]], clock: Callable[[], float]
+) -> dict[str, float]:
+    """Run all in turn, several times; returns median million pixels a second by name."""
+    times: dict[str, list[float]] = {name: [] for name in works}
+    for _ in range(runs):
+        for name, work in works.items():
+            started = clock()
+            work()
+            times[name].append(clock() - started)
+    return {name: WIDTH * HEIGHT / statistics.median(t) / 1e6 for name, t in times.items()}
+
+
+def measure(what: str, recolourer: _core.Recolourer, image: F32, runs: int) -> None:
+    """Print one frame's figures."""
+    four = with_alpha(image)
+    expected = recolourer.apply(image, precision="single", threads=0)
+    ready = _core.Lattice(recolourer)
+    found = ready.apply(image, threads=0)
+    ready.apply(four)
+    wanted = expected.astype(np.float64)
+    error = np.abs(found - wanted) / np.maximum(np.abs(wanted), 0.1)
+    seen, size = ready.largest_error, ready.size
+    del wanted
+    out, scratch = np.empty_like(image), {3: image.copy(), 4: four.copy()}
+    out4 = np.empty_like(four)
+    luts = {n: best_processor(recolourer, n, four) for n in (33, 65, 129)}
+    one: dict[str, Callable[[], object]] = {
+        "exact": lambda: recolourer.apply(image, precision="single", out=out),
+        "made": lambda: _core.Lattice(recolourer).apply(image, out=out),
+        "made4": lambda: _core.Lattice(recolourer).apply(four, out=out4),
+        "ready": lambda: ready.apply(image, out=out),
+        "ready4": lambda: ready.apply(four, out=out4),
+    }
+    for n, lut in luts.items():
+        one[f"ocio{n}"] = lambda lut=lut: lut.applyRGB(scratch[3])  # type: ignore[misc]
+        one[f"ocio{n}4"] = lambda lut=lut: lut.applyRGBA(scratch[4])  # type: ignore[misc]
+    thread = rates(runs, one, time.process_time)
+    two: dict[str, Callable[[], object]] = {
+        "exact": lambda: recolourer.apply(image, precision="single", threads=2, out=out),
+        "made": lambda: _core.Lattice(recolourer).apply(image, threads=2, out=out),
+        "ready": lambda: ready.apply(image, threads=2, out=out),
+    }
+    wall, work = rates(runs, two, time.perf_counter), rates(runs, two, time.process_time)
+    print(f"{what}: {size}")
+    print(
+        f"  largest error {error.max():.5f} of every pixel, {seen:.5f} as the lattice says;"
+        f" above 0.002: {int((error > _core.LATTICE_TOLERANCE).sum())}"
+    )
+    print("  thread:     " + ", ".join(f"{name} {rate:.1f}" for name, rate in thread.items()))
+    print(
+        f"  ratios:     made / exact {thread['made'] / thread['exact']:.2f},"
+        f" ready / exact {thread['ready'] / thread['exact']:.2f}; to OCIO's 33, 65, 129, RGB: made"
+        + ",".join(f" {thread['made'] / thread[f'ocio{n}']:.2f}" for n in luts)
+        + "; RGBA: made"
+        + ",".join(f" {thread['made4'] / thread[f'ocio{n}4']:.2f}" for n in luts)
+        + ", ready"
+        + ",".join(f" {thread['ready4'] / thread[f'ocio{n}4']:.2f}" for n in luts)
+    )
+    print(
+        "  two threads: "
+        + ", ".join(
+            f"{name} {wall[name]:.1f} ({2 * work[name]:.1f}),"
+            f" {100 * wall[name] / WANTED:.0f} % ({200 * work[name] / WANTED:.0f} %)"
+            for name in two
+        )
+        + f" of the {WANTED:.0f} Mpix/s that 24 frames a second are",
+        flush=True,
+    )
+
+
+def growth(recolourer: _core.Recolourer, image: F32, runs: int, plot: Path | None) -> None:
+    """Print how cost grows with palettes, pictures and threads; draw it when asked."""
+    from bench_recolour import HD, UHD, UHD8K, hull, inside
+
+    def work(cut: _core.Recolourer, picture: F32, threads: int, out: F32) -> dict[str, float]:
+        ways: dict[str, Callable[[], object]] = {
+            "exact": lambda: cut.apply(picture, precision="single", threads=threads, out=out),
+            "lattice": lambda: _core.Lattice(cut).apply(picture, threads=threads, out=out),
+        }
+        scale = picture.size / 3 / (WIDTH * HEIGHT)
+        return {k: v * scale for k, v in rates(runs, ways, time.process_time).items()}
+
+    by_vertices: dict[int, dict[str, float]] = {}
+    for vertices in (4, 6, 8, 12, 16, 20, 24):
+        palette = hull(vertices)
+        small = inside(palette, 48, 27)
+        buffer = scaled(small)[: HEIGHT // 2]
+        by_vertices[vertices] = work(_core.Recolourer(*palette), buffer, 1, np.empty_like(buffer))
+    pictures = {HD: image[::2, ::2], UHD: image, UHD8K: np.tile(image, (2, 2, 1))}
+    by_size: dict[str, dict[str, float]] = {}
+    for (width, height), view in pictures.items():
+        picture = np.ascontiguousarray(view)
+        by_size[f"{width}x{height}"] = work(recolourer, picture, 1, np.empty_like(picture))
+    by_threads = {n: work(recolourer, image, n, np.empty_like(image)) for n in (1, 2, 4)}
+    for what, table in (
+        ("palette vertices", by_vertices),
+        ("picture", by_size),
+        ("threads, of processor time", by_threads),
+    ):
+        print(f"{what}:")
+        for key, found in table.items():  # type: ignore[attr-defined]
+            print(f"  {key}: exact {found['exact']:.1f}, lattice {found['lattice']:.1f} Mpix/s")
+    if plot is None:
+        return
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11, 3.5), layout="constrained")
+    for axes, table, label in zip(
+        figure.subplots(1, 3),
+        (by_vertices, by_size, by_threads),
+        ("palette vertices", "picture", "threads"),
+        strict=True,
+    ):
+        for way in ("exact", "lattice"):
+            keys = [str(key) for key in table]
+            axes.plot(keys, [found[way] for found in table.values()], "o-", label=way)
+        axes.set(xlabel=label, ylabel="Mpix/s a thread", ylim=(0, None))
+        axes.legend()
+    figure.savefig(plot, dpi=120)
+    print(f"wrote {plot}")
+
+
+def main() -> None:
+    """Run the comparisons and print their figures."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("pairs", nargs="+", metavar="SIDECAR CLIP", help="edited sidecars, clips")
+    parser.add_argument("--frames", action="append", default=[], help="of each pair, in turn")
+    parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument("--growth", action="store_true", help="also how cost grows")
+    parser.add_argument("--plot", type=Path, help="draw that")
+    args = parser.parse_args()
+    if len(args.pairs) % 2:
+        parser.error("expected pairs: SIDECAR CLIP")
+    from palette4d.analysis.clip import open_clip
+
+    last = None
+    for k, (path, clip) in enumerate(zip(args.pairs[::2], args.pairs[1::2], strict=True)):
+        sidecar = _core.read_sidecar(path)
+        frames = args.frames[k] if k < len(args.frames) else None
+        for image in open_clip(clip, frames=frames).iter_images():
+            cut = _core.slice_at(sidecar.polytope, image.frame)
+            edited = _core.edited_colours(sidecar.polytope, sidecar.edits, cut)
+            recolourer = _core.Recolourer(cut.rgb, edited, cut.faces)
+            last = recolourer, scaled(image.pixels)
+            measure(f"{Path(path).name} at {image.frame}", *last, args.runs)
+    if args.growth and last:
+        growth(*last, args.runs, args.plot)
+
+
+if __name__ == "__main__":
+    main()
