@@ -102,13 +102,13 @@ def measure(what: str, recolourer: _core.Recolourer, image: F32, runs: int) -> N
     one: dict[str, Callable[[], object]] = {
         "exact": lambda: recolourer.apply(image, precision="single", out=out),
         "made": lambda: _core.Lattice(recolourer).apply(image, out=out),
-        "made4": lambda: _core.Lattice(recolourer).apply(four, out=out4),
+        "made RGBA": lambda: _core.Lattice(recolourer).apply(four, out=out4),
         "ready": lambda: ready.apply(image, out=out),
-        "ready4": lambda: ready.apply(four, out=out4),
+        "ready RGBA": lambda: ready.apply(four, out=out4),
     }
     for n, lut in luts.items():
-        one[f"ocio{n}"] = lambda lut=lut: lut.applyRGB(scratch[3])  # type: ignore[misc]
-        one[f"ocio{n}4"] = lambda lut=lut: lut.applyRGBA(scratch[4])  # type: ignore[misc]
+        one[f"OCIO {n}"] = lambda lut=lut: lut.applyRGB(scratch[3])  # type: ignore[misc]
+        one[f"OCIO {n} RGBA"] = lambda lut=lut: lut.applyRGBA(scratch[4])  # type: ignore[misc]
     thread = rates(runs, one, time.process_time)
     two: dict[str, Callable[[], object]] = {
         "exact": lambda: recolourer.apply(image, precision="single", threads=2, out=out),
@@ -125,11 +125,11 @@ def measure(what: str, recolourer: _core.Recolourer, image: F32, runs: int) -> N
     print(
         f"  ratios:     made / exact {thread['made'] / thread['exact']:.2f},"
         f" ready / exact {thread['ready'] / thread['exact']:.2f}; to OCIO's 33, 65, 129, RGB: made"
-        + ",".join(f" {thread['made'] / thread[f'ocio{n}']:.2f}" for n in luts)
+        + ",".join(f" {thread['made'] / thread[f'OCIO {n}']:.2f}" for n in luts)
         + "; RGBA: made"
-        + ",".join(f" {thread['made4'] / thread[f'ocio{n}4']:.2f}" for n in luts)
+        + ",".join(f" {thread['made RGBA'] / thread[f'OCIO {n} RGBA']:.2f}" for n in luts)
         + ", ready"
-        + ",".join(f" {thread['ready4'] / thread[f'ocio{n}4']:.2f}" for n in luts)
+        + ",".join(f" {thread['ready RGBA'] / thread[f'OCIO {n} RGBA']:.2f}" for n in luts)
     )
     print(
         "  two threads: "

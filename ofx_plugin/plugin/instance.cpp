@@ -1,5 +1,6 @@
 #include "instance.hpp"
 
+#include <cmath>
 #include <cstring>
 #include <map>
 #include <optional>
@@ -7,6 +8,7 @@
 #include "files.hpp"
 #include "handles.hpp"
 #include "host_time.hpp"
+#include "mode.hpp"
 #include "params.hpp"
 #include "status.hpp"
 
@@ -94,8 +96,13 @@ void update_instance(const Suites& suites, OfxImageEffectHandle effect, const st
     time = last_time(effect, time);
     if (sidecar && time) {
         const TimeSettings settings = time_settings_at(params, *time);
-        shown =
-            words_of(*time, frame_at(sidecar->clip, settings, host_clip(suites, effect), *time));
+        const FrameAt at = frame_at(sidecar->clip, settings, host_clip(suites, effect), *time);
+        shown = words_of(*time, at);
+        if (mode_at(params, *time) != Mode::kExact && std::isfinite(at.frame)) {
+            const auto lattice = chosen.result.loaded->ready_lattice_at(
+                at.frame, edits_at(params, *sidecar, *time).edits);
+            if (lattice && lattice->largest_error() > 0) shown += "; " + words_of(*lattice);
+        }
     }
     const std::string text = status_of(chosen, handles_in_use(params), copy, shown);
     if (params.string_now(kParamStatus) != text) params.set_string(kParamStatus, text);

@@ -18,7 +18,8 @@ namespace palette4d::plugin {
 namespace {
 
 /// Prepares what the output asks for. Throws what slicing throws.
-void prepare(Look& look, const Params& params, LoadedSidecar& loaded, double frame, OfxTime time) {
+void prepare(Look& look, const Params& params, LoadedSidecar& loaded, double frame, OfxTime time,
+             bool interpolated) {
     Drawing& drawing = look.drawing;
     const OutputSettings& settings = drawing.settings;
     const Sidecar& sidecar = loaded.sidecar();
@@ -47,6 +48,7 @@ void prepare(Look& look, const Params& params, LoadedSidecar& loaded, double fra
     look.note = std::move(edits.note);
     drawing.recolourer = loaded.recolourer_at(frame, edits.edits);
     if (drawing.recolourer->identity() || settings.strength == 0) drawing.recolourer = nullptr;
+    if (drawing.recolourer && interpolated) drawing.lattice = loaded.lattice_at(frame, edits.edits);
     if (settings.output == Output::kPalette) {
         std::tie(drawing.original, drawing.edited) = loaded.palette_at(frame, edits.edits);
     } else {
@@ -56,7 +58,7 @@ void prepare(Look& look, const Params& params, LoadedSidecar& loaded, double fra
 
 }  // namespace
 
-Look look_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time) {
+Look look_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time, bool interpolated) {
     Look look;
     const Params params(suites, effect);
     const Chosen chosen = chosen_sidecar(params, time);
@@ -79,7 +81,7 @@ Look look_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time) {
     }
     if (at.passes) return look;
     try {
-        prepare(look, params, *result.loaded, at.frame, time);
+        prepare(look, params, *result.loaded, at.frame, time, interpolated);
     } catch (const std::bad_alloc&) {
         throw;
     } catch (const std::exception& error) {

@@ -19,8 +19,10 @@ struct Look {
     std::string note;
 };
 
-/// The look of an instance at a time. Reads parameters in the way allowed while rendering. Problems
-/// are in the result; throws std::bad_alloc only.
-Look look_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time);
+/// The look of an instance at a time; with `interpolated`, by a lattice where it has one. Reads
+/// parameters in the way allowed while rendering. Problems are in the result; throws std::bad_alloc
+/// only.
+Look look_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time,
+             bool interpolated = false);
 
 }  // namespace palette4d::plugin

@@ -167,10 +167,13 @@ void draw_rows(const Rows& rows, const Drawing& drawing) {
         const auto channels = static_cast<int>(rows.channels);
         const auto stride =
             static_cast<std::ptrdiff_t>(rows.pixels * rows.channels * sizeof(float));
-        if (drawing.recolourer) {
-            apply_converted(*drawing.recolourer, drawing.conversion.get(),
-                            {rows.source, width, 1, channels, stride},
-                            {rows.result, width, 1, channels, stride}, options);
+        const ConstImageView from{rows.source, width, 1, channels, stride};
+        const ImageView to{rows.result, width, 1, channels, stride};
+        const ColourConversion* const conversion = drawing.conversion.get();
+        if (drawing.lattice) {
+            apply_converted(*drawing.lattice, conversion, from, to, options);
+        } else if (drawing.recolourer) {
+            apply_converted(*drawing.recolourer, conversion, from, to, options);
         } else {
             std::copy_n(rows.source, rows.pixels * rows.channels, rows.result);
         }
@@ -242,7 +245,12 @@ OutputSettings output_settings_at(const Params& params, OfxTime time) {
 void draw(const Image& in, const Image& out, const OfxRectI& area, const Drawing& drawing) {
     const OutputSettings& settings = drawing.settings;
     if (settings.output == Output::kRecoloured && settings.keep == 0 && settings.mix == 1) {
-        recolour(in, out, area, *drawing.recolourer, drawing.conversion.get(), settings.strength);
+        const ColourConversion* const conversion = drawing.conversion.get();
+        if (drawing.lattice) {
+            recolour(in, out, area, *drawing.lattice, conversion, settings.strength);
+        } else {
+            recolour(in, out, area, *drawing.recolourer, conversion, settings.strength);
+        }
         return;
     }
     const OfxRectI covered = intersect(area, in.bounds);

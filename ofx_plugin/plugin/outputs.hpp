@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "palette4d/colour_conversion.hpp"
+#include "palette4d/lattice.hpp"
 #include "palette4d/recolour.hpp"
 #include "param_define.hpp"
 #include "params.hpp"
@@ -48,6 +49,8 @@ struct Drawing {
     /// Of the edit, of the weight (weight_reader()) or of the surface (surface_reader()), as the
     /// output asks; null where the picture keeps its colours.
     std::shared_ptr<const Recolourer> recolourer;
+    /// Of that, where it is the edit's and interpolating will do.
+    std::shared_ptr<const Lattice> lattice;
     /// From the picture's numbers to the palette's; null where they are the same.
     std::shared_ptr<const ColourConversion> conversion;
     /// For Output::kPalette: the slice's colours before and after the edit, and the whole picture,

@@ -3,6 +3,7 @@
 #include "files.hpp"
 #include "handles.hpp"
 #include "host_time.hpp"
+#include "mode.hpp"
 #include "outputs.hpp"
 #include "param_define.hpp"
 
@@ -23,6 +24,7 @@ void define_params(const Suites& suites, OfxParamSetHandle params) {
     define.number({kParamStrength, "Strength",
                    "How much of the edit is applied: 0 is the original picture, 1 the edit."},
                   {1, 0, 1, 0, 1}, 0.01, 3, true);
+    define_mode_param(define);
     define_output_params(define);
     define_handle_params(define);
     define_time_params(define);

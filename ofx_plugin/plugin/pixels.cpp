@@ -38,9 +38,10 @@ std::uint8_t to_byte(float value) {
     return static_cast<std::uint8_t>(value * 255.0f + 0.5f);
 }
 
-void recolour_bytes(const Image& in, const Image& out, const OfxRectI& area,
-                    const Recolourer& recolourer, const ColourConversion* conversion,
-                    const RecolourOptions& options) {
+/// `recolourer` is a Recolourer or a Lattice.
+template <class Self>
+void recolour_bytes(const Image& in, const Image& out, const OfxRectI& area, const Self& recolourer,
+                    const ColourConversion* conversion, const RecolourOptions& options) {
     const int width = area.x2 - area.x1;
     const std::size_t row = static_cast<std::size_t>(width) * static_cast<std::size_t>(in.channels);
     const int rows_at_once = static_cast<int>(std::max<std::size_t>(1, kChunkFloats / row));
@@ -55,6 +56,30 @@ void recolour_bytes(const Image& in, const Image& out, const OfxRectI& area,
                         {floats.data(), width, rows, in.channels, stride}, options);
         write_floats(floats.data(), out, chunk);
     }
+}
+
+template <class Self>
+void recolour_by(const Image& in, const Image& out, const OfxRectI& area, const Self& recolourer,
+                 const ColourConversion* conversion, double strength) {
+    const OfxRectI covered = intersect(area, in.bounds);
+    clear_around(out, area, covered);
+    if (is_empty(covered)) return;
+    RecolourOptions options;
+    options.strength = strength;
+    options.premultiplied = in.premultiplied;
+    options.threads = 1;  // the rows are shared among the host's threads already
+    if (in.depth == Depth::kByte) {
+        recolour_bytes(in, out, covered, recolourer, conversion, options);
+        return;
+    }
+    const int width = covered.x2 - covered.x1;
+    const int height = covered.y2 - covered.y1;
+    apply_converted(recolourer, conversion,
+                    {reinterpret_cast<const float*>(in.at(covered.x1, covered.y1)), width, height,
+                     in.channels, in.row_bytes},
+                    {reinterpret_cast<float*>(out.at(covered.x1, covered.y1)), width, height,
+                     out.channels, out.row_bytes},
+                    options);
 }
 
 }  // namespace
@@ -157,25 +182,12 @@ void copy(const Image& in, const Image& out, const OfxRectI& area) {
 
 void recolour(const Image& in, const Image& out, const OfxRectI& area, const Recolourer& recolourer,
               const ColourConversion* conversion, double strength) {
-    const OfxRectI covered = intersect(area, in.bounds);
-    clear_around(out, area, covered);
-    if (is_empty(covered)) return;
-    RecolourOptions options;
-    options.strength = strength;
-    options.premultiplied = in.premultiplied;
-    options.threads = 1;  // the rows are shared among the host's threads already
-    if (in.depth == Depth::kByte) {
-        recolour_bytes(in, out, covered, recolourer, conversion, options);
-        return;
-    }
-    const int width = covered.x2 - covered.x1;
-    const int height = covered.y2 - covered.y1;
-    apply_converted(recolourer, conversion,
-                    {reinterpret_cast<const float*>(in.at(covered.x1, covered.y1)), width, height,
-                     in.channels, in.row_bytes},
-                    {reinterpret_cast<float*>(out.at(covered.x1, covered.y1)), width, height,
-                     out.channels, out.row_bytes},
-                    options);
+    recolour_by(in, out, area, recolourer, conversion, strength);
+}
+
+void recolour(const Image& in, const Image& out, const OfxRectI& area, const Lattice& lattice,
+              const ColourConversion* conversion, double strength) {
+    recolour_by(in, out, area, lattice, conversion, strength);
 }
 
 }  // namespace palette4d::plugin

@@ -7,6 +7,7 @@
 
 #include "host.hpp"
 #include "palette4d/colour_conversion.hpp"
+#include "palette4d/lattice.hpp"
 #include "palette4d/recolour.hpp"
 
 namespace palette4d::plugin {
@@ -55,6 +56,9 @@ void copy(const Image& in, const Image& out, const OfxRectI& area);
 /// as byte / 255 and come back rounded and clamped.
 /// `conversion`: from the picture's numbers to the palette's; null where they are the same.
 void recolour(const Image& in, const Image& out, const OfxRectI& area, const Recolourer& recolourer,
+              const ColourConversion* conversion, double strength);
+/// The same by a lattice.
+void recolour(const Image& in, const Image& out, const OfxRectI& area, const Lattice& lattice,
               const ColourConversion* conversion, double strength);
 
 }  // namespace palette4d::plugin

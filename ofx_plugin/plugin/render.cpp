@@ -6,6 +6,7 @@
 
 #include "instance.hpp"
 #include "look.hpp"
+#include "mode.hpp"
 #include "pixels.hpp"
 #include "threads.hpp"
 
@@ -101,7 +102,8 @@ OfxStatus render(const Suites& suites, OfxImageEffectHandle effect, const Proper
 
     Look look;
     try {
-        look = look_at(suites, effect, *time);
+        const Mode mode = mode_at(Params(suites, effect), *time);
+        look = look_at(suites, effect, *time, interpolates(mode, in_args));
     } catch (...) {
         copy(in, out, window);
         throw;

@@ -18,6 +18,8 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = fs::file_time_type::clock;
 
+/// Lattices that a sidecar keeps: each takes up to some ten megabytes.
+constexpr std::size_t kMaxLattices = 8;
 constexpr std::size_t kMaxFrames =
     32;  ///< prepared frames a sidecar: more than a machine's threads
 constexpr std::size_t kMaxSidecars = 32;
@@ -215,35 +217,81 @@ std::pair<std::vector<Vec3>, std::vector<Vec3>> LoadedSidecar::palette_at(
     return {slice.rgb, edited_at(sidecar_, slice, edits)};
 }
 
-std::shared_ptr<const Recolourer> LoadedSidecar::prepared(const Key& wanted) {
+LoadedSidecar::Key LoadedSidecar::clamped(const Key& wanted) const {
     Key key = wanted;
     double& frame = std::get<double>(key);
     // All of the time before the clip is its first frame, all after it the last.
     const Polytope& polytope = sidecar_.polytope;
     if (frame < polytope.first_frame()) frame = polytope.first_frame();
     if (frame > polytope.last_frame()) frame = polytope.last_frame();
+    return key;
+}
 
-    std::shared_ptr<Prepared> prepared;
-    {
-        const std::lock_guard<std::mutex> lock(mutex_);
-        const auto [at, is_new] = frames_.try_emplace(key);
-        if (is_new) {
-            at->second = std::make_shared<Prepared>();
-        } else {
-            recent_.remove(&at->first);
-        }
-        prepared = at->second;
-        recent_.push_front(&at->first);
-        while (recent_.size() > kMaxFrames) {
-            const Key* oldest = recent_.back();
-            recent_.pop_back();
-            frames_.erase(frames_.find(*oldest));
-        }
+std::shared_ptr<LoadedSidecar::Prepared> LoadedSidecar::entry(const Key& key) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const auto [at, is_new] = frames_.try_emplace(key);
+    if (is_new) {
+        at->second = std::make_shared<Prepared>();
+    } else {
+        recent_.remove(&at->first);
     }
+    recent_.push_front(&at->first);
+    const std::shared_ptr<Prepared> found = at->second;
+    while (recent_.size() > kMaxFrames) {
+        const Key* oldest = recent_.back();
+        recent_.pop_back();
+        frames_.erase(frames_.find(*oldest));
+    }
+    return found;
+}
+
+std::shared_ptr<const Recolourer> LoadedSidecar::prepared(const Key& wanted) {
+    const Key key = clamped(wanted);
+    const std::shared_ptr<Prepared> prepared = entry(key);
     // Only threads that want this very frame wait for it.
     const std::lock_guard<std::mutex> lock(prepared->building);
     if (!prepared->recolourer) prepared->recolourer = prepare(key);
     return prepared->recolourer;
+}
+
+std::shared_ptr<const Lattice> LoadedSidecar::lattice_at(double frame, const AppliedEdits& edits) {
+    const Key key = clamped({frame, Purpose::kEdit, 0, edits});
+    const std::shared_ptr<Prepared> prepared = entry(key);
+    std::shared_ptr<const Lattice> lattice;
+    {
+        const std::lock_guard<std::mutex> lock(prepared->building);
+        if (prepared->lattice) return prepared->lattice;
+        if (!prepared->recolourer) prepared->recolourer = prepare(key);
+        lattice = prepared->lattice = std::make_shared<const Lattice>(prepared->recolourer);
+    }
+    std::shared_ptr<Prepared> oldest;
+    {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        with_lattice_.push_front(prepared);
+        if (with_lattice_.size() > kMaxLattices) {
+            oldest = with_lattice_.back();
+            with_lattice_.pop_back();
+        }
+    }
+    if (oldest) {
+        const std::lock_guard<std::mutex> lock(oldest->building);
+        oldest->lattice = nullptr;
+    }
+    return lattice;
+}
+
+std::shared_ptr<const Lattice> LoadedSidecar::ready_lattice_at(double frame,
+                                                               const AppliedEdits& edits) {
+    const Key key = clamped({frame, Purpose::kEdit, 0, edits});
+    std::shared_ptr<Prepared> prepared;
+    {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        const auto at = frames_.find(key);
+        if (at == frames_.end()) return nullptr;
+        prepared = at->second;
+    }
+    const std::lock_guard<std::mutex> lock(prepared->building);
+    return prepared->lattice;
 }
 
 std::shared_ptr<const Recolourer> LoadedSidecar::prepare(const Key& key) const {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <deque>
 #include <list>
 #include <map>
 #include <memory>
@@ -14,6 +15,7 @@
 #include <vector>
 
 #include "palette4d/handles.hpp"
+#include "palette4d/lattice.hpp"
 #include "palette4d/recolour.hpp"
 #include "palette4d/sidecar.hpp"
 
@@ -38,6 +40,10 @@ public:
     /// the same frame with the same edits share one, built once. Throws what slicing throws, and
     /// std::invalid_argument for a handle that is not there.
     std::shared_ptr<const Recolourer> recolourer_at(double frame, const AppliedEdits& edits = {});
+    /// Likewise: the lattice of that. The few that were made last are kept.
+    std::shared_ptr<const Lattice> lattice_at(double frame, const AppliedEdits& edits = {});
+    /// The same where it is there already; else null.
+    std::shared_ptr<const Lattice> ready_lattice_at(double frame, const AppliedEdits& edits = {});
     /// Likewise: it adds the weight of a handle's lineage to the first channel (lineage.hpp).
     std::shared_ptr<const Recolourer> weight_at(double frame, int handle);
     /// Likewise: it adds the closest colour of the palette (lineage.hpp).
@@ -53,7 +59,10 @@ private:
     struct Prepared {
         std::mutex building;
         std::shared_ptr<const Recolourer> recolourer;
+        std::shared_ptr<const Lattice> lattice;
     };
+    Key clamped(const Key& key) const;
+    std::shared_ptr<Prepared> entry(const Key& key);
     std::shared_ptr<const Recolourer> prepared(const Key& key);
     std::shared_ptr<const Recolourer> prepare(const Key& key) const;
 
@@ -61,7 +70,8 @@ private:
     const std::string revision_;
     std::mutex mutex_;
     std::map<Key, std::shared_ptr<Prepared>> frames_;
-    std::list<const Key*> recent_;  ///< keys of frames_, latest first
+    std::list<const Key*> recent_;                        ///< keys of frames_, latest first
+    std::deque<std::shared_ptr<Prepared>> with_lattice_;  ///< latest first
 };
 
 /// Either a sidecar or the sentence that says why there is none.

@@ -99,6 +99,7 @@ const std::map<std::string, Rule>& rules() {
         {kOfxImageEffectPropFrameStep, {kDouble, 1, kInArgs, 0}},
         {kOfxImageEffectPropSequentialRenderStatus, {kInt, 1, kInArgs, 0}},
         {kOfxImageEffectPropInteractiveRenderStatus, {kInt, 1, kInArgs, 0}},
+        {kOfxImageEffectPropRenderQualityDraft, {kInt, 1, kInArgs, 0}},
 
         {kOfxParamPropType, {kString, 1, kAnyParam, 0}},
         {kOfxParamPropAnimates, {kInt, 1, kAnyParam, kParamDescriptor}},

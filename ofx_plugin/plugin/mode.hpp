@@ -1,0 +1,28 @@
+// How exactly a node recolours: colour by colour, or from a lattice that plays in real time.
+#pragma once
+
+#include <string>
+
+#include "host.hpp"
+#include "palette4d/lattice.hpp"
+#include "param_define.hpp"
+#include "params.hpp"
+
+namespace palette4d::plugin {
+
+/// The options of kParamMode, in order.
+enum class Mode { kAuto, kExact, kLattice };
+inline constexpr const char* kParamMode = "mode";
+
+void define_mode_param(ParamDefiner& define);
+
+Mode mode_at(const Params& params, OfxTime time);
+
+/// Whether a render with these arguments is to interpolate: Auto does where the host tells that
+/// somebody watches it being made, or that a draft will do.
+bool interpolates(Mode mode, const Properties& render_arguments);
+
+/// What the status says of a lattice's largest error.
+std::string words_of(const Lattice& lattice);
+
+}  // namespace palette4d::plugin

@@ -1,0 +1,184 @@
+// The node's mode: exact, or by a lattice of which the node says how much it errs.
+#include <cmath>
+#include <cstring>
+#include <set>
+#include <thread>
+
+#include "../../ofx_plugin/plugin/sidecar_cache.hpp"
+#include "harness.hpp"
+#include "palette4d/lattice.hpp"
+
+using namespace strict;
+using namespace test;
+using palette4d::Lattice;
+
+namespace {
+
+struct Node {
+    Plugin plugin{bundle()};
+    std::string path = sidecar();
+    std::unique_ptr<Instance> instance = plugin.create();
+    Node() { instance->set("sidecar", path); }
+
+    /// A render in windows of so many rows.
+    std::vector<unsigned char> render(const Picture& source, double time, int rows = 1000) {
+        Picture output(source.layout());
+        const OfxRectI& all = source.layout().bounds;
+        for (int y = all.y1; y < all.y2; y += rows) {
+            const OfxRectI window = rect(all.x1, y, all.x2, std::min(y + rows, all.y2));
+            CHECK(instance->render(time, &source, output, window) == kOfxStatOK);
+        }
+        return output.pixels(all);
+    }
+};
+
+enum { kAuto, kExact, kLattice };
+
+Layout layout(int channels, Depth depth = Depth::kFloat) {
+    Layout made;
+    made.bounds = rect(-3, 5, 157, 66);
+    made.channels = channels;
+    made.depth = depth;
+    return made;
+}
+
+/// Largest |a - b| / max(|b|, 0.1) of float pixels; those that are no numbers have the same bits.
+double difference(const std::vector<unsigned char>& a, const std::vector<unsigned char>& b) {
+    double worst = 0;
+    CHECK(a.size() == b.size());
+    for (std::size_t i = 0; i + 4 <= a.size(); i += 4) {
+        float x, y;
+        std::memcpy(&x, &a[i], 4);
+        std::memcpy(&y, &b[i], 4);
+        if (std::memcmp(&x, &y, 4) == 0) continue;
+        const double exact = y;
+        CHECK(std::isfinite(x) && std::isfinite(y));
+        worst = std::max(worst, std::abs(x - exact) / std::max(std::abs(exact), 0.1));
+    }
+    return worst;
+}
+
+}  // namespace
+
+TEST(the_lattice_is_near_the_exact_picture_and_the_same_in_every_tile) {
+    Node node;
+    for (const int channels : {3, 4}) {
+        Picture source(layout(channels));
+        fill(source);
+        node.instance->set("mode", kExact);
+        const auto exact = node.render(source, 1.25);
+        CHECK(exact == recoloured(palette4d::read_sidecar(node.path), 11.25, source,
+                                  source.layout().bounds));
+        node.instance->set("mode", kLattice);
+        const auto lattice = node.render(source, 1.25);
+        CHECK(lattice != exact);
+        CHECK(difference(lattice, exact) <= Lattice::kTolerance);
+        for (const int rows : {1, 7}) CHECK(node.render(source, 1.25, rows) == lattice);
+        // Made anew after other frames, in another order.
+        for (int t = 0; t < 10; ++t) node.render(source, 0.3 + t, 13);
+        CHECK(node.plugin.call(kOfxActionPurgeCaches, &node.instance->effect(), nullptr, nullptr) ==
+              kOfxStatOK);
+        CHECK(node.render(source, 1.25, 5) == lattice);
+        // The same road where more is done to the picture afterwards.
+        node.instance->set("mix", 0.5);
+        const auto mixed = node.render(source, 1.25);
+        node.instance->set("mode", kExact);
+        const auto exactly_mixed = node.render(source, 1.25);
+        CHECK(mixed != exactly_mixed);
+        CHECK(difference(mixed, exactly_mixed) <= 2 * Lattice::kTolerance);
+        node.instance->set("mix", 1.0);
+    }
+}
+
+TEST(bytes_are_a_level_off_at_most) {
+    Node node;
+    Picture source(layout(4, Depth::kByte));
+    fill(source);
+    node.instance->set("mode", kExact);
+    const auto exact = node.render(source, 3);
+    node.instance->set("mode", kLattice);
+    const auto lattice = node.render(source, 3);
+    int differ = 0;
+    for (std::size_t i = 0; i < exact.size(); ++i) {
+        CHECK(std::abs(int(exact[i]) - int(lattice[i])) <= 1);
+        differ += exact[i] != lattice[i];
+    }
+    CHECK(differ < static_cast<int>(exact.size()) / 20);
+}
+
+TEST(auto_interpolates_only_where_the_host_tells_that_somebody_watches) {
+    Node node;
+    Picture source(layout(4));
+    fill(source);
+    const std::map<std::string, Value> watched{{kOfxImageEffectPropInteractiveRenderStatus, 1}},
+        draft{{kOfxImageEffectPropRenderQualityDraft, 1}},
+        final_render{{kOfxImageEffectPropRenderQualityDraft, 0}};
+    node.instance->set("mode", kExact);
+    const auto exact = node.render(source, 2);
+    node.instance->set("mode", kLattice);
+    const auto lattice = node.render(source, 2);
+    CHECK(lattice != exact);
+    node.instance->set("mode", kAuto);
+    CHECK(node.render(source, 2) == exact);
+    node.instance->extra_arguments = final_render;
+    CHECK(node.render(source, 2) == exact);
+    for (const auto& arguments : {watched, draft}) {
+        node.instance->extra_arguments = arguments;
+        CHECK(node.render(source, 2) == lattice);
+        node.instance->set("mode", kExact);
+        CHECK(node.render(source, 2) == exact);
+        // A number that is no option is the default.
+        node.instance->set("mode", 7);
+        CHECK(node.render(source, 2) == lattice);
+        node.instance->set("mode", kAuto);
+    }
+    // A host that has neither property renders exactly.
+    node.instance->extra_arguments.clear();
+    Config silent;
+    silent.missing_properties = {kOfxImageEffectPropInteractiveRenderStatus,
+                                 kOfxImageEffectPropRenderQualityDraft};
+    Host::get().configure(silent);
+    CHECK(node.render(source, 2) == exact);
+    Host::get().configure({});
+}
+
+TEST(the_status_says_the_largest_error_of_the_frame_that_is_shown) {
+    Node node;
+    Picture source(layout(4));
+    fill(source);
+    const auto error_said = [&](double time) {
+        node.instance->shown_time = time;
+        node.instance->changed("mode");
+        const std::string text = node.instance->text("status"), words = "largest error measured ";
+        const std::size_t at = text.find(words);
+        return at == std::string::npos ? -1.0 : std::stod(text.substr(at + words.size()));
+    };
+    node.instance->set("mode", kLattice);
+    CHECK(error_said(4) == -1);  // nothing measured yet
+    node.render(source, 4);
+    const double said = error_said(4);
+    CHECK(said > 0 && said <= Lattice::kTolerance);
+    CHECK(error_said(5) == -1);
+    node.instance->set("mode", kExact);
+    CHECK(error_said(4) == -1);
+}
+
+TEST(threads_and_tiles_share_a_lattice) {
+    const auto loaded = palette4d::plugin::load_sidecar(sidecar()).loaded;
+    CHECK(loaded->ready_lattice_at(12) == nullptr);
+    // Kept alive: the address of a second one could not be that of the first.
+    std::vector<std::shared_ptr<const Lattice>> seen(8);
+    std::vector<std::thread> threads;
+    for (auto& one : seen) {
+        threads.emplace_back([&] { one = loaded->lattice_at(12); });
+    }
+    for (std::thread& thread : threads) thread.join();
+    CHECK(std::set<std::shared_ptr<const Lattice>>(seen.begin(), seen.end()).size() == 1);
+    CHECK(&seen[0]->recolourer() == loaded->recolourer_at(12).get());
+    CHECK(loaded->ready_lattice_at(12) == seen[0]);
+    // Those made long ago make room; edits of the host make another one.
+    using palette4d::plugin::AppliedEdits;
+    CHECK(loaded->lattice_at(12, AppliedEdits{true, {{3, {1, 0, 0}}}}) != seen[0]);
+    for (int i = 0; i < 20; ++i) loaded->lattice_at(12.5 + i / 8.0);
+    CHECK(loaded->ready_lattice_at(12) == nullptr);
+}
