@@ -144,8 +144,8 @@ def measure(what: str, recolourer: _core.Recolourer, image: F32, runs: int) -> N
 
 
 def growth(recolourer: _core.Recolourer, image: F32, runs: int, plot: Path | None) -> None:
-    """Print how cost grows with palettes, pictures and threads; draw it when asked."""
-    from bench_recolour import HD, UHD, UHD8K, hull, inside
+    """Print how the last frame's cost grows with palettes, pictures, threads; draw it."""
+    from bench_recolour import HD, UHD, UHD8K, hull
 
     def work(cut: _core.Recolourer, picture: F32, threads: int, out: F32) -> dict[str, float]:
         ways: dict[str, Callable[[], object]] = {
@@ -156,11 +156,11 @@ def growth(recolourer: _core.Recolourer, image: F32, runs: int, plot: Path | Non
         return {k: v * scale for k, v in rates(runs, ways, time.process_time).items()}
 
     by_vertices: dict[int, dict[str, float]] = {}
+    half = np.ascontiguousarray(image[: HEIGHT // 2])
     for vertices in (4, 6, 8, 12, 16, 20, 24):
-        palette = hull(vertices)
-        small = inside(palette, 48, 27)
-        buffer = scaled(small)[: HEIGHT // 2]
-        by_vertices[vertices] = work(_core.Recolourer(*palette), buffer, 1, np.empty_like(buffer))
+        by_vertices[vertices] = work(
+            _core.Recolourer(*hull(vertices)), half, 1, np.empty_like(half)
+        )
     pictures = {HD: image[::2, ::2], UHD: image, UHD8K: np.tile(image, (2, 2, 1))}
     by_size: dict[str, dict[str, float]] = {}
     for (width, height), view in pictures.items():
@@ -168,7 +168,7 @@ def growth(recolourer: _core.Recolourer, image: F32, runs: int, plot: Path | Non
         by_size[f"{width}x{height}"] = work(recolourer, picture, 1, np.empty_like(picture))
     by_threads = {n: work(recolourer, image, n, np.empty_like(image)) for n in (1, 2, 4)}
     for what, table in (
-        ("palette vertices", by_vertices),
+        ("palette vertices, a third of them moved", by_vertices),
         ("picture", by_size),
         ("threads, of processor time", by_threads),
     ):

@@ -17,9 +17,8 @@ static_assert(kMostNodes < 1 << 24, "floats count nodes");
 /// Where a cell's interpolation is looked at: the other nodes of the brick that it would be cut
 /// into. Each corner has a part in one, so that a crease that cuts a corner off is seen as well.
 struct Probe {
-    int place[3];           ///< in halves
-    std::size_t corner[4];  ///< of the tetrahedron that it lies in; number 4 x + 2 y + z
-    double weight[4];
+    int place[3];            ///< in halves
+    std::size_t corners[2];  ///< it is half way between them; number 4 x + 2 y + z
 
     std::size_t node() const {
         return static_cast<std::size_t>((place[0] * 3 + place[1]) * 3 + place[2]);
@@ -27,17 +26,11 @@ struct Probe {
 };
 
 Probe probe_at(int x, int y, int z) {
-    Probe probe{{x, y, z}, {}, {}};
-    int axes[3] = {0, 1, 2};
-    std::stable_sort(axes, axes + 3, [&](int a, int b) { return probe.place[a] > probe.place[b]; });
-    int before = 2;
-    for (std::size_t k = 0; k < 3; ++k) {
-        probe.weight[k] = (before - probe.place[axes[k]]) / 2.0;
-        before = probe.place[axes[k]];
-        probe.corner[k + 1] = probe.corner[k] + static_cast<std::size_t>(4 >> axes[k]);
-    }
-    probe.weight[3] = before / 2.0;
-    return probe;
+    const auto corner = [](int i, int j, int k) {
+        return static_cast<std::size_t>(4 * i + 2 * j + k);
+    };
+    return {{x, y, z},
+            {corner(x / 2, y / 2, z / 2), corner((x + 1) / 2, (y + 1) / 2, (z + 1) / 2)}};
 }
 
 /// The middles of the cell and of its faces, then those of its edges.
@@ -69,13 +62,6 @@ double twist(const float (&corners)[8][3], std::size_t c) {
 }
 
 }  // namespace
-
-double lattice_error(double colour, double displacement, double error) {
-    const double exact = colour + displacement;
-    // At a strength between 0 and 1 a channel that changes its sign goes through 0.
-    const double size = colour * exact < 0 ? 0.1 : std::max(std::abs(exact), 0.1);
-    return std::abs(error) / size;
-}
 
 Lattice::Store::Store(const Recolourer& recolourer)
     : recolourer_(recolourer),
@@ -203,11 +189,15 @@ bool Lattice::Store::Builder::corners(const Job& job, float (&values)[8][3]) {
 }
 
 void Lattice::Store::Builder::add_probes(const Job& job, std::size_t first, std::size_t last) {
+    const std::vector<Probe>& all = probes();
+    std::size_t at = colours_.size();
+    colours_.resize(at + 3 * (last - first));
+    const int width = job.width();
     for (std::size_t p = first; p < last; ++p) {
-        for (int c = 0; c < 3; ++c) {
-            const int halves = (2 * job.itself.place[c] + probes()[p].place[c]) * job.width();
-            colours_.push_back(store_.domain_.low[c] +
-                               0.5f * static_cast<float>(halves) * store_.step_[c]);
+        for (std::size_t c = 0; c < 3; ++c) {
+            const int halves = (2 * job.itself.place[c] + all[p].place[c]) * width;
+            colours_[at++] =
+                store_.domain_.low[c] + 0.5f * static_cast<float>(halves) * store_.step_[c];
         }
     }
 }
@@ -215,16 +205,16 @@ void Lattice::Store::Builder::add_probes(const Job& job, std::size_t first, std:
 double Lattice::Store::Builder::error_of(const float (&corners)[8][3], const float* colours,
                                          const float* moved, std::size_t count) {
     double error = 0;
+    const std::vector<Probe>& all = probes();
     const double twists[3] = {twist(corners, 0), twist(corners, 1), twist(corners, 2)};
     for (std::size_t p = 0; p < count; ++p) {
-        const Probe& probe = probes()[p];
+        const Probe& probe = all[p];
         for (std::size_t c = 0; c < 3; ++c) {
             const auto colour = static_cast<double>(colours[3 * p + c]);
             const auto exact = static_cast<double>(moved[3 * p + c]);
-            double value = 0;
-            for (std::size_t k = 0; k < 4; ++k) {
-                value += probe.weight[k] * static_cast<double>(corners[probe.corner[k]][c]);
-            }
+            const double value = (static_cast<double>(corners[probe.corners[0]][c]) +
+                                  static_cast<double>(corners[probe.corners[1]][c])) /
+                                 2;
             // A quarter of the twist is the error of what is bilinear.
             const double worse = std::max(std::abs(value - exact), twists[c] / 4);
             const double found = lattice_error(colour, exact, worse);

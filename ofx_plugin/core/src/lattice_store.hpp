@@ -1,7 +1,9 @@
 // The nodes and cells of a Lattice, made by many threads at a time as they are asked for.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <cstdint>
 #include <cstdlib>
 #include <memory>
@@ -38,7 +40,12 @@ private:
 };
 
 /// What Lattice::kTolerance is held against, at strength 1; at a lower one the error is no larger.
-double lattice_error(double colour, double displacement, double error);
+inline double lattice_error(double colour, double displacement, double error) {
+    const double exact = colour + displacement;
+    // At a strength between 0 and 1 a channel that changes its sign goes through 0.
+    const double size = colour * exact < 0 ? 0.1 : std::max(std::abs(exact), 0.1);
+    return std::abs(error) / size;
+}
 
 class Lattice::Store {
 public:
