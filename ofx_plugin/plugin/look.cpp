@@ -19,7 +19,7 @@ namespace {
 
 /// Prepares what the output asks for. Throws what slicing throws.
 void prepare(Look& look, const Params& params, LoadedSidecar& loaded, double frame, OfxTime time,
-             bool interpolated) {
+             Interpolation interpolation) {
     Drawing& drawing = look.drawing;
     const OutputSettings& settings = drawing.settings;
     const Sidecar& sidecar = loaded.sidecar();
@@ -48,7 +48,11 @@ void prepare(Look& look, const Params& params, LoadedSidecar& loaded, double fra
     look.note = std::move(edits.note);
     drawing.recolourer = loaded.recolourer_at(frame, edits.edits);
     if (drawing.recolourer->identity() || settings.strength == 0) drawing.recolourer = nullptr;
-    if (drawing.recolourer && interpolated) drawing.lattice = loaded.lattice_at(frame, edits.edits);
+    if (drawing.recolourer &&
+        (interpolation == Interpolation::kAlways ||
+         (interpolation == Interpolation::kWithoutConversion && !drawing.conversion))) {
+        drawing.lattice = loaded.lattice_at(frame, edits.edits);
+    }
     if (settings.output == Output::kPalette) {
         std::tie(drawing.original, drawing.edited) = loaded.palette_at(frame, edits.edits);
     } else {
@@ -58,7 +62,8 @@ void prepare(Look& look, const Params& params, LoadedSidecar& loaded, double fra
 
 }  // namespace
 
-Look look_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time, bool interpolated) {
+Look look_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time,
+             Interpolation interpolation) {
     Look look;
     const Params params(suites, effect);
     const Chosen chosen = chosen_sidecar(params, time);
@@ -81,7 +86,7 @@ Look look_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time, bo
     }
     if (at.passes) return look;
     try {
-        prepare(look, params, *result.loaded, at.frame, time, interpolated);
+        prepare(look, params, *result.loaded, at.frame, time, interpolation);
     } catch (const std::bad_alloc&) {
         throw;
     } catch (const std::exception& error) {

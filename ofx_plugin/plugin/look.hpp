@@ -9,6 +9,9 @@
 
 namespace palette4d::plugin {
 
+/// Whether a look has a lattice.
+enum class Interpolation { kNever, kWithoutConversion, kAlways };
+
 struct Look {
     /// The picture passes through unchanged.
     bool passes = true;
@@ -19,10 +22,9 @@ struct Look {
     std::string note;
 };
 
-/// The look of an instance at a time; with `interpolated`, by a lattice where it has one. Reads
-/// parameters in the way allowed while rendering. Problems are in the result; throws std::bad_alloc
-/// only.
+/// The look of an instance at a time. Reads parameters in the way allowed while rendering. Problems
+/// are in the result; throws std::bad_alloc only.
 Look look_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time,
-             bool interpolated = false);
+             Interpolation interpolation = Interpolation::kNever);
 
 }  // namespace palette4d::plugin

@@ -1,16 +1,25 @@
 #include "mode.hpp"
 
+#include <cstdint>
 #include <locale>
 #include <sstream>
 
 namespace palette4d::plugin {
+namespace {
+
+/// A lattice costs what the picture's different colours cost: up to so many pixels, no less than
+/// computing each exactly (benchmarks/README.md).
+constexpr std::int64_t kExactIsFastEnough = 1920 * 1080;
+
+}  // namespace
 
 void define_mode_param(ParamDefiner& define) {
     define.choice({kParamMode, "Mode",
                    "Exact: every colour is worked out by itself. Lattice: colours are interpolated "
-                   "where that is as good as exact, which is several times as fast. Auto: the "
-                   "lattice where the host says that it renders for somebody who watches, or a "
-                   "draft; exact for all else, such as a final render."},
+                   "where that is as good as exact, which is several times as fast in large "
+                   "pictures. Auto: the lattice where the picture is larger than 1920x1080, needs "
+                   "no conversion, and the host says that it renders for somebody who watches, or "
+                   "a draft; exact for all else, such as a final render."},
                   {"Auto", "Exact", "Lattice"});
 }
 
@@ -19,13 +28,21 @@ Mode mode_at(const Params& params, OfxTime time) {
     return mode == 1 ? Mode::kExact : mode == 2 ? Mode::kLattice : Mode::kAuto;
 }
 
-bool interpolates(Mode mode, const Properties& render_arguments) {
-    if (mode != Mode::kAuto) return mode == Mode::kLattice;
+Interpolation interpolation_of(Mode mode, const Properties& render_arguments,
+                               const OfxRectI& picture) {
+    if (mode == Mode::kLattice) return Interpolation::kAlways;
+    if (mode == Mode::kExact) return Interpolation::kNever;
+    const std::int64_t width = static_cast<std::int64_t>(picture.x2) - picture.x1;
+    const std::int64_t height = static_cast<std::int64_t>(picture.y2) - picture.y1;
+    // Either may be as large as 2^32.
+    if (width <= 0 || height <= kExactIsFastEnough / width) return Interpolation::kNever;
     const auto says = [&](const char* name) {
         return render_arguments.get_int(name).value_or(0) != 0;
     };
     return says(kOfxImageEffectPropInteractiveRenderStatus) ||
-           says(kOfxImageEffectPropRenderQualityDraft);
+                   says(kOfxImageEffectPropRenderQualityDraft)
+               ? Interpolation::kWithoutConversion
+               : Interpolation::kNever;
 }
 
 std::string words_of(const Lattice& lattice) {

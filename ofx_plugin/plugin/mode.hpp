@@ -4,6 +4,7 @@
 #include <string>
 
 #include "host.hpp"
+#include "look.hpp"
 #include "palette4d/lattice.hpp"
 #include "param_define.hpp"
 #include "params.hpp"
@@ -18,9 +19,11 @@ void define_mode_param(ParamDefiner& define);
 
 Mode mode_at(const Params& params, OfxTime time);
 
-/// Whether a render with these arguments is to interpolate: Auto does where the host tells that
-/// somebody watches it being made, or that a draft will do.
-bool interpolates(Mode mode, const Properties& render_arguments);
+/// How a render with these arguments is to interpolate: Auto does where the host tells that
+/// somebody watches it being made, or that a draft will do, and where interpolating is faster: the
+/// picture, of which this render may be a part, is large, and no conversion takes most of the time.
+Interpolation interpolation_of(Mode mode, const Properties& render_arguments,
+                               const OfxRectI& picture);
 
 /// What the status says of a lattice's largest error.
 std::string words_of(const Lattice& lattice);

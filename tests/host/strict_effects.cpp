@@ -96,7 +96,7 @@ OfxStatus get_image(OfxImageClipHandle clip, OfxTime, const OfxRectD*,
     set->put(kOfxImagePropData, static_cast<void*>(const_cast<unsigned char*>(
                                     picture->at(layout.bounds.x1, layout.bounds.y1))));
     put_rect(*set, kOfxImagePropBounds, layout.bounds);
-    put_rect(*set, kOfxImagePropRegionOfDefinition, layout.bounds);
+    put_rect(*set, kOfxImagePropRegionOfDefinition, layout.definition.value_or(layout.bounds));
     set->put(kOfxImagePropRowBytes, static_cast<int>(picture->row_bytes()));
     set->put(kOfxImageEffectPropPixelDepth,
              std::string(layout.depth == Depth::kByte ? kOfxBitDepthByte : kOfxBitDepthFloat));

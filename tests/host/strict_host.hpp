@@ -12,6 +12,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 #include <variant>
@@ -120,7 +121,8 @@ struct Layout {
     std::ptrdiff_t padding = 0;  ///< bytes after each row
     bool upside_down = false;    ///< negative rowBytes
     std::string premultiplication = kOfxImageUnPreMultiplied;
-    double scale = 1;  ///< the render scale that it is at
+    double scale = 1;                    ///< the render scale that it is at
+    std::optional<OfxRectI> definition;  ///< the whole picture, where bounds are a part of it
 
     int width() const { return bounds.x2 - bounds.x1; }
     int height() const { return bounds.y2 - bounds.y1; }

@@ -108,7 +108,9 @@ TEST(bytes_are_a_level_off_at_most) {
 
 TEST(auto_interpolates_only_where_the_host_tells_that_somebody_watches) {
     Node node;
-    Picture source(layout(4));
+    Layout tile = layout(4);
+    tile.definition = rect(-960, 0, 961, 1080);
+    Picture source(tile);
     fill(source);
     const std::map<std::string, Value> watched{{kOfxImageEffectPropInteractiveRenderStatus, 1}},
         draft{{kOfxImageEffectPropRenderQualityDraft, 1}},
@@ -140,6 +142,88 @@ TEST(auto_interpolates_only_where_the_host_tells_that_somebody_watches) {
     Host::get().configure(silent);
     CHECK(node.render(source, 2) == exact);
     Host::get().configure({});
+}
+
+TEST(auto_is_exact_for_pictures_that_the_lattice_is_not_faster_for) {
+    Node node;
+    node.instance->extra_arguments = {{kOfxImageEffectPropInteractiveRenderStatus, 1}};
+    const auto interpolates = [&](const Layout& shape) {
+        Picture source(shape);
+        fill(source);
+        node.instance->set("mode", kExact);
+        const auto exact = node.render(source, 2);
+        node.instance->set("mode", kLattice);
+        const auto lattice = node.render(source, 2);
+        CHECK(lattice != exact);
+        node.instance->set("mode", kAuto);
+        const auto found = node.render(source, 2);
+        CHECK(found == exact || found == lattice);
+        return found == lattice;
+    };
+    Layout tile = layout(4);
+    CHECK(!interpolates(tile));
+    for (const auto& [picture, large] :
+         {std::pair{rect(-100, -3, 1820, 1077), false}, std::pair{rect(-100, -3, 1821, 1077), true},
+          std::pair{rect(-100, -3, 980, 1918), true}, std::pair{rect(-3, 5, 157, 12965), false},
+          std::pair{rect(-3, 5, 157, 12966), true},
+          std::pair{rect(-2147483647, -2147483647, 2147483647, 2147483647), true}}) {
+        tile.definition = picture;
+        CHECK(interpolates(tile) == large);
+    }
+    // A host that does not tell of the whole picture.
+    Config silent;
+    silent.missing_properties = {kOfxImagePropRegionOfDefinition};
+    Host::get().configure(silent);
+    CHECK(!interpolates(tile));
+    Host::get().configure({});
+    // A whole picture, and the same at half its size, as hosts show it while it plays.
+    Layout whole;
+    whole.bounds = rect(0, 0, 2048, 1152);
+    whole.channels = 3;
+    CHECK(interpolates(whole));
+    whole.bounds = rect(0, 0, 1024, 576);
+    whole.scale = 0.5;
+    CHECK(!interpolates(whole));
+}
+
+TEST(handles_keyframes_and_a_change_of_mode_meet_their_own_lattices) {
+    Node node;
+    Picture source(layout(4));
+    fill(source);
+    const auto each_mode = [&](double time) {
+        node.instance->set("mode", kExact);
+        const auto exact = node.render(source, time);
+        node.instance->set("mode", kLattice);
+        const auto lattice = node.render(source, time, 9);
+        CHECK(difference(lattice, exact) <= Lattice::kTolerance);
+        return std::pair{exact, lattice};
+    };
+    const auto before = each_mode(2);
+    node.instance->set("handle02", Colour{0.9, 0.2, 0.1});
+    node.instance->set("handle02On", 1);
+    const auto edited = each_mode(2);
+    CHECK(edited.first != before.first && edited.second != before.second);
+    const auto later = each_mode(6);
+    CHECK(later.first != edited.first && later.second != edited.second);
+    // Another time of the clip at the same time of the host.
+    node.instance->set("frameOffset", 4.0);
+    const auto offset = each_mode(2);
+    CHECK(offset == later);
+    node.instance->set("frameOffset", 0.0);
+    node.instance->set("handle02On", 0);
+    CHECK(each_mode(2) == before);
+    // Outputs that are drawn from the same palette.
+    node.instance->set("output", 2);
+    each_mode(2);
+    node.instance->set("output", 0);
+    node.instance->set("strength", 0.35);
+    each_mode(2);
+    node.instance->set("strength", 1.0);
+    for (const int output : {1, 3}) {  // mattes are exact
+        node.instance->set("output", output);
+        const auto matte = each_mode(2);
+        CHECK(matte.first == matte.second);
+    }
 }
 
 TEST(the_status_says_the_largest_error_of_the_frame_that_is_shown) {
