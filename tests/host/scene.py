@@ -94,20 +94,27 @@ class Scene:
         )
 
     def render(self, *, real_time: int = -1, **parameters: object) -> tuple[list[Image], str]:
-        """The clip through the node, at its own depth, and what melt said meanwhile."""
-        for old in self.folder.glob("out_*.png"):
-            old.unlink()
+        """The clip through the node, at its own depth, and what melt said meanwhile.
+
+        On a busy machine melt now and then ends, without a word and with or without an effect,
+        before its first frame: it is asked again.
+        """
         image_format = "rgba" if self.clip[0].dtype == np.uint8 else "rgba64"
         pixels = "rgba" if image_format == "rgba" else "rgba64be"
-        done = self.run(
-            # abnormal: without the loader's normalisers, which take pictures through 4:2:2.
-            # Not -quiet: it would keep the persistent messages to itself.
-            *("-profile", "profile", "abnormal:in_%03d.png", "-attach", SERVICE),
-            *(f"{name}={value}" for name, value in parameters.items()),
-            *("-consumer", "avformat:out_%03d.png", "vcodec=png", "an=1", f"pix_fmt={pixels}"),
-            *(f"mlt_image_format={image_format}", f"real_time={real_time}"),
-        )
-        files = sorted(self.folder.glob("out_*.png"))
+        for _ in range(4):
+            for old in self.folder.glob("out_*.png"):
+                old.unlink()
+            done = self.run(
+                # abnormal: without the loader's normalisers, which take pictures through 4:2:2.
+                # Not -quiet: it would keep the persistent messages to itself.
+                *("-profile", "profile", "abnormal:in_%03d.png", "-attach", SERVICE),
+                *(f"{name}={value}" for name, value in parameters.items()),
+                *("-consumer", "avformat:out_%03d.png", "vcodec=png", "an=1", f"pix_fmt={pixels}"),
+                *(f"mlt_image_format={image_format}", f"real_time={real_time}"),
+            )
+            files = sorted(self.folder.glob("out_*.png"))
+            if files:
+                break
         assert len(files) == len(self.clip), done.stderr
         return [read_image(path) for path in files], done.stderr
 

@@ -20,6 +20,7 @@ from palette4d.lut_export.frame_edit import frame_edit
 from palette4d.lut_export.series import SeriesOptions
 from palette4d.lut_export.spaces import space_of, transforms
 from palette4d.render import RenderOptions, recoloured
+from palette4d.workers import Workers
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
 SIDECAR = GOLDEN / "v2_scene_linear.p4d.json"  # lin_rec709, its palette in ACEScct
@@ -177,7 +178,8 @@ def test_transforms_are_the_steps() -> None:
 
 def test_a_config_s_look_has_the_palette_s_space(gentle: Path, tmp_path: Path) -> None:
     base = BakeOptions(0.0, size=33, format="clf")
-    options = ConfigOptions(SeriesOptions((), base, jobs=1), lambda sidecar: (6,), names=("shot",))
+    series = SeriesOptions((), base, workers=Workers(1))
+    options = ConfigOptions(series, lambda sidecar: (6,), names=("shot",))
     written = write_config([gentle], tmp_path / "show", options)
     assert written.shots[0].process_space == "ACEScct"
     config = ocio.Config.CreateFromFile(str(written.path))
