@@ -107,8 +107,8 @@ def measure(what: str, recolourer: _core.Recolourer, image: F32, runs: int) -> N
         "ready RGBA": lambda: ready.apply(four, out=out4),
     }
     for n, lut in luts.items():
-        one[f"OCIO {n}"] = lambda lut=lut: lut.applyRGB(scratch[3])  # type: ignore[misc]
-        one[f"OCIO {n} RGBA"] = lambda lut=lut: lut.applyRGBA(scratch[4])  # type: ignore[misc]
+        one[f"OCIO {n}"] = lambda lut=lut: lut.applyRGB(scratch[3])
+        one[f"OCIO {n} RGBA"] = lambda lut=lut: lut.applyRGBA(scratch[4])
     thread = rates(runs, one, time.process_time)
     two: dict[str, Callable[[], object]] = {
         "exact": lambda: recolourer.apply(image, precision="single", threads=2, out=out),
@@ -173,7 +173,7 @@ def growth(recolourer: _core.Recolourer, image: F32, runs: int, plot: Path | Non
         ("threads, of processor time", by_threads),
     ):
         print(f"{what}:")
-        for key, found in table.items():  # type: ignore[attr-defined]
+        for key, found in table.items():
             print(f"  {key}: exact {found['exact']:.1f}, lattice {found['lattice']:.1f} Mpix/s")
     if plot is None:
         return

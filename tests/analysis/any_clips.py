@@ -260,8 +260,8 @@ def pq_movie(folder: Path) -> str:
         pictures.append(np.rint(np.stack(planes)).astype(np.uint16))
 
     def tag(stream: object) -> None:
-        stream.codec_context.color_trc = PQ  # type: ignore[attr-defined]
-        stream.codec_context.color_primaries = BT2020  # type: ignore[attr-defined]
+        stream.codec_context.color_trc = PQ
+        stream.codec_context.color_primaries = BT2020
 
     path = folder / "pq.mkv"
     write_movie(
