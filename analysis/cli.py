@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from palette4d.analysis import show_cli
-from palette4d.analysis.options import METHODS, AnalysisOptions
+from palette4d.analysis.options import METHODS, METHODS_OF, AnalysisOptions
 from palette4d.arguments import checked, frame_range, number, whole
 from palette4d.wording import counted
 
@@ -49,17 +49,12 @@ PAPER_OPTIONS = (
     ("--k", "N", "k", "pixels a palette colour is compared with, eq. 3"),
     ("--alpha", "X", "alpha", "block merging: weight of the block's length, eq. 10"),
     ("--beta", "X", "beta", "block merging: weight of the palette's size, eq. 10"),
-    ("--eta1", "X", "eta1", "method paper: merging stops above this multiple of the first loss"),
-    ("--eta2", "X", "eta2", "method paper: removal stops above this multiple of the first loss"),
+    ("--eta1", "X", "eta1", "merging stops above this multiple of the first loss"),
+    ("--eta2", "X", "eta2", "removal stops above this multiple of the first loss"),
     ("--gamma", "X", "gamma", "weight of smoothness in time, eq. 12"),
-    (
-        "--removal-candidates",
-        "N",
-        "removal_candidates",
-        "method paper: vertices tried for each removal",
-    ),
+    ("--removal-candidates", "N", "removal_candidates", "vertices tried for each removal"),
     ("--refinement-box", "X", "refinement_box", "how far a colour may move in refinement"),
-    ("--refinement-cycles", "N", "refinement_cycles", "method paper: rounds of vertex refinement"),
+    ("--refinement-cycles", "N", "refinement_cycles", "rounds of vertex refinement"),
 )
 HANDLE_OPTIONS = (
     ("--handle-cost", "X", "handle_cost", "what a handle must be worth: the rise of L' without it"),
@@ -143,7 +138,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--method",
         choices=METHODS,
         default=defaults.method,
-        help="; ".join(f"{name}: {text}" for name, text in METHODS.items()),
+        help="; ".join(f"{name}: {text}" for name, text in METHODS.items())
+        + "; an option below that names methods is refused with the others",
     )
     show_cli.add_options(parser)
     for title, table in (
@@ -154,13 +150,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         group = parser.add_argument_group(title)
         for flag, metavar, field, text in table:
             default = getattr(defaults, field)
+            methods = f"; method {', '.join(METHODS_OF[field])}" if field in METHODS_OF else ""
             group.add_argument(
                 flag,
                 dest=field,
                 metavar=metavar,
                 type=checked(whole() if isinstance(default, int) else number(), _check(field)),
-                default=default,
-                help=f"{text} (default {default:g})",
+                default=argparse.SUPPRESS,  # what is there was given: `_options`
+                help=f"{text} (default {default:g}{methods})",
             )
     parser.set_defaults(run=run, usage_error=parser.error)
 
@@ -215,8 +212,7 @@ def run(args: argparse.Namespace) -> int:
     from palette4d.analysis.clip import open_clip
 
     many = show_cli.is_show(args)
-    fields = {field.name for field in dataclasses.fields(AnalysisOptions)}
-    options = AnalysisOptions(**{k: v for k, v in vars(args).items() if k in fields})
+    options = _options(args)
     if many:
         return show_cli.run(args, options)
     sidecar.check_target(args.output, on_edits=args.on_edits)
@@ -244,6 +240,22 @@ def run(args: argparse.Namespace) -> int:
         if where := colour_space.described(spaces):
             print(f"{'colours':<10} {where}")
     return 0
+
+
+def _options(args: argparse.Namespace) -> AnalysisOptions:
+    """Return the options; one that was given and that the method does not look at is wrong
+    usage."""
+    fields = {field.name for field in dataclasses.fields(AnalysisOptions)}
+    given = {name: value for name, value in vars(args).items() if name in fields}
+    for name in given:
+        methods = METHODS_OF.get(name, METHODS)
+        if args.method not in methods:
+            flag = name.rstrip("_").replace("_", "-")
+            args.usage_error(
+                f"--{flag} has no effect with --method {args.method}; it belongs to "
+                f"{', '.join(methods)}"
+            )
+    return AnalysisOptions(**given)
 
 
 def _beside(source: str, output: Path) -> str:

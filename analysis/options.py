@@ -14,26 +14,49 @@ METHODS = {
     "rgbt": "the simplified convex hull in RGB and time of section 6.2",
 }
 
+#: Options that only some methods look at; all others count with every method. What the losses
+#: are made of (lambda, k, gamma) counts where figures are printed.
+METHODS_OF: dict[str, tuple[str, ...]] = {
+    "handle_cost": ("skew",),
+    "vertices": ("skew", "rgbt"),
+    "blocks": ("skew",),
+    "alpha": ("skew", "paper"),
+    "beta": ("skew", "paper"),
+    "eta1": ("paper",),
+    "eta2": ("paper",),
+    "gamma": ("skew", "paper", "rgbt"),
+    "removal_candidates": ("paper",),
+    "refinement_cycles": ("paper",),
+    "refinement_box": ("skew", "paper", "static"),
+    "palette_size": ("skew", "paper", "static"),
+    "merge_distance": ("skew", "paper", "static"),
+    "hull_box": ("skew", "paper", "static"),
+    "convexity": ("skew", "paper", "static"),
+    "separation": ("skew", "paper", "static"),
+}
+
 
 @dataclasses.dataclass(frozen=True)
 class AnalysisOptions:
     """Options of `palette4d analyze`; defaults as in Du et al. 2021 unless said otherwise.
 
+    Some methods do not look at some of them: `METHODS_OF`.
+
     Attributes
     ----------
     method : one of `METHODS`.
-    handle_cost : the rise of eq. 12 that a vertex must be worth to stay (ours, `skew`).
-    vertices : most vertices of the palette, 0 for as many as are worth it (`skew`, `rgbt`).
-    blocks : most blocks of one topology (`skew`).
+    handle_cost : the rise of eq. 12 that a vertex must be worth to stay (ours).
+    vertices : most vertices of the palette, 0 for as many as are worth it.
+    blocks : most blocks of one topology.
     lambda_ : weight of the reconstruction loss in eq. 4 (50).
     k : pixels a palette colour is compared with in eq. 3 (50).
     alpha, beta : weights of block size and palette size in eq. 10 (10, 1).
-    eta1 : block merging stops above eta1 times the first block loss (3.5, 5.3.3; `paper`).
-    eta2 : vertex removal stops above eta2 times the loss after merging (3, 5.4.2; `paper`).
+    eta1 : block merging stops above eta1 times the first block loss (3.5, 5.3.3).
+    eta2 : vertex removal stops above eta2 times the loss after merging (3, 5.4.2).
     gamma : weight of the smoothness term in eq. 12 (0.01).
-    removal_candidates : vertices tried for each removal (10, section 5.4.2; `paper`).
+    removal_candidates : vertices tried for each removal (10, section 5.4.2).
     refinement_box : half width of the colour box a vertex may move in (0.1, section 5.5).
-    refinement_cycles : rounds over all vertices (3, section 5.5; `paper`).
+    refinement_cycles : rounds over all vertices (3, section 5.5).
     palette_size : most colours of a frame's palette (8, as the authors' program).
     merge_distance : palette colours closer than this become one (the authors' program: 0.1).
     hull_box : half width of the box in the per-frame refinement (0.15, Wang et al. 2019).

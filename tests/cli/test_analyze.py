@@ -176,6 +176,27 @@ def test_wrong_options_are_wrong_usage(clip, tmp_path, option, value, capsys):
     assert not out.exists()
 
 
+@pytest.mark.parametrize(
+    ("method", "option", "of"),
+    [
+        ("skew", "--eta2", "paper"),
+        ("paper", "--vertices", "skew, rgbt"),
+        ("paper", "--handle-cost", "skew"),
+        ("static", "--gamma", "skew, paper, rgbt"),
+        ("rgbt", "--refinement-box", "skew, paper, static"),
+    ],
+)
+def test_options_of_another_method_are_wrong_usage(clip, tmp_path, method, option, of, capsys):
+    out = tmp_path / "never.p4d.json"
+    with pytest.raises(SystemExit) as stop:
+        # Its own default, too: it would not count.
+        cli.main(["analyze", str(clip), "-o", str(out), "--method", method, option, "3"])
+    assert stop.value.code == 2
+    error = capsys.readouterr().err
+    assert f"{option} has no effect with --method {method}; it belongs to {of}\n" in error
+    assert not out.exists()
+
+
 def test_a_cut_is_refused_and_the_shots_are_named(tmp_path, capsys):
     folder = tmp_path / "cut"
     folder.mkdir()

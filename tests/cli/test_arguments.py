@@ -77,6 +77,25 @@ def test_values_that_no_file_makes_right_are_wrong_usage(capsys, monkeypatch, tm
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(
+    ("words", "verb", "wrong"),
+    [
+        (("paint",), "palette4d VERB", "'paint'"),
+        (("analyze",), "palette4d analyze", "CLIP, -o/--output"),
+        (("analyze", "c", "-o", "a", "--verts", "3"), "palette4d analyze", "--verts"),
+        (("render", EDITED), "palette4d render", "CLIP"),
+        (("edit", EDITED, "set", "v1", "--rgb", "1", "--no"), "palette4d edit SIDECAR set", "--no"),
+    ],
+)
+def test_wrong_usage_is_two_lines(capsys, words, verb, wrong):
+    with pytest.raises(SystemExit) as stop:
+        cli.main(list(words))
+    assert stop.value.code == 2
+    first, second = capsys.readouterr().err.splitlines()
+    assert first == f"usage: {verb} … ({verb} --help)"
+    assert wrong in second
+
+
 def test_negative_frames_of_every_verb(tmp_path, capsys):
     folder = tmp_path / "clip"
     for frame in range(-5, -2):

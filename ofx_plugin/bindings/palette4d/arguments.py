@@ -6,8 +6,8 @@ A value that is wrong whatever the files hold is refused here, as an argparse ty
 import argparse
 import math
 import re
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Iterable
+from typing import Any, NoReturn
 
 from palette4d.errors import Palette4dError
 
@@ -21,9 +21,31 @@ _RANGE = re.compile(r"(-?[0-9]{1,12})(?:-(-?[0-9]{1,12})(?:x([0-9]{1,12}))?)?")
 _FRAMES_ARE = "expected A, A-B or A-BxN with A <= B, or several with commas, such as 1001-1100x2"
 
 
-def accept_negative_values(
-    subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]",
-) -> None:
+class Parser(argparse.ArgumentParser):
+    """A parser that says what is wrong in two lines, and where the help is: of a verb with dozens
+    of options argparse would print the whole usage before it. Verbs and their actions inherit it.
+    """
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong on stderr and exit with 2."""
+        verb = " VERB" if self.prog == "palette4d" else ""
+        self.exit(
+            2,
+            f"usage: {self.prog}{verb} … ({self.prog}{verb} --help)\n"
+            f"{self.prog}: error: {message}\n",
+        )
+
+    def parse_known_args(
+        self, args: Iterable[str] | None = None, namespace: Any = None
+    ) -> tuple[Any, list[str]]:
+        """As argparse, but what a verb does not know is the verb's error, not the command's."""
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return found, unknown
+
+
+def accept_negative_values(subparsers: "argparse._SubParsersAction[Any]") -> None:
     """Let the values of these parsers' options begin with a minus."""
     for parser in subparsers.choices.values():
         parser._negative_number_matcher = _NEGATIVE

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Sequence
 
 from palette4d import __version__
-from palette4d.arguments import accept_negative_values
+from palette4d.arguments import Parser, accept_negative_values
 from palette4d.errors import Palette4dError
 
 #: The modules of the verbs, in the order of a day's work (and of ``palette4d --help``).
@@ -41,7 +41,7 @@ example:
 
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of the whole command."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="palette4d",
         description="Time-varying palettes for colour grading: analyse a clip, edit its colours, "
         "render or bake the result.",
