@@ -26,6 +26,13 @@ MOVIE_EXTENSIONS = frozenset({
 # The last number of a stem. A minus is a sign only at the start or after another separator:
 # "shot-0010" is frame 10 of "shot-", "shot.-0010" is frame -10 of "shot.".
 _NUMBER = re.compile(r"((?:(?<=[._ ])|\A)-)?[0-9]+\Z")
+# Names that say what a file is, not what it shows; of one or two letters they say nothing anyway.
+_ANONYMOUS = re.compile(
+    r".{0,2}|(frame|image|img|out|output|pic|picture|plate|render|still)s?|seq(uence)?"
+    r"|dpx|exr|jpe?g|png|tiff?",
+    re.IGNORECASE,
+)
+_FOLDERS_TO_NAME_BY = 3
 # "shot_v2" is version 2, not frame 2.
 _VERSION = re.compile(r"(^|.*[._ -])[vV]\Z", re.DOTALL)
 
@@ -52,8 +59,16 @@ class Sequence:
 
     @property
     def name(self) -> str:
-        """The prefix without its separator, or the folder's name."""
-        return self.prefix.rstrip("._- ") or self.folder.resolve().name or "clip"
+        """The prefix without its separator; the nearest folder's whose name tells more, of files
+        such as f.0001.png."""
+        own = self.prefix.rstrip("._- ")
+        if not self.width:  # an image of its own, not one of a sequence
+            return own or "clip"
+        folder = self.folder.resolve()
+        above = [folder, *folder.parents][:_FOLDERS_TO_NAME_BY]
+        names = [own, *(parent.name for parent in above)]
+        telling = (name for name in names if not _ANONYMOUS.fullmatch(name))
+        return next(telling, own or folder.name or "clip")
 
     def path(self, frame: int) -> Path:
         """The file of a frame, whether it exists or not."""

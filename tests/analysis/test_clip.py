@@ -97,6 +97,23 @@ def test_every_pattern_finds_the_sequence(tmp_path, pattern):
     assert round(float(clip.read(1003)[0, 0, 0]) * 65535) == 1003
 
 
+@pytest.mark.parametrize(
+    ("path", "name"),
+    [
+        ("beach/f.0001.png", "beach"),
+        ("beach/0001.png", "beach"),
+        ("beach/frames/Frame_0001.png", "beach"),
+        ("beach/shot010.0001.png", "shot010"),
+        ("beach/f.png", "f"),  # an image by itself
+    ],
+)
+def test_a_clip_is_named_by_what_tells_something(tmp_path, path, name):
+    file = tmp_path / path
+    write_image(file, np.zeros((4, 4, 3), np.uint8))
+    assert open_clip(str(file)).name == name
+    assert open_clip(str(file.parent)).name == name
+
+
 def test_ranges_in_the_pattern_and_outside(tmp_path):
     folder = grey_levels(tmp_path, range(1001, 1011))
     assert open_clip(str(folder / "clip.1001-1010x3#.png")).frames == [1001, 1004, 1007, 1010]

@@ -128,7 +128,7 @@ def test_one_frame_is_not_1_frames(tmp_path, capsys):
     assert cli.main([*words, "--frames", "1"]) == 0
     assert "wrote 1 frame, " in capsys.readouterr().out
     assert cli.main(["analyze", str(sample), "-o", str(tmp_path / "a.p4d.json")]) == 0
-    assert "o: 1 frame, 32x32" in capsys.readouterr().out
+    assert "sample: 1 frame, 32x32" in capsys.readouterr().out
     assert cli.main(["info", str(tmp_path / "a.p4d.json")]) == 0
     printed = capsys.readouterr().out
     assert ", 1 block: " in printed

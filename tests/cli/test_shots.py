@@ -113,20 +113,20 @@ class TestMovies:
     def test_no_cut_is_one_shot_and_a_shot_may_be_one_frame(self, tmp_path: Path) -> None:
         whole = sequence(tmp_path / "whole", "a", 1001, 6)
         assert analyze(whole, tmp_path / "one", "--detect-shots") == 0
-        assert shots(tmp_path / "one") == [("a_s001", "done", [1001, 1006])]
+        assert shots(tmp_path / "one") == [("whole_s001", "done", [1001, 1006])]
         sequence(tmp_path / "tail", "b", 1, 8)
         write_image(tmp_path / "tail" / "b.0009.png", picture(0, harbour))
         assert analyze(tmp_path / "tail", tmp_path / "two", "--detect-shots") == 0
         assert [frames for _, _, frames in shots(tmp_path / "two")] == [[1, 8], [9, 9]]
 
     def test_a_range_with_a_step(self, tmp_path: Path) -> None:
-        sequence(tmp_path / "a", "a", 1, 12)
+        sequence(tmp_path / "a", "take", 1, 12)
         for i in range(12):
-            write_image(tmp_path / "a" / f"a.{i + 13:04d}.png", picture(i, harbour))
+            write_image(tmp_path / "a" / f"take.{i + 13:04d}.png", picture(i, harbour))
         out = tmp_path / "out"
         assert analyze(tmp_path / "a", out, "--detect-shots", "--frames", "1-23x2") == 0
         assert [frames for _, _, frames in shots(out)] == [[1, 11], [13, 23]]
-        assert sidecar(out, "a_s002")["clip"]["frames"]["step"] == 2
+        assert sidecar(out, "take_s002")["clip"]["frames"]["step"] == 2
 
 
 class TestEdits:
