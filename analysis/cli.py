@@ -6,6 +6,7 @@ import argparse
 import dataclasses
 import json
 import os
+import shlex
 import sys
 import time
 from collections.abc import Callable
@@ -20,7 +21,6 @@ from palette4d.wording import counted
 
 if TYPE_CHECKING:
     from palette4d.analysis.clip import Clip
-    from palette4d.analysis.methods import Analysis
 
 DESCRIPTION = """\
 Find the time-varying palette of a clip: a 4D skew polytope in RGB and time whose slice at a frame
@@ -28,7 +28,13 @@ is that frame's palette (Du, Lei, Xu, Tan and Gingold 2021), and write it to a s
 
 CLIP is an image sequence (shot.####.exr, shot.%04d.png, shot.1001-1100x2#.dpx, or a folder that
 holds one), a single image, or a movie file. The clip should be one shot: a palette must not span a
-cut.
+cut. Of more than 3000 frames one in n is analysed.
+
+The report says for each stage how far the palette is from the pixels: R, the mean distance of
+those outside; C, of the palette's colours from the pixels nearest to them; L = 50 R + C; K, how
+restless it is; L_prime = L + 0.01 K; farthest, the distance of the farthest pixel outside. In its
+shares a pixel is outside when it is more than 1/255, one step of 8 bits, from the convex hull of
+its frame's palette. docs/palettes.md explains the figures.
 
 """
 DESCRIPTION += show_cli.DESCRIPTION
@@ -208,7 +214,7 @@ def _rate(text: str) -> Fraction:
 
 def run(args: argparse.Namespace) -> int:
     """Run `palette4d analyze`."""
-    from palette4d.analysis import colour_space, pipeline, sidecar
+    from palette4d.analysis import colour_space, pipeline, printed_report, sidecar
     from palette4d.analysis.clip import open_clip
 
     many = show_cli.is_show(args)
@@ -234,11 +240,13 @@ def run(args: argparse.Namespace) -> int:
     for remark in (*_skipped(clip), *beyond, *analysis.remarks):
         print(f"palette4d: note: {remark}", file=sys.stderr)
     if args.json:
-        print(json.dumps(_machine_report(args.output, analysis, show), indent=2))
+        print(json.dumps(printed_report.figures(args.output, analysis, show.seconds), indent=2))
     elif not args.quiet:
-        _print_report(args.output, clip, analysis, show)
-        if where := colour_space.described(spaces):
-            print(f"{'colours':<10} {where}")
+        spaces_used = colour_space.described(spaces)
+        print("\n".join(printed_report.lines(clip, analysis, show.seconds, spaces_used)))
+        colours = counted(analysis.stages[-1].vertices, "palette colour")
+        print(f"wrote {args.output}: {colours} to edit")
+        print(f"next: palette4d plot {shlex.quote(str(args.output))} -o palette.png")
     return 0
 
 
@@ -273,59 +281,6 @@ def _skipped(clip: Clip) -> list[str]:
         return []
     what = counted(len(clip.skipped), "bad frame was", "bad frames were")
     return [f"{what} skipped: {sorted(clip.skipped)}"]
-
-
-def _machine_report(output: Path, analysis: Analysis, show: _Bars) -> dict[str, Any]:
-    assert analysis.report is not None  # analyze_clip always measures
-    return {
-        "sidecar": str(output),
-        "stages": [stage.row() for stage in analysis.stages],
-        "palette": analysis.report.figures(),
-        "frames": [dataclasses.asdict(fit) for fit in analysis.report.fits],
-        "notes": list(analysis.remarks),
-        "seconds": show.seconds,
-        "cpu_seconds": round(time.process_time(), 3),
-    }
-
-
-def _print_report(output: Path, clip: Clip, analysis: Analysis, show: _Bars) -> None:
-    print(f"{clip.name}: {counted(len(clip.frames), 'frame')}, {clip.width}x{clip.height}")
-    print(
-        f"{'stage':<18} {'vertices':>8} {'blocks':>6} {'R':>8} {'C':>8} {'L':>8} {'K':>8} "
-        f"{'L_prime':>8} {'outside':>8} {'farthest':>8} {'seconds':>8}"
-    )
-    for stage in analysis.stages:
-        x = stage.losses
-        print(
-            f"{stage.stage:<18} {stage.vertices:>8} {stage.blocks:>6} {x.R:>8.5f} {x.C:>8.4f} "
-            f"{x.L:>8.4f} {x.K:>8.3f} {x.L_prime:>8.4f} {x.outside:>8.2%} "
-            f"{x.max_distance:>8.3f} "
-            f"{show.seconds.get(stage.stage, 0):>8.2f}"
-        )
-    _print_palette(analysis)
-    seconds = [f"{stage} {took:.2f}" for stage, took in show.seconds.items()]
-    print(f"{'seconds':<10} {', '.join(seconds)}")
-    colours = counted(analysis.stages[-1].vertices, "palette colour")
-    print(f"wrote {output}: {colours} to edit")
-    print(f"next: palette4d plot {output} -o palette.png")
-
-
-def _print_palette(analysis: Analysis) -> None:
-    x = analysis.report
-    assert x is not None  # analyze_clip always measures
-    farthest = max(x.fits, key=lambda fit: fit.farthest)
-    print(
-        f"{'fit':<10} worst frame {x.worst.frame} (L {x.worst.L:.3f}, the median frame's "
-        f"{x.median_loss:.3f}); farthest pixel {farthest.farthest:.3f} outside, in frame "
-        f"{farthest.frame}"
-    )
-    changes = f"{counted(x.splits, 'split')}, {counted(x.merges, 'merge')}"
-    print(f"{'handles':<10} {x.colours:.1f} colours a frame, {changes}", end="")
-    if x.closest:
-        distance, frame, one, other = x.closest
-        print(f"; nearest {one} and {other}, {distance:.2f} apart at frame {frame}", end="")
-    print(f"\n{'use':<10} least used {x.least_used[0]}, up to {x.least_used[1]:.1%} of the picture")
-    print(f"{'shape':<10} deepest dent {x.dent[0]:.2%} of the convex hull, at frame {x.dent[1]}")
 
 
 class _Bars:

@@ -32,9 +32,6 @@ COMPARED = 4096
 #: Samples that may be scene-linear light.
 FLOATS = ("half", "float", "double")
 
-#: No display-referred picture and no log goes so far.
-BRIGHT = 2.0
-
 #: The log encoding for scene-linear light: these roles where they are logs, else this space.
 LOG_ROLES = ("color_timing", "compositing_log")
 LOG_SPACE = "ACEScct"
@@ -227,7 +224,7 @@ def record(document: dict[str, Any], clip: Clip, spaces: Spaces | None) -> list[
         On the clip's own colours the conversion is further than 1e-5 from OpenColorIO's.
     """
     if not isinstance(clip, ConvertedClip):
-        return [] if spaces is not None else _hint(document, clip)
+        return []
     assert spaces is not None
     assert spaces.conversion is not None
     seen = clip.comparison
@@ -251,17 +248,6 @@ def record(document: dict[str, Any], clip: Clip, spaces: Spaces | None) -> list[
             f"brings back {ways}; there the curves are continued"
         )
     return remarks
-
-
-def _hint(document: dict[str, Any], clip: Clip) -> list[str]:
-    """Return what to say of a clip that looks like scene-linear light of which nothing is said."""
-    brightest = max(max(vertex["rgb"]) for vertex in document["polytope"]["vertices"])
-    if clip.depth not in FLOATS or brightest < BRIGHT:
-        return []
-    return [
-        f"the clip's numbers go to {brightest:.3g}: if it is scene-linear light, a palette found "
-        "in a log encoding is of more use; say what it is with --input-space (ACEScg, for example)"
-    ]
 
 
 def described(spaces: Spaces | None) -> str | None:

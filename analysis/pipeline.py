@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from palette4d import _core
-from palette4d.analysis import cuts, methods, quality, sidecar, statistics
+from palette4d.analysis import advice, cuts, methods, quality, sidecar, statistics
 from palette4d.analysis.clip_base import describe, even_step
 from palette4d.analysis.methods import Analysis, Progress
 from palette4d.analysis.options import AnalysisOptions
@@ -82,7 +82,14 @@ def analyze_clip(
     finished = _core.parse_sidecar(sidecar.dumps(document)).polytope
     report = quality.report(finished, usable, options)
     document["quality"]["stages"][-1] |= report.figures()
-    remarks = [*remarks, *analysis.remarks, *report.warnings()]
+    warnings = advice.warnings(
+        report,
+        options,
+        {stage.stage: stage.losses.max_distance for stage in analysis.stages},
+        vertices=len(finished.vertices),
+        brightest=float(finished.vertices[:, :3].max()),
+    )
+    remarks = [*remarks, *analysis.remarks, *warnings]
     return document, dataclasses.replace(analysis, remarks=tuple(remarks), report=report)
 
 

@@ -1,7 +1,7 @@
 """How good a palette is: the fit of each frame, and what the losses do not say about its use.
 
 Input: the polytope as the sidecar holds it, and the frames' statistics. Output: a `Report`, whose
-figures go into the sidecar, and warnings for the user, each with the option that would help.
+figures go into the sidecar. `advice` says what they mean for the user.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 from palette4d import _core
+from palette4d.analysis.frame_hulls import hull_mesh
 from palette4d.analysis.losses import NO_FACES, loss_weights
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.statistics import FrameStatistics
@@ -22,22 +23,21 @@ F64 = NDArray[np.float64]
 # Frames on which the use of handles is measured, evenly spaced: mean value coordinates of every
 # colour of every frame would cost more than the rest of the analysis.
 USE_FRAMES = 12
-# What is worth a warning.
-BAD_FRAME = 4.0  # times the median frame's L ...
-BAD_L = 0.3  # ... and at least this, or the clip's mean
-LOOKALIKE = 0.06  # RGB distance of two handles ...
-DENT = 0.05  # share of its convex hull that a slice lacks
-NARROW = 4 * LOOKALIKE  # frames whose colours extend less than this, such as black ones: neither
-UNUSED = 0.001  # largest mean weight of a handle in any frame
+# Farther outside than this a pixel counts as outside in the report: one step of 8 bits.
+VISIBLE = 1 / 255
+# Frames whose colours extend less than this, such as black ones, have no shape to judge.
+NARROW = 0.24
 
 
 @dataclasses.dataclass(frozen=True)
 class FrameFit:
-    """One frame's L (eq. 4), share of pixels outside, and farthest pixel outside."""
+    """One frame's L (eq. 4), shares of pixels outside, by any distance and by more than 1/255, and
+    farthest pixel outside."""
 
     frame: int
     L: float
     outside: float
+    outside_1_255: float
     farthest: float
 
 
@@ -72,18 +72,33 @@ class Report:
         return max(self.fits, key=lambda fit: fit.L)
 
     @property
+    def farthest(self) -> FrameFit:
+        """The frame of the farthest pixel."""
+        return max(self.fits, key=lambda fit: fit.farthest)
+
+    @property
     def median_loss(self) -> float:
         """The median frame's L."""
         return float(np.median([fit.L for fit in self.fits]))
 
+    @property
+    def mean_loss(self) -> float:
+        """The clip's L (eq. 8)."""
+        return float(np.mean([fit.L for fit in self.fits]))
+
+    @property
+    def outside(self) -> float:
+        """The share of pixels more than 1/255 outside, of all frames."""
+        return float(np.mean([fit.outside_1_255 for fit in self.fits]))
+
     def figures(self) -> dict[str, float | int | str]:
         """Return the figures as scalars, for the sidecar."""
-        farthest = max(self.fits, key=lambda fit: fit.farthest)
         out: dict[str, float | int | str] = {
             "worst_frame": self.worst.frame,
             "worst_frame_L": self.worst.L,
             "median_frame_L": self.median_loss,
-            "farthest_frame": farthest.frame,
+            "outside_1_255": self.outside,
+            "farthest_frame": self.farthest.frame,
             "colours_a_frame": self.colours,
             "least_used": self.least_used[0],
             "least_use": self.least_used[1],
@@ -97,41 +112,6 @@ class Report:
             out |= {"closest_handles": distance, "closest_handles_frame": frame}
             out |= {"closest_handle_ids": f"{one} {other}"}
         return out
-
-    def warnings(self) -> tuple[str, ...]:
-        """Return what does not fit, with what would help."""
-        out = []
-        mean = float(np.mean([fit.L for fit in self.fits]))
-        bad = [f.frame for f in self.fits if max(BAD_L, BAD_FRAME * self.median_loss) < f.L]
-        if mean > BAD_L:
-            out.append(
-                f"the palette fits the clip loosely (mean L {mean:.2f}): lower --handle-cost or "
-                "raise --blocks for more handles, or analyse parts of the clip apart with --frames"
-            )
-        elif bad:
-            names = ", ".join(map(str, bad[:8])) + (", ..." if len(bad) > 8 else "")
-            out.append(
-                f"{len(bad)} of {len(self.fits)} frames fit badly (L up to {self.worst.L:.2f}, "
-                f"the median frame {self.median_loss:.2f}): {names}; lower --handle-cost for more "
-                "handles, or analyse parts of the clip apart with --frames"
-            )
-        if self.closest and self.closest[0] < LOOKALIKE:
-            distance, frame, one, other = self.closest
-            out.append(
-                f"near frame {frame} the handles {one} and {other} are hard to tell apart "
-                f"({distance:.2f} apart): raise --separation or --merge-distance"
-            )
-        if self.dent[0] > DENT:
-            out.append(
-                f"at frame {self.dent[1]} the palette is dented ({self.dent[0]:.0%} of its convex "
-                "hull): raise --convexity, or recoloured gradients may step there"
-            )
-        if self.least_used[1] < UNUSED:
-            out.append(
-                f"the handle {self.least_used[0]} weighs less than {UNUSED:.1%} in every frame: "
-                "raise --handle-cost, or ask for fewer --vertices"
-            )
-        return tuple(out)
 
 
 def report(
@@ -162,7 +142,31 @@ def _fit(cut: _core.Slice, frame: FrameStatistics, options: AnalysisOptions) -> 
     r, c, _, outside, farthest, _ = _core.palette_loss(
         frame.colours, cut.rgb, NO_FACES, loss_weights(options)
     )
-    return FrameFit(frame.frame, options.lambda_ * r + c, outside, farthest)
+    far = _visibly_outside(cut, frame) if farthest > VISIBLE else 0.0
+    return FrameFit(frame.frame, options.lambda_ * r + c, outside, far, farthest)
+
+
+def _visibly_outside(cut: _core.Slice, frame: FrameStatistics) -> float:
+    """Return the share of pixels farther than `VISIBLE` from the convex hull of a slice."""
+    rgb, faces = cut.rgb, cut.faces
+    colours, counts = frame.colours.rgb, frame.colours.counts
+    share = 0.0
+    try:
+        planes = ConvexHull(rgb).equations
+    except QhullError:  # a point, a line or a polygon: its own convex hull
+        pass
+    else:
+        mesh = hull_mesh(rgb)
+        rgb, faces = mesh.rgb, mesh.faces
+        # The distance to a plane is the least that it can be; beside an edge it is more.
+        least = (colours @ planes[:, :3].T + planes[:, 3]).max(axis=1)
+        share = float(counts[least > VISIBLE].sum())
+        unclear = (least > 0) & (least <= VISIBLE)
+        colours, counts = colours[unclear], counts[unclear]
+    if len(colours):
+        _, distances = _core.palette_weights(colours, rgb, faces)
+        share += float(counts[distances > VISIBLE].sum())
+    return share / frame.colours.total
 
 
 def _narrow(frame: FrameStatistics) -> bool:
@@ -179,7 +183,8 @@ def _dent(cut: _core.Slice) -> float:
         hull = float(ConvexHull(cut.rgb).volume)
     except QhullError:
         return 0.0
-    return max(0.0, 1 - volume / hull) if hull > 1e-9 else 0.0
+    # A mesh that is turned inside out has a negative volume: it lacks everything.
+    return float(np.clip(1 - volume / hull, 0.0, 1.0)) if hull > 1e-9 else 0.0
 
 
 def _closest(

@@ -218,7 +218,8 @@ def test_light_above_one_and_below_zero(analysed):
     assert palettes.max() > 30
     assert found.polytope.vertices[:, :3].max() <= 50.1
     # Beside a sun of 50 the picture's own colours weigh little, and the user is told so.
-    assert any("fits the clip loosely" in remark for remark in found.analysis.remarks)
+    (text,) = found.analysis.remarks
+    assert "--input-space" in text
 
 
 def test_pq_is_named_and_fits_as_display_colours_do(analysed):

@@ -1,0 +1,151 @@
+"""What a report's figures mean for the user: warnings, each with what would help.
+
+Input: the `Report` of a finished palette, the options it was found with, and how far outside the
+farthest pixels lie at each stage. Output: sentences. What helps differs from method to method: an
+option that a method does not look at is never advised. docs/palettes.md says on which clips each
+was tried.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from palette4d.analysis.options import AnalysisOptions
+from palette4d.analysis.quality import Report
+from palette4d.wording import counted
+
+# What is worth a warning.
+BAD_FRAME = 4.0  # times the median frame's L ...
+BAD_L = 0.3  # ... and at least this, or the clip's mean
+LOOKALIKE = 0.06  # RGB distance of two handles
+DENT = 0.05  # share of its convex hull that a slice lacks
+UNUSED = 0.001  # largest mean weight of a handle in any frame
+FAR = 0.2  # distance of the farthest pixel outside ...
+FARTHER = 1.4  # ... and how many times as far as a simpler palette leaves it
+# No display-referred picture and no log goes so far.
+BRIGHT = 2.0
+
+DEFAULT = "the default --method skew"
+
+
+def warnings(
+    report: Report,
+    options: AnalysisOptions,
+    reach: Mapping[str, float],
+    *,
+    vertices: int,
+    brightest: float,
+) -> tuple[str, ...]:
+    """Return what does not fit, with what would help.
+
+    Parameters
+    ----------
+    report : of the finished palette.
+    options : what it was found with.
+    reach : for each stage of the analysis, how far outside its farthest pixel lies.
+    vertices : how many the palette has.
+    brightest : its largest number. Where that is scene-linear light distances mean little: nothing
+        else is said then.
+    """
+    if brightest > BRIGHT:
+        return (
+            f"the clip's numbers go to {brightest:.3g}: if it is scene-linear light, neither these "
+            "figures nor other options are of use; say what it is with --input-space (ACEScg, for "
+            "example), and the palette is found in a log encoding",
+        )
+    found = (
+        _fit(report, options, vertices),
+        _far(report, options, reach),
+        _lookalikes(report, options),
+        _dent(report),
+        _unused(report, options),
+    )
+    return tuple(text for text in found if text)
+
+
+def _fit(x: Report, options: AnalysisOptions, vertices: int) -> str:
+    """Frames that the palette fits loosely."""
+    bad = [f.frame for f in x.fits if max(BAD_L, BAD_FRAME * x.median_loss) < f.L]
+    if x.mean_loss > BAD_L:
+        what = f"the palette fits the clip loosely (mean L {x.mean_loss:.2f})"
+    elif bad:
+        names = ", ".join(map(str, bad[:8])) + (", …" if len(bad) > 8 else "")
+        what = (
+            f"{len(bad)} of {counted(len(x.fits), 'frame')} fit badly (L up to {x.worst.L:.2f}, "
+            f"the median frame {x.median_loss:.2f}): {names}"
+        )
+    else:
+        return ""
+    if options.method in ("static", "rgbt"):
+        return f"{what}; {DEFAULT} follows the colours"
+    if options.method == "paper":
+        ways = f"lower --eta2 or --eta1 for more handles, take {DEFAULT}"
+    elif 0 < options.vertices <= vertices:
+        ways = "raise --vertices"
+    elif options.handle_cost > AnalysisOptions().handle_cost:
+        ways = "lower --handle-cost for more handles"
+    else:
+        ways = "lower --handle-cost or raise --blocks for more handles"
+    return f"{what}; {ways}, or analyse parts of the clip apart with --frames"
+
+
+def _far(x: Report, options: AnalysisOptions, reach: Mapping[str, float]) -> str:
+    """Rare colours, such as lights, that simpler palettes hold better."""
+    far = x.farthest.farthest
+    simpler = {
+        "single frames' hulls leave": "frame_hulls",
+        "one static palette leaves": "static_hull",
+    }
+    nearer = {
+        words: reach[stage]
+        for words, stage in simpler.items()
+        if far > FARTHER * reach.get(stage, far)
+    }
+    if far < FAR or not nearer:
+        return ""
+    where = " and ".join(f"{words} {distance:.2f}" for words, distance in nearer.items())
+    more = "to 500, say" if options.lambda_ < 500 else "further"
+    static = ", or take --method static" if "one static palette leaves" in nearer else ""
+    return (
+        f"in frame {x.farthest.frame} colours lie up to {far:.2f} outside the palette, where "
+        f"{where}: if they are lights rather than hot pixels, raise --lambda ({more}), so that "
+        f"rare colours count more{static}"
+    )
+
+
+def _lookalikes(x: Report, options: AnalysisOptions) -> str:
+    if x.closest is None or x.closest[0] >= LOOKALIKE:
+        return ""
+    distance, frame, one, other = x.closest
+    ways = "raise --separation or --merge-distance"
+    if options.method == "rgbt":
+        ways = f"{DEFAULT} keeps them apart"
+    return (
+        f"near frame {frame} the handles {one} and {other} are hard to tell apart "
+        f"({distance:.2f} apart): {ways}"
+    )
+
+
+def _dent(x: Report) -> str:
+    if x.dent[0] <= DENT:
+        return ""
+    return (
+        f"at frame {x.dent[1]} the palette is dented (it lacks {x.dent[0]:.0%} of its convex hull)"
+        ": raise --convexity, or recoloured gradients may step there"
+    )
+
+
+def _unused(x: Report, options: AnalysisOptions) -> str:
+    handle, use = x.least_used
+    if use >= UNUSED:
+        return ""
+    ways = {
+        "skew": "raise --handle-cost, or ask for fewer --vertices",
+        "paper": "raise --eta2",
+        "static": "raise --merge-distance, or ask for a smaller --palette-size",
+        "rgbt": "ask for fewer --vertices",
+    }
+    return (
+        f"the handle {handle} weighs less than {UNUSED:.1%} in every frame: "
+        + (ways[options.method])
+    )
