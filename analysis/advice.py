@@ -33,7 +33,6 @@ def warnings(
     options: AnalysisOptions,
     reach: Mapping[str, float],
     *,
-    vertices: int,
     brightest: float,
 ) -> tuple[str, ...]:
     """Return what does not fit, with what would help.
@@ -43,7 +42,6 @@ def warnings(
     report : of the finished palette.
     options : what it was found with.
     reach : for each stage of the analysis, how far outside its farthest pixel lies.
-    vertices : how many the palette has.
     brightest : its largest number. Where that is scene-linear light distances mean little: nothing
         else is said then.
     """
@@ -54,7 +52,7 @@ def warnings(
             "example), and the palette is found in a log encoding",
         )
     found = (
-        _fit(report, options, vertices),
+        _fit(report, options),
         _far(report, options, reach),
         _lookalikes(report, options),
         _dent(report),
@@ -63,27 +61,34 @@ def warnings(
     return tuple(text for text in found if text)
 
 
-def _fit(x: Report, options: AnalysisOptions, vertices: int) -> str:
+def _fit(x: Report, options: AnalysisOptions) -> str:
     """Frames that the palette fits loosely."""
     bad = [f.frame for f in x.fits if max(BAD_L, BAD_FRAME * x.median_loss) < f.L]
-    if x.mean_loss > BAD_L:
-        what = f"the palette fits the clip loosely (mean L {x.mean_loss:.2f})"
-    elif bad:
+    if bad:
         names = ", ".join(map(str, bad[:8])) + (", …" if len(bad) > 8 else "")
         what = (
             f"{len(bad)} of {counted(len(x.fits), 'frame')} fit badly (L up to {x.worst.L:.2f}, "
             f"the median frame {x.median_loss:.2f}): {names}"
         )
+    elif x.mean_loss > BAD_L:
+        what = f"the palette fits the clip loosely (mean L {x.mean_loss:.2f})"
     else:
         return ""
+    at_once = "lower --gamma (to 0.001, say), so that colours may change at once, as in a flash"
     if options.method in ("static", "rgbt"):
-        return f"{what}; {DEFAULT} follows the colours"
+        ways = f"{DEFAULT} follows the colours"
+        if bad:
+            ways += ", with --gamma 0.001 and more --blocks also those of a flash"
+        return f"{what}; {ways}"
     if options.method == "paper":
-        ways = f"lower --eta2 or --eta1 for more handles, take {DEFAULT}"
-    elif 0 < options.vertices <= vertices:
+        ways = "lower --eta2 or --eta1 for more handles"
+        ways += f", {at_once}" if bad else f", take {DEFAULT}"
+    elif options.vertices:
         ways = "raise --vertices"
     elif options.handle_cost > AnalysisOptions().handle_cost:
         ways = "lower --handle-cost for more handles"
+    elif bad:
+        ways = f"{at_once}, and raise --blocks"
     else:
         ways = "lower --handle-cost or raise --blocks for more handles"
     return f"{what}; {ways}, or analyse parts of the clip apart with --frames"

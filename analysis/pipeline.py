@@ -86,7 +86,6 @@ def analyze_clip(
         report,
         options,
         {stage.stage: stage.losses.max_distance for stage in analysis.stages},
-        vertices=len(finished.vertices),
         brightest=float(finished.vertices[:, :3].max()),
     )
     remarks = [*remarks, *analysis.remarks, *warnings]
