@@ -189,13 +189,14 @@ def draw_timelines(sidecars: Sequence[tuple[str, Path]], output: Path, width: in
     import matplotlib.style
     from matplotlib.figure import Figure
     from palette4d.plotting import layout, style, timeline
+    from palette4d.plotting.panel import Frame, Palette
 
     room, margin, points = 30.0, 14.0, 800.0
     read = [(title, _core.read_sidecar(str(path))) for title, path in sidecars]
-    palettes = [timeline.Palette.of(sidecar) for _, sidecar in read]
+    palettes = [Palette.of(sidecar) for _, sidecar in read]
     layouts = [layout.arrange(p.frames, p.rgb, p.edges) for p in palettes]
     panels = [
-        timeline.Frame(
+        Frame(
             left=margin,
             right=points - margin,
             top=0.0,

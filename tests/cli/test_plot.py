@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.cli import main
-from palette4d.plotting import figure, layout, style, timeline
+from palette4d.plotting import discs, figure, layout, style
+from palette4d.plotting.panel import Frame, Palette
 
 GOLDEN = Path(__file__).resolve().parent.parent / "golden" / "sidecars"
 ALL_GOLDEN = sorted(GOLDEN.glob("v*_*.p4d.json"))
@@ -228,19 +230,39 @@ def test_close_discs_make_way(count: int, distance: float) -> None:
     home = np.clip(home, 30.0, 950.0)
     row = np.zeros(len(home))
     wanted = np.full(len(home), 16.5)
-    x, radius = timeline._place(wanted, home, row, 10.0, 990.0)
+    x, radius = discs._place(wanted, home, row, 10.0, 990.0)
     order = np.argsort(home, kind="stable")
     gaps = np.diff(x[order])
     room = radius[order][:-1] + radius[order][1:]
-    assert (gaps >= room + 2 * timeline.COLLAR - 1e-6).all() or (count >= 120 and (gaps > 0).all())
+    assert (gaps >= room + 2 * discs.COLLAR - 1e-6).all() or (count >= 120 and (gaps > 0).all())
     assert radius.min() >= 1.6
     assert (x - radius >= 10.0).all()
     assert (x + radius <= 990.0).all()
 
 
+def test_labels_keep_off_forks_and_the_axis() -> None:
+    panel = Frame(left=0, right=400, top=300, first=0, last=10, rows=4, row_height=50)
+    up, down = panel.y(1) + np.array([10, 40]), panel.y(1) - np.array([40, 10])
+    above = [190.0, up[0], 210.0, up[1]]
+    below = [190.0, down[0], 210.0, down[1]]
+
+    def label(crossing: list[list[float]], row: int = 1) -> float:
+        axes = Figure().add_axes((0, 0, 1, 1))
+        marks = [(200.0, float(panel.y(row)), 16.0, "v12", False)]
+        discs._draw_labels(axes, marks, np.array(crossing).reshape(-1, 4), panel)
+        (text,) = axes.texts
+        return float(text.get_position()[1] - panel.y(row))
+
+    assert label([]) > 16
+    assert label([above]) < -16
+    assert label([above, below]) > 0  # across a fork, where there is no other room
+    assert panel.y(3) - 16 - panel.floor < 12  # no room between the last row and the axis
+    assert label([[0.0, panel.y(3), 400.0, panel.y(3) + 50]], row=3) > 0
+
+
 def test_discs_with_room_stay_where_they_belong() -> None:
     home, row = np.array([100.0, 160.0, 161.0]), np.array([50.0, 50.0, 90.0])
-    x, radius = timeline._place(np.full(3, 16.5), home, row, 10.0, 990.0)
+    x, radius = discs._place(np.full(3, 16.5), home, row, 10.0, 990.0)
     np.testing.assert_allclose(x, home)
     np.testing.assert_allclose(radius, 16.5)
 
@@ -281,7 +303,7 @@ def test_existing_picture_needs_force(tmp_path: Path, capsys: pytest.CaptureFixt
 def test_bands_show_the_cores_colours(frame: float) -> None:
     """The drawn interpolation in time equals the core's, original and edited."""
     sidecar = _core.read_sidecar(str(GOLDEN / "v1_edited.p4d.json"))
-    palette = timeline.Palette.of(sidecar)
+    palette = Palette.of(sidecar)
     cut = _core.slice_at(sidecar.polytope, frame)
     edited = _core.edited_colours(sidecar.polytope, sidecar.edits, cut)
     for index, edge in enumerate(cut.edges):
@@ -295,7 +317,7 @@ def test_bands_show_the_cores_colours(frame: float) -> None:
 
 @pytest.mark.parametrize("name", ["v1_split", "v1_merge"])
 def test_a_fork_is_a_chain_of_its_own(name: str) -> None:
-    palette = timeline.Palette.of(_core.read_sidecar(str(GOLDEN / f"{name}.p4d.json")))
+    palette = Palette.of(_core.read_sidecar(str(GOLDEN / f"{name}.p4d.json")))
     rows = layout.arrange(palette.frames, palette.rgb, palette.edges)
     # Four colours on one side, five on the other: one fork.
     assert len(rows.chains) == 5

@@ -123,14 +123,15 @@ def plot(
     from palette4d import _core
     from palette4d.errors import Palette4dError
     from palette4d.plotting import figure as pages
-    from palette4d.plotting import style, timeline
+    from palette4d.plotting import style
+    from palette4d.plotting.panel import Palette
     from palette4d.replacing import replacing
     from palette4d.source_clip import frame_colours
 
     sidecar = _core.read_sidecar(str(sidecar_path))
     first, last = sidecar.polytope.first_frame, sidecar.polytope.last_frame
     if frames is None:
-        chosen = pages.default_frames(first, last, timeline.Palette.of(sidecar).edited_times)
+        chosen = pages.default_frames(first, last, Palette.of(sidecar).edited_times)
     else:
         chosen = sorted(set(frames))
     for frame in chosen:

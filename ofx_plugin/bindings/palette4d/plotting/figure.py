@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palette4d import _core
+from palette4d.plotting import discs, polyhedron, style, timeline
 from palette4d.plotting import layout as layouts
-from palette4d.plotting import polyhedron, style, timeline
+from palette4d.plotting.panel import Frame, Palette, row_height
 
 F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
@@ -153,7 +154,7 @@ def _reduced(image: F32, width: int) -> F32:
     return np.asarray(mean, dtype=np.float32)
 
 
-def heading(sidecar: _core.Sidecar, palette: timeline.Palette) -> tuple[str, str]:
+def heading(sidecar: _core.Sidecar, palette: Palette) -> tuple[str, str]:
     """Return the title and the line below it."""
     clip = sidecar.clip
     blocks = sum(not s["transition"] for s in palette.sections)
@@ -181,7 +182,7 @@ def build(sidecar: _core.Sidecar, moments: Sequence[Moment]) -> Any:
     """Lay out and draw the page; return a matplotlib Figure of `WIDTH` points."""
     from matplotlib.figure import Figure
 
-    palette = timeline.Palette.of(sidecar)
+    palette = Palette.of(sidecar)
     encoding = str(sidecar.clip["encoding"])
     rows = layouts.arrange(palette.frames, palette.rgb, palette.edges)
 
@@ -199,8 +200,8 @@ def build(sidecar: _core.Sidecar, moments: Sequence[Moment]) -> Any:
     cube = min(column * 0.96, 300.0)
     solids_height = LEADER + 30 + cube + 8 if moments else 0.0
 
-    row = timeline.row_height(rows.row_count)
-    panel = timeline.Frame(
+    row = row_height(rows.row_count)
+    panel = Frame(
         left=MARGIN,
         right=WIDTH - MARGIN,
         top=0.0,
@@ -249,9 +250,7 @@ def build(sidecar: _core.Sidecar, moments: Sequence[Moment]) -> Any:
     return figure
 
 
-def _draw_heading(
-    axes: Any, sidecar: _core.Sidecar, palette: timeline.Palette, height: float
-) -> None:
+def _draw_heading(axes: Any, sidecar: _core.Sidecar, palette: Palette, height: float) -> None:
     title, facts = heading(sidecar, palette)
     axes.text(
         MARGIN,
@@ -287,17 +286,15 @@ def _draw_legend(axes: Any, y: float) -> None:
     ]
     x = WIDTH - MARGIN
     for kind, before, after, text in reversed(entries):
-        x -= timeline.text_width(text, 8.5)
+        x -= discs.text_width(text, 8.5)
         axes.text(x, y, text, fontsize=8.5, color=style.TEXT, ha="left", va="center_baseline")
         x -= 15
         radius = 6.0 if kind == "stop" else 7.5
-        timeline.half_disc(axes, x, y, radius, before, after, kind=kind, zorder=5)
+        discs.half_disc(axes, x, y, radius, before, after, kind=kind, zorder=5)
         x -= 32
 
 
-def _draw_pin(
-    axes: Any, panel: timeline.Frame, shown: Moment, centre: float, pictures: bool
-) -> None:
+def _draw_pin(axes: Any, panel: Frame, shown: Moment, centre: float, pictures: bool) -> None:
     """Mark a moment on the timeline and lead from its pictures to it and on to its polyhedron."""
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path as Line

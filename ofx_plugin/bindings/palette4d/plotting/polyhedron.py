@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palette4d.plotting import style
-from palette4d.plotting.timeline import half_disc
+from palette4d.plotting.discs import half_disc
 
 F64 = NDArray[np.float64]
 
