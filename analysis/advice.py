@@ -20,7 +20,7 @@ BAD_L = 0.3  # ... and at least this, or the clip's mean
 LOOKALIKE = 0.06  # RGB distance of two handles
 DENT = 0.05  # share of its convex hull that a slice lacks
 UNUSED = 0.001  # largest mean weight of a handle in any frame
-FAR = 0.2  # distance of the farthest pixel outside ...
+FAR = 0.25  # distance of the farthest pixel outside ...
 FARTHER = 1.4  # ... and how many times as far as a simpler palette leaves it
 # No display-referred picture and no log goes so far.
 BRIGHT = 2.0

@@ -277,10 +277,12 @@ def _beside(source: str, output: Path) -> str:
 
 
 def _skipped(clip: Clip) -> list[str]:
+    from palette4d.analysis.clip_base import describe
+
     if not clip.skipped:
         return []
     what = counted(len(clip.skipped), "bad frame was", "bad frames were")
-    return [f"{what} skipped: {sorted(clip.skipped)}"]
+    return [f"{what} skipped: {describe(clip.skipped)}"]
 
 
 class _Bars:

@@ -242,6 +242,8 @@ def _open(path: Path) -> Any:
         return av.open(f"file:{path}", mode="r")
     except (FFmpegError, OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
+        if path.is_file() and path.stat().st_size == 0:
+            reason = "the file is empty"
         raise ClipError(
             f"{path}: the movie cannot be opened ({reason}); expected a whole movie file that "
             "FFmpeg can read. Bring a good copy, or convert it to an image sequence."

@@ -122,7 +122,7 @@ def _usable(
             "frame has no usable pixel and was",
             "frames have no usable pixel and were",
         )
-        remarks.append(f"{what} passed over: {blank}")
+        remarks.append(f"{what} passed over: {describe(blank)}")
     for end, nearest in ((numbers[0], min(have)), (numbers[-1], max(have))):
         if end not in have:
             have[end] = dataclasses.replace(have[nearest], frame=end)

@@ -18,6 +18,7 @@ from palette4d import _core
 from palette4d.analysis import colour_space, pipeline, sidecar
 from palette4d.analysis import manifest as manifests
 from palette4d.analysis.clip import open_clip
+from palette4d.analysis.clip_base import describe
 from palette4d.analysis.colour_space import SpaceOptions
 from palette4d.analysis.manifest import DONE, FAILED, TO_DO, Entry, Manifest
 from palette4d.analysis.options import AnalysisOptions
@@ -330,7 +331,9 @@ def analyse_shot(task: ShotTask, threads: int) -> Analysed:
     document["clip"]["name"] = shot.name
     remarks += colour_space.record(document, clip, spaces)
     if clip.skipped:
-        remarks.append(f"{counted(len(clip.skipped), 'bad frame')} skipped: {clip.skipped}")
+        remarks.append(
+            f"{counted(len(clip.skipped), 'bad frame')} skipped: {describe(clip.skipped)}"
+        )
     return Analysed(document, (*remarks, *analysis.remarks))
 
 

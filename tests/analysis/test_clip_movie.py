@@ -218,3 +218,9 @@ def test_what_is_no_movie(tmp_path):
         open_clip(str(path))
     with pytest.raises(ClipError, match="movie file"):
         open_clip(str(tmp_path))
+
+
+def test_an_empty_file_is_said_to_be_empty(tmp_path):
+    (tmp_path / "a.mov").touch()
+    with pytest.raises(ClipError, match="the file is empty"):
+        open_clip(str(tmp_path / "a.mov"))
