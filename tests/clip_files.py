@@ -121,3 +121,13 @@ def write_movie(
         for packet in stream.encode():
             container.mux(packet)
     return path
+
+
+def damage(movie: Path, picture: int) -> None:
+    """Overwrite part of a movie's n-th picture (in order of time) with zeros."""
+    with av.open(str(movie)) as container:
+        packets = [(p.pts, p.pos, p.size) for p in container.demux(video=0) if p.size]
+    _, position, size = sorted(packets)[picture]
+    whole = bytearray(movie.read_bytes())
+    whole[position + size // 2 : position + size // 2 + 40] = bytes(40)
+    movie.write_bytes(whole)

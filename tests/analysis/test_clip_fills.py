@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-import av
 import numpy as np
 import OpenImageIO as oiio
 import pytest
-from clip_files import write_image, write_movie
+from clip_files import damage, write_image, write_movie
 from palette4d import _core
 from palette4d.analysis import clip_base, clip_images, clip_movie
 from palette4d.analysis.clip import FrameError, open_clip
@@ -281,12 +280,7 @@ def test_a_damaged_picture_fails_when_it_is_filled(tmp_path):
     frames = [random(np.uint8, (48, 64, 3), seed) for seed in range(6)]
     options = {"g": "1", "bf": "0"}
     path = write_movie(tmp_path / "a.mp4", "libx264", "yuv420p", frames, "rgb24", options=options)
-    with av.open(str(path)) as container:
-        packets = [(p.pts, p.pos, p.size) for p in container.demux(video=0) if p.size]
-    _, position, size = sorted(packets)[3]
-    whole = bytearray(path.read_bytes())
-    whole[position + size // 2 : position + size // 2 + 40] = bytes(40)
-    path.write_bytes(whole)
+    damage(path, 3)
     clip, good = open_clip(str(path)), []
     for number, fill in clip.fills(clip.frames):
         binner = _core.ColourBinner()

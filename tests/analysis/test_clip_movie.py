@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-import av
 import numpy as np
 import pytest
 from av.video.reformatter import ColorRange, Colorspace
-from clip_files import write_movie
+from clip_files import damage, write_movie
 from palette4d.analysis.clip import ClipError, FrameError, open_clip
 
 HEIGHT, WIDTH = 48, 64
@@ -177,12 +176,7 @@ def test_damaged_frame_is_named_or_skipped(tmp_path, name, codec, layout):
     path = write_movie(tmp_path / name, codec, layout, noise(6), "rgb24", options=options)
     whole_clip = open_clip(str(path))
     good = dict(whole_clip.iter_frames())
-    with av.open(str(path)) as container:
-        packets = [(p.pts, p.pos, p.size) for p in container.demux(video=0) if p.size]
-    _, position, size = sorted(packets)[3]
-    whole = bytearray(path.read_bytes())
-    whole[position + size // 2 : position + size // 2 + 40] = bytes(40)
-    path.write_bytes(whole)
+    damage(path, 3)
     with pytest.raises(FrameError, match="frame 3 cannot be decoded"):
         list(open_clip(str(path)).iter_frames())
     clip = open_clip(str(path), skip_bad_frames=True)

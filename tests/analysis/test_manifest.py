@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 from fractions import Fraction
 from pathlib import Path
@@ -100,16 +99,6 @@ def test_another_file_is_refused(text: str | bytes, words: str, tmp_path: Path) 
         manifests.read(path)
     with pytest.raises(Palette4dError, match="no such manifest"):
         manifests.read(tmp_path / "y.shots.json")
-
-
-@pytest.fixture(scope="module")
-def tool() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("sidecar_fields", ROOT / "docs/sidecar_fields.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def test_the_page_shows_the_schema(tool: ModuleType) -> None:

@@ -1,7 +1,6 @@
 """The JSON Schema, the page docs/sidecar.md and the reader say the same."""
 
 import importlib.resources
-import importlib.util
 import json
 from pathlib import Path
 from types import ModuleType
@@ -16,16 +15,6 @@ FILES = sorted((ROOT / "tests" / "golden" / "sidecars").glob("v*_*.p4d.json"))
 SCHEMA: dict[str, Any] = json.loads(
     (ROOT / "ofx_plugin/bindings/palette4d/sidecar_v2.schema.json").read_text(encoding="utf-8")
 )
-
-
-@pytest.fixture(scope="module")
-def tool() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("sidecar_fields", ROOT / "docs/sidecar_fields.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def test_the_page_shows_the_schema(tool: ModuleType) -> None:
