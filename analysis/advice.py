@@ -49,7 +49,7 @@ def warnings(
         return (
             f"the clip's numbers go to {brightest:.3g}: if it is scene-linear light, neither these "
             "figures nor other options are of use; say what it is with --input-space (ACEScg, for "
-            "example), and the palette is found in a log encoding",
+            "example) and leave --palette-space out: the palette is then found in a log encoding",
         )
     found = (
         _fit(report, options),
