@@ -159,7 +159,7 @@ def _visibly_outside(cut: _core.Slice, frame: FrameStatistics) -> float:
         mesh = hull_mesh(rgb)
         rgb, faces = mesh.rgb, mesh.faces
         # The distance to a plane is the least that it can be; beside an edge it is more.
-        least = (colours @ planes[:, :3].T + planes[:, 3]).max(axis=1)
+        least = _beyond_planes(colours, planes)
         share = float(counts[least > VISIBLE].sum())
         unclear = (least > 0) & (least <= VISIBLE)
         colours, counts = colours[unclear], counts[unclear]
@@ -167,6 +167,22 @@ def _visibly_outside(cut: _core.Slice, frame: FrameStatistics) -> float:
         _, distances = _core.palette_weights(colours, rgb, faces)
         share += float(counts[distances > VISIBLE].sum())
     return share / frame.colours.total
+
+
+def _beyond_planes(points: F64, planes: F64) -> F64:
+    """Return how far each of (n, 3) points lies beyond any of (m, 4) planes, negative inside.
+
+    Plane by plane and axis by axis: a matrix product of three columns takes twelve times as long.
+    """
+    x, y, z = np.ascontiguousarray(points.T)
+    farthest = np.full(len(points), -np.inf)
+    for a, b, c, d in planes:
+        distance = a * x
+        distance += b * y
+        distance += c * z
+        distance += d
+        np.maximum(farthest, distance, out=farthest)
+    return farthest
 
 
 def _narrow(frame: FrameStatistics) -> bool:
