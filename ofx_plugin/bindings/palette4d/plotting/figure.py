@@ -164,7 +164,9 @@ def heading(sidecar: _core.Sidecar, palette: Palette) -> tuple[str, str]:
         return f"{count} {one if count == 1 else many}"
 
     facts = [
-        f"frames {style.number(palette.first)}–{style.number(palette.last)}",
+        f"frames {style.number(palette.first)}–{style.number(palette.last)}"
+        if palette.last > palette.first
+        else f"frame {style.number(palette.first)}",
         f"{style.number(numerator / denominator)} fps",
         f"{clip['width']}×{clip['height']}",
         str(clip["encoding"]),
