@@ -92,7 +92,7 @@ def test_wrong_usage_is_two_lines(capsys, words, verb, wrong):
         cli.main(list(words))
     assert stop.value.code == 2
     first, second = capsys.readouterr().err.splitlines()
-    assert first == f"usage: {verb} … ({verb} --help)"
+    assert first == f"usage: {verb} … ({verb.removesuffix(' VERB')} --help)"
     assert wrong in second
 
 

@@ -31,8 +31,7 @@ class Parser(argparse.ArgumentParser):
         verb = " VERB" if self.prog == "palette4d" else ""
         self.exit(
             2,
-            f"usage: {self.prog}{verb} … ({self.prog}{verb} --help)\n"
-            f"{self.prog}: error: {message}\n",
+            f"usage: {self.prog}{verb} … ({self.prog} --help)\n{self.prog}: error: {message}\n",
         )
 
     def parse_known_args(
