@@ -21,6 +21,7 @@ import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import evaluator
 import numpy as np
@@ -28,6 +29,10 @@ from evaluator import PAPER_RULES, Figures, Runs, TimedPalette, say, table
 from palette4d.analysis import frame_hulls, statistics
 from palette4d.analysis.clip import open_clip
 from palette4d.analysis.options import AnalysisOptions
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.transforms import Bbox
 
 SINGLY, THEN = 24, (26, 28, 32, 36, 40)
 DEFAULT = "default"
@@ -109,6 +114,53 @@ def header(outside: str) -> list[str]:
     return [*names, price, outside, "farthest", "nearest colours", "deepest dent"]
 
 
+# Where a label may stand beside its point: offsets in points, and how the text is aligned there.
+PLACES = (
+    (8, 0, "left", "center"),
+    (-8, 0, "right", "center"),
+    (0, -8, "center", "top"),
+    (0, 8, "center", "bottom"),
+    (5, -6, "left", "top"),
+    (5, 6, "left", "bottom"),
+    (-5, -6, "right", "top"),
+    (-5, 6, "right", "bottom"),
+)
+
+
+def put_labels(axes: Axes, labels: Sequence[tuple[str, str, float, float]]) -> None:
+    """Write labels (text, colour, x, y), each where it meets the fewest lines and other labels."""
+    paths = [line.get_path().transformed(line.get_transform()) for line in axes.lines]
+    points = [axes.transData.transform((x, y)) for _, _, x, y in labels]
+    taken: list[Bbox] = []
+    inside = axes.get_window_extent()
+
+    def crowding(box: Bbox) -> int:
+        beyond = inside.x0 > box.x0 or box.x1 > inside.x1 or box.y0 < inside.y0
+        hits = sum(path.intersects_bbox(box, filled=False) for path in paths)
+        hits += sum(box.contains(*point) for point in points) + sum(box.overlaps(t) for t in taken)
+        return hits + 100 * beyond
+
+    for text, colour, x, y in labels:
+        tries = []
+        for dx, dy, ha, va in PLACES:
+            note = axes.annotate(
+                text,
+                (x, y),
+                xytext=(dx, dy),
+                textcoords="offset points",
+                ha=ha,
+                va=va,
+                fontsize=8.5,
+                color=colour,
+            )
+            tries.append((crowding(note.get_window_extent()), len(tries), note))
+        _, _, best = min(tries, key=lambda one: one[:2])
+        for *_, note in tries:
+            if note is not best:
+                note.remove()
+        taken.append(best.get_window_extent())
+
+
 def draw(
     line: Sequence[Figures],
     marks: Sequence[tuple[str, str, Figures]],
@@ -126,29 +178,8 @@ def draw(
         axes.plot(x, [f.L_prime for f in line], "-o", color="#1f5fa8", markersize=3.5, label="L'")
         axes.plot(x, [f.L for f in line], "--", color="#7aa5d6", linewidth=1.2, label="L")
         axes.axhline(hulls.L, color="#888888", linewidth=1, linestyle=":")
-        axes.annotate(
-            "L of single frames' hulls",
-            (0, hulls.L),
-            xycoords=("axes fraction", "data"),
-            xytext=(4, -11),
-            textcoords="offset points",
-            fontsize=8,
-            color="#666666",
-        )
-        middle = (min(x) + max(x)) / 2
-        for name, colour, f in marks:
-            left = f.vertices > middle
-            axes.plot([f.vertices], [f.L_prime], "D", color=colour, markersize=6)
-            axes.annotate(
-                f"{name}  {f.L_prime:.4f}",
-                (f.vertices, f.L_prime),
-                # Below the line, beside everything else.
-                xytext=(0, -17) if name == DEFAULT else (-8 if left else 8, -3),
-                textcoords="offset points",
-                ha="center" if name == DEFAULT else "right" if left else "left",
-                fontsize=8.5,
-                color=colour,
-            )
+        for _, colour, f in marks:
+            axes.plot([f.vertices], [f.L_prime], "D", color=colour, markersize=6, zorder=3)
         axes.set_xlabel("vertices: handles that a user has, over the whole clip")
         axes.set_ylabel("loss (eqs. 4 and 12), every pixel counted")
         axes.set_ylim(0, 1.06 * max(f.L_prime for f in [*line, *(m[2] for m in marks)]))
@@ -156,6 +187,12 @@ def draw(
         axes.grid(color="#e4e4e4", linewidth=0.7)
         axes.set_axisbelow(True)
         axes.legend(loc="lower right", frameon=False, fontsize=9)
+        figure.draw_without_rendering()  # settles the layout: labels are placed in pixels
+        labels = [
+            (f"{name}  {f.L_prime:.4f}", colour, f.vertices, f.L_prime) for name, colour, f in marks
+        ]
+        labels.append(("L of single frames' hulls", "#666666", axes.get_xlim()[0], hulls.L))
+        put_labels(axes, labels)
         figure.savefig(output, dpi=120)
     say(f"wrote {output}")
 
