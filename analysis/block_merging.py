@@ -23,6 +23,11 @@ from palette4d.analysis.statistics import FrameStatistics
 
 F64 = NDArray[np.float64]
 
+# Of a frame's refinement: it starts where its neighbour's ended.
+EVALUATIONS = 30
+# Of its loss: a frame that its neighbour's palette fits so nearly as well shows the same.
+SAME = 1e-3
+
 
 @dataclasses.dataclass(frozen=True)
 class Block:
@@ -118,12 +123,24 @@ class Merge:
         """Refine the palette of the next frame, away from `keep`."""
         first, count, at = self.adopt.first, len(self.adopt.palettes), len(self.palettes)
         colours = self.statistics[first + (at if self.forwards else count - 1 - at)].coarse
-        previous = self.palettes[-1] if at else self.keep.palettes[-1 if self.forwards else 0]
-        rgb = refine_palette(
-            colours, previous.rgb, previous.faces, self.low, self.high, self.options
-        )
-        self.palettes.append(Palette(rgb, previous.faces))
-        self.losses.append(palette_loss(colours, rgb, self.options))
+        end = -1 if self.forwards else 0
+        previous = self.palettes[-1] if at else self.keep.palettes[end]
+        fitted = self.losses[-1] if at else self.keep.losses[end]
+        loss = palette_loss(colours, previous.rgb, self.options)
+        if abs(loss - fitted) > SAME * fitted:
+            rgb = refine_palette(
+                colours,
+                previous.rgb,
+                previous.faces,
+                self.low,
+                self.high,
+                self.options,
+                EVALUATIONS,
+            )
+            previous = Palette(rgb, previous.faces)
+            loss = palette_loss(colours, rgb, self.options)
+        self.palettes.append(previous)
+        self.losses.append(loss)
         self.change = self.theta * (self.kept + sum(self.losses)) - self.before
 
     def finish(self) -> Block:

@@ -73,6 +73,7 @@ OUR_OPTIONS = (
     ("--hull-box", "X", "hull_box", "how far a colour may move when a frame's hull is refined"),
     ("--convexity", "X", "convexity", "weight of keeping the palettes convex; 0 is the paper"),
     ("--separation", "X", "separation", "palette colours nearer than this repel; 0 is the paper"),
+    ("--reach", "X", "reach", "pixels this far outside count twice; 0: once, as in the paper"),
     ("--colours", "N", "colours", "most colour bins kept of a frame, for the losses"),
     ("--coarse-colours", "N", "coarse_colours", "the same for hulls, merging and removal"),
     ("--seed", "N", "seed", "accepted and recorded; nothing is random at present"),

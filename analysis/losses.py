@@ -56,8 +56,13 @@ def loss_weights(options: AnalysisOptions) -> _core.LossWeights:
     return _core.LossWeights(options.lambda_, options.k)
 
 
+def reach_weights(options: AnalysisOptions, scale: float) -> _core.LossWeights:
+    """Return the weights of the paper's losses and of what lies far outside."""
+    return _core.LossWeights(options.lambda_, options.k, reach=options.reach * scale)
+
+
 def shaped_weights(options: AnalysisOptions, scale: float, faces: bool = True) -> _core.LossWeights:
-    """Return the weights of what is minimised: the paper's losses, convexity and separation.
+    """Return the weights of what is minimised: the paper's losses, convexity, separation and reach.
 
     Losses are distances: `scale` (of `colour_scale`) sets volumes, its cube, against them.
     """
@@ -66,6 +71,7 @@ def shaped_weights(options: AnalysisOptions, scale: float, faces: bool = True) -
         options.k,
         options.convexity / scale**2 if faces else 0.0,
         options.separation * scale,
+        options.reach * scale,
     )
 
 

@@ -62,6 +62,7 @@ class AnalysisOptions:
     hull_box : half width of the box in the per-frame refinement (0.15, Wang et al. 2019).
     convexity : weight of a term that keeps slices convex (ours; 0 is the paper).
     separation : palette colours nearer than this repel each other (ours; 0 is the paper).
+    reach : pixels this far outside count twice, farther ones still more (ours; 0 is the paper).
     colours : most colour bins kept of a frame; 8-bit frames with no more distinct colours are
     exact. coarse_colours : the same for hulls, merging and removal, where speed counts.
     seed : seeds what is random (nothing at present: every step is deterministic).
@@ -87,6 +88,7 @@ class AnalysisOptions:
     hull_box: float = 0.15
     convexity: float = 3.0
     separation: float = 0.15
+    reach: float = 0.1
     colours: int = 32768
     coarse_colours: int = 4096
     seed: int = 0
@@ -113,6 +115,7 @@ class AnalysisOptions:
             "hull_box": (0.0, 10.0),
             "convexity": (0.0, 1e6),
             "separation": (0.0, 1.0),
+            "reach": (0.0, 10.0),
             "colours": (64, 1e8),
             "coarse_colours": (64, 1e8),
             "seed": (0, 2**63),

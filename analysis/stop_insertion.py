@@ -18,7 +18,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 from palette4d.analysis.handle_removal import Step
-from palette4d.analysis.losses import colour_scale, loss_weights, thread_count
+from palette4d.analysis.losses import colour_scale, reach_weights, thread_count
 from palette4d.analysis.objective import LEAST_GAP, Objective, loss_of, move
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Section, SkewPolytope
@@ -47,9 +47,10 @@ def insert_stops(
     there are never more than so many.
     """
     polytope, value = step.polytope, step.value
+    scale = colour_scale(low, high)
     hopeless: set[int] = set()
     for _ in range(MOST_FRAMES):
-        losses = _frame_losses(polytope, statistics, options)
+        losses = _frame_losses(polytope, statistics, options, scale)
         usual = float(np.median(losses))
         bad = [i for i in np.argsort(-losses, kind="stable").tolist() if i not in hopeless]
         if not bad or losses[bad[0]] <= BAD * usual:
@@ -63,7 +64,7 @@ def insert_stops(
             price = change + options.handle_cost * len(added)
             if change > 0 or (best and price >= best[0]):
                 continue
-            if _frame_losses(moved, [statistics[bad[0]]], options)[0] <= enough:
+            if _frame_losses(moved, [statistics[bad[0]]], options, scale)[0] <= enough:
                 best = price, change, moved
         if best is None:
             hopeless.add(bad[0])
@@ -74,17 +75,20 @@ def insert_stops(
 
 
 def _frame_losses(
-    polytope: SkewPolytope, statistics: Sequence[FrameStatistics], options: AnalysisOptions
+    polytope: SkewPolytope,
+    statistics: Sequence[FrameStatistics],
+    options: AnalysisOptions,
+    scale: float,
 ) -> F64:
-    """L (eq. 4) of each frame."""
+    """L (eq. 4) of each frame, and what lies far outside once more (`reach`)."""
     rows, _ = loss_of(polytope, statistics, coarse=True).evaluate(
         polytope.vertices,
         list(range(len(statistics))),
-        loss_weights(options),
+        reach_weights(options, scale),
         thread_count(options),
         False,
     )
-    losses: F64 = options.lambda_ * rows[:, 0] + rows[:, 1]
+    losses: F64 = options.lambda_ * rows[:, 0] + rows[:, 1] + rows[:, 2]
     return losses
 
 
@@ -183,8 +187,13 @@ def _settled(
     vertices[:, :3] = np.clip(vertices[:, :3], low, high)
     moving = np.array(added)
     which = evaluate.touched(vertices, added)
-    box = evaluate.box(vertices, moving, low, high, share=0.5)
-    vertices = move(evaluate, vertices, moving, which, box, EVALUATIONS)
+    lower, upper = evaluate.box(vertices, moving, low, high, share=0.5)
+    if len(added) > 1:  # what is there for a moment only makes its track give way as briefly
+        times = vertices[moving, 3]
+        span = np.abs(times - times[0]).max()
+        lower[:, 3] = np.maximum(lower[:, 3], times - span)
+        upper[:, 3] = np.minimum(upper[:, 3], times + span)
+    vertices = move(evaluate, vertices, moving, which, (lower, upper), EVALUATIONS)
     value, _ = evaluate(vertices, which)
     before, _ = Objective(polytope, statistics, options, scale, coarse=True)(
         polytope.vertices, which

@@ -43,7 +43,11 @@ TRADES: dict[str, tuple[str, ...]] = {
     "--separation 0": ("--separation", "0"),
     "--convexity 0": ("--convexity", "0"),
     "--merge-distance 0.1": ("--merge-distance", "0.1"),
-    "all three of these": ("--separation", "0", "--convexity", "0", "--merge-distance", "0.1"),
+    "--reach 0": ("--reach", "0"),
+    "all four of these": (
+        *("--separation", "0", "--convexity", "0", "--merge-distance", "0.1"),
+        *("--reach", "0"),
+    ),
     "--handle-cost 0.001": ("--handle-cost", "0.001"),
     "--handle-cost 0.005": ("--handle-cost", "0.005"),
     "--blocks 1": ("--blocks", "1"),

@@ -38,6 +38,7 @@ AGREE = 1e-6
 # The paper's rules and nothing of this program's: no shape terms, the authors' merge distance.
 PAPER_RULES = (
     *("--method", "paper", "--convexity", "0", "--separation", "0"),
+    *("--reach", "0"),
     *("--merge-distance", "0.1"),
 )
 

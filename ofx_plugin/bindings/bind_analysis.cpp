@@ -18,12 +18,12 @@ using namespace palette4d::bindings;
 
 namespace {
 
-/// Rows: R, C, D, share of pixels outside, largest distance.
 /// What is minimised beside the paper's losses.
 double shape_of(const FrameLoss& loss, const LossWeights& weights) {
-    return weights.convexity * loss.D + loss.S;
+    return weights.convexity * loss.D + loss.S + weights.lambda * loss.E;
 }
 
+/// Rows: R, C, shape, share of pixels outside, largest distance.
 DoubleArray loss_rows(const std::vector<FrameLoss>& losses, const LossWeights& weights) {
     DoubleArray rows({static_cast<py::ssize_t>(losses.size()), py::ssize_t{5}});
     double* out = rows.mutable_data();
@@ -81,11 +81,12 @@ void bind_analysis(py::module_& m) {
         .def("__len__", [](const ColourTree& t) { return t.size(); });
 
     py::class_<LossWeights>(m, "LossWeights")
-        .def(py::init([](double lambda, double k, double convexity, double separation) {
-                 return LossWeights{lambda, k, convexity, separation};
-             }),
+        .def(py::init(
+                 [](double lambda, double k, double convexity, double separation, double reach) {
+                     return LossWeights{lambda, k, convexity, separation, reach};
+                 }),
              py::arg("lambda_"), py::arg("k"), py::arg("convexity") = 0.0,
-             py::arg("separation") = 0.0);
+             py::arg("separation") = 0.0, py::arg("reach") = 0.0);
 
     m.def(
         "palette_loss",

@@ -120,12 +120,24 @@ def test_nearest_mean_matches_a_sorted_list():
     np.testing.assert_allclose(few, points[:7].mean(axis=0))
 
 
+def test_reach_adds_what_lies_far_outside():
+    rng = np.random.default_rng(11)
+    points, counts = rng.random((300, 3)), rng.integers(1, 6, 300).astype(float)
+    distances = np.array([loss(p, BOX)["R"] for p in points])
+    _, _, shape, *_ = _core.palette_loss(
+        tree(points, counts), BOX, NO_FACES, _core.LossWeights(50.0, 50.0, reach=0.2)
+    )
+    cubed = (distances / 0.2) ** 3
+    far = counts @ (distances * cubed / (1 + cubed / 8))
+    assert shape == pytest.approx(50 * far / counts.sum(), rel=1e-9)
+
+
 def test_gradient_matches_differences():
     rng = np.random.default_rng(7)
     colours = tree(rng.random((500, 3)))
     palette = BOX + rng.normal(0, 0.02, BOX.shape)
     faces = np.array([[0, 1, 2], [1, 3, 2]], np.int32)
-    weights = _core.LossWeights(50.0, 500.0, convexity=0.7, separation=0.6)
+    weights = _core.LossWeights(50.0, 500.0, convexity=0.7, separation=0.6, reach=0.1)
 
     def value(x):
         r, c, shape, *_ = _core.palette_loss(colours, x, faces, weights)

@@ -29,13 +29,13 @@ def rest(count=FRAMES):
     return SkewPolytope(vertices, (Section(0.0, count - 1.0, tracks, mesh.faces),), ())
 
 
-def clip(lit):
-    """Mixtures of the five; a light on 30 of 900 pixels in the frames `lit`."""
+def clip(lit, pixels=30):
+    """Mixtures of the five; a light on some of 900 pixels in the frames `lit`."""
     pictures = []
     for t in range(FRAMES):
         picture = mixture(FIVE, t, 900)
         if t in lit:
-            picture.reshape(-1, 3)[:30] = LIGHT
+            picture.reshape(-1, 3)[:pixels] = LIGHT
         pictures.append(picture)
     return stats(pictures)
 
@@ -68,11 +68,20 @@ def test_a_light_gets_a_stop(lit):
     np.testing.assert_array_equal(
         after.polytope.vertices[: len(before.polytope.vertices)], before.polytope.vertices
     )
-    # And far from the light nothing has changed much.
+    # And far from the light, which is 0.6 away, not much has changed.
     dark = [t for t in range(FRAMES) if min(abs(t - at) for at in lit) > 4]
     for t in dark:
         moved = np.abs(colours_at(after.polytope, t) - colours_at(before.polytope, t)).max()
-        assert moved < 0.1
+        assert moved < 0.3
+
+
+@pytest.mark.parametrize(("reach", "added"), [(0.0, False), (0.1, True)])
+def test_a_small_light_counts_by_how_far_it_lies_outside(reach, added):
+    """In the mean distance of all pixels two of 900 are nothing."""
+    options, frames = AnalysisOptions(reach=reach), clip((10,), pixels=2)
+    before = step_of(rest(), frames, options)
+    after = insert_stops(before, frames, LOW, HIGH, options)
+    assert (len(after.polytope.vertices) > len(before.polytope.vertices)) == added
 
 
 def test_frames_that_fit_alike_get_none():

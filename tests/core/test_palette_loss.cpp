@@ -137,6 +137,43 @@ TEST(a_tree_of_many_colours_sums_what_single_colours_give) {
     CHECK_NEAR(loss.max_distance, far, 1e-9);
 }
 
+TEST(every_instruction_set_gives_the_same_bits) {
+    shapes::Random random(5);
+    for (int i = 0; i < 20; ++i) {
+        const std::vector<Vec3> palette = shapes::random_convex(random, 4 + random.below(12)).rgb;
+        std::vector<Vec3> colours;
+        std::vector<double> counts;
+        for (int n = 1 + random.below(300); n > 0; --n) {
+            colours.push_back(random.colour(-0.2, 1.2));
+            counts.push_back(1 + random.below(7));
+        }
+        const ColourTree tree(colours, counts);
+        const auto result = [&](InstructionSet set, std::vector<Vec3>& gradient) {
+            return palette_loss(tree, palette, {}, {50, 50, 0, 0.1, 0.1}, &gradient, set);
+        };
+        std::vector<Vec3> expected;
+        const FrameLoss portable = result(InstructionSet::kPortable, expected);
+        for (const InstructionSet set : instruction_sets()) {
+            std::vector<Vec3> gradient;
+            const FrameLoss loss = result(set, gradient);
+            CHECK_EQUAL(loss.R, portable.R);
+            CHECK_EQUAL(loss.E, portable.E);
+            CHECK_EQUAL(loss.max_distance, portable.max_distance);
+            CHECK(gradient == expected);
+        }
+    }
+}
+
+TEST(what_is_far_outside_weighs_more) {
+    // A quarter of the pixels 0.2 outside, where q is 8, an eighth 0.1, where it is 1.
+    const ColourTree tree({{0.5, 0.5, 0.5}, {1.2, 0.5, 0.5}, {0.5, -0.1, 0.5}}, {5, 2, 1});
+    const std::vector<Vec3> cube = shapes::cube().rgb;
+    const FrameLoss loss = palette_loss(tree, cube, {}, {50, 1, 0, 0, 0.1}, nullptr);
+    CHECK_NEAR(loss.E, 0.25 * 0.2 * 4 + 0.125 * 0.1 * 8 / 9, 1e-12);
+    CHECK_NEAR(loss.R, 0.25 * 0.2 + 0.125 * 0.1, 1e-12);
+    CHECK_EQUAL(palette_loss(tree, cube, {}, {50, 1}, nullptr).E, 0.0);
+}
+
 TEST(compactness_by_hand) {
     const ColourTree tree({{0, 0, 0}, {1, 0, 0}}, {1, 3});
     // v_N is (0, 0, 0) for the first colour, half of each for the second.
@@ -167,7 +204,7 @@ TEST(the_gradient_is_that_of_differences) {
     }
     // k covers all pixels, so that v_N does not jump.
     const ColourTree tree(colours, std::vector<double>(colours.size(), 1));
-    const LossWeights weights{50, 200, 0.7, 0.9};
+    const LossWeights weights{50, 200, 0.7, 0.9, 0.5};
     shapes::Mesh mesh = shapes::dented_cube();
     for (Vec3& v : mesh.rgb)
         for (double& x : v) x = 0.5 + 0.6 * (x - 0.5) + random.uniform(-0.03, 0.03);
@@ -178,10 +215,11 @@ TEST(the_gradient_is_that_of_differences) {
     CHECK_EQUAL(with.C, without.C);
     CHECK_EQUAL(with.D, without.D);
     CHECK_EQUAL(with.S, without.S);
-    CHECK(with.R > 0 && with.D > 0 && with.S > 0);
+    CHECK_EQUAL(with.E, without.E);
+    CHECK(with.R > 0 && with.D > 0 && with.S > 0 && with.E > 0);
     const auto value = [&](const std::vector<Vec3>& palette) {
         const FrameLoss loss = palette_loss(tree, palette, mesh.faces, weights, nullptr);
-        return weights.lambda * loss.R + loss.C + weights.convexity * loss.D + loss.S;
+        return weights.lambda * (loss.R + loss.E) + loss.C + weights.convexity * loss.D + loss.S;
     };
     CHECK_EQUAL(gradient.size(), mesh.rgb.size());
     for (std::size_t i = 0; i < gradient.size(); ++i)

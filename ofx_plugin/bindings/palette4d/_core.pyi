@@ -262,11 +262,17 @@ class ColourTree:
 class LossWeights:
     """What the losses weigh: lambda of eq. 4, k of eq. 3, and how a palette should be shaped.
 
-    `convexity` weighs the concavity of the mesh; colours nearer than `separation` repel each other.
+    `convexity` weighs the concavity of the mesh; colours nearer than `separation` repel each other;
+    a pixel that lies `reach` outside counts twice, farther ones still more (0: all as they lie).
     """
 
     def __init__(
-        self, lambda_: float, k: float, convexity: float = ..., separation: float = ...
+        self,
+        lambda_: float,
+        k: float,
+        convexity: float = ...,
+        separation: float = ...,
+        reach: float = ...,
     ) -> None: ...
 
 def palette_loss(
@@ -274,8 +280,8 @@ def palette_loss(
 ) -> tuple[float, float, float, float, float, F64]:
     """R (eq. 2), C (eq. 3), shape, share of pixels outside, largest distance, and gradient.
 
-    `palette` is (n, 3); `shape` is what convexity and separation add; the (n, 3) gradient is that
-    of lambda R + C + shape.
+    `palette` is (n, 3); `shape` is what convexity, separation and reach add; the (n, 3) gradient is
+    that of lambda R + C + shape.
     """
 
 class PolytopeLoss:

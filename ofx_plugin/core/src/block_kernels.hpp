@@ -6,6 +6,7 @@
 #include <cstddef>
 
 #include "lattice_kernels.hpp"
+#include "loss_kernels.hpp"
 
 namespace palette4d {
 
@@ -117,6 +118,7 @@ struct KernelSet {
     Kernels<float> single;
     Kernels<double> twofold;
     LatticeKernels lattice;
+    LossKernels loss;
 };
 
 // Null where the source was compiled for a processor without these instructions.

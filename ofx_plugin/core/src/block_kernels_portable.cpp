@@ -5,6 +5,8 @@
 #include "lanes.hpp"
 //
 #include "block_kernels.inl"
+#include "loss_kernels.inl"
+//
 #include "lattice_kernels.inl"
 
 PALETTE4D_KERNEL_SET

@@ -43,7 +43,7 @@ ColourTree::ColourTree(std::vector<Vec3> rgb, std::vector<double> counts) {
     build(0, static_cast<int>(rgb.size()), order, rgb);
     counts_.resize(rgb.size());
     for (int c = 0; c < 3; ++c) {
-        channel_[c].resize(rgb.size());
+        channel_[c].resize(rgb.size() + kLeafSize);
         for (std::size_t i = 0; i < order.size(); ++i) channel_[c][i] = rgb[order[i]][c];
     }
     for (std::size_t i = 0; i < order.size(); ++i) {

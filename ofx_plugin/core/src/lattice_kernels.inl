@@ -223,5 +223,6 @@ void blend(const float* nodes, const LatticeBlock& block, int begin, int end, co
         {&classify<float>, &mean_value<float>, &closest<float>, &move<float>},     \
         {&classify<double>, &mean_value<double>, &closest<double>, &move<double>}, \
         {&locate, &descend, &weigh, &blend},                                       \
+        {&fall},                                                                   \
     };                                                                             \
     }

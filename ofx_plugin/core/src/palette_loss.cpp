@@ -1,10 +1,10 @@
 #include "palette4d/palette_loss.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
+#include "kernel_choice.hpp"
 #include "vec3.hpp"
 
 namespace palette4d {
@@ -18,22 +18,30 @@ void add(Vec3& a, double s, const Vec3& b) {
 // several facets may lie above one whose triangle is elsewhere.
 constexpr double kFlat = 1e-9;
 
-/// A supporting triangle with what a closest point needs: its plane, and its barycentric
-/// coordinates as linear functions of the colour (of corners 1 and 2; corner 0 takes the rest).
-struct Facet {
-    Face at;
-    Vec3 normal;  // unit, outwards
-    double offset;
-    Vec3 slope[2];
-    double start[2];
-};
+Vec3 vec3(const double (&a)[3]) { return {a[0], a[1], a[2]}; }
 
-Facet facet_of(const std::vector<Vec3>& v, const Face& at, const Vec3& normal, double offset) {
+LossFacet facet_of(const std::vector<Vec3>& v, const Face& at, const Vec3& normal, double offset) {
     const Vec3 ab = v[at[1]] - v[at[0]], ac = v[at[2]] - v[at[0]];
     const Vec3 n = cross(ab, ac);
     const double scale = 1 / dot(n, n);
-    Facet f{at, normal, offset, {scale * cross(ac, n), scale * cross(n, ab)}, {0, 0}};
-    for (int i = 0; i < 2; ++i) f.start[i] = -dot(f.slope[i], v[at[0]]);
+    const Vec3 slope[2] = {scale * cross(ac, n), scale * cross(n, ab)};
+    LossFacet f{};
+    f.offset = offset;
+    for (int c = 0; c < 3; ++c) {
+        f.at[c] = at[c];
+        f.normal[c] = normal[c];
+        f.high[c] = normal[c] > 0;
+        for (int i = 0; i < 2; ++i) f.slope[i][c] = slope[i][c];
+    }
+    for (int i = 0; i < 2; ++i) f.start[i] = -dot(slope[i], v[at[0]]);
+    return f;
+}
+
+/// A segment, as a degenerate triangle.
+LossFacet segment_of(int from, int to) {
+    LossFacet f{};
+    f.at[0] = f.at[1] = from;
+    f.at[2] = to;
     return f;
 }
 
@@ -41,7 +49,7 @@ Facet facet_of(const std::vector<Vec3>& v, const Face& at, const Vec3& normal, d
 /// does no harm to a closest point. `solid` is false for flat palettes: then every triple is a
 /// facet.
 struct Hull {
-    std::vector<Facet> facets;
+    std::vector<LossFacet> facets;
     bool solid = false;
 };
 
@@ -80,7 +88,7 @@ void build_hull(const std::vector<Vec3>& v, Hull& hull) {
     // All on a line (or one colour): the segments between all pairs, as degenerate triangles.
     for (int i = 0; i < n; ++i)
         for (int j = i; j < n; ++j)
-            if (i != j || n == 1) hull.facets.push_back({{i, i, j}, {0, 0, 0}, 0, {}, {}});
+            if (i != j || n == 1) hull.facets.push_back(segment_of(i, j));
 }
 
 struct Closest {
@@ -100,7 +108,7 @@ void try_segment(const Vec3& p, const std::vector<Vec3>& v, int a, int b, Closes
     if (d2 < best.d2) best = {d2, {a, b, b}, {1 - s, s, 0}};
 }
 
-void try_triangle(const Vec3& p, const std::vector<Vec3>& v, const Face& f, Closest& best) {
+void try_triangle(const Vec3& p, const std::vector<Vec3>& v, const int (&f)[3], Closest& best) {
     const Vec3 ab = v[f[1]] - v[f[0]], ac = v[f[2]] - v[f[0]], ap = p - v[f[0]];
     const Vec3 n = cross(ab, ac);
     const double nn = dot(n, n);
@@ -110,7 +118,7 @@ void try_triangle(const Vec3& p, const std::vector<Vec3>& v, const Face& f, Clos
         if (wb >= 0 && wc >= 0 && wb + wc <= 1) {
             const double h = dot(ap, n);
             const double d2 = h * h / nn;
-            if (d2 < best.d2) best = {d2, f, {1 - wb - wc, wb, wc}};
+            if (d2 < best.d2) best = {d2, {f[0], f[1], f[2]}, {1 - wb - wc, wb, wc}};
             return;
         }
     }
@@ -119,12 +127,21 @@ void try_triangle(const Vec3& p, const std::vector<Vec3>& v, const Face& f, Clos
     try_segment(p, v, f[2], f[0], best);
 }
 
+// Of E, times the distance itself: farther out a pixel's weight does not grow any more, so that
+// a few pixels that are wrong (hot ones, say) cannot blow up the palette.
+constexpr double kMostReach = 8;
+
 /// Sums count * distance over the pixels outside.
 class Outside {
 public:
-    Outside(const ColourTree& colours, const std::vector<Vec3>& v, const Hull& hull,
-            std::vector<Vec3>* gradient)
-        : colours_(colours), v_(v), hull_(hull), gradient_(gradient) {}
+    Outside(const ColourTree& colours, const std::vector<Vec3>& v, const Hull& hull, double reach,
+            const LossKernels& kernels, std::vector<Vec3>* gradient)
+        : colours_(colours),
+          v_(v),
+          hull_(hull),
+          far_(reach > 0 ? 1 / (reach * reach * reach) : 0),
+          fall_(kernels.fall),
+          gradient_(gradient) {}
 
     void run(FrameLoss& loss) {
         if (gradient_) gradient_->assign(v_.size(), Vec3{0, 0, 0});
@@ -134,14 +151,16 @@ public:
         loads_.resize(hull_.facets.size());
         visit(0, 0);
         loss.R = sum_ / colours_.total();
+        loss.E = far_sum_ / colours_.total();
         loss.outside = count_ / colours_.total();
         loss.max_distance = max_;
         if (!gradient_) return;
         for (std::size_t i = 0; i < loads_.size(); ++i) {
-            const Facet& f = hull_.facets[i];
+            const LossFacet& f = hull_.facets[i];
+            const Vec3 normal = vec3(f.normal);
             const Load& load = loads_[i];
-            add((*gradient_)[f.at[0]], load.corner[0] + load.corner[1] - load.all, f.normal);
-            for (int c = 0; c < 2; ++c) add((*gradient_)[f.at[c + 1]], -load.corner[c], f.normal);
+            add((*gradient_)[f.at[0]], load.corner[0] + load.corner[1] - load.all, normal);
+            for (int c = 0; c < 2; ++c) add((*gradient_)[f.at[c + 1]], -load.corner[c], normal);
         }
         for (Vec3& g : *gradient_)
             for (double& x : g) x /= colours_.total();
@@ -157,11 +176,11 @@ private:
         if (hull_.solid) {
             facets.clear();
             for (int f : from) {
-                const Facet& facet = hull_.facets[f];
+                const LossFacet& facet = hull_.facets[f];
                 // The box's corner farthest along the normal.
                 double high = facet.offset;
                 for (int c = 0; c < 3; ++c)
-                    high += std::max(facet.normal[c] * node.high[c], facet.normal[c] * node.low[c]);
+                    high += facet.normal[c] * (facet.high[c] ? node.high : node.low)[c];
                 if (high > kFlat) facets.push_back(f);
             }
             if (facets.empty()) return;
@@ -191,67 +210,55 @@ private:
     /// convex body lies on a facet that the colour sees; where the colour falls straight onto such
     /// a facet, that is it.
     void leaf(const ColourTree::Node& node, const std::vector<int>& facets) {
-        constexpr int kMost = ColourTree::kLeafSize;
-        const int n = node.end - node.begin;
-        const double* const x = colours_.channel(0) + node.begin;
-        const double* const y = colours_.channel(1) + node.begin;
-        const double* const z = colours_.channel(2) + node.begin;
+        static_assert(ColourTree::kLeafSize == LossLeaf::kSize, "a leaf at a time");
+        const double* const channels[3] = {colours_.channel(0) + node.begin,
+                                           colours_.channel(1) + node.begin,
+                                           colours_.channel(2) + node.begin};
         const double* const count = colours_.counts().data() + node.begin;
-        std::array<double, kMost> h;          // height above a facet
-        std::array<double, kMost> highest{};  // above any facet that the colour sees
-        std::array<bool, kMost> on_facet{};   // falls straight onto one
-        for (int index : facets) {
-            const Facet& f = hull_.facets[index];
-            double above = 0;
-            for (int i = 0; i < n; ++i) {
-                h[i] = f.normal[0] * x[i] + f.normal[1] * y[i] + f.normal[2] * z[i] + f.offset;
-                highest[i] = std::max(highest[i], h[i]);
-                above = std::max(above, h[i]);
+        fall_(hull_.facets.data(), facets.data(), static_cast<int>(facets.size()), channels, kFlat,
+              leaf_);
+        for (int i = 0; i < node.end - node.begin; ++i) {
+            if (leaf_.highest[i] <= kFlat) continue;
+            if (leaf_.facet[i] >= 0) {
+                const double pull = add_distance(count[i], leaf_.height[i]);
+                Load& load = loads_[static_cast<std::size_t>(leaf_.facet[i])];
+                load.all += pull;
+                for (int c = 0; c < 2; ++c) load.corner[c] += pull * leaf_.share[c][i];
+                continue;
             }
-            if (above <= kFlat) continue;
-            for (int i = 0; i < n; ++i) {
-                if (h[i] <= kFlat || on_facet[i]) continue;
-                const Vec3 p{x[i], y[i], z[i]};
-                const double b = dot(f.slope[0], p) + f.start[0];
-                const double c = dot(f.slope[1], p) + f.start[1];
-                if (b < 0 || c < 0 || b + c > 1) continue;
-                on_facet[i] = true;
-                add_distance(count[i], h[i]);
-                Load& load = loads_[index];
-                load.all += count[i];
-                load.corner[0] += count[i] * b;
-                load.corner[1] += count[i] * c;
-            }
-        }
-        for (int i = 0; i < n; ++i) {
-            if (highest[i] <= kFlat || on_facet[i]) continue;
-            const Vec3 p{x[i], y[i], z[i]};
+            const Vec3 p{channels[0][i], channels[1][i], channels[2][i]};
             Closest best;
             for (int index : facets) {
-                const Facet& f = hull_.facets[index];
-                if (dot(f.normal, p) + f.offset <= kFlat) continue;
+                const LossFacet& f = hull_.facets[index];
+                if (dot(vec3(f.normal), p) + f.offset <= kFlat) continue;
                 for (int e = 0; e < 3; ++e) try_segment(p, v_, f.at[e], f.at[(e + 1) % 3], best);
             }
             if (best.d2 > 0) add_colour(count[i], p, best, std::sqrt(best.d2));
         }
     }
 
-    void add_distance(double n, double d) {
+    /// Returns the slope of R + E with d, times all pixels.
+    double add_distance(double n, double d) {
+        const double cubed = far_ * d * d * d, bound = 1 / (1 + cubed / kMostReach);
+        const double far = cubed * bound;
         sum_ += n * d;
+        far_sum_ += n * far * d;
         if (d > 1e-6) count_ += n;
         max_ = std::max(max_, d);
+        return n * (1 + far * (1 + 3 * bound));
     }
 
     void add_colour(double n, const Vec3& p, const Closest& closest, double d) {
-        add_distance(n, d);
+        const double pull = add_distance(n, d);
         if (!gradient_) return;
         Vec3 u = p;
         for (int c = 0; c < 3; ++c) add(u, -closest.weight[c], v_[closest.at[c]]);
-        for (int c = 0; c < 3; ++c) add((*gradient_)[closest.at[c]], -n * closest.weight[c] / d, u);
+        for (int c = 0; c < 3; ++c)
+            add((*gradient_)[closest.at[c]], -pull * closest.weight[c] / d, u);
     }
 
-    /// What the colours above a facet weigh, in all and on its corners 1 and 2: together with the
-    /// normal, their gradient.
+    /// How the colours above a facet pull at it, in all and on its corners 1 and 2: together with
+    /// the normal, their gradient.
     struct Load {
         double all = 0;
         double corner[2] = {0, 0};
@@ -260,10 +267,13 @@ private:
     const ColourTree& colours_;
     const std::vector<Vec3>& v_;
     const Hull& hull_;
+    const double far_;  ///< of d^4 in E
+    decltype(LossKernels::fall) const fall_;
     std::vector<Vec3>* gradient_;
     std::vector<std::vector<int>> active_;
     std::vector<Load> loads_;  // one a facet
-    double sum_ = 0, count_ = 0, max_ = 0;
+    LossLeaf leaf_;
+    double sum_ = 0, far_sum_ = 0, count_ = 0, max_ = 0;
 };
 
 /// Six times the volumes by which faces fold inwards, summed over the mesh's edges.
@@ -329,11 +339,12 @@ double separation_within(const ColourTree& colours, double separation) {
 
 FrameLoss palette_loss(const ColourTree& colours, const std::vector<Vec3>& palette,
                        const std::vector<Face>& faces, const LossWeights& weights,
-                       std::vector<Vec3>* gradient) {
+                       std::vector<Vec3>* gradient, InstructionSet instructions) {
     FrameLoss loss;
     Hull hull;
     build_hull(palette, hull);
-    Outside(colours, palette, hull, gradient).run(loss);
+    Outside(colours, palette, hull, weights.reach, kernels_of(instructions).loss, gradient)
+        .run(loss);
     if (gradient)
         for (Vec3& g : *gradient)
             for (double& x : g) x *= weights.lambda;

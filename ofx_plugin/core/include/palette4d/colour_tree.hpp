@@ -31,6 +31,7 @@ public:
 
     std::size_t size() const { return counts_.size(); }
     Vec3 rgb(int i) const { return {channel_[0][i], channel_[1][i], channel_[2][i]}; }
+    /// size() numbers, and kLeafSize more that stand for nothing, to be read past a leaf's end.
     const double* channel(int c) const { return channel_[c].data(); }
     const std::vector<double>& counts() const { return counts_; }
     const std::vector<Node>& nodes() const { return nodes_; }

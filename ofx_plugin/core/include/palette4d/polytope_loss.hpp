@@ -26,10 +26,10 @@ struct FrameColours {
 };
 
 /// Losses of the frames `which` (indices of `frames`, each inside a block). `gradient`, when not
-/// null, receives sum over `which` of the derivative of lambda R + C + convexity D + S with respect
-/// to the vertices (r, g, b, t). Frames are shared among `threads` threads; the sums are taken in
-/// order, so the result does not depend on their number. Throws std::invalid_argument for a frame
-/// that no block or track covers.
+/// null, receives sum over `which` of the derivative of lambda (R + E) + C + convexity D + S with
+/// respect to the vertices (r, g, b, t). Frames are shared among `threads` threads; the sums are
+/// taken in order, so the result does not depend on their number. Throws std::invalid_argument for
+/// a frame that no block or track covers.
 std::vector<FrameLoss> polytope_loss(const std::vector<Vec4>& vertices,
                                      const std::vector<BlockTopology>& blocks,
                                      const std::vector<FrameColours>& frames,
