@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from palette4d.analysis.options import AnalysisOptions
+from palette4d.analysis.options import METHODS_OF, AnalysisOptions
 from palette4d.analysis.quality import Report
 from palette4d.wording import counted
 
@@ -20,8 +20,8 @@ BAD_L = 0.3  # ... and at least this, or the clip's mean
 LOOKALIKE = 0.06  # RGB distance of two handles
 DENT = 0.05  # share of its convex hull that a slice lacks
 UNUSED = 0.001  # largest mean weight of a handle in any frame
-FAR = 0.25  # distance of the farthest pixel outside ...
-FARTHER = 1.4  # ... and how many times as far as a simpler palette leaves it
+LOST = 1e-4  # share of a frame's pixels that are lost: fewer are hot pixels or glints ...
+FARTHER = 1.4  # ... and how many times as far out as a simpler palette leaves them
 # No display-referred picture and no log goes so far.
 BRIGHT = 2.0
 
@@ -31,7 +31,7 @@ DEFAULT = "the default --method skew"
 def warnings(
     report: Report,
     options: AnalysisOptions,
-    reach: Mapping[str, float],
+    farthest: Mapping[str, float],
     *,
     brightest: float,
 ) -> tuple[str, ...]:
@@ -41,7 +41,7 @@ def warnings(
     ----------
     report : of the finished palette.
     options : what it was found with.
-    reach : for each stage of the analysis, how far outside its farthest pixel lies.
+    farthest : for each stage of the analysis, how far outside its farthest pixel lies.
     brightest : its largest number. Where that is scene-linear light distances mean little: nothing
         else is said then.
     """
@@ -53,7 +53,7 @@ def warnings(
         )
     found = (
         _fit(report, options),
-        _far(report, options, reach),
+        _lost(report, options, farthest),
         _lookalikes(report, options),
         _dent(report),
         _unused(report, options),
@@ -94,27 +94,29 @@ def _fit(x: Report, options: AnalysisOptions) -> str:
     return f"{what}; {ways}, or analyse parts of the clip apart with --frames"
 
 
-def _far(x: Report, options: AnalysisOptions, reach: Mapping[str, float]) -> str:
+def _lost(x: Report, options: AnalysisOptions, farthest: Mapping[str, float]) -> str:
     """Rare colours, such as lights, that simpler palettes hold better."""
-    far = x.farthest.farthest
+    frame = x.most_lost
     simpler = {
         "single frames' hulls leave": "frame_hulls",
         "one static palette leaves": "static_hull",
     }
     nearer = {
-        words: reach[stage]
+        words: farthest[stage]
         for words, stage in simpler.items()
-        if far > FARTHER * reach.get(stage, far)
+        if frame.farthest > FARTHER * farthest.get(stage, frame.farthest)
     }
-    if far < FAR or not nearer:
+    if frame.lost < LOST or not nearer:
         return ""
     where = " and ".join(f"{words} {distance:.2f}" for words, distance in nearer.items())
-    more = "to 500, say" if options.lambda_ < 500 else "further"
+    ways = f"{DEFAULT} follows the colours"
+    if options.method in METHODS_OF["reach"]:
+        ways = f"lower --reach (to {options.reach / 2:.2g}, say), so that rare colours count more"
     static = ", or take --method static" if "one static palette leaves" in nearer else ""
     return (
-        f"in frame {x.farthest.frame} colours lie up to {far:.2f} outside the palette, where "
-        f"{where}: if they are lights rather than hot pixels, raise --lambda ({more}), so that "
-        f"rare colours count more{static}"
+        f"in frame {frame.frame} colours of {frame.lost:.2%} of the picture lie up to "
+        f"{frame.farthest:.2f} outside the palette, where {where}: if they are lights rather than "
+        f"faulty pixels, {ways}{static}"
     )
 
 

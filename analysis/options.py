@@ -33,6 +33,7 @@ METHODS_OF: dict[str, tuple[str, ...]] = {
     "hull_box": ("skew", "paper", "static"),
     "convexity": ("skew", "paper", "static"),
     "separation": ("skew", "paper", "static"),
+    "reach": ("skew", "paper", "static"),
 }
 
 

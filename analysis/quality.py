@@ -25,20 +25,23 @@ F64 = NDArray[np.float64]
 USE_FRAMES = 12
 # Farther outside than this a pixel counts as outside in the report: one step of 8 bits.
 VISIBLE = 1 / 255
+# Farther outside than this a pixel is lost: no edit of the palette's colours takes hold of it.
+LOST = 0.25
 # Frames whose colours extend less than this, such as black ones, have no shape to judge.
 NARROW = 0.24
 
 
 @dataclasses.dataclass(frozen=True)
 class FrameFit:
-    """One frame's L (eq. 4), shares of pixels outside, by any distance and by more than 1/255, and
-    farthest pixel outside."""
+    """One frame's L (eq. 4), shares of pixels outside, by any distance and by more than 1/255,
+    farthest pixel outside, and share of the pixels that are lost (more than `LOST` outside)."""
 
     frame: int
     L: float
     outside: float
     outside_1_255: float
     farthest: float
+    lost: float = 0.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -75,6 +78,11 @@ class Report:
     def farthest(self) -> FrameFit:
         """The frame of the farthest pixel."""
         return max(self.fits, key=lambda fit: fit.farthest)
+
+    @property
+    def most_lost(self) -> FrameFit:
+        """The frame of the largest share of lost pixels."""
+        return max(self.fits, key=lambda fit: fit.lost)
 
     @property
     def median_loss(self) -> float:
@@ -142,12 +150,13 @@ def _fit(cut: _core.Slice, frame: FrameStatistics, options: AnalysisOptions) -> 
     r, c, _, outside, farthest, _ = _core.palette_loss(
         frame.colours, cut.rgb, NO_FACES, loss_weights(options)
     )
-    far = _visibly_outside(cut, frame) if farthest > VISIBLE else 0.0
-    return FrameFit(frame.frame, options.lambda_ * r + c, outside, far, farthest)
+    visible = _share_beyond(VISIBLE, cut, frame) if farthest > VISIBLE else 0.0
+    lost = _share_beyond(LOST, cut, frame) if farthest > LOST else 0.0
+    return FrameFit(frame.frame, options.lambda_ * r + c, outside, visible, farthest, lost)
 
 
-def _visibly_outside(cut: _core.Slice, frame: FrameStatistics) -> float:
-    """Return the share of pixels farther than `VISIBLE` from the convex hull of a slice."""
+def _share_beyond(limit: float, cut: _core.Slice, frame: FrameStatistics) -> float:
+    """Return the share of pixels farther than `limit` from the convex hull of a slice."""
     rgb, faces = cut.rgb, cut.faces
     colours, counts = frame.colours.rgb, frame.colours.counts
     share = 0.0
@@ -160,12 +169,12 @@ def _visibly_outside(cut: _core.Slice, frame: FrameStatistics) -> float:
         rgb, faces = mesh.rgb, mesh.faces
         # The distance to a plane is the least that it can be; beside an edge it is more.
         least = _beyond_planes(colours, planes)
-        share = float(counts[least > VISIBLE].sum())
-        unclear = (least > 0) & (least <= VISIBLE)
+        share = float(counts[least > limit].sum())
+        unclear = (least > 0) & (least <= limit)
         colours, counts = colours[unclear], counts[unclear]
     if len(colours):
         _, distances = _core.palette_weights(colours, rgb, faces)
-        share += float(counts[distances > VISIBLE].sum())
+        share += float(counts[distances > limit].sum())
     return share / frame.colours.total
 
 

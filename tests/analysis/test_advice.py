@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from analysis_frames import ArrayClip, mixture
@@ -39,11 +41,11 @@ TROUBLES = {
 }
 
 
-def said(changes, method="skew", reach=None, brightest=1.0, **options):
+def said(changes, method="skew", farthest=None, brightest=1.0, **options):
     return warnings(
         report(**changes),
         AnalysisOptions(method=method, **options),
-        reach or {},
+        farthest or {},
         brightest=brightest,
     )
 
@@ -83,20 +85,22 @@ def test_scene_linear_light_needs_its_space_first():
 
 
 def test_colours_that_simpler_palettes_hold_are_named():
-    far = {"fits": (*report().fits[:7], FrameFit(7, 0.05, 0.02, 0.01, 0.32), report().fits[8])}
-    (text,) = said(far, reach={"static_hull": 0.22, "frame_hulls": 0.3})
+    lost = FrameFit(7, 0.05, 0.02, 0.01, 0.32, 0.0004)
+    far = {"fits": (*report().fits[:7], lost, report().fits[8])}
+    (text,) = said(far, farthest={"static_hull": 0.22, "frame_hulls": 0.3})
     assert "in frame 7" in text
+    assert "0.04% of the picture" in text
     assert "0.32" in text
     assert "static palette leaves 0.22" in text
-    assert "--lambda" in text
+    assert "--reach (to 0.05" in text
     assert "--method static" in text
-    (text,) = said(far, "paper", reach={"frame_hulls": 0.2})
+    (text,) = said(far, "paper", farthest={"frame_hulls": 0.2})
     assert "single frames' hulls leave 0.20" in text
     assert "--method static" not in text
-    assert said(far, reach={"static_hull": 0.31, "frame_hulls": 0.3}) == ()
-    assert said(far, "static", reach={"static_hull": 0.32}) == ()
-    near = {"fits": tuple(FrameFit(i, 0.05, 0.02, 0.01, 0.15) for i in range(9))}
-    assert said(near, reach={"static_hull": 0.02, "frame_hulls": 0.02}) == ()
+    assert said(far, farthest={"static_hull": 0.31, "frame_hulls": 0.3}) == ()
+    assert said(far, "static", farthest={"static_hull": 0.32}) == ()
+    few = {"fits": (*report().fits[:8], dataclasses.replace(lost, lost=0.00005))}
+    assert said(few, farthest={"static_hull": 0.02, "frame_hulls": 0.02}) == ()
 
 
 def flashing(frames: int = 9) -> ArrayClip:

@@ -31,6 +31,7 @@ OTHERS = {
     "hull_box": 0.0,
     "convexity": 0.0,
     "separation": 0.9,
+    "reach": 0.01,
 }
 
 
