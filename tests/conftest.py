@@ -16,7 +16,9 @@ import os
 from collections.abc import Generator
 from pathlib import Path
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 REPO_ROOT = Path(__file__).resolve().parent.parent
 
@@ -48,6 +50,19 @@ def seasons(shared: Path) -> Path:
     if not folder.is_dir():
         pytest.skip(f"the SEASONS clip is absent: no folder {folder}")
     return folder
+
+
+@pytest.fixture(scope="session")
+def real_frame() -> NDArray[np.float32]:
+    """A real clip's frame, (h, w, 3) within 0..1: autumn of SEASONS, or else of the sample clip."""
+    seasons = shared_folder() / "clips" / "seasons"
+    if not seasons.is_dir():
+        from palette4d.sample_scene import Scene
+
+        return Scene(320, 180).picture(0.6)
+    from palette4d.analysis.clip import open_clip
+
+    return np.ascontiguousarray(open_clip(str(seasons)).read(40)[..., :3], dtype=np.float32)
 
 
 def host_tests_required() -> bool:

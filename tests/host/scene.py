@@ -93,8 +93,10 @@ class Scene:
             check=True,
         )
 
-    def render(self, *, real_time: int = -1, **parameters: object) -> tuple[list[Image], str]:
-        """The clip through the node, at its own depth, and what melt said meanwhile.
+    def render(
+        self, effect: str = SERVICE, *, real_time: int = -1, **parameters: object
+    ) -> tuple[list[Image], str]:
+        """The clip through an effect, at its own depth, and what melt said meanwhile.
 
         On a busy machine melt now and then ends, without a word and with or without an effect,
         before its first frame: it is asked again.
@@ -107,7 +109,7 @@ class Scene:
             done = self.run(
                 # abnormal: without the loader's normalisers, which take pictures through 4:2:2.
                 # Not -quiet: it would keep the persistent messages to itself.
-                *("-profile", "profile", "abnormal:in_%03d.png", "-attach", SERVICE),
+                *("-profile", "profile", "abnormal:in_%03d.png", "-attach", effect),
                 *(f"{name}={value}" for name, value in parameters.items()),
                 *("-consumer", "avformat:out_%03d.png", "vcodec=png", "an=1", f"pix_fmt={pixels}"),
                 *(f"mlt_image_format={image_format}", f"real_time={real_time}"),

@@ -423,18 +423,3 @@ class TestCommand:
         with pytest.raises(SystemExit) as stop:
             main(["bake", str(warm_sidecar), f"--frame={frame}", "-o", str(tmp_path / "a.cube")])
         assert stop.value.code == 2
-
-
-@pytest.mark.parametrize("extension", [".cube", ".clf"])
-def test_a_real_frame(extension: str, seasons: Path, warm_sidecar: Path, tmp_path: Path) -> None:
-    from palette4d.analysis.clip import open_clip
-
-    image = open_clip(str(seasons)).read(40)
-    out = tmp_path / f"real{extension}"
-    result = bake(warm_sidecar, out, BakeOptions(5.0, 33), image=image, image_frame=40)
-    assert result.clip is not None
-    got = read_back(out, image, ocio.INTERP_DEFAULT)
-    difference = np.abs(got.astype(np.float64) - exact(warm_sidecar, 5.0, image))
-    assert difference.max() <= result.clip.worst.largest + 1e-6
-    assert difference.mean() <= result.clip.worst.mean + 1e-6
-    assert result.clip.worst.mean < 1e-3

@@ -63,8 +63,10 @@ def test_an_edit_that_is_a_cdl_is_found(
 
 
 @pytest.mark.parametrize("extension", EXTENSIONS)
-def test_the_residual_holds(extension: str, warm_sidecar: Path, tmp_path: Path) -> None:
-    image = picture()
+def test_the_residual_holds_on_a_real_frame(
+    extension: str, warm_sidecar: Path, tmp_path: Path, real_frame: F32
+) -> None:
+    image = np.ascontiguousarray(real_frame[::3, ::3])
     out = tmp_path / f"a.{extension}"
     result = bake(warm_sidecar, out, BakeOptions(4.0), image=image, image_frame=4)
     edit = frame_edit(_core.read_sidecar(str(warm_sidecar)), 4.0)

@@ -10,7 +10,6 @@ import PyOpenColorIO as ocio
 import pytest
 from numpy.typing import NDArray
 from palette4d import Palette4dError, _core
-from palette4d.analysis.clip import open_clip
 from palette4d.lut_export.bake import BakeOptions, BakeResult, bake
 from palette4d.lut_export.formats import FORMATS, LutFormat, format_named, format_of
 from palette4d.lut_export.frame_edit import frame_edit
@@ -68,15 +67,15 @@ def test_opencolorio_writes_no_other_format() -> None:
 
 @pytest.mark.parametrize("known", TABLES, ids=named)
 def test_each_format_keeps_its_stated_error_on_a_real_frame(
-    known: LutFormat, warm_sidecar: Path, tmp_path: Path, seasons: Path
+    known: LutFormat, warm_sidecar: Path, tmp_path: Path, real_frame: F32
 ) -> None:
-    image = open_clip(str(seasons)).read(40)[::3, ::3, :3]
+    image = np.ascontiguousarray(real_frame[::3, ::3])
     out = tmp_path / f"warm{known.extension}"
     options = BakeOptions(4.0, 33, format=known.name)
     result = bake(warm_sidecar, out, options, image=image, image_frame=40)
     assert (result.format, result.size) == (known.name, 33)
     assert result.shaper.kind == "none"
-    check(result, out, warm_sidecar, np.ascontiguousarray(image))
+    check(result, out, warm_sidecar, image)
     assert result.error < 0.02
 
 
