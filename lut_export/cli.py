@@ -203,9 +203,11 @@ def warnings(result: BakeResult, format_: LutFormat, options: BakeOptions) -> It
     """Yield what a user should know beside the figures."""
     from palette4d.lut_export.bake import PREVIEW_TIER
     from palette4d.lut_export.error import stated
-    from palette4d.lut_export.formats import with_shaper
+    from palette4d.lut_export.formats import shaper_warning, with_shaper
 
     shaper = result.shaper
+    if shaper.kind != "none" and (about := shaper_warning(format_.name)):
+        yield about
     (low, high), clip = result.palette, result.clip
     beyond = clip.outside_domain > 0 if clip else low < shaper.low or high > shaper.high
     if beyond and result.cdl is None:

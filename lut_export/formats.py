@@ -190,6 +190,16 @@ def format_of(path: Path, name: str | None = None) -> LutFormat:
     raise Palette4dError(f"{path}: found {found}; expected one of {listed}")
 
 
+def shaper_warning(name: str) -> str | None:
+    """Return what a user should know of a shaper in a format, None for nothing."""
+    if name != "resolve_cube":
+        return None
+    return (
+        "only Resolve and OpenColorIO know the shaper of a .cube; ffmpeg, melt and what is built "
+        "on them take it for the table: give those a .csp"
+    )
+
+
 def with_shaper() -> str:
     """Return the names of the formats that can hold a shaper."""
     return ", ".join(known.name for known in FORMATS if known.shaper)

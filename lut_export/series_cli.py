@@ -257,9 +257,19 @@ def report(done: Series) -> list[str]:
 def warn(done: list[Series]) -> None:
     """Say what a user should know beside the figures."""
     from palette4d.lut_export.bake import PREVIEW_TIER
+    from palette4d.lut_export.formats import shaper_warning
     from palette4d.wording import counted
 
     entries = [entry for one in done for entry in one.document["frames"]]
+    shaped = {
+        one.document["options"]["format"]
+        for one in done
+        for entry in one.document["frames"]
+        if entry["shaper"]["kind"] != "none"
+    }
+    for name in shaped:
+        if about := shaper_warning(name):
+            print(f"palette4d: warning: {about}", file=sys.stderr)
     if any(entry["clip"] is None for entry in entries):
         print(
             "palette4d: note: not all of the clip's frames could be read; errors are stated on the "

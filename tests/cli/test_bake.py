@@ -275,6 +275,9 @@ class TestReport:
         printed = capsys.readouterr()
         assert "shaper log, input " in printed.out
         assert "lie outside" not in printed.err
+        assert "give those a .csp" not in printed.err
+        assert run("-o", tmp_path / "a.cube", "--clip", picture, "--size", 5) == 0
+        assert "only Resolve and OpenColorIO know the shaper" in capsys.readouterr().err
 
     def test_without_the_clip_the_palette_decides(
         self, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -40,6 +40,15 @@ class TestExport:
         assert "0 baked, 3 there already" in printed.out
         assert "%" not in printed.err.replace("--clip", "")
 
+    def test_a_cube_with_a_shaper_is_warned_of(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        words = ("--frames", "4", "-o", tmp_path)
+        assert export(*words) == 0
+        assert "give those a .csp" not in capsys.readouterr().err
+        assert export(*words, "--domain", "-0.5", "4", "--force") == 0
+        assert capsys.readouterr().err.count("give those a .csp") == 1
+
     def test_json_is_the_index(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         assert export("--frames", "4,9", "-o", tmp_path, "--format", "clf", "--json") == 0
         printed = json.loads(capsys.readouterr().out)
