@@ -10,7 +10,6 @@ base there is one more that applies it.
 """
 
 import copy
-import difflib
 import os
 import re
 import shutil
@@ -24,7 +23,13 @@ from palette4d.errors import Palette4dError
 from palette4d.lut_export import series
 from palette4d.lut_export.formats import LutFormat, format_named
 from palette4d.lut_export.spaces import PALETTE
-from palette4d.ocio_config import BUILT_IN, load_config, same_encodings
+from palette4d.ocio_config import (
+    BUILT_IN,
+    colour_space,
+    load_config,
+    near_spaces,
+    same_encodings,
+)
 from palette4d.replacing import make_folder, refuse_existing, replacing
 from palette4d.wording import counted, file_safe
 
@@ -280,37 +285,35 @@ def _process_space(config: Any, base: str, sidecar: _core.Sidecar, wanted: str |
     """
     import PyOpenColorIO as ocio
 
+    if wanted is not None:
+        return str(colour_space(config, base, wanted, "--process-space").getName())
     encoding = str(sidecar.clip["encoding"])
-    if wanted is None and encoding.strip().lower() in ("", "unknown"):
+    if encoding.strip().lower() in ("", "unknown"):
         raise Palette4dError(
             f"the sidecar of {sidecar.clip['name']!r} does not say in which encoding its colours "
             "are; name a colour space of the config with --process-space"
         )
-    names = [wanted] if wanted is not None else same_encodings(encoding)
+    names = same_encodings(encoding)
     for name in names:
         space = config.getColorSpace(name)
         if space is not None and not space.isData():
             return str(space.getName())
     lacking = ""
-    if wanted is None:
-        built_in = ocio.Config.CreateFromBuiltinConfig(BUILT_IN)
-        for name in names:
-            if built_in.getColorSpace(name) is None:
-                continue
-            try:
-                return str(ocio.Config.IdentifyBuiltinColorSpace(config, built_in, name))
-            except ocio.Exception:
-                roles = ("aces_interchange", "scene_linear")
-                missing = [role for role in roles if not config.hasRole(role)]
-                if missing:
-                    lacking = f"; it lacks the role {missing[0]}, by which one could be found"
-                break
-    known = [space.getName() for space in config.getColorSpaces()]
-    near = difflib.get_close_matches(names[0], known, n=4, cutoff=0.3) or known[:8]
-    what = f"colour space {wanted!r}" if wanted is not None else f"colour space for {encoding!r}"
+    built_in = ocio.Config.CreateFromBuiltinConfig(BUILT_IN)
+    for name in names:
+        if built_in.getColorSpace(name) is None:
+            continue
+        try:
+            return str(ocio.Config.IdentifyBuiltinColorSpace(config, built_in, name))
+        except ocio.Exception:
+            roles = ("aces_interchange", "scene_linear")
+            missing = [role for role in roles if not config.hasRole(role)]
+            if missing:
+                lacking = f"; it lacks the role {missing[0]}, by which one could be found"
+            break
     raise Palette4dError(
-        f"{base}: found no {what}{lacking}; name one with --process-space, such as "
-        f"{' or '.join(repr(name) for name in near)}"
+        f"{base}: found no colour space for {encoding!r}{lacking}; name one with --process-space, "
+        f"such as {near_spaces(config, encoding)}"
     )
 
 

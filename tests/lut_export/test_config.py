@@ -303,17 +303,18 @@ class TestRefusals:
 
     def test_a_base_without_the_space_and_the_roles(self, shot: Path, tmp_path: Path) -> None:
         config = ocio.Config.CreateRaw()
-        config.addColorSpace(ocio.ColorSpace(name="film log"))
+        config.addColorSpace(ocio.ColorSpace(name="film log", aliases=["flog"]))
         base = tmp_path / "base.ocio"
         base.write_text(config.serialize(), "utf-8")
         word = "no colour space for 'sRGB'; it lacks the role.*--process-space.*film log"
         self.refused([shot], tmp_path, word, options(base=str(base)))
-        self.refused(
-            [shot],
-            tmp_path,
-            "no colour space 'film lgo'.*'film log'",
-            options(base=str(base), process_space="film lgo"),
-        )
+        for near, expected in (
+            ("film lgo", "no such colour space .* such as 'film log'$"),
+            ("fl0g", "such as 'film log'$"),
+            ("raw", "holds data, not colours"),
+        ):
+            found = options(base=str(base), process_space=near)
+            self.refused([shot], tmp_path, f"--process-space '{near}': .*{expected}", found)
         chosen = options(10, base=str(base), process_space="film log")
         assert write_config([shot], tmp_path / "s", chosen).shots[0].process_space == "film log"
 

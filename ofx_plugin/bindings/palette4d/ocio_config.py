@@ -114,14 +114,9 @@ def colour_space(config: Any, config_name: str, name: str, option: str) -> Any:
     """
     found = config.getColorSpace(name)
     if found is None:
-        known = {str(space.getName()): str(space.getName()) for space in config.getColorSpaces()}
-        for space in config.getColorSpaces():
-            known |= {str(alias): str(space.getName()) for alias in space.getAliases()}
-        known |= {str(role): str(role) for role, _ in config.getRoles()}
-        names = list(dict.fromkeys(known[match] for match in near(name, list(known), 6)))[:4]
         raise Palette4dError(
             f"{option} {name!r}: found no such colour space in {config_name}; expected a name, "
-            f"an alias or a role of it, such as {' or '.join(repr(name) for name in names)}"
+            f"an alias or a role of it, such as {near_spaces(config, name)}"
         )
     if found.isData():
         raise Palette4dError(
@@ -129,6 +124,21 @@ def colour_space(config: Any, config_name: str, name: str, option: str) -> Any:
             "space"
         )
     return found
+
+
+def near_spaces(config: Any, name: str) -> str:
+    """Return the config's spaces of colours whose name, alias or role is near, for an error."""
+    known: dict[str, str] = {}
+    for space in config.getColorSpaces():
+        if not space.isData():
+            names = [space.getName(), *space.getAliases()]
+            known |= {str(entry): str(space.getName()) for entry in names}
+    for role, _ in config.getRoles():
+        space = config.getColorSpace(role)
+        if space is not None and not space.isData():
+            known[str(role)] = str(role)
+    names = list(dict.fromkeys(known[match] for match in near(name, list(known), 6)))[:4]
+    return " or ".join(repr(entry) for entry in names)
 
 
 def same_encodings(encoding: str) -> list[str]:
