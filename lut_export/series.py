@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from palette4d import _core
-from palette4d.errors import Palette4dError
+from palette4d.errors import Palette4dError, WriteError
 from palette4d.lut_export.bake import BakeOptions, bake, check_options, check_target
 from palette4d.lut_export.formats import format_named
 from palette4d.lut_export.frame_edit import frame_text
@@ -227,7 +227,7 @@ def export_all(
     ------
     Palette4dError
         Nothing can be baked, or files that differ are there and `force` is false; then nothing was
-        written.
+        written. `WriteError`: the disk is full, say; the files that are there are whole.
     KeyboardInterrupt
         Ctrl-C; the files that are there are whole, and the indexes list them.
     """
@@ -245,10 +245,15 @@ def export_all(
     tell(sum(one.done for one in exports), total)
     tasks = {(i, f): task for i, one in enumerate(exports) for f, task in one.tasks.items()}
     try:
-        workers.run(bake_frame, tasks, take)
-    finally:
-        for one in exports:
-            one.finish()
+        try:
+            workers.run(bake_frame, tasks, take)
+        finally:
+            for one in exports:
+                one.finish()
+    except WriteError as error:
+        raise WriteError(
+            f"{error}; the files that are there are whole, and the same command goes on from them"
+        ) from error
     return [one.series() for one in exports]
 
 
@@ -301,6 +306,8 @@ class _Export:
         target = self.request.folder / self.tasks[frame].file
         try:
             _put(target, outcome.data, self.request.options.force)
+        except WriteError:
+            raise  # so would all others
         except Palette4dError as error:
             self.failed[frame] = str(error)
             return

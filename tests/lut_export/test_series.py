@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -17,6 +18,7 @@ import numpy as np
 import PyOpenColorIO as ocio
 import pytest
 from palette4d import Palette4dError, _core
+from palette4d.errors import WriteError
 from palette4d.lut_export import series
 from palette4d.lut_export.bake import BakeOptions
 from palette4d.lut_export.frame_edit import frame_edit
@@ -227,6 +229,30 @@ if __name__ == "__main__":
         out, err = again.communicate(timeout=300)
         assert again.returncode == 0, err
         assert [entry["frame"] for entry in json.loads(out)["frames"]] == [0, 4, 8, 12, 16, 20]
+
+
+def test_a_disk_that_fills_up_ends_it_at_once(tmp_path: Path) -> None:
+    """From the first frame on this process may write small files only; its workers may not know."""
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    told: list[int] = []
+
+    def fill(done: int, total: int) -> None:
+        told.append(done)
+        if done:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (3000, limits[1]))
+
+    wanted = options(0, 2, 4, 6, 8, 10, jobs=2)
+    try:
+        with pytest.raises(WriteError, match=r"File too large; expected .* goes on from them"):
+            export(EDITED, tmp_path / "l", wanted, fill)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert max(told) == 1  # no other frame was tried
+    (index,) = (tmp_path / "l").glob("*.json")
+    entries = json.loads(index.read_text("utf-8"))["frames"]
+    assert {e["file"] for e in entries} | {index.name} == set(state(tmp_path / "l"))
+    done = export(EDITED, tmp_path / "l", replace(wanted, workers=Workers(1)))
+    assert (len(done.kept), len(done.baked)) == (1, 5)
 
 
 class TestStops:

@@ -8,6 +8,10 @@ class Palette4dError(Exception):
     """
 
 
+class WriteError(Palette4dError):
+    """A file that cannot be written where it should be: no permission, or no room."""
+
+
 class SidecarError(Palette4dError):
     """An unusable sidecar; `str()` is "FILE: POINTER: found X, expected Y".
 

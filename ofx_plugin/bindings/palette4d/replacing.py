@@ -6,7 +6,7 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 
-from palette4d.errors import Palette4dError
+from palette4d.errors import Palette4dError, WriteError
 
 
 def refuse_existing(path: Path, force: bool) -> None:
@@ -51,7 +51,8 @@ def replacing(path: Path, *, force: bool = False) -> Generator[Path]:
     Raises
     ------
     Palette4dError
-        As `refuse_existing`, or the folder cannot be written to, or the disk is full.
+        As `refuse_existing`; `WriteError` where the folder cannot be written to, or the disk is
+        full.
     """
     refuse_existing(path, force)
     try:
@@ -59,7 +60,7 @@ def replacing(path: Path, *, force: bool = False) -> Generator[Path]:
             prefix=f".{path.stem}.", suffix=f".part{path.suffix}", dir=path.parent
         )
     except OSError as error:
-        raise Palette4dError(
+        raise WriteError(
             f"{path}: cannot write in {path.parent}: {error.strerror}; "
             "choose another folder or mend its permissions"
         ) from error
@@ -74,7 +75,10 @@ def replacing(path: Path, *, force: bool = False) -> Generator[Path]:
         refuse_existing(path, force)
         temporary.replace(path)
     except OSError as error:
-        raise Palette4dError(f"{path}: could not be written: {error.strerror or error}") from error
+        raise WriteError(
+            f"{path}: could not be written: {error.strerror or error}; expected a disk with room, "
+            "make some or choose another folder"
+        ) from error
     finally:
         temporary.unlink(missing_ok=True)
 
