@@ -203,11 +203,17 @@ def sidecars(path: Path) -> tuple[list[Path], list[str]]:
     Raises
     ------
     Palette4dError
-        The manifest cannot be read, or no shot of it is done.
+        The manifest cannot be read, no shot of it is done, or the sidecar of one is gone.
     """
     manifest = read(path)
     done = [path.parent / e.sidecar for e in manifest.entries if e.status == DONE]
     others = [e.shot.name for e in manifest.entries if e.status != DONE]
+    if gone := [file.name for file in done if not file.exists()]:
+        some = ", ".join(gone[:8]) + (", …" if len(gone) > 8 else "")
+        raise Palette4dError(
+            f"{path}: found no sidecar {some} beside it, expected those of shots that are done; "
+            "bring them back, or run `palette4d analyze` again, which makes what is missing"
+        )
     if not done:
         raise Palette4dError(
             f"{path}: none of its {len(others)} shots is analysed; run `palette4d analyze` again"

@@ -57,6 +57,9 @@ def test_what_is_written_is_read_back(tmp_path: Path) -> None:
 def test_the_sidecars_of_shots_that_are_done(tmp_path: Path) -> None:
     path = tmp_path / "x.shots.json"
     manifests.write(show(), path)
+    with pytest.raises(Palette4dError, match=r"no sidecar a\.p4d\.json beside it.*analyze` again"):
+        manifests.sidecars(path)
+    (tmp_path / "a.p4d.json").touch()
     assert manifests.sidecars(path) == ([tmp_path / "a.p4d.json"], ["b", "c_f-5"])
 
 

@@ -221,9 +221,10 @@ class TestErrors:
     @pytest.mark.parametrize(
         ("change", "said"),
         [
-            (lambda text: text[: len(text) // 2], "expected"),
-            (lambda text: text.replace('"version": 1', '"version": 999', 1), "999"),
-            (lambda text: "", "expected"),
+            (lambda text: text[: len(text) // 2], "take an earlier copy"),
+            (lambda text: text.replace('"version": 1', '"version": 999', 1), "update palette4d"),
+            (lambda text: "", "expected JSON text (RFC 8259); mend it there"),
+            (lambda text: text.replace('"rgb": [', '"rgb": [7, ', 1), "or analyse the clip again"),
         ],
     )
     def test_sidecars(
@@ -240,6 +241,7 @@ class TestErrors:
             text = capsys.readouterr().err
             assert "bad.p4d.json" in text
             assert said in text
+            assert ("mend it there" in text) != ("update palette4d" in text)
         assert [path.name for path in tmp_path.iterdir()] == ["bad.p4d.json"]
 
 

@@ -298,8 +298,9 @@ def test_folders_that_cannot_be_written_are_named(tmp_path):
     grey_levels(tmp_path / "in", range(2))
     with pytest.raises(OutputError, match="cannot be created"):
         run(PLAIN, tmp_path / "in", "-o", tmp_path / "file" / "o.#.png")
-    with pytest.raises(OutputError, match=r"o\.png.*cannot be written"):
-        write_frame(tmp_path / "none" / "o.png", colours(2, 2, 3), "uint8")
+    for folder in ("none", "file"):
+        with pytest.raises(OutputError, match=r"o\.png.*cannot be written"):
+            write_frame(tmp_path / folder / "o.png", colours(2, 2, 3), "uint8")
     if os.geteuid() != 0:  # root may write everywhere
         (tmp_path / "locked").mkdir(mode=0o500)
         with pytest.raises(OutputError, match="cannot be written"):

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 
 from palette4d import __version__
 from palette4d.arguments import Parser, accept_negative_values
-from palette4d.errors import Palette4dError
+from palette4d.errors import Palette4dError, SidecarError
 
 #: The modules of the verbs, in the order of a day's work (and of ``palette4d --help``).
 VERB_MODULES = (
@@ -88,5 +88,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _report(error: Exception) -> int:
     text = str(error).encode("utf-8", "backslashreplace").decode("utf-8")
+    broken = isinstance(error, SidecarError) and (error.pointer or "JSON" in error.expected)
+    if broken and "update palette4d" not in text:
+        text += "; mend it there, take an earlier copy of the file, or analyse the clip again"
     print(f"palette4d: error: {text}", file=sys.stderr)
     return 1

@@ -6,6 +6,7 @@ premultiplied in EXR, straight in PNG, and in TIFF whichever the frame has (and 
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -220,7 +221,9 @@ def write_frame(
     except OSError as error:
         raise _cannot_write(path, error.strerror or str(error)) from error
     finally:
-        temporary.unlink(missing_ok=True)
+        # Where the folder cannot be written, not even this can be asked.
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def _is_whole(path: Path) -> bool:
