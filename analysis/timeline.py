@@ -90,7 +90,7 @@ class _Reader:
         self, otio: Any, document: Document, folder: media.Folder | None, handles: int
     ) -> None:
         self.otio, self.timeline, self.path = otio, document.timeline, document.path
-        self.late, self.folder, self.handles = document.late, folder, handles
+        self.folder, self.handles = folder, handles
         self.clips: dict[str, Clip] = {}
         self.shots: list[Shot] = []
         self.others: dict[tuple[str, str], int] = {}
@@ -135,7 +135,7 @@ class _Reader:
             self.passed_over("clip is cut away", "clips are cut away")
             return
         record, used = shown
-        place = Place(track, self.record_of(path, record), path)
+        place = Place(track, self.record_of(record), path)
         try:
             spec, opened = self.opened(clip)
             first, last = self.frames(clip, used, opened)
@@ -170,13 +170,12 @@ class _Reader:
         name = file_safe(clip.name or "shot")
         self.shots.append(Shot(name, "", 0, 0, (0, 0), place=place, problem=problem))
 
-    def record_of(self, path: tuple[int, ...], time: Any) -> str:
+    def record_of(self, time: Any) -> str:
         """Return a time of the timeline as a timecode, or a number where there is none."""
         opentime = self.otio.opentime
-        late = self.late[path[0]] if self.late else 0.0
         start = self.timeline.global_start_time
         rate = float(self.rate)
-        at = time.rescaled_to(rate) + opentime.RationalTime(late, rate)
+        at = time.rescaled_to(rate)
         if start is not None:
             at += start.rescaled_to(rate)
         try:
@@ -214,13 +213,14 @@ class _Reader:
             return spec
         if self.folder is not None and (there := self.folder.find(names)):
             return str(there)
-        looked = f" under {self.folder.path}" if self.folder is not None else ""
-        what = f"{named!r}" if named else "no media named, and"
-        raise Palette4dError(
-            f"the media is missing: found {what} {'not there' if named else 'nothing'}"
-            + (f", and nothing named {' or '.join(map(repr, names))}{looked}" if looked else "")
-            + "; name the folder that holds it with --media FOLDER"
-        )
+        what = f"{named!r} is not there" if named else "the edit names no file for it"
+        if self.folder is None:
+            help_ = "name the folder that holds it with --media FOLDER"
+        else:
+            looked = " or ".join(map(repr, names)) or "its name"
+            what += f", and nothing under {self.folder.path} is called {looked}"
+            help_ = "bring it there, or name another folder with --media"
+        raise Palette4dError(f"the media is missing: {what}; {help_}")
 
     def frames(self, clip: Any, used: Any, opened: Clip) -> tuple[int, int]:
         """Return the first and the last of the media's frame numbers in a range of its time."""

@@ -34,12 +34,10 @@ def library() -> Any:
 
 @dataclasses.dataclass(frozen=True)
 class Document:
-    """A timeline that was read: OpenTimelineIO's object, and how many frames later than the first
-    each track of an EDL begins."""
+    """A timeline that was read: its file and OpenTimelineIO's object."""
 
     path: Path
     timeline: Any
-    late: tuple[float, ...]
 
 
 def is_timeline(spec: str) -> bool:
@@ -94,33 +92,33 @@ def read(path: Path, rate: Fraction | None = None) -> Document:
             f"{path}: found a {type(found).__name__}, expected a timeline; write the edit to a "
             "file as a whole"
         )
-    return Document(path, found, _rebase(found) if extension == "edl" else ())
+    if extension == "edl":
+        _rebase(found)
+    return Document(path, found)
 
 
 def _first_line(error: Exception) -> str:
     return str(error).strip().partition("\n")[0] or type(error).__name__
 
 
-def _rebase(timeline: Any) -> tuple[float, ...]:
-    """Let an EDL's tracks begin at their start; return how much later than the first each does.
+def _rebase(timeline: Any) -> None:
+    """Let an EDL's tracks begin with the first of them, those that start later with a gap.
 
     The EDL adapter notes a track's first record timecode as a start before the track's own; taken
     as a range, as OpenTimelineIO does, it shows nothing of the track.
     """
     otio = library()
     starts = [t.source_range.start_time for t in timeline.tracks if t.source_range is not None]
-    late: list[float] = []
     if not starts:
-        return ()
+        return
     first = max(starts)  # the least record timecode: they are its negative
     for track in timeline.tracks:
         if track.source_range is not None:
-            late.append(float((first - track.source_range.start_time).value))
+            late = first - track.source_range.start_time
             track.source_range = None
-        else:
-            late.append(0.0)
+            if late.value > 0:
+                track.insert(0, otio.schema.Gap(duration=late))
     timeline.global_start_time = otio.opentime.RationalTime(-first.value, first.rate)
-    return tuple(late)
 
 
 def sha256(path: Path) -> str:

@@ -270,10 +270,10 @@ class TestMedia:
             clip("take", external("plates/b/take.mov"), 0, 5),
         )
         gone, web, none, take = edit(made, tmp_path, plates).shots
-        assert "'/vol/gone.mov' not there" in gone.problem
+        assert "'/vol/gone.mov' is not there" in gone.problem
         assert "--media" in gone.problem
         assert "expected a file" in web.problem
-        assert "no media named" in none.problem
+        assert "the edit names no file for it, and nothing under" in none.problem
         assert not take.problem
 
     def test_no_such_folder(self, tmp_path: Path) -> None:

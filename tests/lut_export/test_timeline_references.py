@@ -134,8 +134,10 @@ class TestReferences:
         assert not Path("luts").exists()
 
     def test_an_edl_becomes_an_otio(self, show: Path, tmp_path: Path) -> None:
+        """Its tracks begin at different times, the later one first in the file."""
         (tmp_path / "reel.edl").write_text(
-            "TITLE: reel\n\n001 ONE V C 00:00:00:02 00:00:00:08 01:00:00:00 01:00:00:06\n"
+            "TITLE: reel\n\n001 ONE V2 C 00:00:00:04 00:00:00:10 01:00:10:03 01:00:10:09\n"
+            "* FROM CLIP NAME: one\n002 ONE V C 00:00:00:02 00:00:00:08 01:00:00:00 01:00:00:06\n"
             "* FROM CLIP NAME: one\n"
         )
         words = ["analyze", "reel.edl", "--media", "media", "-o", "reel", "--quiet", *QUICK]
@@ -143,9 +145,15 @@ class TestReferences:
         manifest = tmp_path / "reel" / "reel.shots.json"
         assert export(manifest, "-o", "luts", "--otio", "reel.otio") == 0
         found = otio.adapters.read_from_file("reel.otio")
-        (track,) = found.tracks
-        assert track[0].metadata["palette4d"]["sidecar"] == "reel/one.p4d.json"
-        assert otio.opentime.to_timecode(found.global_start_time) == "01:00:00:00"
+        places = {}
+        for one in found.find_clips():
+            noted = one.metadata["palette4d"]
+            at = found.global_start_time + one.range_in_parent().start_time
+            places[noted["sidecar"]] = (list(noted["used"]), otio.opentime.to_timecode(at))
+        assert places == {
+            "reel/one.p4d.json": ([4, 9], "01:00:10:03"),
+            "reel/one_f2.p4d.json": ([2, 7], "01:00:00:00"),
+        }
 
     def test_a_movie_has_no_timeline(
         self, show: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
