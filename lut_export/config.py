@@ -26,12 +26,16 @@ from palette4d.lut_export.spaces import PALETTE
 from palette4d.ocio_config import (
     BUILT_IN,
     colour_space,
+    failures,
     load_config,
     near_spaces,
     same_encodings,
 )
 from palette4d.replacing import make_folder, refuse_existing, replacing
 from palette4d.wording import counted, file_safe
+
+#: The folder of the tables, beside the config.
+TABLES = "luts"
 
 #: The look whose shot and frame are both variables.
 ANY_SHOT = "palette4d"
@@ -149,7 +153,7 @@ def write_config(
     in_palette = replace(options.series.bake, space=PALETTE)
     requests = []
     for file, name, chosen in zip(sidecars, names, frames, strict=True):
-        _remove_links(folder / "luts" / name)
+        _remove_links(folder / TABLES / name)
         one = replace(
             options.series,
             bake=in_palette,
@@ -158,7 +162,7 @@ def write_config(
             padding=0,
             force=options.force,
         )
-        requests.append(series.Request(file, folder / "luts" / name, one))
+        requests.append(series.Request(file, folder / TABLES / name, one))
     baked = series.export_all(requests, options.series.workers, progress)
     _refuse_failed(names, baked)
     shots = []
@@ -175,10 +179,10 @@ def write_config(
         temporary.write_text(config.serialize(), encoding="utf-8", newline="\n")
         try:
             _validate(ocio.Config.CreateFromFile(str(temporary)), shots, views)
-        except ocio.Exception as error:
+        except failures() as error:
             raise Palette4dError(
                 f"{path}: OpenColorIO refuses the config: {error}; nothing was written but the "
-                "tables"
+                f"tables. Mend {base}, or choose another with --base"
             ) from error
     return WrittenConfig(path, base, shots, views, notes)
 
@@ -305,7 +309,7 @@ def _process_space(config: Any, base: str, sidecar: _core.Sidecar, wanted: str |
             continue
         try:
             return str(ocio.Config.IdentifyBuiltinColorSpace(config, built_in, name))
-        except ocio.Exception:
+        except failures():
             roles = ("aces_interchange", "scene_linear")
             missing = [role for role in roles if not config.hasRole(role)]
             if missing:
@@ -321,9 +325,10 @@ def _refuse_looks(config: Any, base: str, names: list[str]) -> None:
     there = {str(name).lower() for name in config.getLookNames()}
     for name in names:
         if name.lower() in there:
+            other = "give all shots in one command" if name == ANY_SHOT else "choose with --names"
             raise Palette4dError(
-                f"{base}: it has a look {name!r} already; give another name with --names, or "
-                "replace it with --force"
+                f"{base}: it has a look {name!r} already, expected none; {other}, or replace it "
+                "with --force"
             )
 
 
@@ -341,17 +346,20 @@ def _relocate(config: Any, base: str, archive: bool, folder: Path) -> list[str]:
             there = Path(base).absolute().parent
             root = "" if there == folder.absolute() else str(there)
         config.clearSearchPaths()
+        # First: only a base of palette4d's own can have files of the same names.
+        config.addSearchPath(TABLES)
         for path in own or [""]:
             absolute = Path(path).is_absolute() or path.startswith(("$", "%"))
             found = path if absolute or not root else str(Path(root) / path)
-            config.addSearchPath(found or ".")
+            if found != TABLES:
+                config.addSearchPath(found or ".")
         if root and not archive:
             notes.append(f"the base's own files are still read from {root}")
         # A list of variables in the config keeps all others of the environment out.
         if not list(config.getEnvironmentVarNames()):
             notes += _declare_variables(config)
-    if "luts" not in own:
-        config.addSearchPath("luts")
+    else:
+        config.addSearchPath(TABLES)
     config.setWorkingDir(str(folder.absolute()))
     return notes
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from palette4d.errors import Palette4dError
+from palette4d.ocio_config import failures
 
 F32 = NDArray[np.float32]
 
@@ -67,7 +68,7 @@ class LoadedLut:
             )
             # Lossless: no step may be replaced by an approximation, the error is the file's own.
             self._processor = processor.getOptimizedCPUProcessor(ocio.OPTIMIZATION_LOSSLESS)
-        except (ocio.Exception, ocio.ExceptionMissingFile) as error:
+        except failures() as error:
             raise Palette4dError(f"{path}: OpenColorIO cannot read it: {error}") from error
 
     def apply(self, colours: F32) -> F32:

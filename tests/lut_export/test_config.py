@@ -173,15 +173,15 @@ def test_more_tables_replace_links(shot: Path, tmp_path: Path) -> None:
 
 
 class TestBase:
-    def own(self, tmp_path: Path, *, environment: bool = False) -> Path:
+    def own(self, tmp_path: Path, *, environment: bool = False, files: str = "files") -> Path:
         """A small config with a file of its own in a search path."""
         folder = tmp_path / "base"
-        (folder / "files").mkdir(parents=True)
-        (folder / "files" / "half.spi1d").write_text(
+        (folder / files).mkdir(parents=True)
+        (folder / files / "half.spi1d").write_text(
             "Version 1\nFrom 0.0 1.0\nLength 2\nComponents 1\n{\n0.0\n0.5\n}\n", "utf-8"
         )
         config = ocio.Config.CreateRaw()
-        config.addSearchPath("files")
+        config.addSearchPath(files)
         if environment:
             config.addEnvironmentVar("SHOT", "theirs")
         config.addColorSpace(ocio.ColorSpace(name="srgb_tx"))
@@ -193,8 +193,9 @@ class TestBase:
         path.write_text(config.serialize(), "utf-8")
         return path
 
-    def test_its_own_files_are_still_found(self, shot: Path, tmp_path: Path) -> None:
-        base = self.own(tmp_path)
+    @pytest.mark.parametrize("files", ["files", "luts"])
+    def test_its_own_files_are_still_found(self, files: str, shot: Path, tmp_path: Path) -> None:
+        base = self.own(tmp_path, files=files)
         before = base.read_bytes()
         done = write_config([shot], tmp_path / "show", options(5, base=str(base)))
         assert base.read_bytes() == before
@@ -204,6 +205,33 @@ class TestBase:
         )
         got = shown(done.path, {"SHOT": "cube", "FRAME": "10"}, transform)
         np.testing.assert_allclose(got, core(shot, 10) / 2, atol=0.02)
+
+    def test_one_of_palette4d(self, two_shots: list[Path], tmp_path: Path) -> None:
+        """A second shot is added, and the first one changed, from another folder."""
+        first = write_config(two_shots[:1], tmp_path / "first", options(10))
+        with pytest.raises(Palette4dError, match=r"has a look 'palette4d' already.*--force"):
+            write_config(two_shots[1:], tmp_path / "show", options(10, base=str(first.path)))
+        names = [_core.read_sidecar(str(path)).clip["name"] for path in two_shots]
+        found = options(10, base=str(first.path), force=True)
+        done = write_config(two_shots[1:], tmp_path / "show", found)
+        for name, path in zip(names, two_shots, strict=True):
+            got = shown(done.path, {"SHOT": name, "FRAME": "10"}, look("palette4d"))
+            np.testing.assert_allclose(got, core(path, 10), atol=0.02)
+        document = json.loads(two_shots[0].read_text("utf-8"))
+        document["edits"]["vertices"] = [{"vertex": "v16", "rgb": [0.2, 0.9, 0.4]}]
+        two_shots[0].write_text(json.dumps(document), "utf-8")
+        done = write_config(two_shots[:1], tmp_path / "again", found)
+        got = shown(done.path, {"SHOT": names[0], "FRAME": "10"}, look("palette4d"))
+        np.testing.assert_allclose(got, core(two_shots[0], 10), atol=0.02)
+
+    def test_files_that_it_lacks(self, shot: Path, tmp_path: Path) -> None:
+        base = self.own(tmp_path)
+        (tmp_path / "base" / "files" / "half.spi1d").unlink()
+        with pytest.raises(
+            Palette4dError, match=r"OpenColorIO refuses .*'half.spi1d' could not be"
+        ):
+            write_config([shot], tmp_path / "show", options(5, base=str(base)))
+        assert not (tmp_path / "show" / "config.ocio").exists()
 
     def test_an_archive(self, shot: Path, tmp_path: Path) -> None:
         base = ocio.Config.CreateFromFile(str(self.own(tmp_path)))

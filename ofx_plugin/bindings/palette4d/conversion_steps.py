@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from palette4d import _core
 from palette4d.errors import Palette4dError
+from palette4d.ocio_config import failures
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -72,12 +73,11 @@ def conversion(config: Any, source: str, target: str) -> Conversion:
         There is something else than matrices and curves between them, or the chain is further than
         `TOLERANCE` from OpenColorIO.
     """
-    import PyOpenColorIO as ocio
 
     try:
         forward = _Processor(config.getProcessor(source, target))
         backward = _Processor(config.getProcessor(target, source))
-    except ocio.Exception as error:
+    except failures() as error:
         raise ConversionError(
             f"OpenColorIO has no way from {source!r} to {target!r} and back: {error}; choose "
             "another --palette-space"

@@ -47,6 +47,13 @@ SAME_ENCODINGS = (
 )
 
 
+def failures() -> tuple[type[Exception], ...]:
+    """Return what OpenColorIO raises: that for a missing file is no kind of its Exception."""
+    import PyOpenColorIO as ocio
+
+    return ocio.Exception, ocio.ExceptionMissingFile
+
+
 def load_config(name: str, option: str) -> Any:
     """Return the config of a name.
 
@@ -68,7 +75,7 @@ def load_config(name: str, option: str) -> Any:
         known = [f"ocio://{entry[0]}" for entry in ocio.BuiltinConfigRegistry().getBuiltinConfigs()]
         try:
             return ocio.Config.CreateFromBuiltinConfig(name)
-        except ocio.Exception as error:
+        except failures() as error:
             raise Palette4dError(
                 f"{name}: OpenColorIO {ocio.__version__} has no such config; expected one such as "
                 f"{' or '.join(near(name, known))}"
@@ -81,7 +88,7 @@ def load_config(name: str, option: str) -> Any:
     try:
         config = ocio.Config.CreateFromFile(name)
         config.validate()
-    except ocio.Exception as error:
+    except failures() as error:
         raise Palette4dError(
             f"{name}: OpenColorIO cannot use it as a config: {error}; mend it, or choose another "
             f"with {option}"
