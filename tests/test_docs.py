@@ -1,0 +1,51 @@
+"""The pages: every command that they show is one, and every link leads somewhere."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from palette4d.cli import build_parser
+
+PAGES = ["README.md", "CONTRIBUTING.md", "benchmarks/README.md"]
+
+
+def pages(repo_root: Path) -> list[Path]:
+    return [repo_root / name for name in PAGES] + sorted((repo_root / "docs").rglob("*.md"))
+
+
+def commands(text: str) -> list[list[str]]:
+    """The words after `palette4d` of each indented command, without pipes and remarks."""
+    lines = re.sub(r"\\\n\s*", "", text)
+    found = []
+    for line in re.findall(r"^ {4}(?:sudo )?palette4d (.*)$", lines, re.MULTILINE):
+        lexer = shlex.shlex(line, posix=True, punctuation_chars="|><;&")
+        lexer.whitespace_split, lexer.commenters = True, "#"
+        words = list(lexer)
+        end = next((i for i, word in enumerate(words) if set(word) <= set("|><;&")), len(words))
+        found.append(words[:end])
+    return found
+
+
+def test_every_command_is_one(repo_root: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    parser = build_parser()
+    shown = [(page, words) for page in pages(repo_root) for words in commands(page.read_text())]
+    assert len(shown) > 50
+    for page, words in shown:
+        try:
+            parser.parse_args(words)
+        except SystemExit:
+            said = capsys.readouterr().err.strip().splitlines()[-1]
+            pytest.fail(f"{page.name}: palette4d {shlex.join(words)}: {said}")
+
+
+def test_every_link_leads_somewhere(repo_root: Path) -> None:
+    seen = 0
+    for page in pages(repo_root):
+        for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text("utf-8")):
+            if "://" not in target:
+                assert (page.parent / target).exists(), f"{page.name}: {target}"
+                seen += 1
+    assert seen > 20
