@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import PyOpenColorIO as ocio
 import pytest
 from numpy.typing import NDArray
 
@@ -77,6 +80,24 @@ def cube_document(
         "edits": {"vertices": edits, "stops": []},
         "extra": {},
     }
+
+
+@pytest.fixture(scope="session")
+def ocio_tool() -> Callable[..., str]:
+    """Run one of OpenColorIO's own programs, which must succeed; what it prints."""
+
+    def run(name: str, *words: object, **environment: str) -> str:
+        done = subprocess.run(
+            [Path(ocio.__file__).parent / "bin" / name, *map(str, words)],
+            capture_output=True,
+            text=True,
+            check=False,
+            env={**os.environ, **environment},
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
+
+    return run
 
 
 @pytest.fixture

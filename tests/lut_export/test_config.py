@@ -125,8 +125,11 @@ def test_views_apply_the_look(shot: Path, tmp_path: Path) -> None:
         assert (np.abs(got - colours()).max() > 0.1) == edited
 
 
-def test_without_variables_the_middle_is_shown(shot: Path, tmp_path: Path) -> None:
+def test_without_variables_the_middle_is_shown(
+    shot: Path, tmp_path: Path, ocio_tool: Callable[..., str]
+) -> None:
     done = write_config([shot], tmp_path / "show", options())
+    assert "ERROR" not in ocio_tool("ociocheck", "--iconfig", done.path)
     got = shown(done.path, {}, look("palette4d"))
     np.testing.assert_array_equal(got, shown(done.path, {"FRAME": "5"}, look("cube")))
     assert np.abs(got - colours()).max() > 0.01

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -67,7 +68,11 @@ def test_opencolorio_writes_no_other_format() -> None:
 
 @pytest.mark.parametrize("known", TABLES, ids=named)
 def test_each_format_keeps_its_stated_error_on_a_real_frame(
-    known: LutFormat, warm_sidecar: Path, tmp_path: Path, real_frame: F32
+    known: LutFormat,
+    warm_sidecar: Path,
+    tmp_path: Path,
+    real_frame: F32,
+    ocio_tool: Callable[..., str],
 ) -> None:
     image = np.ascontiguousarray(real_frame[::3, ::3])
     out = tmp_path / f"warm{known.extension}"
@@ -77,6 +82,11 @@ def test_each_format_keeps_its_stated_error_on_a_real_frame(
     assert result.shaper.kind == "none"
     check(result, out, warm_sidecar, image)
     assert result.error < 0.02
+    brightest = image.reshape(-1, 3)[image.sum(axis=-1).argmax()]
+    found = np.array(ocio_tool("ociochecklut", out, *brightest).split(), dtype=np.float64)
+    want = exact(warm_sidecar, 4.0, brightest)
+    assert np.all(np.abs(found - want) <= result.error * np.maximum(np.abs(want), 0.1) + 1e-5)
+    assert np.abs(found - brightest).max() > 0.01
 
 
 @pytest.mark.parametrize("known", SHAPED, ids=named)

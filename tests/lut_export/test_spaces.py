@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 import xml.etree.ElementTree as ET
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -99,7 +101,9 @@ def test_a_list_of_transforms_has_the_conversion_beside_the_table(
     assert (np.abs(wanted - image) > 0.01 * image).any()
 
 
-def test_aces_look_transforms_take_and_return_ap0(gentle: Path, tmp_path: Path) -> None:
+def test_aces_look_transforms_take_and_return_ap0(
+    gentle: Path, tmp_path: Path, ocio_tool: Callable[..., str]
+) -> None:
     out = tmp_path / "look.clf"
     image = scene()
     result = bake(gentle, out, BakeOptions(FRAME, size=65, space="ACES2065-1"), image=image)
@@ -112,6 +116,8 @@ def test_aces_look_transforms_take_and_return_ap0(gentle: Path, tmp_path: Path) 
     back = through("ACES2065-1", "Linear Rec.709 (sRGB)", applied(out, ap0))
     wanted = rendered(gentle, image)
     assert (np.abs(back - wanted) / np.maximum(np.abs(wanted), 0.1)).mean() < 2e-3
+    steps = re.findall(r"<(\w+)Transform", ocio_tool("ociochecklut", out))
+    assert steps == ["Matrix", "LogCamera", "Lut3D", "LogCamera", "Matrix"]
 
 
 def test_a_table_holds_the_conversion_where_the_format_has_no_room(
