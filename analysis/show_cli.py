@@ -12,6 +12,7 @@ from palette4d import workers
 from palette4d.analysis.timeline_files import is_timeline
 from palette4d.arguments import whole
 from palette4d.errors import Palette4dError
+from palette4d.ocio_config import from_anywhere
 from palette4d.wording import counted
 
 if TYPE_CHECKING:
@@ -150,9 +151,7 @@ def _spaces(args: argparse.Namespace) -> SpaceOptions:
     from palette4d.analysis.colour_space import SpaceOptions
 
     config = args.ocio_config or os.environ.get("OCIO") or None
-    if config is not None and Path(config).is_file():
-        config = str(Path(config).absolute())
-    return SpaceOptions(args.input_space, args.palette_space, config)
+    return SpaceOptions(args.input_space, args.palette_space, from_anywhere(config))
 
 
 def _of_edit(args: argparse.Namespace) -> tuple[Source, list[Shot], list[str]]:

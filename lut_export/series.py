@@ -30,6 +30,7 @@ from palette4d.lut_export.series_index import (
     read_index,
     write_index,
 )
+from palette4d.ocio_config import from_anywhere
 from palette4d.replacing import make_folder, replacing
 from palette4d.source_clip import frame_colours
 from palette4d.wording import file_safe
@@ -279,11 +280,12 @@ class _Export:
         _refuse_changed(request.folder, names, todo, known, options.force)
         # Absolute: other processes may run elsewhere.
         clip = None if options.clip is None else str(Path.cwd() / options.clip)
+        baked = replace(options.bake, ocio_config=from_anywhere(options.bake.ocio_config))
         self.tasks = {
             f: FrameTask(
                 sidecar=request.sidecar.absolute(),
                 file=names[f],
-                options=replace(options.bake, frame=float(f)),
+                options=replace(baked, frame=float(f)),
                 clip=clip,
             )
             for f in todo

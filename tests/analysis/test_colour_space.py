@@ -201,16 +201,20 @@ def test_files_and_rules_decide_when_nothing_is_said(
     assert display.conversion is None
 
 
-def test_a_file_rule_decides_by_name(linear_clip: str, tmp_path: Path) -> None:
+def test_a_file_rule_decides_by_name(
+    linear_clip: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     config = ocio_config.load_config(STUDIO, "test")
     rules = config.getFileRules()
     rules.insertRule(0, "cg renders", "ACEScg", "*/cg.*", "exr")
     config.setFileRules(rules)
     path = tmp_path / "config.ocio"
     path.write_text(config.serialize(), encoding="utf-8")
-    spaces = chosen(linear_clip, ocio_config=str(path))
+    monkeypatch.chdir(tmp_path)
+    spaces = chosen(linear_clip, ocio_config=path.name)
     assert spaces is not None
     assert spaces.input_space == "ACEScg"
+    assert spaces.config_name == str(path)  # sidecars are read in other folders
     archive = tmp_path / "packed.ocioz"
     config.setWorkingDir(str(tmp_path))
     config.archive(str(archive))

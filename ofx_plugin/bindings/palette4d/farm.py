@@ -21,6 +21,7 @@ from typing import Any
 
 from palette4d import _core
 from palette4d.errors import Palette4dError
+from palette4d.ocio_config import from_anywhere
 from palette4d.pool import Failed, Key, Result, Task, later_interrupts, outcome, without_interrupts
 
 LOCAL = re.compile(r"local:([1-9][0-9]{0,2})")
@@ -75,7 +76,7 @@ def run(
         from distributed import as_completed
 
         _check_scheduler(client, address)
-        config = os.environ.get("OCIO")
+        config = from_anywhere(os.environ.get("OCIO"))
         keys = {}
         futures = []
         for key, task in tasks.items():

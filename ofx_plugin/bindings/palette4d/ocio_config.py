@@ -96,18 +96,24 @@ def load_config(name: str, option: str) -> Any:
     return config
 
 
+def from_anywhere(name: str | None) -> str | None:
+    """Return a config's name as it holds in every folder; None, "" and names of no file stay."""
+    return str(Path(name).absolute()) if name and Path(name).is_file() else name
+
+
 def chosen_config(given: str | None) -> tuple[Any, str]:
     """Return the config that was given, else that of ``$OCIO``, else `BUILT_IN`; and its name.
+
+    The name of a file is absolute.
 
     Raises
     ------
     Palette4dError
         It cannot be used.
     """
-    if given is not None:
-        return load_config(given, "--ocio-config"), given
-    if variable := os.environ.get("OCIO", ""):
-        return load_config(variable, "$OCIO"), variable
+    for name, option in ((given, "--ocio-config"), (os.environ.get("OCIO") or None, "$OCIO")):
+        if name is not None:
+            return load_config(name, option), from_anywhere(name) or name
     return load_config(BUILT_IN, "--ocio-config"), BUILT_IN
 
 
