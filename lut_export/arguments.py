@@ -1,9 +1,15 @@
 """The options that `bake`, `export` and `config` share."""
 
+from __future__ import annotations
+
 import argparse
+from typing import TYPE_CHECKING
 
 from palette4d.arguments import checked, number, whole
 from palette4d.lut_export.formats import format_named, format_names
+
+if TYPE_CHECKING:
+    from palette4d.lut_export.bake import BakeOptions
 
 
 def add_table_options(parser: argparse.ArgumentParser, default: str | None) -> None:
@@ -61,11 +67,6 @@ def add_table_options(parser: argparse.ArgumentParser, default: str | None) -> N
     )
 
 
-def domain(args: argparse.Namespace) -> tuple[float, float] | None:
-    """Return --domain as a pair."""
-    return None if args.domain is None else (args.domain[0], args.domain[1])
-
-
 def add_space_options(parser: argparse.ArgumentParser) -> None:
     """Add --space and --ocio-config."""
     parser.add_argument(
@@ -81,4 +82,24 @@ def add_space_options(parser: argparse.ArgumentParser) -> None:
         metavar="CONFIG",
         help="the config that knows SPACE: a config.ocio, .ocioz or ocio:// name (default: the one "
         "that the sidecar names, else $OCIO, else OpenColorIO's built-in studio config)",
+    )
+
+
+def bake_options(args: argparse.Namespace, format_name: str, frame: float = 0.0) -> BakeOptions:
+    """Return what the options ask for; a --domain that is none is wrong usage."""
+    from palette4d.lut_export.bake import BakeOptions
+
+    if args.domain is not None and not args.domain[0] < args.domain[1]:
+        args.usage_error("argument --domain: expected two numbers, the smaller one first")
+    # `config` has neither: it chooses the space itself.
+    spaces = {name: vars(args)[name] for name in ("space", "ocio_config") if name in args}
+    return BakeOptions(
+        frame=frame,
+        size=args.size,
+        strength=args.strength,
+        format=format_name,
+        shaper=args.shaper,
+        domain=None if args.domain is None else (args.domain[0], args.domain[1]),
+        max_error=args.max_error,
+        **spaces,
     )

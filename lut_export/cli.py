@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from palette4d.arguments import number
-from palette4d.lut_export.arguments import add_space_options, add_table_options, domain
+from palette4d.lut_export.arguments import add_space_options, add_table_options, bake_options
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -87,12 +87,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Bake; print what was written and its error."""
     from palette4d import _core
-    from palette4d.lut_export.bake import BakeOptions, bake, check_options, check_target
+    from palette4d.lut_export.bake import bake, check_options, check_target
     from palette4d.lut_export.formats import format_named, format_of
     from palette4d.source_clip import frame_colours
 
-    if args.domain is not None and not args.domain[0] < args.domain[1]:
-        args.usage_error("argument --domain: expected two numbers, the smaller one first")
     piped = args.output == "-"
     if piped and args.format is None:
         args.usage_error("-o - has no extension; expected --format FORMAT with it")
@@ -101,17 +99,7 @@ def run(args: argparse.Namespace) -> int:
     format_ = format_named(args.format) if piped else format_of(Path(args.output), args.format)
     if not piped:
         check_target(Path(args.output), args.force)
-    options = BakeOptions(
-        frame=args.frame,
-        size=args.size,
-        strength=args.strength,
-        format=format_.name,
-        shaper=args.shaper,
-        domain=domain(args),
-        max_error=args.max_error,
-        space=args.space,
-        ocio_config=args.ocio_config,
-    )
+    options = bake_options(args, format_.name, args.frame)
     sidecar = _core.read_sidecar(str(args.sidecar))
     check_options(options, format_, sidecar)
 

@@ -8,11 +8,10 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from palette4d.lut_export.arguments import add_table_options, domain
+from palette4d.lut_export.arguments import add_table_options, bake_options
 from palette4d.lut_export.series_cli import (
     add_frame_choice,
     add_run_options,
-    check_domain,
     chosen_frames,
     with_bar,
 )
@@ -84,27 +83,17 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Write the config; print what is in it."""
     from palette4d.lut_export import show_export
-    from palette4d.lut_export.bake import BakeOptions
     from palette4d.lut_export.config import ConfigOptions, write_config
     from palette4d.lut_export.formats import format_named
     from palette4d.lut_export.series import SeriesOptions
 
-    check_domain(args)
     sidecars, remarks = show_export.sidecars(args.sidecars)
     if args.clip is not None and len(sidecars) > 1:
         args.usage_error("--clip names one clip; with several sidecars each must name its own")
     options = ConfigOptions(
         series=SeriesOptions(
             frames=(),
-            bake=BakeOptions(
-                frame=0.0,
-                size=args.size,
-                strength=args.strength,
-                format=format_named(args.format).name,
-                shaper=args.shaper,
-                domain=domain(args),
-                max_error=args.max_error,
-            ),
+            bake=bake_options(args, format_named(args.format).name),
             clip=args.clip,
             workers=Workers(args.jobs, args.cluster),
         ),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from palette4d.arguments import frame_range, parse_frames, whole
 from palette4d.errors import Palette4dError
-from palette4d.lut_export.arguments import add_space_options, add_table_options, domain
+from palette4d.lut_export.arguments import add_space_options, add_table_options, bake_options
 from palette4d.workers import Workers, add_options
 
 if TYPE_CHECKING:
@@ -120,36 +120,18 @@ def chosen_frames(
     return series.every(sidecar, args.every or 1)
 
 
-def check_domain(args: argparse.Namespace) -> None:
-    """Refuse a --domain that is none, as wrong usage."""
-    if args.domain is not None and not args.domain[0] < args.domain[1]:
-        args.usage_error("argument --domain: expected two numbers, the smaller one first")
-
-
 def run(args: argparse.Namespace) -> int:
     """Export; print what was written."""
     from palette4d import _core
     from palette4d.analysis.manifest import is_manifest
     from palette4d.lut_export import series
-    from palette4d.lut_export.bake import BakeOptions
     from palette4d.lut_export.formats import format_named
 
-    check_domain(args)
     show = is_manifest(args.sidecar)
     _check_show(args, show)
     options = series.SeriesOptions(
         frames=(),
-        bake=BakeOptions(
-            frame=0.0,
-            size=args.size,
-            strength=args.strength,
-            format=format_named(args.format).name,
-            shaper=args.shaper,
-            domain=domain(args),
-            max_error=args.max_error,
-            space=args.space,
-            ocio_config=args.ocio_config,
-        ),
+        bake=bake_options(args, format_named(args.format).name),
         name=args.name,
         padding=args.padding,
         clip=args.clip,
