@@ -88,6 +88,8 @@ def run(args: argparse.Namespace) -> int:
     from palette4d.lut_export.series import SeriesOptions
 
     sidecars, remarks = show_export.sidecars(args.sidecars)
+    # A manifest is a show, also one of a single shot.
+    show = len(sidecars) > 1 or sidecars != args.sidecars
     if args.clip is not None and len(sidecars) > 1:
         args.usage_error("--clip names one clip; with several sidecars each must name its own")
     options = ConfigOptions(
@@ -97,7 +99,7 @@ def run(args: argparse.Namespace) -> int:
             clip=args.clip,
             workers=Workers(args.jobs, args.cluster),
         ),
-        choose=lambda sidecar: chosen_frames(args, sidecar, show=len(sidecars) > 1),
+        choose=lambda sidecar: chosen_frames(args, sidecar, show=show),
         base=args.base,
         names=None if args.names is None else tuple(args.names.split(",")),
         process_space=args.process_space,

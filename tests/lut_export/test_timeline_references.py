@@ -244,3 +244,9 @@ def test_a_config_has_a_look_a_shot(show: Path, capsys: pytest.CaptureFixture[st
         changed[shot] = max(abs(value - 0.5) for value in grey)
     assert changed["one"] < 1e-3
     assert changed["two"] > 0.01
+    # A show of one shot, which is not edited, is still a show.
+    document = json.loads(show.read_text("utf-8"))
+    document["shots"] = [shot for shot in document["shots"] if shot["name"] == "one"]
+    show.write_text(json.dumps(document), "utf-8")
+    verb = ["config", str(show), "-o", "lone", "--stops", "--size", "5", "--jobs", "1", "--quiet"]
+    assert cli.main([*verb, "--process-space", "sRGB - Texture"]) == 0
