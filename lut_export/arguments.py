@@ -9,7 +9,7 @@ from palette4d.arguments import checked, number, whole
 from palette4d.lut_export.formats import format_named, format_names
 
 if TYPE_CHECKING:
-    from palette4d.lut_export.bake import BakeOptions
+    from palette4d.lut_export.bake_options import BakeOptions
 
 
 def add_table_options(parser: argparse.ArgumentParser, default: str | None) -> None:
@@ -87,7 +87,7 @@ def add_space_options(parser: argparse.ArgumentParser) -> None:
 
 def bake_options(args: argparse.Namespace, format_name: str, frame: float = 0.0) -> BakeOptions:
     """Return what the options ask for; a --domain that is none is wrong usage."""
-    from palette4d.lut_export.bake import BakeOptions
+    from palette4d.lut_export.bake_options import BakeOptions
 
     if args.domain is not None and not args.domain[0] < args.domain[1]:
         args.usage_error("argument --domain: expected two numbers, the smaller one first")

@@ -18,16 +18,23 @@ from palette4d.conversion_steps import Step
 from palette4d.errors import Palette4dError
 from palette4d.lut_export import cdl as cdls
 from palette4d.lut_export import lattice as lattices
-from palette4d.lut_export import shaper as shapers
+from palette4d.lut_export.bake_options import (
+    BakeOptions,
+    check_options,
+    check_target,
+    choose_shaper,
+)
 from palette4d.lut_export.colour_difference import Viewing, viewing_of
-from palette4d.lut_export.error import Figures, Measure, measure, stated
+from palette4d.lut_export.error import Measure, figures_info, figures_text, measure, stated
 from palette4d.lut_export.formats import LutFormat, format_of, with_shaper
 from palette4d.lut_export.frame_edit import FrameEdit, frame_edit, frame_text
 from palette4d.lut_export.reading import LoadedLut, load
-from palette4d.lut_export.shaper import Shaper
-from palette4d.lut_export.spaces import INPUT, BakeSpace, space_of
+from palette4d.lut_export.shaper import UNSHAPED, Shaper
+from palette4d.lut_export.spaces import BakeSpace, space_of
 from palette4d.lut_export.writers import Description
-from palette4d.replacing import refuse_existing, replacing
+from palette4d.replacing import replacing
+
+__all__ = ["PREVIEW_TIER", "BakeOptions", "BakeResult", "bake"]
 
 F32 = NDArray[np.float32]
 
@@ -36,46 +43,6 @@ NAMESPACE = uuid.UUID("09823ba4-0bc8-43a9-995d-cb9a6abeb5b3")
 
 #: The relative error up to which a table serves for previews.
 PREVIEW_TIER = 0.002
-
-
-@dataclass(frozen=True)
-class BakeOptions:
-    """What to bake.
-
-    Attributes
-    ----------
-    frame : float
-        The time, a frame number.
-    size : int
-        Samples a side, 2..129.
-    strength : float
-        0..1, as in the node.
-    format : str or None
-        A name of `formats.FORMATS`; None: by the extension.
-    shaper : {"auto", "none", "linear", "log"}
-        See `shaper.choose`.
-    domain : (low, high) or None
-        What the shaper covers; None: the frame's colours and the palette's.
-    max_error : float or None
-        The lattice is made larger until the file's error (`BakeResult.error`) is at most this.
-    threads : int
-        0: one a processor; the files do not depend on it.
-    space : str
-        What the file takes and returns: "input" (the clip's numbers), "palette", or a colour space.
-    ocio_config : str or None
-        The config that knows `space`; None: see `spaces.space_of`.
-    """
-
-    frame: float
-    size: int = 33
-    strength: float = 1.0
-    format: str | None = None
-    shaper: str = "auto"
-    domain: tuple[float, float] | None = None
-    max_error: float | None = None
-    threads: int = 0
-    space: str = INPUT
-    ocio_config: str | None = None
 
 
 @dataclass(frozen=True)
@@ -141,76 +108,6 @@ class BakeResult:
     def as_json(self) -> dict[str, Any]:
         """Return the result as plain JSON values."""
         return asdict(self)
-
-
-def check_target(path: Path, force: bool) -> None:
-    """Refuse a file that may not be written; see `replacing.refuse_existing`.
-
-    Raises
-    ------
-    Palette4dError
-        Also when `path` is a device or a pipe, which a file would replace.
-    """
-    if path.exists() and not path.is_file() and not path.is_dir():
-        raise Palette4dError(
-            f"{path}: found a device or a pipe, expected a file name; use `-o - --format …` and "
-            "let the shell lead the output there"
-        )
-    refuse_existing(path, force)
-
-
-def check_options(options: BakeOptions, format_: LutFormat, sidecar: _core.Sidecar) -> None:
-    """Refuse what cannot be baked, before any frame is read.
-
-    Raises
-    ------
-    Palette4dError
-        Time, size, strength, shaper or domain are out of range or do not go with the format.
-    """
-    frame_edit(sidecar, options.frame, options.strength)
-    if format_.is_cdl:
-        return
-    lattices.check_size(options.size)
-    format_.check_size(options.size)
-    if options.domain is not None:
-        shapers.Shaper("linear", *options.domain)
-        if options.shaper == "none" or not format_.shaper:
-            # Says why the two do not go together.
-            _check_shaper(shapers.Shaper("none", *options.domain), format_)
-    if options.shaper in ("linear", "log"):
-        _check_shaper(shapers.Shaper("log", *(options.domain or (0, 1))), format_)
-
-
-def _check_shaper(shaper: Shaper, format_: LutFormat) -> None:
-    if shaper.kind != "none" and not format_.shaper:
-        raise Palette4dError(
-            f"{format_.title} cannot hold a shaper; choose one of {with_shaper()}, or --shaper none"
-        )
-
-
-def choose_shaper(
-    options: BakeOptions, format_: LutFormat, palette: NDArray[Any], image: F32 | None
-) -> Shaper:
-    """Return the shaper that the options and the colours ask for.
-
-    The frame's colours decide whether one is needed; where it is, it covers the palette's, too, so
-    that the tables of one clip resemble each other. Without a frame the palette decides. `palette`
-    holds the (n, 3) colours of the whole palette, in the same numbers as `image`.
-    """
-    if options.domain is not None:
-        kind = "log" if options.shaper == "auto" else options.shaper
-        return shapers.Shaper(kind, *options.domain)  # type: ignore[arg-type]
-    low, high = float(palette.min()), float(palette.max())
-    if image is not None:
-        finite = image[..., :3][np.isfinite(image[..., :3])]
-        if not finite.size or (finite.min() >= 0 and finite.max() <= 1):
-            low, high = 0.0, 1.0
-        else:
-            low, high = min(low, float(finite.min())), max(high, float(finite.max()))
-    if options.shaper == "auto" and not format_.shaper:
-        return shapers.UNSHAPED
-    most = shapers.LARGEST
-    return shapers.choose(options.shaper, max(low, -most), min(high, most))
 
 
 @dataclass(frozen=True)
@@ -334,7 +231,7 @@ def bake(
         colours = space.of_clip(np.asarray(image[..., :3], dtype=np.float32))
     palette: NDArray[Any] = sidecar.polytope.vertices[:, :3]
     in_palette = bool(space.steps) and format_.discrete
-    shaper = shapers.UNSHAPED
+    shaper = UNSHAPED
     if not in_palette:
         palette = space.of_palette(palette)
     if not format_.is_cdl:
@@ -452,24 +349,6 @@ def _check_same(
 # --------------------------------------------------------------------------- what a file says
 
 
-def figures_text(figures: Figures) -> str:
-    """Return one line of errors."""
-    f = figures
-    return (
-        f"|a-b|/max(|b|,0.1) mean {stated(f.relative_mean)}, largest {stated(f.relative_largest)}; "
-        f"deltaE 2000 mean {stated(f.delta_e_mean)}, largest {stated(f.delta_e_largest)}"
-    )
-
-
-def _figures_info(figures: Figures) -> dict[str, str]:
-    return {
-        "RelativeMean": stated(figures.relative_mean),
-        "RelativeLargest": stated(figures.relative_largest),
-        "DeltaE2000Mean": stated(figures.delta_e_mean),
-        "DeltaE2000Largest": stated(figures.delta_e_largest),
-    }
-
-
 def _describe(
     job: _Job, content: _Content, errors: tuple[Measure, Measure | None] | None
 ) -> Description:
@@ -500,9 +379,9 @@ def _describe(
         if on_clip is not None:
             where = f"on the clip's colours at frame {job.image_frame}"
             lines.append(f"error {where}: {figures_text(on_clip.worst)}")
-            info["Error"]["Clip"] = {"Frame": job.image_frame, **_figures_info(on_clip.worst)}
+            info["Error"]["Clip"] = {"Frame": job.image_frame, **figures_info(on_clip.worst)}
         lines.append(f"error on a dense grid: {figures_text(grid.worst)}")
-        info["Error"]["Grid"] = _figures_info(grid.worst)
+        info["Error"]["Grid"] = figures_info(grid.worst)
         info["Error"]["Colours"] = job.viewing.assumption
         kind = "values" if job.format.is_cdl else "interpolation"
         lines.append(f"errors hold for {' and '.join(job.format.readings)} {kind}")

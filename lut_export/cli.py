@@ -87,7 +87,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Bake; print what was written and its error."""
     from palette4d import _core
-    from palette4d.lut_export.bake import bake, check_options, check_target
+    from palette4d.lut_export.bake import bake
+    from palette4d.lut_export.bake_options import check_options, check_target
     from palette4d.lut_export.formats import format_named, format_of
     from palette4d.source_clip import frame_colours
 

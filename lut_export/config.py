@@ -10,8 +10,6 @@ base there is one more that applies it.
 """
 
 import copy
-import os
-import re
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -21,24 +19,19 @@ from typing import Any
 from palette4d import _core
 from palette4d.errors import Palette4dError
 from palette4d.lut_export import series
+from palette4d.lut_export.config_base import (
+    ANY_SHOT,
+    TABLES,
+    load_base,
+    process_space,
+    refuse_looks,
+    relocate,
+)
 from palette4d.lut_export.formats import LutFormat, format_named
 from palette4d.lut_export.spaces import PALETTE
-from palette4d.ocio_config import (
-    BUILT_IN,
-    colour_space,
-    failures,
-    load_config,
-    near_spaces,
-    same_encodings,
-)
+from palette4d.ocio_config import BUILT_IN, failures
 from palette4d.replacing import make_folder, refuse_existing, replacing
-from palette4d.wording import counted, file_safe
-
-#: The folder of the tables, beside the config.
-TABLES = "luts"
-
-#: The look whose shot and frame are both variables.
-ANY_SHOT = "palette4d"
+from palette4d.wording import checked_name, counted, file_safe
 
 #: What FRAME is when a host does not set it, and the name of the file for that.
 NO_FRAME = "default"
@@ -141,10 +134,10 @@ def write_config(
     read = [_core.read_sidecar(str(name)) for name in sidecars]
     names = _shot_names(sidecars, read, options.names)
     base = options.base or BUILT_IN
-    config, archive = _load_base(base)
-    spaces = [_process_space(config, base, s, options.process_space) for s in read]
+    config, archive = load_base(base)
+    spaces = [process_space(config, base, s, options.process_space) for s in read]
     if not options.force:
-        _refuse_looks(config, base, [ANY_SHOT, *names])
+        refuse_looks(config, base, [ANY_SHOT, *names])
     frames = [options.choose(sidecar) for sidecar in read]
 
     make_folder(folder)
@@ -173,7 +166,7 @@ def write_config(
         _link(request.folder, name, format_, request.options.frames, every)
         shots.append(Shot(name, str(request.sidecar), space, every[0], every[-1], made))
 
-    notes = _relocate(config, base, archive, folder)
+    notes = relocate(config, base, archive, folder)
     views = _add_looks(config, shots, format_, notes)
     with replacing(path, force=options.force) as temporary:
         temporary.write_text(config.serialize(), encoding="utf-8", newline="\n")
@@ -199,13 +192,7 @@ def _shot_names(
                 f"found {len(given)} names for {len(sidecars)} sidecars, expected one for each, in "
                 "the same order"
             )
-        for name in given:
-            if file_safe(name) != name:
-                raise Palette4dError(
-                    f"found the name {name!r}, expected letters, digits, '.', '_' and '-' only, as "
-                    f"in {file_safe(name)!r}"
-                )
-        names = list(given)
+        names = [checked_name(name) for name in given]
     else:
         names = [file_safe(sidecar.clip["name"]) for sidecar in read]
     for i, name in enumerate(names):
@@ -271,107 +258,6 @@ def _link(
         except OSError:
             # A file system without links.
             shutil.copyfile(tables / target, place)
-
-
-# --------------------------------------------------------------------------------------- the base
-
-
-def _load_base(base: str) -> tuple[Any, bool]:
-    """Return an editable copy of the base config, and whether it is an archive."""
-    return load_config(base, "--base"), base.lower().endswith(".ocioz")
-
-
-def _process_space(config: Any, base: str, sidecar: _core.Sidecar, wanted: str | None) -> str:
-    """Return the name of the config's colour space for a sidecar's numbers.
-
-    Looked up by name, alias or role, under every name that the encoding has; then, where the config
-    has the roles for it, among its colour spaces by what they do.
-    """
-    import PyOpenColorIO as ocio
-
-    if wanted is not None:
-        return str(colour_space(config, base, wanted, "--process-space").getName())
-    encoding = str(sidecar.clip["encoding"])
-    if encoding.strip().lower() in ("", "unknown"):
-        raise Palette4dError(
-            f"the sidecar of {sidecar.clip['name']!r} does not say in which encoding its colours "
-            "are; name a colour space of the config with --process-space"
-        )
-    names = same_encodings(encoding)
-    for name in names:
-        space = config.getColorSpace(name)
-        if space is not None and not space.isData():
-            return str(space.getName())
-    lacking = ""
-    built_in = ocio.Config.CreateFromBuiltinConfig(BUILT_IN)
-    for name in names:
-        if built_in.getColorSpace(name) is None:
-            continue
-        try:
-            return str(ocio.Config.IdentifyBuiltinColorSpace(config, built_in, name))
-        except failures():
-            roles = ("aces_interchange", "scene_linear")
-            missing = [role for role in roles if not config.hasRole(role)]
-            if missing:
-                lacking = f"; it lacks the role {missing[0]}, by which one could be found"
-            break
-    raise Palette4dError(
-        f"{base}: found no colour space for {encoding!r}{lacking}; name one with --process-space, "
-        f"such as {near_spaces(config, encoding)}"
-    )
-
-
-def _refuse_looks(config: Any, base: str, names: list[str]) -> None:
-    there = {str(name).lower() for name in config.getLookNames()}
-    for name in names:
-        if name.lower() in there:
-            other = "give all shots in one command" if name == ANY_SHOT else "choose with --names"
-            raise Palette4dError(
-                f"{base}: it has a look {name!r} already, expected none; {other}, or replace it "
-                "with --force"
-            )
-
-
-def _relocate(config: Any, base: str, archive: bool, folder: Path) -> list[str]:
-    """Let the base's own files be found from the new place; return notes on that."""
-    import PyOpenColorIO as ocio
-
-    notes: list[str] = []
-    own = [str(path) for path in config.getSearchPaths()]
-    if not base.startswith("ocio://"):
-        if archive:
-            ocio.ExtractOCIOZArchive(base, str(folder / "base"))
-            root = "base"
-        else:
-            there = Path(base).absolute().parent
-            root = "" if there == folder.absolute() else str(there)
-        config.clearSearchPaths()
-        # First: only a base of palette4d's own can have files of the same names.
-        config.addSearchPath(TABLES)
-        for path in own or [""]:
-            absolute = Path(path).is_absolute() or path.startswith(("$", "%"))
-            found = path if absolute or not root else str(Path(root) / path)
-            if found != TABLES:
-                config.addSearchPath(found or ".")
-        if root and not archive:
-            notes.append(f"the base's own files are still read from {root}")
-        # A list of variables in the config keeps all others of the environment out.
-        if not list(config.getEnvironmentVarNames()):
-            notes += _declare_variables(config)
-    else:
-        config.addSearchPath(TABLES)
-    config.setWorkingDir(str(folder.absolute()))
-    return notes
-
-
-def _declare_variables(config: Any) -> list[str]:
-    notes = []
-    used = set(re.findall(r"\$\{?([A-Za-z_][A-Za-z0-9_]*)", config.serialize()))
-    used |= set(re.findall(r"%([A-Za-z_][A-Za-z0-9_]*)%", config.serialize()))
-    for name in sorted(used - {"SHOT", "FRAME"}):
-        config.addEnvironmentVar(name, os.environ.get(name, ""))
-        notes.append(f"the base's variable {name} is now {os.environ.get(name, '')!r} by default")
-    return notes
 
 
 # --------------------------------------------------------------------------------- looks and views

@@ -201,6 +201,25 @@ def stated(value: float, digits: int = 3) -> str:
     return f"{float(exact.quantize(step, rounding=ROUND_CEILING)):.{digits}g}"
 
 
+def figures_text(figures: Figures) -> str:
+    """Return errors in one line."""
+    f = figures
+    return (
+        f"|a-b|/max(|b|,0.1) mean {stated(f.relative_mean)}, largest {stated(f.relative_largest)}; "
+        f"deltaE 2000 mean {stated(f.delta_e_mean)}, largest {stated(f.delta_e_largest)}"
+    )
+
+
+def figures_info(figures: Figures) -> dict[str, str]:
+    """Return errors as they stand in the Info of a CLF."""
+    return {
+        "RelativeMean": stated(figures.relative_mean),
+        "RelativeLargest": stated(figures.relative_largest),
+        "DeltaE2000Mean": stated(figures.delta_e_mean),
+        "DeltaE2000Largest": stated(figures.delta_e_largest),
+    }
+
+
 def table(rows: Iterable[tuple[str, Figures]]) -> list[str]:
     """Return the lines of a table of errors, a row for each (name, figures)."""
     listed = list(rows)

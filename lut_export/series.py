@@ -19,7 +19,8 @@ from typing import Any
 
 from palette4d import _core
 from palette4d.errors import Palette4dError, WriteError
-from palette4d.lut_export.bake import BakeOptions, bake, check_options, check_target
+from palette4d.lut_export.bake import bake
+from palette4d.lut_export.bake_options import BakeOptions, check_options, check_target
 from palette4d.lut_export.formats import format_named
 from palette4d.lut_export.frame_edit import frame_text
 from palette4d.lut_export.series_index import (
@@ -33,7 +34,7 @@ from palette4d.lut_export.series_index import (
 from palette4d.ocio_config import from_anywhere
 from palette4d.replacing import make_folder, replacing
 from palette4d.source_clip import frame_colours
-from palette4d.wording import file_safe
+from palette4d.wording import checked_name, file_safe
 from palette4d.workers import Failed, Workers
 
 #: Seconds between two writings of the index while frames are baked.
@@ -270,7 +271,7 @@ class _Export:
         frames = check_frames(sidecar, options.frames)
         for frame in frames[:1]:
             check_options(replace(options.bake, frame=float(frame)), format_, sidecar)
-        name = _checked_name(options.name) if options.name else file_safe(sidecar.clip["name"])
+        name = checked_name(options.name) if options.name else file_safe(sidecar.clip["name"])
         self.index = request.folder / f"{name}.series.json"
         self.header = header_of(sidecar, request.sidecar, options.bake)
         known = read_index(self.index, self.header, options.force)
@@ -378,15 +379,6 @@ def _refuse_changed(
         if target.exists():
             # Without an entry it may be the very file, left by an export that was killed.
             check_target(target, force or frame not in known)
-
-
-def _checked_name(name: str) -> str:
-    if file_safe(name) != name:
-        raise Palette4dError(
-            f"found the name {name!r}, expected letters, digits, '.', '_' and '-' only, as in "
-            f"{file_safe(name)!r}"
-        )
-    return name
 
 
 def failures_text(failed: dict[int, str]) -> str:

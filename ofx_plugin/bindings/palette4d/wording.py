@@ -2,6 +2,8 @@
 
 import re
 
+from palette4d.errors import Palette4dError
+
 
 def counted(count: int, one: str, several: str | None = None) -> str:
     """Return "1 frame", "2 frames"; `several` where an s does not make the plural.
@@ -19,3 +21,19 @@ def file_safe(name: str) -> str:
     ('shot_010_a_b', 'x')
     """
     return re.sub(r"[^A-Za-z0-9._-]+", "_", name).strip("-.") or "clip"
+
+
+def checked_name(name: str) -> str:
+    """Return a name that is fit for files as it is.
+
+    Raises
+    ------
+    Palette4dError
+        It is not, with one that is.
+    """
+    if file_safe(name) != name:
+        raise Palette4dError(
+            f"found the name {name!r}, expected letters, digits, '.', '_' and '-' only, as in "
+            f"{file_safe(name)!r}"
+        )
+    return name

@@ -1,0 +1,133 @@
+"""The config that looks are added to: a copy of it, its colour space for a shot, its own files."""
+
+import os
+import re
+from pathlib import Path
+from typing import Any
+
+from palette4d import _core
+from palette4d.errors import Palette4dError
+from palette4d.ocio_config import (
+    BUILT_IN,
+    colour_space,
+    failures,
+    load_config,
+    near_spaces,
+    same_encodings,
+)
+
+#: The folder of the tables, beside the config.
+TABLES = "luts"
+
+#: The look whose shot and frame are both variables.
+ANY_SHOT = "palette4d"
+
+
+def load_base(base: str) -> tuple[Any, bool]:
+    """Return an editable copy of the base config, and whether it is an archive."""
+    return load_config(base, "--base"), base.lower().endswith(".ocioz")
+
+
+def process_space(config: Any, base: str, sidecar: _core.Sidecar, wanted: str | None) -> str:
+    """Return the name of the config's colour space for a sidecar's numbers.
+
+    Looked up by name, alias or role, under every name that the encoding has; then, where the config
+    has the roles for it, among its colour spaces by what they do.
+
+    Raises
+    ------
+    Palette4dError
+        There is none, with the near names; or the encoding is not known.
+    """
+    import PyOpenColorIO as ocio
+
+    if wanted is not None:
+        return str(colour_space(config, base, wanted, "--process-space").getName())
+    encoding = str(sidecar.clip["encoding"])
+    if encoding.strip().lower() in ("", "unknown"):
+        raise Palette4dError(
+            f"the sidecar of {sidecar.clip['name']!r} does not say in which encoding its colours "
+            "are; name a colour space of the config with --process-space"
+        )
+    names = same_encodings(encoding)
+    for name in names:
+        space = config.getColorSpace(name)
+        if space is not None and not space.isData():
+            return str(space.getName())
+    lacking = ""
+    built_in = ocio.Config.CreateFromBuiltinConfig(BUILT_IN)
+    for name in names:
+        if built_in.getColorSpace(name) is None:
+            continue
+        try:
+            return str(ocio.Config.IdentifyBuiltinColorSpace(config, built_in, name))
+        except failures():
+            roles = ("aces_interchange", "scene_linear")
+            missing = [role for role in roles if not config.hasRole(role)]
+            if missing:
+                lacking = f"; it lacks the role {missing[0]}, by which one could be found"
+            break
+    raise Palette4dError(
+        f"{base}: found no colour space for {encoding!r}{lacking}; name one with --process-space, "
+        f"such as {near_spaces(config, encoding)}"
+    )
+
+
+def refuse_looks(config: Any, base: str, names: list[str]) -> None:
+    """Refuse a base that has looks of these names, upper and lower case alike.
+
+    Raises
+    ------
+    Palette4dError
+        Names the first that is there.
+    """
+    there = {str(name).lower() for name in config.getLookNames()}
+    for name in names:
+        if name.lower() in there:
+            other = "give all shots in one command" if name == ANY_SHOT else "choose with --names"
+            raise Palette4dError(
+                f"{base}: it has a look {name!r} already, expected none; {other}, or replace it "
+                "with --force"
+            )
+
+
+def relocate(config: Any, base: str, archive: bool, folder: Path) -> list[str]:
+    """Let the base's own files be found from the new place; return notes on that."""
+    import PyOpenColorIO as ocio
+
+    notes: list[str] = []
+    own = [str(path) for path in config.getSearchPaths()]
+    if not base.startswith("ocio://"):
+        if archive:
+            ocio.ExtractOCIOZArchive(base, str(folder / "base"))
+            root = "base"
+        else:
+            there = Path(base).absolute().parent
+            root = "" if there == folder.absolute() else str(there)
+        config.clearSearchPaths()
+        # First: only a base of palette4d's own can have files of the same names.
+        config.addSearchPath(TABLES)
+        for path in own or [""]:
+            absolute = Path(path).is_absolute() or path.startswith(("$", "%"))
+            found = path if absolute or not root else str(Path(root) / path)
+            if found != TABLES:
+                config.addSearchPath(found or ".")
+        if root and not archive:
+            notes.append(f"the base's own files are still read from {root}")
+        # A list of variables in the config keeps all others of the environment out.
+        if not list(config.getEnvironmentVarNames()):
+            notes += _declare_variables(config)
+    else:
+        config.addSearchPath(TABLES)
+    config.setWorkingDir(str(folder.absolute()))
+    return notes
+
+
+def _declare_variables(config: Any) -> list[str]:
+    notes = []
+    used = set(re.findall(r"\$\{?([A-Za-z_][A-Za-z0-9_]*)", config.serialize()))
+    used |= set(re.findall(r"%([A-Za-z_][A-Za-z0-9_]*)%", config.serialize()))
+    for name in sorted(used - {"SHOT", "FRAME"}):
+        config.addEnvironmentVar(name, os.environ.get(name, ""))
+        notes.append(f"the base's variable {name} is now {os.environ.get(name, '')!r} by default")
+    return notes
