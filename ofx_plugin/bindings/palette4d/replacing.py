@@ -15,7 +15,8 @@ def refuse_existing(path: Path, force: bool) -> None:
     Raises
     ------
     Palette4dError
-        `path` is a folder, lies in a folder that does not exist, or exists and `force` is false.
+        `path` is a folder, lies in a folder that does not exist, or exists and `force` is false;
+        `WriteError` where its folder may not be written to.
     """
     if path.is_dir():
         raise Palette4dError(f"{path}: found a folder, expected a file name for the output")
@@ -23,6 +24,8 @@ def refuse_existing(path: Path, force: bool) -> None:
         raise Palette4dError(f"{path}: there is no folder {path.parent}; create it first")
     if path.exists() and not force:
         raise Palette4dError(f"{path}: the file exists already; use --force to replace it")
+    if not os.access(path.parent, os.W_OK):
+        raise _closed(path)
 
 
 def make_folder(folder: Path) -> None:
@@ -60,10 +63,7 @@ def replacing(path: Path, *, force: bool = False) -> Generator[Path]:
             prefix=f".{path.stem}.", suffix=f".part{path.suffix}", dir=path.parent
         )
     except OSError as error:
-        raise WriteError(
-            f"{path}: cannot write in {path.parent}: {error.strerror}; "
-            "choose another folder or mend its permissions"
-        ) from error
+        raise _closed(path, f": {error.strerror}") from error
     os.close(handle)
     temporary = Path(name)
     try:
@@ -81,6 +81,12 @@ def replacing(path: Path, *, force: bool = False) -> Generator[Path]:
         ) from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _closed(path: Path, why: str = "") -> WriteError:
+    return WriteError(
+        f"{path}: cannot write in {path.parent}{why}; choose another folder or mend its permissions"
+    )
 
 
 def _umask() -> int:
