@@ -217,7 +217,7 @@ def warnings(result: BakeResult, format_: LutFormat, options: BakeOptions) -> It
         help_ = (
             "a table (.clf, .cube) comes nearer"
             if result.cdl is not None
-            else f"--size or --max-error {PREVIEW_TIER:g} make it larger"
+            else f"--size or --max-error {PREVIEW_TIER:g} make the table larger"
             if options.max_error is None and result.size != 129
             else "the node and `palette4d render` are exact"
         )

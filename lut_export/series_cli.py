@@ -263,7 +263,7 @@ def warn(done: list[Series]) -> None:
         print(
             f"palette4d: warning: {counted(len(missed), 'file')} of {len(entries)} "
             f"{'misses' if len(missed) == 1 else 'miss'} the preview tier {PREVIEW_TIER:g}; "
-            "--size or --max-error make them larger",
+            "--size or --max-error make the tables larger",
             file=sys.stderr,
         )
 
