@@ -30,8 +30,8 @@ CLIP is an image sequence (shot.####.exr, shot.%04d.png, shot.1001-1100x2#.dpx, 
 holds one), a single image, or a movie file. The clip should be one shot: a palette must not span a
 cut. Of more than 3000 frames one in n is analysed.
 
-The report says for each stage how far the palette is from the pixels: R, the mean distance of
-those outside; C, of the palette's colours from the pixels nearest to them; L = 50 R + C; K, how
+The report says for each stage how far the palette is from the pixels: R, the mean distance of all
+pixels to it, 0 inside; C, of its colours from the pixels nearest to them; L = 50 R + C; K, how
 restless it is; L_prime = L + 0.01 K; farthest, the distance of the farthest pixel outside. In its
 shares a pixel is outside when it is more than 1/255, one step of 8 bits, from the convex hull of
 its frame's palette. docs/palettes.md explains the figures.
