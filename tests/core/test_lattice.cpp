@@ -203,6 +203,9 @@ TEST(what_lies_outside_or_is_no_number_has_the_exact_bits) {
         const LatticeCounts counts = lattice.apply(image.in(), found.out(), {1.0, premultiplied});
         CHECK_EQUAL(counts.interpolated, 0LL);
         CHECK(same_bits(found.data, expected.data));
+        Image place = image;
+        lattice.apply(place.in(), place.out(), {1.0, premultiplied});
+        CHECK(same_bits(place.data, expected.data));
     }
 }
 

@@ -34,6 +34,10 @@ public:
             const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(x) * channels_;
             const float* from = in + at;
             float* to = out + at;
+            if (x + (kAhead + 1) * kSize <= width) {
+                fetch<0>(from + kAhead * kSize * channels_);
+                fetch<1>(to + kAhead * kSize * channels_);
+            }
             block(
                 from, to, count,
                 [&](int i) { exact_.pixel(from + i * channels_, to + i * channels_, channels_); },
@@ -57,50 +61,59 @@ public:
 private:
     static constexpr int kSize = LatticeBlock::kSize;
     static constexpr std::size_t kWaiting = 4096;
-    static constexpr int kSampleEvery = 7;  ///< runs; a pixel of one is also evaluated exactly
+    static constexpr int kSampleEvery = 7;  ///< blocks; a pixel of one is also evaluated exactly
+
+    /// Blocks that are asked of memory early: work on one takes as long as that.
+    static constexpr int kAhead = 2;
 
     struct Pixel {
         const float* from;
         float* to;
     };
 
-    /// `exact(i)` and `wait(i)` take those of the pixels that this does not do.
+    template <int Write>
+    void fetch(const float* block) const {
+#if defined(__GNUC__)
+        constexpr int kLine = 64 / sizeof(float);
+        for (int i = 0; i < kSize * channels_; i += kLine) __builtin_prefetch(block + i, Write);
+#endif
+    }
+
+    /// `exact(i)` and `wait(i)` take those of the pixels that this leaves as they are.
     template <class Exact, class Wait>
     void block(const float* from, float* to, int count, const Exact& exact, const Wait& wait) {
         LatticeBlock& b = block_;
-        find(from, count, kLatticeCuts);
+        const bool all_good = find(from, count, kLatticeCuts);
         kernels_.weigh(b, count);
-        for (int i = 0; i < count;) {
-            const int begin = i;
-            while (i < count && b.state[i] == Store::kGood) ++i;
-            if (i > begin) {
-                if (++runs_ % kSampleEvery == 0)
-                    sample(begin + static_cast<int>(runs_ % (i - begin)));
-                kernels_.blend(store_.nodes(), b, begin, i, from, to, channels_, count, strength_,
-                               premultiplied_);
-                interpolated_ += i - begin;
-            }
-            for (; i < count && b.state[i] != Store::kGood; ++i) {
-                if (b.state[i] == Store::kExact) {
-                    exact(i);
-                } else {
-                    wait(i);
-                }
+        if (++blocks_ % kSampleEvery == 0) sample(static_cast<int>(blocks_ % count));
+        kernels_.blend(store_.nodes(), b, count, from, to, channels_, strength_, premultiplied_);
+        interpolated_ += count;
+        if (all_good) return;
+        for (int i = 0; i < count; ++i) {
+            if (b.state[i] == Store::kGood) continue;
+            --interpolated_;
+            if (b.state[i] == Store::kExact) {
+                exact(i);
+            } else {
+                wait(i);
             }
         }
     }
 
-    /// The pixels' cells or, after at most so many cuts, parts, and what they are, in block_.
-    void find(const float* from, int count, int most_cuts) {
+    /// The pixels' cells or, after at most so many cuts, parts, and what they are, in block_: are
+    /// all of them good?
+    bool find(const float* from, int count, int most_cuts) {
         LatticeBlock& b = block_;
         kernels_.locate(store_.domain(), b, from, channels_, count, premultiplied_);
         for (int cuts = 0;; ++cuts) {
-            std::int32_t most = 0;
+            std::int32_t others = 0;
             for (int i = 0; i < count; ++i) {
-                b.state[i] = store_.state(b.number[i]).load(std::memory_order_acquire);
-                most = std::max(most, b.state[i]);
+                const std::int32_t state =
+                    store_.state(b.number[i]).load(std::memory_order_acquire);
+                b.state[i] = state;
+                others |= state ^ Store::kGood;
             }
-            if (most < Store::kBrick || cuts == most_cuts) return;
+            if (others < Store::kBrick || cuts == most_cuts) return others == 0;
             kernels_.descend(b, count);
         }
     }
@@ -170,6 +183,7 @@ private:
     }
 
     void sample(int i) {
+        if (block_.state[i] != Store::kGood) return;
         for (int c = 0; c < 3; ++c) {
             float moved = 0;
             for (int k = 0; k < 4; ++k) {
@@ -206,7 +220,7 @@ private:
     alignas(64) float gathered_[4 * kSize] = {}, results_[4 * kSize] = {};
     std::vector<Pixel> waiting_;
     std::vector<float> sampled_, sampled_moves_;
-    long long interpolated_ = 0, runs_ = 0;
+    long long interpolated_ = 0, blocks_ = 0;
 };
 
 Lattice::Lattice(std::shared_ptr<const Recolourer> recolourer)

@@ -8,19 +8,24 @@ namespace palette4d {
 
 /// A cube of cells spans the domain. A cell that is too coarse is cut in half along each axis, and
 /// its eight parts where they are too coarse, and so on: the nodes of each such cut (a brick)
-/// follow those of the cells in memory. Cells, parts and nodes are numbered with blue running
-/// fastest; the number of a part is its brick's, counted from the cells on.
+/// follow those of the cells in memory, after one that is always 0. Cells, parts and nodes are
+/// numbered with blue running fastest; the number of a part is its brick's, counted from the cells
+/// on.
 constexpr int kLatticeSide = 36;  ///< cells along each axis
 constexpr int kLatticeCuts = 2;   ///< most of a cell
 constexpr int kLatticeCells = kLatticeSide * kLatticeSide * kLatticeSide;
 constexpr int kLatticeNodes = (kLatticeSide + 1) * (kLatticeSide + 1) * (kLatticeSide + 1);
+constexpr int kLatticeZero = kLatticeNodes;           ///< the node that is 0
+constexpr int kLatticeFirstBrick = kLatticeZero + 1;  ///< its first node
 constexpr int kBrickParts = 8;
 constexpr int kBrickNodes = 27;
 /// Numbers: the cells, what lies outside of the domain, the parts.
 constexpr int kLatticeOutside = kLatticeCells;
 constexpr int kLatticeFirstPart = kLatticeCells + 1;
-/// What a cell or a part is; from kLatticeBrick on, it is cut into parts: brick (state - that).
-constexpr int kLatticeBrick = 4;
+/// What a cell or a part is. From kLatticeBrick on, it is cut into parts: brick (state - that); a
+/// bit above all bricks' numbers.
+constexpr int kLatticeGood = 2;
+constexpr int kLatticeBrick = 1 << 20;
 
 struct LatticeDomain {
     float low[3], high[3];
@@ -49,13 +54,12 @@ struct LatticeKernels {
     /// Where `state` is a brick's, from the cell or part to the brick's part: within, first, cut,
     /// number.
     void (*descend)(LatticeBlock& block, int count);
-    /// Tetrahedral interpolation there: corner, weight.
+    /// Tetrahedral interpolation there: corner, weight. All of it 0 where `state` is not good.
     void (*weigh)(LatticeBlock& block, int count);
-    /// In `to`, what the pixels `begin` to `end` - 1 of the `count` of `from` become at a strength;
-    /// channels that do not move keep their bits. `nodes` are 4 numbers each, the last is 0.
-    void (*blend)(const float* nodes, const LatticeBlock& block, int begin, int end,
-                  const float* from, float* to, int channels, int count, float strength,
-                  bool premultiplied);
+    /// In `to`, what the `count` pixels of `from` become at a strength; channels that do not move
+    /// keep their bits. `nodes` are 4 numbers each, the last is 0.
+    void (*blend)(const float* nodes, const LatticeBlock& block, int count, const float* from,
+                  float* to, int channels, float strength, bool premultiplied);
 };
 
 }  // namespace palette4d

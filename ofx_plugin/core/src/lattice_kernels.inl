@@ -62,7 +62,7 @@ void locate(const LatticeDomain& domain, LatticeBlock& block, const float* from,
 
 void descend(LatticeBlock& block, int count) {
     constexpr float kFirst = palette4d::kLatticeFirstPart, kParts = palette4d::kBrickParts,
-                    kCellNodes = palette4d::kLatticeNodes, kNodes = palette4d::kBrickNodes;
+                    kFirstNode = palette4d::kLatticeFirstBrick, kNodes = palette4d::kBrickNodes;
     const Lanes<float> zero = all(0.0f), one = all(1.0f), two = all(2.0f), three = all(3.0f);
     for (int at = 0; at < count; at += Lanes<float>::kCount) {
         const Lanes<float> brick =
@@ -79,18 +79,24 @@ void descend(LatticeBlock& block, int count) {
         store_whole(block.number + at, select(cut, all(kFirst) + all(kParts) * brick + part,
                                               load_whole(block.number + at)));
         store(block.first + at,
-              select(cut, all(kCellNodes) + all(kNodes) * brick + node, load(block.first + at)));
+              select(cut, all(kFirstNode) + all(kNodes) * brick + node, load(block.first + at)));
         store(block.cut + at, select(cut, one, load(block.cut + at)));
     }
 }
 
 void weigh(LatticeBlock& block, int count) {
     constexpr float kSide = palette4d::kLatticeSide + 1, kBrickSide = 3;
-    const Lanes<float> zero = all(0.0f), one = all(1.0f);
+    const Lanes<float> zero = all(0.0f), one = all(1.0f),
+                       state_of_good = all(float(palette4d::kLatticeGood));
     for (int at = 0; at < count; at += Lanes<float>::kCount) {
         const LaneMask<float> cut = load(block.cut + at) > zero;
         const Lanes<float> x = load(block.within[0] + at), y = load(block.within[1] + at),
                            z = load(block.within[2] + at), first = load(block.first + at);
+        const Lanes<float> state = load_whole(block.state + at);
+        const LaneMask<float> good = (state >= state_of_good) & (state <= state_of_good);
+        const auto offsets = [&](unsigned* to, Lanes<float> node) {
+            store_offsets(to, select(good, node, all(float(palette4d::kLatticeZero))));
+        };
         const Lanes<float> step_x = select(cut, all(kBrickSide * kBrickSide), all(kSide * kSide)),
                            step_y = select(cut, all(kBrickSide), all(kSide)), step_z = one;
         // From the first corner along the axis that the colour is farthest along, then along the
@@ -101,10 +107,10 @@ void weigh(LatticeBlock& block, int count) {
         const Lanes<float> shortest =
             select(xy, select(yz, step_z, step_y), select(xz, step_z, step_x));
         const Lanes<float> end = first + step_x + step_y + step_z;
-        store_offsets(block.corner[0] + at, first);
-        store_offsets(block.corner[1] + at, first + longest);
-        store_offsets(block.corner[2] + at, end - shortest);
-        store_offsets(block.corner[3] + at, end);
+        offsets(block.corner[0] + at, first);
+        offsets(block.corner[1] + at, first + longest);
+        offsets(block.corner[2] + at, end - shortest);
+        offsets(block.corner[3] + at, end);
         const Lanes<float> most = max(max(x, y), z), least = min(min(x, y), z),
                            middle = max(min(x, y), min(max(x, y), z));
         store(block.weight[0] + at, one - most);
@@ -135,13 +141,15 @@ PALETTE4D_INLINE Four load_four(const float* from) {
     return r;
 }
 
-PALETTE4D_INLINE Four step_from(Four before, Four step) {
+/// `factor` may be no number where there is no step.
+PALETTE4D_INLINE Four step_from(Four before, float factor, Four step) {
+    const Four after = before + factor * step;
 #if defined(__GNUC__)
-    return step != 0.0f ? before + step : before;
+    return step != 0.0f ? after : before;
 #else
     Four r = before;
     for (int c = 0; c < 4; ++c) {
-        if (step.at[c] != 0) r.at[c] = before.at[c] + step.at[c];
+        if (step.at[c] != 0) r.at[c] = after.at[c];
     }
     return r;
 #endif
@@ -165,53 +173,98 @@ PALETTE4D_INLINE void store_pixel(float* to, Four after) {
 #endif
 }
 
+PALETTE4D_INLINE const float* node_at(const float* nodes, std::size_t bytes) {
+    return reinterpret_cast<const float*>(reinterpret_cast<const char*>(nodes) + bytes);
+}
+
 /// What pixel i of the block becomes.
-template <int Channels, bool Premultiplied>
+template <bool Premultiplied>
 PALETTE4D_INLINE Four blended(const float* nodes, const LatticeBlock& block, int i, Four before,
                               float strength) {
     const auto part = [&](int k) {
-        const auto at = static_cast<std::size_t>(block.corner[k][i]);
-        return block.weight[k][i] *
-               load_four(reinterpret_cast<const float*>(reinterpret_cast<const char*>(nodes) + at));
+        return block.weight[k][i] * load_four(node_at(nodes, block.corner[k][i]));
     };
-    const Four moved = (part(0) + part(1)) + (part(2) + part(3));
-    Four step = strength * moved;
-    if (Premultiplied) step = before[3] * step;
-    return step_from(before, step);
+    const Four step = strength * ((part(0) + part(1)) + (part(2) + part(3)));
+    return step_from(before, Premultiplied ? before[3] : 1.0f, step);
 }
+
+#if defined(PALETTE4D_LANES_X86) && PALETTE4D_LANES_BYTES > 16
+/// The same for eight pixels from i on, two in a register: half of the instructions.
+template <int Channels, bool Premultiplied>
+PALETTE4D_INLINE void blend_eight(const float* nodes, const LatticeBlock& block, int i, bool last,
+                                  const float* from, float* to, float strength) {
+    const auto join = [](Four a, Four b) {
+        return _mm256_insertf128_ps(_mm256_castps128_ps256(a), b, 1);
+    };
+    __m256 weights[4];
+    for (int k = 0; k < 4; ++k) weights[k] = _mm256_load_ps(block.weight[k] + i);
+    for (int pair = 0; pair < 8; pair += 2) {
+        const __m256i both =
+            _mm256_set_epi32(pair + 1, pair + 1, pair + 1, pair + 1, pair, pair, pair, pair);
+        const auto part = [&](int k) {
+            unsigned long long corners;
+            std::memcpy(&corners, block.corner[k] + i + pair, sizeof corners);
+            return _mm256_mul_ps(_mm256_permutevar8x32_ps(weights[k], both),
+                                 join(load_four(node_at(nodes, corners & 0xFFFFFFFF)),
+                                      load_four(node_at(nodes, corners >> 32))));
+        };
+        const float* const one = from + (i + pair) * Channels;
+        __m256 before;
+        if (Channels == 4) {
+            before = _mm256_loadu_ps(one);
+        } else if (last && pair == 6) {
+            before = join(load_four(one), Four{one[3], one[4], one[5], 0});
+        } else {
+            before = join(load_four(one), load_four(one + 3));
+        }
+        const __m256 moved =
+            _mm256_add_ps(_mm256_add_ps(part(0), part(1)), _mm256_add_ps(part(2), part(3)));
+        __m256 step = _mm256_mul_ps(_mm256_set1_ps(strength), moved);
+        const __m256 stays = _mm256_cmp_ps(step, _mm256_setzero_ps(), _CMP_EQ_OQ);
+        if (Premultiplied) step = _mm256_mul_ps(_mm256_permute_ps(before, 0xFF), step);
+        const __m256 after = _mm256_blendv_ps(_mm256_add_ps(before, step), before, stays);
+        float* const there = to + (i + pair) * Channels;
+        if (Channels == 4) {
+            _mm256_storeu_ps(there, after);
+        } else {
+            _mm_storeu_ps(there, _mm256_castps256_ps128(after));
+            store_pixel<3>(there + 3, _mm256_extractf128_ps(after, 1));
+        }
+    }
+}
+#endif
 
 template <int Channels, bool Premultiplied>
-void blend_run(const float* nodes, const LatticeBlock& block, int begin, int end, const float* from,
-               float* to, int count, float strength) {
-    const auto pixel = [&](int i) {
-        if (Channels == 4 || i + 1 < count) return load_four(from + i * Channels);
-        // What lies behind the last of three channels is nobody's.
-        const float* rgb = from + i * 3;
-        const float padded[4] = {rgb[0], rgb[1], rgb[2], 0};
-        return load_four(padded);
-    };
-    const int last = end - 1;
-    Four before = pixel(begin);
-    for (int i = begin; i < last; ++i) {
-        // Loaded before the store, which reaches into the next pixel where there are three
-        // channels, and `to` may be `from`.
-        const Four next = pixel(i + 1);
-        const Four after = blended<Channels, Premultiplied>(nodes, block, i, before, strength);
-        std::memcpy(to + i * Channels, &after, sizeof after);
-        before = next;
+void blend_all(const float* nodes, const LatticeBlock& block, int count, const float* from,
+               float* to, float strength) {
+    int i = 0;
+#if defined(PALETTE4D_LANES_X86) && PALETTE4D_LANES_BYTES > 16
+    for (; i + 8 <= count; i += 8) {
+        blend_eight<Channels, Premultiplied>(nodes, block, i, i + 8 == count, from, to, strength);
     }
-    store_pixel<Channels>(to + last * Channels,
-                          blended<Channels, Premultiplied>(nodes, block, last, before, strength));
+#endif
+    for (; i < count; ++i) {
+        const float* const one = from + i * Channels;
+        Four before;
+        if (Channels == 4) {
+            before = load_four(one);
+        } else {  // what lies behind the third channel may be somebody else's
+            const float padded[4] = {one[0], one[1], one[2], 0};
+            before = load_four(padded);
+        }
+        store_pixel<Channels>(to + i * Channels,
+                              blended<Premultiplied>(nodes, block, i, before, strength));
+    }
 }
 
-void blend(const float* nodes, const LatticeBlock& block, int begin, int end, const float* from,
-           float* to, int channels, int count, float strength, bool premultiplied) {
+void blend(const float* nodes, const LatticeBlock& block, int count, const float* from, float* to,
+           int channels, float strength, bool premultiplied) {
     if (channels == 3) {
-        blend_run<3, false>(nodes, block, begin, end, from, to, count, strength);
+        blend_all<3, false>(nodes, block, count, from, to, strength);
     } else if (premultiplied) {
-        blend_run<4, true>(nodes, block, begin, end, from, to, count, strength);
+        blend_all<4, true>(nodes, block, count, from, to, strength);
     } else {
-        blend_run<4, false>(nodes, block, begin, end, from, to, count, strength);
+        blend_all<4, false>(nodes, block, count, from, to, strength);
     }
 }
 

@@ -10,9 +10,10 @@ namespace {
 /// All that there can be: every cell, and every part but the smallest.
 constexpr std::size_t kMostBricks =
     kLatticeCells * ((std::size_t{1} << 3 * kLatticeCuts) - 1) / (kBrickParts - 1);
-constexpr std::size_t kMostNodes = kLatticeNodes + kMostBricks * kBrickNodes;
+constexpr std::size_t kMostNodes = kLatticeFirstBrick + kMostBricks * kBrickNodes;
 constexpr std::size_t kMostStates = kLatticeFirstPart + kMostBricks * kBrickParts;
 static_assert(kMostNodes < 1 << 24, "floats count nodes");
+static_assert(kMostBricks < kLatticeBrick, "states count bricks");
 
 /// Where a cell's interpolation is looked at: the other nodes of the brick that it would be cut
 /// into. Each corner has a part in one, so that a crease that cuts a corner off is seen as well.
@@ -117,7 +118,7 @@ void Lattice::Store::Builder::add(int number) {
     jobs_.push_back(
         {{{2 * whole.place[0] + x, 2 * whole.place[1] + y, 2 * whole.place[2] + z}, whole.cuts + 1},
          number,
-         kLatticeNodes + brick * kBrickNodes + (x * 3 + y) * 3 + z,
+         kLatticeFirstBrick + brick * kBrickNodes + (x * 3 + y) * 3 + z,
          9,
          3});
 }
@@ -267,7 +268,7 @@ std::int32_t Lattice::Store::Builder::make_brick(const ToCut& one) {
     const std::int32_t brick = store_.bricks_++;
     store_.cuts_[brick] = one.job->itself;
     float* const nodes =
-        store_.nodes_ + 4 * (kLatticeNodes + static_cast<std::size_t>(brick) * kBrickNodes);
+        store_.nodes_ + 4 * (kLatticeFirstBrick + static_cast<std::size_t>(brick) * kBrickNodes);
     for (std::size_t corner = 0; corner < 8; ++corner) {
         const std::size_t node = (corner >> 2) * 18 + (corner >> 1 & 1) * 6 + (corner & 1) * 2;
         std::copy_n(one.corners[corner], 3, nodes + 4 * node);

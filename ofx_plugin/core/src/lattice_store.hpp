@@ -49,7 +49,13 @@ inline double lattice_error(double colour, double displacement, double error) {
 
 class Lattice::Store {
 public:
-    enum : std::int32_t { kUnknown = 0, kClaimed, kGood, kExact, kBrick = kLatticeBrick };
+    enum : std::int32_t {
+        kUnknown = 0,
+        kClaimed,
+        kGood = kLatticeGood,
+        kExact,
+        kBrick = kLatticeBrick
+    };
     using State = std::atomic<std::int32_t>;
 
     explicit Store(const Recolourer& recolourer);
