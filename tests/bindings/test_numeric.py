@@ -300,7 +300,7 @@ def test_a_lattice_is_made_while_it_is_used(recolourer: _core.Recolourer) -> Non
     found = lattice.apply(image, threads=2)
     size = lattice.size
     assert size["cells"] > 0
-    assert size["colours"] > 8 * size["cells"]
+    assert size["colours"] > size["cells"]  # a node for each, some at the rim
     again = lattice.apply(image)
     assert same_bits(again, found).all()
     assert lattice.size["cells"] == size["cells"]

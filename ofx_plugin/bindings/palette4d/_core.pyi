@@ -184,7 +184,7 @@ class Lattice:
         """Largest abs(interpolated - exact) / max(abs(exact), 0.1) seen so far, at strength 1."""
     @property
     def size(self) -> dict[str, int]:
-        """Cells looked at, cut, parts looked at, exact parts, colours evaluated exactly."""
+        """Cells made, cut, their parts, exact parts in use, colours evaluated exactly."""
 
 LATTICE_TOLERANCE: float
 """What `Lattice.largest_error` is held against."""

@@ -13,8 +13,9 @@
 
 namespace palette4d {
 
-/// Pixels in cells that nobody has made yet wait until there are enough of them for the cells to be
-/// made many at a time; pixels in parts that are not good enough go on to the exact worker.
+/// Blocks of pixels with some in cells that nobody has made yet wait until there are enough of them
+/// for the cells to be made many at a time; pixels in parts that are not good enough go on to the
+/// exact worker.
 class Lattice::Worker {
 public:
     Worker(const Recolourer& recolourer, Store& store, const RecolourOptions& options, int channels)
@@ -38,11 +39,8 @@ public:
                 fetch<0>(from + kAhead * kSize * channels_);
                 fetch<1>(to + kAhead * kSize * channels_);
             }
-            block(
-                from, to, count,
-                [&](int i) { exact_.pixel(from + i * channels_, to + i * channels_, channels_); },
-                [&](int i) { waiting_.push_back({from + i * channels_, to + i * channels_}); });
-            if (waiting_.size() > kWaiting - kSize) do_waiting();
+            if (!block(from, to, count)) waiting_.push_back({from, to, count});
+            if (waiting_.size() == kWaiting) do_waiting();
         }
     }
 
@@ -60,15 +58,16 @@ public:
 
 private:
     static constexpr int kSize = LatticeBlock::kSize;
-    static constexpr std::size_t kWaiting = 4096;
+    static constexpr std::size_t kWaiting = 256;
     static constexpr int kSampleEvery = 7;  ///< blocks; a pixel of one is also evaluated exactly
 
     /// Blocks that are asked of memory early: work on one takes as long as that.
     static constexpr int kAhead = 2;
 
-    struct Pixel {
+    struct Waiting {
         const float* from;
         float* to;
+        int count;
     };
 
     template <int Write>
@@ -79,106 +78,60 @@ private:
 #endif
     }
 
-    /// `exact(i)` and `wait(i)` take those of the pixels that this leaves as they are.
-    template <class Exact, class Wait>
-    void block(const float* from, float* to, int count, const Exact& exact, const Wait& wait) {
+    /// False when some of its pixels' cells or parts have to be made first.
+    bool block(const float* from, float* to, int count) {
         LatticeBlock& b = block_;
-        const bool all_good = find(from, count, kLatticeCuts);
+        kernels_.locate(store_.domain(), b, from, channels_, count, premultiplied_);
+        std::int32_t others = look_up(count);
+        if (others >= Store::kBrick) {
+            kernels_.descend(b, count);
+            others = look_up(count);
+        }
+        if (others != 0 && !claim(count)) return false;
         kernels_.weigh(b, count);
         if (++blocks_ % kSampleEvery == 0) sample(static_cast<int>(blocks_ % count));
         kernels_.blend(store_.nodes(), b, count, from, to, channels_, strength_, premultiplied_);
         interpolated_ += count;
-        if (all_good) return;
+        if (others == 0) return true;
         for (int i = 0; i < count; ++i) {
-            if (b.state[i] == Store::kGood) continue;
-            --interpolated_;
             if (b.state[i] == Store::kExact) {
-                exact(i);
-            } else {
-                wait(i);
+                exact_.pixel(from + i * channels_, to + i * channels_, channels_);
+                --interpolated_;
             }
         }
+        return true;
     }
 
-    /// The pixels' cells or, after at most so many cuts, parts, and what they are, in block_: are
-    /// all of them good?
-    bool find(const float* from, int count, int most_cuts) {
-        LatticeBlock& b = block_;
-        kernels_.locate(store_.domain(), b, from, channels_, count, premultiplied_);
-        for (int cuts = 0;; ++cuts) {
-            std::int32_t others = 0;
-            for (int i = 0; i < count; ++i) {
-                const std::int32_t state =
-                    store_.state(b.number[i]).load(std::memory_order_acquire);
-                b.state[i] = state;
-                others |= state ^ Store::kGood;
-            }
-            if (others < Store::kBrick || cuts == most_cuts) return others == 0;
-            kernels_.descend(b, count);
+    /// The states in block_; 0 when all of them are good, no less than kBrick when some are cut.
+    std::int32_t look_up(int count) {
+        int* const states = block_.state;
+        for (int i = 0; i < count; ++i) {
+            states[i] = store_.state(block_.number[i]).load(std::memory_order_acquire);
         }
+        std::int32_t others = 0;
+        for (int i = 0; i < count; ++i) others |= states[i] ^ Store::kGood;
+        return others;
     }
 
-    void copy(const float* from, float* to) const {
-        for (int c = 0; c < 3; ++c) to[c] = from[c];
-        if (channels_ == 4) to[3] = from[3];
-    }
-
-    /// Block after block of the waiting pixels, next to each other.
-    template <class Do>
-    void each_waiting_block(const Do& work) {
-        for (std::size_t at = 0; at < waiting_.size(); at += kSize) {
-            const int count = static_cast<int>(std::min<std::size_t>(kSize, waiting_.size() - at));
-            for (int i = 0; i < count; ++i) {
-                copy(waiting_[at + i].from, gathered_ + i * channels_);
+    /// What has to be made, by this thread unless another is at it. True when there is nothing.
+    bool claim(int count) {
+        bool made = true;
+        for (int i = 0; i < count; ++i) {
+            // Cut since it was looked at is not made either: its part has to be found.
+            if (block_.state[i] != Store::kGood && block_.state[i] != Store::kExact) {
+                made = false;
+                builder_.claim(block_.number[i], block_.state[i]);
             }
-            work(&waiting_[at], count);
         }
+        return made;
     }
 
     void do_waiting() {
-        if (waiting_.empty()) return;
-        for (int cuts = 0; cuts <= kLatticeCuts; ++cuts) {
-            each_waiting_block([&](const Pixel*, int count) { claim(count, cuts); });
+        while (!waiting_.empty()) {
+            if (!builder_.claimed()) std::this_thread::yield();  // others are at it
             builder_.run();
-            each_waiting_block([&](const Pixel*, int count) { settle(count, cuts); });
-        }
-        each_waiting_block([&](const Pixel* pixels, int count) {
-            bool done[kSize];
-            std::fill_n(done, count, true);
-            block(
-                gathered_, results_, count,
-                [&](int i) {
-                    done[i] = false;
-                    exact_.pixel(pixels[i].from, pixels[i].to, channels_);
-                },
-                [&](int) { throw std::logic_error("lattice: a cell was not made"); });
-            for (int i = 0; i < count; ++i) {
-                if (done[i]) copy(results_ + i * channels_, pixels[i].to);
-            }
-        });
-        waiting_.clear();
-    }
-
-    /// To be made by this thread: what nobody has, after so many cuts.
-    void claim(int count, int cuts) {
-        find(gathered_, count, cuts);
-        for (int i = 0; i < count; ++i) {
-            std::int32_t unknown = Store::kUnknown;
-            if (block_.state[i] == unknown &&
-                store_.state(block_.number[i]).compare_exchange_strong(unknown, Store::kClaimed)) {
-                builder_.add(block_.number[i]);
-            }
-        }
-    }
-
-    /// Waits for what other threads make.
-    void settle(int count, int cuts) {
-        find(gathered_, count, cuts);
-        for (int i = 0; i < count; ++i) {
-            while (store_.state(block_.number[i]).load(std::memory_order_acquire) ==
-                   Store::kClaimed) {
-                std::this_thread::yield();
-            }
+            const auto done = [&](const Waiting& w) { return block(w.from, w.to, w.count); };
+            waiting_.erase(std::remove_if(waiting_.begin(), waiting_.end(), done), waiting_.end());
         }
     }
 
@@ -196,7 +149,7 @@ private:
     }
 
     void check_samples() {
-        const std::vector<float>& exact = builder_.displacements(sampled_);
+        const float* const exact = builder_.displacements(sampled_.data(), sampled_.size() / 3);
         double largest = 0;
         for (std::size_t i = 0; i < sampled_.size(); ++i) {
             largest = std::max(largest, lattice_error(static_cast<double>(sampled_[i]),
@@ -217,8 +170,7 @@ private:
     ExactWorker exact_;
     Store::Builder builder_;
     LatticeBlock block_{};
-    alignas(64) float gathered_[4 * kSize] = {}, results_[4 * kSize] = {};
-    std::vector<Pixel> waiting_;
+    std::vector<Waiting> waiting_;
     std::vector<float> sampled_, sampled_moves_;
     long long interpolated_ = 0, blocks_ = 0;
 };

@@ -6,13 +6,11 @@
 
 namespace palette4d {
 
-/// A cube of cells spans the domain. A cell that is too coarse is cut in half along each axis, and
-/// its eight parts where they are too coarse, and so on: the nodes of each such cut (a brick)
-/// follow those of the cells in memory, after one that is always 0. Cells, parts and nodes are
-/// numbered with blue running fastest; the number of a part is its brick's, counted from the cells
-/// on.
-constexpr int kLatticeSide = 36;  ///< cells along each axis
-constexpr int kLatticeCuts = 2;   ///< most of a cell
+/// A cube of cells spans the domain. One that is too coarse is cut in half along each axis: the
+/// nodes of each such cut (a brick) follow those of the cells in memory, after one that is always
+/// 0. Cells, parts and nodes are numbered with blue running fastest; the number of a part is its
+/// brick's, counted from the cells on.
+constexpr int kLatticeSide = 72;  ///< cells along each axis
 constexpr int kLatticeCells = kLatticeSide * kLatticeSide * kLatticeSide;
 constexpr int kLatticeNodes = (kLatticeSide + 1) * (kLatticeSide + 1) * (kLatticeSide + 1);
 constexpr int kLatticeZero = kLatticeNodes;           ///< the node that is 0
@@ -24,7 +22,7 @@ constexpr int kLatticeOutside = kLatticeCells;
 constexpr int kLatticeFirstPart = kLatticeCells + 1;
 /// What a cell or a part is. From kLatticeBrick on, it is cut into parts: brick (state - that); a
 /// bit above all bricks' numbers.
-constexpr int kLatticeGood = 2;
+constexpr int kLatticeGood = 3;
 constexpr int kLatticeBrick = 1 << 20;
 
 struct LatticeDomain {
@@ -51,8 +49,7 @@ struct LatticeKernels {
     /// divided by alpha where premultiplied; alpha that cannot be divided by is outside.
     void (*locate)(const LatticeDomain& domain, LatticeBlock& block, const float* from,
                    int channels, int count, bool premultiplied);
-    /// Where `state` is a brick's, from the cell or part to the brick's part: within, first, cut,
-    /// number.
+    /// Where `state` is a brick's, from the cell to the brick's part: within, first, cut, number.
     void (*descend)(LatticeBlock& block, int count);
     /// Tetrahedral interpolation there: corner, weight. All of it 0 where `state` is not good.
     void (*weigh)(LatticeBlock& block, int count);

@@ -1,5 +1,7 @@
 // The kernels of lattice_kernels.hpp for the width that lanes.hpp was included with.
 
+#include "four.hpp"
+
 namespace {
 
 using palette4d::LatticeBlock;
@@ -120,45 +122,10 @@ void weigh(LatticeBlock& block, int count) {
     }
 }
 
-#if defined(__GNUC__)
-typedef float Four __attribute__((vector_size(16)));
-#else
-struct Four {
-    float at[4];
-    float operator[](int c) const { return at[c]; }
-};
-inline Four operator+(Four a, Four b) {
-    return {{a.at[0] + b.at[0], a.at[1] + b.at[1], a.at[2] + b.at[2], a.at[3] + b.at[3]}};
-}
-inline Four operator*(float s, Four a) {
-    return {{s * a.at[0], s * a.at[1], s * a.at[2], s * a.at[3]}};
-}
-#endif
-
-PALETTE4D_INLINE Four load_four(const float* from) {
-    Four r;
-    std::memcpy(&r, from, sizeof r);
-    return r;
-}
-
-/// `factor` may be no number where there is no step.
-PALETTE4D_INLINE Four step_from(Four before, float factor, Four step) {
-    const Four after = before + factor * step;
-#if defined(__GNUC__)
-    return step != 0.0f ? after : before;
-#else
-    Four r = before;
-    for (int c = 0; c < 4; ++c) {
-        if (step.at[c] != 0) r.at[c] = after.at[c];
-    }
-    return r;
-#endif
-}
-
 template <int Channels>
 PALETTE4D_INLINE void store_pixel(float* to, Four after) {
     if (Channels == 4) {
-        std::memcpy(to, &after, sizeof after);
+        store_four(to, after);
         return;
     }
     // Not through memory, as compilers copy twelve bytes of a register.
@@ -185,7 +152,8 @@ PALETTE4D_INLINE Four blended(const float* nodes, const LatticeBlock& block, int
         return block.weight[k][i] * load_four(node_at(nodes, block.corner[k][i]));
     };
     const Four step = strength * ((part(0) + part(1)) + (part(2) + part(3)));
-    return step_from(before, Premultiplied ? before[3] : 1.0f, step);
+    // There is nothing to add where alpha may be no number.
+    return where_zero(step, before, before + (Premultiplied ? before[3] : 1.0f) * step);
 }
 
 #if defined(PALETTE4D_LANES_X86) && PALETTE4D_LANES_BYTES > 16

@@ -47,11 +47,19 @@ inline double lattice_error(double colour, double displacement, double error) {
     return std::abs(error) / size;
 }
 
+/// In half widths of a part; the last is 0.
+struct LatticePlace {
+    float at[4];
+};
+
 class Lattice::Store {
 public:
+    /// States. Cells are made eight at a time (a group), with all nodes between them: where these
+    /// tell that a cell is fine it is good, else suspect until it was looked at itself.
     enum : std::int32_t {
         kUnknown = 0,
         kClaimed,
+        kSuspect,
         kGood = kLatticeGood,
         kExact,
         kBrick = kLatticeBrick
@@ -65,8 +73,6 @@ public:
     /// Of a cell or part, by its number.
     State& state(int number) { return states_[static_cast<std::size_t>(number)]; }
 
-    /// Makes cells, and parts of bricks, that were claimed by the calling thread (it made their
-    /// state kClaimed from kUnknown). On return none of them is kClaimed any more.
     class Builder;
 
     void saw_error(double error);
@@ -74,65 +80,69 @@ public:
     Size size() const;
 
 private:
-    /// The cell or part that a brick cuts: where it is, in its own width, after so many cuts.
-    struct Cut {
-        std::int32_t place[3];
-        std::int32_t cuts;
-    };
     enum : std::uint8_t { kEmpty = 0, kTaken, kReady, kFailed };
+
+    float* node(int number) { return nodes_ + 4 * static_cast<std::size_t>(number); }
 
     const Recolourer& recolourer_;
     LatticeDomain domain_;
-    float step_[3];  ///< width of the smallest parts
+    float low_[4], step_[4];  ///< of the domain; half of a part's width
     Zeros memory_;
-    float* const nodes_;  ///< 4 numbers each
-    Cut* const cuts_;     ///< one a brick
+    float* const nodes_;          ///< 4 numbers each
+    LatticePlace* const bricks_;  ///< where they are
     State* const states_;
     std::atomic<std::uint8_t>* const node_states_;  ///< of the cells; a brick is made in one piece
-    std::atomic<std::int32_t> bricks_{0};
-    std::atomic<long long> cells_{0}, parts_{0}, exact_{0}, colours_{0};
+    std::atomic<std::int32_t> cut_{0};
+    std::atomic<long long> cells_{0}, exact_{0}, colours_{0};
     std::atomic<double> largest_error_{0};
 };
 
+/// Makes what one thread has claimed.
 class Lattice::Store::Builder {
 public:
     Builder(Store& store, InstructionSet instructions);
 
-    /// A cell or part, by its number.
-    void add(int number);
-    /// Makes what was added.
+    /// To be made by run(): what is unknown or suspect, unless another thread was faster.
+    void claim(int number, std::int32_t state);
+    bool claimed() const { return !groups_.empty() || !jobs_.empty(); }
+    /// On return nothing of it is kClaimed any more.
     void run() noexcept;
 
-    /// Evaluates colours at strength 1: displacements (n, 3).
-    const std::vector<float>& displacements(const std::vector<float>& colours);
+    /// Evaluates `count` colours at strength 1: displacements (count, 3), and a number more.
+    const float* displacements(const float* colours, std::size_t count);
 
 private:
+    /// A cell or part that is suspect.
     struct Job {
-        Cut itself;
+        LatticePlace place;
+        float half;  ///< of its width
         int number, node, step_x, step_y;
-        int width() const { return 1 << (kLatticeCuts - itself.cuts); }  ///< in smallest parts
+        int corner(int k) const {
+            return node + (k >> 2) * step_x + (k >> 1 & 1) * step_y + (k & 1);
+        }
     };
-    /// One that is to be cut.
-    struct ToCut {
-        const Job* job;
-        float corners[8][3];
-        float probed[19 * 3];
-    };
-    void make_corners();
-    void judge();
-    void add_probes(const Job& job, std::size_t first, std::size_t last);
-    static double error_of(const float (&corners)[8][3], const float* colours, const float* moved,
-                           std::size_t count);
-    std::int32_t make_brick(const ToCut& one);
-    void publish(const Job& job, std::int32_t state);
-    /// Waits for nodes that other threads have taken; false when one could not be made.
-    bool corners(const Job& job, float (&values)[8][3]);
+
+    void make_groups();
+    void take_nodes(int group);
+    void publish_group(int group);
+    void make_jobs();
+    Job job_of(int number) const;
+    /// What the probes `first` to `last` - 1 of jobs have moved.
+    const float* probe(const std::vector<Job>& jobs, std::size_t first, std::size_t last);
+    float error_of(const Job& job, const float* moved) const;
+    void cut(const Job& job, const float* middles, const float* edges);
+    template <class NodeAt>
+    void judge(const LatticePlace& place, float half, const NodeAt& node_at,
+               std::int32_t* states) const;
+    void publish(int number, std::int32_t state) {
+        store_.state(number).store(state, std::memory_order_release);
+    }
 
     Store& store_;
     ExactWorker exact_;
-    std::vector<Job> jobs_;
-    std::vector<int> taken_;
-    std::vector<float> colours_, moved_;
+    std::vector<int> groups_, taken_;
+    std::vector<Job> jobs_, to_cut_;
+    std::vector<float> colours_, moved_, middles_;
 };
 
 }  // namespace palette4d

@@ -23,11 +23,12 @@ struct LatticeCounts {
 /// One frame's displacements at the nodes of a lattice, interpolated tetrahedrally between them.
 ///
 /// The lattice spans the unit cube and the palette's bounding box, and a sixteenth of that more on
-/// every side. It is made while it is used: of its 36^3 cells only those that pixels lie in. Those
-/// in which the interpolation errs by more than kProbeTolerance, at points that are evaluated
-/// exactly, are halved along each axis, up to twice; smallest parts that are not good enough, and
-/// all that lies outside, are recoloured exactly. What a cell holds depends on the palette and the
-/// edit only. Used by many threads at a time.
+/// every side. It is made while it is used: of its 72^3 cells only those that pixels lie in, eight
+/// (2 x 2 x 2) at a time. Where these tell by their 27 nodes that the interpolation in one is good,
+/// it is. Others are looked at in seven more points that are evaluated exactly, and those that err
+/// by more than kProbeTolerance are halved along each axis. Their parts are treated alike; parts
+/// that are not good enough, and all that lies outside, are recoloured exactly. What a cell holds
+/// depends on the palette and the edit only. Used by many threads at a time.
 class Lattice {
 public:
     /// Of (interpolated - exact) / max(|exact|, 0.1), channel by channel.
@@ -56,10 +57,10 @@ public:
 
     /// What the lattice holds at the moment.
     struct Size {
-        long long cells = 0;    ///< looked at
-        long long cut = 0;      ///< cells and parts that were halved
-        long long parts = 0;    ///< looked at
-        long long exact = 0;    ///< smallest parts that are not good enough
+        long long cells = 0;    ///< made
+        long long cut = 0;      ///< those of them that were halved
+        long long parts = 0;    ///< of these
+        long long exact = 0;    ///< parts that are not good enough, among those in use
         long long colours = 0;  ///< evaluated exactly for all this
     };
     Size size() const;
