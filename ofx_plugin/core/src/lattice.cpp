@@ -13,9 +13,9 @@
 
 namespace palette4d {
 
-/// Blocks of pixels with some in cells that nobody has made yet wait until there are enough of them
-/// for the cells to be made many at a time; pixels in parts that are not good enough go on to the
-/// exact worker.
+/// Blocks of pixels with some in cells that nobody has made yet wait until there are a few of them,
+/// for the cells to be made many at a time and yet before too many others wait for the same; pixels
+/// in parts that are not good enough go on to the exact worker.
 class Lattice::Worker {
 public:
     Worker(const Recolourer& recolourer, Store& store, const RecolourOptions& options, int channels)
@@ -58,7 +58,7 @@ public:
 
 private:
     static constexpr int kSize = LatticeBlock::kSize;
-    static constexpr std::size_t kWaiting = 256;
+    static constexpr std::size_t kWaiting = 16;
     static constexpr int kSampleEvery = 7;  ///< blocks; a pixel of one is also evaluated exactly
 
     /// Blocks that are asked of memory early: work on one takes as long as that.
