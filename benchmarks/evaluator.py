@@ -70,7 +70,8 @@ class Cut:
             return 0.0
         a, b, c = (self.rgb[self.faces[:, i]] - self.rgb[0] for i in range(3))
         volume = float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum()) / 6
-        return max(0.0, 1.0 - volume / hull)
+        # A mesh that is turned inside out has a negative volume: it lacks everything.
+        return float(np.clip(1.0 - volume / hull, 0.0, 1.0))
 
 
 @dataclasses.dataclass(frozen=True)
