@@ -26,7 +26,7 @@ public:
           channels_(channels),
           exact_(recolourer, options),
           builder_(store, options.instructions) {
-        waiting_.reserve(kWaiting);
+        waiting_.reserve(kMostLeft + kWaiting);
     }
 
     void row(const float* in, float* out, int width) {
@@ -40,13 +40,16 @@ public:
                 fetch<1>(to + kAhead * kSize * channels_);
             }
             if (!block(from, to, count)) waiting_.push_back({from, to, count});
-            if (waiting_.size() == kWaiting) do_waiting();
+            if (waiting_.size() >= left_ + kWaiting) {
+                do_waiting(kMostLeft);
+                left_ = waiting_.size();
+            }
         }
     }
 
     /// All of it is written when this returns.
     void finish() {
-        do_waiting();
+        do_waiting(0);
         check_samples();
         exact_.finish();
     }
@@ -58,7 +61,7 @@ public:
 
 private:
     static constexpr int kSize = LatticeBlock::kSize;
-    static constexpr std::size_t kWaiting = 16;
+    static constexpr std::size_t kWaiting = 16, kMostLeft = 256;
     static constexpr int kSampleEvery = 7;  ///< blocks; a pixel of one is also evaluated exactly
 
     /// Blocks that are asked of memory early: work on one takes as long as that.
@@ -126,12 +129,15 @@ private:
         return made;
     }
 
-    void do_waiting() {
-        while (!waiting_.empty()) {
-            if (!builder_.claimed()) std::this_thread::yield();  // others are at it
+    /// Leaves no more than so many blocks, which wait for what other threads make.
+    void do_waiting(std::size_t most_left) {
+        const auto done = [&](const Waiting& w) { return block(w.from, w.to, w.count); };
+        for (;;) {
             builder_.run();
-            const auto done = [&](const Waiting& w) { return block(w.from, w.to, w.count); };
             waiting_.erase(std::remove_if(waiting_.begin(), waiting_.end(), done), waiting_.end());
+            if (builder_.claimed()) continue;
+            if (waiting_.size() <= most_left) return;
+            std::this_thread::yield();
         }
     }
 
@@ -171,6 +177,7 @@ private:
     Store::Builder builder_;
     LatticeBlock block_{};
     std::vector<Waiting> waiting_;
+    std::size_t left_ = 0;  ///< of those, when some were done last
     std::vector<float> sampled_, sampled_moves_;
     long long interpolated_ = 0, blocks_ = 0;
 };
