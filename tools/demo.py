@@ -162,7 +162,7 @@ def demo(out: Path) -> None:
 == What to try next
 
   another colour
-      {command} edit {sidecar} set --near 0.89,0.13,0.07 --frame 29 --rgb 0.1 0.4 0.9
+      {command} edit {sidecar} set --near 0.84,0.03,0.03 --frame 29 --rgb 0.1 0.4 0.9
       {command} render {sidecar} '{frames}' -o '{graded}/sample.####.exr' --force
   undo every edit
       {command} edit {sidecar} reset

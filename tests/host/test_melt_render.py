@@ -74,11 +74,11 @@ def crimson_autumn(
     """SEASONS, all of it at its full size, with the autumn leaves turned crimson."""
     sidecar = tmp_path_factory.mktemp("seasons") / "seasons.p4d.json"
     palette4d("analyze", seasons, "-o", sidecar, "--quiet")
-    for orange, frame in (("0.9,0.3,0.1", 49), ("0.8,0.5,0", 39)):
+    for orange, frame in (("0.9,0.3,0.1", 49), ("0.87,0.48,0", 44)):
         near = ("--near", orange, "--frame", frame)
         palette4d("edit", sidecar, "set", *near, "--rgb", 0.75, 0.05, 0.3)
-    summer = ("--near", "0.7,0.42,0.15", "--frame", 28)  # until here as it was
-    palette4d("edit", sidecar, "stop", *summer, "--rgb", 0.7, 0.42, 0.15)
+    summer = ("--near", "0.58,0.29,0", "--frame", 28)  # until here as it was
+    palette4d("edit", sidecar, "stop", *summer, "--rgb", 0.58, 0.29, 0)
     return render_both_ways(melt, bundle, sidecar, seasons)
 
 
