@@ -111,7 +111,13 @@ def _lost(x: Report, options: AnalysisOptions, farthest: Mapping[str, float]) ->
     where = " and ".join(f"{words} {distance:.2f}" for words, distance in nearer.items())
     ways = f"{DEFAULT} follows the colours"
     if options.method in METHODS_OF["reach"]:
-        ways = f"lower --reach (to {options.reach / 2:.2g}, say), so that rare colours count more"
+        reach = f"lower --reach (to {options.reach / 2:.2g}, say)"
+        if options.reach == 0:  # without it no distance counts more than once
+            reach = f"raise --reach to {AnalysisOptions().reach:g}"
+        ways = (
+            f"{reach} or raise --lambda (to {10 * options.lambda_:g}, say), so that rare colours "
+            f"count more, or lower --k where they are fewer than {options.k} pixels"
+        )
     static = ", or take --method static" if "one static palette leaves" in nearer else ""
     return (
         f"in frame {frame.frame} colours of {frame.lost:.2%} of the picture lie up to "

@@ -93,7 +93,11 @@ def test_colours_that_simpler_palettes_hold_are_named():
     assert "0.32" in text
     assert "static palette leaves 0.22" in text
     assert "--reach (to 0.05" in text
+    assert "--lambda (to 500" in text
+    assert "--k where they are fewer than 50" in text
     assert "--method static" in text
+    (text,) = said(far, farthest={"static_hull": 0.22}, reach=0.0)
+    assert "raise --reach to 0.1" in text
     (text,) = said(far, "paper", farthest={"frame_hulls": 0.2})
     assert "single frames' hulls leave 0.20" in text
     assert "--method static" not in text
