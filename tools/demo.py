@@ -130,8 +130,11 @@ def demo(out: Path) -> None:
     run("Edit: a colour stop turns the day's blue, in the sky and the haze, to lavender",
         "edit", str(sidecar), "stop", "--near", "0.2,0.47,0.85", "--frame", "11",
         "--rgb", "0.52", "0.45", "0.85")
-    # fmt: on
     say(f"   {fade(sidecar)}")
+    run("Edit: until the same frame the green that turns to gold stays as it was",
+        "edit", str(sidecar), "stop", "--near", "0.55,0.71,0.16", "--frame", "11",
+        "--rgb", "0.55", "0.71", "0.16")
+    # fmt: on
     run("The palette with its edits", "plot", str(sidecar), "--clip", frames, "-o", str(edited))
     run("Render", "render", str(sidecar), frames, "-o", str(graded / "sample.####.exr"))
     for file in (cube, clf):
