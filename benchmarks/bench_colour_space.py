@@ -53,9 +53,9 @@ def write(folder: Path) -> str:
     """Write the clip; returns its pattern."""
     for frame in range(1, FRAMES + 1):
         buffer = oiio.ImageBuf(scene(frame))
-        if not buffer.write(str(folder / f"cg.{frame:04d}.exr")):
+        if not buffer.write(str(folder / f"bright.{frame:04d}.exr")):
             raise SystemExit(buffer.geterror())
-    return str(folder / "cg.####.exr")
+    return str(folder / "bright.####.exr")
 
 
 def analysed(clip: str, sidecar: Path, *options: str) -> dict[str, Any]:
