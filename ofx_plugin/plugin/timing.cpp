@@ -10,6 +10,8 @@ namespace {
 /// Times a little beside a frame by the rounding of a rate are on it.
 constexpr double kRounding = 1e-6;
 constexpr double kLargestTime = 1e9;
+/// Hosts round a clip's length at their own rate down, up or to the nearest frame.
+constexpr double kFrameMoreOrLess = 1 + kRounding;
 
 double rate_of(const ClipInfo& clip) {
     return static_cast<double>(clip.rate_num) / static_cast<double>(clip.rate_den);
@@ -29,8 +31,9 @@ Start start_of(const ClipInfo& clip, const TimeSettings& settings, const HostCli
         const bool by_rates = settings.by_rates && is_rate(rate);
         return {settings.start, by_rates ? rate_of(clip) / *rate : 1.0};
     }
-    // Hosts without a clip report 0 to 0, and those with an endless one numbers beyond all clips.
-    if (!host.first || !host.last || !(*host.first < *host.last) ||
+    // Hosts without a clip report 0 to 0, which begins where no word does, and those with an
+    // endless one numbers beyond all clips.
+    if (!host.first || !host.last || !(*host.first <= *host.last) ||
         !(std::abs(*host.first) < kLargestTime) || !(std::abs(*host.last) < kLargestTime)) {
         return {0, 1};
     }
@@ -39,8 +42,10 @@ Start start_of(const ClipInfo& clip, const TimeSettings& settings, const HostCli
     if (*host.first >= first && *host.last < last + step) return {first, 1};
     if (!is_rate(host.rate)) return {*host.first, 1};
     const double frames = last - first + step, ratio = rate_of(clip) / *host.rate;
-    const double shown = *host.last - *host.first + 1;
-    const bool by_rates = std::abs(shown - frames / ratio) < std::abs(shown - frames);
+    const double shown = *host.last - *host.first + 1, kept = frames / ratio;
+    // A trim is as long as neither: of it nothing is known but where it begins.
+    const bool by_rates = std::abs(shown - kept) <= kFrameMoreOrLess &&
+                          std::abs(shown - kept) < std::abs(shown - frames);
     return {*host.first, by_rates ? ratio : 1.0};
 }
 

@@ -89,6 +89,9 @@ TEST(times_that_are_the_clips_frame_numbers) {
          {range(1001, 1100), range(1010, 1050), range(1001, 1002, 60), range(1099, 1100.5)}) {
         CHECK(frame_at(clip(1001, 1100), settings, host, 1040).frame == 1040);
     }
+    // A trim to one frame, and a still.
+    CHECK(frame_at(clip(1001, 1100), settings, range(1040, 1040), 1040).frame == 1040);
+    CHECK(frame_at(clip(1001, 1001), settings, range(1001, 1001), 1001).place == Place::kInside);
     // With every second frame analysed, the last one stands for two.
     CHECK(frame_at(clip(1001, 1099, 24, 1, 2), settings, range(1001, 1100), 1100).frame == 1100);
 }
@@ -119,6 +122,13 @@ TEST(rates_tell_whether_frames_or_seconds_are_kept) {
                600 * (60000.0 / 1001) / 60));
     // 24 on 30: a quarter more frames in the same time.
     CHECK(near(frame_at(clip(0, 99), settings, range(500, 624, 30), 510).frame, 8));
+    // 60 of the 100 frames of a clip of 60 a second, at 24: more than the 40 that keep its time.
+    CHECK(frame_at(clip(0, 99, 60), settings, range(500, 559, 24), 510).frame == 10);
+    CHECK(near(frame_at(clip(0, 99, 60), settings, range(500, 539, 24), 510).frame, 25));
+    CHECK(near(frame_at(clip(0, 99, 60), settings, range(500, 540, 24), 510).frame, 25));
+    // A trim: nothing is known but its beginning.
+    CHECK(frame_at(clip(0, 99, 60), settings, range(500, 519, 24), 510).frame == 10);
+    CHECK(frame_at(clip(0, 99, 24), settings, range(500, 519, 60), 510).frame == 10);
     // A nonsense rate says nothing.
     for (const double rate : {0.0, -24.0, std::numeric_limits<double>::quiet_NaN()}) {
         CHECK(frame_at(clip(0, 99), settings, range(500, 624, rate), 510).frame == 10);
