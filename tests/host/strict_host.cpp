@@ -64,6 +64,16 @@ std::vector<std::string> Host::take_faults() {
     return std::exchange(faults_, {});
 }
 
+void Host::asked(const std::string& property) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    asked_.insert(property);
+}
+
+std::set<std::string> Host::take_asked() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return std::exchange(asked_, {});
+}
+
 const void* Host::suite(const std::string& name, int version) {
     const std::string key = name + "/" + std::to_string(version);
     SuiteTable table{};
@@ -196,7 +206,10 @@ Plugin::Plugin(const std::string& bundle) {
     plugin_->setHost(Host::get().ofx());
 }
 
+Plugin::Plugin(OfxPlugin& resident) : plugin_(&resident) { plugin_->setHost(Host::get().ofx()); }
+
 Plugin::~Plugin() {
+    if (!library_) return;
 #if defined(_WIN32)
     FreeLibrary(static_cast<HMODULE>(library_));
 #else

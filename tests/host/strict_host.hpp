@@ -178,6 +178,10 @@ public:
     void configure(Config config);
     const Config& config() const { return config_; }
 
+    /// The names of all properties that a plugin has asked for or set since the last call.
+    std::set<std::string> take_asked();
+    void asked(const std::string& property);
+
     void fault(const std::string& what);
     std::vector<std::string> take_faults();
     long calls() const { return calls_.load(); }
@@ -196,6 +200,7 @@ private:
     std::atomic<bool> refused_{false};
     std::mutex mutex_;
     std::vector<std::string> faults_;
+    std::set<std::string> asked_;
     std::vector<std::unique_ptr<std::vector<unsigned char>>> handed_out_;
 };
 
@@ -249,6 +254,8 @@ class Instance;
 class Plugin {
 public:
     explicit Plugin(const std::string& bundle);
+    /// One that lives in this program: the host's own tests have such.
+    explicit Plugin(OfxPlugin& resident);
     ~Plugin();
     Plugin(const Plugin&) = delete;
     Plugin& operator=(const Plugin&) = delete;

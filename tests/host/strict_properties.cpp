@@ -151,6 +151,29 @@ const std::map<std::string, std::set<std::string>>& types_with() {
     return types;
 }
 
+/// What texts may say where the standard has a word for each meaning.
+const std::map<std::string, std::set<std::string>>& words_of() {
+    static const std::set<std::string> flags = {"true", "false"};
+    static const std::set<std::string> alpha = {kOfxImageOpaque, kOfxImagePreMultiplied,
+                                                kOfxImageUnPreMultiplied};
+    static const std::map<std::string, std::set<std::string>> words = {
+        {kOfxImageEffectPropSupportedContexts,
+         {kOfxImageEffectContextFilter, kOfxImageEffectContextGeneral}},
+        {kOfxImageEffectPropSupportedPixelDepths, {kOfxBitDepthByte, kOfxBitDepthFloat}},
+        {kOfxImageEffectPropSupportedComponents,
+         {kOfxImageComponentRGBA, kOfxImageComponentRGB, kOfxImageComponentAlpha}},
+        {kOfxImageEffectPluginRenderThreadSafety, {kOfxImageEffectRenderFullySafe}},
+        {kOfxImageEffectPropPreMultiplication, alpha},
+        {"OfxImageEffectPropNoSpatialAwareness", flags},
+        {"OfxImageEffectPropCPURenderSupported", flags},
+        {kOfxParamPropDoubleType, {kOfxParamDoubleTypePlain}},
+        {kOfxParamPropStringMode,
+         {kOfxParamStringIsSingleLine, kOfxParamStringIsMultiLine, kOfxParamStringIsFilePath,
+          kOfxParamStringIsDirectoryPath, kOfxParamStringIsLabel}},
+    };
+    return words;
+}
+
 std::mutex g_sets_mutex;
 std::set<const OfxPropertySetStruct*>& live_sets() {
     static std::set<const OfxPropertySetStruct*> sets;
@@ -225,6 +248,7 @@ OfxStatus check(OfxPropertySetHandle set, const char* name, int index, bool writ
         host.fault(std::string(function) + ": no name");
         return kOfxStatErrUnknown;
     }
+    host.asked(name);
     if (host.config().missing_properties.count(name)) return kOfxStatErrUnknown;
     const int known = type_of(set, name, writing, function);
     if (known < 0) return kOfxStatErrUnknown;
@@ -285,6 +309,12 @@ OfxStatus set_pointer(OfxPropertySetHandle s, const char* n, int i, void* v) {
 OfxStatus set_string(OfxPropertySetHandle s, const char* n, int i, const char* v) {
     if (!v) {
         Host::get().fault("propSetString: a null string");
+        return kOfxStatErrValue;
+    }
+    const auto words = n ? words_of().find(n) : words_of().end();
+    if (words != words_of().end() && !words->second.count(v)) {
+        Host::get().fault(std::string("propSetString(") + n + "): the standard has no word " + v +
+                          " for it, or not one that a node of this kind may use");
         return kOfxStatErrValue;
     }
     return set_one<std::string>("propSetString", s, n, i, kString, v);
@@ -352,6 +382,7 @@ OfxStatus dimension(OfxPropertySetHandle set, const char* name, int* count) {
     const Call call("propGetDimension");
     if (call.refused()) return kOfxStatErrUnknown;
     if (!set || !is_live(set) || !name) return kOfxStatErrBadHandle;
+    if (type_of(set, name, false, "propGetDimension") < 0) return kOfxStatErrUnknown;
     const std::lock_guard<std::mutex> lock(g_values_mutex);
     const auto found = set->values.find(name);
     if (found == set->values.end()) return kOfxStatErrUnknown;
