@@ -28,6 +28,8 @@ void failed(const char* file, int line, const std::string& what) {
     std::cerr << file << ":" << line << ": " << what << "\n";
 }
 
+void figure(const std::string& what) { std::cout << "      " << what << std::endl; }
+
 const std::string& bundle() { return g_bundle; }
 std::filesystem::path folder() { return g_folder; }
 

@@ -36,6 +36,9 @@ void failed(const char* file, int line, const std::string& what);
         if (!(condition)) ::test::failed(__FILE__, __LINE__, (words)); \
     } while (false)
 
+/// A figure of a test, for docs: printed above its line.
+void figure(const std::string& what);
+
 /// The bundle under test, and a folder of the running test's own.
 const std::string& bundle();
 std::filesystem::path folder();

@@ -261,16 +261,20 @@ TEST(more_sidecars_than_the_cache_holds) {
 
 TEST(a_sidecar_rewritten_while_rendering) {
     // Whole, truncated, gone and other files come and go under the renders: each picture is one of
-    // the honest three, never a mixture.
+    // the honest three (edited so, otherwise, or not), never a mixture.
     Scene scene;
     const std::string path = sidecar();
     const std::string whole = sidecar_text(), plain = sidecar_text(false);
     const auto edited =
         recoloured(palette4d::read_sidecar(path), 12, scene.source, scene.layout.bounds);
+    std::string other = whole;
+    other.replace(other.find("[0.2, 0.7, 0.1]"), 15, "[0.2, 0.1, 0.7]");
+    const auto swapped =
+        recoloured(palette4d::parse_sidecar(other, ""), 12, scene.source, scene.layout.bounds);
     const auto unchanged = scene.unchanged();
-    CHECK(edited != unchanged);
+    CHECK(edited != unchanged && swapped != unchanged && swapped != edited);
     std::atomic<bool> done{false};
-    std::atomic<int> wrong{0}, seen_edited{0}, seen_unchanged{0};
+    std::atomic<int> wrong{0}, seen_edited{0}, seen_swapped{0}, seen_unchanged{0};
     std::vector<std::thread> threads;
     for (int t = 0; t < 4; ++t) {
         threads.emplace_back([&] {
@@ -283,6 +287,8 @@ TEST(a_sidecar_rewritten_while_rendering) {
                 const auto pixels = output.pixels(scene.layout.bounds);
                 if (pixels == edited) {
                     ++seen_edited;
+                } else if (pixels == swapped) {
+                    ++seen_swapped;
                 } else if (pixels == unchanged) {
                     ++seen_unchanged;
                 } else {
@@ -291,8 +297,12 @@ TEST(a_sidecar_rewritten_while_rendering) {
             }
         });
     }
-    for (int round = 0; round < 200; ++round) {
-        switch (round % 5) {
+    const auto replace = [](const std::string& text) {
+        write("next.p4d.json", text);
+        std::filesystem::rename(folder() / "next.p4d.json", folder() / "clip.p4d.json");
+    };
+    for (int round = 0; round < 240; ++round) {
+        switch (round % 6) {
             case 0:
                 write("clip.p4d.json", whole);
                 break;
@@ -300,13 +310,15 @@ TEST(a_sidecar_rewritten_while_rendering) {
                 write("clip.p4d.json", whole.substr(0, whole.size() / 2));
                 break;
             case 2:
-                write("next.p4d.json", whole);
-                std::filesystem::rename(folder() / "next.p4d.json", folder() / "clip.p4d.json");
+                replace(whole);
                 break;
             case 3:
                 write("clip.p4d.json", plain);
                 break;
             case 4:
+                replace(other);
+                break;
+            case 5:
                 std::filesystem::remove(path);
                 break;
         }
@@ -314,7 +326,10 @@ TEST(a_sidecar_rewritten_while_rendering) {
     }
     done = true;
     for (std::thread& thread : threads) thread.join();
+    figure(std::to_string(seen_edited + seen_swapped + seen_unchanged) +
+           " pictures of a file that changed 240 times, " + std::to_string(wrong) + " wrong");
     CHECK(wrong == 0);
     CHECK(seen_edited > 0);
+    CHECK(seen_swapped > 0);
     CHECK(seen_unchanged > 0);
 }
