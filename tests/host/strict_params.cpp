@@ -20,7 +20,11 @@ bool has_value(const OfxParamStruct& param) {
     return param.type != kOfxParamTypeGroup && param.type != kOfxParamTypePushButton;
 }
 
-bool rendering() { return activity().action == kOfxImageEffectActionRender; }
+/// Whether the action is about a frame, which need not be the one that the host shows.
+bool of_a_frame() {
+    const std::string& action = activity().action;
+    return action == kOfxImageEffectActionRender || action == kOfxImageEffectActionIsIdentity;
+}
 
 OfxStatus define(OfxParamSetHandle set, const char* type, const char* name,
                  OfxPropertySetHandle* properties) {
@@ -128,7 +132,7 @@ OfxStatus read(OfxParamHandle param, double time, va_list arguments) {
 OfxStatus get_value(OfxParamHandle param, ...) {
     const Call call("paramGetValue");
     if (call.refused()) return kOfxStatFailed;
-    if (rendering()) Host::get().fault("paramGetValue: while rendering; it has no time");
+    if (of_a_frame()) Host::get().fault("paramGetValue: while rendering; it has no time");
     va_list arguments;
     va_start(arguments, param);
     const OfxStatus status = read(param, 0, arguments);

@@ -152,6 +152,7 @@ OfxStatus main_entry(const char* name, const void* handle, OfxPropertySetHandle,
     for (OfxPropertySetHandle image : {now.source, now.output}) {
         if (image) g.effect->clipReleaseImage(image);
     }
+    if (action == kOfxImageEffectActionIsIdentity) return kOfxStatReplyDefault;
     return renders ? g.answer : kOfxStatOK;
 }
 
@@ -175,6 +176,9 @@ std::vector<std::string> faults_of(const std::string& action, Breach breach,
     const auto node = plugin.create();
     if (!g.left_out.count("Source") && !g.left_out.count("Output")) {
         node->changed("number");
+        std::string clip;
+        double time = 0;
+        node->is_identity(0, clip, time);
         node->twice = true;
         const Layout layout;
         Picture source(layout), output(layout);
@@ -195,12 +199,12 @@ void expect(const std::string& words, const std::vector<std::string>& faults) {
     EXPECT(found, "no fault '" + words + "' among" + (all.empty() ? " none at all" : all));
 }
 
-struct Case {
+struct Wrong {
     const char* words;  ///< of the fault that must be noted
     Breach breach;
 };
-void expect_each(const std::string& action, const std::vector<Case>& cases) {
-    for (const Case& one : cases) expect(one.words, faults_of(action, one.breach));
+void expect_each(const std::string& action, const std::vector<Wrong>& cases) {
+    for (const Wrong& one : cases) expect(one.words, faults_of(action, one.breach));
 }
 
 const char* const kDescribe = kOfxActionDescribe;
@@ -338,6 +342,9 @@ TEST(calls_in_the_wrong_place_are_noticed) {
          {"an unknown type",
           [](Now& n) { g.message->message(n.effect, "OfxMessageSad", "", "words"); }},
          {"multiThread: no function", [](Now&) { g.thread->multiThread(nullptr, 2, nullptr); }}});
+    const Wrong no_time = {"paramGetValue: while rendering",
+                           [&](Now& n) { g.param->paramGetValue(handle_of(n, "number"), &value); }};
+    expect_each(kOfxImageEffectActionIsIdentity, {no_time});
     expect_each(kOfxActionInstanceChanged,
                 {{"in answer to the plugin's own setting",
                   [](Now& n) { g.param->paramSetValue(handle_of(n, "number"), 0.5); }}});
