@@ -13,6 +13,9 @@ CXX ?= g++
 # Passed on to pytest: make test-py PYTEST_ARGS="-k slice -x"
 PYTEST_ARGS ?=
 
+# An OpenFX SDK whose headers the C++ tests are to be built with: make test OPENFX_ROOT=/path/to/openfx
+OPENFX_ROOT ?=
+
 # A Python path or an active environment of the caller must not leak into what is tested.
 unexport PYTHONPATH PYTHONHOME VIRTUAL_ENV
 
@@ -27,8 +30,8 @@ SOURCES := pyproject.toml README.md LICENSE $(shell find ofx_plugin analysis lut
 	! -name '__pycache__*' ! -name '*.pyc')
 CXX_FILES = $(shell find ofx_plugin tests -name '*.cpp' -o -name '*.hpp' -o -name '*.h' -o -name '*.inl')
 
-.PHONY: help demo test install dev wheel lint style types build-cpp build-sanitize test-cpp \
-	test-sanitize test-py format clean compiler
+.PHONY: help demo test install dev wheel lint style types build-cpp build-sanitize build-threads \
+	test-cpp test-sanitize test-threads test-threads-short test-py format clean compiler
 
 help: ## this list
 	@echo "make demo            from nothing to results in demo_output/"
@@ -40,11 +43,13 @@ help: ## this list
 	@echo "make lint            ruff, clang-format, mypy (strict, on the installed wheel)"
 	@echo "make test-cpp        C++ tests, warnings as errors"
 	@echo "make test-sanitize   the same under AddressSanitizer and UndefinedBehaviorSanitizer"
+	@echo "make test-threads    the node's tests in the strict host under ThreadSanitizer (not part of make test)"
 	@echo "make test-py         pytest on the wheel in a fresh environment (PYTEST_ARGS=... is passed on)"
 	@echo "make format          rewrite the sources as ruff and clang-format want them"
 	@echo "make clean           remove everything that was built"
 	@echo
-	@echo "PYTHON=/path/to/python3.12 chooses the Python; CXX=... the compiler."
+	@echo "PYTHON=/path/to/python3.12 chooses the Python; CXX=... the compiler; OPENFX_ROOT=... a folder"
+	@echo "whose include/ holds the official OpenFX headers, for the C++ tests."
 
 # ---------------------------------------------------------------------------- environments
 
@@ -139,14 +144,19 @@ define preset
 	@PATH="$(CURDIR)/$(TOOLS)/bin:$$PATH" && export PATH && cd ofx_plugin && $(2) --preset $(1)
 endef
 
-build-cpp build-sanitize: build-%: $(TOOLS)/.installed compiler
+build-cpp build-sanitize build-threads: build-%: $(TOOLS)/.installed compiler
 	@echo "== C++ (preset $(PRESET_$*))"
-	$(call preset,$(PRESET_$*),cmake -DPython_EXECUTABLE="$(CURDIR)/$(TOOLS)/bin/python")
+	$(call preset,$(PRESET_$*),cmake -DPython_EXECUTABLE="$(CURDIR)/$(TOOLS)/bin/python" \
+		-DOPENFX_ROOT="$(abspath $(OPENFX_ROOT))")
 	$(call preset,$(PRESET_$*),cmake --build)
 PRESET_cpp := test
 PRESET_sanitize := sanitize
+PRESET_threads := threads
+PRESET_threads-short := threads-short
 
-test-cpp test-sanitize: test-%: build-%
+test-threads-short: build-threads
+test-cpp test-sanitize test-threads: test-%: build-%
+test-cpp test-sanitize test-threads test-threads-short: test-%:
 	@echo "== C++ tests (preset $(PRESET_$*))"
 	$(call preset,$(PRESET_$*),ctest)
 
