@@ -27,6 +27,7 @@ from palette4d.lut_export.config_base import (
     refuse_looks,
     relocate,
 )
+from palette4d.lut_export.error import stated
 from palette4d.lut_export.formats import LutFormat, format_named
 from palette4d.lut_export.spaces import PALETTE
 from palette4d.ocio_config import BUILT_IN, failures
@@ -87,6 +88,11 @@ class Shot:
     first: int
     last: int
     baked: series.Series
+
+    @property
+    def error(self) -> float:
+        """The largest relative error of the tables, of numbers in the process space."""
+        return float(max(entry["error"] for entry in self.baked.document["frames"]))
 
 
 @dataclass(frozen=True)
@@ -285,7 +291,10 @@ def _add_looks(
         else:
             config.addEnvironmentVar(variable, value)
     for shot in shots:
-        text = f"palette4d, frames {shot.first} to {shot.last} by the variable FRAME"
+        text = (
+            f"palette4d, frames {shot.first} to {shot.last} by the variable FRAME; largest "
+            f"|a-b|/max(|b|,0.1) in {shot.process_space} {stated(shot.error)}"
+        )
         config.addLook(look(shot.name, shot.name, shot.process_space, text))
     spaces = list(dict.fromkeys(shot.process_space for shot in shots))
     if len(spaces) > 1:

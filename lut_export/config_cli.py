@@ -131,6 +131,8 @@ def as_json(done: WrittenConfig) -> dict[str, object]:
                 "process_space": shot.process_space,
                 "frames": [shot.first, shot.last],
                 "tables": len(shot.baked.baked) + len(shot.baked.kept),
+                "error": shot.error,
+                "error_space": shot.process_space,
                 "index": str(shot.baked.index),
             }
             for shot in done.shots
@@ -149,11 +151,10 @@ def report(done: WrittenConfig) -> list[str]:
     width = max(len(shot.name) for shot in done.shots)
     for shot in done.shots:
         tables = len(shot.baked.baked) + len(shot.baked.kept)
-        worst = max(entry["error"] for entry in shot.baked.document["frames"])
         lines.append(
             f"  {shot.name:<{width}}  frames {shot.first} to {shot.last}, "
-            f"{counted(tables, 'table')}, largest |a-b|/max(|b|,0.1) {stated(worst)}, process "
-            f"space {shot.process_space}"
+            f"{counted(tables, 'table')}, process space {shot.process_space}, largest "
+            f"|a-b|/max(|b|,0.1) in it {stated(shot.error)}"
         )
     if done.views:
         lines.append(

@@ -63,6 +63,7 @@ def entry_of(path: Path, result: BakeResult) -> Entry:
         "size": result.size,
         "shaper": asdict(result.shaper),
         "error": result.error,
+        "error_space": result.encoding,
         "clip": clip,
         "grid": asdict(result.grid.worst),
     }

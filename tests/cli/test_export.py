@@ -107,7 +107,8 @@ class TestConfig:
         assert config(*words, "--names", "shot010") == 0
         printed = capsys.readouterr()
         assert printed.out.startswith(f"{show}/config.ocio: 1 look, added to ocio://")
-        assert "shot010  frames 0 to 20, 3 tables" in printed.out
+        assert "shot010  frames 0 to 20, 3 tables, process space sRGB - Texture, " in printed.out
+        assert "largest |a-b|/max(|b|,0.1) in it 0." in printed.out
         assert f"OCIO={show}/config.ocio SHOT=shot010 FRAME=0" in printed.out
         assert config(*words, "--names", "shot010") == 1
         assert "--force" in capsys.readouterr().err
@@ -115,6 +116,8 @@ class TestConfig:
         report = json.loads(capsys.readouterr().out)
         assert report["shots"][0]["look"] == "shot010"
         assert report["shots"][0]["process_space"] == "sRGB - Texture"
+        assert report["shots"][0]["error_space"] == "sRGB - Texture"
+        assert 0 < report["shots"][0]["error"] < 1
         assert len(report["views"]) > 5
 
     def test_two_shots_of_one_name(

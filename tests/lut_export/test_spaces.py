@@ -18,6 +18,7 @@ from palette4d import Palette4dError, _core, ocio_config
 from palette4d.analysis import sidecar as sidecars
 from palette4d.lut_export.bake import BakeOptions, bake
 from palette4d.lut_export.config import ConfigOptions, write_config
+from palette4d.lut_export.error import stated
 from palette4d.lut_export.frame_edit import frame_edit
 from palette4d.lut_export.series import SeriesOptions
 from palette4d.lut_export.spaces import space_of, transforms
@@ -192,6 +193,10 @@ def test_a_config_s_look_has_the_palette_s_space(gentle: Path, tmp_path: Path) -
     look = ocio.LookTransform(
         src="Linear Rec.709 (sRGB)", dst="Linear Rec.709 (sRGB)", looks="shot"
     )
+    # The error is of ACEScct's numbers, and said to be.
+    said = f"in ACEScct {stated(written.shots[0].error)}"
+    assert config.getLook("shot").getDescription().endswith(said)
+    assert written.shots[0].baked.document["frames"][0]["error_space"] == "ACEScct"
     context = config.getCurrentContext()
     context["FRAME"] = "6"
     result = scene()
