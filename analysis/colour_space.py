@@ -221,7 +221,8 @@ def record(document: dict[str, Any], clip: Clip, spaces: Spaces | None) -> list[
     Raises
     ------
     Palette4dError
-        On the clip's own colours the conversion is further than 1e-5 from OpenColorIO's.
+        On the clip's own colours the conversion is further than 1e-5 from OpenColorIO's, beyond
+        what its single precision explains.
     """
     if not isinstance(clip, ConvertedClip):
         return []

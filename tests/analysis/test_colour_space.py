@@ -15,7 +15,7 @@ from palette4d.analysis import sidecar as sidecars
 from palette4d.analysis.clip import open_clip
 from palette4d.analysis.colour_space import SpaceOptions, Spaces, spaces_of
 from palette4d.cli import main
-from palette4d.conversion_steps import TOLERANCE, ConversionError, conversion
+from palette4d.conversion_steps import TOLERANCE, Comparison, ConversionError, conversion
 from palette4d.errors import Palette4dError
 
 STUDIO = "ocio://studio-config-v1.0.0_aces-v1.3_ocio-v2.1"
@@ -102,6 +102,47 @@ def test_a_chain_is_opencolorio_s_conversion(config: str, source: str, target: s
         rounding = np.abs(shaken).max(axis=0)
         off = (np.abs(found - wanted) - rounding) / np.maximum(np.abs(wanted), 1)
         assert off[inside].max() < TOLERANCE
+
+
+def saturated() -> np.ndarray[Any, Any]:
+    """(n, 3) colours of 8 bits, many of them with channels at 0."""
+    random = np.random.default_rng(0)
+    codes = random.integers(0, 256, (4096, 3))
+    for channel in range(3):
+        codes[channel :: 2 + channel, channel] = 0
+    return (np.minimum(codes, random.integers(0, 256, (4096, 1))) / 255).astype(np.float32)
+
+
+@pytest.mark.parametrize(
+    "source", ["Gamma 2.2 Rec.709 - Texture", "Rec.1886 Rec.709 - Display", "ADX10"]
+)
+def test_opencolorio_s_own_rounding_near_black_is_not_the_chain_s(source: str) -> None:
+    config = ocio_config.load_config(STUDIO, "test")
+    chain = conversion(config, source, "ACEScct").chain
+    there = through(config, source, "ACEScct", saturated())
+    off = np.abs(chain.to_clip(there) - through(config, "ACEScct", source, there))
+    assert off.max() > TOLERANCE  # OpenColorIO's
+    seen = Comparison(config, source, "ACEScct", chain)
+    seen.add(saturated())
+    assert seen.error < 1e-6
+    assert seen.colours == 4096
+    assert seen.beyond == 0
+
+
+def test_a_chain_that_is_off_near_black_is_seen() -> None:
+    """By 1e-4 of a gamma, and by a matrix that mixes 1e-4 of a channel into another."""
+    config = ocio_config.load_config(STUDIO, "test")
+    spaces = "Gamma 2.2 Rec.709 - Texture", "ACEScct"
+    for kind in ("gamma", "matrix"):
+        steps = json.loads(json.dumps(conversion(config, *spaces).steps))
+        (step,) = (step for step in steps if step["kind"] == kind)
+        if kind == "gamma":
+            step["gamma"] = [value * (1 + 1e-4) for value in step["gamma"]]
+        else:
+            step["matrix"][0][1] += 1e-4
+        seen = Comparison(config, *spaces, _core.ColourConversion(json.dumps(steps), "wrong"))
+        seen.add(saturated())
+        assert seen.error > TOLERANCE
 
 
 def test_what_a_chain_cannot_do_is_refused() -> None:

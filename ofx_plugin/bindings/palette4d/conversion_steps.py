@@ -8,7 +8,7 @@ encoding holds its curves go on, so that every number has a way there and back.
 """
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,7 +23,9 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 Step = dict[str, Any]
 
-#: The largest difference from OpenColorIO, relative to 1 or to the number, whichever is larger.
+#: The largest difference from OpenColorIO, relative to 1 or to the number, whichever is larger,
+#: beyond what OpenColorIO's single precision explains: two bits more or less of the colour that it
+#: was given, which a gamma makes large near 0.
 TOLERANCE = 1e-5
 
 #: OpenColorIO brings a number back that was there and back again by this, or its encoding has
@@ -56,7 +58,8 @@ class Conversion:
         What applies them.
     error : float
         The largest |a - b| / max(|b|, 1) that was found between the chain and OpenColorIO, in
-        both directions, wherever OpenColorIO itself brings a colour back.
+        both directions, wherever OpenColorIO itself brings a colour back, beyond what its single
+        precision explains.
     """
 
     steps: list[Step]
@@ -71,7 +74,7 @@ def conversion(config: Any, source: str, target: str) -> Conversion:
     ------
     ConversionError
         There is something else than matrices and curves between them, or the chain is further than
-        `TOLERANCE` from OpenColorIO.
+        `TOLERANCE` from OpenColorIO, beyond what its single precision explains.
     """
 
     try:
@@ -96,8 +99,8 @@ def conversion(config: Any, source: str, target: str) -> Conversion:
     chain = _core.ColourConversion(json.dumps(steps), f"{source} to {target}")
     scene = [_is_scene_linear(config, name) for name in (source, target)]
     error_ = max(
-        _difference(chain.to_palette, forward, backward, _probes(scene[0])),
-        _difference(chain.to_clip, backward, forward, _probes(scene[1])),
+        _difference(_Way(chain.to_palette, scene[0]), forward, backward, _probes(scene[0])),
+        _difference(_Way(chain.to_clip, scene[1]), backward, forward, _probes(scene[1])),
     )
     if error_ > TOLERANCE:
         raise ConversionError(
@@ -114,7 +117,8 @@ class Comparison:
     def __init__(self, config: Any, source: str, target: str, chain: _core.ColourConversion):
         self._forward = _Processor(config.getProcessor(source, target))
         self._backward = _Processor(config.getProcessor(target, source))
-        self._chain = chain
+        self._there = _Way(chain.to_palette, _is_scene_linear(config, source))
+        self._back = _Way(chain.to_clip, _is_scene_linear(config, target))
         self.colours = 0  #: compared so far
         self.beyond = 0  #: of them, where OpenColorIO brings no colour back
         self.error = 0.0  #: the largest of the others, in both directions
@@ -122,15 +126,18 @@ class Comparison:
     def add(self, colours: F32) -> None:
         """Compare (n, 3) finite colours of the clip."""
         there = self._forward(colours)
-        inside = _comes_back(self._backward(there), colours)
+        back = self._backward(there)
+        inside = _comes_back(back, colours)
         self.colours += len(colours)
-        self.beyond += int((~inside).sum())
+        # What OpenColorIO's rounding alone keeps from coming back is not beyond its encoding.
+        lost, reached = colours[~inside], there[~inside]
+        self.beyond += int((~_comes_back(back[~inside], lost, self._back.rounding(reached))).sum())
         if inside.any():
             kept, reached = colours[inside], there[inside]
             self.error = max(
                 self.error,
-                _worst(self._chain.to_palette, kept, reached),
-                _worst(self._chain.to_clip, reached, self._backward(reached)),
+                _worst(self._there, kept, reached),
+                _worst(self._back, reached, back[inside]),
             )
 
 
@@ -422,30 +429,47 @@ def _probes(scene_linear: bool) -> F32:
     return np.concatenate([neutral, mixed, *alone]).astype(np.float32)
 
 
-def _comes_back(back: F32, colours: F32) -> NDArray[np.bool_]:
+class _Way:
+    """A chain in one direction, and how far OpenColorIO's single precision may be from it."""
+
+    def __init__(self, apply: Callable[[ArrayLike], F64], scene_linear: bool) -> None:
+        self.apply = apply
+        # The constants of an encoding are about 1, so that its numbers near 0 are no finer.
+        self._least = 0.0 if scene_linear else 1.0
+
+    def rounding(self, colours: F32) -> F64:
+        """(n, 3) -> (n, 3): how far two bits more or less in each channel move the result.
+
+        They are the last bits of a colour's largest channel, as matrices mix the channels, and of
+        1 at least in an encoding.
+        """
+        exact = self.apply(colours)
+        moved = np.zeros_like(exact)
+        with np.errstate(invalid="ignore", over="ignore"):
+            size = np.maximum(np.abs(colours).max(axis=1, keepdims=True), self._least)
+            for shift in size.astype(np.float64) * 2.0**-22 * np.eye(3)[:, None]:
+                up, down = (np.abs(self.apply(colours + s) - exact) for s in (shift, -shift))
+                moved += np.maximum(up, down)
+        return moved
+
+
+def _comes_back(back: F32, colours: F32, rounding: F64 | float = 0.0) -> NDArray[np.bool_]:
     with np.errstate(invalid="ignore", over="ignore"):
-        near = np.abs(back - colours) <= _COMES_BACK * np.maximum(np.abs(colours), 1)
+        off = np.abs(back - colours)
+        near = off <= _COMES_BACK * np.maximum(np.abs(colours), 1) + rounding
     return np.asarray(near.all(axis=1) & np.isfinite(back).all(axis=1))
 
 
-def _difference(chain: Any, forward: _Processor, backward: _Processor, colours: F32) -> float:
+def _difference(way: _Way, forward: _Processor, backward: _Processor, colours: F32) -> float:
     there = forward(colours)
     inside = _comes_back(backward(there), colours) & np.isfinite(there).all(axis=1)
     if not inside.any():
         return float("inf")
-    return _worst(chain, colours[inside], there[inside])
+    return _worst(way, colours[inside], there[inside])
 
 
-def _worst(chain: Any, colours: F32, expected: F32) -> float:
-    """Return the largest |a - b| / max(|b|, 1) beyond what single precision explains.
-
-    OpenColorIO computes in single precision: what the last two bits of a colour's largest channel
-    make is its rounding, not the chain's error.
-    """
-    a, b = chain(colours), expected.astype(np.float64)
-    grain = np.abs(colours).max(axis=1, keepdims=True) * 2.0**-22
-    rounding = np.zeros_like(a)
-    for shift in np.concatenate([np.eye(3), -np.eye(3)]):
-        rounding = np.maximum(rounding, np.abs(chain(colours + grain * shift) - a))
-    off = np.maximum(np.abs(a - b) - rounding, 0) / np.maximum(np.abs(b), 1)
+def _worst(way: _Way, colours: F32, expected: F32) -> float:
+    """Return the largest |a - b| / max(|b|, 1) beyond what single precision explains."""
+    a, b = way.apply(colours), expected.astype(np.float64)
+    off = np.maximum(np.abs(a - b) - way.rounding(colours), 0) / np.maximum(np.abs(b), 1)
     return float(off.max())
