@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -148,6 +149,38 @@ def test_a_worker_with_several_threads_does_one_piece_at_a_time(tmp_path: Path) 
         tasks = {i: i for i in (1, 2, 3, 6)}
         Workers(cluster=made.address).run(piece, tasks, found.__setitem__)
     assert found == {1: (1, 3), 2: (4, 3), 3: Failed("three is refused"), 6: (36, 3)}
+
+
+def test_a_worker_that_dies_while_it_is_asked_is_passed_over(tmp_path: Path) -> None:
+    path = os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
+    with farm(tmp_path / "farm", workers=2, PYTHONPATH=path) as made:
+        with Client(made.address, set_as_default=False) as client:
+            client.wait_for_workers(2, timeout=120)
+        # Halted, it takes the question and does not answer: its death then cuts the connection.
+        made.workers["w0"].send_signal(signal.SIGSTOP)
+        later = threading.Timer(1.5, made.kill, [made.workers["w0"]])
+        later.start()
+        found: dict[int, object] = {}
+        Workers(cluster=made.address).run(piece, {1: 1, 2: 2}, found.__setitem__)
+        later.join()
+    assert found == {1: (1, 1), 2: (4, 1)}
+
+
+def test_no_worker_yet_is_told_and_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
+    monkeypatch.setattr(farms, "TOLD_AFTER", 0.5)
+    with farm(tmp_path / "farm", workers=0, PYTHONPATH=path) as made:
+        later = threading.Timer(1.5, made.add_worker, ["late"])
+        later.start()
+        found: dict[int, object] = {}
+        Workers(cluster=made.address).run(piece, {2: 2}, found.__setitem__)
+        later.join()
+    assert found == {2: (4, 1)}
+    told = capsys.readouterr().err
+    assert told.count("has no worker yet") == 1
+    assert f"`dask worker {made.address}`" in told
 
 
 class TestRefusals:

@@ -13,7 +13,9 @@ import contextlib
 import logging
 import os
 import re
+import sys
 import threading
+import time
 import uuid
 from collections.abc import Callable, Iterator, Mapping
 from multiprocessing import resource_tracker
@@ -29,6 +31,10 @@ LOCAL = re.compile(r"local:([1-9][0-9]{0,2})")
 #: Seconds to wait for a scheduler to answer, and for the first worker to come.
 ANSWERS_WITHIN = 15
 WORKERS_WITHIN = 120
+
+#: Seconds until it is told that there is no worker, and between looks for one.
+TOLD_AFTER = 3
+ASKED_EVERY = 0.2
 
 
 def check_address(text: str) -> str:
@@ -193,16 +199,31 @@ def _client(distributed: Any, target: Any, otherwise: str) -> Iterator[Any]:
 
 
 def _check_workers(client: Any, address: str) -> None:
-    """Wait for the first worker, and refuse workers with another palette4d."""
-    try:
-        client.wait_for_workers(1, timeout=WORKERS_WITHIN)
-    except TimeoutError as error:
-        raise Palette4dError(
-            f"the scheduler at {address} has had no worker for {WORKERS_WITHIN} seconds; start "
-            f"some with `dask worker {address}`"
-        ) from error
-    for worker, found in sorted(client.run(_version, on_error="return").items()):
-        _check_version(f"the worker {worker}", found)
+    """Wait for the first worker that answers, and refuse workers with another palette4d."""
+    from tqdm import tqdm
+
+    started = time.monotonic()
+    told = False
+    while (waited := time.monotonic() - started) < WORKERS_WITHIN:
+        found = client.run(_version, on_error="return")
+        # One that died, or lost its connection, does not lack palette4d: Dask does without it.
+        there = {who: it for who, it in found.items() if not isinstance(it, OSError)}
+        for worker, version in sorted(there.items()):
+            _check_version(f"the worker {worker}", version)
+        if there:
+            return
+        if not told and waited >= TOLD_AFTER:
+            told = True
+            tqdm.write(
+                f"palette4d: note: the scheduler at {address} has no worker yet; start one with "
+                f"`dask worker {address}` (waiting for {WORKERS_WITHIN - waited:.0f} more seconds)",
+                file=sys.stderr,
+            )
+        time.sleep(ASKED_EVERY)
+    raise Palette4dError(
+        f"the scheduler at {address} has had no worker for {WORKERS_WITHIN} seconds; start some "
+        f"with `dask worker {address}`"
+    )
 
 
 def _check_scheduler(client: Any, address: str) -> None:
