@@ -187,6 +187,11 @@ class _Run:
             options=options.analysis.recorded() | _asked(options.spaces),
             entries=(),
         )
+        self.same_edit = (
+            before is not None
+            and self.manifest.is_timeline
+            and (before.source_sha256, before.rate) == (source.sha256, source.rate)
+        )
         self.same_options = before is not None and before.options == self.manifest.options
         self.entries: dict[str, Entry] = {}
         self.tasks: dict[str, ShotTask] = {}
@@ -201,21 +206,34 @@ class _Run:
         own = dataclasses.replace(shot, clip=self.beside(shot.clip), problem="")
         entry = Entry(own)
         chosen = not self.options.only or shot.name in self.options.only
-        if shot.problem:
+        if before is not None and not chosen and self.stays(before, own):
+            entry = before if self.same_edit else _placed(before, own)
+            if entry.status == DONE:
+                self.kept.append(shot.name)
+        elif shot.problem:
             entry = Entry(own, FAILED, error=shot.problem)
         elif not self.options.anew and (frames := self.there(own, before)) is not None:
             entry = Entry(own, DONE, frames)
             self.kept.append(shot.name)
-        elif not chosen:
-            if before is not None and _media(before.shot) == _media(own):
-                entry = before
-        else:
+        elif chosen:
             try:
                 self.check_target(entry, before)
                 self.tasks[shot.name] = ShotTask(shot, str(Path.cwd() / shot.clip), self.options)
             except Palette4dError as error:
                 entry = Entry(own, FAILED, error=str(error))
         self.entries[shot.name] = entry
+
+    def stays(self, before: Entry, shot: Shot) -> bool:
+        """Whether what is known of a shot that is not asked for still holds."""
+        own = before.shot
+        if before.status != DONE:
+            # The cause of a failure may be mended, and a sidecar there although it is not noted.
+            return self.same_edit and own.clip == shot.clip and self.there(shot, before) is None
+        if self.same_edit:
+            return True  # with other handles, or with its media away, it is what it was
+        first, last = before.frames or (0, -1)
+        shown = first <= shot.used[0] and shot.used[1] <= last
+        return (own.clip, own.step) == (shot.clip, shot.step) and shown
 
     def check_target(self, entry: Entry, before: Entry | None) -> None:
         """Refuse a sidecar that may not be replaced."""
@@ -354,6 +372,12 @@ def _asked(spaces: SpaceOptions) -> dict[str, str | None]:
 def _media(shot: Shot) -> tuple[object, ...]:
     """Return what of a shot its palette depends on."""
     return shot.clip, shot.first, shot.last, shot.used, shot.step
+
+
+def _placed(entry: Entry, shot: Shot) -> Entry:
+    """Return an entry with its shot's place in the edit as it is now."""
+    place = dataclasses.replace(entry.shot, used=shot.used, place=shot.place)
+    return dataclasses.replace(entry, shot=place)
 
 
 def _check_only(shots: list[Shot], only: Collection[str]) -> None:

@@ -274,6 +274,46 @@ class TestAgain:
         assert analyze(edit, out, "--only", "tke") == 1
         assert "--only: there is no shot 'tke'; expected names such as" in capsys.readouterr().err
 
+    def test_shots_that_are_not_named_stay_as_they_were(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        take = movie(tmp_path / "take.mov", 30)
+        items = [clip(n, external(str(take)), at, 4) for n, at in (("A", 2), ("B", 12), ("C", 22))]
+        path, out = save(timeline(*items), tmp_path / "edit.otio"), tmp_path / "shots"
+        assert analyze(path, out, "--handles", "1") == 0
+        before, files = manifest(out)["shots"], state(out)
+        assert analyze(path, out, "--handles", "2", "--only", "B") == 0
+        assert "1 analysed, 2 there already" in capsys.readouterr().out
+        assert [shot["frames"] for shot in manifest(out)["shots"]] == [[1, 6], [10, 17], [21, 26]]
+        assert manifest(out)["shots"][::2] == before[::2]
+        assert {n: s for n, s in state(out).items() if n[0] in "AC"} == {
+            n: s for n, s in files.items() if n[0] in "AC"
+        }
+        # Also with its media away, and of an edited shot, which itself is told.
+        take.rename(tmp_path / "away.mov")
+        recolour(out / "C.p4d.json")
+        assert analyze(path, out, "--handles", "1", "--only", "B", "--anew") == 1
+        assert [status for _, status, _ in shots(out)] == ["done", "failed", "done"]
+        assert manifest(out)["shots"][::2] == before[::2]
+
+    def test_shots_that_are_not_named_follow_a_new_edit(self, tmp_path: Path) -> None:
+        take = external(str(movie(tmp_path / "take.mov", 30)))
+        out = tmp_path / "shots"
+        old = timeline(clip("A", take, 2, 4), clip("B", take, 12, 4), clip("C", take, 22, 4))
+        assert analyze(save(old, tmp_path / "edit.otio"), out, "--handles", "1") == 0
+        # B comes first; A is a frame longer, within its handle; C goes beyond its own.
+        new = timeline(clip("B", take, 12, 4), clip("A", take, 2, 5), clip("C", take, 22, 6))
+        path = save(new, tmp_path / "edit.otio")
+        assert analyze(path, out, "--handles", "2", "--only", "B") == 0
+        rows = {row["name"]: row for row in manifest(out)["shots"]}
+        assert {name: row["status"] for name, row in rows.items()} == {
+            "B": "done",
+            "A": "done",
+            "C": "to do",
+        }
+        assert (rows["A"]["frames"], rows["A"]["used"]) == ([1, 6], [2, 6])
+        assert rows["A"]["edit"]["path"] == [0, 1]
+
     def test_another_clip_s_sidecar_is_not_replaced(
         self, cut_movie: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     ) -> None:
