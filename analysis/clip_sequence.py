@@ -26,9 +26,10 @@ MOVIE_EXTENSIONS = frozenset({
 # The last number of a stem. A minus is a sign only at the start or after another separator:
 # "shot-0010" is frame 10 of "shot-", "shot.-0010" is frame -10 of "shot.".
 _NUMBER = re.compile(r"((?:(?<=[._ ])|\A)-)?[0-9]+\Z")
-# Names that say what a file is, not what it shows; of one or two letters they say nothing anyway.
+# Names that say what a file is, not what it shows; one letter, or a letter and a digit, say nothing
+# anyway. Two letters (cg, bg) do.
 _ANONYMOUS = re.compile(
-    r".{0,2}|(frame|image|img|out|output|pic|picture|plate|render|still)s?|seq(uence)?"
+    r".?|.?[\W\d_].?|(frame|image|img|out|output|pic|picture|plate|render|still)s?|seq(uence)?"
     r"|dpx|exr|jpe?g|png|tiff?",
     re.IGNORECASE,
 )

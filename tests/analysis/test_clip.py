@@ -103,6 +103,9 @@ def test_every_pattern_finds_the_sequence(tmp_path, pattern):
         ("beach/f.0001.png", "beach"),
         ("beach/0001.png", "beach"),
         ("beach/frames/Frame_0001.png", "beach"),
+        ("beach/v1/01.0001.png", "beach"),
+        ("beach/cg/cg.0001.png", "cg"),
+        ("beach/cg/f.0001.png", "cg"),
         ("beach/shot010.0001.png", "shot010"),
         ("beach/f.png", "f"),  # an image by itself
     ],
