@@ -180,22 +180,22 @@ def _of_movie(args: argparse.Namespace, hidden: bool) -> tuple[Source, list[Shot
     from palette4d.analysis.clip import open_clip
     from palette4d.analysis.shots import detect
     from palette4d.analysis.show import Source
+    from palette4d.frames_bar import frames_bar
     from palette4d.wording import file_safe
-    from tqdm import tqdm
 
     clip = open_clip(
         args.clip, frames=args.frames, rate=args.rate, skip_bad_frames=args.skip_bad_frames
     )
-    with tqdm(total=len(clip.frames), desc="cuts", unit="frame", disable=hidden or None) as bar:
+    with frames_bar("cuts", hidden=hidden, total=len(clip.frames)) as bar:
         shots = detect(clip, lambda done, total: bar.update(done - bar.n))
     return Source(file_safe(clip.name), clip.source, "", clip.rate), shots, list(clip.notes)
 
 
 def _with_bar(hidden: bool, work: Callable[[Callable[[int, int, str], None]], Show]) -> Show:
     """Do `work` with a progress bar of frames."""
-    from tqdm import tqdm
+    from palette4d.frames_bar import frames_bar
 
-    with tqdm(desc="shots", unit="frame", disable=hidden or None) as bar:
+    with frames_bar("shots", hidden=hidden) as bar:
 
         def progress(done: int, total: int, words: str) -> None:
             if bar.total != total:

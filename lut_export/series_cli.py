@@ -194,9 +194,9 @@ def _run_show(args: argparse.Namespace, options: SeriesOptions) -> int:
 
 def with_bar(what: str, quiet: bool, work: Callable[[Callable[[int, int], None]], Done]) -> Done:
     """Do `work` with a progress bar of frames."""
-    from tqdm import tqdm
+    from palette4d.frames_bar import frames_bar
 
-    with tqdm(desc=what, unit="frame", disable=quiet) as bar:
+    with frames_bar(what, hidden=quiet) as bar:
 
         def progress(done: int, total: int) -> None:
             if bar.total != total:

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
+import pty
+import subprocess
+import sys
+import termios
 from pathlib import Path
 
 import pytest
@@ -33,7 +39,7 @@ class TestExport:
         assert export("--every", "10", "-o", tmp_path, "--name", "shot") == 0
         printed = capsys.readouterr()
         assert f"3 files, {tmp_path}/shot.0000.cube to shot.0020.cube: 3 baked" in printed.out
-        assert "100%" in printed.err  # the bar
+        assert "%|" not in printed.err  # a bar is for terminals alone
         assert "--clip" in printed.err
         assert export("--every", "10", "-o", tmp_path, "--name", "shot", "--quiet") == 0
         printed = capsys.readouterr()
@@ -96,6 +102,37 @@ class TestExport:
         assert main(["export", str(SPLIT), "--stops", "-o", str(tmp_path / "x")]) == 1
         assert "nothing is edited" in capsys.readouterr().err
         assert not (tmp_path / "x").exists()
+
+
+def on_terminal(*words: object) -> list[str]:
+    """Return the lines that a terminal shows of a command's standard error."""
+    terminal, error = pty.openpty()
+    termios.tcsetwinsize(error, (25, 200))
+    command = [sys.executable, "-m", "palette4d", *map(str, words)]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=error) as process:
+        os.close(error)
+        written = b""
+        with contextlib.suppress(OSError):  # Linux reports the end of a terminal as an error
+            while some := os.read(terminal, 4096):
+                written += some
+        assert process.wait(timeout=60) in (0, 1)
+    os.close(terminal)
+    lines = []
+    for line in written.decode("utf-8").replace("\r\n", "\n").split("\n"):
+        seen = ""
+        for part in line.split("\r"):
+            seen = part + seen[len(part) :]
+        lines.append(seen.rstrip())
+    return lines
+
+
+def test_an_error_takes_the_bar_away(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("", "utf-8")
+    words = (EDITED, "--size", "5", "--jobs", "1", "--frames", "4")
+    (shown, *_) = on_terminal("export", *words, "-o", tmp_path / "there")
+    assert "export: 100%|" in shown
+    (shown, *_) = on_terminal("export", *words, "-o", tmp_path / "file")
+    assert shown.startswith("palette4d: error: ")
 
 
 class TestConfig:

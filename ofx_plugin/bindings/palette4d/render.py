@@ -172,8 +172,7 @@ def render(
 
     One frame is written while the next is read and recoloured: memory holds three at most.
     """
-    from tqdm import tqdm
-
+    from palette4d.frames_bar import frames_bar
     from palette4d.imageio import write_frame
 
     written: list[int] = []
@@ -181,7 +180,7 @@ def render(
     pending: Future[None] | None = None
     with (
         ThreadPoolExecutor(1) as writer,
-        tqdm(total=len(clip.frames), desc="render", unit="frame", disable=quiet) as bar,
+        frames_bar("render", hidden=quiet, total=len(clip.frames)) as bar,
     ):
         for image in images:
             pixels = recoloured(sidecar, image.frame, image.pixels, clip.premultiplied, options)

@@ -121,8 +121,8 @@ def write_sample_clip(
 ) -> list[Path]:
     """Draw and write the clip; returns its files. The folder must exist."""
     import OpenImageIO as oiio
-    from tqdm import tqdm
 
+    from palette4d.frames_bar import frames_bar
     from palette4d.imageio import write_frame
     from palette4d.sample_scene import Scene
 
@@ -134,10 +134,12 @@ def write_sample_clip(
     ]
     scene = Scene(*size)
     files = []
-    for index in tqdm(range(frames), desc="sample clip", unit="frame", disable=quiet):
-        path = pattern.path(first + index)
-        # A single frame shows the middle of the story.
-        time = index / (frames - 1) if frames > 1 else 0.5
-        write_frame(path, scene.picture(time), samples, metadata=metadata)
-        files.append(path)
+    with frames_bar("sample clip", hidden=quiet, total=frames) as bar:
+        for index in range(frames):
+            path = pattern.path(first + index)
+            # A single frame shows the middle of the story.
+            time = index / (frames - 1) if frames > 1 else 0.5
+            write_frame(path, scene.picture(time), samples, metadata=metadata)
+            files.append(path)
+            bar.update()
     return files
