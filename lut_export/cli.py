@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from palette4d.arguments import number
+from palette4d.errors import WriteError
 from palette4d.lut_export.arguments import add_space_options, add_table_options, bake_options
 
 if TYPE_CHECKING:
@@ -111,7 +112,7 @@ def run(args: argparse.Namespace) -> int:
         with tempfile.TemporaryDirectory(prefix="palette4d-") as folder:
             path = Path(folder) / f"baked{format_.extension}"
             result = bake(args.sidecar, path, options, image=image, image_frame=number_)
-            _to_stdout(path.read_bytes())
+            _to_stdout(path.read_bytes(), format_)
         result = replace(result, output="-")
     else:
         result = bake(
@@ -140,12 +141,21 @@ def _note_no_clip(sidecar: _core.Sidecar) -> None:
     )
 
 
-def _to_stdout(data: bytes) -> None:
-    """Write everything or raise OSError; past Python's buffer, which would fail again at exit."""
-    sys.stdout.flush()
+def _to_stdout(data: bytes, format_: LutFormat) -> None:
+    """Write everything or raise; past Python's buffer, which would fail again at exit."""
     rest = memoryview(data)
-    while rest:
-        rest = rest[os.write(sys.stdout.fileno(), rest) :]
+    try:
+        sys.stdout.flush()
+        while rest:
+            rest = rest[os.write(sys.stdout.fileno(), rest) :]
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise WriteError(
+            f"standard output: only {len(data) - len(rest)} of the {len(data)} bytes of the "
+            f"{format_.name} file could be written: {error.strerror or error}; expected a place "
+            f"with room, make some or choose another folder with -o FILE{format_.extension}"
+        ) from error
 
 
 def report(result: BakeResult) -> Iterator[str]:
