@@ -7,11 +7,13 @@ import os
 import resource
 import subprocess
 import sys
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
 from clip_files import write_image
+from palette4d.analysis.manifest import Manifest, write
 from palette4d.cli import main
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
@@ -245,6 +247,16 @@ class TestErrors:
             assert ("mend it there" in text) != ("update palette4d" in text)
         assert [path.name for path in tmp_path.iterdir()] == ["bad.p4d.json"]
 
+
+    def test_a_manifest(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        path = tmp_path / "edit.shots.json"
+        write(Manifest("edit.edl", "0" * 64, Fraction(24), {}, ()), path)
+        for words in (["bake", str(path), "--frame", "4", "-o", "a.cube"], ["info", str(path)]):
+            assert main(words) == 1
+            text = capsys.readouterr().err
+            assert "edit.shots.json: /schema: " in text
+            assert "this is a manifest of shots: name the sidecar (.p4d.json) of one" in text
+            assert "mend it there" not in text
 
 class TestReport:
     def test_the_table(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

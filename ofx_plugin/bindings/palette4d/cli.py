@@ -89,7 +89,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _report(error: Exception) -> int:
     text = str(error).encode("utf-8", "backslashreplace").decode("utf-8")
     broken = isinstance(error, SidecarError) and (error.pointer or "JSON" in error.expected)
-    if broken and "update palette4d" not in text:
+    if isinstance(error, SidecarError) and '"palette4d.shots"' in error.found:
+        text += (
+            "; this is a manifest of shots: name the sidecar (.p4d.json) of one, or use `palette4d "
+            "export` or `palette4d config`, which take them all"
+        )
+    elif broken and "update palette4d" not in text:
         text += "; mend it there, take an earlier copy of the file, or analyse the clip again"
     print(f"palette4d: error: {text}", file=sys.stderr)
     return 1
