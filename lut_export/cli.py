@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from palette4d import _core
-    from palette4d.lut_export.bake import BakeOptions, BakeResult
+    from palette4d.lut_export.bake import BakeResult
     from palette4d.lut_export.error import Figures, Measure
     from palette4d.lut_export.formats import LutFormat
 
@@ -128,7 +128,7 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps(result.as_json(), indent=2), file=out)
     else:
         print("\n".join(report(result)), file=out)
-    for line in warnings(result, format_, options):
+    for line in warnings(result, format_):
         print(f"palette4d: warning: {line}", file=sys.stderr)
     return 0
 
@@ -198,11 +198,12 @@ def _rows(where: str, found: Measure) -> list[tuple[str, Figures]]:
     return [(f"{where}, {name}", figures) for name, figures in found.by_reading.items()]
 
 
-def warnings(result: BakeResult, format_: LutFormat, options: BakeOptions) -> Iterator[str]:
+def warnings(result: BakeResult, format_: LutFormat) -> Iterator[str]:
     """Yield what a user should know beside the figures."""
     from palette4d.lut_export.bake import PREVIEW_TIER
     from palette4d.lut_export.error import stated
     from palette4d.lut_export.formats import shaper_warning, with_shaper
+    from palette4d.lut_export.lattice import nearer
 
     shaper = result.shaper
     if shaper.kind != "none" and (about := shaper_warning(format_.name)):
@@ -224,14 +225,7 @@ def warnings(result: BakeResult, format_: LutFormat, options: BakeOptions) -> It
         yield f"{what} outside {shaper.low:g} to {shaper.high:g}, where the table clamps; {help_}"
     if not result.preview_tier:
         where = "the dense grid" if result.clip is None else "the clip's colours"
-        help_ = (
-            "a table (.clf, .cube) comes nearer"
-            if result.cdl is not None
-            else f"--size or --max-error {PREVIEW_TIER:g} make the table larger"
-            if options.max_error is None and result.size != 129
-            else "the node and `palette4d render` are exact"
-        )
         yield (
             f"the largest error on {where}, {stated(result.error)}, misses the preview tier "
-            f"{PREVIEW_TIER:g}; {help_}"
+            f"{PREVIEW_TIER:g}; {nearer(result.size)}"
         )

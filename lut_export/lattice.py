@@ -114,3 +114,14 @@ def build(
     check_size(size)
     values = edit.apply(grid(samples(size, shaper)), threads)
     return Lattice(values.reshape(size, size, size, 3), shaper, steps)
+
+
+def nearer(size: int | None) -> str:
+    """Return what is nearer to an edit than a table of so many samples a side; None: than a CDL.
+
+    No more is promised: a strong edit may be off by more than the preview tier at any size.
+    """
+    if size is None:
+        return "a table (.clf, .cube) comes nearer"
+    exact = "the node and `palette4d render` are exact"
+    return f"a larger --size comes nearer; {exact}" if size < LARGEST else exact

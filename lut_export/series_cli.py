@@ -240,6 +240,7 @@ def warn(done: list[Series]) -> None:
     """Say what a user should know beside the figures."""
     from palette4d.lut_export.bake import PREVIEW_TIER
     from palette4d.lut_export.formats import shaper_warning
+    from palette4d.lut_export.lattice import nearer
     from palette4d.wording import counted
 
     entries = [entry for one in done for entry in one.document["frames"]]
@@ -260,10 +261,11 @@ def warn(done: list[Series]) -> None:
         )
     missed = [entry for entry in entries if entry["error"] > PREVIEW_TIER]
     if missed:
+        sizes = [entry["size"] for entry in missed if entry["size"] is not None]
         print(
             f"palette4d: warning: {counted(len(missed), 'file')} of {len(entries)} "
             f"{'misses' if len(missed) == 1 else 'miss'} the preview tier {PREVIEW_TIER:g}; "
-            "--size or --max-error make the tables larger",
+            f"{nearer(min(sizes, default=None))}",
             file=sys.stderr,
         )
 

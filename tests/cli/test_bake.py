@@ -15,6 +15,7 @@ import pytest
 from clip_files import write_image
 from palette4d.analysis.manifest import Manifest, write
 from palette4d.cli import main
+from palette4d.lut_export.lattice import nearer
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
 EDITED = GOLDEN / "v1_edited.p4d.json"
@@ -247,7 +248,6 @@ class TestErrors:
             assert ("mend it there" in text) != ("update palette4d" in text)
         assert [path.name for path in tmp_path.iterdir()] == ["bad.p4d.json"]
 
-
     def test_a_manifest(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         path = tmp_path / "edit.shots.json"
         write(Manifest("edit.edl", "0" * 64, Fraction(24), {}, ()), path)
@@ -257,6 +257,7 @@ class TestErrors:
             assert "edit.shots.json: /schema: " in text
             assert "this is a manifest of shots: name the sidecar (.p4d.json) of one" in text
             assert "mend it there" not in text
+
 
 class TestReport:
     def test_the_table(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -274,7 +275,12 @@ class TestReport:
             "clip's colours at frame 4", "clip's colours at frame 4", "dense grid", "dense grid",
         ]  # fmt: skip
         assert "deltaE: " in lines[7]
-        assert "misses the preview tier 0.002" in printed.err
+        exact = "the node and `palette4d render` are exact\n"
+        advice = "misses the preview tier 0.002; "
+        assert f"{advice}a larger --size comes nearer; {exact}" in printed.err
+        assert run("-o", tmp_path / "a.cc") == 0
+        assert f"{advice}a table (.clf, .cube) comes nearer\n" in capsys.readouterr().err
+        assert f"{nearer(129)}\n" == exact
 
     def test_clamped_colours_are_warned_of(
         self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
