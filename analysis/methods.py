@@ -3,7 +3,7 @@
 `skew` and `paper` follow section 5; they part at block merging. The paper stops merging and removal
 at multiples of a first loss (eta1, eta2). `skew` takes the configurations of one to `blocks`
 blocks, removes vertices from each while refining, and keeps what costs least with every handle paid
-for; a static hull of the whole clip takes part, so that the result is never worse than that.
+for; a static hull of the whole clip takes part, so that the result is never worse than that by L'.
 `static` and `rgbt` are what section 6.2 compares with.
 """
 
