@@ -116,7 +116,7 @@ def _lost(x: Report, options: AnalysisOptions, farthest: Mapping[str, float]) ->
             reach = f"raise --reach to {AnalysisOptions().reach:g}"
         ways = (
             f"{reach} or raise --lambda (to {10 * options.lambda_:g}, say), so that rare colours "
-            f"count more, or lower --k where they are fewer than {options.k} pixels"
+            f"count more, or lower --k where they are fewer than {options.k:g} pixels"
         )
     static = ", or take --method static" if "one static palette leaves" in nearer else ""
     return (
