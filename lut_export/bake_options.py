@@ -12,7 +12,7 @@ from palette4d.lut_export import lattice as lattices
 from palette4d.lut_export import shaper as shapers
 from palette4d.lut_export.formats import LutFormat, with_shaper
 from palette4d.lut_export.frame_edit import frame_edit
-from palette4d.lut_export.shaper import Shaper
+from palette4d.lut_export.shaper import Choice, Kind, Shaper
 from palette4d.lut_export.spaces import INPUT
 from palette4d.replacing import refuse_existing
 
@@ -51,7 +51,7 @@ class BakeOptions:
     size: int = 33
     strength: float = 1.0
     format: str | None = None
-    shaper: str = "auto"
+    shaper: Choice = "auto"
     domain: tuple[float, float] | None = None
     max_error: float | None = None
     threads: int = 0
@@ -114,8 +114,8 @@ def choose_shaper(
     holds the (n, 3) colours of the whole palette, in the same numbers as `image`.
     """
     if options.domain is not None:
-        kind = "log" if options.shaper == "auto" else options.shaper
-        return shapers.Shaper(kind, *options.domain)  # type: ignore[arg-type]
+        kind: Kind = "log" if options.shaper == "auto" else options.shaper
+        return shapers.Shaper(kind, *options.domain)
     low, high = float(palette.min()), float(palette.max())
     if image is not None:
         finite = image[..., :3][np.isfinite(image[..., :3])]

@@ -23,6 +23,8 @@ from palette4d.errors import Palette4dError
 F64 = NDArray[np.float64]
 
 Kind = Literal["none", "linear", "log"]
+#: What may be asked for: a kind, or that the colours decide.
+Choice = Literal["auto", "none", "linear", "log"]
 
 #: Where the log curve turns from even steps to even ratios: 0.85 stops below middle grey.
 OFFSET = 0.1

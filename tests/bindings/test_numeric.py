@@ -314,9 +314,11 @@ def test_a_lattice_is_made_while_it_is_used(recolourer: _core.Recolourer) -> Non
 
 def test_a_lattice_refuses_what_recolouring_refuses(recolourer: _core.Recolourer) -> None:
     lattice = _core.Lattice(recolourer)
+    twofold: Any = np.zeros((2, 2, 3))
     with pytest.raises(ValueError, match=r"expected float32"):
-        lattice.apply(np.zeros((2, 2, 3)))  # type: ignore[arg-type]
+        lattice.apply(twofold)
     with pytest.raises(ValueError, match="strength is not finite"):
         lattice.apply(np.zeros((2, 2, 3), np.float32), strength=float("nan"))
+    nothing: Any = None
     with pytest.raises(TypeError):
-        _core.Lattice(None)  # type: ignore[arg-type]
+        _core.Lattice(nothing)

@@ -1,38 +1,19 @@
 #include "palette4d/lattice.hpp"
 
 #include <cstring>
-#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <thread>
 
 #include "check.hpp"
+#include "images.hpp"
 #include "shapes.hpp"
 
 using namespace palette4d;
+using namespace images;
 using namespace shapes;
 
 namespace {
-
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-constexpr float kInf = std::numeric_limits<float>::infinity();
-
-/// A packed image, and views of it.
-struct Image {
-    int width, height, channels;
-    std::vector<float> data;
-    Image(int w, int h, int c)
-        : width(w), height(h), channels(c), data(static_cast<std::size_t>(w) * h * c) {}
-    std::ptrdiff_t row() const {
-        return static_cast<std::ptrdiff_t>(sizeof(float)) * width * channels;
-    }
-    ConstImageView in() const { return {data.data(), width, height, channels, row()}; }
-    ImageView out() { return {data.data(), width, height, channels, row()}; }
-};
-
-bool same_bits(const std::vector<float>& a, const std::vector<float>& b) {
-    return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
-}
 
 /// Colours around a few, as in a picture: some in the middle, some far outside, gradients between.
 Image picture(int width, int height, int channels, std::uint64_t seed, double low = -0.05,

@@ -5,32 +5,14 @@
 #include <stdexcept>
 
 #include "check.hpp"
+#include "images.hpp"
 #include "shapes.hpp"
 
 using namespace palette4d;
+using namespace images;
 using namespace shapes;
 
 namespace {
-
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-constexpr float kInf = std::numeric_limits<float>::infinity();
-
-/// A packed image, and views of it.
-struct Image {
-    int width, height, channels;
-    std::vector<float> data;
-    Image(int w, int h, int c)
-        : width(w), height(h), channels(c), data(static_cast<std::size_t>(w) * h * c) {}
-    std::ptrdiff_t row() const {
-        return static_cast<std::ptrdiff_t>(sizeof(float)) * width * channels;
-    }
-    ConstImageView in() const { return {data.data(), width, height, channels, row()}; }
-    ImageView out() { return {data.data(), width, height, channels, row()}; }
-};
-
-bool same_bits(const std::vector<float>& a, const std::vector<float>& b) {
-    return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
-}
 
 Image noise(int width, int height, int channels, std::uint64_t seed) {
     Image image(width, height, channels);

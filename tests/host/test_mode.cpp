@@ -3,6 +3,7 @@
 #include <cstring>
 #include <set>
 #include <thread>
+#include <utility>
 
 #include "../../ofx_plugin/plugin/sidecar_cache.hpp"
 #include "harness.hpp"
@@ -33,6 +34,16 @@ struct Node {
 };
 
 enum { kAuto, kExact, kLattice };
+
+/// What the two modes make of a picture; not the same.
+auto exact_and_lattice(Node& node, const Picture& source) {
+    node.instance->set("mode", kExact);
+    auto exact = node.render(source, 2);
+    node.instance->set("mode", kLattice);
+    auto lattice = node.render(source, 2);
+    CHECK(lattice != exact);
+    return std::pair(std::move(exact), std::move(lattice));
+}
 
 Layout layout(int channels, Depth depth = Depth::kFloat) {
     Layout made;
@@ -115,11 +126,7 @@ TEST(auto_interpolates_only_where_the_host_tells_that_somebody_watches) {
     const std::map<std::string, Value> watched{{kOfxImageEffectPropInteractiveRenderStatus, 1}},
         draft{{kOfxImageEffectPropRenderQualityDraft, 1}},
         final_render{{kOfxImageEffectPropRenderQualityDraft, 0}};
-    node.instance->set("mode", kExact);
-    const auto exact = node.render(source, 2);
-    node.instance->set("mode", kLattice);
-    const auto lattice = node.render(source, 2);
-    CHECK(lattice != exact);
+    const auto [exact, lattice] = exact_and_lattice(node, source);
     node.instance->set("mode", kAuto);
     CHECK(node.render(source, 2) == exact);
     node.instance->extra_arguments = final_render;
@@ -150,11 +157,7 @@ TEST(auto_is_exact_for_pictures_that_the_lattice_is_not_faster_for) {
     const auto interpolates = [&](const Layout& shape) {
         Picture source(shape);
         fill(source);
-        node.instance->set("mode", kExact);
-        const auto exact = node.render(source, 2);
-        node.instance->set("mode", kLattice);
-        const auto lattice = node.render(source, 2);
-        CHECK(lattice != exact);
+        const auto [exact, lattice] = exact_and_lattice(node, source);
         node.instance->set("mode", kAuto);
         const auto found = node.render(source, 2);
         CHECK(found == exact || found == lattice);
