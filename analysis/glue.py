@@ -113,11 +113,21 @@ class _Search:
         self.distance = distance.tolist()
         self.near_first: list[list[bool]] = first.adjacency().tolist()
         self.near_second: list[list[bool]] = second.adjacency().tolist()
+        # Sets of the second palette's colours are bits of a number: each colour with those next to
+        # it, and of each colour of the first palette those that it links to.
+        self.around = [
+            1 << u | sum(1 << w for w in range(self.m) if self.near_second[u][w])
+            for u in range(self.m)
+        ]
+        self.linked = [0] * self.n
         self.order = _breadth_first(first.adjacency())
         self.choices = [self._choices(v, allowed[v]) for v in range(self.n)]
+        self.before = [
+            [w for w in self.order[:at] if self.near_first[v][w]] for at, v in enumerate(self.order)
+        ]
         self.rest = [0.0] * (self.n + 1)  # the least that the colours still to come must cost
         for at in range(self.n - 1, -1, -1):
-            costs = [cost for cost, _ in self.choices[self.order[at]]]
+            costs = [cost for cost, *_ in self.choices[self.order[at]]]
             self.rest[at] = self.rest[at + 1] + (min(costs) if costs else np.inf)
         self.chosen: list[tuple[int, ...]] = [()] * self.n
         self.users: list[list[int]] = [[] for _ in range(self.m)]
@@ -127,14 +137,19 @@ class _Search:
         self.nodes = 0
         self.complete = True
 
-    def _choices(self, v: int, allowed: Bool) -> list[tuple[float, tuple[int, ...]]]:
-        """Sets of one to three colours that v may link to; topological rule 1 within each set."""
+    def _choices(self, v: int, allowed: Bool) -> list[tuple[float, tuple[int, ...], int, int]]:
+        """Sets of one to three colours that v may link to (topological rule 1 within each set):
+        what each costs, its colours, these as bits, and as bits those and all around them."""
         near = np.flatnonzero(allowed).tolist()
         out = []
         for size in (1, 2, 3):
             for group in itertools.combinations(near, size):
                 if all(self.near_second[a][b] for a, b in itertools.combinations(group, 2)):
-                    out.append((sum(self.distance[v][u] for u in group), group))
+                    bits = around = 0
+                    for u in group:
+                        bits |= 1 << u
+                        around |= self.around[u]
+                    out.append((sum(self.distance[v][u] for u in group), group, bits, around))
         return sorted(out)
 
     def run(self) -> tuple[tuple[tuple[int, int], ...], int] | None:
@@ -154,10 +169,6 @@ class _Search:
             if not all(self.near_first[v][w] for w in users):  # topological rule 1
                 return False
         return True
-
-    def _maps_edge(self, v: int, w: int) -> bool:
-        """Topological rule 2 for an intra-frame edge of the first palette."""
-        return any(a == b or self.near_second[a][b] for a in self.chosen[v] for b in self.chosen[w])
 
     def _broken_back(self) -> int:
         """Topological rule 2 for the second palette's edges."""
@@ -186,21 +197,22 @@ class _Search:
                 self.best_links = tuple((v, u) for v in range(self.n) for u in self.chosen[v])
             return
         v = self.order[at]
-        earlier = [w for w in self.order[:at] if self.near_first[v][w]]
-        for extra, group in self.choices[v]:
+        for extra, group, bits, around in self.choices[v]:
             if cost + extra + self.rest[at + 1] >= self.best:
                 break
             if not self._fits(v, group):
                 continue
-            self.chosen[v] = group
-            wrong = sum(not self._maps_edge(v, w) for w in earlier)
-            if not (self.strict and wrong):
-                for u in group:
-                    self.users[u].append(v)
-                self._descend(at + 1, cost + extra + BROKEN * wrong, broken + wrong)
-                for u in group:
-                    self.users[u].pop()
-            self.chosen[v] = ()
+            # Topological rule 2 for the intra-frame edges to the colours that have chosen.
+            wrong = sum(not around & self.linked[w] for w in self.before[at])
+            if self.strict and wrong:
+                continue
+            self.chosen[v], self.linked[v] = group, bits
+            for u in group:
+                self.users[u].append(v)
+            self._descend(at + 1, cost + extra + BROKEN * wrong, broken + wrong)
+            for u in group:
+                self.users[u].pop()
+            self.chosen[v], self.linked[v] = (), 0
 
 
 def _breadth_first(adjacency: Bool) -> list[int]:

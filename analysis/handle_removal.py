@@ -13,6 +13,7 @@ nobody sees, and on others it removes those that the palette needs.
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -52,22 +53,28 @@ def simplify(
     high: F64,
     options: AnalysisOptions,
     progress: Callable[[int, int], None] | None = None,
+    bound: float = math.inf,
 ) -> list[Step]:
     """Return the polytope with fewer and fewer vertices, most vertices first.
 
-    Ends where no vertex may go, or where the price can hardly fall below the best any more.
-    `statistics` may be a choice of the clip's frames.
+    Ends where no vertex may go, or where the price can hardly fall any more below the best, or
+    below `bound`, the price of another structure. `statistics` may be a choice of the clip's
+    frames.
     """
     start, value = refine_jointly(polytope, statistics, low, high, options, FIRST_EVALUATIONS, True)
     steps = [Step(start, value)]
     most = len(start.vertices)
     scale = colour_scale(low, high)
+    fewest = most - len(start.removable())
     while True:
         last = steps[-1].polytope
         count = len(last.vertices)
         best = min(step.price(options) for step in steps)
         wanted = options.vertices == 0 or count <= options.vertices
         if wanted and steps[-1].price(options) > best + PATIENCE:
+            break
+        least = steps[-1].value + options.handle_cost * fewest  # values hardly ever fall
+        if options.vertices == 0 and least > bound + PATIENCE:
             break
         cheapest = _cheapest(last, statistics, options, scale)
         if not cheapest:

@@ -81,9 +81,11 @@ def palette_loss(colours: _core.ColourTree, rgb: F64, options: AnalysisOptions) 
     return options.lambda_ * r + c
 
 
-def smoothness(vertices: F64, edges: I32, length: float) -> tuple[float, F64]:
+def smoothness(
+    vertices: F64, edges: I32, length: float, weights: F64 | None = None
+) -> tuple[float, F64]:
     """Eq. 11 and its (n, 4) gradient with respect to the vertices; `length` is the clip's, in
-    frames.
+    frames, `weights` of the edges are 1 in the paper.
 
     Edges without extent in time (there are none in a valid polytope) count as nothing.
     """
@@ -94,8 +96,9 @@ def smoothness(vertices: F64, edges: I32, length: float) -> tuple[float, F64]:
     colour = vertices[v, :3] - vertices[u, :3]
     dt = (vertices[v, 3] - vertices[u, 3]) / length
     distance = np.linalg.norm(colour, axis=1)
-    slope = distance / dt
-    unit = colour / np.maximum(distance, 1e-12)[:, None] / dt[:, None] / len(edges)
+    steepness = (1.0 if weights is None else weights) / dt
+    slope = distance * steepness
+    unit = colour * (steepness / np.maximum(distance, 1e-12) / len(edges))[:, None]
     np.add.at(gradient[:, :3], v, unit)
     np.add.at(gradient[:, :3], u, -unit)
     along = slope / dt / length / len(edges)

@@ -6,7 +6,7 @@ may move in, the frames that a vertex touches, and NLopt with the core's exact g
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,8 @@ F64 = NDArray[np.float64]
 
 # Two vertices of a track stay this many frames apart: a steeper change is a cut, not a palette.
 LEAST_GAP = 0.5
+# What a change to and from a colour that is there for a moment weighs in eq. 11.
+BRIEF = 0.25
 
 
 def loss_of(
@@ -47,14 +49,15 @@ def refine_jointly(
     options: AnalysisOptions,
     most_evaluations: int,
     coarse: bool,
+    brief: Collection[int] = (),
 ) -> tuple[SkewPolytope, float]:
     """Move all vertices together in their boxes; return the polytope and what was minimised.
 
     That is eq. 12, and what keeps slices convex and colours apart. It is never above that of the
-    polytope given, clipped to the gamut.
+    polytope given, clipped to the gamut. `brief` as in `Objective`.
     """
     scale = colour_scale(low, high)
-    evaluate = Objective(polytope, statistics, options, scale, coarse)
+    evaluate = Objective(polytope, statistics, options, scale, coarse, brief)
     vertices = polytope.vertices.copy()
     vertices[:, :3] = np.clip(vertices[:, :3], low, high)
     everything = list(range(len(statistics)))
@@ -93,7 +96,11 @@ def move(
 
 
 class Objective:
-    """Eq. 12, and what keeps slices convex and colours apart, over a choice of frames."""
+    """Eq. 12, and what keeps slices convex and colours apart, over a choice of frames.
+
+    `brief` are vertices that are there for a moment: their colours may come and go quickly, so
+    that in eq. 11 the edges that end at them count `BRIEF` times only.
+    """
 
     def __init__(
         self,
@@ -102,6 +109,7 @@ class Objective:
         options: AnalysisOptions,
         scale_of_colours: float,
         coarse: bool,
+        brief: Collection[int] = (),
     ) -> None:
         self.colour_box = options.refinement_box * scale_of_colours
         self.weights = shaped_weights(options, scale_of_colours)
@@ -111,6 +119,7 @@ class Objective:
         self.count = len(statistics)
         self.frames = np.array([s.frame for s in statistics], float)
         self.edges = polytope.edges()
+        self.quick = np.where(np.isin(self.edges, list(brief)).any(axis=1), BRIEF, 1.0)
         self.length = polytope.length()
         self.fixed = polytope.fixed_times()
         # Times are divided by the clip's length, as in the paper, so that all four axes are alike.
@@ -130,7 +139,7 @@ class Objective:
         value = (o.lambda_ * sums[0] + sums[1] + sums[2]) / self.count
         gradient = gradient / self.count
         if o.gamma and self.count > 1:
-            k, slope = smoothness(vertices, self.edges, self.length)
+            k, slope = smoothness(vertices, self.edges, self.length, self.quick)
             value += o.gamma * k
             gradient += o.gamma * slope
         return float(value), gradient

@@ -85,7 +85,7 @@ class AnalysisOptions:
     refinement_box: float = 0.1
     refinement_cycles: int = 3
     palette_size: int = 8
-    merge_distance: float = 0.15
+    merge_distance: float = 0.1
     hull_box: float = 0.15
     convexity: float = 3.0
     separation: float = 0.15

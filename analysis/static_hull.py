@@ -7,7 +7,8 @@ of section 6.2. It is refined against the loss of every frame (eq. 8).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,21 @@ from palette4d.analysis.statistics import FrameStatistics
 F64 = NDArray[np.float64]
 
 EVALUATIONS = 100
+
+
+def plain(options: AnalysisOptions) -> Iterator[AnalysisOptions]:
+    """Yield options of a hull of `palette_size` colours for the paper's loss, without our terms and
+    in wide boxes; then of the same kept as convex as asked for, which is better on some clips:
+    where a hull caves in, colours are lost."""
+    for convexity in dict.fromkeys((0.0, options.convexity)):
+        yield dataclasses.replace(
+            options,
+            convexity=convexity,
+            separation=0.0,
+            reach=0.0,
+            merge_distance=0.0,
+            refinement_box=max(options.refinement_box, 2 * options.hull_box),
+        )
 
 
 def static_polytope(

@@ -1,23 +1,24 @@
 """After removal: stops for what single frames lack, such as a light that shines for a moment.
 
-Input: a `Step` (a refined polytope) and the clip's frames. Output: a step whose value is no higher.
+Input: a refined polytope and the clip's frames. Output: the polytope with such stops.
 Merging takes a block's palettes on from frame to frame, and removal looks at the mean: neither sees
-a colour that is there for a few frames only, however far it lies outside. So frames that fit much
-worse than the usual one are looked at: the colours that one leaves outside get a stop on a track
-near to them, with or without one before and after, which keep the rest of the track where it is.
-Such stops need not be worth `handle_cost`, which is a matter of the mean; they stay if they make
-good most of what the frame lacks and nothing else suffers for it.
+a colour that is there for a few frames only, however far it lies outside. So two kinds of frames
+are looked at: those that fit much worse than the usual one, and those of whose pixels some are lost
+(`LOST`). The colours that one leaves outside get a stop on a track near to them, with or without
+one before and after, which keep the rest of the track where it is. Such stops need not be worth
+`handle_cost`, which is a matter of the mean; they stay if they make good most of what the frame
+lacks and nothing else suffers for it. That they come and go at once is not held against them: eq.
+11 would rather lose a light than let a colour jump.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d.analysis.handle_removal import Step
 from palette4d.analysis.losses import colour_scale, reach_weights, thread_count
 from palette4d.analysis.objective import LEAST_GAP, Objective, loss_of, move
 from palette4d.analysis.options import AnalysisOptions
@@ -28,59 +29,98 @@ from scipy.spatial import ConvexHull, QhullError
 F64 = NDArray[np.float64]
 
 MOST_FRAMES = 6
-BAD = 3.0  # times the median frame's loss: a frame to be looked at
-MENDED = 0.5  # of what its loss is above the median must go
+BAD = 3.0  # times the median frame's loss: a frame to be looked at ...
+LOST = 0.25  # ... and one of whose pixels at least this share is lost, so far outside: fewer are
+LEAST_LOST = 1e-4  # hot pixels or glints
+MENDED = 0.5  # of what is lacking must go
 NEAREST = 3  # tracks tried
 EVALUATIONS = 30
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class Inserted:
+    """The polytope with stops, and which of its vertices are there for a moment (`brief` of
+    `Objective`)."""
+
+    polytope: SkewPolytope
+    brief: tuple[int, ...]
+
+
 def insert_stops(
-    step: Step,
+    polytope: SkewPolytope,
     statistics: Sequence[FrameStatistics],
     low: F64,
     high: F64,
     options: AnalysisOptions,
-) -> Step:
+) -> Inserted:
     """Return the polytope with stops for its worst frames.
 
-    `statistics` are all of the clip's frames; `step.value` is on them. With `options.vertices`
-    there are never more than so many.
+    `statistics` are all of the clip's frames. With `options.vertices` there are never more than so
+    many.
     """
-    polytope, value = step.polytope, step.value
     scale = colour_scale(low, high)
+    now = Inserted(polytope, ())
     hopeless: set[int] = set()
     for _ in range(MOST_FRAMES):
-        losses = _frame_losses(polytope, statistics, options, scale)
-        usual = float(np.median(losses))
-        bad = [i for i in np.argsort(-losses, kind="stable").tolist() if i not in hopeless]
-        if not bad or losses[bad[0]] <= BAD * usual:
+        lacks = _lacks(now.polytope, statistics, options, scale)
+        worst = lacks.worst(hopeless)
+        if worst is None:
             break
-        enough = losses[bad[0]] - MENDED * (losses[bad[0]] - usual)
-        best: tuple[float, float, SkewPolytope] | None = None
-        for trial, added in _trials(polytope, statistics, losses, bad[0]):
+        enough = lacks.enough(worst)
+        best: tuple[float, Inserted] | None = None
+        for trial, added in _trials(now.polytope, statistics, lacks.loss, worst, scale):
             if options.vertices and len(trial.vertices) > options.vertices:
                 continue
-            moved, change = _settled(polytope, trial, added, statistics, low, high, options)
+            moved, change = _settled(now, trial, added, statistics, low, high, options)
             price = change + options.handle_cost * len(added)
             if change > 0 or (best and price >= best[0]):
                 continue
-            if _frame_losses(moved, [statistics[bad[0]]], options, scale)[0] <= enough:
-                best = price, change, moved
+            rest = _lacks(moved, [statistics[worst]], options, scale)
+            if enough(rest):
+                best = price, Inserted(moved, (*now.brief, added[0]))
         if best is None:
-            hopeless.add(bad[0])
+            hopeless.add(worst)
         else:
-            _, change, polytope = best
-            value += change
-    return Step(polytope, value)
+            now = best[1]
+    return now
 
 
-def _frame_losses(
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Lacks:
+    """What each frame lacks: its L (eq. 4) with what lies far outside once more (`reach`); the
+    latter alone; and the share of its pixels that are lost."""
+
+    loss: F64
+    far: F64
+    lost: F64
+
+    def worst(self, hopeless: set[int]) -> int | None:
+        """Return the frame to be looked at next."""
+        usual = float(np.median(self.loss))
+        for of, bad in (
+            (self.loss, self.loss > BAD * usual),
+            (self.far, self.lost >= LEAST_LOST),
+        ):
+            found = [i for i in np.flatnonzero(bad).tolist() if i not in hopeless]
+            if found:
+                return max(found, key=lambda i: of[i])
+        return None
+
+    def enough(self, frame: int) -> Callable[[_Lacks], bool]:
+        """Return whether that frame alone, in `_Lacks` of its own, lacks so much less."""
+        usual = float(np.median(self.loss))
+        if self.loss[frame] > BAD * usual:
+            most = self.loss[frame] - MENDED * (self.loss[frame] - usual)
+            return lambda rest: bool(rest.loss[0] <= most)
+        return lambda rest: bool(rest.far[0] <= MENDED * self.far[frame])
+
+
+def _lacks(
     polytope: SkewPolytope,
     statistics: Sequence[FrameStatistics],
     options: AnalysisOptions,
     scale: float,
-) -> F64:
-    """L (eq. 4) of each frame, and what lies far outside once more (`reach`)."""
+) -> _Lacks:
     rows, _ = loss_of(polytope, statistics, coarse=True).evaluate(
         polytope.vertices,
         list(range(len(statistics))),
@@ -88,12 +128,21 @@ def _frame_losses(
         thread_count(options),
         False,
     )
-    losses: F64 = options.lambda_ * rows[:, 0] + rows[:, 1] + rows[:, 2]
-    return losses
+    lost = np.zeros(len(statistics))
+    if options.reach:  # else a light counts like everything else
+        for i in np.flatnonzero(rows[:, 4] > LOST * scale).tolist():
+            frame = statistics[i]
+            distance = _outside(_slice(polytope, float(frame.frame)), frame)
+            lost[i] = frame.coarse.counts[distance > LOST * scale].sum() / frame.pixels
+    return _Lacks(options.lambda_ * rows[:, 0] + rows[:, 1] + rows[:, 2], rows[:, 2], lost)
 
 
 def _trials(
-    polytope: SkewPolytope, statistics: Sequence[FrameStatistics], losses: F64, worst: int
+    polytope: SkewPolytope,
+    statistics: Sequence[FrameStatistics],
+    losses: F64,
+    worst: int,
+    scale: float,
 ) -> Iterator[tuple[SkewPolytope, list[int]]]:
     """Polytopes with a stop more in the worst frame, and their new vertices."""
     frame = statistics[worst]
@@ -101,8 +150,8 @@ def _trials(
     for place, block in enumerate(polytope.blocks):
         if not block.first <= time <= block.last or len(block.faces) == 0:
             continue
-        rgb = np.array([_colour(polytope.vertices[list(t)], time) for t in block.tracks])
-        target = _lost_colour(rgb, frame)
+        rgb = _colours(polytope, block, time)
+        target = _lost_colour(rgb, frame, LOST * scale)
         if target is None:
             continue
         # For as long as frames are nearer to this one than to the usual.
@@ -125,18 +174,37 @@ def _colour(track: F64, time: float) -> F64:
     return np.array([np.interp(time, track[:, 3], track[:, c]) for c in range(3)])
 
 
-def _lost_colour(rgb: F64, frame: FrameStatistics) -> F64 | None:
-    """Return the mean of the colours that lie farthest outside; None where none does."""
+def _colours(polytope: SkewPolytope, block: Section, time: float) -> F64:
+    """(n, 3) colours of a block's tracks."""
+    return np.array([_colour(polytope.vertices[list(t)], time) for t in block.tracks])
+
+
+def _slice(polytope: SkewPolytope, time: float) -> F64:
+    """(n, 3) colours of the block there; between blocks, those of the nearest."""
+    block = min(polytope.blocks, key=lambda b: max(b.first - time, time - b.last))
+    return _colours(polytope, block, min(max(time, block.first), block.last))
+
+
+def _outside(rgb: F64, frame: FrameStatistics) -> F64:
+    """How far each coarse colour lies outside a palette's convex hull; 0 where it has none."""
     try:
         planes = ConvexHull(rgb).equations
     except QhullError:
-        return None
+        return np.zeros(len(frame.coarse.counts))
+    distance: F64 = (frame.coarse.rgb @ planes[:, :3].T + planes[:, 3]).max(axis=1)
+    return distance
+
+
+def _lost_colour(rgb: F64, frame: FrameStatistics, lost: float) -> F64 | None:
+    """Return the mean of the colours that lie farthest outside; None where none does."""
+    distance = _outside(rgb, frame)
     colours, counts = frame.coarse.rgb, frame.coarse.counts
-    distance = (colours @ planes[:, :3].T + planes[:, 3]).max(axis=1)
     # The farthest pixels decide, not the farthest one.
     order = np.argsort(-distance, kind="stable")
-    few = int(np.searchsorted(np.cumsum(counts[order]), frame.pixels / 1000)) + 1
-    far = order[:few][distance[order[:few]] > 0]
+    most = int(np.searchsorted(np.cumsum(counts[order]), frame.pixels / 1000)) + 1
+    gone = int((distance > lost).sum())  # and where some are lost, those alone
+    far = order[: min(most, gone or most)]
+    far = far[distance[far] > 0]
     if len(far) == 0:
         return None
     mean: F64 = counts[far] @ colours[far] / counts[far].sum()
@@ -171,7 +239,7 @@ def _with_stops(
 
 
 def _settled(
-    polytope: SkewPolytope,
+    now: Inserted,
     trial: SkewPolytope,
     added: list[int],
     statistics: Sequence[FrameStatistics],
@@ -182,7 +250,8 @@ def _settled(
     """Move the new vertices to their best places; return the polytope, and by how much the value
     has changed."""
     scale = colour_scale(low, high)
-    evaluate = Objective(trial, statistics, options, scale, coarse=True)
+    brief = (*now.brief, added[0])
+    evaluate = Objective(trial, statistics, options, scale, coarse=True, brief=brief)
     vertices = trial.vertices.copy()
     vertices[:, :3] = np.clip(vertices[:, :3], low, high)
     moving = np.array(added)
@@ -195,7 +264,7 @@ def _settled(
         upper[:, 3] = np.minimum(upper[:, 3], times + span)
     vertices = move(evaluate, vertices, moving, which, (lower, upper), EVALUATIONS)
     value, _ = evaluate(vertices, which)
-    before, _ = Objective(polytope, statistics, options, scale, coarse=True)(
-        polytope.vertices, which
+    before, _ = Objective(now.polytope, statistics, options, scale, coarse=True, brief=now.brief)(
+        now.polytope.vertices, which
     )
     return trial.with_vertices(vertices), value - before

@@ -151,16 +151,20 @@ def test_gradient_matches_differences():
         assert gradient[i, c] == pytest.approx(slope, abs=1e-4)
 
 
-def test_smoothness_by_hand_and_its_gradient():
+@pytest.mark.parametrize("weights", [(1.0, 1.0), (0.25, 1.0), (0.0, 0.5)])
+def test_smoothness_by_hand_and_its_gradient(weights):
     vertices = np.array([[0, 0, 0, 0], [0.3, 0.4, 0, 5], [0.1, 0.2, 0.3, 10]], float)
     edges = np.array([[0, 1], [1, 2]], np.int32)
-    k, gradient = smoothness(vertices, edges, 10.0)
-    by_hand = (0.5 / 0.5 + np.linalg.norm([0.2, 0.2, 0.3]) / 0.5) / 2
-    assert k == pytest.approx(by_hand)
+    factors = np.array(weights)
+    k, gradient = smoothness(vertices, edges, 10.0, factors)
+    slopes = 0.5 / 0.5, np.linalg.norm([0.2, 0.2, 0.3]) / 0.5
+    assert k == pytest.approx(factors @ slopes / 2)
+    if weights == (1.0, 1.0):
+        assert smoothness(vertices, edges, 10.0)[0] == k
     for i, c in itertools.product(range(3), range(4)):
         step = np.zeros((3, 4))
         step[i, c] = 1e-6
-        up, down = (smoothness(vertices + s * step, edges, 10.0)[0] for s in (1, -1))
+        up, down = (smoothness(vertices + s * step, edges, 10.0, factors)[0] for s in (1, -1))
         assert gradient[i, c] == pytest.approx((up - down) / 2e-6, abs=1e-6)
     assert smoothness(vertices, np.zeros((0, 2), np.int32), 10.0)[0] == 0
 

@@ -7,8 +7,9 @@ import itertools
 import numpy as np
 import pytest
 from analysis_frames import constant, grey, mixture, noise, stats
-from palette4d.analysis import methods
+from palette4d.analysis import methods, static_hull, statistics, structure_search
 from palette4d.analysis.block_merging import Block
+from palette4d.analysis.clip import open_clip
 from palette4d.analysis.frame_hulls import hull_mesh
 from palette4d.analysis.options import METHODS, AnalysisOptions
 
@@ -49,6 +50,28 @@ def test_the_default_is_never_worse_than_a_static_hull(name):
     assert first.stage == "static_hull"
     assert first.losses == static.stages[-1].losses
     assert analysis.stages[-1].losses.L_prime <= first.losses.L_prime + 1e-12
+    # Nor than one of eight colours without our own terms.
+    for options in static_hull.plain(AnalysisOptions(method="static")):
+        plain = methods.analyze(frames, options).stages[-1]
+        assert analysis.stages[-1].losses.L_prime <= plain.losses.L_prime + 1e-12
+
+
+@pytest.mark.parametrize(("first", "last"), [(0, 1), (10, 13)])
+def test_where_little_moves_the_default_beats_eight_static_colours(seasons, first, last):
+    clip = open_clip(str(seasons), frames=f"{first}-{last}")
+    found = statistics.gather_clip(clip, AnalysisOptions()).frames
+    frames = [found[number] for number in sorted(found)]
+    default = methods.analyze(frames, AnalysisOptions()).stages[-1].losses
+    for options in static_hull.plain(AnalysisOptions(method="static")):
+        assert default.L_prime < methods.analyze(frames, options).stages[-1].losses.L_prime
+
+
+@pytest.mark.parametrize("most", [8, 10, 12])
+def test_few_vertices_mean_few_colours(most):
+    """A colour has one at either end of the clip at least."""
+    analysis = methods.analyze(stats(drifting(9)), AnalysisOptions(vertices=most))
+    assert len(analysis.polytope.vertices) <= most
+    assert analysis.remarks == ()
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -87,8 +110,11 @@ def test_search_frames_hold_the_ends_the_worst_and_the_blocks():
     blocks = [Block(0, (palette,) * 70, (0.1,) * 70), Block(70, (palette,) * 30, (0.1,) * 30)]
     losses = np.full(100, 0.1)
     losses[37] = 0.5
-    chosen = methods.search_frames(losses, blocks)
+    chosen = structure_search.search_frames(losses, blocks)
     assert {0, 99, 37, 69, 70} <= set(chosen)
-    assert len(chosen) <= methods.SEARCH_FRAMES + methods.WORST_FRAMES + 4
+    assert len(chosen) <= structure_search.SEARCH_FRAMES + structure_search.WORST_FRAMES + 4
     assert max(b - a for a, b in itertools.pairwise(chosen)) <= 5
-    assert methods.search_frames(losses[:2], [Block(0, (palette,) * 2, (0.1,) * 2)]) == [0, 1]
+    assert structure_search.search_frames(losses[:2], [Block(0, (palette,) * 2, (0.1,) * 2)]) == [
+        0,
+        1,
+    ]

@@ -71,14 +71,17 @@ def render_both_ways(melt: Path, bundle: Path, sidecar: Path, clip: Path) -> Ren
 def crimson_autumn(
     melt: Path, bundle: Path, seasons: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> Rendered:
-    """SEASONS, all of it at its full size, with the autumn leaves turned crimson."""
+    """SEASONS, all of it at its full size, with the autumn leaves turned red and crimson."""
     sidecar = tmp_path_factory.mktemp("seasons") / "seasons.p4d.json"
     palette4d("analyze", seasons, "-o", sidecar, "--quiet")
-    for orange, frame in (("0.9,0.3,0.1", 49), ("0.87,0.48,0", 44)):
-        near = ("--near", orange, "--frame", frame)
-        palette4d("edit", sidecar, "set", *near, "--rgb", 0.75, 0.05, 0.3)
-    summer = ("--near", "0.58,0.29,0", "--frame", 28)  # until here as it was
-    palette4d("edit", sidecar, "stop", *summer, "--rgb", 0.58, 0.29, 0)
+    for leaves, colour in (
+        ("0.98,0.8,0", (0.85, 0.25, 0.1)),
+        ("0.87,0.32,0.12", (0.75, 0.05, 0.3)),
+    ):
+        palette4d("edit", sidecar, "set", "--near", leaves, "--frame", 49, "--rgb", *colour)
+    for summer in ("0.82,0.86,0", "0.69,0.32,0.25"):  # until here as they were
+        near = ("--near", summer, "--frame", 28)
+        palette4d("edit", sidecar, "stop", *near, "--rgb", *summer.split(","))
     return render_both_ways(melt, bundle, sidecar, seasons)
 
 

@@ -1,0 +1,202 @@
+"""The default method: section 5, its structure chosen by what each handle is worth.
+
+Input: the frames' statistics. Output: an `Analysis`. The configurations of one to `blocks` blocks
+are simplified each, their vertices removed while the others take over; what costs least with every
+handle paid for is kept, given stops for what single frames lack, and refined. Static hulls of the
+whole clip take part, and one simple hull, refined for the paper's loss alone, is what the result is
+held to: it is never worse than that by L'.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from palette4d.analysis import (
+    block_merging,
+    handle_removal,
+    static_hull,
+    stop_insertion,
+    vertex_removal,
+)
+from palette4d.analysis.block_merging import Block
+from palette4d.analysis.handle_removal import Step
+from palette4d.analysis.objective import refine_jointly
+from palette4d.analysis.options import AnalysisOptions
+from palette4d.analysis.polytope import SkewPolytope
+from palette4d.analysis.road import Analysis, Glued, Progress, Road
+from palette4d.analysis.statistics import FrameStatistics
+
+F64 = NDArray[np.float64]
+
+# A palette has this many at least, however few vertices are asked for.
+LEAST_COLOURS = 4
+# Frames that removal looks at: these evenly spaced ones, and the worst fitted.
+SEARCH_FRAMES = 24
+WORST_FRAMES = 8
+# Joint moves on all frames: before candidates are compared, and at the end.
+COMPARE_EVALUATIONS = 40
+FINAL_EVALUATIONS = 150
+# Of a simple hull that nothing else beats: what its shape counts, for as long as L' is too high.
+SHAPE_WEIGHTS = (1.0, 0.1)
+
+
+@dataclasses.dataclass(frozen=True)
+class Candidate:
+    """A structure and what became of it: blocks before removal (none for a static hull); the price
+    when it was searched on some frames; the edges that blocks have between them."""
+
+    merged: SkewPolytope
+    removed: Step
+    price: float = math.inf
+    remarks: tuple[str, ...] = ()
+
+
+class Skew(Road):
+    """Section 5, its structure chosen by what each handle is worth."""
+
+    def __init__(
+        self, frames: list[FrameStatistics], options: AnalysisOptions, progress: Progress | None
+    ) -> None:
+        if options.vertices:  # a colour has a vertex at either end of the clip at least
+            most = max(LEAST_COLOURS, options.vertices // 2)
+            options = dataclasses.replace(options, palette_size=min(options.palette_size, most))
+        super().__init__(frames, options, progress)
+
+    def run(self) -> Analysis:
+        """Search, insert stops, refine, and compare with what is simple."""
+        static = self.static(self.options)
+        self.measure("static_hull", static)
+        hulls = self.plain_hulls() or [static]
+        simple = min((static, *hulls), key=lambda hull: self.losses(hull).L_prime)
+        configurations = self.configurations()
+        candidates: list[Candidate] = []
+        for i, blocks in enumerate(reversed(configurations)):  # those of few blocks cost least
+            bound = min((c.price for c in candidates), default=math.inf)
+            candidates.append(self.simplified(blocks, i, len(configurations), bound))
+        for hull in hulls:
+            candidates.append(Candidate(hull, self.compared(hull)))
+        steps = [c.removed for c in candidates]
+        chosen = candidates[steps.index(handle_removal.choose(steps, self.options))]
+        self.measure("block_merging", chosen.merged)
+        removed = stop_insertion.insert_stops(
+            chosen.removed.polytope, self.frames, self.low, self.high, self.options
+        )
+        self.measure("vertex_removal", removed.polytope)
+        ways = [lambda: self.refined(removed.polytope, self.options, removed.brief)]
+        if removed.brief:
+            ways.append(lambda: self.refined(chosen.removed.polytope, self.options))
+        polytope = self.never_worse(ways, simple)
+        remarks = chosen.remarks if len(polytope.blocks) > 1 else ()
+        if 0 < self.options.vertices < len(polytope.vertices):
+            remarks = (
+                *remarks,
+                f"the palette has {len(polytope.vertices)} vertices, not {self.options.vertices}: "
+                "it has four colours at least, and each of them two",
+            )
+        return Analysis(polytope, tuple(self.stages), remarks)
+
+    def plain_hulls(self) -> list[SkewPolytope]:
+        """Return plain static hulls of no more vertices than asked for."""
+        hulls = [self.static(options) for options in static_hull.plain(self.options)]
+        most = self.options.vertices
+        return [hull for hull in hulls if not most or len(hull.vertices) <= most]
+
+    def never_worse(
+        self, ways: list[Callable[[], SkewPolytope]], simple: SkewPolytope
+    ) -> SkewPolytope:
+        """Take the first of the ways to a refined polytope that is not worse than `simple` by L';
+        if there is none, `simple` itself, kept in shape as far as that allows."""
+        reference = self.losses(simple).L_prime
+        for weight in SHAPE_WEIGHTS:
+            relaxed = self.shaped(weight)
+            ways.append(functools.partial(self.refined, simple, relaxed))
+        ways.append(lambda: simple)
+        for way in ways:
+            polytope = way()
+            if self.losses(polytope).L_prime <= reference:
+                break
+        self.measure("vertex_refinement", polytope)
+        self.report("vertex_refinement", 1, 1)
+        return polytope
+
+    def shaped(self, weight: float) -> AnalysisOptions:
+        """Return the options with what keeps palettes in shape weighed so much."""
+        o = self.options
+        return dataclasses.replace(
+            o, convexity=weight * o.convexity, separation=weight * o.separation
+        )
+
+    def configurations(self) -> list[list[Block]]:
+        """Return the configurations of at most `blocks` blocks, most blocks first."""
+        blocks = self.first_blocks()
+        out = []
+        for _, configuration in block_merging.merge_sequence(
+            blocks, self.frames, self.low, self.high, self.options
+        ):
+            self.report("block_merging", len(blocks) - len(configuration), len(blocks) - 1)
+            if len(configuration) <= self.options.blocks:
+                out.append(configuration)
+        return out
+
+    def simplified(self, blocks: list[Block], place: int, of: int, bound: float) -> Candidate:
+        """Remove vertices from a configuration; compare on all frames."""
+        glued = Glued(self.frames, blocks)
+        merged = glued.polytope()
+        losses = vertex_removal.thin(glued.strands, self.frames, self.options)
+        some = [self.frames[i] for i in search_frames(losses, blocks)]
+
+        def progress(done: int, total: int) -> None:
+            self.report("vertex_removal", place * 1000 + 1000 * done // total, of * 1000)
+
+        steps = handle_removal.simplify(
+            glued.polytope(), some, self.low, self.high, self.options, progress, bound
+        )
+        best = handle_removal.choose(steps, self.options)
+        self.report("vertex_removal", (place + 1) * 1000, of * 1000)
+        price = best.price(self.options)
+        return Candidate(merged, self.compared(best.polytope), price, glued.remarks())
+
+    def compared(self, polytope: SkewPolytope) -> Step:
+        """Return the polytope refined a little on all frames, with its value there."""
+        return Step(
+            *refine_jointly(
+                polytope,
+                self.frames,
+                self.low,
+                self.high,
+                self.options,
+                COMPARE_EVALUATIONS,
+                coarse=True,
+            )
+        )
+
+    def refined(
+        self, polytope: SkewPolytope, options: AnalysisOptions, brief: tuple[int, ...] = ()
+    ) -> SkewPolytope:
+        """Return the polytope refined on all colours of all frames."""
+        out, _ = refine_jointly(
+            polytope,
+            self.frames,
+            self.low,
+            self.high,
+            options,
+            FINAL_EVALUATIONS,
+            coarse=False,
+            brief=brief,
+        )
+        return out
+
+
+def search_frames(losses: F64, blocks: list[Block]) -> list[int]:
+    """Return indices of frames that stand for all: evenly spaced ones, the worst, blocks' ends."""
+    count = len(losses)
+    chosen = set(range(0, count, max(1, -(-count // SEARCH_FRAMES)))) | {count - 1}
+    for block in blocks:
+        chosen |= {block.first, block.first + len(block.palettes) - 1}
+    chosen |= {int(i) for i in np.argsort(-losses, kind="stable")[:WORST_FRAMES]}
+    return sorted(chosen)
