@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from palette4d.analysis.losses import LOST_SHARE
 from palette4d.analysis.options import METHODS_OF, AnalysisOptions
 from palette4d.analysis.quality import Report
 from palette4d.wording import counted
@@ -20,8 +21,7 @@ BAD_L = 0.3  # ... and at least this, or the clip's mean
 LOOKALIKE = 0.06  # RGB distance of two handles
 DENT = 0.05  # share of its convex hull that a slice lacks
 UNUSED = 0.001  # largest mean weight of a handle in any frame
-LOST = 1e-4  # share of a frame's pixels that are lost: fewer are hot pixels or glints ...
-FARTHER = 1.4  # ... and how many times as far out as a simpler palette leaves them
+FARTHER = 1.4  # times as far out as a simpler palette leaves them: lost pixels
 # No display-referred picture and no log goes so far.
 BRIGHT = 2.0
 
@@ -106,7 +106,7 @@ def _lost(x: Report, options: AnalysisOptions, farthest: Mapping[str, float]) ->
         for words, stage in simpler.items()
         if frame.farthest > FARTHER * farthest.get(stage, frame.farthest)
     }
-    if frame.lost < LOST or not nearer:
+    if frame.lost < LOST_SHARE or not nearer:
         return ""
     where = " and ".join(f"{words} {distance:.2f}" for words, distance in nearer.items())
     ways = f"{DEFAULT} follows the colours"

@@ -24,6 +24,9 @@ STOPPED = (
     nlopt.runtime_error,
     nlopt.invalid_argument,
 )
+# Farther outside than this a pixel is lost: no edit of the palette's colours takes hold of it. Of a
+# frame at least this share must be lost to matter: fewer are hot pixels or glints.
+LOST, LOST_SHARE = 0.25, 1e-4
 NO_FACES: I32 = np.zeros((0, 3), np.int32)
 
 

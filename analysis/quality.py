@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.analysis.frame_hulls import hull_mesh
-from palette4d.analysis.losses import NO_FACES, loss_weights
+from palette4d.analysis.losses import LOST, NO_FACES, loss_weights
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.statistics import FrameStatistics
 from scipy.spatial import ConvexHull, QhullError
@@ -25,8 +25,6 @@ F64 = NDArray[np.float64]
 USE_FRAMES = 12
 # Farther outside than this a pixel counts as outside in the report: one step of 8 bits.
 VISIBLE = 1 / 255
-# Farther outside than this a pixel is lost: no edit of the palette's colours takes hold of it.
-LOST = 0.25
 # Frames whose colours extend less than this, such as black ones, have no shape to judge.
 NARROW = 0.24
 

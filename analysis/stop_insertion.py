@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d.analysis.losses import colour_scale, reach_weights, thread_count
+from palette4d.analysis.losses import LOST, LOST_SHARE, colour_scale, reach_weights, thread_count
 from palette4d.analysis.objective import LEAST_GAP, Objective, loss_of, move
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Section, SkewPolytope
@@ -29,9 +29,7 @@ from scipy.spatial import ConvexHull, QhullError
 F64 = NDArray[np.float64]
 
 MOST_FRAMES = 6
-BAD = 3.0  # times the median frame's loss: a frame to be looked at ...
-LOST = 0.25  # ... and one of whose pixels at least this share is lost, so far outside: fewer are
-LEAST_LOST = 1e-4  # hot pixels or glints
+BAD = 3.0  # times the median frame's loss: a frame to be looked at
 MENDED = 0.5  # of what is lacking must go
 NEAREST = 3  # tracks tried
 EVALUATIONS = 30
@@ -99,7 +97,7 @@ class _Lacks:
         usual = float(np.median(self.loss))
         for of, bad in (
             (self.loss, self.loss > BAD * usual),
-            (self.far, self.lost >= LEAST_LOST),
+            (self.far, self.lost >= LOST_SHARE),
         ):
             found = [i for i in np.flatnonzero(bad).tolist() if i not in hopeless]
             if found:
