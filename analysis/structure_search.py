@@ -41,8 +41,8 @@ WORST_FRAMES = 8
 # Joint moves on all frames: before candidates are compared, and at the end.
 COMPARE_EVALUATIONS = 40
 FINAL_EVALUATIONS = 150
-# Of a simple hull that nothing else beats: what its shape counts, for as long as L' is too high.
-SHAPE_WEIGHTS = (1.0, 0.1)
+# Where nothing else is as good as a simple hull: what its shape counts, as much as L' lets it.
+SHAPE_WEIGHTS = (1.0, 0.7, 0.5, 0.25, 0.1)
 
 
 @dataclasses.dataclass(frozen=True)
