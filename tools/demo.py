@@ -125,7 +125,7 @@ def demo(out: Path) -> None:
     run("The palette as a picture", "plot", str(sidecar), "--clip", frames, "-o", str(palette))
     # fmt: off
     run("Edit: the gold of late autumn, in leaves and meadow, becomes rose",
-        "edit", str(sidecar), "set", "--near", "0.96,0.56,0.05", "--frame", str(AUTUMN),
+        "edit", str(sidecar), "set", "--near", "0.86,0.58,0.07", "--frame", str(AUTUMN),
         "--rgb", "0.9", "0.42", "0.62")
     run("Edit: a colour stop turns the day's blue, in the sky and the haze, to lavender",
         "edit", str(sidecar), "stop", "--near", "0.2,0.47,0.85", "--frame", "11",
@@ -165,7 +165,7 @@ def demo(out: Path) -> None:
 == What to try next
 
   another colour
-      {command} edit {sidecar} set --near 0.84,0.03,0.03 --frame 29 --rgb 0.1 0.4 0.9
+      {command} edit {sidecar} set --near 0.9,0.11,0.05 --frame 29 --rgb 0.1 0.4 0.9
       {command} render {sidecar} '{frames}' -o '{graded}/sample.####.exr' --force
   undo every edit
       {command} edit {sidecar} reset
