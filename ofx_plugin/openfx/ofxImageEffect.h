@@ -64,6 +64,7 @@ typedef struct OfxImageMemoryStruct* OfxImageMemoryHandle;
 #define kOfxImageEffectRenderUnsafe "OfxImageEffectRenderUnsafe"
 #define kOfxImageEffectRenderInstanceSafe "OfxImageEffectRenderInstanceSafe"
 #define kOfxImageEffectRenderFullySafe "OfxImageEffectRenderFullySafe"
+#define kOfxImageEffectPropClipPreferencesSlaveParam "OfxImageEffectPropClipPreferencesSlaveParam"
 
 /* Of its clips and their images */
 #define kOfxImageEffectOutputClipName "Output"

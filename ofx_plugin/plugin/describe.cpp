@@ -1,6 +1,8 @@
 #include "describe.hpp"
 
 #include "colour.hpp"
+#include "files.hpp"
+#include "outputs.hpp"
 #include "params.hpp"
 
 namespace palette4d::plugin {
@@ -71,6 +73,14 @@ OfxStatus describe_in_context(const Suites& suites, OfxImageEffectHandle effect)
         return kOfxStatFailed;
     }
     define_params(suites, params);
+    OfxPropertySetHandle handle = nullptr;
+    if (suites.effect->getPropertySet &&
+        suites.effect->getPropertySet(effect, &handle) == kOfxStatOK) {
+        // Hosts ask for clip_preferences() again when one of these changes, and else never.
+        Properties(suites, handle)
+            .set_strings(kOfxImageEffectPropClipPreferencesSlaveParam,
+                         {kParamSidecar, kParamClipFolder, kParamRevision, kParamPictureIn});
+    }
     return kOfxStatOK;
 }
 

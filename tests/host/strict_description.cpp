@@ -86,6 +86,10 @@ void check_descriptor(const OfxImageEffectStruct& effect) {
                 std::string("no components of clip ") + name);
     }
     for (const auto& [name, param] : effect.params.params) check_param(effect, name, *param);
+    for (const std::string& name : slave_params(effect)) {
+        require(effect.params.params.count(name) != 0,
+                "the clip preferences depend on " + name + ", which is no parameter");
+    }
 }
 
 }  // namespace strict

@@ -103,6 +103,7 @@ const void* Host::suite(const std::string& name, int version) {
 }
 
 bool Host::count_call(const char*) {
+    if (uncounted_ > 0) return true;
     if (calls_.fetch_add(1) != config_.refused_call) return true;
     refused_ = true;
     return false;
@@ -272,7 +273,7 @@ Value initial_value(const OfxParamStruct& param) {
 
 Instance::Instance(Plugin& plugin, const OfxImageEffectStruct& descriptor,
                    const std::string& context)
-    : plugin_(plugin), effect_(false) {
+    : plugin_(plugin), effect_(false), slaves_(slave_params(descriptor)) {
     effect_.properties.put(kOfxPropType, std::string(kOfxTypeImageEffectInstance));
     effect_.properties.put(kOfxImageEffectPropContext, context);
     for (const auto& [name, clip] : descriptor.clips) {
@@ -315,6 +316,7 @@ Instance::~Instance() {
 OfxStatus Instance::create() {
     const OfxStatus status = plugin_.call(kOfxActionCreateInstance, &effect_, nullptr, nullptr);
     created_ = status == kOfxStatOK;
+    if (created_) check_preferences();
     return status;
 }
 
@@ -334,6 +336,7 @@ void Instance::set(const std::string& param, Value value) {
         throw std::runtime_error("a value of the wrong type for " + param);
     }
     found->second->value = std::move(value);
+    set_since_.insert(param);
 }
 
 void Instance::animate(const std::string& param, std::map<double, Value> keys) {
@@ -354,7 +357,9 @@ OfxStatus Instance::changed(const std::string& type, const std::string& name,
     in.put(kOfxPropChangeReason, reason);
     in.put(kOfxPropTime, shown_time);
     in.put_all(kOfxImageEffectPropRenderScale, {1.0, 1.0});
-    return plugin_.call(kOfxActionInstanceChanged, &effect_, &in, nullptr);
+    const OfxStatus status = plugin_.call(kOfxActionInstanceChanged, &effect_, &in, nullptr);
+    if (!telling_) check_preferences();
+    return status;
 }
 
 OfxStatus Instance::bracket(const char* action, const std::string& reason) {
@@ -367,6 +372,7 @@ OfxStatus Instance::bracket(const char* action, const std::string& reason) {
 // before the call that sets returns. It may not answer that with another setting.
 void Instance::tell(const std::string& param) {
     ++settings_[param];
+    set_since_.insert(param);
     if (telling_) {
         Host::get().fault("paramSetValue: in answer to the plugin's own setting");
         return;
@@ -418,18 +424,6 @@ OfxStatus Instance::is_identity(double time, std::string& clip, double& clip_tim
     const OfxStatus status = plugin_.call(kOfxImageEffectActionIsIdentity, &effect_, &in, &out);
     clip = out.text(kOfxPropName);
     clip_time = out.number(kOfxPropTime);
-    return status;
-}
-
-OfxStatus Instance::clip_preferences(OfxPropertySetStruct& out) {
-    out.put(kOfxImageEffectFrameVarying, 0);
-    return plugin_.call(kOfxImageEffectActionGetClipPreferences, &effect_, nullptr, &out);
-}
-
-OfxStatus Instance::clip_preferences(bool& frame_varying) {
-    OfxPropertySetStruct out(kOutArgs);
-    const OfxStatus status = clip_preferences(out);
-    frame_varying = out.number(kOfxImageEffectFrameVarying) != 0;
     return status;
 }
 

@@ -190,6 +190,8 @@ public:
     // For the suites.
     const void* suite(const std::string& name, int version);
     bool count_call(const char* function);  ///< false: refuse this one
+    /// What the host does of its own accord is not counted and never refused.
+    void count_calls(bool count) { uncounted_ += count ? -1 : 1; }
 
 private:
     Host();
@@ -198,6 +200,7 @@ private:
     Config config_;
     std::atomic<long> calls_{0};
     std::atomic<bool> refused_{false};
+    std::atomic<int> uncounted_{0};
     std::mutex mutex_;
     std::vector<std::string> faults_;
     std::set<std::string> asked_;
@@ -247,6 +250,8 @@ SuiteTable message_suite_v2();
 
 /// Notes what a host's author would find wrong with a description as a fault.
 void check_descriptor(const OfxImageEffectStruct& effect);
+/// The parameters after whose changes a host asks for the clip preferences again.
+std::set<std::string> slave_params(const OfxImageEffectStruct& descriptor);
 
 class Instance;
 
@@ -276,6 +281,8 @@ private:
 };
 
 class Instance {
+    using Properties = std::map<std::string, std::vector<Value>>;
+
 public:
     Instance(Plugin& plugin, const OfxImageEffectStruct& descriptor, const std::string& context);
     ~Instance();
@@ -317,9 +324,16 @@ private:
     OfxImageEffectStruct effect_;
     bool created_ = false;
     std::map<std::string, int> settings_;
-    bool telling_ = false;  ///< the plugin is being told of its own setting
+    bool telling_ = false;                   ///< the plugin is being told of its own setting
+    std::set<std::string> slaves_;           ///< parameters that the preferences depend on
+    std::set<std::string> set_since_;        ///< parameters that were set since preferred_
+    std::optional<Properties> preferred_{};  ///< what the plugin last answered
 
     void tell(const std::string& param);
+    /// Asks for the clip preferences as hosts do, after CreateInstance and changes of the
+    /// parameters named for it. That they differ after any other change is a fault: no host would
+    /// have heard of it.
+    void check_preferences();
     OfxStatus render_once(double time, const Picture* source, Picture& output,
                           const OfxRectI& window);
 };

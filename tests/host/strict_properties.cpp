@@ -75,6 +75,8 @@ const std::map<std::string, Rule>& rules() {
         {kOfxImageEffectPluginRenderThreadSafety,
          {kString, 1, kEffectDescriptor, kEffectDescriptor}},
         {kOfxImageEffectFrameVarying, {kInt, 1, kOutArgs, kOutArgs}},
+        {kOfxImageEffectPropClipPreferencesSlaveParam,
+         {kString, 0, kEffectDescriptor, kEffectDescriptor}},
 
         {kOfxImageClipPropOptional, {kInt, 1, kAnyClip, kClipDescriptor}},
         {kOfxImageClipPropIsMask, {kInt, 1, kAnyClip, kClipDescriptor}},

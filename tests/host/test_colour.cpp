@@ -61,6 +61,37 @@ TEST(without_negotiation_nothing_is_wanted) {
     CHECK(plugin.create()->output_colourspace(name) == kOfxStatReplyDefault);
 }
 
+TEST(hosts_ask_again_when_a_sidecar_is_chosen) {
+    Plugin plugin(bundle());
+    const auto node = plugin.create();
+    node->effect().properties.put(kOfxImageEffectPropColourManagementStyle,
+                                  std::string(kOfxImageEffectColourManagementFull));
+    const auto named = [&] {
+        OfxPropertySetStruct out(kOutArgs);
+        CHECK(node->clip_preferences(out) == kOfxStatOK);
+        return out.text(kWanted);
+    };
+    // Each change is told, and an answer that it changes unannounced would be a fault.
+    const auto set = [&](const char* param, Value value) {
+        node->set(param, std::move(value));
+        CHECK(node->changed(param) == kOfxStatOK);
+        return named();
+    };
+    const std::string path = sidecar("chosen.p4d.json");
+    CHECK(set("strength", 0.5).empty());
+    CHECK(set("sidecar", path) == "ofx_scene_linear");
+    // Another encoding, seen when the file is read anew.
+    std::string text = sidecar_text();
+    const std::string old = R"("encoding": "linear")";
+    write("chosen.p4d.json", text.replace(text.find(old), old.size(), R"("encoding": "sRGB")"));
+    CHECK(node->changed("reload") == kOfxStatOK);
+    CHECK(named() == "srgb_display");
+    // A moved one, found in the clip's folder.
+    CHECK(set("sidecar", std::string("/nowhere/chosen.p4d.json")) == "srgb_display");
+    CHECK(set("clipFolder", std::string("/nowhere")).empty());
+    CHECK(set("clipFolder", folder().u8string()) == "srgb_display");
+}
+
 TEST(the_output_is_in_the_sources_space) {
     Plugin plugin(bundle());
     const auto node = plugin.create();

@@ -16,6 +16,7 @@ struct Now {
     OfxParamSetHandle params = nullptr;
     OfxPropertySetHandle properties = nullptr;  ///< the effect's
     OfxPropertySetHandle source = nullptr, output = nullptr;
+    OfxPropertySetHandle answer = nullptr;  ///< the action's
     unsigned char* source_pixels = nullptr;
     unsigned char* output_pixels = nullptr;
 };
@@ -32,6 +33,7 @@ struct Guest {
     std::string action;  ///< in which the breach happens
     Breach breach;
     std::set<std::string> left_out;  ///< of the description
+    std::string slave;               ///< a parameter that the clip preferences depend on
     OfxStatus answer = kOfxStatOK;   ///< of a render
     int renders = 0;
 } g;
@@ -121,10 +123,13 @@ void describe_in_context(Now& now) {
     put(number(now, "number"), kOfxParamPropParent, "group");
     choice(now, "choice", {"One", "Two"});
     text(now, "text");
+    if (!g.slave.empty()) {
+        put(now.properties, kOfxImageEffectPropClipPreferencesSlaveParam, g.slave.c_str());
+    }
 }
 
 OfxStatus main_entry(const char* name, const void* handle, OfxPropertySetHandle,
-                     OfxPropertySetHandle) {
+                     OfxPropertySetHandle answer) {
     const std::string action = name;
     if (action == kOfxActionLoad) {
         g.prop = fetch<OfxPropertySuiteV1>(kOfxPropertySuite);
@@ -136,6 +141,7 @@ OfxStatus main_entry(const char* name, const void* handle, OfxPropertySetHandle,
     }
     Now now;
     now.effect = static_cast<OfxImageEffectHandle>(const_cast<void*>(handle));
+    now.answer = answer;
     g.effect->getParamSet(now.effect, &now.params);
     g.effect->getPropertySet(now.effect, &now.properties);
     const bool renders = action == kOfxImageEffectActionRender;
@@ -175,6 +181,7 @@ std::vector<std::string> faults_of(const std::string& action, Breach breach,
     Plugin plugin(g_plugin);
     const auto node = plugin.create();
     if (!g.left_out.count("Source") && !g.left_out.count("Output")) {
+        node->set("number", 0.25);
         node->changed("number");
         std::string clip;
         double time = 0;
@@ -361,6 +368,21 @@ TEST(calls_in_the_wrong_place_are_noticed) {
                       };
                       g.thread->multiThread(ask, 2, &n);
                   }}});
+}
+
+TEST(preferences_that_change_unasked_are_noticed) {
+    const auto follow_the_number = [](Now& n) {
+        double value = 0;
+        g.param->paramGetValue(handle_of(n, "number"), &value);
+        g.prop->propSetInt(n.answer, kOfxImageEffectFrameVarying, 0, value < 0.5);
+    };
+    const char* const kPreferences = kOfxImageEffectActionGetClipPreferences;
+    expect("another answer after a change of number", faults_of(kPreferences, follow_the_number));
+    g.slave = "number";
+    CHECK(faults_of(kPreferences, follow_the_number).empty());
+    g.slave = "nubmer";
+    expect("depend on nubmer, which is no parameter", faults_of("", {}));
+    g.slave.clear();
 }
 
 TEST(wrong_renders_are_noticed) {
