@@ -79,7 +79,8 @@ OfxStatus describe_in_context(const Suites& suites, OfxImageEffectHandle effect)
         // Hosts ask for clip_preferences() again when one of these changes, and else never.
         Properties(suites, handle)
             .set_strings(kOfxImageEffectPropClipPreferencesSlaveParam,
-                         {kParamSidecar, kParamClipFolder, kParamRevision, kParamPictureIn});
+                         {kParamSidecar, kParamClipFolder, kParamRevision, kParamPictureIn,
+                          kParamOutput, kParamMatteIn});
     }
     return kOfxStatOK;
 }
@@ -87,6 +88,7 @@ OfxStatus describe_in_context(const Suites& suites, OfxImageEffectHandle effect)
 OfxStatus clip_preferences(const Suites& suites, OfxImageEffectHandle effect,
                            const Properties& out_args) {
     prefer_colour(suites, effect, out_args);
+    prefer_alpha(suites, effect, out_args);
     return out_args.set_int(kOfxImageEffectFrameVarying, 1) ? kOfxStatOK : kOfxStatReplyDefault;
 }
 

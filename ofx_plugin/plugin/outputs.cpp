@@ -27,6 +27,12 @@ double clamped(const std::optional<double>& value, double initial, double low, d
     return std::isfinite(given) ? std::clamp(given, low, high) : initial;
 }
 
+Output output_of(const std::optional<int>& choice) {
+    const int number = choice.value_or(0);
+    return number > 0 && number <= static_cast<int>(Output::kOutside) ? static_cast<Output>(number)
+                                                                      : Output::kRecoloured;
+}
+
 double dot(const Vec3& weights, const float* rgb) {
     return weights[0] * rgb[0] + weights[1] * rgb[1] + weights[2] * rgb[2];
 }
@@ -157,7 +163,7 @@ void draw_strip(float* row, int x1, int x2, int y, std::size_t channels, const D
 
 void draw_rows(const Rows& rows, const Drawing& drawing) {
     const OutputSettings& settings = drawing.settings;
-    if (settings.output == Output::kWeight || settings.output == Output::kOutside) {
+    if (settings.is_matte()) {
         draw_matte(rows, drawing);
     } else {
         RecolourOptions options;
@@ -197,7 +203,8 @@ void define_output_params(ParamDefiner& define) {
                    {1, 1, 100000, 1, 32});
     define.choice({kParamMatteIn, "Matte in",
                    "Picture: a matte (weight, outside) is a grey picture. Alpha: the picture keeps "
-                   "its colours, and its alpha is multiplied by the matte."},
+                   "its colours, and its alpha (1 where it is opaque) is multiplied by the "
+                   "matte."},
                   {"Picture", "Alpha"});
     define.number({kParamOutsideReach, "Outside at",
                    "How far from the palette a colour is all outside; nearer ones are in between."},
@@ -223,10 +230,7 @@ void define_output_params(ParamDefiner& define) {
 
 OutputSettings output_settings_at(const Params& params, OfxTime time) {
     OutputSettings settings;
-    const int output = params.int_at(kParamOutput, time).value_or(0);
-    if (output > 0 && output <= static_cast<int>(Output::kOutside)) {
-        settings.output = static_cast<Output>(output);
-    }
+    settings.output = output_of(params.int_at(kParamOutput, time));
     settings.weight_of = params.int_at(kParamWeightOf, time).value_or(1);
     settings.in_alpha = params.int_at(kParamMatteIn, time).value_or(0) == 1;
     // Not every host keeps a parameter inside its range.
@@ -240,6 +244,30 @@ OutputSettings output_settings_at(const Params& params, OfxTime time) {
     settings.in_palette_space = params.int_at(kParamPictureIn, time).value_or(0) == 1;
     settings.mix = clamped(params.double_at(kParamMix, time), 1, 0, 1);
     return settings;
+}
+
+void prefer_alpha(const Suites& suites, OfxImageEffectHandle effect, const Properties& out_args) {
+    const Params params(suites, effect);
+    OutputSettings settings;
+    settings.output = output_of(params.int_now(kParamOutput));
+    if (!settings.is_matte() || params.int_now(kParamMatteIn).value_or(0) != 1) return;
+    OfxImageClipHandle clip = nullptr;
+    OfxPropertySetHandle handle = nullptr;
+    if (!suites.effect->clipGetHandle ||
+        suites.effect->clipGetHandle(effect, kOfxImageEffectSimpleSourceClipName, &clip, &handle) !=
+            kOfxStatOK) {
+        return;
+    }
+    const Properties source(suites, handle);
+    // Of a clip of alpha alone there are no colours to tell a matte by.
+    if (source.get_string(kOfxImageEffectPropComponents) == kOfxImageComponentAlpha) return;
+    for (const char* name : {kOfxImageEffectSimpleSourceClipName, kOfxImageEffectOutputClipName}) {
+        const std::string components = std::string("OfxImageClipPropComponents_") + name;
+        out_args.set_string(components.c_str(), kOfxImageComponentRGBA);
+    }
+    if (source.get_string(kOfxImageEffectPropPreMultiplication) == kOfxImageOpaque) {
+        out_args.set_string(kOfxImageEffectPropPreMultiplication, kOfxImageUnPreMultiplied);
+    }
 }
 
 void draw(const Image& in, const Image& out, const OfxRectI& area, const Drawing& drawing) {
@@ -266,6 +294,9 @@ void draw(const Image& in, const Image& out, const OfxRectI& area, const Drawing
         source.resize(count);
         result.resize(count);
         read_floats(in, rows, source.data());
+        if (in.opaque && settings.is_matte() && settings.in_alpha) {
+            for (std::size_t i = channels - 1; i < count; i += channels) source[i] = 1;
+        }
         draw_rows({source.data(), result.data(), count / channels, channels, in.premultiplied},
                   drawing);
         for (int r = rows.y1; settings.output == Output::kPalette && r < rows.y2; ++r) {

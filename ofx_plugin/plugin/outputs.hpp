@@ -40,8 +40,12 @@ struct OutputSettings {
 
     /// The source comes out, whatever else is set.
     bool passes() const { return mix == 0 || (output == Output::kRecoloured && strength == 0); }
+    bool is_matte() const { return output == Output::kWeight || output == Output::kOutside; }
 };
 OutputSettings output_settings_at(const Params& params, OfxTime time);
+/// Tells a host that asks for preferences what a matte in alpha needs: a channel to stand in, and
+/// that the output is not opaque even where the source is.
+void prefer_alpha(const Suites& suites, OfxImageEffectHandle effect, const Properties& out_args);
 
 /// What is drawn, all of it read only: threads share it.
 struct Drawing {

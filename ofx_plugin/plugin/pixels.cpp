@@ -102,9 +102,11 @@ std::optional<Image> read_image(const Properties& image, const Properties& clip)
                                                 : Depth::kOther;
     result.channels = channels_of(either(image, clip, kOfxImageEffectPropComponents));
     result.pixel_bytes = bytes_of_depth(depth) * result.channels;
-    result.premultiplied =
-        result.channels == 4 &&
-        either(image, clip, kOfxImageEffectPropPreMultiplication) == kOfxImagePreMultiplied;
+    if (result.channels == 4) {
+        const std::string alpha = either(image, clip, kOfxImageEffectPropPreMultiplication);
+        result.premultiplied = alpha == kOfxImagePreMultiplied;
+        result.opaque = alpha == kOfxImageOpaque;
+    }
 
     const std::int64_t width = static_cast<std::int64_t>(bounds->x2) - bounds->x1;
     const std::int64_t stride = result.row_bytes < 0 ? -result.row_bytes : result.row_bytes;

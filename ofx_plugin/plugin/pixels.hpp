@@ -23,6 +23,7 @@ struct Image {
     int channels = 0;
     int pixel_bytes = 0;
     bool premultiplied = false;  ///< only ever for four channels
+    bool opaque = false;         ///< likewise: whatever its alpha holds, the picture covers all
     /// The whole picture, of which bounds may be a part; bounds where the host does not tell.
     OfxRectI definition{};
 

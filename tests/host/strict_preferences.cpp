@@ -16,6 +16,17 @@ std::set<std::string> slave_params(const OfxImageEffectStruct& descriptor) {
 
 OfxStatus Instance::clip_preferences(OfxPropertySetStruct& out) {
     out.put(kOfxImageEffectFrameVarying, 0);
+    // What holds where a plugin says nothing.
+    const auto found = effect_.clips.find(kOfxImageEffectSimpleSourceClipName);
+    if (found != effect_.clips.end()) {
+        const OfxPropertySetStruct& source = found->second->properties;
+        out.put(kOfxImageEffectPropPreMultiplication,
+                source.text(kOfxImageEffectPropPreMultiplication));
+        for (const char* name : {"Source", "Output"}) {
+            out.put(std::string("OfxImageClipPropComponents_") + name,
+                    source.text(kOfxImageEffectPropComponents));
+        }
+    }
     return plugin_.call(kOfxImageEffectActionGetClipPreferences, &effect_, nullptr, &out);
 }
 

@@ -75,6 +75,8 @@ const std::map<std::string, Rule>& rules() {
         {kOfxImageEffectPluginRenderThreadSafety,
          {kString, 1, kEffectDescriptor, kEffectDescriptor}},
         {kOfxImageEffectFrameVarying, {kInt, 1, kOutArgs, kOutArgs}},
+        {"OfxImageClipPropComponents_Source", {kString, 0, kOutArgs, kOutArgs}},
+        {"OfxImageClipPropComponents_Output", {kString, 0, kOutArgs, kOutArgs}},
         {kOfxImageEffectPropClipPreferencesSlaveParam,
          {kString, 0, kEffectDescriptor, kEffectDescriptor}},
 
@@ -158,12 +160,15 @@ const std::map<std::string, std::set<std::string>>& words_of() {
     static const std::set<std::string> flags = {"true", "false"};
     static const std::set<std::string> alpha = {kOfxImageOpaque, kOfxImagePreMultiplied,
                                                 kOfxImageUnPreMultiplied};
+    static const std::set<std::string> components = {kOfxImageComponentRGBA, kOfxImageComponentRGB,
+                                                     kOfxImageComponentAlpha};
     static const std::map<std::string, std::set<std::string>> words = {
         {kOfxImageEffectPropSupportedContexts,
          {kOfxImageEffectContextFilter, kOfxImageEffectContextGeneral}},
         {kOfxImageEffectPropSupportedPixelDepths, {kOfxBitDepthByte, kOfxBitDepthFloat}},
-        {kOfxImageEffectPropSupportedComponents,
-         {kOfxImageComponentRGBA, kOfxImageComponentRGB, kOfxImageComponentAlpha}},
+        {kOfxImageEffectPropSupportedComponents, components},
+        {"OfxImageClipPropComponents_Source", components},
+        {"OfxImageClipPropComponents_Output", components},
         {kOfxImageEffectPluginRenderThreadSafety, {kOfxImageEffectRenderFullySafe}},
         {kOfxImageEffectPropPreMultiplication, alpha},
         {"OfxImageEffectPropNoSpatialAwareness", flags},

@@ -77,11 +77,14 @@ void check_matte(const Layout& layout, const Picture& source, const Picture& out
     const std::vector<float> out = floats(layout, output.pixels(layout.bounds));
     const auto channels = static_cast<std::size_t>(layout.channels);
     const bool premultiplied = channels == 4 && layout.premultiplication == kOfxImagePreMultiplied;
+    const bool opaque = channels == 4 && layout.premultiplication == kOfxImageOpaque;
     if (layout.depth == Depth::kByte) tolerance += 0.5 / 255;
     double lowest = 1, highest = 0;
     for (std::size_t i = 0; i < in.size() / channels; ++i) {
         const float* p = &in[i * channels];
-        const double alpha = channels == 4 ? p[3] : 1.0, divisor = premultiplied ? alpha : 1.0;
+        // Of an opaque picture alpha is 1, whatever stands in it.
+        const double alpha = channels == 4 && !(opaque && in_alpha) ? p[3] : 1.0;
+        const double divisor = premultiplied ? alpha : 1.0;
         const Vec3 straight = {p[0] / divisor, p[1] / divisor, p[2] / divisor};
         const double m = divisor == 0 || !finite(straight) ? 0 : matte(straight);
         lowest = std::min(lowest, m);
@@ -89,7 +92,9 @@ void check_matte(const Layout& layout, const Picture& source, const Picture& out
         const float* found = &out[i * channels];
         for (std::size_t c = 0; c < channels; ++c) {
             double expected = c == 3 ? alpha : (premultiplied ? alpha : 1) * m;
-            if (in_alpha && channels == 4) expected = c == 3 || premultiplied ? p[c] * m : p[c];
+            if (in_alpha && channels == 4) {
+                expected = c == 3 ? alpha * m : premultiplied ? p[c] * m : p[c];
+            }
             if (!std::isfinite(expected)) continue;
             // The result is a float, of whatever size.
             const double limit = tolerance * std::max(1.0, std::abs(expected / (m > 0 ? m : 1)));
@@ -106,8 +111,9 @@ std::vector<Layout> layouts() {
     std::vector<Layout> all;
     for (const Depth depth : {Depth::kFloat, Depth::kByte}) {
         for (const int channels : {3, 4}) {
-            for (const char* alpha : {kOfxImageUnPreMultiplied, kOfxImagePreMultiplied}) {
-                if (channels == 3 && alpha == std::string(kOfxImagePreMultiplied)) continue;
+            for (const char* alpha :
+                 {kOfxImageUnPreMultiplied, kOfxImagePreMultiplied, kOfxImageOpaque}) {
+                if (channels == 3 && alpha != std::string(kOfxImageUnPreMultiplied)) continue;
                 Layout layout;
                 layout.bounds = rect(-9, 4, 22, 31);
                 layout.depth = depth;
@@ -203,6 +209,42 @@ TEST(a_slots_id_is_the_weights_handle_and_a_missing_one_is_said) {
         CHECK(output.pixels(layout.bounds) == source.pixels(layout.bounds));
         const std::string said = node.instance->effect().persistent_message;
         EXPECT(said.find("expected one of its 17") != std::string::npos, said);
+    }
+}
+
+TEST(a_matte_in_alpha_asks_for_an_alpha_that_counts) {
+    Node node;
+    const auto preferred = [&](const char* components, const char* alpha, int output, int in) {
+        auto& source = node.instance->effect().clips.at("Source")->properties;
+        source.put(kOfxImageEffectPropComponents, std::string(components));
+        source.put(kOfxImageEffectPropPreMultiplication, std::string(alpha));
+        // Told each time: that the answer changes for any other reason would be a fault.
+        for (const auto& [param, value] : {std::pair{"output", output}, {"matteIn", in}}) {
+            node.set(param, value);
+            CHECK(node.instance->changed(param) == kOfxStatOK);
+        }
+        OfxPropertySetStruct out(kOutArgs);
+        CHECK(node.instance->clip_preferences(out) == kOfxStatOK);
+        CHECK(out.text("OfxImageClipPropComponents_Source") ==
+              out.text("OfxImageClipPropComponents_Output"));
+        return std::pair(out.text("OfxImageClipPropComponents_Output"),
+                         out.text(kOfxImageEffectPropPreMultiplication));
+    };
+    const char* const rgb = kOfxImageComponentRGB;
+    const char* const rgba = kOfxImageComponentRGBA;
+    const char* const lone = kOfxImageComponentAlpha;
+    using Answer = std::pair<std::string, std::string>;
+    for (const int matte : {1, 3}) {
+        CHECK(preferred(rgb, kOfxImageOpaque, matte, 1) == Answer(rgba, kOfxImageUnPreMultiplied));
+        CHECK(preferred(rgba, kOfxImageOpaque, matte, 1) == Answer(rgba, kOfxImageUnPreMultiplied));
+        CHECK(preferred(rgba, kOfxImagePreMultiplied, matte, 1) ==
+              Answer(rgba, kOfxImagePreMultiplied));
+        CHECK(preferred(rgb, kOfxImageOpaque, matte, 0) == Answer(rgb, kOfxImageOpaque));
+        CHECK(preferred(lone, kOfxImageUnPreMultiplied, matte, 1) ==
+              Answer(lone, kOfxImageUnPreMultiplied));
+    }
+    for (const int picture : {0, 2}) {
+        CHECK(preferred(rgb, kOfxImageOpaque, picture, 1) == Answer(rgb, kOfxImageOpaque));
     }
 }
 
