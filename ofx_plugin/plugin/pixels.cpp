@@ -31,11 +31,15 @@ std::string either(const Properties& image, const Properties& clip, const char* 
     return clip.get_string(name).value_or("");
 }
 
+/// Adding it leaves a float of 0 to 255 no digits after the point, rounded as IEEE 754 does.
+constexpr float kNoFraction = 12582912.0f;  // 1.5 * 2^23
+
+/// To the nearest, halves to the even one: as `palette4d render` rounds.
 std::uint8_t to_byte(float value) {
     // NaN fails both comparisons' opposites: it becomes 0.
     if (!(value > 0.0f)) return 0;
     if (value >= 1.0f) return 255;
-    return static_cast<std::uint8_t>(value * 255.0f + 0.5f);
+    return static_cast<std::uint8_t>((value * 255.0f + kNoFraction) - kNoFraction);
 }
 
 /// `recolourer` is a Recolourer or a Lattice.

@@ -141,9 +141,8 @@ std::vector<unsigned char> recoloured(const palette4d::Sidecar& sidecar, double 
     std::vector<unsigned char> result(pixels.size());
     if (bytes) {
         for (std::size_t i = 0; i < values.size(); ++i) {
-            const double v = values[i] * 255.0f;
-            result[i] =
-                static_cast<unsigned char>(std::floor(std::fmin(std::fmax(v, 0), 255) + 0.5));
+            const float v = values[i] * 255.0f;
+            result[i] = static_cast<unsigned char>(std::nearbyint(std::fmin(std::fmax(v, 0), 255)));
         }
     } else {
         std::memcpy(result.data(), values.data(), result.size());

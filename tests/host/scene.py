@@ -13,6 +13,7 @@ import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 from palette4d import _core
+from palette4d.imageio import quantised
 
 SERVICE = "openfx.org.palette4d.Palette4D"
 RATE = 25  # melt's own idea of the rate of numbered pictures
@@ -147,13 +148,16 @@ class Scene:
         """Every frame is the expected one, (h, w, 3) within 0..1, rounded to its depth, and
         together they are not the source."""
         top = float(np.iinfo(self.clip[0].dtype).max)
-        # Bytes are rounded by the node itself; floats by the host, which computes in float32.
-        limit = 0.5 + (1e-3 if top == 255 else 1e-2)
+        # Bytes are rounded by the node itself, and are those that `palette4d render` writes; floats
+        # are rounded by the host, which computes in float32.
+        limit = 0.51
         changed = 0.0
         together = zip(frames, self.clip, expected, strict=True)
         for index, (frame, image, wanted) in enumerate(together):
             error = np.abs(frame[..., :3].astype(np.float64) - wanted.astype(np.float64) * top)
             assert error.max() <= limit, f"frame {index}: off by {error.max()} of {top}"
+            if top == 255:
+                assert np.array_equal(frame[..., :3], quantised(wanted, "uint8")), f"frame {index}"
             assert np.all(frame[..., 3] == top), f"frame {index}: its alpha changed"
             changed += float(np.abs(wanted - image[..., :3] / top).mean())
         assert changed / len(frames) > 0.005, "the edit changed next to nothing"

@@ -287,6 +287,27 @@ TEST(inside_is_black_to_the_last_bit) {
     }
 }
 
+TEST(halves_of_bytes_are_rounded_to_the_even_one) {
+    Node node;
+    node.set("output", 3);
+    node.set("mix", 0.5);  // all inside, so that half of the byte comes out
+    Layout layout;
+    layout.bounds = rect(0, 0, 100, 1);
+    layout.depth = Depth::kByte;
+    layout.channels = 3;
+    Picture source(layout), output(layout);
+    for (int x = 0; x < 100; ++x) std::memset(source.at(x, 0), 51 + x, 3);
+    CHECK(node.instance->render(0, &source, output, layout.bounds) == kOfxStatOK);
+    int halves = 0;
+    for (int x = 0; x < 100; ++x) {
+        const float half = static_cast<float>(static_cast<float>(51 + x) / 255.0f * 0.5) * 255.0f;
+        halves += half - std::floor(half) == 0.5f;
+        EXPECT(*output.at(x, 0) == static_cast<int>(std::nearbyint(half)),
+               std::to_string(half) + " became " + std::to_string(*output.at(x, 0)));
+    }
+    CHECK(halves > 20);
+}
+
 TEST(the_palette_stands_at_the_pictures_foot) {
     Node node;
     Layout layout;

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from palette4d import _core
+from palette4d.imageio import quantised
 
 FORMATS = {
     "float RGBA": ("RGBA", "float", ()),
@@ -51,8 +52,7 @@ def through_the_core(
         ).tobytes()
     values = image.astype(np.float32) / np.float32(255)
     moved = recolourer.apply(values, strength=strength, precision="single")
-    result = np.clip(moved, 0, 1) * np.float32(255)
-    return np.floor(result.astype(np.float64) + 0.5).astype(np.uint8).tobytes()
+    return quantised(moved, "uint8").tobytes()
 
 
 def golden() -> list[Path]:
