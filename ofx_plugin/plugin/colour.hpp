@@ -2,9 +2,6 @@
 // in, and gives them back in it. Hosts that negotiate no colour are not asked for anything.
 #pragma once
 
-#include <string>
-#include <vector>
-
 #include "host.hpp"
 
 namespace palette4d::plugin {
@@ -15,9 +12,5 @@ void describe_colour(const Properties& node);
 void prefer_colour(const Suites& suites, OfxImageEffectHandle effect, const Properties& out_args);
 /// kOfxImageEffectActionGetOutputColourspace: that of the source.
 OfxStatus output_colour(const Properties& out_args);
-
-/// The standard's names for an encoding as sidecars have it, best first, with the generic space
-/// that it belongs to last; empty for one that is not known.
-std::vector<std::string> colourspaces_of(const std::string& encoding);
 
 }  // namespace palette4d::plugin

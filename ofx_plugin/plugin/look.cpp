@@ -12,6 +12,7 @@
 #include "palette4d/handles.hpp"
 #include "params.hpp"
 #include "sidecar_cache.hpp"
+#include "spaces.hpp"
 
 namespace palette4d::plugin {
 
@@ -75,9 +76,14 @@ Look look_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time,
         return look;
     }
     look.drawing.settings = output_settings_at(params, time);
-    if (look.drawing.settings.passes()) return look;
-    const FrameAt at = frame_at(result.loaded->sidecar().clip, time_settings_at(params, time),
-                                host_clip(suites, effect), time);
+    OutputSettings& settings = look.drawing.settings;
+    if (settings.passes()) return look;
+    const Sidecar& sidecar = result.loaded->sidecar();
+    if (settings.keep > 0 && settings.own_lightness) {
+        settings.lightness = luminance_weights(encoding_of(sidecar, settings.in_palette_space));
+    }
+    const FrameAt at =
+        frame_at(sidecar.clip, time_settings_at(params, time), host_clip(suites, effect), time);
     if (!std::isfinite(at.frame)) {
         look.problem = path +
                        ": the host's time and the node's parameters of time give no frame; "

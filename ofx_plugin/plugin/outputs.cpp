@@ -214,9 +214,10 @@ void define_output_params(ParamDefiner& define) {
                    "all of it, so that hue and saturation alone change."},
                   {0, 0, 1, 0, 1}, 0.01, 3, true);
     define.choice({kParamLightnessOf, "Lightness of",
-                   "Whose weights of red, green and blue make up lightness: choose the primaries "
-                   "of the picture's encoding."},
-                  {"Rec.709", "Rec.2020", "P3", "ACES AP1", "Rec.601"});
+                   "Whose weights of red, green and blue make up lightness. Auto: those of the "
+                   "space that the picture is in by the sidecar, Rec.709 where it names none that "
+                   "is known."},
+                  {"Auto", "Rec.709", "Rec.2020", "P3", "ACES AP1", "Rec.601"});
     define.choice({kParamPictureIn, "Picture is in",
                    "Input space: the numbers of the clip that was analysed, such as scene-linear "
                    "light; the sidecar knows the way to the palette's and back. Palette space: the "
@@ -238,12 +239,19 @@ OutputSettings output_settings_at(const Params& params, OfxTime time) {
     settings.strength = clamped(params.double_at(kParamStrength, time), 1, 0, 1);
     settings.keep = clamped(params.double_at(kParamKeepLightness, time), 0, 0, 1);
     const int of = params.int_at(kParamLightnessOf, time).value_or(0);
-    const auto& weights =
-        kLightness[of > 0 && of < static_cast<int>(std::size(kLightness)) ? of : 0];
-    settings.lightness = {weights[0], weights[1], weights[2]};
+    settings.own_lightness = of < 1 || of > static_cast<int>(std::size(kLightness));
+    if (!settings.own_lightness) {
+        const auto& weights = kLightness[of - 1];
+        settings.lightness = {weights[0], weights[1], weights[2]};
+    }
     settings.in_palette_space = params.int_at(kParamPictureIn, time).value_or(0) == 1;
     settings.mix = clamped(params.double_at(kParamMix, time), 1, 0, 1);
     return settings;
+}
+
+const std::string& encoding_of(const Sidecar& sidecar, bool in_palette_space) {
+    return sidecar.conversion && !in_palette_space ? sidecar.conversion->input_space
+                                                   : sidecar.clip.encoding;
 }
 
 void prefer_alpha(const Suites& suites, OfxImageEffectHandle effect, const Properties& out_args) {

@@ -3,11 +3,13 @@
 
 #include <array>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "palette4d/colour_conversion.hpp"
 #include "palette4d/lattice.hpp"
 #include "palette4d/recolour.hpp"
+#include "palette4d/sidecar.hpp"
 #include "param_define.hpp"
 #include "params.hpp"
 #include "pixels.hpp"
@@ -34,6 +36,7 @@ struct OutputSettings {
     double reach = 0.05;            ///< distance from the palette at which a colour is all outside
     double strength = 1;            ///< 0 to 1
     double keep = 0;                ///< of the source's lightness, 0 to 1
+    bool own_lightness = true;      ///< weighed as the sidecar's picture is, and not by a choice
     Vec3 lightness{0, 0, 0};        ///< weights of red, green and blue; they sum to 1
     double mix = 1;                 ///< 0 the source, 1 what is put out
     bool in_palette_space = false;  ///< the picture has the palette's numbers already
@@ -46,6 +49,9 @@ OutputSettings output_settings_at(const Params& params, OfxTime time);
 /// Tells a host that asks for preferences what a matte in alpha needs: a channel to stand in, and
 /// that the output is not opaque even where the source is.
 void prefer_alpha(const Suites& suites, OfxImageEffectHandle effect, const Properties& out_args);
+
+/// What the node's picture is in: the sidecar's input, or with the choice its palette's space.
+const std::string& encoding_of(const Sidecar& sidecar, bool in_palette_space);
 
 /// What is drawn, all of it read only: threads share it.
 struct Drawing {

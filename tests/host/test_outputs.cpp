@@ -390,7 +390,7 @@ TEST(lightness_is_kept) {
                 Picture plain(layout), kept(layout);
                 node.set("keepLightness", 0.0);
                 CHECK(node.instance->render(4, &source, plain, layout.bounds) == kOfxStatOK);
-                node.set("lightnessOf", space);
+                node.set("lightnessOf", 1 + space);
                 node.set("keepLightness", keep);
                 CHECK(node.instance->render(4, &source, kept, layout.bounds) == kOfxStatOK);
                 const auto in = floats(layout, source.pixels(layout.bounds));
@@ -420,6 +420,35 @@ TEST(lightness_is_kept) {
                 CHECK(changed > 20);
             }
         }
+    }
+}
+
+TEST(lightness_is_that_of_the_pictures_own_space) {
+    Node node;
+    node.set("keepLightness", 1.0);
+    const Layout layout;
+    const Picture source = source_of(layout);
+    const auto rendered = [&](int lightness_of) {
+        Picture output(layout);
+        node.set("lightnessOf", lightness_of);
+        CHECK(node.instance->render(4, &source, output, layout.bounds) == kOfxStatOK);
+        return floats(layout, output.pixels(layout.bounds));
+    };
+    const std::pair<const char*, int> spaces[] = {
+        {"linear", 1}, {"Rec.2020", 2}, {"P3-D65", 3}, {"ACEScct", 4}, {"my own", 1}};
+    for (const auto& [encoding, choice] : spaces) {
+        std::string text = sidecar_text();
+        const std::string old = R"("encoding": "linear")";
+        text.replace(text.find(old), old.size(), R"("encoding": ")" + std::string(encoding) + "\"");
+        node.set("sidecar", write(std::string(encoding) + ".p4d.json", text));
+        const auto by_itself = rendered(0), chosen = rendered(choice), other = rendered(5);
+        double off = 0, differs = 0;
+        for (std::size_t i = 0; i < by_itself.size(); ++i) {
+            if (!std::isfinite(by_itself[i]) || std::abs(by_itself[i]) > 10) continue;
+            off = std::max<double>(off, std::abs(by_itself[i] - chosen[i]));
+            differs = std::max<double>(differs, std::abs(by_itself[i] - other[i]));
+        }
+        EXPECT(off < 1e-4 && differs > 1e-3, encoding);
     }
 }
 
