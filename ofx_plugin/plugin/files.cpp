@@ -63,6 +63,10 @@ Chosen chosen_sidecar(const Params& params, std::optional<OfxTime> time) {
     // It says what is wrong.
     chosen.path = expanded(given);
     chosen.result = load_sidecar(chosen.path);
+    const std::string missing = words_of_missing(given);
+    if (!chosen.result.loaded && !missing.empty()) {
+        chosen.result.problem = chosen.path + ": " + missing;
+    }
     return chosen;
 }
 

@@ -101,6 +101,29 @@ std::optional<std::string> find_file(const std::string& path, const std::string&
     return std::nullopt;
 }
 
+std::string words_of_missing(const std::string& path) {
+    std::string name;
+    for (std::size_t at = 0; at < path.size(); ++at) {
+        if (path[at] != '$' && path[at] != '%') continue;
+        const std::size_t end = variable_at(path, at, name);
+        if (!name.empty() && !std::getenv(name.c_str())) {
+            return "the environment that the host was started in has no variable " + name +
+                   "; start the host where it is set, or write out what it stands for";
+        }
+        at = end - 1;
+    }
+    std::error_code error;
+    const fs::path given = fs::u8path(expanded(path));
+    if (fs::exists(given, error)) return "";
+    const bool relative = given.is_relative();
+    std::string words = "the file does not exist";
+    words +=
+        relative ? " in Clip's folder, " : ", and there is none of its name in Clip's folder or ";
+    words += kSearchPath;
+    if (relative) words += " or " + fs::current_path(error).u8string();
+    return words + "; choose the file again, or the folder that it is in as Clip's folder";
+}
+
 std::string clip_folder(const std::string& path, const std::string& source) {
     std::error_code error;
     const fs::path sidecar = fs::absolute(fs::u8path(path), error);

@@ -19,6 +19,9 @@ std::string expanded(const std::string& path);
 /// `folder` is expanded too and may be empty. Empty when there is no such file.
 std::optional<std::string> find_file(const std::string& path, const std::string& folder);
 
+/// Why find_file() found nothing, and what to do; empty where something else than a file is there.
+std::string words_of_missing(const std::string& path);
+
 /// The folder of a clip, as the sidecar at `path` names its source; empty where there is none.
 std::string clip_folder(const std::string& path, const std::string& source);
 

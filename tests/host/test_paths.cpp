@@ -9,6 +9,7 @@ using namespace test;
 using palette4d::plugin::clip_folder;
 using palette4d::plugin::expanded;
 using palette4d::plugin::find_file;
+using palette4d::plugin::words_of_missing;
 
 namespace {
 
@@ -130,4 +131,21 @@ TEST(the_node_finds_its_sidecar) {
     Picture output(layout);
     CHECK(node->render(3, &source, output, layout.bounds) == kOfxStatOK);
     CHECK(node->effect().persistent_message.find(in_folder("none.p4d.json")) != std::string::npos);
+}
+
+TEST(a_missing_file_is_said_with_where_it_was_looked_for) {
+    const Variable set("P4D_SHOW", folder().u8string());
+    const auto says = [](const std::string& path, const std::string& words) {
+        const std::string said = words_of_missing(path);
+        EXPECT(said.find(words) != std::string::npos, path + ": " + said);
+    };
+    says("/nowhere/a.p4d.json", "does not exist, and there is none of its name in Clip's folder");
+    says("$P4D_SHOW/a.p4d.json", "does not exist, and there is none of its name");
+    says("a.p4d.json", "PALETTE4D_PATH or " + fs::current_path().u8string());
+    for (const char* path : {"$P4D_NONE/a.json", "$P4D_SHOW/${P4D_NONE}.json", "%P4D_NONE%/100%"}) {
+        says(path, "no variable P4D_NONE");
+    }
+    for (const char* path : {"$/a.json", "100%/%", "${/a.json"}) says(path, "does not exist");
+    // A folder is there, and says itself what is wrong with it.
+    CHECK(words_of_missing("$P4D_SHOW").empty());
 }
