@@ -39,16 +39,16 @@ def sidecars(scene: Scene) -> tuple[_core.Sidecar, _core.Sidecar]:
     return first, _core.read_sidecar(str(path))
 
 
-def consumer(scene: Scene) -> tuple[str, ...]:
+def consumer(scene: Scene, threads: int = -1) -> tuple[str, ...]:
     form, pixels = DEPTHS["8bit" if scene.clip[0].dtype == np.uint8 else "16bit"]
     return (
         *("-consumer", "avformat:out_%03d.png", "vcodec=png", "an=1", f"pix_fmt={pixels}"),
-        *(f"mlt_image_format={form}", "real_time=-1"),
+        *(f"mlt_image_format={form}", f"real_time={threads}"),
     )
 
 
 def render(
-    scene: Scene, *words: str, folder: Path | None = None, **environment: str
+    scene: Scene, *words: str, folder: Path | None = None, threads: int = -1, **environment: str
 ) -> tuple[list[Image], str]:
     """The frames that melt writes into a folder (the scene's), and what it said.
 
@@ -59,7 +59,7 @@ def render(
         for old in folder.glob("out_*.png"):
             old.unlink()
         done = subprocess.run(
-            [str(scene.melt), *words, *consumer(scene)],
+            [str(scene.melt), *words, *consumer(scene, threads)],
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
@@ -115,6 +115,21 @@ def test_several_nodes_in_a_chain(
 ) -> None:
     frames = without_a_message(render(scene, *CLIP, *GRADES))
     check_chain(scene.clip, frames, sidecars)
+
+
+def test_many_threads_on_a_movie(
+    scene: Scene, sidecars: tuple[_core.Sidecar, _core.Sidecar]
+) -> None:
+    """docs/hosts/melt.md: threads exchange frames of image sequences, and not those of movies."""
+    movie = ("vcodec=ffv1", "an=1", "pix_fmt=bgr0", "mlt_image_format=rgba", "real_time=-1")
+    for _ in range(4):  # as in render()
+        scene.run(*CLIP, "-consumer", "avformat:clip.mkv", *movie)
+        if (scene.folder / "clip.mkv").exists():
+            break
+    words = ("-profile", "profile", "avformat:clip.mkv")
+    clip = without_a_message(render(scene, *words))
+    assert all((a != b).any() for a, b in zip(clip[1:], clip, strict=False))
+    check_chain(clip, without_a_message(render(scene, *words, *GRADES, threads=-4)), sidecars)
 
 
 def test_a_project_on_disk(
