@@ -50,8 +50,9 @@ OfxStatus dispatch(const char* action, OfxImageEffectHandle effect, OfxPropertyS
         destroy_instance(effect);
         return kOfxStatOK;
     }
-    if (is(kOfxActionInstanceChanged) || is(kOfxActionBeginInstanceChanged) ||
-        is(kOfxActionEndInstanceChanged)) {
+    // Begin: what is to be told has changed already, and is not told yet.
+    if (is(kOfxActionBeginInstanceChanged)) return kOfxStatOK;
+    if (is(kOfxActionInstanceChanged) || is(kOfxActionEndInstanceChanged)) {
         instance_changed(host, effect, in);
         return kOfxStatOK;
     }

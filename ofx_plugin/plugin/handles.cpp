@@ -145,13 +145,14 @@ int handles_in_use(const Params& params) {
     return count;
 }
 
-void show_handles(const Params& params, const Sidecar* sidecar) {
+void show_handles(const Params& params, const Sidecar* sidecar, ShownColours& shown) {
     if (!sidecar) return;
     const std::vector<Handle> handles = handles_of(sidecar->polytope, sidecar->edits);
     for (std::size_t i = 0; i < slots().size(); ++i) {
         const Slot& slot = slots()[i];
         const bool in_use = params.int_now(slot.use.c_str()).value_or(0) != 0;
-        const int at = handle_of(*sidecar, i, params.string_now(slot.id.c_str()).value_or(""));
+        const std::string id = params.string_now(slot.id.c_str()).value_or("");
+        const int at = handle_of(*sidecar, i, id);
         const Handle* handle = at < 0 ? nullptr : &handles[static_cast<std::size_t>(at)];
         const Properties colour = params.properties(slot.colour.c_str());
         set_text(colour, kOfxPropLabel, handle ? label_of(*handle) : slot.colour_label);
@@ -161,12 +162,20 @@ void show_handles(const Params& params, const Sidecar* sidecar) {
         }
         if (!handle || in_use || params.animated(slot.colour.c_str())) continue;
         const auto now = params.rgb_now(slot.colour.c_str());
-        if (now && !close(*now, handle->rgb)) params.set_rgb(slot.colour.c_str(), handle->rgb);
+        if (!now) continue;
+        // Of a project that was opened it is not known; there an id says that it was in use.
+        const bool untouched = shown[i] ? close(*now, *shown[i]) : id.empty();
+        const bool same = close(*now, handle->rgb);
+        if (!untouched && !same) continue;
+        shown[i] = handle->rgb;
+        if (!same) params.set_rgb(slot.colour.c_str(), handle->rgb);
     }
 }
 
-bool handle_changed(const Params& params, const Sidecar* sidecar, const std::string& name) {
+bool handle_changed(const Params& params, const Sidecar* sidecar, const std::string& name,
+                    ShownColours& shown) {
     if (name == kParamResetHandles) {
+        shown = {};
         for (const Slot& slot : slots()) {
             if (params.int_now(slot.use.c_str()).value_or(0)) params.set_int(slot.use.c_str(), 0);
             if (!params.string_now(slot.id.c_str()).value_or("").empty()) {
@@ -179,6 +188,12 @@ bool handle_changed(const Params& params, const Sidecar* sidecar, const std::str
         const Slot& slot = slots()[i];
         if (name != slot.colour && name != slot.use) continue;
         if (name == slot.colour && params.int_now(slot.use.c_str()) == 0) {
+            const auto now = params.rgb_now(slot.colour.c_str());
+            // What was shown all along is no edit: the host has undone one.
+            if (now && shown[i] && close(*now, *shown[i]) &&
+                !params.animated(slot.colour.c_str())) {
+                break;
+            }
             params.set_int(slot.use.c_str(), 1);
         }
         const bool in_use = params.int_now(slot.use.c_str()).value_or(0) != 0;

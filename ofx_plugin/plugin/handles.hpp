@@ -4,6 +4,7 @@
 // an id, slot n is the nth handle of the sidecar.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 
@@ -34,12 +35,18 @@ EditsAt edits_at(const Params& params, const Sidecar& sidecar, OfxTime time);
 int handle_at(const Params& params, const Sidecar& sidecar, int slot, OfxTime time);
 /// How many slots are in use, outside of rendering.
 int handles_in_use(const Params& params);
+/// The colours that an instance's slots have been given by show_handles(), and by nobody else.
+using ShownColours = std::array<std::optional<Vec3>, kHandleSlots>;
+
 /// For instance changes only. Labels the slots after the sidecar's handles, hides those that it has
 /// no handle for, and gives slots that are not in use their handle's colour, so that they begin
-/// from there. Without a sidecar all stay as they are.
-void show_handles(const Params& params, const Sidecar* sidecar);
+/// from there; one that holds another colour than was given to it keeps that, since the user has
+/// taken it out of use, or has changed it and the host is about to say so. Without a sidecar all
+/// stay as they are.
+void show_handles(const Params& params, const Sidecar* sidecar, ShownColours& shown);
 /// For instance changes by the user. A colour that is changed comes into use; a slot that comes
 /// into use keeps its handle's id, whatever the sidecar's order will be. True when it set anything.
-bool handle_changed(const Params& params, const Sidecar* sidecar, const std::string& name);
+bool handle_changed(const Params& params, const Sidecar* sidecar, const std::string& name,
+                    ShownColours& shown);
 
 }  // namespace palette4d::plugin

@@ -90,8 +90,19 @@ void update_instance(const Suites& suites, OfxImageEffectHandle effect, const st
     const Chosen chosen = chosen_sidecar(params, std::nullopt);
     const Sidecar* sidecar = chosen.result.loaded ? &chosen.result.loaded->sidecar() : nullptr;
     const std::string copy = keep_files(params, chosen, param);
-    if (!param.empty()) handle_changed(params, sidecar, param);
-    show_handles(params, sidecar);
+    // Not under the instance's lock: setting a parameter may have the host wait for a render.
+    const std::shared_ptr<Instance> instance = find(effect);
+    ShownColours shown_colours;
+    if (instance) {
+        const std::lock_guard<std::mutex> lock(instance->mutex);
+        shown_colours = instance->shown;
+    }
+    if (!param.empty()) handle_changed(params, sidecar, param, shown_colours);
+    show_handles(params, sidecar, shown_colours);
+    if (instance) {
+        const std::lock_guard<std::mutex> lock(instance->mutex);
+        instance->shown = shown_colours;
+    }
     std::string shown;
     time = last_time(effect, time);
     if (sidecar && time) {

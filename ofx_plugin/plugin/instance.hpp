@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "handles.hpp"
 #include "host.hpp"
 
 namespace palette4d::plugin {
@@ -15,6 +16,7 @@ struct Instance {
     std::mutex mutex;
     std::string message;          ///< the persistent message that the host shows; empty for none
     std::optional<OfxTime> time;  ///< that the host last said it shows
+    ShownColours shown;           ///< of the handles
 };
 
 /// The actions of an instance's life. They never fail: without its record an instance still
@@ -24,11 +26,11 @@ void destroy_instance(OfxImageEffectHandle effect);
 /// Brings the parameters that the plugin sets up to date: the status says what the instance's
 /// sidecar is or what is wrong with it, and the handles show those of the sidecar. `param` is what
 /// the user changed, if anything, and `time` what the host shows, if it says so. The standard lets
-/// a plugin set parameters while an instance is created, changed (begin and end included) or
-/// synchronised, and at no other time: not while rendering, nor in PurgeCaches.
+/// a plugin set parameters while an instance is created, changed or synchronised, and at no other
+/// time: not while rendering, nor in PurgeCaches.
 void update_instance(const Suites& suites, OfxImageEffectHandle effect,
                      const std::string& param = "", std::optional<OfxTime> time = std::nullopt);
-/// kOfxActionInstanceChanged, its Begin and its End: whatever changed, the time and the clips
+/// kOfxActionInstanceChanged and its End: whatever changed, the time and the clips
 /// included, the sidecar may have changed on disk since the last look at it.
 void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const Properties& args);
 

@@ -344,7 +344,11 @@ void Instance::animate(const std::string& param, std::map<double, Value> keys) {
 }
 
 OfxStatus Instance::changed(const std::string& param) {
-    return changed(kOfxTypeParameter, param, kOfxChangeUserEdited);
+    // Hosts set the value, or several, before they say so: it is there when the bracket opens.
+    bracket(kOfxActionBeginInstanceChanged, kOfxChangeUserEdited);
+    const OfxStatus status = changed(kOfxTypeParameter, param, kOfxChangeUserEdited);
+    bracket(kOfxActionEndInstanceChanged, kOfxChangeUserEdited);
+    return status;
 }
 
 OfxStatus Instance::changed(const std::string& type, const std::string& name,

@@ -173,18 +173,67 @@ TEST(changing_a_colour_brings_it_into_use) {
     palette4d::Edits edits = graded.parsed.edits;
     edits.vertex_rgb[1] = palette4d::Vec3{1, 1, 0};
     CHECK(graded.render(1) == graded.expected(edits, 1));
-    // Out of use: the palette's colour again.
+    // Out of use it keeps its colour, and is back with it when it is switched on again.
     node.set("handle02On", 0);
     CHECK(node.changed("handle02On") == kOfxStatOK);
-    CHECK(std::get<Colour>(node.value("handle02")) == (Colour{0.2, 0.7, 0.1}));
     CHECK(graded.render(1) == graded.expected(graded.parsed.edits, 1));
+    node.set("handle02On", 1);
+    CHECK(node.changed("handle02On") == kOfxStatOK);
+    CHECK(std::get<Colour>(node.value("handle02")) == (Colour{1, 1, 0}));
+    CHECK(graded.render(1) == graded.expected(edits, 1));
     // All of them.
     graded.use("handle02", {1, 1, 0});
     graded.use("handle03", {1, 1, 0});
     CHECK(node.changed("resetHandles") == kOfxStatOK);
     CHECK(std::get<int>(node.value("handle03On")) == 0);
     CHECK(node.text("handle02Id").empty());
+    CHECK(std::get<Colour>(node.value("handle02")) == (Colour{0.2, 0.7, 0.1}));
     CHECK(graded.render(1) == graded.expected(graded.parsed.edits, 1));
+}
+
+TEST(colours_that_change_together_are_all_kept) {
+    Graded graded;
+    Instance& node = *graded.node;
+    // A preset, or several values pasted: all are there before the first is told.
+    node.set("handle02", Colour{1, 1, 0});
+    node.set("handle03", Colour{0, 1, 1});
+    for (const char* name : {"strength", "handle02", "handle03"}) {
+        CHECK(node.changed(name) == kOfxStatOK);
+    }
+    palette4d::Edits edits = graded.parsed.edits;
+    edits.vertex_rgb[1] = palette4d::Vec3{1, 1, 0};
+    edits.vertex_rgb[2] = palette4d::Vec3{0, 1, 1};
+    CHECK(graded.render(1) == graded.expected(edits, 1));
+}
+
+TEST(an_edit_that_the_host_undoes_is_undone) {
+    Graded graded;
+    Instance& node = *graded.node;
+    const Colour before = std::get<Colour>(node.value("handle02"));
+    node.set("handle02", Colour{1, 1, 0});
+    CHECK(node.changed("handle02") == kOfxStatOK);
+    // With it what the node has set, as hosts keep them together.
+    node.set("handle02", before);
+    node.set("handle02On", 0);
+    node.set("handle02Id", std::string());
+    for (const char* name : {"handle02Id", "handle02On", "handle02"}) {
+        CHECK(node.changed(name) == kOfxStatOK);
+    }
+    CHECK(std::get<int>(node.value("handle02On")) == 0);
+    CHECK(graded.render(1) == graded.expected(graded.parsed.edits, 1));
+}
+
+TEST(a_project_that_is_opened_keeps_colours_out_of_use) {
+    Graded graded;
+    const auto opened = graded.plugin.create();
+    opened->set("sidecar", graded.path);
+    // As it was saved: one that was in use before, and one that never was.
+    opened->set("handle02", Colour{1, 1, 0});
+    opened->set("handle02Id", std::string("v1"));
+    opened->set("handle03", Colour{0.3, 0.3, 0.3});
+    CHECK(opened->sync() == kOfxStatOK);
+    CHECK(std::get<Colour>(opened->value("handle02")) == (Colour{1, 1, 0}));
+    CHECK(std::get<Colour>(opened->value("handle03")) != (Colour{0.3, 0.3, 0.3}));
 }
 
 TEST(keyframes_of_a_handle_out_of_use_are_kept) {
