@@ -50,10 +50,16 @@ OfxStatus dispatch(const char* action, OfxImageEffectHandle effect, OfxPropertyS
         destroy_instance(effect);
         return kOfxStatOK;
     }
-    // Begin: what is to be told has changed already, and is not told yet.
-    if (is(kOfxActionBeginInstanceChanged)) return kOfxStatOK;
-    if (is(kOfxActionInstanceChanged) || is(kOfxActionEndInstanceChanged)) {
+    if (is(kOfxActionBeginInstanceChanged)) {
+        changes_begin(effect, in);
+        return kOfxStatOK;
+    }
+    if (is(kOfxActionInstanceChanged)) {
         instance_changed(host, effect, in);
+        return kOfxStatOK;
+    }
+    if (is(kOfxActionEndInstanceChanged)) {
+        changes_end(host, effect, in);
         return kOfxStatOK;
     }
     if (is(kOfxActionSyncPrivateData)) {

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <map>
 #include <optional>
+#include <utility>
 
 #include "files.hpp"
 #include "handles.hpp"
@@ -55,6 +56,14 @@ std::optional<OfxTime> last_time(OfxImageEffectHandle effect, std::optional<OfxT
     const std::lock_guard<std::mutex> lock(instance->mutex);
     if (time) instance->time = time;
     return instance->time;
+}
+
+/// What an instance was told, and what holds from now on.
+std::optional<bool> set_told(OfxImageEffectHandle effect, std::optional<bool> told) {
+    const std::shared_ptr<Instance> instance = find(effect);
+    if (!instance) return std::nullopt;
+    const std::lock_guard<std::mutex> lock(instance->mutex);
+    return std::exchange(instance->told, told);
 }
 
 }  // namespace
@@ -129,6 +138,17 @@ void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const P
     const bool by_user = reason && *reason == kOfxChangeUserEdited;
     update_instance(suites, effect, by_user ? name.value_or("") : "",
                     args.get_double(kOfxPropTime));
+    if (set_told(effect, std::nullopt)) set_told(effect, true);
+}
+
+void changes_begin(OfxImageEffectHandle effect, const Properties& args) {
+    if (args.get_string(kOfxPropChangeReason) != kOfxChangePluginEdited) set_told(effect, false);
+}
+
+void changes_end(const Suites& suites, OfxImageEffectHandle effect, const Properties& args) {
+    // The plugin's own settings are told within the telling of what made it set them.
+    if (args.get_string(kOfxPropChangeReason) == kOfxChangePluginEdited) return;
+    if (set_told(effect, std::nullopt) != true) instance_changed(suites, effect, args);
 }
 
 void report(const Suites& suites, OfxImageEffectHandle effect, const std::string& problem) {

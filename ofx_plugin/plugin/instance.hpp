@@ -17,6 +17,7 @@ struct Instance {
     std::string message;          ///< the persistent message that the host shows; empty for none
     std::optional<OfxTime> time;  ///< that the host last said it shows
     ShownColours shown;           ///< of the handles
+    std::optional<bool> told;     ///< while a host tells of changes: of one at least
 };
 
 /// The actions of an instance's life. They never fail: without its record an instance still
@@ -30,9 +31,14 @@ void destroy_instance(OfxImageEffectHandle effect);
 /// time: not while rendering, nor in PurgeCaches.
 void update_instance(const Suites& suites, OfxImageEffectHandle effect,
                      const std::string& param = "", std::optional<OfxTime> time = std::nullopt);
-/// kOfxActionInstanceChanged and its End: whatever changed, the time and the clips
-/// included, the sidecar may have changed on disk since the last look at it.
+/// kOfxActionInstanceChanged: whatever changed, the time and the clips included, the sidecar may
+/// have changed on disk since the last look at it.
 void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const Properties& args);
+
+/// Its Begin and its End. When it begins, values have changed that are not told yet: they are left
+/// alone. When it ends, there is something to do only where nothing was told in between.
+void changes_begin(OfxImageEffectHandle effect, const Properties& args);
+void changes_end(const Suites& suites, OfxImageEffectHandle effect, const Properties& args);
 
 /// Shows a problem as the instance's persistent message, or takes the message away when `problem`
 /// is empty. Allowed while rendering; tells the host only what is new.
