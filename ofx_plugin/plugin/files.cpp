@@ -70,7 +70,7 @@ Chosen chosen_sidecar(const Params& params, std::optional<OfxTime> time) {
     return chosen;
 }
 
-std::string keep_files(const Params& params, const Chosen& chosen, const std::string& param) {
+std::string keep_files(const Params& params, Chosen& chosen, const std::string& param) {
     const LoadedSidecar* loaded = chosen.result.loaded.get();
     if (loaded) set_text(params, kParamRevision, loaded->revision());
     if (loaded && !chosen.embedded && param == kParamSidecar) {
@@ -79,6 +79,7 @@ std::string keep_files(const Params& params, const Chosen& chosen, const std::st
     }
     if (params.int_now(kParamEmbed).value_or(0) == 0) {
         set_text(params, kParamEmbedded, "");
+        if (chosen.embedded) chosen = chosen_sidecar(params, std::nullopt);
         return "";
     }
     if (chosen.embedded) return "the project's copy, since there is no file";

@@ -29,7 +29,7 @@ Chosen chosen_sidecar(const Params& params, std::optional<OfxTime> time);
 
 /// For instance changes only: keeps the project's copy and the clip's folder up to date, and the
 /// revision, by which a host knows that frames it keeps are old. `param` is what the user changed.
-/// What is to be said of the copy, or nothing.
-std::string keep_files(const Params& params, const Chosen& chosen, const std::string& param);
+/// What is to be said of the copy, or nothing; `chosen` is anew where that copy has gone.
+std::string keep_files(const Params& params, Chosen& chosen, const std::string& param);
 
 }  // namespace palette4d::plugin

@@ -96,9 +96,9 @@ void update_instance(const Suites& suites, OfxImageEffectHandle effect, const st
         ~Guard() { flag = false; }
     } const guard(updating);
     const Params params(suites, effect);
-    const Chosen chosen = chosen_sidecar(params, std::nullopt);
-    const Sidecar* sidecar = chosen.result.loaded ? &chosen.result.loaded->sidecar() : nullptr;
+    Chosen chosen = chosen_sidecar(params, std::nullopt);
     const std::string copy = keep_files(params, chosen, param);
+    const Sidecar* sidecar = chosen.result.loaded ? &chosen.result.loaded->sidecar() : nullptr;
     // Not under the instance's lock: setting a parameter may have the host wait for a render.
     const std::shared_ptr<Instance> instance = find(effect);
     ShownColours shown_colours;

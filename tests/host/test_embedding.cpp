@@ -71,6 +71,19 @@ TEST(an_embedded_sidecar_travels_with_the_project) {
     CHECK(!there->effect().persistent_message.empty());
 }
 
+TEST(the_copy_that_goes_last_is_missed_at_once) {
+    Project project;
+    const std::string path = sidecar();
+    project.choose(path);
+    project.node->set("embed", 1);
+    CHECK(project.node->changed("embed") == kOfxStatOK);
+    fs::remove(path);
+    CHECK(project.render(*project.node) == project.edited());
+    project.node->set("embed", 0);
+    CHECK(project.node->changed("embed") == kOfxStatOK);
+    CHECK(project.node->text("status").find("does not exist") != std::string::npos);
+}
+
 TEST(a_broken_copy_is_said_to_be_one) {
     Project project;
     project.node->set("sidecar", std::string("/nowhere/at.all"));
