@@ -90,7 +90,7 @@ OfxPlugin g_plugin = {kOfxImageEffectPluginApi,
                       kOfxImageEffectPluginApiVersion,
                       "org.palette4d.Palette4D",
                       1,
-                      1,
+                      2,
                       &remember_host,
                       &main_entry};
 
