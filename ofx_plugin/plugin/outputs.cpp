@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "spaces.hpp"
+
 namespace palette4d::plugin {
 namespace {
 
@@ -14,13 +16,9 @@ constexpr double kAtSurface = 1e-3;
 constexpr float kLarge = 256;
 constexpr int kStripPart = 8;  ///< of the picture's height
 
-// Luminance of linear light of these primaries (ITU-R BT.709, BT.2020, SMPTE EG 432-1 for P3 with
-// D65, Academy S-2014-004 for AP1) and luma of BT.601.
-constexpr double kLightness[][3] = {{0.2126, 0.7152, 0.0722},
-                                    {0.2627, 0.6780, 0.0593},
-                                    {0.2289745641, 0.6917385218, 0.0792869141},
-                                    {0.2722287168, 0.6740817658, 0.0536895174},
-                                    {0.299, 0.587, 0.114}};
+/// The options of kParamLightnessOf after the first: spaces by name.
+constexpr const char* kLightnessOf[] = {"Rec.709", "Rec.2020", "P3-D65", "ACEScg"};
+constexpr Vec3 kRec601 = {0.299, 0.587, 0.114};  // of luma, as ITU-R BT.601 has it
 
 double clamped(const std::optional<double>& value, double initial, double low, double high) {
     const double given = value.value_or(initial);
@@ -239,10 +237,10 @@ OutputSettings output_settings_at(const Params& params, OfxTime time) {
     settings.strength = clamped(params.double_at(kParamStrength, time), 1, 0, 1);
     settings.keep = clamped(params.double_at(kParamKeepLightness, time), 0, 0, 1);
     const int of = params.int_at(kParamLightnessOf, time).value_or(0);
-    settings.own_lightness = of < 1 || of > static_cast<int>(std::size(kLightness));
-    if (!settings.own_lightness) {
-        const auto& weights = kLightness[of - 1];
-        settings.lightness = {weights[0], weights[1], weights[2]};
+    constexpr int spaces = static_cast<int>(std::size(kLightnessOf));
+    settings.own_lightness = of < 1 || of > spaces + 1;
+    if (!settings.own_lightness && settings.keep > 0) {
+        settings.lightness = of > spaces ? kRec601 : luminance_weights(kLightnessOf[of - 1]);
     }
     settings.in_palette_space = params.int_at(kParamPictureIn, time).value_or(0) == 1;
     settings.mix = clamped(params.double_at(kParamMix, time), 1, 0, 1);
