@@ -108,8 +108,10 @@ private:
     /// The states in block_; 0 when all of them are good, no less than kBrick when some are cut.
     std::int32_t look_up(int count) {
         int* const states = block_.state;
+        const int* const numbers = block_.number;
+        const Store::State* const table = &store_.state(0);
         for (int i = 0; i < count; ++i) {
-            states[i] = store_.state(block_.number[i]).load(std::memory_order_acquire);
+            states[i] = table[numbers[i]].load(std::memory_order_acquire);
         }
         std::int32_t others = 0;
         for (int i = 0; i < count; ++i) others |= states[i] ^ Store::kGood;

@@ -166,7 +166,7 @@ PALETTE4D_INLINE void blend_eight(const float* nodes, const LatticeBlock& block,
     };
     __m256 weights[4];
     for (int k = 0; k < 4; ++k) weights[k] = _mm256_load_ps(block.weight[k] + i);
-    for (int pair = 0; pair < 8; pair += 2) {
+    const auto blend_two = [&](const int pair) __attribute__((always_inline)) {
         const __m256i both =
             _mm256_set_epi32(pair + 1, pair + 1, pair + 1, pair + 1, pair, pair, pair, pair);
         const auto part = [&](int k) {
@@ -198,7 +198,12 @@ PALETTE4D_INLINE void blend_eight(const float* nodes, const LatticeBlock& block,
             _mm_storeu_ps(there, _mm256_castps256_ps128(after));
             store_pixel<3>(there + 3, _mm256_extractf128_ps(after, 1));
         }
-    }
+    };
+    // A loop over constants that compilers leave a loop.
+    blend_two(0);
+    blend_two(2);
+    blend_two(4);
+    blend_two(6);
 }
 #endif
 

@@ -20,10 +20,8 @@ namespace palette4d {
 /// in one piece, so that it is large enough for that.
 class Zeros {
 public:
-    explicit Zeros(std::size_t bytes) : data_(static_cast<char*>(std::calloc(bytes, 1))) {
-        if (!data_) throw std::bad_alloc();
-    }
-    ~Zeros() { std::free(data_); }
+    explicit Zeros(std::size_t bytes);
+    ~Zeros();
     Zeros(const Zeros&) = delete;
     Zeros& operator=(const Zeros&) = delete;
     /// The next part of it; the sizes must add up.
@@ -35,6 +33,7 @@ public:
     }
 
 private:
+    std::size_t size_;
     char* data_;
     std::size_t taken_ = 0;
 };
