@@ -106,8 +106,9 @@ TEST(pictures_are_within_the_tolerance_of_the_exact_ones) {
     CHECK(interpolated > 2 * exact);
 }
 
-TEST(instruction_sets_threads_tiles_and_what_was_asked_before_do_not_show) {
-    const Edited palette = edited(dented_cube(), 3);
+namespace {
+
+void check_that_bits_depend_on_pixels_only(const Edited& palette) {
     const auto recolourer = palette.recolourer();
     for (const int channels : {3, 4}) {
         const Image image = picture(517, 61, channels, 7);
@@ -149,21 +150,32 @@ TEST(instruction_sets_threads_tiles_and_what_was_asked_before_do_not_show) {
     }
 }
 
+}  // namespace
+
+TEST(instruction_sets_threads_tiles_and_what_was_asked_before_do_not_show) {
+    Random random(40);
+    check_that_bits_depend_on_pixels_only(edited(dented_cube(), 3));
+    check_that_bits_depend_on_pixels_only(edited(random_convex(random, 8), 4));
+}
+
 TEST(threads_of_a_host_share_one_lattice) {
-    const auto recolourer = edited(dented_cube(), 9).recolourer();
-    // The same colours for all threads, so that they are at the same cells at the same time.
-    const Image image = picture(400, 24, 4, 11);
-    Image expected(400, 24, 4);
-    Lattice(recolourer).apply(image.in(), expected.out(), {1.0, true});
-    for (int again = 0; again < 100; ++again) {
-        const Lattice lattice(recolourer);
-        std::vector<Image> found(4, Image(400, 24, 4));
-        std::vector<std::thread> threads;
-        for (Image& mine : found) {
-            threads.emplace_back([&] { lattice.apply(image.in(), mine.out(), {1.0, true}); });
+    Random random(41);
+    for (const Edited& palette : {edited(dented_cube(), 9), edited(random_convex(random, 8), 9)}) {
+        const auto recolourer = palette.recolourer();
+        // The same colours for all threads, so that they are at the same cells at the same time.
+        const Image image = picture(400, 24, 4, 11);
+        Image expected(400, 24, 4);
+        Lattice(recolourer).apply(image.in(), expected.out(), {1.0, true});
+        for (int again = 0; again < 50; ++again) {
+            const Lattice lattice(recolourer);
+            std::vector<Image> found(4, Image(400, 24, 4));
+            std::vector<std::thread> threads;
+            for (Image& mine : found) {
+                threads.emplace_back([&] { lattice.apply(image.in(), mine.out(), {1.0, true}); });
+            }
+            for (std::thread& thread : threads) thread.join();
+            for (const Image& mine : found) CHECK(same_bits(mine.data, expected.data));
         }
-        for (std::thread& thread : threads) thread.join();
-        for (const Image& mine : found) CHECK(same_bits(mine.data, expected.data));
     }
 }
 

@@ -86,16 +86,19 @@ private:
         LatticeBlock& b = block_;
         kernels_.locate(store_.domain(), b, from, channels_, count, premultiplied_);
         std::int32_t others = look_up(count);
-        if (others >= Store::kBrick) {
+        while (others < 0) {
             kernels_.descend(b, count);
             others = look_up(count);
         }
-        if (others != 0 && !claim(count)) return false;
+        if ((others & kLatticeKind) != 0 && !claim(count)) return false;
+        if (others >= kLatticeFirstPlane) {
+            others |= kernels_.choose_sides(store_.planes(), b, count);
+        }
         kernels_.weigh(b, count);
-        if (++blocks_ % kSampleEvery == 0) sample(static_cast<int>(blocks_ % count));
+        if (blocks_++ % kSampleEvery == 0) sample(static_cast<int>(blocks_ % count));
         kernels_.blend(store_.nodes(), b, count, from, to, channels_, strength_, premultiplied_);
         interpolated_ += count;
-        if (others == 0) return true;
+        if ((others & kLatticeKind) == 0) return true;
         for (int i = 0; i < count; ++i) {
             if (b.state[i] == Store::kExact) {
                 exact_.pixel(from + i * channels_, to + i * channels_, channels_);
@@ -105,7 +108,8 @@ private:
         return true;
     }
 
-    /// The states in block_; 0 when all of them are good, no less than kBrick when some are cut.
+    /// The states in block_, and together in what they differ from kGood: below 0 when some are
+    /// cut.
     std::int32_t look_up(int count) {
         int* const states = block_.state;
         const int* const numbers = block_.number;
@@ -122,8 +126,8 @@ private:
     bool claim(int count) {
         bool made = true;
         for (int i = 0; i < count; ++i) {
-            // Cut since it was looked at is not made either: its part has to be found.
-            if (block_.state[i] != Store::kGood && block_.state[i] != Store::kExact) {
+            const std::int32_t state = block_.state[i];
+            if ((state & kLatticeKind) != Store::kGood && state != Store::kExact) {
                 made = false;
                 builder_.claim(block_.number[i], block_.state[i]);
             }
@@ -144,7 +148,7 @@ private:
     }
 
     void sample(int i) {
-        if (block_.state[i] != Store::kGood) return;
+        if (block_.state[i] == Store::kExact) return;
         for (int c = 0; c < 3; ++c) {
             float moved = 0;
             for (int k = 0; k < 4; ++k) {

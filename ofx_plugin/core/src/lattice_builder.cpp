@@ -2,125 +2,49 @@
 #include <algorithm>
 #include <thread>
 
-#include "four.hpp"
+#include "lattice_geometry.hpp"
 #include "lattice_store.hpp"
 
 namespace palette4d {
 namespace {
 
-constexpr int kSide = kLatticeSide, kNodeSide = kSide + 1;
-constexpr float kCellWidth = 4;  ///< in half widths of a part
+/// Where there are regions, what is interpolated is smooth: what it may be off at the probes; along
+/// three nodes in a line, of which it is a quarter between two; near an edge of the palette, where
+/// it bends most between the probes; and what going on beyond the surface may be off.
+constexpr float kMostSmooth = 0.0012f, kMostSmoothInLine = 2.5f * kMostSmooth,
+                kMostAtEdge = 0.0004f, kMostBeyond = 0.0003f;
+/// Elsewhere a crease may lie between the probes. Between three nodes in a line an interpolation is
+/// better than across all three: an error that is smooth by four times.
+constexpr float kMostCreased = 0.0008f, kMostCreasedInLine = 1.25f * kMostCreased;
 
-/// Of one of the eight corners or parts of something, along an axis: number 4 x + 2 y + z.
-constexpr int bit(int corner, int axis) { return corner >> (2 - axis) & 1; }
+struct Point {
+    float at[4];
+};
+Point centre_of(const float* low, const float* step, const LatticePlace& place, float half_width) {
+    Point centre;
+    store_four(centre.at, colour_at(low, step, load_four(place.at) + all_four(half_width)));
+    return centre;
+}
 
-/// Of a brick: along each axis, in halves of what it cuts.
-struct BrickPlaces {
-    float at[kBrickNodes][4]{};
-    constexpr BrickPlaces() {
-        for (int node = 0; node < kBrickNodes; ++node) {
-            at[node][0] = static_cast<float>(node / 9);
-            at[node][1] = static_cast<float>(node / 3 % 3);
-            at[node][2] = static_cast<float>(node % 3);
-        }
+/// Whether, in one of the eight parts of a cube of 3 x 3 x 3 nodes that have `moved`, the
+/// displacement goes on beyond the plane as below it: above, it is that of four columns.
+template <class ColourOf>
+bool goes_on(const LatticePlane& plane, const float* columns, int part, const Four* moved,
+             const ColourOf& colour_of) {
+    Four off{};
+    for (int corner = 0; corner < 8; ++corner) {
+        const int node = 9 * (bit(part, 0) + bit(corner, 0)) + 3 * (bit(part, 1) + bit(corner, 1)) +
+                         bit(part, 2) + bit(corner, 2);
+        const Four colour = colour_of(node);
+        float height = -plane.offset;
+        for (int c = 0; c < 3; ++c) height += plane.normal[c] * colour[c];
+        if (height < 0) continue;
+        Four exact = load_four(columns);
+        for (int c = 0; c < 3; ++c) exact = exact + colour[c] * load_four(columns + 4 * (c + 1));
+        off = max(off, relative(moved[node] - exact, colour, exact));
     }
-};
-constexpr BrickPlaces kPlaces;
-
-/// Where the interpolation of a cell or part is looked at: the other nodes of the brick that it
-/// would be cut into, the middles of it and of its faces, then those of its edges. Each corner has
-/// a part in one, so that a crease that cuts a corner off is seen as well.
-struct Probes {
-    static constexpr std::size_t kMiddles = 7, kAll = 19;
-    struct Probe {
-        int node;     ///< of the brick
-        int ends[2];  ///< it is half way between these two corners
-    };
-    Probe all[kAll]{};
-
-    constexpr Probes() {
-        std::size_t middles = 0, edges = kMiddles;
-        for (int node = 0; node < kBrickNodes; ++node) {
-            const int x = node / 9, y = node / 3 % 3, z = node % 3;
-            const int halves = (x == 1) + (y == 1) + (z == 1);
-            if (halves == 0) continue;
-            all[halves > 1 ? middles++ : edges++] = {
-                node,
-                {4 * (x / 2) + 2 * (y / 2) + z / 2,
-                 4 * ((x + 1) / 2) + 2 * ((y + 1) / 2) + (z + 1) / 2}};
-        }
-    }
-};
-constexpr Probes kProbes;
-
-/// The lines through 3 x 3 x 3 nodes that edges of the tetrahedra lie on, three nodes each.
-struct Lines {
-    static constexpr std::size_t kCount = 37, kTouching = 19;
-    struct Line {
-        int middle, step;
-    };
-    Line all[kCount]{};
-    int of_part[8][kTouching]{};  ///< those that touch one of the eight parts
-
-    constexpr Lines() {
-        int count = 0, touching[8] = {};
-        for (int direction = 1; direction < 8; ++direction) {
-            for (int node = 0; node < kBrickNodes; ++node) {
-                const int at[3] = {node / 9, node / 3 % 3, node % 3};
-                bool middle = true;
-                for (int c = 0; c < 3; ++c) middle &= !bit(direction, c) || at[c] == 1;
-                if (!middle) continue;
-                for (int part = 0; part < 8; ++part) {
-                    bool touches = true;
-                    for (int c = 0; c < 3; ++c) {
-                        touches &= bit(direction, c) || at[c] == 1 || at[c] / 2 == bit(part, c);
-                    }
-                    if (touches) of_part[part][touching[part]++] = count;
-                }
-                all[count++] = {node,
-                                9 * bit(direction, 0) + 3 * bit(direction, 1) + bit(direction, 2)};
-            }
-        }
-    }
-};
-constexpr Lines kLines;
-
-struct Cell {
-    int x, y, z;
-    int first_node() const { return (x * kNodeSide + y) * kNodeSide + z; }
-};
-
-Cell cell_at(int number) {
-    return {number / (kSide * kSide), number / kSide % kSide, number % kSide};
+    return largest_of(off) <= kMostBeyond;
 }
-
-/// Of a group that is known by its first cell.
-int group_cell(int group, int part) {
-    return group + (bit(part, 0) * kSide + bit(part, 1)) * kSide + bit(part, 2);
-}
-
-LatticePlace place_of(const Cell& cell) {
-    return {{kCellWidth * static_cast<float>(cell.x), kCellWidth * static_cast<float>(cell.y),
-             kCellWidth * static_cast<float>(cell.z), 0}};
-}
-
-/// Places are whole numbers, so that a place has one colour, whatever it is counted from.
-Four colour_at(const float* low, const float* step, Four place) {
-    return load_four(low) + place * load_four(step);
-}
-
-/// As lattice_error().
-Four relative(Four error, Four colour, Four moved) {
-    const Four exact = colour + moved, least = all_four(0.1f);
-    return abs(error) / where_negative(colour * exact, least, max(abs(exact), least));
-}
-
-float largest_of(Four error) { return std::max(std::max(error[0], error[1]), error[2]); }
-
-constexpr float kMost = static_cast<float>(Lattice::kProbeTolerance);
-/// Between three nodes in a line an interpolation is better than across all three: an error that is
-/// smooth by four times.
-constexpr float kMostInLine = 1.25f * kMost;
 
 }  // namespace
 
@@ -129,13 +53,18 @@ Lattice::Store::Builder::Builder(Store& store, InstructionSet instructions)
           RecolourOptions options;
           options.instructions = instructions;
           return options;
-      }()) {}
+      }()) {
+    if (store.regions_) {
+        mean_value_ = std::make_unique<MeanValueWorker>(store.recolourer_, instructions);
+    }
+}
 
 void Lattice::Store::Builder::claim(int number, std::int32_t state) {
     if (state == kUnknown) {  // its group's first cell stands for all
         const Cell cell = cell_at(number);
         const int group = number - (cell.x % 2 * kSide + cell.y % 2) * kSide - cell.z % 2;
-        if (store_.state(group).compare_exchange_strong(state, kClaimed)) groups_.push_back(group);
+        if (store_.state(group).compare_exchange_strong(state, kClaimed))
+            groups_.push_back({group, {}});
     } else if (state == kSuspect) {
         if (store_.state(number).compare_exchange_strong(state, kClaimed)) {
             jobs_.push_back(job_of(number));
@@ -157,9 +86,9 @@ void Lattice::Store::Builder::run() noexcept {
             std::int32_t claimed = kClaimed;
             store_.state(job.number).compare_exchange_strong(claimed, kExact);
         }
-        for (const int group : groups_) {
+        for (const Group& group : groups_) {
             for (int part = 0; part < 8; ++part) {
-                publish(group_cell(group, part), kExact);
+                publish(group_cell(group.number, part), kExact);
             }
         }
     }
@@ -167,16 +96,48 @@ void Lattice::Store::Builder::run() noexcept {
     jobs_.clear();
 }
 
+PaletteRegions::Within Lattice::Store::Builder::within(const LatticePlace& place, float half,
+                                                       int start) const {
+    if (!store_.regions_) return {PaletteRegions::kInside, -1, true};
+    const Point centre = centre_of(store_.low_, store_.step_, place, half);
+    return store_.regions_->within(centre.at, half, start);
+}
+
+/// False where none of its cells is interpolated, nor cut.
+bool Lattice::Store::Builder::find_regions(Group& group) const {
+    const Cell cell = cell_at(group.number);
+    const LatticePlace place = place_of(cell);
+    int region = PaletteRegions::kInside;
+    bool whole = true;
+    if (store_.regions_) {
+        const Point centre = centre_of(store_.low_, store_.step_, place, kCellWidth);
+        region = store_.regions_->around(centre.at, kCellWidth, region, whole);
+    }
+    bool nodes = false;
+    for (int part = 0; part < 8; ++part) {
+        PaletteRegions::Within& one = group.within[static_cast<std::size_t>(part)];
+        one = {region, -1, region == PaletteRegions::kInside};
+        if (!whole) {
+            const Cell at{cell.x + bit(part, 0), cell.y + bit(part, 1), cell.z + bit(part, 2)};
+            one = within(place_of(at), kCellWidth / 2, region);
+        }
+        nodes |= one.inside;
+    }
+    return nodes;
+}
+
 void Lattice::Store::Builder::make_groups() {
     colours_.clear();
     taken_.clear();
-    for (const int group : groups_) take_nodes(group);
-    const float* const moved = displacements(colours_.data(), taken_.size());
+    for (Group& group : groups_) {
+        if (find_regions(group)) take_nodes(group.number);
+    }
+    const float* const moved = node_displacements(colours_.data(), taken_.size());
     for (std::size_t i = 0; i < taken_.size(); ++i) {
         std::copy_n(moved + 3 * i, 3, store_.node(taken_[i]));
         store_.node_states_[taken_[i]].store(kReady, std::memory_order_release);
     }
-    for (const int group : groups_) publish_group(group);
+    for (const Group& group : groups_) publish_group(group);
     groups_.clear();
 }
 
@@ -198,9 +159,8 @@ void Lattice::Store::Builder::take_nodes(int group) {
     }
 }
 
-void Lattice::Store::Builder::publish_group(int group) {
-    const Cell cell = cell_at(group);
-    std::int32_t states[8];
+void Lattice::Store::Builder::publish_group(const Group& group) {
+    const Cell cell = cell_at(group.number);
     bool known = true;
     const auto node_at = [&](int n) {
         const int node = Cell{cell.x + n / 9, cell.y + n / 3 % 3, cell.z + n % 3}.first_node();
@@ -211,33 +171,50 @@ void Lattice::Store::Builder::publish_group(int group) {
         known &= state == kReady;
         return store_.node(node);
     };
-    judge(place_of(cell), kCellWidth, node_at, states);
+    std::int32_t states[8];
+    judge(place_of(cell), kCellWidth, node_at, group.within, states);
     for (int part = 0; part < 8; ++part) {
-        publish(group_cell(group, part), known ? states[part] : kExact);
+        publish(group_cell(group.number, part), known ? states[part] : kExact);
     }
     store_.cells_ += 8;
 }
 
-/// Of the eight parts of a cube of 3 x 3 x 3 nodes, `half` of its width apart: good or suspect. A
-/// part is not worse than the whole: along a line, what a crease is off in a half of it is no more
-/// than at its middle, and what is smooth is off by a quarter of that.
+/// The states of the eight parts of a cube of 3 x 3 x 3 nodes, `half` of its width apart. A part is
+/// not worse than the whole: along a line, what a crease is off in a half of it is no more than at
+/// its middle, and what is smooth is off by a quarter of that.
 template <class NodeAt>
 void Lattice::Store::Builder::judge(const LatticePlace& place, float half, const NodeAt& node_at,
-                                    std::int32_t* states) const {
+                                    const Parts& within, std::int32_t* states) const {
+    if (std::none_of(within.begin(), within.end(), [](const auto& one) { return one.inside; })) {
+        for (std::size_t part = 0; part < 8; ++part) {
+            states[part] = first_state_of(within[part], true);
+        }
+        return;
+    }
+    const float most = store_.regions_ ? kMostSmoothInLine : kMostCreasedInLine;
     Four moved[kBrickNodes];
     for (int n = 0; n < kBrickNodes; ++n) moved[n] = load_four(node_at(n));
+    const auto colour_of = [&](int n) {
+        return colour_at(store_.low_, store_.step_,
+                         load_four(place.at) + half * load_four(kPlaces.at[n]));
+    };
     Four errors[Lines::kCount];
     for (std::size_t i = 0; i < Lines::kCount; ++i) {
         const auto [middle, step] = kLines.all[i];
-        const Four colour = colour_at(store_.low_, store_.step_,
-                                      load_four(place.at) + half * load_four(kPlaces.at[middle]));
         const Four value = 0.5f * (moved[middle - step] + moved[middle + step]);
-        errors[i] = relative(value - moved[middle], colour, moved[middle]);
+        errors[i] = relative(value - moved[middle], colour_of(middle), moved[middle]);
     }
-    for (int part = 0; part < 8; ++part) {
+    for (std::size_t part = 0; part < 8; ++part) {
         Four worst{};
         for (const int line : kLines.of_part[part]) worst = max(worst, errors[line]);
-        states[part] = largest_of(worst) <= kMostInLine ? kGood : kSuspect;
+        states[part] = first_state_of(within[part], largest_of(worst) <= most);
+        if (!within[part].inside || states[part] < kLatticeFirstPlane) continue;
+        const LatticePlane& plane = store_.planes_[static_cast<std::size_t>(within[part].plane)];
+        const int face = plane.sides[1] / 8;  // region
+        if (goes_on(plane, store_.node(kLatticeFirstRegion + 4 * face), static_cast<int>(part),
+                    moved, colour_of)) {
+            states[part] = kGood;
+        }
     }
 }
 
@@ -245,17 +222,30 @@ void Lattice::Store::Builder::make_jobs() {
     constexpr std::size_t kMiddles = Probes::kMiddles, kAll = Probes::kAll;
     to_cut_.clear();
     middles_.clear();
-    const float* moved = probe(jobs_, 0, kMiddles);
-    float largest = 0;
     long long exact = 0;
-    for (const Job& job : jobs_) {
-        const float error = error_of(job, moved);
-        if (error <= kMost) {
-            largest = std::max(largest, error);
-            publish(job.number, kGood);
-        } else if (job.number >= kLatticeCells) {
+    const auto needs_no_nodes = [&](const Job& job) {
+        if (job.within.region != PaletteRegions::kSeveral) return false;
+        if (job.number >= kLatticeCells) {
             ++exact;
             publish(job.number, kExact);
+            return true;
+        }
+        if (!job.within.inside) cut(job, nullptr, nullptr);
+        return !job.within.inside;
+    };
+    jobs_.erase(std::remove_if(jobs_.begin(), jobs_.end(), needs_no_nodes), jobs_.end());
+    const float* moved = probe(jobs_, 0, kMiddles);
+    float largest = 0;
+    const float most = store_.regions_ ? kMostSmooth : kMostCreased;
+    for (const Job& job : jobs_) {
+        const float error = error_of(job, moved);
+        const bool last = job.number >= kLatticeCells;
+        const bool good = job.within.region != PaletteRegions::kSeveral &&
+                          (job.within.edge ? last && error <= kMostAtEdge : error <= most);
+        if (good || last) {
+            if (good) largest = std::max(largest, error);
+            exact += !good;
+            publish(job.number, state_of(job.within, good));
         } else {
             to_cut_.push_back(job);
             middles_.insert(middles_.end(), moved, moved + 3 * kMiddles);
@@ -274,17 +264,26 @@ void Lattice::Store::Builder::make_jobs() {
 Lattice::Store::Builder::Job Lattice::Store::Builder::job_of(int number) const {
     if (number < kLatticeCells) {
         const Cell cell = cell_at(number);
-        return {place_of(cell),    kCellWidth / 2,        number,
-                cell.first_node(), kNodeSide * kNodeSide, kNodeSide};
+        return {place_of(cell),
+                kCellWidth / 2,
+                number,
+                cell.first_node(),
+                kNodeSide * kNodeSide,
+                kNodeSide,
+                within(place_of(cell), kCellWidth / 2, PaletteRegions::kInside)};
     }
     const int brick = (number - kLatticeFirstPart) / kBrickParts;
     const int part = (number - kLatticeFirstPart) % kBrickParts;
     LatticePlace place = store_.bricks_[brick];
     for (int c = 0; c < 3; ++c) place.at[c] += static_cast<float>(bit(part, c)) * kCellWidth / 2;
     const int first = kLatticeFirstBrick + brick * kBrickNodes;
-    return {place,  kCellWidth / 4,
-            number, first + bit(part, 0) * 9 + bit(part, 1) * 3 + bit(part, 2),
-            9,      3};
+    return {place,
+            kCellWidth / 4,
+            number,
+            first + bit(part, 0) * 9 + bit(part, 1) * 3 + bit(part, 2),
+            9,
+            3,
+            within(place, kCellWidth / 4, PaletteRegions::kInside)};
 }
 
 const float* Lattice::Store::Builder::probe(const std::vector<Job>& jobs, std::size_t first,
@@ -299,7 +298,7 @@ const float* Lattice::Store::Builder::probe(const std::vector<Job>& jobs, std::s
                                      load_four(job.place.at) + job.half * halves));
         }
     }
-    return displacements(colours_.data(), count);
+    return node_displacements(colours_.data(), count);
 }
 
 /// At the middles, which have moved so far.
@@ -331,20 +330,53 @@ void Lattice::Store::Builder::cut(const Job& job, const float* middles, const fl
     const std::int32_t brick = store_.cut_++;
     store_.bricks_[brick] = job.place;
     float* const nodes = store_.node(kLatticeFirstBrick + brick * kBrickNodes);
-    for (int k = 0; k < 8; ++k) {
+    for (int k = 0; middles && k < 8; ++k) {
         const int node = 18 * bit(k, 0) + 6 * bit(k, 1) + 2 * bit(k, 2);
         std::copy_n(store_.node(job.corner(k)), 4, nodes + 4 * node);
     }
-    for (std::size_t p = 0; p < Probes::kAll; ++p) {
+    for (std::size_t p = 0; middles && p < Probes::kAll; ++p) {
         const float* const moved =
             p < Probes::kMiddles ? middles + 3 * p : edges + 3 * (p - Probes::kMiddles);
         std::copy_n(moved, 3, nodes + 4 * kProbes.all[p].node);
     }
+    Parts parts;
+    for (int part = 0; part < kBrickParts; ++part) {
+        LatticePlace place = job.place;
+        for (int c = 0; c < 3; ++c) place.at[c] += static_cast<float>(bit(part, c)) * job.half;
+        parts[static_cast<std::size_t>(part)] =
+            within(place, job.half / 2, PaletteRegions::kInside);
+    }
     std::int32_t states[kBrickParts];
-    judge(job.place, job.half, [&](int n) { return nodes + 4 * n; }, states);
+    judge(job.place, job.half, [&](int n) { return nodes + 4 * n; }, parts, states);
     const int first = kLatticeFirstPart + brick * kBrickParts;
     for (int part = 0; part < kBrickParts; ++part) publish(first + part, states[part]);
-    publish(job.number, kBrick + brick);
+    publish(job.number, -1 - brick);
+}
+
+/// Where its inside is, or is not, interpolated well.
+std::int32_t Lattice::Store::Builder::state_of(const PaletteRegions::Within& within,
+                                               bool good) const {
+    if (within.region == PaletteRegions::kSeveral) return kExact;
+    const bool exact = within.inside && !good;
+    if (within.plane < 0) return exact ? kExact : lattice_region(within.region);
+    const int count = static_cast<int>(store_.planes_.size() / 2);
+    return lattice_plane(within.plane + (exact ? count : 0));
+}
+
+/// The same before it was looked at itself.
+std::int32_t Lattice::Store::Builder::first_state_of(const PaletteRegions::Within& within,
+                                                     bool good) const {
+    if (within.region == PaletteRegions::kSeveral || (within.inside && (!good || within.edge)))
+        return kSuspect;
+    return state_of(within, good);
+}
+
+const float* Lattice::Store::Builder::node_displacements(const float* colours, std::size_t count) {
+    if (!mean_value_) return displacements(colours, count);
+    moved_.resize(3 * count + 1);
+    mean_value_->displacements(colours, count, moved_.data());
+    store_.colours_ += static_cast<long long>(count);
+    return moved_.data();
 }
 
 const float* Lattice::Store::Builder::displacements(const float* colours, std::size_t count) {

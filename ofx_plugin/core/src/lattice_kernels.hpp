@@ -3,27 +3,40 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 namespace palette4d {
 
-/// A cube of cells spans the domain. One that is too coarse is cut in half along each axis: the
-/// nodes of each such cut (a brick) follow those of the cells in memory, after one that is always
-/// 0. Cells, parts and nodes are numbered with blue running fastest; the number of a part is its
-/// brick's, counted from the cells on.
+/// A cube of cells spans the domain. One that is too coarse is cut in half along each axis. Nodes
+/// in memory: those of the cells, one that is always 0, four for each region of the palette's
+/// surface, then those of each cut cell (a brick). Cells, parts and nodes are numbered with blue
+/// running fastest; the number of a part is its brick's, counted from the cells on.
 constexpr int kLatticeSide = 72;  ///< cells along each axis
 constexpr int kLatticeCells = kLatticeSide * kLatticeSide * kLatticeSide;
 constexpr int kLatticeNodes = (kLatticeSide + 1) * (kLatticeSide + 1) * (kLatticeSide + 1);
-constexpr int kLatticeZero = kLatticeNodes;           ///< the node that is 0
-constexpr int kLatticeFirstBrick = kLatticeZero + 1;  ///< its first node
+constexpr int kLatticeZero = kLatticeNodes;            ///< the node that is 0
+constexpr int kLatticeFirstRegion = kLatticeZero + 1;  ///< its first node
+constexpr int kLatticeMostRegions = 256;
+constexpr int kLatticeFirstBrick = kLatticeFirstRegion + 4 * kLatticeMostRegions;
 constexpr int kBrickParts = 8;
 constexpr int kBrickNodes = 27;
 /// Numbers: the cells, what lies outside of the domain, the parts.
 constexpr int kLatticeOutside = kLatticeCells;
 constexpr int kLatticeFirstPart = kLatticeCells + 1;
-/// What a cell or a part is. From kLatticeBrick on, it is cut into parts: brick (state - that); a
-/// bit above all bricks' numbers.
+/// What a cell or a part is. Its last three bits tell whether there is something to apply (those of
+/// kLatticeGood); the others what that is: 0 for interpolation, else a region, or a plane between
+/// two. Negative where it is cut into parts: brick -1 - state.
 constexpr int kLatticeGood = 3;
-constexpr int kLatticeBrick = 1 << 20;
+constexpr int kLatticeKind = 7;
+constexpr int lattice_region(int region) { return 8 * region + kLatticeGood; }
+constexpr int kLatticeFirstPlane = 8 * kLatticeMostRegions;
+constexpr int lattice_plane(int plane) { return kLatticeFirstPlane + 8 * plane + kLatticeGood; }
+
+/// The states below and above normal . colour = offset; they may be other planes'.
+struct LatticePlane {
+    float normal[3], offset;
+    std::int32_t sides[2];
+};
 
 struct LatticeDomain {
     float low[3], high[3];
@@ -51,7 +64,11 @@ struct LatticeKernels {
                    int channels, int count, bool premultiplied);
     /// Where `state` is a brick's, from the cell to the brick's part: within, first, cut, number.
     void (*descend)(LatticeBlock& block, int count);
-    /// Tetrahedral interpolation there: corner, weight. All of it 0 where `state` is not good.
+    /// Where `state` is a plane's: from it to that of the colour's side, until it is none. Not 0
+    /// where something is then not good.
+    std::int32_t (*choose_sides)(const LatticePlane* planes, LatticeBlock& block, int count);
+    /// Tetrahedral interpolation there, or what a region does, an affine function of the colour:
+    /// corner, weight. All of it 0 where `state` is not good.
     void (*weigh)(LatticeBlock& block, int count);
     /// In `to`, what the `count` pixels of `from` become at a strength; channels that do not move
     /// keep their bits. `nodes` are 4 numbers each, the last is 0.

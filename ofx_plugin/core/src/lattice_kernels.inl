@@ -6,6 +6,7 @@ namespace {
 
 using palette4d::LatticeBlock;
 using palette4d::LatticeDomain;
+using palette4d::LatticePlane;
 
 template <int Channels>
 void spread(LatticeBlock& block, const float* from, int count) {
@@ -67,8 +68,7 @@ void descend(LatticeBlock& block, int count) {
                     kFirstNode = palette4d::kLatticeFirstBrick, kNodes = palette4d::kBrickNodes;
     const Lanes<float> zero = all(0.0f), one = all(1.0f), two = all(2.0f), three = all(3.0f);
     for (int at = 0; at < count; at += Lanes<float>::kCount) {
-        const Lanes<float> brick =
-            load_whole(block.state + at) - all(float(palette4d::kLatticeBrick));
+        const Lanes<float> brick = zero - one - load_whole(block.state + at);
         const LaneMask<float> cut = brick >= zero;
         Lanes<float> half[3];
         for (int c = 0; c < 3; ++c) {
@@ -86,18 +86,51 @@ void descend(LatticeBlock& block, int count) {
     }
 }
 
+std::int32_t choose_sides(const LatticePlane* planes, LatticeBlock& block, int count) {
+    constexpr int kFirst = palette4d::kLatticeFirstPlane;
+    int chosen[LatticeBlock::kSize], chosen_count = 0;  // no branch: there is no rule for it
+    for (int i = 0; i < count; ++i) {
+        chosen[chosen_count] = i;
+        chosen_count += block.state[i] >= kFirst;
+    }
+    std::int32_t others = 0;
+    for (int k = 0; k < chosen_count; ++k) {
+        const int i = chosen[k];
+        const float r = block.colour[0][i], g = block.colour[1][i], b = block.colour[2][i];
+        std::int32_t state = block.state[i];
+        do {
+            const LatticePlane& plane = planes[(state - kFirst) / 8];
+            const float height = plane.normal[0] * r + plane.normal[1] * g + plane.normal[2] * b;
+            state = plane.sides[height >= plane.offset];
+        } while (state >= kFirst);
+        block.state[i] = state;
+        others |= state ^ palette4d::kLatticeGood;
+    }
+    return others & palette4d::kLatticeKind;
+}
+
 void weigh(LatticeBlock& block, int count) {
     constexpr float kSide = palette4d::kLatticeSide + 1, kBrickSide = 3;
-    const Lanes<float> zero = all(0.0f), one = all(1.0f),
-                       state_of_good = all(float(palette4d::kLatticeGood));
+    constexpr float kGood = palette4d::kLatticeGood, kKind = palette4d::kLatticeKind;
+    const Lanes<float> zero = all(0.0f), one = all(1.0f);
     for (int at = 0; at < count; at += Lanes<float>::kCount) {
         const LaneMask<float> cut = load(block.cut + at) > zero;
         const Lanes<float> x = load(block.within[0] + at), y = load(block.within[1] + at),
                            z = load(block.within[2] + at), first = load(block.first + at);
         const Lanes<float> state = load_whole(block.state + at);
-        const LaneMask<float> good = (state >= state_of_good) & (state <= state_of_good);
-        const auto offsets = [&](unsigned* to, Lanes<float> node) {
-            store_offsets(to, select(good, node, all(float(palette4d::kLatticeZero))));
+        const LaneMask<float> good = (state >= all(kGood)) & (state <= all(kGood));
+        const LaneMask<float> affine = state > all(kKind);
+        const bool any_affine = any(affine);
+        const Lanes<float> column =
+            all(float(palette4d::kLatticeFirstRegion)) + all(0.5f) * (state - all(kGood));
+        const auto put = [&](int k, Lanes<float> node, Lanes<float> weight, Lanes<float> factor) {
+            node = select(good, node, all(float(palette4d::kLatticeZero)));
+            if (any_affine) {
+                node = select(affine, column + all(float(k)), node);
+                weight = select(affine, factor, weight);
+            }
+            store_offsets(block.corner[k] + at, node);
+            store(block.weight[k] + at, weight);
         };
         const Lanes<float> step_x = select(cut, all(kBrickSide * kBrickSide), all(kSide * kSide)),
                            step_y = select(cut, all(kBrickSide), all(kSide)), step_z = one;
@@ -109,16 +142,12 @@ void weigh(LatticeBlock& block, int count) {
         const Lanes<float> shortest =
             select(xy, select(yz, step_z, step_y), select(xz, step_z, step_x));
         const Lanes<float> end = first + step_x + step_y + step_z;
-        offsets(block.corner[0] + at, first);
-        offsets(block.corner[1] + at, first + longest);
-        offsets(block.corner[2] + at, end - shortest);
-        offsets(block.corner[3] + at, end);
         const Lanes<float> most = max(max(x, y), z), least = min(min(x, y), z),
                            middle = max(min(x, y), min(max(x, y), z));
-        store(block.weight[0] + at, one - most);
-        store(block.weight[1] + at, most - middle);
-        store(block.weight[2] + at, middle - least);
-        store(block.weight[3] + at, least);
+        put(0, first, one - most, one);
+        put(1, first + longest, most - middle, load(block.colour[0] + at));
+        put(2, end - shortest, middle - least, load(block.colour[1] + at));
+        put(3, end, least, load(block.colour[2] + at));
     }
 }
 
@@ -248,7 +277,7 @@ void blend(const float* nodes, const LatticeBlock& block, int count, const float
     constexpr palette4d::KernelSet kKernels = {                                    \
         {&classify<float>, &mean_value<float>, &closest<float>, &move<float>},     \
         {&classify<double>, &mean_value<double>, &closest<double>, &move<double>}, \
-        {&locate, &descend, &weigh, &blend},                                       \
+        {&locate, &descend, &choose_sides, &weigh, &blend},                        \
         {&fall},                                                                   \
     };                                                                             \
     }

@@ -15,7 +15,7 @@ constexpr std::size_t kMostNodes =
 constexpr std::size_t kMostStates =
     kLatticeFirstPart + static_cast<std::size_t>(kLatticeCells) * kBrickParts;
 static_assert(kMostNodes < 1 << 24 && kMostStates < 1 << 24, "floats count nodes and parts");
-static_assert(kLatticeCells < kLatticeBrick, "states count bricks, one a cell at most");
+static_assert(PaletteRegions::kMostRegions <= kLatticeMostRegions, "their nodes have room");
 
 }  // namespace
 
@@ -52,6 +52,7 @@ Lattice::Store::Store(const Recolourer& recolourer)
       states_(memory_.take<State>(kMostStates)),
       node_states_(memory_.take<std::atomic<std::uint8_t>>(kLatticeNodes)) {
     state(kLatticeOutside) = kExact;
+    double farthest = 0;
     for (std::size_t c = 0; c < 3; ++c) {
         double low = 0, high = 1;
         for (const Vec3& colour : recolourer.original()) {
@@ -66,6 +67,36 @@ Lattice::Store::Store(const Recolourer& recolourer)
         domain_.scale[c] = static_cast<float>(kLatticeSide / width);
         low_[c] = domain_.low[c];
         step_[c] = static_cast<float>(width / (4 * kLatticeSide));
+        farthest = std::max({farthest, -low + margin, high + margin});
+    }
+    regions_ = PaletteRegions::of(recolourer.body(), recolourer.displacement(), step_, farthest);
+    if (regions_) add_regions();
+}
+
+void Lattice::Store::add_regions() {
+    const int count = static_cast<int>(regions_->planes().size());
+    for (const bool exact : {false, true}) {
+        const auto state = [&](int side) -> std::int32_t {
+            if (side < 0) return lattice_plane(PaletteRegions::chosen(side) + exact * count);
+            return side == PaletteRegions::kInside && exact ? kExact : lattice_region(side);
+        };
+        for (const PaletteRegions::Plane& plane : regions_->planes()) {
+            LatticePlane rounded{};
+            for (std::size_t c = 0; c < 3; ++c) {
+                rounded.normal[c] = static_cast<float>(plane.normal[c]);
+            }
+            rounded.offset = static_cast<float>(plane.offset);
+            rounded.sides[0] = state(plane.below);
+            rounded.sides[1] = state(plane.above);
+            planes_.push_back(rounded);
+        }
+    }
+    for (std::size_t region = 0; region < regions_->count(); ++region) {
+        for (std::size_t k = 0; k < 4; ++k) {
+            const Vec3& column = regions_->affine(region)[k];
+            float* const to = node(kLatticeFirstRegion + static_cast<int>(4 * region + k));
+            for (std::size_t c = 0; c < 3; ++c) to[c] = static_cast<float>(column[c]);
+        }
     }
 }
 

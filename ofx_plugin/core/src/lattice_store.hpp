@@ -12,7 +12,9 @@
 
 #include "exact_worker.hpp"
 #include "lattice_kernels.hpp"
+#include "mean_value_worker.hpp"
 #include "palette4d/lattice.hpp"
+#include "palette4d/palette_regions.hpp"
 
 namespace palette4d {
 
@@ -55,20 +57,14 @@ class Lattice::Store {
 public:
     /// States. Cells are made eight at a time (a group), with all nodes between them: where these
     /// tell that a cell is fine it is good, else suspect until it was looked at itself.
-    enum : std::int32_t {
-        kUnknown = 0,
-        kClaimed,
-        kSuspect,
-        kGood = kLatticeGood,
-        kExact,
-        kBrick = kLatticeBrick
-    };
+    enum : std::int32_t { kUnknown = 0, kClaimed, kSuspect, kGood = kLatticeGood, kExact };
     using State = std::atomic<std::int32_t>;
 
     explicit Store(const Recolourer& recolourer);
 
     const LatticeDomain& domain() const { return domain_; }
     const float* nodes() const { return nodes_; }
+    const LatticePlane* planes() const { return planes_.data(); }
     /// Of a cell or part, by its number.
     State& state(int number) { return states_[static_cast<std::size_t>(number)]; }
 
@@ -83,7 +79,11 @@ private:
 
     float* node(int number) { return nodes_ + 4 * static_cast<std::size_t>(number); }
 
+    void add_regions();
+
     const Recolourer& recolourer_;
+    std::unique_ptr<const PaletteRegions> regions_;
+    std::vector<LatticePlane> planes_;  ///< between them; then all again, with an exact inside
     LatticeDomain domain_;
     float low_[4], step_[4];  ///< of the domain; half of a part's width
     Zeros memory_;
@@ -116,14 +116,23 @@ private:
         LatticePlace place;
         float half;  ///< of its width
         int number, node, step_x, step_y;
+        PaletteRegions::Within within;
         int corner(int k) const {
             return node + (k >> 2) * step_x + (k >> 1 & 1) * step_y + (k & 1);
         }
     };
 
+    using Parts = std::array<PaletteRegions::Within, 8>;
+    struct Group {
+        int number;    ///< its first cell's
+        Parts within;  ///< its cells
+    };
+
     void make_groups();
+    PaletteRegions::Within within(const LatticePlace& place, float half, int start) const;
+    bool find_regions(Group& group) const;
     void take_nodes(int group);
-    void publish_group(int group);
+    void publish_group(const Group& group);
     void make_jobs();
     Job job_of(int number) const;
     /// What the probes `first` to `last` - 1 of jobs have moved.
@@ -131,15 +140,22 @@ private:
     float error_of(const Job& job, const float* moved) const;
     void cut(const Job& job, const float* middles, const float* edges);
     template <class NodeAt>
-    void judge(const LatticePlace& place, float half, const NodeAt& node_at,
+    void judge(const LatticePlace& place, float half, const NodeAt& node_at, const Parts& within,
                std::int32_t* states) const;
+    std::int32_t state_of(const PaletteRegions::Within& within, bool good) const;
+    std::int32_t first_state_of(const PaletteRegions::Within& within, bool good) const;
     void publish(int number, std::int32_t state) {
         store_.state(number).store(state, std::memory_order_release);
     }
 
+    /// By mean value coordinates everywhere where there are regions, else exactly.
+    const float* node_displacements(const float* colours, std::size_t count);
+
     Store& store_;
     ExactWorker exact_;
-    std::vector<int> groups_, taken_;
+    std::unique_ptr<MeanValueWorker> mean_value_;  ///< where there are regions
+    std::vector<Group> groups_;
+    std::vector<int> taken_;
     std::vector<Job> jobs_, to_cut_;
     std::vector<float> colours_, moved_, middles_;
 };

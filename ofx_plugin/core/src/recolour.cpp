@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <cstring>
 #include <limits>
 #include <mutex>
@@ -180,7 +179,8 @@ private:
               tolerance_(static_cast<T>(
                   kSingleTolerance / 2 *
                   std::max(1 / std::abs(options.strength), static_cast<double>(plan_.spread)))),
-              next_(next) {
+              next_(next),
+              scratch_(plan_) {
             if (!usable_) return;
             // Pictures have many colours that lie on the surface exactly, in a face where a channel
             // is 0 or 1: they take the closest point. Where the surface is, is rounded by about
@@ -190,10 +190,6 @@ private:
                 shell_ = step;
                 at_surface_ = 0;
             }
-            constexpr std::size_t kNumbers = 64 / sizeof(T);
-            scratch_.resize(static_cast<std::size_t>(scratch_size(plan_)) + kNumbers);
-            const auto misfit = reinterpret_cast<std::uintptr_t>(scratch_.data()) % 64 / sizeof(T);
-            aligned_ = scratch_.data() + (kNumbers - misfit) % kNumbers;
         }
 
         /// Up to Block::kSize pixels that lie next to each other.
@@ -219,13 +215,13 @@ private:
                 }
             }
             if (usable_) {
-                kernels_.classify(plan_, batch.block, count, shell_, at_surface_, aligned_);
+                kernels_.classify(plan_, batch.block, count, shell_, at_surface_, scratch_.data());
             } else {
                 for (int i = 0; i < count; ++i) batch.block.verdict[i] = 0;
             }
             const Kernel kernel = all_good ? same_kernel(batch.block, count) : nullptr;
             if (kernel) {
-                kernel(plan_, batch.block, count, tolerance_, aligned_);
+                kernel(plan_, batch.block, count, tolerance_, scratch_.data());
                 kernels_.move(batch.block, count, strength_, divide_);
             }
             for (int i = 0; i < count; ++i) {
@@ -303,7 +299,8 @@ private:
         void sort() {
             Batch& batch = incoming_;
             if (batch.count == 0) return;
-            kernels_.classify(plan_, batch.block, batch.count, shell_, at_surface_, aligned_);
+            kernels_.classify(plan_, batch.block, batch.count, shell_, at_surface_,
+                              scratch_.data());
             if (const Kernel kernel = same_kernel(batch.block, batch.count)) {
                 flush(batch, kernel);
                 return;
@@ -338,7 +335,7 @@ private:
 
         void flush(Batch& batch, Kernel kernel) {
             if (batch.count == 0) return;
-            kernel(plan_, batch.block, batch.count, tolerance_, aligned_);
+            kernel(plan_, batch.block, batch.count, tolerance_, scratch_.data());
             kernels_.move(batch.block, batch.count, strength_, divide_);
             for (int i = 0; i < batch.count; ++i) {
                 float* to = batch.to[i];
@@ -361,8 +358,7 @@ private:
         T shell_ = 0;
         T at_surface_ = -1;
         Next& next_;
-        std::vector<T> scratch_;
-        T* aligned_ = nullptr;
+        Scratch<T> scratch_;
         Batch incoming_, sorted_[2];  ///< those inside, those outside
         long long count_ = 0;
     };

@@ -1,6 +1,7 @@
 // A palette and its edit as the kernels of block_kernels.hpp want them.
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "block_kernels.hpp"
@@ -37,6 +38,22 @@ private:
 
 extern template class PlanMemory<float>;
 extern template class PlanMemory<double>;
+
+/// What kernels want for scratch memory.
+template <class T>
+class Scratch {
+public:
+    explicit Scratch(const Plan<T>& plan)
+        : memory_(static_cast<std::size_t>(scratch_size(plan)) + kNumbers) {}
+    T* data() {
+        const auto misfit = reinterpret_cast<std::uintptr_t>(memory_.data()) % 64 / sizeof(T);
+        return memory_.data() + (kNumbers - misfit) % kNumbers;
+    }
+
+private:
+    static constexpr std::size_t kNumbers = 64 / sizeof(T);
+    std::vector<T> memory_;
+};
 
 /// Both precisions of one palette and edit.
 struct RecolourPlan {

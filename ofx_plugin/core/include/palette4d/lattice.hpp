@@ -26,15 +26,19 @@ struct LatticeCounts {
 /// every side. It is made while it is used: of its 72^3 cells only those that pixels lie in, eight
 /// (2 x 2 x 2) at a time. Where these tell by their 27 nodes that the interpolation in one is good,
 /// it is. Others are looked at in seven more points that are evaluated exactly, and those that err
-/// by more than kProbeTolerance are halved along each axis. Their parts are treated alike; parts
-/// that are not good enough, and all that lies outside, are recoloured exactly. What a cell holds
-/// depends on the palette and the edit only. Used by many threads at a time.
+/// by too much are halved along each axis. Their parts are treated alike; parts that are not good
+/// enough, and all that lies outside, are recoloured exactly. What a cell holds depends on the
+/// palette and the edit only. Used by many threads at a time.
+///
+/// Where the palette is convex (PaletteRegions), colours outside of it are not interpolated: their
+/// displacement is an affine function of them, region by region. Nodes are then the inside's mean
+/// value coordinates, beyond the surface as well, so that a cell that the surface crosses is
+/// interpolated below it, as smoothly as if it were not there.
 class Lattice {
 public:
-    /// Of (interpolated - exact) / max(|exact|, 0.1), channel by channel.
+    /// Of (interpolated - exact) / max(|exact|, 0.1), channel by channel. Where cells are looked at
+    /// less is asked for, since an error is larger in between.
     static constexpr double kTolerance = 0.002;
-    /// Less, since an error is larger between the points where it is looked at.
-    static constexpr double kProbeTolerance = 0.0008;
 
     /// Throws std::invalid_argument for null.
     explicit Lattice(std::shared_ptr<const Recolourer> recolourer);

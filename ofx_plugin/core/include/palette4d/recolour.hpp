@@ -77,6 +77,10 @@ public:
     /// Some colour moves; else apply() copies as well.
     bool moves() const { return !displaced_.empty(); }
     const std::vector<Vec3>& original() const { return body_.rgb(); }
+    /// For the core's own sources; the plan is there where some colour moves.
+    const PaletteBody& body() const { return body_; }
+    const std::vector<Vec3>& displacement() const { return displacement_; }
+    const RecolourPlan& plan() const { return *plan_; }
     /// One colour, in double precision. A colour with a NaN or an infinity is returned as it is.
     Vec3 displaced(const Vec3& p, double strength) const;
     /// `in` and `out` have the same size and channels; they may be the same memory. Rows are shared
