@@ -62,7 +62,7 @@ public:
 private:
     static constexpr int kSize = LatticeBlock::kSize;
     static constexpr std::size_t kWaiting = 16, kMostLeft = 256;
-    static constexpr int kSampleEvery = 7;  ///< blocks; a pixel of one is also evaluated exactly
+    static constexpr int kSampleEvery = 16;  ///< blocks; a pixel of one is also evaluated exactly
 
     /// Blocks that are asked of memory early: work on one takes as long as that.
     static constexpr int kAhead = 2;

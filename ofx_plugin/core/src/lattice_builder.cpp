@@ -11,20 +11,11 @@ namespace {
 /// Where there are regions, what is interpolated is smooth: what it may be off at the probes; along
 /// three nodes in a line, of which it is a quarter between two; near an edge of the palette, where
 /// it bends most between the probes; and what going on beyond the surface may be off.
-constexpr float kMostSmooth = 0.0012f, kMostSmoothInLine = 2.5f * kMostSmooth,
+constexpr float kMostSmooth = 0.0012f, kMostSmoothInLine = 2.0f * kMostSmooth,
                 kMostAtEdge = 0.0004f, kMostBeyond = 0.0003f;
 /// Elsewhere a crease may lie between the probes. Between three nodes in a line an interpolation is
 /// better than across all three: an error that is smooth by four times.
 constexpr float kMostCreased = 0.0008f, kMostCreasedInLine = 1.25f * kMostCreased;
-
-struct Point {
-    float at[4];
-};
-Point centre_of(const float* low, const float* step, const LatticePlace& place, float half_width) {
-    Point centre;
-    store_four(centre.at, colour_at(low, step, load_four(place.at) + all_four(half_width)));
-    return centre;
-}
 
 /// Whether, in one of the eight parts of a cube of 3 x 3 x 3 nodes that have `moved`, the
 /// displacement goes on beyond the plane as below it: above, it is that of four columns.
@@ -107,12 +98,13 @@ PaletteRegions::Within Lattice::Store::Builder::within(const LatticePlace& place
 bool Lattice::Store::Builder::find_regions(Group& group) const {
     const Cell cell = cell_at(group.number);
     const LatticePlace place = place_of(cell);
-    int region = PaletteRegions::kInside;
-    bool whole = true;
+    PaletteRegions::Around around{PaletteRegions::kInside, 0, 0};
     if (store_.regions_) {
         const Point centre = centre_of(store_.low_, store_.step_, place, kCellWidth);
-        region = store_.regions_->around(centre.at, kCellWidth, region, whole);
+        around = store_.regions_->around(centre.at, kCellWidth, around.region);
     }
+    const int region = std::max(around.region, +PaletteRegions::kInside);
+    const bool whole = around.region == region && around.crossings == 0;
     bool nodes = false;
     for (int part = 0; part < 8; ++part) {
         PaletteRegions::Within& one = group.within[static_cast<std::size_t>(part)];
@@ -198,16 +190,24 @@ void Lattice::Store::Builder::judge(const LatticePlace& place, float half, const
         return colour_at(store_.low_, store_.step_,
                          load_four(place.at) + half * load_four(kPlaces.at[n]));
     };
-    Four errors[Lines::kCount];
+    Four allowed[kBrickNodes];
+    for (int n = 0; n < kBrickNodes; ++n) allowed[n] = most * size_of(colour_of(n), moved[n]);
+    Four beyond[Lines::kCount], farthest = all_four(-1);
     for (std::size_t i = 0; i < Lines::kCount; ++i) {
         const auto [middle, step] = kLines.all[i];
         const Four value = 0.5f * (moved[middle - step] + moved[middle + step]);
-        errors[i] = relative(value - moved[middle], colour_of(middle), moved[middle]);
+        beyond[i] = abs(value - moved[middle]) - allowed[middle];
+        farthest = max(farthest, beyond[i]);
     }
+    const bool all_good = largest_of(farthest) <= 0;
     for (std::size_t part = 0; part < 8; ++part) {
-        Four worst{};
-        for (const int line : kLines.of_part[part]) worst = max(worst, errors[line]);
-        states[part] = first_state_of(within[part], largest_of(worst) <= most);
+        bool good = all_good;
+        if (!all_good) {
+            Four worst = all_four(-1);
+            for (const int line : kLines.of_part[part]) worst = max(worst, beyond[line]);
+            good = largest_of(worst) <= 0;
+        }
+        states[part] = first_state_of(within[part], good);
         if (!within[part].inside || states[part] < kLatticeFirstPlane) continue;
         const LatticePlane& plane = store_.planes_[static_cast<std::size_t>(within[part].plane)];
         const int face = plane.sides[1] / 8;  // region

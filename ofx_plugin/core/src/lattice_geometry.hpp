@@ -112,13 +112,28 @@ inline Four colour_at(const float* low, const float* step, Four place) {
     return load_four(low) + place * load_four(step);
 }
 
-/// As lattice_error().
-inline Four relative(Four error, Four colour, Four moved) {
+struct Point {
+    float at[4];
+};
+/// Of something that is so wide from there on.
+inline Point centre_of(const float* low, const float* step, const LatticePlace& place,
+                       float half_width) {
+    Point centre;
+    store_four(centre.at, colour_at(low, step, load_four(place.at) + all_four(half_width)));
+    return centre;
+}
+
+/// What errors are measured in, as lattice_error() does.
+inline Four size_of(Four colour, Four moved) {
     const Four exact = colour + moved, least = all_four(0.1f);
-    return abs(error) / where_negative(colour * exact, least, max(abs(exact), least));
+    return where_negative(colour * exact, least, max(abs(exact), least));
 }
 
 inline float largest_of(Four error) { return std::max(std::max(error[0], error[1]), error[2]); }
+
+inline Four relative(Four error, Four colour, Four moved) {
+    return abs(error) / size_of(colour, moved);
+}
 
 }  // namespace
 }  // namespace palette4d

@@ -207,7 +207,8 @@ bool PaletteRegions::find(int region, const float* centre, float half_width, Fou
     return true;
 }
 
-int PaletteRegions::around(const float* centre, float half_width, int start, bool& whole) const {
+PaletteRegions::Around PaletteRegions::around(const float* centre, float half_width,
+                                              int start) const {
     // Across the walls that the centre is farthest behind to where it is.
     constexpr int kMostSteps = 16;
     int region = start;
@@ -215,46 +216,60 @@ int PaletteRegions::around(const float* centre, float half_width, int start, boo
         const Walls& walls = walls_[index(region)];
         const Rooms rooms(walls, centre, half_width);
         float least = 0;
-        std::size_t farthest = 0;
-        bool crossed = false;
+        std::size_t farthest = 0, crossed = 0;
+        int crossings = 0;
         for (std::size_t i = 0; i < rooms.count; ++i) {
             if (rooms.centre[i] < least) {
                 least = rooms.centre[i];
                 farthest = i;
             }
-            crossed |= rooms.centre[i] < rooms.box[i];
+            if (rooms.centre[i] < rooms.box[i]) {
+                ++crossings;
+                crossed = i;
+            }
         }
-        if (least < 0) {
-            region = walls.beyond[farthest];
-            continue;
-        }
-        whole = !crossed;
-        return region;
+        if (least >= 0) return {region, crossings, crossed};
+        region = walls.beyond[farthest];
     }
-    whole = false;
-    return kInside;
+    return {kSeveral, 0, 0};
+}
+
+bool PaletteRegions::within_two(int region, int other, const float* centre,
+                                float half_width) const {
+    const Walls& walls = walls_[index(other)];
+    const Rooms rooms(walls, centre, half_width);
+    for (std::size_t i = 0; i < rooms.count; ++i) {
+        if (rooms.centre[i] < rooms.box[i] && walls.beyond[i] != region) return false;
+    }
+    return true;
 }
 
 PaletteRegions::Within PaletteRegions::within(const float* centre, float half_width,
                                               int start) const {
-    bool whole;
-    const int region = around(centre, half_width, start, whole);
-    if (whole) return {region, -1, region == kInside};
+    const auto [region, crossings, crossed] = around(centre, half_width, start);
+    if (region == kSeveral) return {kSeveral, -1, true};
+    if (crossings == 0) return {region, -1, region == kInside};
+    const Walls& walls = walls_[index(region)];
     Found found;
-    if (!find(region, centre, half_width, found)) return {kSeveral, -1, true};
+    // The most frequent ones need no search.
+    if (crossings == 1 && within_two(region, walls.beyond[crossed], centre, half_width)) {
+        found.count = 2;
+        found.regions[0] = region;
+        found.regions[1] = walls.beyond[crossed];
+    } else if (!find(region, centre, half_width, found)) {
+        return {kSeveral, -1, true};
+    }
     const bool inside = found.has(kInside);
     const Within neither{kSeveral, -1, inside};
-    if (!inside && std::all_of(found.begin(), found.end(), [&](int other) {
-            return alike(region, other, centre, half_width);
-        })) {
+    const auto moves_alike = [&](int other) { return alike(region, other, centre, half_width); };
+    if (!inside && std::all_of(found.begin(), found.end(), moves_alike)) {
         return {region, -1, false};
     }
     if (found.count == 2) {
-        const Walls& walls = walls_[index(region)];
         const auto beyond = std::find(walls.beyond.begin(), walls.beyond.end(), found.regions[1]);
         if (beyond == walls.beyond.end()) return neither;
-        return {region, walls.plane[index(static_cast<int>(beyond - walls.beyond.begin()))],
-                inside};
+        const auto wall = static_cast<std::size_t>(beyond - walls.beyond.begin());
+        return {region, walls.plane[wall], inside};
     }
     for (const int edge : found) {
         if (edge_choices_[index(edge)] < 0) continue;

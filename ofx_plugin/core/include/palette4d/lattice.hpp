@@ -55,8 +55,8 @@ public:
                         const RecolourOptions& options) const;
 
     /// The largest error, measured as kTolerance says and at strength 1, that was seen so far: of
-    /// the points looked at in the cells in use and of every few hundredth pixel, evaluated exactly
-    /// as well. 0 before the first apply().
+    /// the points looked at in the cells in use and of about every thousandth pixel, evaluated
+    /// exactly as well. 0 before the first apply().
     double largest_error() const;
 
     /// What the lattice holds at the moment.

@@ -50,8 +50,13 @@ public:
         bool edge = false;  ///< and an edge of it
     };
     Within within(const float* centre, float half_width, int start = kInside) const;
-    /// The centre's region, which is looked for from `start` on; `whole` where it is the box's.
-    int around(const float* centre, float half_width, int start, bool& whole) const;
+    /// The centre's region, or kSeveral where it was not found, and how many of the planes around
+    /// it cross the box: 0 where the region is the whole box's. It is looked for from `start` on.
+    struct Around {
+        int region, crossings;
+        std::size_t crossed;  ///< the last of those planes, as the region counts them
+    };
+    Around around(const float* centre, float half_width, int start) const;
 
 private:
     /// Of one region, a number each.
@@ -71,6 +76,7 @@ private:
     void add_walls(const float* unit);
     bool precise(double size) const;
     bool alike(int a, int b, const float* centre, float half_width) const;
+    bool within_two(int region, int other, const float* centre, float half_width) const;
     bool find(int region, const float* centre, float half_width, Found& found) const;
 
     std::vector<Plane> planes_;
