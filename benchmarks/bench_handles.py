@@ -184,7 +184,9 @@ def draw(
             axes.plot([f.vertices], [f.L_prime], "D", color=colour, markersize=6, zorder=3)
         axes.set_xlabel("vertices: handles that a user has, over the whole clip")
         axes.set_ylabel("loss (eqs. 4 and 12), every pixel counted")
-        axes.set_ylim(0, 1.06 * max(f.L_prime for f in [*line, *(m[2] for m in marks)]))
+        # A palette of four colours may be far above all others: the line may leave at the top.
+        axes.set_ylim(0, 1.25 * max(f.L_prime for _, _, f in marks))
+        axes.xaxis.get_major_locator().set_params(integer=True)
         axes.margins(x=0.06)
         axes.grid(color="#e4e4e4", linewidth=0.7)
         axes.set_axisbelow(True)
