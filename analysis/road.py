@@ -4,12 +4,14 @@ glued together to strands."""
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from palette4d import _core
 from palette4d.analysis import block_merging, frame_hulls, glue, static_hull, statistics
 from palette4d.analysis.block_merging import Block
 from palette4d.analysis.losses import Losses, loss_weights, smoothness, summarise, thread_count
@@ -131,10 +133,14 @@ class Road:
         self.measure("frame_hulls", strands.polytope(), len(blocks))
         return blocks
 
+    @functools.cached_property
+    def pooled(self) -> _core.ColourTree:
+        """The colours of all frames together."""
+        return statistics.pooled([f.coarse for f in self.frames], self.options.coarse_colours)
+
     def static(self, options: AnalysisOptions) -> SkewPolytope:
         """Return the static palette of section 6.2."""
-        pooled = statistics.pooled([f.coarse for f in self.frames], options.coarse_colours)
-        palette = frame_hulls.frame_palette(pooled, self.low, self.high, options)
+        palette = frame_hulls.frame_palette(self.pooled, self.low, self.high, options)
         polytope = static_hull.static_polytope(palette, self.frames, self.low, self.high, options)
         self.report("static_hull", 1, 1)
         return polytope

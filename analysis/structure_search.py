@@ -71,14 +71,17 @@ class Skew(Road):
         """Search, insert stops, refine, and compare with what is simple."""
         static = self.static(self.options)
         self.measure("static_hull", static)
-        hulls = self.plain_hulls() or [static]
-        simple = min((static, *hulls), key=lambda hull: self.losses(hull).L_prime)
+        hulls = self.plain_hulls()
+        simple, reference = static, self.stages[-1].losses.L_prime
+        for hull in hulls:
+            if (found := self.losses(hull).L_prime) < reference:
+                simple, reference = hull, found
         configurations = self.configurations()
         candidates: list[Candidate] = []
         for i, blocks in enumerate(reversed(configurations)):  # those of few blocks cost least
             bound = min((c.price for c in candidates), default=math.inf)
             candidates.append(self.simplified(blocks, i, len(configurations), bound))
-        for hull in hulls:
+        for hull in hulls or [static]:
             candidates.append(Candidate(hull, self.compared(hull)))
         steps = [c.removed for c in candidates]
         chosen = candidates[steps.index(handle_removal.choose(steps, self.options))]
@@ -90,7 +93,7 @@ class Skew(Road):
         ways = [lambda: self.refined(removed.polytope, self.options, removed.brief)]
         if removed.brief:
             ways.append(lambda: self.refined(chosen.removed.polytope, self.options))
-        polytope = self.never_worse(ways, simple)
+        polytope = self.never_worse(ways, simple, reference)
         remarks = chosen.remarks if len(polytope.blocks) > 1 else ()
         if 0 < self.options.vertices < len(polytope.vertices):
             remarks = (
@@ -107,11 +110,10 @@ class Skew(Road):
         return [hull for hull in hulls if not most or len(hull.vertices) <= most]
 
     def never_worse(
-        self, ways: list[Callable[[], SkewPolytope]], simple: SkewPolytope
+        self, ways: list[Callable[[], SkewPolytope]], simple: SkewPolytope, reference: float
     ) -> SkewPolytope:
-        """Take the first of the ways to a refined polytope that is not worse than `simple` by L';
-        if there is none, `simple` itself, kept in shape as far as that allows."""
-        reference = self.losses(simple).L_prime
+        """Take the first of the ways to a refined polytope whose L' is not above `reference`, that
+        of `simple`; if there is none, `simple` itself, kept in shape as far as that allows."""
         for weight in SHAPE_WEIGHTS:
             relaxed = self.shaped(weight)
             ways.append(functools.partial(self.refined, simple, relaxed))
