@@ -7,35 +7,14 @@ import itertools
 import numpy as np
 import pytest
 from analysis_frames import mixture, stats
+from bent_track import FACES, FOUR, bent, colours_at
 from palette4d import _core
 from palette4d.analysis.frame_hulls import hull_mesh
 from palette4d.analysis.objective import Objective, loss_of, move, refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Section, SkewPolytope
 
-FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
-FACES = hull_mesh(FOUR).faces
 LOW, HIGH = np.zeros(3), np.ones(3)
-
-
-def bent(middle=6.0):
-    """Frames 0 to 10; three colours rest, colour 1 goes to blue-ish by `middle` and back."""
-    ends = [[*c, t] for t in (0.0, 10.0) for c in FOUR]
-    vertices = np.array([*ends, [0.9, 0.2, 0.7, middle]])
-    tracks = ((0, 4), (1, 8, 5), (2, 6), (3, 7))
-    return SkewPolytope(vertices, (Section(0.0, 10.0, tracks, FACES),), ())
-
-
-def colours_at(polytope, t):
-    return np.array(
-        [
-            [
-                np.interp(t, polytope.vertices[list(k), 3], polytope.vertices[list(k), c])
-                for c in range(3)
-            ]
-            for k in polytope.blocks[0].tracks
-        ]
-    )
 
 
 @pytest.fixture

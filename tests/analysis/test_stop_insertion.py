@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from analysis_frames import mixture, stats
+from bent_track import colours_at
 from palette4d.analysis.frame_hulls import hull_mesh
 from palette4d.analysis.losses import loss_weights
 from palette4d.analysis.objective import Objective, loss_of
@@ -51,11 +52,6 @@ def farthest(polytope, frames):
         polytope.vertices, list(range(len(frames))), loss_weights(AnalysisOptions()), 1, False
     )
     return rows[:, 4]
-
-
-def colours_at(polytope, time):
-    tracks = [polytope.vertices[list(t)] for t in polytope.blocks[0].tracks]
-    return np.array([[np.interp(time, t[:, 3], t[:, c]) for c in range(3)] for t in tracks])
 
 
 @pytest.mark.parametrize("lit", [(10,), (9, 10, 11), (3, 16)])
