@@ -5,17 +5,18 @@ Merging takes a block's palettes on from frame to frame, and removal looks at th
 a colour that is there for a few frames only, however far it lies outside. So two kinds of frames
 are looked at: those that fit much worse than the usual one, and those of whose pixels some are lost
 (`LOST`). The colours that one leaves outside get a stop on a track near to them, with or without
-one before and after, which keep the rest of the track where it is. Such stops need not be worth
-`handle_cost`, which is a matter of the mean; they stay if they make good most of what the frame
-lacks and nothing else suffers for it. That they come and go at once is not held against them: eq.
-11 would rather lose a light than let a colour jump.
+one before and after, which keep the rest of the track where it is; at the clip's ends the track's
+own vertex takes the light's colour. Such stops need not be worth `handle_cost`, which is a matter
+of the mean; they stay if they make good most of what the frame lacks and nothing else suffers for
+it: in a frame with lost pixels what is minimised may rise by `WORTH`. That they come and go at once
+is hardly held against them: eq. 11 would rather lose a light than let a colour jump.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,12 +26,16 @@ from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Section, SkewPolytope
 from palette4d.analysis.statistics import FrameStatistics
 from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial.distance import cdist
 
 F64 = NDArray[np.float64]
 
-MOST_FRAMES = 6
+MOST_ROUNDS = 10
 BAD = 3.0  # times the median frame's loss: a frame to be looked at
 MENDED = 0.5  # of what is lacking must go
+WORTH = 0.02  # of a light: by how much what is minimised may rise for it
+SAME_LIGHT = 0.25  # lost colours so near to each other are of one light
+FEW_COLOURS = 1000  # of the farthest ones lights are made
 NEAREST = 3  # tracks tried
 EVALUATIONS = 30
 
@@ -59,23 +64,22 @@ def insert_stops(
     scale = colour_scale(low, high)
     now = Inserted(polytope, ())
     hopeless: set[int] = set()
-    for _ in range(MOST_FRAMES):
+    for _ in range(MOST_ROUNDS):
         lacks = _lacks(now.polytope, statistics, options, scale)
         worst = lacks.worst(hopeless)
         if worst is None:
             break
-        enough = lacks.enough(worst)
         best: tuple[float, Inserted] | None = None
-        for trial, added in _trials(now.polytope, statistics, lacks.loss, worst, scale):
-            if options.vertices and len(trial.vertices) > options.vertices:
+        for trial in _trials(now.polytope, statistics, lacks, worst, scale):
+            if options.vertices and len(trial.polytope.vertices) > options.vertices:
                 continue
-            moved, change = _settled(now, trial, added, statistics, low, high, options)
-            price = change + options.handle_cost * len(added)
-            if change > 0 or (best and price >= best[0]):
+            moved, change = _settled(now, trial, statistics, low, high, options)
+            price = change + options.handle_cost * len(trial.new)
+            if change > (WORTH if trial.share else 0) or (best and price >= best[0]):
                 continue
-            rest = _lacks(moved, [statistics[worst]], options, scale)
-            if enough(rest):
-                best = price, Inserted(moved, (*now.brief, added[0]))
+            rest = _lacks(moved.polytope, [statistics[worst]], options, scale)
+            if lacks.mended(worst, rest, trial.share):
+                best = price, moved
         if best is None:
             hopeless.add(worst)
         else:
@@ -104,13 +108,14 @@ class _Lacks:
                 return max(found, key=lambda i: of[i])
         return None
 
-    def enough(self, frame: int) -> Callable[[_Lacks], bool]:
-        """Return whether that frame alone, in `_Lacks` of its own, lacks so much less."""
+    def mended(self, frame: int, rest: _Lacks, share: float) -> bool:
+        """Return whether that frame alone, in `rest`, lacks so much less: of a light, on this share
+        of its pixels, most is no longer lost."""
+        if share:
+            less = self.lost[frame] - rest.lost[0] >= MENDED * share
+            return bool(less and rest.far[0] < self.far[frame])
         usual = float(np.median(self.loss))
-        if self.loss[frame] > BAD * usual:
-            most = self.loss[frame] - MENDED * (self.loss[frame] - usual)
-            return lambda rest: bool(rest.loss[0] <= most)
-        return lambda rest: bool(rest.far[0] <= MENDED * self.far[frame])
+        return bool(rest.loss[0] <= self.loss[frame] - MENDED * (self.loss[frame] - usual))
 
 
 def _lacks(
@@ -135,36 +140,55 @@ def _lacks(
     return _Lacks(options.lambda_ * rows[:, 0] + rows[:, 1] + rows[:, 2], rows[:, 2], lost)
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Trial:
+    """A polytope with new stops: their vertices, how many of these (the first ones) have the lost
+    colour, and the share of the frame's pixels that are this light, 0 where none are lost."""
+
+    polytope: SkewPolytope
+    new: list[int]
+    peaks: int
+    share: float
+
+
 def _trials(
     polytope: SkewPolytope,
     statistics: Sequence[FrameStatistics],
-    losses: F64,
+    lacks: _Lacks,
     worst: int,
     scale: float,
-) -> Iterator[tuple[SkewPolytope, list[int]]]:
-    """Polytopes with a stop more in the worst frame, and their new vertices."""
+) -> Iterator[_Trial]:
+    """Ways to give the worst frame what it lacks."""
     frame = statistics[worst]
     time = float(frame.frame)
     for place, block in enumerate(polytope.blocks):
         if not block.first <= time <= block.last or len(block.faces) == 0:
             continue
         rgb = _colours(polytope, block, time)
-        target = _lost_colour(rgb, frame, LOST * scale)
+        target, share = _lost_colour(rgb, frame, scale)
         if target is None:
             continue
-        # For as long as frames are nearer to this one than to the usual.
-        limit = (losses[worst] + float(np.median(losses))) / 2
-        before = next((i for i in range(worst, -1, -1) if losses[i] < limit), None)
-        after = next((i for i in range(worst, len(losses)) if losses[i] < limit), None)
-        ends = [float(statistics[i].frame) for i in (before, after) if i is not None]
+        # For as long as frames lack nearly as much as this one.
+        if share:
+            what, limit = lacks.far, lacks.far[worst] / 2
+        else:
+            what, limit = lacks.loss, (lacks.loss[worst] + float(np.median(lacks.loss))) / 2
+        before = next((i for i in range(worst, -1, -1) if what[i] < limit), -1)
+        after = next((i for i in range(worst, len(what)) if what[i] < limit), len(what))
+        beside = [float(statistics[i].frame) for i in (before, after) if 0 <= i < len(what)]
+        lasting = [float(statistics[i].frame) for i in (before + 1, after - 1)]
+        # At once; with the track kept beside it; and for as long as it is there.
+        shapes = [([time], []), ([time], beside)]
+        if share and lasting[0] < lasting[1]:
+            shapes.append((lasting, beside))
         nearest = np.argsort(np.linalg.norm(rgb - target, axis=1), kind="stable")[:NEAREST]
-        for track, pinned in itertools.product(nearest.tolist(), (False, True)):
-            stops = [(*target.tolist(), time)]
-            for end in ends if pinned else ():
-                stops.append((*_colour(polytope.vertices[list(block.tracks[track])], end), end))
-            trial, added = _with_stops(polytope, place, track, stops)
-            if added:
-                yield trial, added
+        for track, (peaks, pins) in itertools.product(nearest.tolist(), shapes):
+            chain = polytope.vertices[list(block.tracks[track])]
+            stops = [(*target.tolist(), at) for at in peaks]
+            stops += [(*_colour(chain, at), at) for at in pins]
+            changed, new = _with_stops(polytope, place, track, stops, len(peaks))
+            if new:
+                yield _Trial(changed, new, len(peaks), share)
 
 
 def _colour(track: F64, time: float) -> F64:
@@ -193,43 +217,57 @@ def _outside(rgb: F64, frame: FrameStatistics) -> F64:
     return distance
 
 
-def _lost_colour(rgb: F64, frame: FrameStatistics, lost: float) -> F64 | None:
-    """Return the mean of the colours that lie farthest outside; None where none does."""
+def _lost_colour(rgb: F64, frame: FrameStatistics, scale: float) -> tuple[F64 | None, float]:
+    """Return the mean of the colours that lie farthest outside, None where none does, and the share
+    of the frame's pixels that are lost and of that colour."""
     distance = _outside(rgb, frame)
     colours, counts = frame.coarse.rgb, frame.coarse.counts
-    # The farthest pixels decide, not the farthest one.
     order = np.argsort(-distance, kind="stable")
-    most = int(np.searchsorted(np.cumsum(counts[order]), frame.pixels / 1000)) + 1
-    gone = int((distance > lost).sum())  # and where some are lost, those alone
-    far = order[: min(most, gone or most)]
-    far = far[distance[far] > 0]
+    far = order[:FEW_COLOURS]
+    far = far[distance[far] > LOST * scale]
+    if counts[far].sum() >= LOST_SHARE * frame.pixels:
+        # One light a time: that on most pixels, and on those farthest outside.
+        near = cdist(colours[far], colours[far]) < SAME_LIGHT * scale
+        far = far[near[np.argmax(near @ (counts[far] * distance[far]))]]
+        return counts[far] @ colours[far] / counts[far].sum(), counts[far].sum() / frame.pixels
+    # The farthest pixels decide, not the farthest one.
+    few = int(np.searchsorted(np.cumsum(counts[order]), frame.pixels / 1000)) + 1
+    far = order[:few][distance[order[:few]] > 0]
     if len(far) == 0:
-        return None
-    mean: F64 = counts[far] @ colours[far] / counts[far].sum()
-    return mean
+        return None, 0.0
+    return counts[far] @ colours[far] / counts[far].sum(), 0.0
 
 
 def _with_stops(
-    polytope: SkewPolytope, place: int, track: int, stops: Sequence[tuple[float, ...]]
+    polytope: SkewPolytope, place: int, track: int, stops: Sequence[tuple[float, ...]], peaks: int
 ) -> tuple[SkewPolytope, list[int]]:
     """Put stops (r, g, b, frame) on a block's track, where no other is too near in time.
 
-    Nothing is added where the first of them has no room.
+    The first `peaks` of them are needed: nothing is added where one has no room. At the clip's
+    first and last frame such a one is the track's own vertex, if another keeps the track beside it.
     """
     block = polytope.blocks[place]
     chain = list(block.tracks[track])
-    vertices = polytope.vertices
+    vertices = polytope.vertices.copy()
+    before, after = polytope.neighbours()
     added: list[int] = []
-    for stop in stops:
+    for i, stop in enumerate(stops):
         times = vertices[chain, 3]
+        end = chain[0] if stop[3] == times[0] else chain[-1] if stop[3] == times[-1] else None
+        if end is not None and i < peaks and len(before[end]) + len(after[end]) == 1:
+            vertices[end] = stop
+            added.append(end)
+            continue
         inside = max(block.first, times[0]) < stop[3] < min(block.last, times[-1])
         if not inside or np.abs(times - stop[3]).min() < 2 * LEAST_GAP:
-            if not added:
+            if i < peaks:
                 return polytope, []
             continue
         chain.insert(int(np.searchsorted(times, stop[3])), len(vertices))
         added.append(len(vertices))
         vertices = np.vstack([vertices, stop])
+    if len(added) <= peaks and min(added) < len(polytope.vertices):  # all of the track would change
+        return polytope, []
     tracks = (*block.tracks[:track], tuple(chain), *block.tracks[track + 1 :])
     section: Section = dataclasses.replace(block, tracks=tracks)
     blocks = (*polytope.blocks[:place], section, *polytope.blocks[place + 1 :])
@@ -238,24 +276,23 @@ def _with_stops(
 
 def _settled(
     now: Inserted,
-    trial: SkewPolytope,
-    added: list[int],
+    trial: _Trial,
     statistics: Sequence[FrameStatistics],
     low: F64,
     high: F64,
     options: AnalysisOptions,
-) -> tuple[SkewPolytope, float]:
+) -> tuple[Inserted, float]:
     """Move the new vertices to their best places; return the polytope, and by how much the value
     has changed."""
     scale = colour_scale(low, high)
-    brief = (*now.brief, added[0])
-    evaluate = Objective(trial, statistics, options, scale, coarse=True, brief=brief)
-    vertices = trial.vertices.copy()
+    brief = (*now.brief, *trial.new[: trial.peaks])
+    evaluate = Objective(trial.polytope, statistics, options, scale, coarse=True, brief=brief)
+    vertices = trial.polytope.vertices.copy()
     vertices[:, :3] = np.clip(vertices[:, :3], low, high)
-    moving = np.array(added)
-    which = evaluate.touched(vertices, added)
+    moving = np.array(trial.new)
+    which = evaluate.touched(vertices, trial.new)
     lower, upper = evaluate.box(vertices, moving, low, high, share=0.5)
-    if len(added) > 1:  # what is there for a moment only makes its track give way as briefly
+    if len(trial.new) > 1:  # what is there for a moment only makes its track give way as briefly
         times = vertices[moving, 3]
         span = np.abs(times - times[0]).max()
         lower[:, 3] = np.maximum(lower[:, 3], times - span)
@@ -265,4 +302,4 @@ def _settled(
     before, _ = Objective(now.polytope, statistics, options, scale, coarse=True, brief=now.brief)(
         now.polytope.vertices, which
     )
-    return trial.with_vertices(vertices), value - before
+    return Inserted(trial.polytope.with_vertices(vertices), brief), value - before

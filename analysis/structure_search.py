@@ -71,9 +71,8 @@ class Skew(Road):
         """Search, insert stops, refine, and compare with what is simple."""
         static = self.static(self.options)
         self.measure("static_hull", static)
-        hulls = self.plain_hulls()
         simple, reference = static, self.stages[-1].losses.L_prime
-        for hull in hulls:
+        for hull in self.plain_hulls():
             if (found := self.losses(hull).L_prime) < reference:
                 simple, reference = hull, found
         configurations = self.configurations()
@@ -81,8 +80,7 @@ class Skew(Road):
         for i, blocks in enumerate(reversed(configurations)):  # those of few blocks cost least
             bound = min((c.price for c in candidates), default=math.inf)
             candidates.append(self.simplified(blocks, i, len(configurations), bound))
-        for hull in hulls or [static]:
-            candidates.append(Candidate(hull, self.compared(hull)))
+        candidates.append(Candidate(simple, self.compared(simple)))
         steps = [c.removed for c in candidates]
         chosen = candidates[steps.index(handle_removal.choose(steps, self.options))]
         self.measure("block_merging", chosen.merged)

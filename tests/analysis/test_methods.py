@@ -56,7 +56,7 @@ def test_the_default_is_never_worse_than_a_static_hull(name):
         assert analysis.stages[-1].losses.L_prime <= plain.losses.L_prime + 1e-12
 
 
-@pytest.mark.parametrize(("first", "last"), [(0, 1), (10, 13)])
+@pytest.mark.parametrize(("first", "last"), [(0, 1), (10, 13), (30, 33)])
 def test_where_little_moves_the_default_beats_eight_static_colours(seasons, first, last):
     clip = open_clip(str(seasons), frames=f"{first}-{last}")
     found = statistics.gather_clip(clip, AnalysisOptions()).frames

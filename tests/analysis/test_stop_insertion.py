@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from analysis_frames import mixture, stats
 from bent_track import colours_at
+from palette4d.analysis import methods
+from palette4d.analysis.clip import open_clip
 from palette4d.analysis.frame_hulls import hull_mesh
 from palette4d.analysis.losses import loss_weights
 from palette4d.analysis.objective import Objective, loss_of
@@ -104,6 +106,40 @@ def test_a_lost_light_is_kept_although_it_comes_and_goes_at_once():
     # Without `reach` a light counts like everything else.
     plain = AnalysisOptions(k=8, reach=0.0)
     assert insert_stops(before, frames, LOW, HIGH, plain).polytope is before
+
+
+def light_over_seasons(seasons, numbers, lit, lights):
+    """Pieces of SEASONS at half size; squares of (rgb, side) are lit in some frames."""
+    clip = open_clip(str(seasons), frames=numbers)
+    pictures = []
+    for number, image in clip.iter_frames():
+        picture = np.array(image[::2, ::2, :3])
+        for place, (rgb, side) in enumerate(lights if number in lit else ()):
+            picture[60 : 60 + side, 100 + 60 * place : 100 + 60 * place + side] = rgb
+        pictures.append(picture)
+    return stats([p[:, : p.shape[1] // 30 * 30] for p in pictures])
+
+
+MAGENTA, BLUE = ((1.0, 0.0, 1.0), 8), ((0.0, 0.0, 1.0), 8)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "lit", "lights"),
+    [
+        ("10-34", (22, 23, 24), (MAGENTA,)),
+        ("10-34", (22, 23, 24), (MAGENTA, BLUE)),
+        ("0-19", (0,), (MAGENTA,)),
+        ("0-19", (17, 18, 19), (MAGENTA,)),
+    ],
+    ids=["one", "two at once", "in the first frame", "in the last frames"],
+)
+def test_lights_in_a_real_clip_are_kept(seasons, numbers, lit, lights):
+    frames = light_over_seasons(seasons, numbers, lit, lights)
+    analysis = methods.analyze(frames, AnalysisOptions())
+    dark = methods.analyze(light_over_seasons(seasons, numbers, (), ()), AnalysisOptions())
+    assert analysis.stages[-1].losses.max_distance < 0.3
+    assert dark.stages[-1].losses.max_distance < 0.25
+    assert analysis.stages[-1].losses.L_prime < analysis.stages[0].losses.L_prime
 
 
 def test_frames_that_fit_alike_get_none():
