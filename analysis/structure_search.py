@@ -42,7 +42,7 @@ WORST_FRAMES = 8
 COMPARE_EVALUATIONS = 40
 FINAL_EVALUATIONS = 150
 # Where nothing else is as good as a simple hull: what its shape counts, as much as L' lets it.
-SHAPE_WEIGHTS = (1.0, 0.7, 0.5, 0.25, 0.1)
+SHAPE_WEIGHTS = (1.0, 0.7, 0.5, 0.25, 0.1, 0.0)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -128,7 +128,10 @@ class Skew(Road):
         """Return the options with what keeps palettes in shape weighed so much."""
         o = self.options
         return dataclasses.replace(
-            o, convexity=weight * o.convexity, separation=weight * o.separation
+            o,
+            convexity=weight * o.convexity,
+            separation=weight * o.separation,
+            reach=o.reach if weight else 0.0,
         )
 
     def configurations(self) -> list[list[Block]]:
