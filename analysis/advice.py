@@ -115,7 +115,7 @@ def _lost(x: Report, options: AnalysisOptions, farthest: Mapping[str, float]) ->
         if options.reach == 0:  # without it no distance counts more than once
             reach = f"raise --reach to {AnalysisOptions().reach:g}"
         ways = (
-            f"{reach} or raise --lambda (to {10 * options.lambda_:g}, say), so that rare colours "
+            f"raise --lambda (to {10 * options.lambda_:g}, say) or {reach}, so that rare colours "
             f"count more, or lower --k where they are fewer than {options.k:g} pixels"
         )
     static = ", or take --method static" if "one static palette leaves" in nearer else ""

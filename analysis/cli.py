@@ -97,7 +97,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         required=True,
         metavar="OUT",
         type=Path,
-        help="the sidecar, OUT.p4d.json; for many shots a folder",
+        help="the sidecar to write, such as clip.p4d.json; for many shots a folder",
     )
     parser.add_argument(
         "--frames",
