@@ -3,6 +3,7 @@ glued together to strands."""
 
 from __future__ import annotations
 
+import abc
 import dataclasses
 import functools
 import itertools
@@ -69,7 +70,7 @@ class Analysis:
     report: Report | None = None
 
 
-class Road:
+class Road(abc.ABC):
     """What the methods share: the frames, the gamut, and what each stage reached."""
 
     def __init__(
@@ -83,9 +84,9 @@ class Road:
         self.low, self.high = statistics.gamut_box(frames)
         self.stages: list[StageResult] = []
 
+    @abc.abstractmethod
     def run(self) -> Analysis:
         """Go the whole way."""
-        raise NotImplementedError
 
     def counter(self, stage: str) -> Callable[[int, int], None]:
         """Return what tells the progress of one stage."""
