@@ -54,13 +54,15 @@ def refine_jointly(
     """Move all vertices together in their boxes; return the polytope and what was minimised.
 
     That is eq. 12, and what keeps slices convex and colours apart. It is never above that of the
-    polytope given, clipped to the gamut. `brief` as in `Objective`.
+    polytope given, clipped to the gamut. `brief` as in `Objective`; these stay where they are in
+    time: else the mean, to which a moment hardly matters, would shorten it.
     """
     scale = colour_scale(low, high)
     evaluate = Objective(polytope, statistics, options, scale, coarse, brief)
     vertices = polytope.vertices.copy()
     vertices[:, :3] = np.clip(vertices[:, :3], low, high)
     everything = list(range(len(statistics)))
+    evaluate.fixed[list(brief)] = True
     moving = np.arange(len(vertices))
     # Neighbours in time share the gap between them, so that both may move at once.
     box = evaluate.box(vertices, moving, low, high, share=0.5)

@@ -91,7 +91,7 @@ class AnalysisOptions:
     separation: float = 0.15
     reach: float = 0.1
     colours: int = 32768
-    coarse_colours: int = 4096
+    coarse_colours: int = 2048
     seed: int = 0
     threads: int = 0
 

@@ -33,10 +33,10 @@ F64 = NDArray[np.float64]
 MOST_ROUNDS = 10
 BAD = 3.0  # times the median frame's loss: a frame to be looked at
 MENDED = 0.5  # of what is lacking must go
-WORTH = 0.02  # of a light: by how much what is minimised may rise for it
+WORTH = 0.04  # of a light: by how much what is minimised may rise for it
 SAME_LIGHT = 0.25  # lost colours so near to each other are of one light
 FEW_COLOURS = 1000  # of the farthest ones lights are made
-NEAREST = 3  # tracks tried
+NEAREST = 8  # tracks tried: one that matters little just then need not be near
 EVALUATIONS = 30
 
 
@@ -55,36 +55,40 @@ def insert_stops(
     low: F64,
     high: F64,
     options: AnalysisOptions,
-) -> Inserted:
-    """Return the polytope with stops for its worst frames.
+) -> list[Inserted]:
+    """Return the polytope as it is, and, each on top of the one before, with stops for its worst
+    frames.
 
     `statistics` are all of the clip's frames. With `options.vertices` there are never more than so
     many.
     """
     scale = colour_scale(low, high)
-    now = Inserted(polytope, ())
+    steps = [Inserted(polytope, ())]
     hopeless: set[int] = set()
     for _ in range(MOST_ROUNDS):
+        now = steps[-1]
         lacks = _lacks(now.polytope, statistics, options, scale)
         worst = lacks.worst(hopeless)
         if worst is None:
             break
-        best: tuple[float, Inserted] | None = None
+        best: tuple[int, float, Inserted] | None = None
         for trial in _trials(now.polytope, statistics, lacks, worst, scale):
             if options.vertices and len(trial.polytope.vertices) > options.vertices:
                 continue
             moved, change = _settled(now, trial, statistics, low, high, options)
-            price = change + options.handle_cost * len(trial.new)
-            if change > (WORTH if trial.share else 0) or (best and price >= best[0]):
+            if change > (WORTH if trial.share else 0):
                 continue
-            rest = _lacks(moved.polytope, [statistics[worst]], options, scale)
-            if lacks.mended(worst, rest, trial.share):
-                best = price, moved
+            price = change + options.handle_cost * len(trial.new)
+            rest = _lacks(moved.polytope, [statistics[i] for i in trial.span], options, scale)
+            mended = [lacks.mended(i, rest, at, trial.share) for at, i in enumerate(trial.span)]
+            left = mended.count(False)  # of a light that shines for longer
+            if mended[trial.span.index(worst)] and (best is None or (left, price) < best[:2]):
+                best = left, price, moved
         if best is None:
             hopeless.add(worst)
         else:
-            now = best[1]
-    return now
+            steps.append(best[2])
+    return steps
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -108,14 +112,15 @@ class _Lacks:
                 return max(found, key=lambda i: of[i])
         return None
 
-    def mended(self, frame: int, rest: _Lacks, share: float) -> bool:
-        """Return whether that frame alone, in `rest`, lacks so much less: of a light, on this share
-        of its pixels, most is no longer lost."""
+    def mended(self, frame: int, rest: _Lacks, at: int, share: float) -> bool:
+        """Return whether that frame, the one `at` in `rest`, lacks so much less: of a light, on
+        this share of the pixels of some frame, most is no longer lost."""
         if share:
-            less = self.lost[frame] - rest.lost[0] >= MENDED * share
-            return bool(less and rest.far[0] < self.far[frame])
+            light = min(share, self.lost[frame])
+            less = self.lost[frame] - rest.lost[at] >= MENDED * light
+            return bool(less and rest.far[at] <= self.far[frame])
         usual = float(np.median(self.loss))
-        return bool(rest.loss[0] <= self.loss[frame] - MENDED * (self.loss[frame] - usual))
+        return bool(rest.loss[at] <= self.loss[frame] - MENDED * (self.loss[frame] - usual))
 
 
 def _lacks(
@@ -143,12 +148,16 @@ def _lacks(
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Trial:
     """A polytope with new stops: their vertices, how many of these (the first ones) have the lost
-    colour, and the share of the frame's pixels that are this light, 0 where none are lost."""
+    colour, the share of the frame's pixels that are this light, 0 where none are lost, and the
+    frames (indices) that are looked at: of a light all that lack nearly as much. The times of the
+    first vertices may move unless they are `held`."""
 
     polytope: SkewPolytope
     new: list[int]
     peaks: int
     share: float
+    span: range
+    held: bool
 
 
 def _trials(
@@ -178,17 +187,18 @@ def _trials(
         beside = [float(statistics[i].frame) for i in (before, after) if 0 <= i < len(what)]
         lasting = [float(statistics[i].frame) for i in (before + 1, after - 1)]
         # At once; with the track kept beside it; and for as long as it is there.
-        shapes = [([time], []), ([time], beside)]
+        span = range(before + 1, after) if share else range(worst, worst + 1)
+        shapes = [([time], [], False), ([time], beside, False)]
         if share and lasting[0] < lasting[1]:
-            shapes.append((lasting, beside))
+            shapes += [(lasting, beside, False), (lasting, beside, True)]
         nearest = np.argsort(np.linalg.norm(rgb - target, axis=1), kind="stable")[:NEAREST]
-        for track, (peaks, pins) in itertools.product(nearest.tolist(), shapes):
+        for track, (peaks, pins, held) in itertools.product(nearest.tolist(), shapes):
             chain = polytope.vertices[list(block.tracks[track])]
             stops = [(*target.tolist(), at) for at in peaks]
             stops += [(*_colour(chain, at), at) for at in pins]
             changed, new = _with_stops(polytope, place, track, stops, len(peaks))
             if new:
-                yield _Trial(changed, new, len(peaks), share)
+                yield _Trial(changed, new, len(peaks), share, span, held)
 
 
 def _colour(track: F64, time: float) -> F64:
@@ -292,11 +302,13 @@ def _settled(
     moving = np.array(trial.new)
     which = evaluate.touched(vertices, trial.new)
     lower, upper = evaluate.box(vertices, moving, low, high, share=0.5)
+    times = vertices[moving, 3]
     if len(trial.new) > 1:  # what is there for a moment only makes its track give way as briefly
-        times = vertices[moving, 3]
         span = np.abs(times - times[0]).max()
         lower[:, 3] = np.maximum(lower[:, 3], times - span)
         upper[:, 3] = np.minimum(upper[:, 3], times + span)
+    if trial.held:
+        lower[: trial.peaks, 3] = upper[: trial.peaks, 3] = times[: trial.peaks]
     vertices = move(evaluate, vertices, moving, which, (lower, upper), EVALUATIONS)
     value, _ = evaluate(vertices, which)
     before, _ = Objective(now.polytope, statistics, options, scale, coarse=True, brief=now.brief)(

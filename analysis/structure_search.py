@@ -12,7 +12,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,8 @@ WORST_FRAMES = 8
 # Joint moves on all frames: before candidates are compared, and at the end.
 COMPARE_EVALUATIONS = 40
 FINAL_EVALUATIONS = 150
+# Of the stops for single frames, how many are tried, where L' does not allow them all.
+STOPS_KEPT = (1, 0.75, 0.5, 0.25, 0)
 # Where nothing else is as good as a simple hull: what its shape counts, as much as L' lets it.
 SHAPE_WEIGHTS = (1.0, 0.7, 0.5, 0.25, 0.1, 0.0)
 
@@ -84,13 +86,16 @@ class Skew(Road):
         steps = [c.removed for c in candidates]
         chosen = candidates[steps.index(handle_removal.choose(steps, self.options))]
         self.measure("block_merging", chosen.merged)
-        removed = stop_insertion.insert_stops(
+        stops = stop_insertion.insert_stops(
             chosen.removed.polytope, self.frames, self.low, self.high, self.options
         )
-        self.measure("vertex_removal", removed.polytope)
-        ways = [lambda: self.refined(removed.polytope, self.options, removed.brief)]
-        if removed.brief:
-            ways.append(lambda: self.refined(chosen.removed.polytope, self.options))
+        self.measure("vertex_removal", stops[-1].polytope)
+        # All stops, else as many as L' lets: those that came first are the most wanted.
+        shares = sorted({round(part * (len(stops) - 1)) for part in STOPS_KEPT}, reverse=True)
+        ways = [
+            functools.partial(self.refined, stops[i].polytope, self.options, stops[i].brief)
+            for i in shares
+        ]
         polytope = self.never_worse(ways, simple, reference)
         remarks = chosen.remarks if len(polytope.blocks) > 1 else ()
         if 0 < self.options.vertices < len(polytope.vertices):
@@ -108,15 +113,13 @@ class Skew(Road):
         return [hull for hull in hulls if not most or len(hull.vertices) <= most]
 
     def never_worse(
-        self, ways: list[Callable[[], SkewPolytope]], simple: SkewPolytope, reference: float
+        self, ways: Sequence[Callable[[], SkewPolytope]], simple: SkewPolytope, reference: float
     ) -> SkewPolytope:
         """Take the first of the ways to a refined polytope whose L' is not above `reference`, that
         of `simple`; if there is none, `simple` itself, kept in shape as far as that allows."""
-        for weight in SHAPE_WEIGHTS:
-            relaxed = self.shaped(weight)
-            ways.append(functools.partial(self.refined, simple, relaxed))
-        ways.append(lambda: simple)
-        for way in ways:
+        simpler = [functools.partial(self.refined, simple, self.shaped(w)) for w in SHAPE_WEIGHTS]
+        every: list[Callable[[], SkewPolytope]] = [*ways, *simpler, lambda: simple]
+        for way in every:
             polytope = way()
             if self.losses(polytope).L_prime <= reference:
                 break

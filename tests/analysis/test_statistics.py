@@ -158,7 +158,9 @@ def test_colours_kept_of_a_clip_are_bounded(monkeypatch):
         colours, coarse = budget(frames, options)
         assert colours >= statistics.FEWEST_COLOURS
         assert coarse >= statistics.FEWEST_COARSE
-        assert frames * (colours + coarse) < 1.2 * statistics.MOST_COLOURS
+        fewest = frames * (statistics.FEWEST_COLOURS + statistics.FEWEST_COARSE)
+        assert frames * (colours + coarse) < max(1.2 * statistics.MOST_COLOURS, 1.001 * fewest)
+        assert frames * (colours + coarse) < 5_000_000
     assert budget(3000, AnalysisOptions(colours=100, coarse_colours=64)) == (100, 64)
     monkeypatch.setattr(statistics, "MOST_COLOURS", 4000)
     monkeypatch.setattr(statistics, "FEWEST_COLOURS", 64)

@@ -60,7 +60,7 @@ def farthest(polytope, frames):
 def test_a_light_gets_a_stop(lit):
     options, frames = AnalysisOptions(), clip(lit)
     before = rest()
-    after = insert_stops(before, frames, LOW, HIGH, options)
+    after = insert_stops(before, frames, LOW, HIGH, options)[-1]
     added = len(after.polytope.vertices) - len(before.vertices)
     assert 1 <= added <= 3 * len(lit)
     assert 1 <= len(after.brief) <= len(lit)
@@ -82,7 +82,7 @@ def test_a_light_gets_a_stop(lit):
 def test_a_small_light_counts_by_how_far_it_lies_outside(reach, added):
     """In the mean distance of all pixels two of 900 are nothing."""
     options, frames = AnalysisOptions(reach=reach), clip((10,), pixels=2)
-    after = insert_stops(rest(), frames, LOW, HIGH, options)
+    after = insert_stops(rest(), frames, LOW, HIGH, options)[-1]
     assert (len(after.polytope.vertices) > len(rest().vertices)) == added
 
 
@@ -97,7 +97,7 @@ def test_a_lost_light_is_kept_although_it_comes_and_goes_at_once():
         pictures.append(picture)
     frames, before = stats(pictures), rest(np.vstack([FIVE, spare]))
     options = AnalysisOptions(k=8)  # no more than a handle of its own has pixels
-    after = insert_stops(before, frames, LOW, HIGH, options)
+    after = insert_stops(before, frames, LOW, HIGH, options)[-1]
     assert farthest(before, frames)[10] > 0.7
     assert farthest(after.polytope, frames)[10] < 0.3
     # The paper's eq. 11 would not have it.
@@ -105,7 +105,7 @@ def test_a_lost_light_is_kept_although_it_comes_and_goes_at_once():
     assert value(after.polytope, frames, options) > value(before, frames, options)
     # Without `reach` a light counts like everything else.
     plain = AnalysisOptions(k=8, reach=0.0)
-    assert insert_stops(before, frames, LOW, HIGH, plain).polytope is before
+    assert insert_stops(before, frames, LOW, HIGH, plain)[-1].polytope is before
 
 
 def light_over_seasons(seasons, numbers, lit, lights):
@@ -145,19 +145,19 @@ def test_lights_in_a_real_clip_are_kept(seasons, numbers, lit, lights):
 def test_frames_that_fit_alike_get_none():
     options, frames = AnalysisOptions(), clip(())
     before = rest()
-    assert insert_stops(before, frames, LOW, HIGH, options).polytope is before
+    assert insert_stops(before, frames, LOW, HIGH, options)[-1].polytope is before
 
 
 def test_never_more_vertices_than_asked_for():
     options, frames = AnalysisOptions(vertices=len(rest().vertices)), clip((10,))
     before = rest()
-    assert insert_stops(before, frames, LOW, HIGH, options).polytope is before
+    assert insert_stops(before, frames, LOW, HIGH, options)[-1].polytope is before
 
 
 @pytest.mark.parametrize("lit", [(0,), (FRAMES - 1,)])
 def test_the_clips_ends_have_stops_already(lit):
     """There is no room for another; nothing may break."""
     options, frames = AnalysisOptions(), clip(lit)
-    after = insert_stops(rest(), frames, LOW, HIGH, options)
+    after = insert_stops(rest(), frames, LOW, HIGH, options)[-1]
     now = value(after.polytope, frames, options, after.brief)
     assert now <= value(rest(), frames, options)
