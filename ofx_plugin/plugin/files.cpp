@@ -6,9 +6,14 @@
 namespace palette4d::plugin {
 namespace {
 
-void set_text(const Params& params, const char* name, const std::string& text) {
+bool differs(const Params& params, const char* name, const std::string& text) {
     const auto now = params.string_now(name);
-    if (now && *now != text) params.set_string(name, text);
+    return now && *now != text;
+}
+
+/// For the hidden ones, which cannot be undone.
+void note_text(const Params& params, const char* name, const std::string& text) {
+    if (differs(params, name, text)) params.note_string(name, text);
 }
 
 }  // namespace
@@ -72,13 +77,15 @@ Chosen chosen_sidecar(const Params& params, std::optional<OfxTime> time) {
 
 std::string keep_files(const Params& params, Chosen& chosen, const std::string& param) {
     const LoadedSidecar* loaded = chosen.result.loaded.get();
-    if (loaded) set_text(params, kParamRevision, loaded->revision());
+    if (loaded) note_text(params, kParamRevision, loaded->revision());
     if (loaded && !chosen.embedded && param == kParamSidecar) {
         const std::string folder = clip_folder(chosen.path, loaded->sidecar().clip.source);
-        if (!folder.empty()) set_text(params, kParamClipFolder, folder);
+        if (!folder.empty() && differs(params, kParamClipFolder, folder)) {
+            params.set_string(kParamClipFolder, folder);
+        }
     }
     if (params.int_now(kParamEmbed).value_or(0) == 0) {
-        set_text(params, kParamEmbedded, "");
+        note_text(params, kParamEmbedded, "");
         if (chosen.embedded) chosen = chosen_sidecar(params, std::nullopt);
         return "";
     }
@@ -86,7 +93,7 @@ std::string keep_files(const Params& params, Chosen& chosen, const std::string& 
     if (!loaded) return "";
     const std::optional<std::string> file = sidecar_text(chosen.path);
     if (!file) return "";
-    set_text(params, kParamEmbedded, *file);
+    note_text(params, kParamEmbedded, *file);
     return params.string_now(kParamEmbedded) == file ? "a copy is in the project"
                                                      : "the host does not keep a copy of it";
 }

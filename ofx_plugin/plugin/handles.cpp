@@ -7,6 +7,7 @@
 #include <sstream>
 #include <vector>
 
+#include "files.hpp"
 #include "palette4d/handles.hpp"
 
 namespace palette4d::plugin {
@@ -145,8 +146,31 @@ int handles_in_use(const Params& params) {
     return count;
 }
 
-void show_handles(const Params& params, const Sidecar* sidecar, ShownColours& shown) {
+void notice_undone(const Params& params, ShownHandles& shown) {
+    const auto holds = [&](std::size_t i, const std::optional<Vec3>& colour) {
+        const std::string& name = slots()[i].colour;
+        const auto now = colour ? params.rgb_now(name.c_str()) : std::nullopt;
+        return now && close(*now, *colour) && !params.animated(name.c_str());
+    };
+    bool given = false, back = true;
+    for (std::size_t i = 0; i < shown.size() && back; ++i) {
+        if (!shown[i].before) continue;
+        given = true;
+        back = holds(i, shown[i].before);
+    }
+    for (std::size_t i = 0; i < shown.size(); ++i) {
+        ShownHandle& slot = shown[i];
+        if (given && back && slot.before) {
+            slot = {slot.before, std::nullopt, slot.given};
+        } else if (holds(i, slot.declined)) {  // done again
+            slot = {slot.declined, slot.given, std::nullopt};
+        }
+    }
+}
+
+void show_handles(const Params& params, const Sidecar* sidecar, ShownHandles& shown) {
     if (!sidecar) return;
+    bool first = true;
     const std::vector<Handle> handles = handles_of(sidecar->polytope, sidecar->edits);
     for (std::size_t i = 0; i < slots().size(); ++i) {
         const Slot& slot = slots()[i];
@@ -164,16 +188,25 @@ void show_handles(const Params& params, const Sidecar* sidecar, ShownColours& sh
         const auto now = params.rgb_now(slot.colour.c_str());
         if (!now) continue;
         // Of a project that was opened it is not known; there an id says that it was in use.
-        const bool untouched = shown[i] ? close(*now, *shown[i]) : id.empty();
-        const bool same = close(*now, handle->rgb);
-        if (!untouched && !same) continue;
-        shown[i] = handle->rgb;
-        if (!same) params.set_rgb(slot.colour.c_str(), handle->rgb);
+        const bool untouched = shown[i].given ? close(*now, *shown[i].given) : id.empty();
+        if (close(*now, handle->rgb)) {
+            shown[i].given = handle->rgb;
+            continue;
+        }
+        const std::optional<Vec3>& declined = shown[i].declined;
+        if (!untouched || (declined && close(handle->rgb, *declined))) continue;
+        if (first) {
+            for (ShownHandle& other : shown) other.before.reset();
+        }
+        first = false;
+        if (params.set_rgb(slot.colour.c_str(), handle->rgb)) {
+            shown[i] = {handle->rgb, now, std::nullopt};
+        }
     }
 }
 
 bool handle_changed(const Params& params, const Sidecar* sidecar, const std::string& name,
-                    ShownColours& shown) {
+                    ShownHandles& shown) {
     if (name == kParamResetHandles) {
         shown = {};
         for (const Slot& slot : slots()) {
@@ -184,13 +217,16 @@ bool handle_changed(const Params& params, const Sidecar* sidecar, const std::str
         }
         return true;
     }
+    if (name == kParamSidecar || name == kParamReload) {
+        for (ShownHandle& slot : shown) slot.declined.reset();
+    }
     for (std::size_t i = 0; i < slots().size(); ++i) {
         const Slot& slot = slots()[i];
         if (name != slot.colour && name != slot.use) continue;
         if (name == slot.colour && params.int_now(slot.use.c_str()) == 0) {
             const auto now = params.rgb_now(slot.colour.c_str());
             // What was shown all along is no edit: the host has undone one.
-            if (now && shown[i] && close(*now, *shown[i]) &&
+            if (now && shown[i].given && close(*now, *shown[i].given) &&
                 !params.animated(slot.colour.c_str())) {
                 break;
             }

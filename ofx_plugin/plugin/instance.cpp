@@ -66,6 +66,28 @@ std::optional<bool> set_told(OfxImageEffectHandle effect, std::optional<bool> to
     return std::exchange(instance->told, told);
 }
 
+/// What a host calls the step that undoes what the node has set after a change of `param`.
+const char* step_after(const std::string& param) {
+    if (param == kParamSidecar) return "Show the sidecar's handles";
+    if (param == kParamResetHandles) return "Reset handles";
+    return param.rfind("handle", 0) == 0 ? "Use the handle" : "Follow the sidecar";
+}
+
+/// A change, as kOfxActionInstanceChanged tells it, or its End where that told nothing.
+void follow_change(const Suites& suites, OfxImageEffectHandle effect, const Properties& args,
+                   bool one_step) {
+    const std::optional<std::string> name = args.get_string(kOfxPropName);
+    const std::optional<std::string> reason = args.get_string(kOfxPropChangeReason);
+    // The user cannot change the status: the plugin hears of its own setting.
+    if (name && *name == kParamStatus) return;
+    if (reason && *reason == kOfxChangePluginEdited) return;
+    // A colour that follows its keyframes is not an edit.
+    const bool by_user = reason && *reason == kOfxChangeUserEdited;
+    update_instance(suites, effect, by_user ? name.value_or("") : "", args.get_double(kOfxPropTime),
+                    one_step);
+    if (set_told(effect, std::nullopt)) set_told(effect, true);
+}
+
 }  // namespace
 
 void create_instance(const Suites& suites, OfxImageEffectHandle effect) {
@@ -85,7 +107,7 @@ void destroy_instance(OfxImageEffectHandle effect) {
 }
 
 void update_instance(const Suites& suites, OfxImageEffectHandle effect, const std::string& param,
-                     std::optional<OfxTime> time) {
+                     std::optional<OfxTime> time, bool one_step) {
     // A host tells of a new value from within the call that sets it. Hosts that do so without
     // saying what changed, and do not give back what they were given, would go round for ever.
     thread_local bool updating = false;
@@ -95,22 +117,24 @@ void update_instance(const Suites& suites, OfxImageEffectHandle effect, const st
         explicit Guard(bool& f) : flag(f) { flag = true; }
         ~Guard() { flag = false; }
     } const guard(updating);
-    const Params params(suites, effect);
+    Params params(suites, effect);
+    if (one_step) params.one_undo_step(step_after(param));
     Chosen chosen = chosen_sidecar(params, std::nullopt);
     const std::string copy = keep_files(params, chosen, param);
     const Sidecar* sidecar = chosen.result.loaded ? &chosen.result.loaded->sidecar() : nullptr;
     // Not under the instance's lock: setting a parameter may have the host wait for a render.
     const std::shared_ptr<Instance> instance = find(effect);
-    ShownColours shown_colours;
+    ShownHandles shown_handles;
     if (instance) {
         const std::lock_guard<std::mutex> lock(instance->mutex);
-        shown_colours = instance->shown;
+        shown_handles = instance->shown;
     }
-    if (!param.empty()) handle_changed(params, sidecar, param, shown_colours);
-    show_handles(params, sidecar, shown_colours);
+    notice_undone(params, shown_handles);
+    if (!param.empty()) handle_changed(params, sidecar, param, shown_handles);
+    show_handles(params, sidecar, shown_handles);
     if (instance) {
         const std::lock_guard<std::mutex> lock(instance->mutex);
-        instance->shown = shown_colours;
+        instance->shown = shown_handles;
     }
     std::string shown;
     time = last_time(effect, time);
@@ -125,20 +149,11 @@ void update_instance(const Suites& suites, OfxImageEffectHandle effect, const st
         }
     }
     const std::string text = status_of(chosen, handles_in_use(params), copy, shown);
-    if (params.string_now(kParamStatus) != text) params.set_string(kParamStatus, text);
+    if (params.string_now(kParamStatus) != text) params.note_string(kParamStatus, text);
 }
 
 void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const Properties& args) {
-    const std::optional<std::string> name = args.get_string(kOfxPropName);
-    const std::optional<std::string> reason = args.get_string(kOfxPropChangeReason);
-    // The user cannot change the status: the plugin hears of its own setting.
-    if (name && *name == kParamStatus) return;
-    if (reason && *reason == kOfxChangePluginEdited) return;
-    // A colour that follows its keyframes is not an edit.
-    const bool by_user = reason && *reason == kOfxChangeUserEdited;
-    update_instance(suites, effect, by_user ? name.value_or("") : "",
-                    args.get_double(kOfxPropTime));
-    if (set_told(effect, std::nullopt)) set_told(effect, true);
+    follow_change(suites, effect, args, true);
 }
 
 void changes_begin(OfxImageEffectHandle effect, const Properties& args) {
@@ -148,7 +163,7 @@ void changes_begin(OfxImageEffectHandle effect, const Properties& args) {
 void changes_end(const Suites& suites, OfxImageEffectHandle effect, const Properties& args) {
     // The plugin's own settings are told within the telling of what made it set them.
     if (args.get_string(kOfxPropChangeReason) == kOfxChangePluginEdited) return;
-    if (set_told(effect, std::nullopt) != true) instance_changed(suites, effect, args);
+    if (set_told(effect, std::nullopt) != true) follow_change(suites, effect, args, false);
 }
 
 void report(const Suites& suites, OfxImageEffectHandle effect, const std::string& problem) {

@@ -1,5 +1,7 @@
 #include "params.hpp"
 
+#include <utility>
+
 #include "files.hpp"
 #include "handles.hpp"
 #include "host_time.hpp"
@@ -35,6 +37,16 @@ Params::Params(const Suites& suites, OfxImageEffectHandle effect)
     if (!suites.effect->getParamSet || suites.effect->getParamSet(effect, &set_) != kOfxStatOK) {
         set_ = nullptr;
     }
+}
+
+Params::~Params() {
+    if (in_step_) suite_->paramEditEnd(set_);
+}
+
+void Params::begin_step() const {
+    const char* label = std::exchange(step_, nullptr);
+    if (!label || !set_ || !suite_->paramEditBegin || !suite_->paramEditEnd) return;
+    in_step_ = suite_->paramEditBegin(set_, label) == kOfxStatOK;
 }
 
 OfxParamHandle Params::find(const char* name) const {
@@ -142,17 +154,24 @@ bool Params::animated(const char* name) const {
 }
 
 bool Params::set_string(const char* name, const std::string& value) const {
+    begin_step();
+    return note_string(name, value);
+}
+
+bool Params::note_string(const char* name, const std::string& value) const {
     const OfxParamHandle param = find(name);
     return param && suite_->paramSetValue &&
            suite_->paramSetValue(param, value.c_str()) == kOfxStatOK;
 }
 
 bool Params::set_int(const char* name, int value) const {
+    begin_step();
     const OfxParamHandle param = find(name);
     return param && suite_->paramSetValue && suite_->paramSetValue(param, value) == kOfxStatOK;
 }
 
 bool Params::set_rgb(const char* name, const std::array<double, 3>& value) const {
+    begin_step();
     const OfxParamHandle param = find(name);
     return param && suite_->paramSetValue &&
            suite_->paramSetValue(param, value[0], value[1], value[2]) == kOfxStatOK;

@@ -76,8 +76,19 @@ struct OfxParamStruct {
     strict::Value value{};
     /// Doubles or colours, linear between keys; empty: `value` at all times.
     std::map<double, strict::Value> keys{};
-    std::function<void(const std::string& name)> on_set{};  ///< the plugin has set an instance's
+    /// The plugin has set an instance's, which had another value before.
+    std::function<void(const std::string& name, const strict::Value& before)> on_set{};
 };
+
+namespace strict {
+
+/// What the plugin has set between paramEditBegin and paramEditEnd.
+struct UndoStep {
+    std::string label;
+    std::map<std::string, Value> before;  ///< the values that it took the place of
+};
+
+}  // namespace strict
 
 struct OfxParamSetStruct {
     explicit OfxParamSetStruct(bool of_descriptor) : descriptor(of_descriptor) {}
@@ -85,6 +96,8 @@ struct OfxParamSetStruct {
     OfxPropertySetStruct properties{strict::kParamSet};
     std::map<std::string, std::unique_ptr<OfxParamStruct>> params;
     std::vector<std::string> order;
+    std::optional<strict::UndoStep> open_step{};
+    std::vector<strict::UndoStep> steps{};  ///< the oldest first
 };
 
 struct OfxImageClipStruct {
@@ -163,10 +176,11 @@ struct Config {
     unsigned processors = 4;
     int api_minor = 4;  ///< of the standard's version 1 that the host says it has
     bool tiles = true, multi_resolution = true;
-    bool animates_strings = true;       ///< else a text that animates is a fault
-    bool secret_stays = false;          ///< what was described as secret is never shown
-    std::vector<double> frame_range{};  ///< of the source, as instances report it; empty: not
-    double frame_rate = 0;              ///< likewise; 0: not
+    bool animates_strings = true;        ///< else a text that animates is a fault
+    bool secret_stays = false;           ///< what was described as secret is never shown
+    std::vector<double> frame_range{};   ///< of the source, as instances report it; empty: not
+    double frame_rate = 0;               ///< likewise; 0: not
+    OfxStatus edit_answer = kOfxStatOK;  ///< of paramEditBegin and its End
 };
 
 /// The process' one host. Change its configuration only while no plugin runs.
@@ -186,6 +200,8 @@ public:
     std::vector<std::string> take_faults();
     long calls() const { return calls_.load(); }
     bool refused() const { return refused_.load(); }
+    /// Whether a plugin can have several settings undone in one step, and say which cannot be.
+    bool has_undo_steps() const;
 
     // For the suites.
     const void* suite(const std::string& name, int version);
@@ -298,6 +314,12 @@ public:
     OfxStatus changed(const std::string& type, const std::string& name, const std::string& reason);
     /// kOfxActionBeginInstanceChanged or its End.
     OfxStatus bracket(const char* action, const std::string& reason);
+    /// What the plugin has set together, the oldest first.
+    const std::vector<UndoStep>& undo_steps() const { return effect_.params.steps; }
+    /// Puts values back, and then tells of each as of the user's edits; those that were there.
+    std::map<std::string, Value> put_back(const std::map<std::string, Value>& values);
+    /// The user undoes the last step of the plugin's; what put_back() does it again with.
+    std::map<std::string, Value> undo();
     /// How often the plugin has set a parameter.
     int settings(const std::string& param) { return settings_[param]; }
     OfxStatus sync();
@@ -329,7 +351,7 @@ private:
     std::set<std::string> set_since_;        ///< parameters that were set since preferred_
     std::optional<Properties> preferred_{};  ///< what the plugin last answered
 
-    void tell(const std::string& param);
+    void tell(const std::string& param, const Value& before);
     /// Asks for the clip preferences as hosts do, after CreateInstance and changes of the
     /// parameters named for it. That they differ after any other change is a fault: no host would
     /// have heard of it.

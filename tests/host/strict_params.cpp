@@ -1,6 +1,7 @@
 // The parameter suite: values with their exact types, by time only while rendering.
 #include <cstdarg>
 #include <iterator>
+#include <utility>
 
 #include "strict_host.hpp"
 
@@ -164,6 +165,7 @@ OfxStatus set_value(OfxParamHandle param, ...) {
         Host::get().fault("paramSetValue: no parameter, or one without a value");
         return kOfxStatErrBadHandle;
     }
+    const Value before = param->value;
     va_list arguments;
     va_start(arguments, param);
     {
@@ -181,7 +183,7 @@ OfxStatus set_value(OfxParamHandle param, ...) {
         }
     }
     va_end(arguments);
-    if (param->on_set) param->on_set(param->name);
+    if (param->on_set) param->on_set(param->name, before);
     return kOfxStatOK;
 }
 
@@ -205,8 +207,37 @@ OfxStatus delete_keys(OfxParamHandle) { return unexpected("paramDeleteAllKeys");
 OfxStatus copy(OfxParamHandle, OfxParamHandle, OfxTime, const OfxRangeD*) {
     return unexpected("paramCopy");
 }
-OfxStatus edit_begin(OfxParamSetHandle, const char*) { return unexpected("paramEditBegin"); }
-OfxStatus edit_end(OfxParamSetHandle) { return unexpected("paramEditEnd"); }
+OfxStatus edit_begin(OfxParamSetHandle set, const char* label) {
+    const Call call("paramEditBegin");
+    if (call.refused()) return kOfxStatFailed;
+    Host& host = Host::get();
+    if (!set || set->descriptor || !label || !*label) {
+        host.fault("paramEditBegin: not an instance's parameters, or no label");
+        return kOfxStatErrBadHandle;
+    }
+    if (activity().action != kOfxActionInstanceChanged) {
+        host.fault("paramEditBegin: only while an instance changes");
+        return kOfxStatFailed;
+    }
+    if (host.config().edit_answer != kOfxStatOK) return host.config().edit_answer;
+    if (set->open_step) host.fault("paramEditBegin: one has begun already");
+    set->open_step = UndoStep{label, {}};
+    return kOfxStatOK;
+}
+
+OfxStatus edit_end(OfxParamSetHandle set) {
+    const Call call("paramEditEnd");
+    if (call.refused()) return kOfxStatFailed;
+    if (!set || !set->open_step) {
+        Host::get().fault("paramEditEnd: none has begun");
+        return kOfxStatErrBadHandle;
+    }
+    if (set->open_step->before.empty() && Host::get().has_undo_steps()) {
+        Host::get().fault("paramEditEnd: nothing to undo was set");
+    }
+    set->steps.push_back(*std::exchange(set->open_step, std::nullopt));
+    return kOfxStatOK;
+}
 
 const OfxParameterSuiteV1 kSuite = {
     define,      get_handle, set_properties, param_properties, get_value, get_value_at, derivative,
@@ -225,7 +256,9 @@ SuiteTable parameter_suite() {
              {"paramGetValue", offsetof(S, paramGetValue)},
              {"paramGetValueAtTime", offsetof(S, paramGetValueAtTime)},
              {"paramSetValue", offsetof(S, paramSetValue)},
-             {"paramGetNumKeys", offsetof(S, paramGetNumKeys)}}};
+             {"paramGetNumKeys", offsetof(S, paramGetNumKeys)},
+             {"paramEditBegin", offsetof(S, paramEditBegin)},
+             {"paramEditEnd", offsetof(S, paramEditEnd)}}};
 }
 
 }  // namespace strict

@@ -223,6 +223,94 @@ TEST(an_edit_that_the_host_undoes_is_undone) {
     CHECK(graded.render(1) == graded.expected(graded.parsed.edits, 1));
 }
 
+TEST(what_the_node_sets_is_undone_in_one_step) {
+    Graded graded;
+    Instance& node = *graded.node;
+    // Choosing the sidecar has given colours to its 17 handles, and the clip's folder.
+    CHECK(node.undo_steps().size() == 1 && node.undo_steps()[0].before.size() == 18);
+    // To say which frame is shown is no step.
+    node.shown_time = 3;
+    CHECK(node.changed("", "", kOfxChangeTime) == kOfxStatOK);
+    CHECK(node.changed("strength") == kOfxStatOK);
+    CHECK(node.undo_steps().size() == 1);
+    const palette4d::Edits before = graded.parsed.edits;
+    node.set("handle02", Colour{1, 1, 0});
+    CHECK(node.changed("handle02") == kOfxStatOK);
+    node.set("handle03", Colour{1, 0, 1});
+    CHECK(node.changed("handle03") == kOfxStatOK);
+    CHECK(node.undo_steps().size() == 3 && node.undo_steps()[2].before.size() == 2);
+    CHECK(node.changed("resetHandles") == kOfxStatOK);
+    CHECK(node.undo_steps().size() == 4);
+    CHECK(graded.render(1) == graded.expected(before, 1));
+    const auto again = node.undo();
+    palette4d::Edits edits = before;
+    edits.vertex_rgb[1] = palette4d::Vec3{1, 1, 0};
+    edits.vertex_rgb[2] = palette4d::Vec3{1, 0, 1};
+    CHECK(graded.render(1) == graded.expected(edits, 1));
+    CHECK(std::get<Colour>(node.value("handle02")) == (Colour{1, 1, 0}));
+    node.put_back(again);
+    CHECK(graded.render(1) == graded.expected(before, 1));
+    for (const UndoStep& step : node.undo_steps()) CHECK(!step.label.empty());
+}
+
+TEST(colours_that_the_host_takes_back_are_no_edits) {
+    Graded graded;
+    Instance& node = *graded.node;
+    const Colour begun = std::get<Colour>(node.value("handle02"));
+    const auto none_in_use = [&] {
+        for (const char* use : {"handle01On", "handle02On", "handle17On"}) {
+            CHECK(std::get<int>(node.value(use)) == 0);
+        }
+        return graded.render(3) == graded.expected(graded.parsed.edits, 3);
+    };
+    const auto again = node.undo();
+    CHECK(none_in_use());
+    CHECK(std::get<Colour>(node.value("handle02")) == (Colour{0, 0, 0}));
+    // They are not given anew, which would be a step that nobody could get behind.
+    CHECK(node.changed("strength") == kOfxStatOK);
+    CHECK(node.undo_steps().empty());
+    // Done again, and undone again.
+    const auto undone = node.put_back(again);
+    CHECK(none_in_use());
+    CHECK(std::get<Colour>(node.value("handle02")) == begun);
+    node.put_back(undone);
+    CHECK(none_in_use());
+    CHECK(std::get<Colour>(node.value("handle02")) == (Colour{0, 0, 0}));
+    CHECK(node.undo_steps().empty());
+    // Another sidecar is followed as ever.
+    write("clip.p4d.json", sidecar_text(false));
+    CHECK(node.changed("reload") == kOfxStatOK);
+    CHECK(std::get<Colour>(node.value("handle02")) == (Colour{0.9, 0.1, 0.1}));
+    CHECK(node.undo_steps().size() == 1);
+    // One of them alone is an edit, of the colour that it had before, too.
+    node.set("handle03", Colour{0, 0, 0});
+    CHECK(node.changed("handle03") == kOfxStatOK);
+    CHECK(std::get<int>(node.value("handle03On")) == 1);
+}
+
+TEST(a_host_without_undo_steps_has_the_same_node) {
+    const OfxStatus answers[] = {kOfxStatErrUnsupported, kOfxStatReplyDefault, kOfxStatFailed,
+                                 kOfxStatErrMissingHostFeature};
+    std::vector<Config> configs;
+    for (const OfxStatus answer : answers) {
+        configs.emplace_back();
+        configs.back().edit_answer = answer;
+    }
+    for (const char* function : {"paramEditBegin", "paramEditEnd"}) {
+        configs.emplace_back();
+        configs.back().null_functions = {function};
+    }
+    for (const Config& config : configs) {
+        Host::get().configure(config);
+        Graded graded;
+        CHECK(std::get<Colour>(graded.node->value("handle02")) == (Colour{0.2, 0.7, 0.1}));
+        graded.node->set("handle02", Colour{1, 1, 0});
+        CHECK(graded.node->changed("handle02") == kOfxStatOK);
+        CHECK(std::get<int>(graded.node->value("handle02On")) == 1);
+        CHECK(graded.node->undo_steps().empty());
+    }
+}
+
 TEST(a_project_that_is_opened_keeps_colours_out_of_use) {
     Graded graded;
     const auto opened = graded.plugin.create();

@@ -352,9 +352,28 @@ TEST(calls_in_the_wrong_place_are_noticed) {
     const Wrong no_time = {"paramGetValue: while rendering",
                            [&](Now& n) { g.param->paramGetValue(handle_of(n, "number"), &value); }};
     expect_each(kOfxImageEffectActionIsIdentity, {no_time});
-    expect_each(kOfxActionInstanceChanged,
-                {{"in answer to the plugin's own setting",
-                  [](Now& n) { g.param->paramSetValue(handle_of(n, "number"), 0.5); }}});
+    const Breach set_number = [](Now& n) { g.param->paramSetValue(handle_of(n, "number"), 0.5); };
+    expect_each(
+        kOfxActionInstanceChanged,
+        {{"in answer to the plugin's own setting", set_number},
+         {"number would be undone in a step of its own", set_number},
+         {"or no label", [](Now& n) { g.param->paramEditBegin(n.params, ""); }},
+         {"or no label", [](Now& n) { g.param->paramEditBegin(n.params, nullptr); }},
+         {"paramEditBegin without its End", [](Now& n) { g.param->paramEditBegin(n.params, "x"); }},
+         {"one has begun already",
+          [](Now& n) {
+              g.param->paramEditBegin(n.params, "x");
+              g.param->paramEditBegin(n.params, "x");
+          }},
+         {"paramEditEnd: none has begun", [](Now& n) { g.param->paramEditEnd(n.params); }},
+         {"nothing to undo was set", [](Now& n) {
+              g.param->paramEditBegin(n.params, "x");
+              g.param->paramEditEnd(n.params);
+          }}});
+    for (const char* action : {kCreate, kOfxActionEndInstanceChanged}) {
+        expect("paramEditBegin: only while an instance changes",
+               faults_of(action, [](Now& n) { g.param->paramEditBegin(n.params, "x"); }));
+    }
     expect_each(kRender,
                 {{"paramGetValue: while rendering",
                   [&](Now& n) { g.param->paramGetValue(handle_of(n, "number"), &value); }},
