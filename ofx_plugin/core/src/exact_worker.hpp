@@ -1,4 +1,4 @@
-// One thread's work in Precision::kSingle, pixel by pixel, for others than Recolourer::apply().
+// One thread's work in Precision::kSingle: of Recolourer::apply(), and pixel by pixel of others.
 #pragma once
 
 #include <memory>
@@ -23,7 +23,8 @@ public:
     RecolourCounts counts() const;
 
 private:
-    std::unique_ptr<Recolourer::Pipeline> pipeline_;
+    class Pipeline;
+    std::unique_ptr<Pipeline> pipeline_;
 };
 
 }  // namespace palette4d

@@ -91,9 +91,7 @@ public:
                          const RecolourOptions& options) const;
 
 private:
-    friend class ExactWorker;
-    class OneByOne;  ///< a thread's work in double precision
-    class Pipeline;  ///< a thread's work many colours at a time
+    friend class OneByOne;
 
     /// At strength 1. `p` must be finite; `weights` has room for one a vertex.
     Vec3 displacement_at(const Vec3& p, std::vector<double>& weights,
