@@ -1,8 +1,9 @@
 """How fast and how close is the lattice on real frames, against exact mode and OpenColorIO?
 
     python benchmarks/bench_lattice.py SIDECAR CLIP [SIDECAR CLIP ...] [--frames 5,32,42,49]
+        [--size 3840x2160]
 
-Every frame is scaled to 3840x2160 in float (OpenImageIO, Lanczos: it overshoots, as filters do) and
+Every frame is scaled to that size in float (OpenImageIO, Lanczos: it overshoots, as filters do) and
 recoloured three ways, each by one thread and by two: exactly; by a lattice that is made for it, the
 making included, as each frame of a clip that plays needs it; by a lattice that is there already, as
 where palette and edit stay. The peer is OpenColorIO's CPU processor with a 3D LUT, tetrahedral, the
@@ -29,18 +30,16 @@ from numpy.typing import NDArray
 from palette4d import _core
 
 F32 = NDArray[np.float32]
-WIDTH, HEIGHT = 3840, 2160
-#: 24 frames a second.
-WANTED = 24 * WIDTH * HEIGHT / 1e6
+UHD = (3840, 2160)
 OPTIMISATIONS = ("NONE", "LOSSLESS", "VERY_GOOD", "DEFAULT", "DRAFT", "ALL")
 
 
-def scaled(pixels: F32) -> F32:
-    """Return an (h, w, 3 or more) picture as (HEIGHT, WIDTH, 3) float32."""
+def scaled(pixels: F32, width: int, height: int) -> F32:
+    """Return an (h, w, 3 or more) picture as (height, width, 3) float32."""
     spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, oiio.FLOAT)
     source = oiio.ImageBuf(spec)
     source.set_pixels(spec.roi, np.ascontiguousarray(pixels[:, :, :3]))
-    roi = oiio.ROI(0, WIDTH, 0, HEIGHT, 0, 1, 0, 3)
+    roi = oiio.ROI(0, width, 0, height, 0, 1, 0, 3)
     result = oiio.ImageBufAlgo.resize(source, filtername="lanczos3", roi=roi)
     return np.ascontiguousarray(result.get_pixels(oiio.FLOAT))
 
@@ -73,7 +72,7 @@ def best_processor(recolourer: _core.Recolourer, size: int, image: F32) -> ocio.
 
 
 def rates(
-    runs: int, works: dict[str, Callable[[], object]], clock: Callable[[], float]
+    runs: int, image: F32, works: dict[str, Callable[[], object]], clock: Callable[[], float]
 ) -> dict[str, float]:
     """Run all in turn, several times; returns median million pixels a second by name."""
     times: dict[str, list[float]] = {name: [] for name in works}
@@ -82,7 +81,7 @@ def rates(
             started = clock()
             work()
             times[name].append(clock() - started)
-    return {name: WIDTH * HEIGHT / statistics.median(t) / 1e6 for name, t in times.items()}
+    return {name: image.size / 3 / statistics.median(t) / 1e6 for name, t in times.items()}
 
 
 def measure(what: str, recolourer: _core.Recolourer, image: F32, runs: int) -> None:
@@ -109,13 +108,15 @@ def measure(what: str, recolourer: _core.Recolourer, image: F32, runs: int) -> N
     for n, lut in luts.items():
         one[f"OCIO {n}"] = lambda lut=lut: lut.applyRGB(scratch[3])
         one[f"OCIO {n} RGBA"] = lambda lut=lut: lut.applyRGBA(scratch[4])
-    thread = rates(runs, one, time.process_time)
+    thread = rates(runs, image, one, time.process_time)
     two: dict[str, Callable[[], object]] = {
         "exact": lambda: recolourer.apply(image, precision="single", threads=2, out=out),
         "made": lambda: _core.Lattice(recolourer).apply(image, threads=2, out=out),
         "ready": lambda: ready.apply(image, threads=2, out=out),
     }
-    wall, work = rates(runs, two, time.perf_counter), rates(runs, two, time.process_time)
+    wall = rates(runs, image, two, time.perf_counter)
+    work = rates(runs, image, two, time.process_time)
+    playing = 24 * image.size / 3 / 1e6
     print(f"{what}: {size}")
     print(
         f"  largest error {error.max():.5f} of every pixel, {seen:.5f} as the lattice says;"
@@ -135,28 +136,27 @@ def measure(what: str, recolourer: _core.Recolourer, image: F32, runs: int) -> N
         "  two threads: "
         + ", ".join(
             f"{name} {wall[name]:.1f} ({2 * work[name]:.1f}),"
-            f" {100 * wall[name] / WANTED:.0f} % ({200 * work[name] / WANTED:.0f} %)"
+            f" {100 * wall[name] / playing:.0f} % ({200 * work[name] / playing:.0f} %)"
             for name in two
         )
-        + f" of the {WANTED:.0f} Mpix/s that 24 frames a second are",
+        + f" of the {playing:.0f} Mpix/s that 24 frames a second are",
         flush=True,
     )
 
 
 def growth(recolourer: _core.Recolourer, image: F32, runs: int, plot: Path | None) -> None:
     """Print how the last frame's cost grows with palettes, pictures, threads; draw it."""
-    from bench_recolour import HD, UHD, UHD8K, hull
+    from bench_recolour import HD, UHD8K, hull
 
     def work(cut: _core.Recolourer, picture: F32, threads: int, out: F32) -> dict[str, float]:
         ways: dict[str, Callable[[], object]] = {
             "exact": lambda: cut.apply(picture, precision="single", threads=threads, out=out),
             "lattice": lambda: _core.Lattice(cut).apply(picture, threads=threads, out=out),
         }
-        scale = picture.size / 3 / (WIDTH * HEIGHT)
-        return {k: v * scale for k, v in rates(runs, ways, time.process_time).items()}
+        return rates(runs, picture, ways, time.process_time)
 
     by_vertices: dict[int, dict[str, float]] = {}
-    half = np.ascontiguousarray(image[: HEIGHT // 2])
+    half = np.ascontiguousarray(image[: len(image) // 2])
     for vertices in (4, 6, 8, 12, 16, 20, 24):
         by_vertices[vertices] = work(
             _core.Recolourer(*hull(vertices)), half, 1, np.empty_like(half)
@@ -201,11 +201,17 @@ def main() -> None:
     parser.add_argument("pairs", nargs="+", metavar="SIDECAR CLIP", help="edited sidecars, clips")
     parser.add_argument("--frames", action="append", default=[], help="of each pair, in turn")
     parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument(
+        "--size", default="{}x{}".format(*UHD), metavar="WxH", help="of the pictures"
+    )
     parser.add_argument("--growth", action="store_true", help="also how cost grows")
     parser.add_argument("--plot", type=Path, help="draw that")
     args = parser.parse_args()
     if len(args.pairs) % 2:
         parser.error("expected pairs: SIDECAR CLIP")
+    width, height = map(int, args.size.split("x"))
+    if args.growth and (width, height) != UHD:
+        parser.error("--growth goes by pictures of {}x{}".format(*UHD))
     from palette4d.analysis.clip import open_clip
 
     last = None
@@ -216,7 +222,7 @@ def main() -> None:
             cut = _core.slice_at(sidecar.polytope, image.frame)
             edited = _core.edited_colours(sidecar.polytope, sidecar.edits, cut)
             recolourer = _core.Recolourer(cut.rgb, edited, cut.faces)
-            last = recolourer, scaled(image.pixels)
+            last = recolourer, scaled(image.pixels, width, height)
             measure(f"{Path(path).name} at {image.frame}", *last, args.runs)
     if args.growth and last:
         growth(*last, args.runs, args.plot)

@@ -7,9 +7,9 @@
 namespace palette4d::plugin {
 namespace {
 
-/// A lattice costs what the picture's different colours cost: up to so many pixels, no less than
-/// computing each exactly (benchmarks/README.md).
-constexpr std::int64_t kExactIsFastEnough = 1920 * 1080;
+/// A lattice costs what the picture's different colours cost: from so many pixels on, less than
+/// computing each exactly, whatever the edit (`bench_lattice.py --size`).
+constexpr std::int64_t kLatticePays = 1920 * 1080;
 
 }  // namespace
 
@@ -17,7 +17,7 @@ void define_mode_param(ParamDefiner& define) {
     define.choice({kParamMode, "Mode",
                    "Exact: every colour is worked out by itself. Lattice: colours are interpolated "
                    "where that is as good as exact, which is several times as fast in large "
-                   "pictures. Auto: the lattice where the picture is larger than 1920x1080, needs "
+                   "pictures. Auto: the lattice where the picture is 1920x1080 or larger, needs "
                    "no conversion, and the host says that it renders for somebody who watches, or "
                    "a draft; exact for all else, such as a final render."},
                   {"Auto", "Exact", "Lattice"});
@@ -35,7 +35,7 @@ Interpolation interpolation_of(Mode mode, const Properties& render_arguments,
     const std::int64_t width = static_cast<std::int64_t>(picture.x2) - picture.x1;
     const std::int64_t height = static_cast<std::int64_t>(picture.y2) - picture.y1;
     // Either may be as large as 2^32.
-    if (width <= 0 || height <= kExactIsFastEnough / width) return Interpolation::kNever;
+    if (width <= 0 || height <= (kLatticePays - 1) / width) return Interpolation::kNever;
     const auto says = [&](const char* name) {
         return render_arguments.get_int(name).value_or(0) != 0;
     };

@@ -120,7 +120,7 @@ TEST(bytes_are_a_level_off_at_most) {
 TEST(auto_interpolates_only_where_the_host_tells_that_somebody_watches) {
     Node node;
     Layout tile = layout(4);
-    tile.definition = rect(-960, 0, 961, 1080);
+    tile.definition = rect(-960, 0, 960, 1080);
     Picture source(tile);
     fill(source);
     const std::map<std::string, Value> watched{{kOfxImageEffectPropInteractiveRenderStatus, 1}},
@@ -166,9 +166,9 @@ TEST(auto_is_exact_for_pictures_that_the_lattice_is_not_faster_for) {
     Layout tile = layout(4);
     CHECK(!interpolates(tile));
     for (const auto& [picture, large] :
-         {std::pair{rect(-100, -3, 1820, 1077), false}, std::pair{rect(-100, -3, 1821, 1077), true},
-          std::pair{rect(-100, -3, 980, 1918), true}, std::pair{rect(-3, 5, 157, 12965), false},
-          std::pair{rect(-3, 5, 157, 12966), true},
+         {std::pair{rect(-100, -3, 1819, 1077), false}, std::pair{rect(-100, -3, 1820, 1077), true},
+          std::pair{rect(-100, -3, 980, 1916), false}, std::pair{rect(-3, 5, 157, 12964), false},
+          std::pair{rect(-3, 5, 157, 12965), true},
           std::pair{rect(-2147483647, -2147483647, 2147483647, 2147483647), true}}) {
         tile.definition = picture;
         CHECK(interpolates(tile) == large);
@@ -181,10 +181,10 @@ TEST(auto_is_exact_for_pictures_that_the_lattice_is_not_faster_for) {
     Host::get().configure({});
     // A whole picture, and the same at half its size, as hosts show it while it plays.
     Layout whole;
-    whole.bounds = rect(0, 0, 2048, 1152);
+    whole.bounds = rect(0, 0, 1920, 1080);
     whole.channels = 3;
     CHECK(interpolates(whole));
-    whole.bounds = rect(0, 0, 1024, 576);
+    whole.bounds = rect(0, 0, 960, 540);
     whole.scale = 0.5;
     CHECK(!interpolates(whole));
 }
@@ -248,6 +248,17 @@ TEST(the_status_says_the_largest_error_of_the_frame_that_is_shown) {
     CHECK(error_said(5) == -1);
     node.instance->set("mode", kExact);
     CHECK(error_said(4) == -1);
+    // By itself: of a frame that is watched, and not of one that was rendered for good.
+    node.instance->set("mode", kAuto);
+    Layout tile = layout(4);
+    tile.definition = rect(0, 0, 1920, 1080);
+    Picture part(tile);
+    fill(part);
+    node.render(part, 6);
+    CHECK(error_said(6) == -1);
+    node.instance->extra_arguments = {{kOfxImageEffectPropInteractiveRenderStatus, 1}};
+    node.render(part, 6);
+    CHECK(error_said(6) > 0 && error_said(6) <= Lattice::kTolerance);
 }
 
 TEST(threads_and_tiles_share_a_lattice) {
