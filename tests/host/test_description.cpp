@@ -165,4 +165,12 @@ TEST(identity_is_reported) {
     CHECK(identity(2.5));
     instance->set("sidecar", std::string("/nowhere/at/all.p4d.json"));
     CHECK(!identity(2.5));  // there is a message to show
+    // The same where all that is wrong is a handle that is in use and not there.
+    instance->set("sidecar", sidecar("plain.p4d.json", false));
+    instance->set("handle05Id", std::string("v99"));
+    CHECK(identity(2.5));
+    instance->set("handle05On", 1);
+    CHECK(!identity(2.5));
+    instance->set("mix", 0.0);
+    CHECK(identity(2.5));
 }

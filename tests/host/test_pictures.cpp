@@ -222,6 +222,51 @@ TEST(a_source_smaller_than_the_window_is_framed_in_black) {
     }
 }
 
+TEST(other_outputs_are_framed_in_black_too) {
+    Ready node;
+    Layout in, out;
+    in.bounds = rect(5, 4, 20, 31);
+    out.bounds = rect(0, 0, 40, 44);
+    Picture source(in);
+    fill(source);
+    const std::pair<const char*, Value> settings[] = {
+        {"output", 3}, {"output", 1}, {"keepLightness", 1.0}, {"mix", 0.5}};
+    for (const auto& [name, value] : settings) {
+        const Value before = node.instance->value(name);
+        node.instance->set(name, value);
+        Picture output(out), alone(in), expected(out, 0);
+        CHECK(node.instance->render(1, &source, output, out.bounds) == kOfxStatOK);
+        CHECK(node.instance->render(1, &source, alone, in.bounds) == kOfxStatOK);
+        for (int y = in.bounds.y1; y < in.bounds.y2; ++y) {
+            std::copy_n(alone.at(in.bounds.x1, y), in.width() * in.pixel_bytes(),
+                        expected.at(in.bounds.x1, y));
+        }
+        CHECK(output.pixels(out.bounds) == expected.pixels(out.bounds));
+        node.instance->set(name, before);
+    }
+}
+
+TEST(images_that_are_parts_are_parts_of_the_one_picture) {
+    Ready node;
+    Layout whole;
+    whole.bounds = rect(-4, 10, 60, 58);
+    Picture source(whole), all(whole);
+    fill(source);
+    for (const int shown : {0, 2}) {  // the palette's strip stands where the picture ends
+        node.instance->set("output", shown);
+        CHECK(node.instance->render(1, &source, all, whole.bounds) == kOfxStatOK);
+        for (const OfxRectI& part : {rect(-4, 10, 28, 34), rect(28, 10, 60, 34),
+                                     rect(-4, 34, 28, 58), rect(7, 13, 41, 15)}) {
+            Layout tile = whole;
+            tile.bounds = part;
+            tile.definition = whole.bounds;
+            Picture output(tile);
+            CHECK(node.instance->render(1, &source, output, part) == kOfxStatOK);
+            CHECK(output.pixels(part) == all.pixels(part));
+        }
+    }
+}
+
 TEST(no_source_is_transparent_black) {
     Ready node;
     Layout layout;
