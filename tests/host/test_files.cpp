@@ -275,7 +275,7 @@ TEST(a_sidecar_rewritten_while_rendering) {
     const auto unchanged = scene.unchanged();
     CHECK(edited != unchanged && swapped != unchanged && swapped != edited);
     std::atomic<bool> done{false};
-    std::atomic<int> wrong{0}, seen_edited{0}, seen_swapped{0}, seen_unchanged{0};
+    std::atomic<int> wrong{0}, seen_edited{0}, seen_swapped{0}, seen_unchanged{0}, seen_told{0};
     std::vector<std::thread> threads;
     for (int t = 0; t < 4; ++t) {
         threads.emplace_back([&] {
@@ -296,6 +296,27 @@ TEST(a_sidecar_rewritten_while_rendering) {
                     ++wrong;
                 }
             }
+        });
+    }
+    // Others draw from lattices, and are told of changes: handles, status and the copy follow too.
+    for (int t = 0; t < 2; ++t) {
+        threads.emplace_back([&, t] {
+            const auto instance = scene.plugin.create();
+            instance->set("sidecar", path);
+            instance->set("mode", 2);
+            instance->set("embed", t);
+            Picture output(scene.layout);
+            const char* const changes[] = {"reload", "handle02", "resetHandles"};
+            for (int round = 0; !done; ++round) {
+                instance->set("handle02", Colour{0.1 * (round % 10), 0.5, 0.5});
+                wrong += instance->changed(changes[round % 3]) != kOfxStatOK;
+                wrong +=
+                    instance->render(2, &scene.source, output, scene.layout.bounds) != kOfxStatOK;
+                std::string clip;
+                double time = 0;
+                instance->is_identity(2, clip, time);
+            }
+            seen_told += instance->settings("status") > 0;
         });
     }
     const auto replace = [](const std::string& text) {
@@ -333,4 +354,5 @@ TEST(a_sidecar_rewritten_while_rendering) {
     CHECK(seen_edited > 0);
     CHECK(seen_swapped > 0);
     CHECK(seen_unchanged > 0);
+    CHECK(seen_told == 2);
 }
