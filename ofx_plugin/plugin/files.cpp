@@ -21,14 +21,16 @@ void note_text(const Params& params, const char* name, const std::string& text) 
 void define_file_params(ParamDefiner& define) {
     define
         .text({kParamSidecar, "Sidecar",
-               "The clip's palette and its edits, a file made by 'palette4d analyze'. ~ and "
-               "environment variables may stand in it. Read again whenever it changes."},
+               "The file that 'palette4d analyze' made of the clip: its palette and the edits of "
+               "it. The path may begin with ~ and name environment variables. The file is read "
+               "again whenever it changes."},
               kOfxParamStringIsFilePath)
         .set_int(kOfxParamPropStringFilePathExists, 1);
     define
         .text({kParamClipFolder, "Clip's folder",
-               "Where a relative sidecar is, and where one that was moved is looked for by its "
-               "name. Filled in when a sidecar is chosen whose clip is there."},
+               "The folder that a relative path of the sidecar starts from, and in which one that "
+               "is not where its path says is looked for by its name. Filled in when a sidecar is "
+               "chosen, where its clip is found."},
               kOfxParamStringIsDirectoryPath)
         .set_int(kOfxParamPropStringFilePathExists, 0);
     define.button({kParamReload, "Reload", "Looks at the sidecar's file again, now."});

@@ -84,10 +84,10 @@ void define_handle_params(ParamDefiner& define) {
     for (const Slot& slot : slots()) {
         define.flag({slot.use.c_str(), slot.use_label.c_str(),
                      "Whether the colour below takes the place of the palette's. Changing the "
-                     "colour switches it on, where the host tells."},
+                     "colour switches this on, in hosts that tell the node of changes."},
                     false);
         define.colour({slot.colour.c_str(), slot.colour_label.c_str(),
-                       "The new colour of this handle of the palette, in the sidecar's own "
+                       "The new colour of this handle, in the numbers of the palette's own "
                        "encoding. May be keyframed."},
                       {0, 0, 0}, -kLargest, kLargest);
     }

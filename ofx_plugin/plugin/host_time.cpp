@@ -20,21 +20,23 @@ void define_time_params(ParamDefiner& define) {
                   kFrames, 1, 2, false);
     define.choice({kParamConform, "Conform",
                    "Manual timing. Frame for frame: each frame of the host is one of the clip, "
-                   "whatever the rates. By rates: time passes alike, as where 24 frames a second "
-                   "play at 23.976 without change of speed."},
+                   "whatever the rates, as where 24 frames a second were conformed to 23.976. By "
+                   "rates: seconds count, as where they play at their own speed on a timeline of "
+                   "60."},
                   {"Frame for frame", "By rates"});
     define.number({kParamHostRate, "Host's rate",
                    "Manual timing by rates: frames a second of the host's timeline; 0 for what the "
                    "host reports."},
                   {0, 0, 1000, 0, 120}, 1, 3, false);
     define.number(
-        {kParamInPoint, "In-point", "Frames that are cut off the clip's beginning in the host."},
+        {kParamInPoint, "In-point", "How many frames the host has cut off the clip's beginning."},
         kFrames, 1, 2, false);
     define.number({kParamFrameOffset, "Frame offset",
-                   "Frames added before the palette is looked up, to put right what is left."},
+                   "Frames added to the one that all else here gives, to put right what is left."},
                   kFrames, 1, 2, false);
     define.number(
-        {kParamSpeed, "Speed", "Frames of the clip a frame of the host: 2 plays it twice as fast."},
+        {kParamSpeed, "Speed",
+         "Frames of the clip for each frame of the host: 2 where it plays twice as fast."},
         {1, 0.001, 1000, 0.1, 10}, 0.1, 4, false);
     define.flag({kParamReverse, "Reverse",
                  "The host plays the clip backwards: its last frame comes first, and the in-point "

@@ -37,9 +37,10 @@ void prepare(Look& look, const Params& params, LoadedSidecar& loaded, double fra
         const int handle = handle_at(params, sidecar, settings.weight_of, time);
         if (handle < 0) {
             look.passes = true;
-            look.problem = std::string(kParamWeightOf) + ": the sidecar has no handle " +
+            look.problem = "Weight of a handle: the sidecar has no handle " +
                            std::to_string(settings.weight_of) + ", expected one of its " +
-                           std::to_string(handles_of(sidecar.polytope, sidecar.edits).size());
+                           std::to_string(handles_of(sidecar.polytope, sidecar.edits).size()) +
+                           "; choose another number as Handle";
             return;
         }
         drawing.recolourer = loaded.weight_at(frame, handle);
@@ -97,7 +98,7 @@ Look look_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time,
         throw;
     } catch (const std::exception& error) {
         look.passes = true;
-        look.problem = path + ": frame " + std::to_string(at.frame) + ": " + error.what();
+        look.problem = path + ": " + words_of(time, at) + ": " + error.what();
     }
     return look;
 }

@@ -16,7 +16,7 @@ constexpr std::int64_t kLatticePays = 1920 * 1080;
 void define_mode_param(ParamDefiner& define) {
     define.choice({kParamMode, "Mode",
                    "Exact: every colour is worked out by itself. Lattice: colours are interpolated "
-                   "where that is as good as exact, which is several times as fast in large "
+                   "where that is within 0.002 of exact, which is several times as fast in large "
                    "pictures. Auto: the lattice where the picture is 1920x1080 or larger, needs "
                    "no conversion, and the host says that it renders for somebody who watches, or "
                    "a draft; exact for all else, such as a final render."},

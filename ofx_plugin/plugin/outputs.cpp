@@ -197,7 +197,8 @@ void define_output_params(ParamDefiner& define) {
                    "colours above and the new ones below. Outside: what the palette does not "
                    "enclose."},
                   {"Recoloured", "Weight of a handle", "Palette", "Outside"});
-    define.integer({kParamWeightOf, "Handle", "The handle whose weight is put out, by its number."},
+    define.integer({kParamWeightOf, "Handle",
+                    "The handle whose weight is put out: 2 for the one at Use 2 below."},
                    {1, 1, 100000, 1, 32});
     define.choice({kParamMatteIn, "Matte in",
                    "Picture: a matte (weight, outside) is a grey picture. Alpha: the picture keeps "
@@ -205,7 +206,8 @@ void define_output_params(ParamDefiner& define) {
                    "matte."},
                   {"Picture", "Alpha"});
     define.number({kParamOutsideReach, "Outside at",
-                   "How far from the palette a colour is all outside; nearer ones are in between."},
+                   "The distance from the palette at which Outside is white; nearer to it, it is "
+                   "grey."},
                   {0.05, 0.0001, 100, 0.001, 1}, 0.01, 4, false);
     define.number({kParamKeepLightness, "Keep lightness",
                    "How much of the source's lightness the graded picture keeps: 0 none of it, 1 "
@@ -222,7 +224,7 @@ void define_output_params(ParamDefiner& define) {
                    "palette's own numbers, such as ACEScct, as a host that converts by itself has "
                    "them. Without a conversion in the sidecar both are the same."},
                   {"Input space", "Palette space"});
-    define.number({kParamMix, "Mix", "What is put out (1) or the source (0), or in between."},
+    define.number({kParamMix, "Mix", "From the source (0) to what is put out (1)."},
                   {1, 0, 1, 0, 1}, 0.01, 3, true);
     define.end_group();
 }

@@ -35,7 +35,8 @@ std::string status_of(const Chosen& chosen, int handles, const std::string& copy
     if (!chosen.result.loaded) return chosen.result.problem;
     std::string text = describe(chosen.result.loaded->sidecar());
     if (handles > 0) {
-        text += ", " + counted(static_cast<std::size_t>(handles), "handle", "handles") + " here";
+        text +=
+            ", " + counted(static_cast<std::size_t>(handles), "handle", "handles") + " in use here";
     }
     if (!copy.empty()) text += "; " + copy;
     if (!shown.empty()) text += "; " + shown;

@@ -147,7 +147,7 @@ TEST(handles_show_what_the_sidecar_holds) {
     CHECK(std::get<Colour>(node.value("handle01")) == (Colour{0.3, 0.3, 0.3}));
     CHECK(std::get<Colour>(node.value("handle02")) == (Colour{0.9, 0.1, 0.1}));
     CHECK(secret(node, "handle17"));
-    CHECK(node.text("status").find("0 edits, 1 handle here") != std::string::npos);
+    CHECK(node.text("status").find("0 edits, 1 handle in use here") != std::string::npos);
     // Again, nothing is new: nothing is set.
     const int before = node.settings("handle02");
     CHECK(node.changed("strength") == kOfxStatOK);
