@@ -238,8 +238,17 @@ public:
         if (type == kOfxParamTypeGroup) return new sdk::Param::GroupInstance(d, this);
         return nullptr;
     }
-    OfxStatus editBegin(const std::string&) override { return kOfxStatOK; }
-    OfxStatus editEnd() override { return kOfxStatOK; }
+    OfxStatus editBegin(const std::string& label) override {
+        EXPECT(!in_step && !label.empty());
+        in_step = true;
+        return kOfxStatOK;
+    }
+    OfxStatus editEnd() override {
+        EXPECT(in_step);
+        in_step = false;
+        ++steps;
+        return kOfxStatOK;
+    }
     void progressStart(const std::string&, const std::string&) override {}
     void progressEnd() override {}
     bool progressUpdate(double) override { return true; }
@@ -256,6 +265,7 @@ public:
         beginInstanceChangedAction(kOfxChangeUserEdited);
         EXPECT(paramInstanceChangedAction(name, kOfxChangeUserEdited, time, kScale) == kOfxStatOK);
         endInstanceChangedAction(kOfxChangeUserEdited);
+        EXPECT(!in_step);
         const bool asks = areClipPrefsDirty();
         if (asks) EXPECT(getClipPreferences());
         return asks;
@@ -287,6 +297,8 @@ public:
         return clip.output ? clip.output->pixels : std::vector<float>();
     }
     std::string message;
+    bool in_step = false;
+    int steps = 0;  ///< of undo
 };
 
 class Host : public sdk::ImageEffect::Host {

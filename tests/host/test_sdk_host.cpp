@@ -69,6 +69,7 @@ void live(sdk::ImageEffect::ImageEffectPlugin& plugin, const std::string& contex
     std::filesystem::copy_file(given, path, std::filesystem::copy_options::overwrite_existing);
     const palette4d::Sidecar sidecar = palette4d::read_sidecar(path.string());
     EXPECT(node->change<Text>("sidecar", path.string()));
+    EXPECT(node->steps == 1);  // all colours of its handles
     const auto status = [&] { return node->param<Text>("status").value; };
     EXPECT(status().find("time 0 is frame 0") != std::string::npos);
     const auto handles = palette4d::handles_of(sidecar.polytope, sidecar.edits);
@@ -85,9 +86,11 @@ void live(sdk::ImageEffect::ImageEffectPlugin& plugin, const std::string& contex
 
     EXPECT(!node->change<Number>("strength", 0.0) && node->identity(4.5));
     node->change<Number>("strength", 1.0);
+    EXPECT(node->steps == 1);
     // A colour of the host's own switches its handle on.
     node->param<Colour>("handle02").rgb = {0.2, 0.9, 0.6};
     EXPECT(!node->changed("handle02") && node->param<Flag>("handle02On").value);
+    EXPECT(node->steps == 2);
     const palette4d::Edits graded =
         palette4d::with_colours(sidecar.polytope, sidecar.edits, true, {{1, {0.2, 0.9, 0.6}}});
     EXPECT(node->rendered(3) == recoloured(sidecar, graded, 3));
