@@ -113,7 +113,7 @@ OfxStatus Instance::changed(const std::string& type, const std::string& name,
     const OfxStatus status = plugin_.call(kOfxActionInstanceChanged, &effect_, &in, nullptr);
     if (telling_) return status;
     if (effect_.params.open_step) {
-        if (!Host::get().refused()) Host::get().fault("paramEditBegin without its End");
+        Host::get().fault("paramEditBegin without its End");
         effect_.params.open_step.reset();
     }
     check_preferences();

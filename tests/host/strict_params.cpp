@@ -227,7 +227,10 @@ OfxStatus edit_begin(OfxParamSetHandle set, const char* label) {
 
 OfxStatus edit_end(OfxParamSetHandle set) {
     const Call call("paramEditEnd");
-    if (call.refused()) return kOfxStatFailed;
+    if (call.refused()) {
+        if (set) set->open_step.reset();  // the plugin has done its part
+        return kOfxStatFailed;
+    }
     if (!set || !set->open_step) {
         Host::get().fault("paramEditEnd: none has begun");
         return kOfxStatErrBadHandle;
