@@ -315,15 +315,22 @@ TEST(a_sidecar_rewritten_while_rendering) {
                 std::string clip;
                 double time = 0;
                 instance->is_identity(2, clip, time);
+                ++seen_told;
             }
-            seen_told += instance->settings("status") > 0;
+            wrong += instance->settings("status") == 0;
         });
     }
     const auto replace = [](const std::string& text) {
         write("next.p4d.json", text);
         std::filesystem::rename(folder() / "next.p4d.json", folder() / "clip.p4d.json");
     };
-    for (int round = 0; round < 240; ++round) {
+    // Sanitizers make renders slow, and the file changes no slower.
+    const auto enough = [&] {
+        return seen_edited > 0 && seen_swapped > 0 && seen_unchanged > 0 && seen_told > 10 &&
+               seen_edited + seen_swapped + seen_unchanged > 100;
+    };
+    int round = 0;
+    for (; round < 240 || (!enough() && round < 10000); ++round) {
         switch (round % 6) {
             case 0:
                 write("clip.p4d.json", whole);
@@ -349,10 +356,11 @@ TEST(a_sidecar_rewritten_while_rendering) {
     done = true;
     for (std::thread& thread : threads) thread.join();
     figure(std::to_string(seen_edited + seen_swapped + seen_unchanged) +
-           " pictures of a file that changed 240 times, " + std::to_string(wrong) + " wrong");
+           " pictures of a file that changed " + std::to_string(round) + " times, " +
+           std::to_string(wrong) + " wrong");
     CHECK(wrong == 0);
     CHECK(seen_edited > 0);
     CHECK(seen_swapped > 0);
     CHECK(seen_unchanged > 0);
-    CHECK(seen_told == 2);
+    CHECK(seen_told > 0);
 }
