@@ -75,7 +75,7 @@ OUR_OPTIONS = (
     ("--separation", "X", "separation", "palette colours nearer than this repel; 0 is the paper"),
     ("--reach", "X", "reach", "pixels this far outside count twice; 0: once, as in the paper"),
     ("--colours", "N", "colours", "most colour bins kept of a frame, for the losses"),
-    ("--coarse-colours", "N", "coarse_colours", "the same for hulls, merging and removal"),
+    ("--coarse-colours", "N", "coarse_colours", "the same for the search; of short clips more"),
     ("--seed", "N", "seed", "accepted and recorded; nothing is random at present"),
     ("--threads", "N", "threads", "threads; 0 is one a processor; never changes the result"),
 )

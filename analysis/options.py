@@ -65,7 +65,8 @@ class AnalysisOptions:
     separation : palette colours nearer than this repel each other (ours; 0 is the paper).
     reach : pixels this far outside count twice, farther ones still more (ours; 0 is the paper).
     colours : most colour bins kept of a frame; 8-bit frames with no more distinct colours are
-    exact. coarse_colours : the same for hulls, merging and removal, where speed counts.
+    exact. coarse_colours : the same for hulls, merging and removal, where speed counts (of clips
+    of less than 48 frames up to twice as many).
     seed : seeds what is random (nothing at present: every step is deterministic).
     threads : threads of the loss evaluation; the result does not depend on it. 0: one a processor.
     """

@@ -134,14 +134,15 @@ class Road(abc.ABC):
         self.measure("frame_hulls", strands.polytope(), len(blocks))
         return blocks
 
-    @functools.cached_property
-    def pooled(self) -> _core.ColourTree:
-        """The colours of all frames together."""
-        return statistics.pooled([f.coarse for f in self.frames], self.options.coarse_colours)
+    @functools.cache  # noqa: B019 (a road is walked once, and ends with its analysis)
+    def pooled(self, sparser: int = 1) -> _core.ColourTree:
+        """Return the colours of all frames together, or only so many times fewer."""
+        most = statistics.searched(len(self.frames), self.options) // sparser
+        return statistics.pooled([f.coarse for f in self.frames], most)
 
-    def static(self, options: AnalysisOptions) -> SkewPolytope:
-        """Return the static palette of section 6.2."""
-        palette = frame_hulls.frame_palette(self.pooled, self.low, self.high, options)
+    def static(self, options: AnalysisOptions, sparser: int = 1) -> SkewPolytope:
+        """Return the static palette of section 6.2, started from the colours `pooled`."""
+        palette = frame_hulls.frame_palette(self.pooled(sparser), self.low, self.high, options)
         polytope = static_hull.static_polytope(palette, self.frames, self.low, self.high, options)
         self.report("static_hull", 1, 1)
         return polytope

@@ -37,6 +37,10 @@ MOST_COLOURS = 2_000_000
 """Colours kept of a clip, all frames together: about 100 MB. Four times as many gave palettes no
 better, for twice the time."""
 
+SHORT, RICHER = 48, 2
+"""Of clips with fewer frames than these more coarse colours are kept of each, so that as many take
+part in the search, up to so many times."""
+
 MOST_FRAMES = 3000
 """Of a clip with more frames only every n-th is analysed: a palette is linear in time anyway."""
 
@@ -150,11 +154,17 @@ def budget(frames: int, options: AnalysisOptions) -> tuple[int, int]:
     """Return how many colours and coarse colours are kept of each of so many frames."""
     share = MOST_COLOURS / (frames * (options.colours + options.coarse_colours))
     if share >= 1:
-        return options.colours, options.coarse_colours
+        return options.colours, min(options.colours, searched(frames, options))
     return (
         min(options.colours, max(FEWEST_COLOURS, int(share * options.colours))),
         min(options.coarse_colours, max(FEWEST_COARSE, int(share * options.coarse_colours))),
     )
+
+
+def searched(frames: int, options: AnalysisOptions) -> int:
+    """Return how many colours of a frame, of so many, or of all of them together, suffice to
+    compare alternatives."""
+    return int(options.coarse_colours * min(RICHER, max(1.0, SHORT / frames)))
 
 
 def pooled(trees: Sequence[_core.ColourTree], most: int) -> _core.ColourTree:

@@ -20,6 +20,7 @@ from palette4d.analysis import (
     block_merging,
     handle_removal,
     static_hull,
+    statistics,
     stop_insertion,
     vertex_removal,
 )
@@ -43,6 +44,8 @@ COMPARE_EVALUATIONS = 40
 FINAL_EVALUATIONS = 150
 # Of the stops for single frames, how many are tried, where L' does not allow them all.
 STOPS_KEPT = (1, 0.75, 0.5, 0.25, 0)
+# Of the pooled colours, one in so many: what static hulls of short clips start from.
+STARTS = (1, 2, 4)
 # Where nothing else is as good as a simple hull: what its shape counts, as much as L' lets it.
 SHAPE_WEIGHTS = (1.0, 0.7, 0.5, 0.25, 0.1, 0.0)
 
@@ -107,8 +110,16 @@ class Skew(Road):
         return Analysis(polytope, tuple(self.stages), remarks)
 
     def plain_hulls(self) -> list[SkewPolytope]:
-        """Return plain static hulls of no more vertices than asked for."""
-        hulls = [self.static(options) for options in static_hull.plain(self.options)]
+        """Return plain static hulls of no more vertices than asked for.
+
+        In a short clip little moves, and such a hull is hard to beat: several starts are tried.
+        """
+        starts = STARTS if len(self.frames) < statistics.SHORT else STARTS[:1]
+        hulls = [
+            self.static(options, sparser)
+            for options in static_hull.plain(self.options)
+            for sparser in starts
+        ]
         most = self.options.vertices
         return [hull for hull in hulls if not most or len(hull.vertices) <= most]
 

@@ -129,9 +129,10 @@ MAGENTA, BLUE = ((1.0, 0.0, 1.0), 8), ((0.0, 0.0, 1.0), 8)
         ("10-34", (22, 23, 24), (MAGENTA,)),
         ("10-34", (22, 23, 24), (MAGENTA, BLUE)),
         ("0-19", (0,), (MAGENTA,)),
+        ("0-19", (0, 1, 2), (MAGENTA,)),
         ("0-19", (17, 18, 19), (MAGENTA,)),
     ],
-    ids=["one", "two at once", "in the first frame", "in the last frames"],
+    ids=["one", "two at once", "in the first frame", "in the first three", "in the last frames"],
 )
 def test_lights_in_a_real_clip_are_kept(seasons, numbers, lit, lights):
     frames = light_over_seasons(seasons, numbers, lit, lights)
@@ -140,6 +141,18 @@ def test_lights_in_a_real_clip_are_kept(seasons, numbers, lit, lights):
     assert analysis.stages[-1].losses.max_distance < 0.3
     assert dark.stages[-1].losses.max_distance < 0.25
     assert analysis.stages[-1].losses.L_prime < analysis.stages[0].losses.L_prime
+
+
+def test_of_a_blinking_light_as_much_is_kept_as_l_prime_allows(seasons):
+    """Stops for all six flashes would raise it above that of one static palette."""
+    lit = range(12, 34, 4)
+    frames = light_over_seasons(seasons, "10-34", lit, (MAGENTA,))
+    analysis = methods.analyze(frames, AnalysisOptions())
+    distances = farthest(analysis.polytope, frames)
+    held = [n for n in lit if distances[n - 10] < 0.45]
+    assert len(held) >= 2
+    static = methods.analyze(frames, AnalysisOptions(method="static"))
+    assert analysis.stages[-1].losses.L_prime < static.stages[-1].losses.L_prime
 
 
 def test_frames_that_fit_alike_get_none():

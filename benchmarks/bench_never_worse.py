@@ -1,0 +1,84 @@
+"""Is the default never worse than one static palette of the same clip?
+
+Analyses each clip, or piece of one, with the defaults and as static palettes: `--method static` as
+it is, and the plain hulls of `--palette-size` colours that the default holds itself to, without the
+terms that shape a palette. All of them are measured on every pixel.
+
+    python benchmarks/bench_never_worse.py CLIP[:A-B[xN]] ... [--evaluator PROGRAM]
+
+Prints Markdown. Ends with 1 where the default is the worse one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+import evaluator
+from evaluator import Figures, Runs, say, table
+from palette4d.analysis import static_hull
+from palette4d.analysis.options import AnalysisOptions
+from palette4d.arguments import frame_range
+
+STATIC = ("--method", "static")
+# What the command and these measurements may differ by: a sample of the colours is searched.
+SAMPLED = 0.0005
+
+
+def plain_hulls() -> dict[str, tuple[str, ...]]:
+    """Return the command's options for each plain hull."""
+    defaults, out = AnalysisOptions(), {}
+    for options in static_hull.plain(defaults):
+        given = []
+        for name, value in options.recorded().items():
+            if value != defaults.recorded()[name]:
+                given += [f"--{name.replace('_', '-')}", f"{value:g}"]
+        out[" ".join(given)] = (*STATIC, *given)
+    return out
+
+
+def measured(clip: str, frames: str | None, program: Path | None) -> dict[str, Figures]:
+    """Return the figures of the default, "", and of the static palettes."""
+    ways = {"": (), "as it is": STATIC, **plain_hulls()}
+    with tempfile.TemporaryDirectory() as folder:
+        runs = Runs(clip, frames, Path(folder))
+        palettes = {name: runs.palette(*options) for name, options in ways.items()}
+        return evaluator.measure(clip, palettes, program, frames)
+
+
+def piece(text: str) -> tuple[str, str | None]:
+    """Argparse type: a clip, with or without the frames of a piece."""
+    clip, colon, frames = text.rpartition(":")
+    try:
+        return (clip, frame_range(frames)) if colon else (text, None)
+    except argparse.ArgumentTypeError:  # a colon of the path's own
+        return text, None
+
+
+def main() -> None:
+    """Run the benchmark."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    parser.add_argument("clips", metavar="CLIP[:A-B]", type=piece, nargs="+")
+    parser.add_argument(
+        "--evaluator", metavar="PROGRAM", type=Path, help="measure with it (8-bit clips)"
+    )
+    args = parser.parse_args()
+    rows, worse = [], False
+    for clip, frames in args.clips:
+        name = f"{Path(clip).stem} {frames or ''}".strip()
+        figures = measured(clip, frames, args.evaluator)
+        own = figures.pop("")
+        best = min(figures, key=lambda way: figures[way].L_prime)
+        bound = figures[best].L_prime
+        worse |= own.L_prime > bound + SAMPLED
+        rows.append([name, f"{bound:.4f}", f"{own.L_prime:.4f}", own.vertices, best])
+        say(f"{name}: " + ", ".join(f"{way}: {x.L_prime:.4f}" for way, x in figures.items()))
+    heads = ["clip", "best static palette, L'", "default, L'", "handles", "options of the static"]
+    print(table(heads, rows))
+    sys.exit("stopped: the default is worse than a static palette" if worse else 0)
+
+
+if __name__ == "__main__":
+    main()
