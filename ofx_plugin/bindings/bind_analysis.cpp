@@ -65,7 +65,11 @@ void bind_analysis(py::module_& m) {
                                        rgb.push_back(t.rgb(static_cast<int>(i)));
                                    return to_array(rgb);
                                })
-        .def_property_readonly("counts", [](const ColourTree& t) { return to_array(t.counts()); })
+        .def_property_readonly(
+            "counts",
+            [](const ColourTree& t) {
+                return to_array(std::vector<double>(t.counts(), t.counts() + t.size()));
+            })
         .def_property_readonly("total", &ColourTree::total)
         .def(
             "nearest_mean",

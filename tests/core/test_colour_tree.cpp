@@ -138,9 +138,49 @@ TEST(boxes_hold_their_colours_and_counts_stay_with_them) {
         for (int i = 0; i < n; ++i) found.push_back(tree.rgb(i));
         for (std::size_t i = 0; i < found.size(); ++i)
             CHECK_EQUAL(tree.counts()[i], 1 + 100 * found[i][0]);
+        for (int i = 0; i < ColourTree::kLeafSize; ++i) CHECK_EQUAL(tree.counts()[n + i], 0.0);
         std::sort(found.begin(), found.end());
         std::sort(rgb.begin(), rgb.end());
         CHECK(found == rgb);
+    }
+}
+
+TEST(the_wide_tree_has_the_same_leaves_and_a_box_around_each_group) {
+    shapes::Random random(4);
+    for (const int n : {1, 16, 17, 100, 130, 2000}) {
+        std::vector<Vec3> rgb;
+        for (int i = 0; i < n; ++i) rgb.push_back(random.colour(-1, 2));
+        const ColourTree tree(rgb, std::vector<double>(rgb.size(), 1));
+        int end = 0;
+        std::vector<std::pair<Vec3, Vec3>> boxes;
+        for (const int leaf : tree.leaves()) {
+            const ColourTree::Node& node = tree.nodes()[static_cast<std::size_t>(leaf)];
+            CHECK_EQUAL(node.left, -1);
+            CHECK_EQUAL(node.begin, end);
+            end = node.end;
+            boxes.emplace_back(node.low, node.high);
+        }
+        CHECK_EQUAL(end, n);
+        for (const std::vector<ColourTree::Boxes>& level : tree.levels()) {
+            std::vector<std::pair<Vec3, Vec3>> around;
+            std::size_t next = 0;
+            for (const ColourTree::Boxes& group : level) {
+                Vec3 low{kInf, kInf, kInf}, high{-kInf, -kInf, -kInf};
+                CHECK(group.count > 0);
+                for (int i = 0; i < group.count; ++i, ++next)
+                    for (std::size_t c = 0; c < 3; ++c) {
+                        CHECK_EQUAL(group.sides[0][c][i], boxes.at(next).first[c]);
+                        CHECK_EQUAL(group.sides[1][c][i], boxes.at(next).second[c]);
+                        low[c] = std::min(low[c], boxes[next].first[c]);
+                        high[c] = std::max(high[c], boxes[next].second[c]);
+                    }
+                around.emplace_back(low, high);
+            }
+            CHECK_EQUAL(next, boxes.size());
+            boxes = around;
+        }
+        CHECK_EQUAL(boxes.size(), 1u);
+        CHECK(boxes[0].first == tree.nodes()[0].low && boxes[0].second == tree.nodes()[0].high);
     }
 }
 

@@ -139,11 +139,15 @@ TEST(a_tree_of_many_colours_sums_what_single_colours_give) {
 
 TEST(every_instruction_set_gives_the_same_bits) {
     shapes::Random random(5);
-    for (int i = 0; i < 20; ++i) {
-        const std::vector<Vec3> palette = shapes::random_convex(random, 4 + random.below(12)).rgb;
+    for (int i = 0; i < 40; ++i) {
+        std::vector<Vec3> palette = shapes::random_convex(random, 4 + random.below(12)).rgb;
+        if (i % 4 == 1) palette = shapes::cube().rgb;  // overlapping facets
+        if (i % 4 == 2)
+            for (Vec3& v : palette) v[2] = 0.5;
+        if (i % 4 == 3) palette.push_back(palette[0]);  // edges without length
         std::vector<Vec3> colours;
         std::vector<double> counts;
-        for (int n = 1 + random.below(300); n > 0; --n) {
+        for (int n = 1 + random.below(1500); n > 0; --n) {
             colours.push_back(random.colour(-0.2, 1.2));
             counts.push_back(1 + random.below(7));
         }
@@ -158,6 +162,7 @@ TEST(every_instruction_set_gives_the_same_bits) {
             const FrameLoss loss = result(set, gradient);
             CHECK_EQUAL(loss.R, portable.R);
             CHECK_EQUAL(loss.E, portable.E);
+            CHECK_EQUAL(loss.outside, portable.outside);
             CHECK_EQUAL(loss.max_distance, portable.max_distance);
             CHECK(gradient == expected);
         }

@@ -5,6 +5,8 @@
 #include <limits>
 #include <numeric>
 #include <stdexcept>
+#include <tuple>
+#include <utility>
 
 #include "vec3.hpp"
 
@@ -30,7 +32,7 @@ struct Candidate {
 
 }  // namespace
 
-ColourTree::ColourTree(std::vector<Vec3> rgb, std::vector<double> counts) {
+ColourTree::ColourTree(std::vector<Vec3> rgb, std::vector<double> counts) : size_(rgb.size()) {
     if (rgb.empty() || rgb.size() != counts.size())
         throw std::invalid_argument("a colour tree needs as many counts as colours, at least one");
     for (std::size_t i = 0; i < rgb.size(); ++i) {
@@ -41,7 +43,8 @@ ColourTree::ColourTree(std::vector<Vec3> rgb, std::vector<double> counts) {
     std::iota(order.begin(), order.end(), 0);
     nodes_.reserve(4 * rgb.size() / kLeafSize + 4);
     build(0, static_cast<int>(rgb.size()), order, rgb);
-    counts_.resize(rgb.size());
+    build_levels();
+    counts_.resize(rgb.size() + kLeafSize);
     for (int c = 0; c < 3; ++c) {
         channel_[c].resize(rgb.size() + kLeafSize);
         for (std::size_t i = 0; i < order.size(); ++i) channel_[c][i] = rgb[order[i]][c];
@@ -75,6 +78,34 @@ int ColourTree::build(int begin, int end, std::vector<int>& order, const std::ve
     }
     nodes_[index] = node;
     return index;
+}
+
+void ColourTree::build_levels() {
+    // A level's boxes: first the leaves, then one around each group of the level before.
+    std::vector<std::pair<Vec3, Vec3>> boxes;
+    for (std::size_t i = 0; i < nodes_.size(); ++i)
+        if (nodes_[i].left < 0) {
+            leaves_.push_back(static_cast<int>(i));
+            boxes.emplace_back(nodes_[i].low, nodes_[i].high);
+        }
+    do {
+        std::vector<Boxes> level((boxes.size() + Boxes::kSize - 1) / Boxes::kSize);
+        std::vector<std::pair<Vec3, Vec3>> around(level.size());
+        for (std::size_t i = 0; i < boxes.size(); ++i) {
+            Boxes& group = level[i / Boxes::kSize];
+            auto& [low, high] = around[i / Boxes::kSize];
+            if (group.count == 0) std::tie(low, high) = boxes[i];
+            for (int c = 0; c < 3; ++c) {
+                group.sides[0][c][group.count] = boxes[i].first[c];
+                group.sides[1][c][group.count] = boxes[i].second[c];
+                low[c] = std::min(low[c], boxes[i].first[c]);
+                high[c] = std::max(high[c], boxes[i].second[c]);
+            }
+            ++group.count;
+        }
+        levels_.push_back(std::move(level));
+        boxes = std::move(around);
+    } while (boxes.size() > 1);
 }
 
 Vec3 ColourTree::nearest_mean(const Vec3& v, double k) const {

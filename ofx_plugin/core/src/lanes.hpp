@@ -122,6 +122,14 @@ PALETTE4D_INLINE bool any(const LaneMask<T>& m) {
     PALETTE4D_EACH found |= m.at[lane];
     return found;
 }
+/// A bit a lane, the first lane's the lowest.
+PALETTE4D_INLINE unsigned bits(const LaneMask<double>& m) {
+    unsigned found = 0;
+    for (int lane = 0; lane < Lanes<double>::kCount; ++lane) {
+        found |= static_cast<unsigned>(m.at[lane]) << lane;
+    }
+    return found;
+}
 #undef PALETTE4D_EACH
 #undef PALETTE4D_BINARY
 #undef PALETTE4D_OPERATOR
@@ -247,6 +255,16 @@ PALETTE4D_INLINE bool any(LaneMask<T> m) {
     return _mm512_test_epi32_mask((__m512i)m.v, (__m512i)m.v) != 0;
 #endif
 }
+/// A bit a lane, the first lane's the lowest.
+PALETTE4D_INLINE unsigned bits(LaneMask<double> m) {
+#if PALETTE4D_LANES_BYTES == 16
+    return static_cast<unsigned>(_mm_movemask_pd((__m128d)m.v));
+#elif PALETTE4D_LANES_BYTES == 32
+    return static_cast<unsigned>(_mm256_movemask_pd((__m256d)m.v));
+#else
+    return _mm512_movepi64_mask((__m512i)m.v);
+#endif
+}
 #undef PALETTE4D_X86
 
 #else
@@ -269,6 +287,14 @@ template <class T>
 PALETTE4D_INLINE bool any(LaneMask<T> m) {
     bool found = false;
     for (int lane = 0; lane < Lanes<T>::kCount; ++lane) found |= m.v[lane] != 0;
+    return found;
+}
+/// A bit a lane, the first lane's the lowest.
+PALETTE4D_INLINE unsigned bits(LaneMask<double> m) {
+    unsigned found = 0;
+    for (int lane = 0; lane < Lanes<double>::kCount; ++lane) {
+        found |= static_cast<unsigned>(m.v[lane] != 0) << lane;
+    }
     return found;
 }
 

@@ -278,6 +278,6 @@ void blend(const float* nodes, const LatticeBlock& block, int count, const float
         {&classify<float>, &mean_value<float>, &closest<float>, &move<float>},     \
         {&classify<double>, &mean_value<double>, &closest<double>, &move<double>}, \
         {&locate, &descend, &choose_sides, &weigh, &blend},                        \
-        {&fall},                                                                   \
+        {&reach, &fall, &pull},                                                    \
     };                                                                             \
     }
