@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
@@ -19,7 +18,8 @@ constexpr double kTie = 1e-12;
 double squared_distance_to_box(const Vec3& p, const ColourTree::Node& node) {
     double sum = 0;
     for (int c = 0; c < 3; ++c) {
-        const double d = std::max({node.low[c] - p[c], 0.0, p[c] - node.high[c]});
+        const double below = node.low[c] - p[c], above = p[c] - node.high[c];
+        const double beside = below > above ? below : above, d = beside > 0 ? beside : 0;
         sum += d * d;
     }
     return sum;
@@ -39,42 +39,43 @@ ColourTree::ColourTree(std::vector<Vec3> rgb, std::vector<double> counts) : size
         if (!(counts[i] > 0) || !std::isfinite(counts[i]) || !finite(rgb[i]))
             throw std::invalid_argument("a colour tree needs finite colours and positive counts");
     }
-    std::vector<int> order(rgb.size());
-    std::iota(order.begin(), order.end(), 0);
+    std::vector<Colour> order(rgb.size());
+    for (std::size_t i = 0; i < rgb.size(); ++i) order[i] = {rgb[i], static_cast<int>(i)};
     nodes_.reserve(4 * rgb.size() / kLeafSize + 4);
-    build(0, static_cast<int>(rgb.size()), order, rgb);
+    build(0, static_cast<int>(rgb.size()), order);
     build_levels();
     counts_.resize(rgb.size() + kLeafSize);
     for (int c = 0; c < 3; ++c) {
         channel_[c].resize(rgb.size() + kLeafSize);
-        for (std::size_t i = 0; i < order.size(); ++i) channel_[c][i] = rgb[order[i]][c];
+        for (std::size_t i = 0; i < order.size(); ++i) channel_[c][i] = order[i].rgb[c];
     }
     for (std::size_t i = 0; i < order.size(); ++i) {
-        counts_[i] = counts[order[i]];
+        counts_[i] = counts[order[i].index];
         total_ += counts_[i];
     }
 }
 
-int ColourTree::build(int begin, int end, std::vector<int>& order, const std::vector<Vec3>& rgb) {
+int ColourTree::build(int begin, int end, std::vector<Colour>& order) {
     const int index = static_cast<int>(nodes_.size());
     nodes_.push_back({});
-    Node node{rgb[order[begin]], rgb[order[begin]], begin, end, -1, -1};
+    Node node{order[begin].rgb, order[begin].rgb, begin, end, -1, -1};
     for (int i = begin; i < end; ++i)
         for (int c = 0; c < 3; ++c) {
-            node.low[c] = std::min(node.low[c], rgb[order[i]][c]);
-            node.high[c] = std::max(node.high[c], rgb[order[i]][c]);
+            node.low[c] = std::min(node.low[c], order[i].rgb[c]);
+            node.high[c] = std::max(node.high[c], order[i].rgb[c]);
         }
     if (end - begin > kLeafSize) {
         int axis = 0;
         for (int c = 1; c < 3; ++c)
             if (node.high[c] - node.low[c] > node.high[axis] - node.low[axis]) axis = c;
         const int middle = begin + (end - begin) / 2;
-        std::nth_element(
-            order.begin() + begin, order.begin() + middle, order.begin() + end, [&](int a, int b) {
-                return rgb[a][axis] != rgb[b][axis] ? rgb[a][axis] < rgb[b][axis] : a < b;
-            });
-        node.left = build(begin, middle, order, rgb);
-        node.right = build(middle, end, order, rgb);
+        std::nth_element(order.begin() + begin, order.begin() + middle, order.begin() + end,
+                         [axis](const Colour& a, const Colour& b) {
+                             return a.rgb[axis] != b.rgb[axis] ? a.rgb[axis] < b.rgb[axis]
+                                                               : a.index < b.index;
+                         });
+        node.left = build(begin, middle, order);
+        node.right = build(middle, end, order);
     }
     nodes_[index] = node;
     return index;
@@ -113,8 +114,13 @@ Vec3 ColourTree::nearest_mean(const Vec3& v, double k) const {
         throw std::invalid_argument("nearest_mean needs a finite colour and a positive k");
     k = std::min(k, total_);
     // Candidates sorted by distance; the farthest group of ties goes as soon as the rest suffices.
-    thread_local std::vector<Candidate> best;
-    thread_local std::vector<std::pair<double, int>> stack;
+    struct Search {
+        std::vector<Candidate> best;
+        std::vector<std::pair<double, int>> stack;
+    };
+    thread_local Search of_this_thread;
+    Search& search = of_this_thread;  // which takes a call to find
+    auto& [best, stack] = search;
     best.clear();
     stack.clear();
     double have = 0;
@@ -137,10 +143,16 @@ Vec3 ColourTree::nearest_mean(const Vec3& v, double k) const {
             }
             continue;
         }
+        // All at once, past the leaf's end, too: compilers make vectors of it.
+        double squared[kLeafSize];
+        const double *const x = channel(0) + node.begin, *const y = channel(1) + node.begin,
+                            *const z = channel(2) + node.begin;
+        for (int i = 0; i < kLeafSize; ++i) {
+            const double dx = x[i] - v[0], dy = y[i] - v[1], dz = z[i] - v[2];
+            squared[i] = dx * dx + dy * dy + dz * dz;
+        }
         for (int i = node.begin; i < node.end; ++i) {
-            const double dx = channel_[0][i] - v[0], dy = channel_[1][i] - v[1],
-                         dz = channel_[2][i] - v[2];
-            const double d2 = dx * dx + dy * dy + dz * dz;
+            const double d2 = squared[i - node.begin];
             if (d2 > limit + kTie) continue;
             auto at = best.end();
             while (at != best.begin() && (at - 1)->d2 > d2) --at;

@@ -52,8 +52,9 @@ struct LossKernels {
     /// `distance` to `along` for the `size` colours (rounded up to whole registers) at the three
     /// `channels`, against the `count` facets that `which` names. A colour counts as above a facet
     /// from `flat` on. The closest point of a convex body lies on a facet that the colour sees;
-    /// where the colour falls straight onto such a facet, that is it.
-    void (*fall)(const LossFacet* facets, const int* which, int count,
+    /// where the colour falls straight onto such a facet, that is it. Returns whether some colour
+    /// is outside, of those rounded up to included.
+    bool (*fall)(const LossFacet* facets, const int* which, int count,
                  const double* const* channels, int size, double flat, LossLeaf& leaf);
     /// `weighted` to `pull` from `distance`, for `size` colours of so many pixels each.
     void (*pull)(const double* counts, int size, const LossReach& reach, LossLeaf& leaf);

@@ -63,10 +63,11 @@ PALETTE4D_INLINE void closest_edge(const palette4d::LossFacet* facets, const int
     distance = select(wanted, sqrt(nearest), distance);
 }
 
-void fall(const palette4d::LossFacet* facets, const int* which, int count,
+bool fall(const palette4d::LossFacet* facets, const int* which, int count,
           const double* const* channels, int size, double flat, palette4d::LossLeaf& leaf) {
     using Numbers = Lanes<double>;
     const Numbers zero = all(0.0), one = all(1.0), none = all(-1.0);
+    bool some = false;
     for (int at = 0; at < size; at += Numbers::kCount) {
         const Numbers x = load(channels[0] + at), y = load(channels[1] + at),
                       z = load(channels[2] + at);
@@ -88,7 +89,8 @@ void fall(const palette4d::LossFacet* facets, const int* which, int count,
             first = select(here, b, first);
             second = select(here, c, second);
         }
-        const LaneMask<double> beside = (highest > all(flat)) & (on < zero);
+        const LaneMask<double> outside = highest > all(flat), beside = outside & (on < zero);
+        some |= any(outside);
         if (any(beside)) {
             Numbers edge, along;
             closest_edge(facets, which, count, x, y, z, beside, flat, distance, edge, along);
@@ -100,6 +102,7 @@ void fall(const palette4d::LossFacet* facets, const int* which, int count,
         store(leaf.share[0] + at, first);
         store(leaf.share[1] + at, second);
     }
+    return some;
 }
 
 void pull(const double* counts, int size, const palette4d::LossReach& reach,

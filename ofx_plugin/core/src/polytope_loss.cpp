@@ -33,11 +33,18 @@ const BlockTopology& block_of(const std::vector<BlockTopology>& blocks, double f
     throw std::invalid_argument("no block covers frame " + std::to_string(frame));
 }
 
-FrameLoss one_frame(const std::vector<Vec4>& vertices, const BlockTopology& block,
-                    const FrameColours& frame, const LossWeights& weights,
-                    std::vector<std::pair<int, Vec4>>* gradient) {
+/// Memory that one frame after the other uses.
+struct Scratch {
     std::vector<Point> points;
-    std::vector<Vec3> palette;
+    std::vector<Vec3> palette, slice_gradient;
+};
+
+FrameLoss one_frame(const std::vector<Vec4>& vertices, const BlockTopology& block,
+                    const FrameColours& frame, const LossWeights& weights, Scratch& scratch,
+                    std::vector<std::pair<int, Vec4>>* gradient) {
+    auto& [points, palette, slice_gradient] = scratch;
+    points.clear();
+    palette.clear();
     for (const auto& track : block.tracks) {
         points.push_back(locate(track, vertices, frame.frame));
         const Vec4 &a = vertices[points.back().from], &b = vertices[points.back().to];
@@ -45,10 +52,10 @@ FrameLoss one_frame(const std::vector<Vec4>& vertices, const BlockTopology& bloc
         palette.push_back(
             {a[0] + w * (b[0] - a[0]), a[1] + w * (b[1] - a[1]), a[2] + w * (b[2] - a[2])});
     }
-    std::vector<Vec3> slice_gradient;
     const FrameLoss loss = palette_loss(*frame.colours, palette, block.faces, weights,
                                         gradient ? &slice_gradient : nullptr);
     if (!gradient) return loss;
+    gradient->reserve(2 * points.size());
     for (std::size_t i = 0; i < points.size(); ++i) {
         const Point& p = points[i];
         const Vec3& g = slice_gradient[i];
@@ -99,10 +106,11 @@ std::vector<FrameLoss> polytope_loss(const std::vector<Vec4>& vertices,
     std::vector<std::exception_ptr> failures(static_cast<std::size_t>(std::max(1, threads)));
     auto work = [&](std::size_t self) {
         try {
+            Scratch scratch;
             for (int i = next++; i < count; i = next++) {
                 const FrameColours& frame = frames[which[i]];
                 losses[i] = one_frame(vertices, block_of(blocks, frame.frame), frame, weights,
-                                      gradient ? &parts[i] : nullptr);
+                                      scratch, gradient ? &parts[i] : nullptr);
             }
         } catch (...) {
             failures[self] = std::current_exception();

@@ -118,7 +118,8 @@ private:
         const double* const channels[3] = {colours_.channel(0) + node.begin,
                                            colours_.channel(1) + node.begin,
                                            colours_.channel(2) + node.begin};
-        kernels_.fall(hull_.facets.data(), facets, count, channels, size, kFlat, leaf_);
+        if (!kernels_.fall(hull_.facets.data(), facets, count, channels, size, kFlat, leaf_))
+            return;
         kernels_.pull(colours_.counts() + node.begin, size, reach_, leaf_);
         add_up(size);
         if (!gradient_) return;

@@ -15,7 +15,7 @@ class ColourTree {
 public:
     static constexpr int kLeafSize = 16;  ///< most colours of a leaf
 
-    struct Node {
+    struct alignas(64) Node {  // a line of a cache
         Vec3 low, high;
         int begin, end;   ///< points of the subtree
         int left, right;  ///< children, -1 in a leaf
@@ -50,7 +50,11 @@ public:
     double total() const { return total_; }
 
 private:
-    int build(int begin, int end, std::vector<int>& order, const std::vector<Vec3>& rgb);
+    struct Colour {
+        Vec3 rgb;
+        int index;  ///< among those given
+    };
+    int build(int begin, int end, std::vector<Colour>& order);
 
     void build_levels();
 
