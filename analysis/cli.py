@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from palette4d.analysis import show_cli
 from palette4d.analysis.options import METHODS, METHODS_OF, AnalysisOptions
 from palette4d.arguments import checked, frame_range, number, whole
+from palette4d.errors import Palette4dError
 from palette4d.wording import counted
 
 if TYPE_CHECKING:
@@ -196,9 +197,16 @@ def _add_space_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _check(field: str) -> Callable[[float], AnalysisOptions]:
+def _check(field: str) -> Callable[[float], None]:
     """Return a function that refuses a value out of the option's range."""
-    return lambda value: AnalysisOptions(**{field: value})  # type: ignore[arg-type]
+
+    def check(value: float) -> None:
+        try:
+            AnalysisOptions(**{field: value})  # type: ignore[arg-type]
+        except Palette4dError as error:  # argparse has named the option already
+            raise Palette4dError(str(error).partition(": ")[2]) from None
+
+    return check
 
 
 def _rate(text: str) -> Fraction:

@@ -132,7 +132,7 @@ class AnalysisOptions:
             if not math.isfinite(value) or not low <= value <= high:
                 raise Palette4dError(
                     f"option {name.rstrip('_').replace('_', '-')}: found {value}, "
-                    f"expected a number from {low:g} to {high:g}"
+                    f"expected a number from {low:.10g} to {high:.10g}"
                 )
 
     def recorded(self) -> dict[str, float | int | str]:

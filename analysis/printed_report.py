@@ -22,6 +22,7 @@ def figures(output: Path, analysis: Analysis, seconds: Mapping[str, float]) -> d
     return {
         "sidecar": str(output),
         "stages": [stage.row() for stage in analysis.stages],
+        "held_to_L_prime": analysis.bound,
         "palette": analysis.report.figures(),
         "frames": [dataclasses.asdict(fit) for fit in analysis.report.fits],
         "notes": list(analysis.remarks),

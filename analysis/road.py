@@ -36,6 +36,8 @@ STAGES = (
     "vertex_removal",
     "vertex_refinement",
 )
+# Of all frames together so many times as many coarse colours are kept as of one.
+POOLED = 2
 Progress = Callable[[str, int, int], None]
 """Called as progress(stage, done, total)."""
 
@@ -61,13 +63,15 @@ class StageResult:
 
 @dataclasses.dataclass(frozen=True)
 class Analysis:
-    """The result: the polytope, what each stage reached, remarks for the user, and how good the
-    palette is (measured on the finished sidecar)."""
+    """The result: the polytope, what each stage reached, remarks for the user, how good the palette
+    is (measured on the finished sidecar), and the L' that it is held to (that of the best static
+    palette found; None where the method holds it to nothing)."""
 
     polytope: SkewPolytope
     stages: tuple[StageResult, ...]
     remarks: tuple[str, ...]
     report: Report | None = None
+    bound: float | None = None
 
 
 class Road(abc.ABC):
@@ -137,7 +141,7 @@ class Road(abc.ABC):
     @functools.cache  # noqa: B019 (a road is walked once, and ends with its analysis)
     def pooled(self, sparser: int = 1) -> _core.ColourTree:
         """Return the colours of all frames together, or only so many times fewer."""
-        most = statistics.searched(len(self.frames), self.options) // sparser
+        most = POOLED * self.options.coarse_colours // sparser
         return statistics.pooled([f.coarse for f in self.frames], most)
 
     def static(self, options: AnalysisOptions, sparser: int = 1) -> SkewPolytope:

@@ -154,17 +154,12 @@ def budget(frames: int, options: AnalysisOptions) -> tuple[int, int]:
     """Return how many colours and coarse colours are kept of each of so many frames."""
     share = MOST_COLOURS / (frames * (options.colours + options.coarse_colours))
     if share >= 1:
-        return options.colours, min(options.colours, searched(frames, options))
+        richer = min(RICHER, max(1.0, SHORT / frames))
+        return options.colours, min(options.colours, int(richer * options.coarse_colours))
     return (
         min(options.colours, max(FEWEST_COLOURS, int(share * options.colours))),
         min(options.coarse_colours, max(FEWEST_COARSE, int(share * options.coarse_colours))),
     )
-
-
-def searched(frames: int, options: AnalysisOptions) -> int:
-    """Return how many colours of a frame, of so many, or of all of them together, suffice to
-    compare alternatives."""
-    return int(options.coarse_colours * min(RICHER, max(1.0, SHORT / frames)))
 
 
 def pooled(trees: Sequence[_core.ColourTree], most: int) -> _core.ColourTree:

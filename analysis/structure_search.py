@@ -107,7 +107,7 @@ class Skew(Road):
                 f"the palette has {len(polytope.vertices)} vertices, not {self.options.vertices}: "
                 "it has four colours at least, and each of them two",
             )
-        return Analysis(polytope, tuple(self.stages), remarks)
+        return Analysis(polytope, tuple(self.stages), remarks, bound=reference)
 
     def plain_hulls(self) -> list[SkewPolytope]:
         """Return plain static hulls of no more vertices than asked for.

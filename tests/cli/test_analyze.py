@@ -52,8 +52,17 @@ def test_json_report_and_frames(clip, tmp_path, capsys):
     assert [fit["frame"] for fit in report["frames"]] == [1002, 1004, 1006]
     assert report["palette"]["worst_frame"] in (1002, 1004, 1006)
     assert set(report["seconds"]) >= {"statistics", "frame_hulls", "vertex_refinement"}
+    assert report["stages"][-1]["L_prime"] <= report["held_to_L_prime"]
+    assert report["held_to_L_prime"] <= report["stages"][0]["L_prime"]
     frames = json.loads(out.read_text())["clip"]["frames"]
     assert (frames["first"], frames["last"], frames["step"]) == (1002, 1006, 2)
+
+
+def test_other_methods_are_held_to_nothing(clip, tmp_path, capsys):
+    for method in ("paper", "static", "rgbt"):
+        out = str(tmp_path / f"{method}.p4d.json")
+        assert cli.main(["analyze", str(clip), "-o", out, "--method", method, "--json"]) == 0
+        assert json.loads(capsys.readouterr().out)["held_to_L_prime"] is None
 
 
 def test_the_files_bytes_are_the_same_every_time(clip, tmp_path):
