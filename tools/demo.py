@@ -132,8 +132,8 @@ def demo(out: Path) -> None:
         "--rgb", "0.52", "0.45", "0.85")
     say(f"   {fade(sidecar)}")
     run("Edit: until the same frame the green that turns to gold stays as it was",
-        "edit", str(sidecar), "stop", "--near", "0.55,0.71,0.16", "--frame", "11",
-        "--rgb", "0.55", "0.71", "0.16")
+        "edit", str(sidecar), "stop", "--near", "0.49,0.67,0.14", "--frame", "11",
+        "--rgb", "0.49", "0.67", "0.14")
     # fmt: on
     run("The palette with its edits", "plot", str(sidecar), "--clip", frames, "-o", str(edited))
     run("Render", "render", str(sidecar), frames, "-o", str(graded / "sample.####.exr"))

@@ -71,17 +71,17 @@ def render_both_ways(melt: Path, bundle: Path, sidecar: Path, clip: Path) -> Ren
 def crimson_autumn(
     melt: Path, bundle: Path, seasons: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> Rendered:
-    """SEASONS, all of it at its full size, with the autumn leaves turned red and crimson."""
+    """SEASONS, all of it at its full size, edited as the README does: autumn's gold turns red,
+    the orange that it ends in crimson; until frame 28 the leaves stay as they were."""
     sidecar = tmp_path_factory.mktemp("seasons") / "seasons.p4d.json"
     palette4d("analyze", seasons, "-o", sidecar, "--quiet")
-    for leaves, colour in (
-        ("0.98,0.8,0", (0.85, 0.25, 0.1)),
-        ("0.87,0.32,0.12", (0.75, 0.05, 0.3)),
+    for leaves, frame, colour in (
+        ("0.95,0.85,0", 35, (0.9, 0.35, 0.1)),
+        ("1,0.6,0", 49, (0.8, 0.12, 0.15)),
     ):
-        palette4d("edit", sidecar, "set", "--near", leaves, "--frame", 49, "--rgb", *colour)
-    for summer in ("0.82,0.86,0", "0.69,0.32,0.25"):  # until here as they were
-        near = ("--near", summer, "--frame", 28)
-        palette4d("edit", sidecar, "stop", *near, "--rgb", *summer.split(","))
+        palette4d("edit", sidecar, "set", "--near", leaves, "--frame", frame, "--rgb", *colour)
+    summer = ("--near", "0.91,0.84,0.04", "--frame", 28)
+    palette4d("edit", sidecar, "stop", *summer, "--rgb", 0.91, 0.84, 0.04)
     return render_both_ways(melt, bundle, sidecar, seasons)
 
 
