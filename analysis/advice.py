@@ -12,14 +12,13 @@ from collections.abc import Mapping
 
 from palette4d.analysis.losses import LOST_SHARE
 from palette4d.analysis.options import METHODS_OF, AnalysisOptions
-from palette4d.analysis.quality import Report
+from palette4d.analysis.quality import DENT, Report
 from palette4d.wording import counted
 
 # What is worth a warning.
 BAD_FRAME = 4.0  # times the median frame's L ...
 BAD_L = 0.3  # ... and at least this, or the clip's mean
 LOOKALIKE = 0.06  # RGB distance of two handles
-DENT = 0.05  # share of its convex hull that a slice lacks
 UNUSED = 0.001  # largest mean weight of a handle in any frame
 FARTHER = 1.4  # times as far out as a simpler palette leaves them: lost pixels
 # No display-referred picture and no log goes so far.

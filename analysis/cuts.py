@@ -3,10 +3,8 @@
 Input: the frames' statistics. Output: the frame numbers with which new shots begin.
 
 The measure is the share of pixels whose colour has no counterpart in the other frame: one minus the
-intersection of two histograms over a grid of `CELLS` cells a channel. Each pixel is shared out
-among the eight cells around it, so that a small shift of all colours (exposure, fading, grain) is a
-small difference. The grid is even in the square root of a colour, which serves encoded pictures and
-linear light alike, and widens above 1.
+intersection of two histograms (`colour_histogram`), in which a small shift of all colours
+(exposure, fading, grain) is a small difference.
 
 The difference of a frame from the one before is a cut when
 
@@ -46,26 +44,19 @@ AROUND = 5
 # So many differences on both sides say enough.
 SURE = 3
 
-CELLS = 12
-# Cells from 0 to 1; those above reach to about 60.
-CELLS_TO_ONE = 7
-ABOVE_ONE = 0.15
-
 MOST_SHOWN = 8
 
 
 def find_cuts(statistics: Sequence[FrameStatistics]) -> list[int]:
     """Return the numbers of the frames that begin a new shot, rising; none for a single shot.
 
-    Costs under a millisecond a frame, whatever the resolution: the coarse colours are looked at.
+    Costs next to nothing: what they are found by was counted when the frames were read.
     """
-    return find_cuts_of(
-        (frame.frame, histogram(frame.coarse.rgb, frame.coarse.counts)) for frame in statistics
-    )
+    return find_cuts_of((frame.frame, frame.histogram) for frame in statistics)
 
 
 def find_cuts_of(histograms: Iterable[tuple[int, F64]]) -> list[int]:
-    """Return the same for frame numbers with `histogram`s, of which few are held at a time."""
+    """Return the same for frame numbers with their histograms, of which few are held at a time."""
     numbers = []
     # gaps[d][i] is the difference of frame i + d from frame i.
     gaps: dict[int, list[float]] = {d: [] for d in range(1, LONGEST_FLASH + 2)}
@@ -108,32 +99,6 @@ def _usual(jumps: list[float]) -> float:
     frames (pulldown, animation on twos) leave only two of five that say how fast the clip moves."""
     ordered = sorted(jumps)
     return ordered[-2] if len(ordered) > 2 else ordered[-1]
-
-
-def histogram(rgb: F64, counts: F64) -> F64:
-    """Return (CELLS^3,) shares of pixels of (n, 3) colours with (n,) counts; they sum to 1."""
-    places = np.clip(CELLS_TO_ONE * _eased(rgb), 0, CELLS - 1)
-    cells = np.minimum(places.astype(np.int64), CELLS - 2)
-    upper = places - cells
-    shares = np.stack([1 - upper, upper])  # (2, n, 3)
-    out = np.zeros(CELLS**3)
-    for corner in itertools.product((0, 1), repeat=3):
-        weight = counts * np.prod([shares[c, :, i] for i, c in enumerate(corner)], axis=0)
-        r, g, b = (cells[:, i] + c for i, c in enumerate(corner))
-        out += np.bincount((r * CELLS + g) * CELLS + b, weight, minlength=CELLS**3)
-    shares_of_cells: F64 = out / out.sum()
-    return shares_of_cells
-
-
-def _eased(colours: F64) -> F64:
-    """Square roots up to 1, where a difference shows alike in darks and lights; logarithms above.
-
-    Colours below 0 count as 0.
-    """
-    positive = np.maximum(colours, 0)
-    above = 1 + ABOVE_ONE * np.log(np.maximum(positive, 1))
-    eased: F64 = np.where(positive <= 1, np.sqrt(positive), above)
-    return eased
 
 
 def difference(one: F64, other: F64) -> float:

@@ -33,7 +33,7 @@ class _Static(Road):
     """One palette for the whole clip (section 6.2)."""
 
     def run(self) -> Analysis:
-        polytope = self.static(self.options)
+        polytope = self.static()
         self.measure("static_hull", polytope)
         return Analysis(polytope, tuple(self.stages), ())
 

@@ -15,6 +15,7 @@ from palette4d import _core
 from palette4d.analysis.frame_hulls import hull_mesh
 from palette4d.analysis.losses import LOST, NO_FACES, loss_weights
 from palette4d.analysis.options import AnalysisOptions
+from palette4d.analysis.polytope import SkewPolytope
 from palette4d.analysis.statistics import FrameStatistics
 from scipy.spatial import ConvexHull, QhullError
 
@@ -25,6 +26,8 @@ F64 = NDArray[np.float64]
 USE_FRAMES = 12
 # Farther outside than this a pixel counts as outside in the report: one step of 8 bits.
 VISIBLE = 1 / 255
+# Share of its convex hull that a slice may lack before it is worth a warning.
+DENT = 0.05
 # Frames whose colours extend less than this, such as black ones, have no shape to judge.
 NARROW = 0.24
 
@@ -127,7 +130,7 @@ def report(
     slices = [_core.slice_at(polytope, float(s.frame)) for s in statistics]
     fits = tuple(_fit(cut, s, options) for cut, s in zip(slices, statistics, strict=True))
     dents = [
-        (0.0 if _narrow(s) else _dent(cut), s.frame)
+        (0.0 if _narrow(s) else _dent(cut.rgb, cut.faces), s.frame)
         for cut, s in zip(slices, statistics, strict=True)
     ]
     sources, targets = np.unique(polytope.edges[:, 0]), np.unique(polytope.edges[:, 1])
@@ -196,14 +199,27 @@ def _narrow(frame: FrameStatistics) -> bool:
     return float(np.max(frame.high - frame.low)) < NARROW
 
 
-def _dent(cut: _core.Slice) -> float:
-    """Return the share of its convex hull that a slice lacks, 0 where it fills no volume."""
-    if len(cut.rgb) < 4 or len(cut.faces) == 0:
+def deepest_dent(polytope: SkewPolytope, statistics: Sequence[FrameStatistics]) -> float:
+    """Return the largest share of its convex hull that a frame's slice of a block lacks (frames
+    that are nearly of one colour do not count)."""
+    tracks = [[polytope.vertices[list(t)] for t in b.tracks] for b in polytope.blocks]
+    deepest = 0.0
+    for frame in statistics:
+        for block, chains in zip(polytope.blocks, tracks, strict=True):
+            if block.first <= frame.frame <= block.last and not _narrow(frame):
+                rgb = [[np.interp(frame.frame, v[:, 3], v[:, c]) for c in range(3)] for v in chains]
+                deepest = max(deepest, _dent(np.array(rgb), block.faces))
+    return deepest
+
+
+def _dent(rgb: F64, faces: NDArray[np.int32]) -> float:
+    """Return the share of its convex hull that a mesh lacks, 0 where it fills no volume."""
+    if len(rgb) < 4 or len(faces) == 0:
         return 0.0
-    a, b, c = (cut.rgb[cut.faces[:, i]] for i in range(3))
-    volume = float(np.einsum("ij,ij->i", a - cut.rgb[0], np.cross(b - a, c - a)).sum()) / 6
+    a, b, c = (rgb[faces[:, i]] for i in range(3))
+    volume = float(np.einsum("ij,ij->i", a - rgb[0], np.cross(b - a, c - a)).sum()) / 6
     try:
-        hull = float(ConvexHull(cut.rgb).volume)
+        hull = float(ConvexHull(rgb).volume)
     except QhullError:
         return 0.0
     # A mesh that is turned inside out has a negative volume: it lacks everything.

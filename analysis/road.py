@@ -38,6 +38,8 @@ STAGES = (
 )
 # Of all frames together so many times as many coarse colours are kept as of one.
 POOLED = 2
+# Of these, one in so many: what static palettes start from.
+STARTS = (1, 2, 4)
 Progress = Callable[[str, int, int], None]
 """Called as progress(stage, done, total)."""
 
@@ -144,8 +146,13 @@ class Road(abc.ABC):
         most = POOLED * self.options.coarse_colours // sparser
         return statistics.pooled([f.coarse for f in self.frames], most)
 
-    def static(self, options: AnalysisOptions, sparser: int = 1) -> SkewPolytope:
-        """Return the static palette of section 6.2, started from the colours `pooled`."""
+    def static(self) -> SkewPolytope:
+        """Return the static palette of section 6.2, the best of several starts."""
+        found = [self.static_from(self.options, sparser) for sparser in STARTS]
+        return min(found, key=lambda polytope: self.losses(polytope).L_prime)
+
+    def static_from(self, options: AnalysisOptions, sparser: int) -> SkewPolytope:
+        """Return a static palette that started from the colours `pooled`."""
         palette = frame_hulls.frame_palette(self.pooled(sparser), self.low, self.high, options)
         polytope = static_hull.static_polytope(palette, self.frames, self.low, self.high, options)
         self.report("static_hull", 1, 1)

@@ -15,7 +15,7 @@ from palette4d.analysis.options import AnalysisOptions
 from palette4d.errors import Palette4dError
 from palette4d.wording import file_safe
 
-#: Colour bins of a frame that the search for cuts looks at: those of the analysis' coarse colours.
+#: Colour bins of a frame that the search for cuts looks at.
 BINS = 4096
 
 
@@ -144,14 +144,14 @@ def cuts_of(clip: Clip, progress: Callable[[int, int], None] | None = None) -> l
     tell = progress or (lambda done, total: None)
     options = AnalysisOptions(colours=BINS, coarse_colours=BINS)
 
-    def coarse() -> Iterator[tuple[int, cuts.F64]]:
+    def histograms() -> Iterator[tuple[int, cuts.F64]]:
         for done, (number, image) in enumerate(clip.iter_colours(), start=1):
             tell(done, len(clip.frames))
             found = statistics.gather(number, image, options)
             if found is not None:
-                yield number, cuts.histogram(found.coarse.rgb, found.coarse.counts)
+                yield number, found.histogram
 
-    return cuts.find_cuts_of(coarse())
+    return cuts.find_cuts_of(histograms())
 
 
 def trimmed(shot: Shot, clip: Clip) -> Shot:

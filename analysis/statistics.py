@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 from palette4d import _core
+from palette4d.analysis import colour_histogram
 from palette4d.analysis.clip_base import Fill, FrameError
 from palette4d.analysis.losses import thread_count
 from palette4d.analysis.options import AnalysisOptions
@@ -65,6 +66,7 @@ class FrameStatistics:
     frame : the frame number.
     colours : the colours the losses are measured on.
     coarse : fewer of them, for the stages that only compare alternatives.
+    histogram : `colour_histogram.histogram` of the frame, to find cuts by.
     low, high : (3,) float64 the colours' bounding box.
     pixels, ignored : how many pixels count, and how many do not.
     """
@@ -72,6 +74,7 @@ class FrameStatistics:
     frame: int
     colours: _core.ColourTree
     coarse: _core.ColourTree
+    histogram: NDArray[np.float64]
     low: NDArray[np.float64]
     high: NDArray[np.float64]
     pixels: int
@@ -179,11 +182,18 @@ def _taken(
     looked_at = binner.pixels + binner.ignored
     scale = pixels / looked_at if looked_at else 1.0
     count, ignored = round(scale * binner.pixels), round(scale * binner.ignored)
-    taken = binner.take(colours, coarse, scale)
+    least = colour_histogram.LEAST_COLOURS
+    taken = binner.take(max(colours, least), coarse, scale)
     if taken is None:
         return None
     fine, few, low, high = taken
-    return FrameStatistics(frame, fine, few, low, high, count, ignored)
+    seen = few
+    if coarse < least:  # of a long clip
+        seen = fine if len(fine) < 2 * least else pooled([fine], least)
+    histogram = colour_histogram.histogram(seen.rgb, seen.counts)
+    if colours < least:
+        fine = pooled([fine], colours)
+    return FrameStatistics(frame, fine, few, histogram, low, high, count, ignored)
 
 
 def _in_order(

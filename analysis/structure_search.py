@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from palette4d.analysis import (
     block_merging,
     handle_removal,
+    quality,
     static_hull,
     statistics,
     stop_insertion,
@@ -29,7 +30,7 @@ from palette4d.analysis.handle_removal import Step
 from palette4d.analysis.objective import refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import SkewPolytope
-from palette4d.analysis.road import Analysis, Glued, Progress, Road
+from palette4d.analysis.road import STARTS, Analysis, Glued, Progress, Road
 from palette4d.analysis.statistics import FrameStatistics
 
 F64 = NDArray[np.float64]
@@ -42,10 +43,10 @@ WORST_FRAMES = 8
 # Joint moves on all frames: before candidates are compared, and at the end.
 COMPARE_EVALUATIONS = 40
 FINAL_EVALUATIONS = 150
+# Where slices are dented all the same: times `convexity`.
+STIFFER = 10.0
 # Of the stops for single frames, how many are tried, where L' does not allow them all.
 STOPS_KEPT = (1, 0.75, 0.5, 0.25, 0)
-# Of the pooled colours, one in so many: what static hulls of short clips start from.
-STARTS = (1, 2, 4)
 # Where nothing else is as good as a simple hull: what its shape counts, as much as L' lets it.
 SHAPE_WEIGHTS = (1.0, 0.7, 0.5, 0.25, 0.1, 0.0)
 
@@ -74,7 +75,7 @@ class Skew(Road):
 
     def run(self) -> Analysis:
         """Search, insert stops, refine, and compare with what is simple."""
-        static = self.static(self.options)
+        static = self.static()
         self.measure("static_hull", static)
         simple, reference = static, self.stages[-1].losses.L_prime
         for hull in self.plain_hulls():
@@ -116,7 +117,7 @@ class Skew(Road):
         """
         starts = STARTS if len(self.frames) < statistics.SHORT else STARTS[:1]
         hulls = [
-            self.static(options, sparser)
+            self.static_from(options, sparser)
             for options in static_hull.plain(self.options)
             for sparser in starts
         ]
@@ -195,18 +196,29 @@ class Skew(Road):
     def refined(
         self, polytope: SkewPolytope, options: AnalysisOptions, brief: tuple[int, ...] = ()
     ) -> SkewPolytope:
-        """Return the polytope refined on all colours of all frames."""
-        out, _ = refine_jointly(
-            polytope,
-            self.frames,
-            self.low,
-            self.high,
-            options,
-            FINAL_EVALUATIONS,
-            coarse=False,
-            brief=brief,
-        )
-        return out
+        """Return the polytope refined on all colours of all frames; where it has dents, refined
+        once more to have less of them."""
+
+        def once(start: SkewPolytope, o: AnalysisOptions) -> SkewPolytope:
+            out, _ = refine_jointly(
+                start,
+                self.frames,
+                self.low,
+                self.high,
+                o,
+                FINAL_EVALUATIONS,
+                coarse=False,
+                brief=brief,
+            )
+            return out
+
+        found = once(polytope, options)
+        deepest = quality.deepest_dent(found, self.frames)
+        if not options.convexity or deepest <= quality.DENT:
+            return found
+        stiffer = dataclasses.replace(options, convexity=STIFFER * options.convexity)
+        mended = once(found, stiffer)
+        return mended if quality.deepest_dent(mended, self.frames) < deepest else found
 
 
 def search_frames(losses: F64, blocks: list[Block]) -> list[int]:

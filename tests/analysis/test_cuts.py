@@ -10,6 +10,7 @@ import pytest
 from any_clips import harbour, landscape, linear
 from palette4d.analysis import cuts, statistics
 from palette4d.analysis.clip import open_clip
+from palette4d.analysis.colour_histogram import histogram
 from palette4d.analysis.options import AnalysisOptions
 
 
@@ -188,14 +189,14 @@ def test_seasons_has_no_cut_however_it_is_sampled(seasons):
 
 def test_the_measure_is_the_share_of_other_pixels():
     grey, other = np.full((1, 3), 0.25), np.array([[0.81, 0.0, 0.0]])
-    whole = cuts.histogram(grey, np.array([10.0]))
+    whole = histogram(grey, np.array([10.0]))
     assert whole.sum() == pytest.approx(1)
     assert cuts.difference(whole, whole) == 0
-    assert cuts.difference(whole, cuts.histogram(other, np.array([3.0]))) == pytest.approx(1)
-    mixed = cuts.histogram(np.vstack([grey, other]), np.array([6.0, 2.0]))
+    assert cuts.difference(whole, histogram(other, np.array([3.0]))) == pytest.approx(1)
+    mixed = histogram(np.vstack([grey, other]), np.array([6.0, 2.0]))
     assert cuts.difference(whole, mixed) == pytest.approx(0.25)
     # A small shift of all colours moves a small share of each pixel to the next cells.
-    slightly = cuts.histogram(grey + 0.004, np.array([10.0]))
+    slightly = histogram(grey + 0.004, np.array([10.0]))
     assert 0 < cuts.difference(whole, slightly) < 0.1
 
 

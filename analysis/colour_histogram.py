@@ -1,0 +1,50 @@
+"""A frame's colours as shares of pixels in the cells of a coarse grid, to tell frames apart by.
+
+Input: weighted colours. Output: a histogram of `CELLS` cells a channel. Each pixel is shared out
+among the eight cells around it, so that a small shift of all colours (exposure, fading, grain) is a
+small difference. The grid is even in the square root of a colour, which serves encoded pictures and
+linear light alike, and widens above 1.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+from numpy.typing import NDArray
+
+F64 = NDArray[np.float64]
+
+#: So many of a frame's colours must be looked at: with 1024 noise comes near to what a cut is.
+LEAST_COLOURS = 2048
+
+CELLS = 12
+# Cells from 0 to 1; those above reach to about 60.
+CELLS_TO_ONE = 7
+ABOVE_ONE = 0.15
+
+
+def histogram(rgb: F64, counts: F64) -> F64:
+    """Return (CELLS^3,) shares of pixels of (n, 3) colours with (n,) counts; they sum to 1."""
+    places = np.clip(CELLS_TO_ONE * _eased(rgb), 0, CELLS - 1)
+    cells = np.minimum(places.astype(np.int64), CELLS - 2)
+    upper = places - cells
+    shares = np.stack([1 - upper, upper])  # (2, n, 3)
+    out = np.zeros(CELLS**3)
+    for corner in itertools.product((0, 1), repeat=3):
+        weight = counts * np.prod([shares[c, :, i] for i, c in enumerate(corner)], axis=0)
+        r, g, b = (cells[:, i] + c for i, c in enumerate(corner))
+        out += np.bincount((r * CELLS + g) * CELLS + b, weight, minlength=CELLS**3)
+    shares_of_cells: F64 = out / out.sum()
+    return shares_of_cells
+
+
+def _eased(colours: F64) -> F64:
+    """Square roots up to 1, where a difference shows alike in darks and lights; logarithms above.
+
+    Colours below 0 count as 0.
+    """
+    positive = np.maximum(colours, 0)
+    above = 1 + ABOVE_ONE * np.log(np.maximum(positive, 1))
+    eased: F64 = np.where(positive <= 1, np.sqrt(positive), above)
+    return eased
