@@ -96,8 +96,10 @@ def test_dents_and_unused_handles_are_found(frames):
     apex = int(np.argmin(np.linalg.norm(mesh.rgb - [0.5, 0.5, 0.95], axis=1)))
     dented = mesh.rgb.copy()
     dented[apex, 2] = 0.5  # a pyramid is missing: 1/3 base times 0.4
-    found = quality.report(in_core(resting(dented, mesh.faces), frames), frames, OPTIONS)
+    polytope = resting(dented, mesh.faces)
+    found = quality.report(in_core(polytope, frames), frames, OPTIONS)
     assert found.dent[0] == pytest.approx((0.8 * 0.8 * 0.4 / 3) / 0.8**3, rel=1e-6)
+    assert quality.deepest_dent(polytope, frames) == pytest.approx(found.dent[0], rel=1e-6)
 
     far = np.vstack([FOUR * 0.2, [0.9, 0.9, 0.9]])
     mesh = hull_mesh(far)

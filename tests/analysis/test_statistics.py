@@ -11,6 +11,8 @@ from clip_files import grey_levels, write_image
 from palette4d import _core
 from palette4d.analysis import frame_hulls, statistics
 from palette4d.analysis.clip import FrameError, open_clip
+from palette4d.analysis.colour_histogram import histogram
+from palette4d.analysis.cuts import difference
 from palette4d.analysis.losses import palette_loss
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.statistics import budget, chosen_frames, gamut_box, gather, gather_clip
@@ -166,6 +168,22 @@ def test_colours_kept_of_a_clip_are_bounded(monkeypatch):
     monkeypatch.setattr(statistics, "FEWEST_COLOURS", 64)
     found = gather_clip(ArrayClip([noise(i, size=(90, 90)) for i in range(4)]), options)
     assert all(700 < len(one.colours) <= 800 for one in found.frames.values())
+
+
+def test_cuts_are_found_by_enough_colours_of_however_long_a_clip(monkeypatch):
+    pictures = [noise(i, size=(90, 90)) for i in range(3)]
+    whole = gather_clip(ArrayClip(pictures), AnalysisOptions()).frames
+    monkeypatch.setattr(statistics, "MOST_COLOURS", 600)
+    monkeypatch.setattr(statistics, "FEWEST_COLOURS", 128)
+    monkeypatch.setattr(statistics, "FEWEST_COARSE", 64)
+    few = gather_clip(ArrayClip(pictures), AnalysisOptions()).frames
+    for i, frame in few.items():
+        assert len(frame.colours) <= 200
+        assert frame.colours.total == whole[i].colours.total
+        sampled = histogram(frame.colours.rgb, frame.colours.counts)
+        error = difference(frame.histogram, whole[i].histogram)
+        assert error < 0.5 * difference(sampled, whole[i].histogram)
+        assert error < 0.1
 
 
 @pytest.fixture(scope="module")
