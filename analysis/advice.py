@@ -129,7 +129,7 @@ def _lookalikes(x: Report, options: AnalysisOptions) -> str:
     if x.closest is None or x.closest[0] >= LOOKALIKE:
         return ""
     distance, frame, one, other = x.closest
-    ways = "raise --separation or --merge-distance, or ask for a smaller --palette-size"
+    ways = "ask for a smaller --palette-size, or raise --separation or --merge-distance"
     if options.method == "rgbt":
         ways = f"{DEFAULT} keeps them apart"
     return (

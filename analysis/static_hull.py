@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from palette4d.analysis.frame_hulls import THIN, hull_mesh
 from palette4d.analysis.objective import refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Palette, Section, SkewPolytope
@@ -55,11 +56,24 @@ def static_polytope(
         (),
     )
     still, _ = refine_jointly(still, statistics, low, high, options, EVALUATIONS, coarse=True)
+    faces = _unfolded(still.vertices[:, :3], palette.faces)
     if first == last:
-        return still
+        return dataclasses.replace(
+            still, blocks=(dataclasses.replace(still.blocks[0], faces=faces),)
+        )
     ends = still.vertices.copy()
     ends[:, 3] = last
     tracks = tuple((i, count + i) for i in range(count))
     return SkewPolytope(
-        np.vstack([still.vertices, ends]), (Section(first, last, tracks, palette.faces),), ()
+        np.vstack([still.vertices, ends]), (Section(first, last, tracks, faces),), ()
     )
+
+
+def _unfolded(rgb: F64, faces: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return the faces of the colours' convex hull, if all of them are its corners: the losses see
+    that alone, and without `convexity` a mesh may fold while its colours move."""
+    spread = np.linalg.svd(rgb - rgb.mean(axis=0), compute_uv=False)
+    if len(rgb) < 4 or spread[2] < THIN:
+        return faces
+    mesh = hull_mesh(rgb)
+    return mesh.faces if len(mesh.rgb) == len(rgb) else faces

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 import math
 from collections.abc import Callable, Sequence
 
@@ -111,9 +112,11 @@ class Skew(Road):
         return Analysis(polytope, tuple(self.stages), remarks, bound=reference)
 
     def plain_hulls(self) -> list[SkewPolytope]:
-        """Return plain static hulls of no more vertices than asked for.
+        """Return plain static hulls of no more vertices than asked for, all of them corners.
 
         In a short clip little moves, and such a hull is hard to beat: several starts are tried.
+        Without shape terms a colour may end inside of the others' hull, where it costs less and is
+        of no use: such a palette is dented.
         """
         starts = STARTS if len(self.frames) < statistics.SHORT else STARTS[:1]
         hulls = [
@@ -122,19 +125,28 @@ class Skew(Road):
             for sparser in starts
         ]
         most = self.options.vertices
-        return [hull for hull in hulls if not most or len(hull.vertices) <= most]
+        return [
+            hull
+            for hull in hulls
+            if (not most or len(hull.vertices) <= most)
+            and quality.deepest_dent(hull, self.frames) <= quality.DENT
+        ]
 
     def never_worse(
         self, ways: Sequence[Callable[[], SkewPolytope]], simple: SkewPolytope, reference: float
     ) -> SkewPolytope:
         """Take the first of the ways to a refined polytope whose L' is not above `reference`, that
         of `simple`; if there is none, `simple` itself, kept in shape as far as that allows."""
-        simpler = [functools.partial(self.refined, simple, self.shaped(w)) for w in SHAPE_WEIGHTS]
-        every: list[Callable[[], SkewPolytope]] = [*ways, *simpler, lambda: simple]
-        for way in every:
-            polytope = way()
-            if self.losses(polytope).L_prime <= reference:
-                break
+        polytopes = itertools.chain(
+            (way() for way in ways),
+            # What is in no better shape than `simple` is not worth it.
+            filter(
+                lambda found: quality.deepest_dent(found, self.frames) <= quality.DENT,
+                (self.refined(simple, self.shaped(weight)) for weight in SHAPE_WEIGHTS),
+            ),
+        )
+        within = (p for p in polytopes if self.losses(p).L_prime <= reference)
+        polytope = next(within, simple)
         self.measure("vertex_refinement", polytope)
         self.report("vertex_refinement", 1, 1)
         return polytope
