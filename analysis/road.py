@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-import functools
 import itertools
 from collections.abc import Callable
 from typing import Any
@@ -89,6 +88,7 @@ class Road(abc.ABC):
         self.report = progress or (lambda stage, done, total: None)
         self.low, self.high = statistics.gamut_box(frames)
         self.stages: list[StageResult] = []
+        self._pooled: dict[int, _core.ColourTree] = {}
 
     @abc.abstractmethod
     def run(self) -> Analysis:
@@ -140,11 +140,12 @@ class Road(abc.ABC):
         self.measure("frame_hulls", strands.polytope(), len(blocks))
         return blocks
 
-    @functools.cache  # noqa: B019 (a road is walked once, and ends with its analysis)
     def pooled(self, sparser: int = 1) -> _core.ColourTree:
         """Return the colours of all frames together, or only so many times fewer."""
-        most = POOLED * self.options.coarse_colours // sparser
-        return statistics.pooled([f.coarse for f in self.frames], most)
+        if sparser not in self._pooled:
+            most = POOLED * self.options.coarse_colours // sparser
+            self._pooled[sparser] = statistics.pooled([f.coarse for f in self.frames], most)
+        return self._pooled[sparser]
 
     def static(self) -> SkewPolytope:
         """Return the static palette of section 6.2, the best of several starts."""
