@@ -201,8 +201,9 @@ def _check(field: str) -> Callable[[float], None]:
     """Return a function that refuses a value out of the option's range."""
 
     def check(value: float) -> None:
+        given: dict[str, Any] = {field: value}
         try:
-            AnalysisOptions(**{field: value})  # type: ignore[arg-type]
+            AnalysisOptions(**given)
         except Palette4dError as error:  # argparse has named the option already
             raise Palette4dError(str(error).partition(": ")[2]) from None
 
