@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import subprocess
-from collections.abc import Iterable, Sequence
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -51,6 +53,65 @@ def recolour(
     return np.clip(recolourer.apply(values, strength=strength, precision="single"), 0, 1)
 
 
+FIRST_FRAME, WHOLE_CLIP = 60.0, 300.0  # seconds
+
+
+def run_until_it_writes(
+    command: Sequence[str],
+    folder: Path,
+    environment: dict[str, str],
+    written: Callable[[], object],
+) -> tuple[str, int]:
+    """What melt said, and the KiB of memory that it took at most; asked again where it must be.
+
+    On a busy machine melt 7.42, with or without an effect, now and then (2 of 100 runs) ends
+    without a word before its first frame, and more rarely (2 of 1000) waits for ever instead, its
+    rendering threads gone already. Whatever else happens once it has written something is not
+    forgiven: a render that stops midway fails the test.
+    """
+    for _ in range(5):
+        said, status, memory = _run_once(command, folder, environment, written)
+        assert status in (0, None), f"melt ended with {status}: {said}"
+        if written():
+            assert status == 0, f"melt did not end within {WHOLE_CLIP:g} s: {said}"
+            return said, memory
+    raise AssertionError(f"melt wrote nothing, five times: {said}")
+
+
+def _run_once(
+    command: Sequence[str],
+    folder: Path,
+    environment: dict[str, str],
+    written: Callable[[], object],
+) -> tuple[str, int | None, int]:
+    """What a program said, its exit status (None: it was killed) and its most KiB of memory."""
+    with tempfile.TemporaryFile() as output:
+        program = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            cwd=folder,
+            env={**os.environ, **environment},
+        )
+        started = time.monotonic()
+        killed = False
+        while True:
+            # wait4, and not Popen's own: it tells the memory of this program alone.
+            ended, status, used = os.wait4(program.pid, os.WNOHANG)
+            if ended:
+                break
+            elapsed = time.monotonic() - started
+            if not killed and elapsed > (WHOLE_CLIP if written() else FIRST_FRAME):
+                program.kill()
+                killed = True
+            time.sleep(0.02)
+        program.returncode = os.waitstatus_to_exitcode(status)
+        output.seek(0)
+        said = output.read().decode(errors="replace")
+    return said, None if killed else program.returncode, int(used.ru_maxrss)
+
+
 @dataclass
 class Scene:
     """A clip as numbered pictures, and melt to render it through the node."""
@@ -94,32 +155,38 @@ class Scene:
             check=True,
         )
 
+    def write(
+        self, pattern: str, *words: str, folder: Path | None = None, **environment: str
+    ) -> tuple[list[Path], str]:
+        """The files that melt writes into a folder (the scene's), and what it said meanwhile."""
+        folder = folder or self.folder
+
+        def written() -> list[Path]:
+            return sorted(folder.glob(pattern))
+
+        for old in written():
+            old.unlink()
+        environment = {"OFX_PLUGIN_PATH": str(self.plugins), **environment}
+        said, _ = run_until_it_writes([str(self.melt), *words], folder, environment, written)
+        return written(), said
+
     def render(
         self, effect: str = SERVICE, *, real_time: int = -1, **parameters: object
     ) -> tuple[list[Image], str]:
-        """The clip through an effect, at its own depth, and what melt said meanwhile.
-
-        On a busy machine melt now and then ends, without a word and with or without an effect,
-        before its first frame: it is asked again.
-        """
+        """The clip through an effect, at its own depth, and what melt said meanwhile."""
         image_format = "rgba" if self.clip[0].dtype == np.uint8 else "rgba64"
         pixels = "rgba" if image_format == "rgba" else "rgba64be"
-        for _ in range(4):
-            for old in self.folder.glob("out_*.png"):
-                old.unlink()
-            done = self.run(
-                # abnormal: without the loader's normalisers, which take pictures through 4:2:2.
-                # Not -quiet: it would keep the persistent messages to itself.
-                *("-profile", "profile", "abnormal:in_%03d.png", "-attach", effect),
-                *(f"{name}={value}" for name, value in parameters.items()),
-                *("-consumer", "avformat:out_%03d.png", "vcodec=png", "an=1", f"pix_fmt={pixels}"),
-                *(f"mlt_image_format={image_format}", f"real_time={real_time}"),
-            )
-            files = sorted(self.folder.glob("out_*.png"))
-            if files:
-                break
-        assert len(files) == len(self.clip), done.stderr
-        return [read_image(path) for path in files], done.stderr
+        files, said = self.write(
+            "out_*.png",
+            # abnormal: without the loader's normalisers, which take pictures through 4:2:2.
+            # Not -quiet: it would keep the persistent messages to itself.
+            *("-profile", "profile", "abnormal:in_%03d.png", "-attach", effect),
+            *(f"{name}={value}" for name, value in parameters.items()),
+            *("-consumer", "avformat:out_%03d.png", "vcodec=png", "an=1", f"pix_fmt={pixels}"),
+            *(f"mlt_image_format={image_format}", f"real_time={real_time}"),
+        )
+        assert len(files) == len(self.clip), said
+        return [read_image(path) for path in files], said
 
     def unchanged(self, frames: list[Image]) -> bool:
         """Whether every frame came through bit for bit."""

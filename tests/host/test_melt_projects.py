@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
-from host.scene import SERVICE, Image, Scene, read_image, recolour
+from host.scene import SERVICE, Image, Scene, read_image, recolour, run_until_it_writes
 from host.test_melt import box_sidecar, moving_clip
 from palette4d import _core
 
@@ -50,30 +48,11 @@ def consumer(scene: Scene, threads: int = -1) -> tuple[str, ...]:
 def render(
     scene: Scene, *words: str, folder: Path | None = None, threads: int = -1, **environment: str
 ) -> tuple[list[Image], str]:
-    """The frames that melt writes into a folder (the scene's), and what it said.
-
-    On a busy machine melt now and then ends, without a word, before its first frame: asked again.
-    """
-    folder = folder or scene.folder
-    for _ in range(4):
-        for old in folder.glob("out_*.png"):
-            old.unlink()
-        done = subprocess.run(
-            [str(scene.melt), *words, *consumer(scene, threads)],
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            cwd=folder,
-            env={**os.environ, "OFX_PLUGIN_PATH": str(scene.plugins), **environment},
-            timeout=300,
-            check=True,
-        )
-        files = sorted(folder.glob("out_*.png"))
-        if files:
-            break
-    assert len(files) == len(scene.clip), done.stderr
-    return [read_image(path) for path in files], done.stderr
+    """The frames that melt writes into a folder (the scene's), and what it said."""
+    words += consumer(scene, threads)
+    files, said = scene.write("out_*.png", *words, folder=folder, **environment)
+    assert len(files) == len(scene.clip), said
+    return [read_image(path) for path in files], said
 
 
 def without_a_message(rendered: tuple[list[Image], str]) -> list[Image]:
@@ -122,10 +101,7 @@ def test_many_threads_on_a_movie(
 ) -> None:
     """docs/hosts/melt.md: threads exchange frames of image sequences, and not those of movies."""
     movie = ("vcodec=ffv1", "an=1", "pix_fmt=bgr0", "mlt_image_format=rgba", "real_time=-1")
-    for _ in range(4):  # as in render()
-        scene.run(*CLIP, "-consumer", "avformat:clip.mkv", *movie)
-        if (scene.folder / "clip.mkv").exists():
-            break
+    scene.write("clip.mkv", *CLIP, "-consumer", "avformat:clip.mkv", *movie)
     words = ("-profile", "profile", "avformat:clip.mkv")
     clip = without_a_message(render(scene, *words))
     assert all((a != b).any() for a, b in zip(clip[1:], clip, strict=False))
@@ -194,26 +170,25 @@ def test_a_project_rendered_from_another_folder(
 
 def peak_memory(scene: Scene, bundle: Path, count: int, threads: int, *effect: str) -> int:
     """KiB that melt takes at most for `count` frames through an effect."""
-    form, _ = DEPTHS["8bit" if scene.clip[0].dtype == np.uint8 else "16bit"]
+    form, pixels = DEPTHS["8bit" if scene.clip[0].dtype == np.uint8 else "16bit"]
+    raw = scene.folder / "out.raw"
+    raw.unlink(missing_ok=True)
     words = (
         *("-quiet", "-profile", "profile", "color:#ff8050", f"out={count - 1}"),
-        *("-attach", *effect, "-consumer", "avformat:/dev/null", "f=rawvideo"),
+        *("-attach", *effect, "-consumer", f"avformat:{raw.name}", "f=rawvideo"),
         *("vcodec=rawvideo", "an=1", f"mlt_image_format={form}", f"real_time={threads}"),
-        f"pix_fmt={'rgba' if form == 'rgba' else 'rgba64le'}",
+        f"pix_fmt={pixels.replace('be', 'le')}",
     )
-    with subprocess.Popen(
+    _, memory = run_until_it_writes(
         [str(scene.melt), *words],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        cwd=scene.folder,
-        env={**os.environ, "OFX_PLUGIN_PATH": str(bundle.parent)},
-    ) as melt:
-        said = melt.stderr.read() if melt.stderr else b""
-        _, status, used = os.wait4(melt.pid, 0)
-        melt.returncode = os.waitstatus_to_exitcode(status)
-    assert melt.returncode == 0, said
-    return int(used.ru_maxrss)
+        scene.folder,
+        {"OFX_PLUGIN_PATH": str(bundle.parent)},
+        lambda: raw.exists() and raw.stat().st_size,
+    )
+    height, width = scene.clip[0].shape[:2]
+    assert raw.stat().st_size == count * height * width * 4 * scene.clip[0].itemsize
+    raw.unlink()
+    return memory
 
 
 @pytest.mark.parametrize("threads", [-1, -4])
