@@ -15,6 +15,10 @@
 namespace palette4d {
 namespace {
 
+/// Neighbouring rows have the same colours: threads that each work on one wait for each other where
+/// these are to be prepared first (the cells of a Lattice).
+constexpr int kMostRowsAtOnce = 16;
+
 template <class View>
 void check_view(const View& view, const char* name) {
     const std::string what = std::string("recolour: the ") + name + " image ";
@@ -70,14 +74,20 @@ void copy_rows(const ConstImageView& in, const ImageView& out) {
 void share_rows(int count, int threads, const std::function<void(const NextRow&)>& work) {
     if (threads == 0) threads = static_cast<int>(std::thread::hardware_concurrency());
     threads = std::clamp(threads, 1, std::max(count, 1));
+    // Several rows in a piece, as long as there is work for all to the end.
+    const int band = std::clamp(count / threads / 8, 1, kMostRowsAtOnce);
     std::atomic<int> next{0};
     std::exception_ptr problem;
     std::mutex guard;
-    const NextRow next_row = [&] {
-        const int row = next++;
-        return row < count ? row : -1;
-    };
     const auto guarded = [&] {
+        int row = 0, end = 0;
+        const NextRow next_row = [&] {
+            if (row == end) {
+                row = next.fetch_add(band);
+                end = row + band;
+            }
+            return row < count ? row++ : -1;
+        };
         try {
             work(next_row);
         } catch (...) {
