@@ -34,7 +34,10 @@ def loss_of(
     polytope: SkewPolytope, statistics: Sequence[FrameStatistics], coarse: bool = False
 ) -> _core.PolytopeLoss:
     """Prepare the polytope's structure for evaluation on all frames' fine or coarse colours."""
-    blocks = [(b.first, b.last, polytope.extended_tracks(b), b.faces) for b in polytope.blocks]
+    blocks = [
+        (b.first, b.last, tracks, b.faces)
+        for b, tracks in zip(polytope.blocks, polytope.extended_tracks(), strict=True)
+    ]
     frames = np.array([s.frame for s in statistics], float)
     return _core.PolytopeLoss(
         blocks, frames, [s.coarse if coarse else s.colours for s in statistics]

@@ -85,29 +85,28 @@ class SkewPolytope:
             after[u].append(v)
         return before, after
 
-    def extended_tracks(self, block: Section) -> list[list[int]]:
-        """Return a block's tracks, each going on to the next vertex before and after it.
+    def extended_tracks(self) -> list[list[list[int]]]:
+        """Return each block's tracks, each going on to the next vertex before and after it.
 
         A vertex at the block's end may move into the block; the track then goes on behind it. Only
         splitting and merging vertices, which stay where they are, have no single vertex to go on
         to.
         """
         before, after = self.neighbours()
-        out = []
-        for track in block.tracks:
+
+        def extended(track: tuple[int, ...]) -> list[int]:
             head, tail = before[track[0]], after[track[-1]]
-            out.append(
-                [*(head if len(head) == 1 else []), *track, *(tail if len(tail) == 1 else [])]
-            )
-        return out
+            return [*(head if len(head) == 1 else []), *track, *(tail if len(tail) == 1 else [])]
+
+        return [[extended(track) for track in block.tracks] for block in self.blocks]
 
     def with_vertices(self, vertices: F64) -> SkewPolytope:
         """Return the same edges with other vertices, whose times may have moved inside their
         blocks."""
         blocks = []
-        for block in self.blocks:
+        for block, extended in zip(self.blocks, self.extended_tracks(), strict=True):
             tracks = []
-            for track in self.extended_tracks(block):
+            for track in extended:
                 times = vertices[track, 3]
                 # The shortest run that covers the block.
                 start = max(int(np.searchsorted(times, block.first, side="right")) - 1, 0)
