@@ -21,6 +21,8 @@ BAD_L = 0.3  # ... and at least this, or the clip's mean
 LOOKALIKE = 0.06  # RGB distance of two handles
 UNUSED = 0.001  # largest mean weight of a handle in any frame
 FARTHER = 1.4  # times as far out as a simpler palette leaves them: lost pixels
+# What lets colours change at once: less held against a jump, handles cheaper, more blocks.
+AT_ONCE = {"gamma": 0.001, "handle_cost": 0.001, "blocks": 6}
 # No display-referred picture and no log goes so far.
 BRIGHT = 2.0
 
@@ -73,21 +75,23 @@ def _fit(x: Report, options: AnalysisOptions) -> str:
         what = f"the palette fits the clip loosely (mean L {x.mean_loss:.2f})"
     else:
         return ""
-    at_once = "lower --gamma (to 0.001, say), so that colours may change at once, as in a flash"
+    at_once = " ".join(f"--{name.replace('_', '-')} {x:g}" for name, x in AT_ONCE.items())
     if options.method in ("static", "rgbt"):
         ways = f"{DEFAULT} follows the colours"
         if bad:
-            ways += ", with --gamma 0.001 and more --blocks also those of a flash"
+            ways += f", with {at_once} also those of a flash"
         return f"{what}; {ways}"
     if options.method == "paper":
         ways = "lower --eta2 or --eta1 for more handles"
-        ways += f", {at_once}" if bad else f", take {DEFAULT}"
+        ways += ", lower --gamma for those of a flash" if bad else f", take {DEFAULT}"
     elif options.vertices:
         ways = "raise --vertices"
     elif options.handle_cost > AnalysisOptions().handle_cost:
         ways = "lower --handle-cost for more handles"
     elif bad:
-        ways = f"{at_once}, and raise --blocks"
+        if options.gamma <= AT_ONCE["gamma"] and options.blocks >= AT_ONCE["blocks"]:
+            return f"{what}; analyse parts of the clip apart with --frames"
+        ways = f"with {at_once} colours may change at once, as in a flash"
     else:
         ways = "lower --handle-cost or raise --blocks for more handles"
     return f"{what}; {ways}, or analyse parts of the clip apart with --frames"
