@@ -119,7 +119,7 @@ Vec3 ColourTree::nearest_mean(const Vec3& v, double k) const {
         std::vector<std::pair<double, int>> stack;
     };
     thread_local Search of_this_thread;
-    Search& search = of_this_thread;  // which takes a call to find
+    Search& search = of_this_thread;  // once: each mention of a thread_local may be a call
     auto& [best, stack] = search;
     best.clear();
     stack.clear();

@@ -13,6 +13,7 @@
 #include "vec3.hpp"
 
 namespace palette4d {
+
 Recolourer::Recolourer(std::vector<Vec3> original, const std::vector<Vec3>& edited,
                        std::vector<Face> faces)
     : body_(std::move(original), std::move(faces)) {

@@ -15,7 +15,7 @@ class ColourTree {
 public:
     static constexpr int kLeafSize = 16;  ///< most colours of a leaf
 
-    struct alignas(64) Node {  // a line of a cache
+    struct alignas(64) Node {  // a cache line
         Vec3 low, high;
         int begin, end;   ///< points of the subtree
         int left, right;  ///< children, -1 in a leaf
@@ -55,7 +55,6 @@ private:
         int index;  ///< among those given
     };
     int build(int begin, int end, std::vector<Colour>& order);
-
     void build_levels();
 
     std::size_t size_ = 0;
