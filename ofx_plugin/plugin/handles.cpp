@@ -55,6 +55,13 @@ bool close(const Vec3& a, const Vec3& b) {
     return true;
 }
 
+/// Whether a slot holds a colour, at all times.
+bool holds(const Params& params, const Slot& slot, const std::optional<Vec3>& colour) {
+    if (!colour) return false;
+    const auto now = params.rgb_now(slot.colour.c_str());
+    return now && close(*now, *colour) && !params.animated(slot.colour.c_str());
+}
+
 std::string label_of(const Handle& handle) {
     std::ostringstream text;
     text.imbue(std::locale::classic());
@@ -147,22 +154,15 @@ int handles_in_use(const Params& params) {
 }
 
 void notice_undone(const Params& params, ShownHandles& shown) {
-    const auto holds = [&](std::size_t i, const std::optional<Vec3>& colour) {
-        const std::string& name = slots()[i].colour;
-        const auto now = colour ? params.rgb_now(name.c_str()) : std::nullopt;
-        return now && close(*now, *colour) && !params.animated(name.c_str());
-    };
-    bool given = false, back = true;
-    for (std::size_t i = 0; i < shown.size() && back; ++i) {
-        if (!shown[i].before) continue;
-        given = true;
-        back = holds(i, shown[i].before);
+    bool all_are_back = true;
+    for (std::size_t i = 0; i < shown.size() && all_are_back; ++i) {
+        all_are_back = !shown[i].before || holds(params, slots()[i], shown[i].before);
     }
     for (std::size_t i = 0; i < shown.size(); ++i) {
         ShownHandle& slot = shown[i];
-        if (given && back && slot.before) {
+        if (all_are_back && slot.before) {
             slot = {slot.before, std::nullopt, slot.given};
-        } else if (holds(i, slot.declined)) {  // done again
+        } else if (holds(params, slots()[i], slot.declined)) {  // done again
             slot = {slot.declined, slot.given, std::nullopt};
         }
     }
@@ -170,7 +170,7 @@ void notice_undone(const Params& params, ShownHandles& shown) {
 
 void show_handles(const Params& params, const Sidecar* sidecar, ShownHandles& shown) {
     if (!sidecar) return;
-    bool first = true;
+    bool given_one = false;
     const std::vector<Handle> handles = handles_of(sidecar->polytope, sidecar->edits);
     for (std::size_t i = 0; i < slots().size(); ++i) {
         const Slot& slot = slots()[i];
@@ -195,10 +195,10 @@ void show_handles(const Params& params, const Sidecar* sidecar, ShownHandles& sh
         }
         const std::optional<Vec3>& declined = shown[i].declined;
         if (!untouched || (declined && close(handle->rgb, *declined))) continue;
-        if (first) {
+        if (!given_one) {
             for (ShownHandle& other : shown) other.before.reset();
         }
-        first = false;
+        given_one = true;
         if (params.set_rgb(slot.colour.c_str(), handle->rgb)) {
             shown[i] = {handle->rgb, now, std::nullopt};
         }
@@ -224,12 +224,8 @@ bool handle_changed(const Params& params, const Sidecar* sidecar, const std::str
         const Slot& slot = slots()[i];
         if (name != slot.colour && name != slot.use) continue;
         if (name == slot.colour && params.int_now(slot.use.c_str()) == 0) {
-            const auto now = params.rgb_now(slot.colour.c_str());
             // What was shown all along is no edit: the host has undone one.
-            if (now && shown[i].given && close(*now, *shown[i].given) &&
-                !params.animated(slot.colour.c_str())) {
-                break;
-            }
+            if (holds(params, slot, shown[i].given)) break;
             params.set_int(slot.use.c_str(), 1);
         }
         const bool in_use = params.int_now(slot.use.c_str()).value_or(0) != 0;
