@@ -152,6 +152,57 @@ std::vector<unsigned char> recoloured(const palette4d::Sidecar& sidecar, double 
 
 OfxRectI rect(int x1, int y1, int x2, int y2) { return {x1, y1, x2, y2}; }
 
+std::vector<strict::Layout> layouts() {
+    std::vector<strict::Layout> all;
+    for (const strict::Depth depth : {strict::Depth::kFloat, strict::Depth::kByte}) {
+        for (const int channels : {3, 4}) {
+            for (const char* alpha :
+                 {kOfxImageUnPreMultiplied, kOfxImagePreMultiplied, kOfxImageOpaque}) {
+                if (channels == 3 && alpha != std::string(kOfxImageUnPreMultiplied)) continue;
+                strict::Layout layout;
+                layout.bounds = rect(-9, 4, 22, 31);
+                layout.depth = depth;
+                layout.channels = channels;
+                layout.premultiplication = alpha;
+                layout.padding = 12;
+                layout.upside_down = channels == 4;
+                all.push_back(layout);
+            }
+        }
+    }
+    return all;
+}
+
+strict::Picture source_of(const strict::Layout& layout) {
+    strict::Picture source(layout, 0x22);
+    fill(source, 3);
+    if (layout.premultiplication != kOfxImagePreMultiplied) return source;
+    for (int y = layout.bounds.y1; y < layout.bounds.y2; ++y) {
+        for (int x = layout.bounds.x1; x < layout.bounds.x2; ++x) {
+            for (int c = 0; c < 3; ++c) {
+                if (layout.depth == strict::Depth::kByte) {
+                    unsigned char* p = source.at(x, y);
+                    p[c] = static_cast<unsigned char>(p[c] * p[3] / 255);
+                } else {
+                    source.floats(x, y)[c] *= source.floats(x, y)[3];
+                }
+            }
+        }
+    }
+    return source;
+}
+
+std::vector<float> floats(const strict::Layout& layout, const std::vector<unsigned char>& pixels) {
+    std::vector<float> values(layout.depth == strict::Depth::kByte ? pixels.size()
+                                                                   : pixels.size() / 4);
+    if (layout.depth == strict::Depth::kByte) {
+        for (std::size_t i = 0; i < values.size(); ++i) values[i] = pixels[i] / 255.0f;
+    } else {
+        std::memcpy(values.data(), pixels.data(), pixels.size());
+    }
+    return values;
+}
+
 }  // namespace test
 
 /// palette4d_host_tests BUNDLE FOLDER [NAME …]: runs the tests whose names contain one of NAME.

@@ -2,8 +2,9 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
+#include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "palette4d/recolour.hpp"
@@ -63,5 +64,24 @@ std::vector<unsigned char> recoloured(const palette4d::Sidecar& sidecar, double 
                                       double strength = 1);
 
 OfxRectI rect(int x1, int y1, int x2, int y2);
+
+/// A small picture's layouts of either depth, with and without alpha of every kind.
+std::vector<strict::Layout> layouts();
+/// A picture as fill() makes it, whose premultiplied colours go with its alpha.
+strict::Picture source_of(const strict::Layout& layout);
+/// Float or byte pixels as floats.
+std::vector<float> floats(const strict::Layout& layout, const std::vector<unsigned char>& pixels);
+
+/// An instance of the node that has a sidecar.
+struct Ready {
+    strict::Plugin plugin{bundle()};
+    std::string path;
+    palette4d::Sidecar parsed = palette4d::read_sidecar(path);
+    std::unique_ptr<strict::Instance> instance = plugin.create();
+    explicit Ready(std::string chosen = test::sidecar()) : path(std::move(chosen)) {
+        set("sidecar", path);
+    }
+    void set(const char* name, strict::Value value) { instance->set(name, std::move(value)); }
+};
 
 }  // namespace test

@@ -34,16 +34,8 @@ std::string with_conversion(bool edited = true) {
     return text;
 }
 
-struct Node {
-    Plugin plugin{bundle()};
-    std::string path;
-    palette4d::Sidecar parsed;
-    std::unique_ptr<Instance> instance = plugin.create();
-    explicit Node(bool edited = true)
-        : path(write("light.p4d.json", with_conversion(edited))),
-          parsed(palette4d::read_sidecar(path)) {
-        instance->set("sidecar", path);
-    }
+struct Node : Ready {
+    explicit Node(bool edited = true) : Ready(write("light.p4d.json", with_conversion(edited))) {}
 };
 
 Layout layout_of(Depth depth, int channels, const char* premultiplication) {

@@ -15,12 +15,7 @@ using palette4d::Lattice;
 
 namespace {
 
-struct Node {
-    Plugin plugin{bundle()};
-    std::string path = sidecar();
-    std::unique_ptr<Instance> instance = plugin.create();
-    Node() { instance->set("sidecar", path); }
-
+struct Node : Ready {
     /// A render in windows of so many rows.
     std::vector<unsigned char> render(const Picture& source, double time, int rows = 1000) {
         Picture output(source.layout());

@@ -20,14 +20,6 @@ void compare(Instance& instance, const palette4d::Sidecar& parsed, const Layout&
     if (strength > 0 && window.x2 - window.x1 > 3) CHECK(source.pixels(window) != expected);
 }
 
-struct Ready {
-    Plugin plugin{bundle()};
-    std::string path = sidecar();
-    palette4d::Sidecar parsed = palette4d::read_sidecar(path);
-    std::unique_ptr<Instance> instance = plugin.create();
-    Ready() { instance->set("sidecar", path); }
-};
-
 }  // namespace
 
 TEST(every_layout_gives_the_cores_bytes) {
