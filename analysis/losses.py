@@ -6,6 +6,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import os
+import weakref
 from collections.abc import Callable
 
 import nlopt
@@ -175,6 +176,10 @@ def minimise(
     best_value, best = objective(x)[0], x.copy()
 
     failures: list[BaseException] = []
+    solver = nlopt.opt(nlopt.LD_LBFGS, len(x))
+    # The solver holds `call`: were it held by that in turn, it were a cycle through C++, which no
+    # collector sees, and all that the objective knows would stay in memory until the end.
+    running = weakref.proxy(solver)
 
     def call(point: F64, gradient: F64) -> float:
         nonlocal best_value, best
@@ -189,10 +194,9 @@ def minimise(
             return value
         except BaseException as error:  # NLopt drops what a callback raises, Ctrl-C included
             failures.append(error)
-            solver.force_stop()
+            running.force_stop()
             return float("inf")
 
-    solver = nlopt.opt(nlopt.LD_LBFGS, len(x))
     solver.set_min_objective(call)
     solver.set_lower_bounds(low)
     solver.set_upper_bounds(high)

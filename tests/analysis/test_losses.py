@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import itertools
+import weakref
 
 import numpy as np
 import pytest
@@ -197,6 +199,22 @@ def test_what_an_objective_raises_comes_out(error, at):
     with pytest.raises(error):
         minimise(objective, np.array([-1.2, 1.0]), np.full(2, -5.0), np.full(2, 5.0), 50)
     assert len(calls) == at
+
+
+def test_what_an_objective_knows_is_let_go_of():
+    """It knows the colours of a frame, or of all frames of a shot."""
+
+    class Parabola:
+        def __call__(self, x):
+            return float(x @ x), 2 * x
+
+    parabola = Parabola()
+    gone = weakref.ref(parabola)
+    best = minimise(parabola, np.ones(2), np.full(2, -5.0), np.full(2, 5.0), 50)
+    np.testing.assert_allclose(best, 0, atol=1e-6)
+    del parabola
+    gc.collect()
+    assert gone() is None
 
 
 def test_bad_arguments_are_refused():
