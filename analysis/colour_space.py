@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.analysis.clip_base import Clip, Fill, FrameError, Image
-from palette4d.conversion_steps import TOLERANCE, Comparison, Conversion, conversion
+from palette4d.colour_conversion import TOLERANCE, Comparison, Conversion, conversion
 from palette4d.errors import Palette4dError
 from palette4d.ocio_config import chosen_config, colour_space, same_encodings
 

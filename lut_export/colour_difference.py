@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from palette4d.ocio_config import SAME_ENCODINGS, same_encodings
+from palette4d.ocio_processor import ExactProcessor
 
 F64 = NDArray[np.float64]
 
@@ -71,15 +72,8 @@ def _by_opencolorio(names: list[str]) -> tuple[str, Callable[[F64], F64]] | None
     space = next((found for found in spaces if found is not None and not found.isData()), None)
     if space is None:
         return None
-    processor = config.getProcessor(space.getName(), "lin_rec709")
-    cpu = processor.getOptimizedCPUProcessor(ocio.OPTIMIZATION_LOSSLESS)
-
-    def linear(colours: F64) -> F64:
-        result = np.array(colours, dtype=np.float32, order="C")
-        cpu.applyRGB(result.reshape(1, -1, 3))
-        return result.astype(np.float64)
-
-    return space.getName(), linear
+    to_linear = ExactProcessor(config.getProcessor(space.getName(), "lin_rec709"))
+    return space.getName(), lambda colours: to_linear(colours).astype(np.float64)
 
 
 def srgb_to_linear(colours: F64) -> F64:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from palette4d.errors import Palette4dError
 from palette4d.ocio_config import failures
+from palette4d.ocio_processor import ExactProcessor
 
 F32 = NDArray[np.float32]
 
@@ -66,13 +67,11 @@ class LoadedLut:
             processor = ocio.Config.CreateRaw().getProcessor(
                 ocio.Context(), transform, ocio.TRANSFORM_DIR_FORWARD
             )
-            # Lossless: no step may be replaced by an approximation, the error is the file's own.
-            self._processor = processor.getOptimizedCPUProcessor(ocio.OPTIMIZATION_LOSSLESS)
+            # The error shall be the file's own.
+            self._processor = ExactProcessor(processor)
         except failures() as error:
             raise Palette4dError(f"{path}: OpenColorIO cannot read it: {error}") from error
 
     def apply(self, colours: F32) -> F32:
         """Return the (…, 3) float32 colours that replace the (…, 3) float32 `colours`."""
-        result = np.array(colours, dtype=np.float32, order="C")
-        self._processor.applyRGB(result.reshape(1, -1, 3))
-        return result
+        return self._processor(colours)

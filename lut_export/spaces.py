@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from palette4d import _core
-from palette4d.conversion_steps import Step, conversion
+from palette4d.colour_conversion import conversion
+from palette4d.conversion_steps import Step
 from palette4d.errors import Palette4dError
 from palette4d.ocio_config import chosen_config, colour_space, load_config, same_encodings
 

@@ -15,7 +15,8 @@ from palette4d.analysis import sidecar as sidecars
 from palette4d.analysis.clip import open_clip
 from palette4d.analysis.colour_space import SpaceOptions, Spaces, spaces_of
 from palette4d.cli import main
-from palette4d.conversion_steps import TOLERANCE, Comparison, ConversionError, conversion
+from palette4d.colour_conversion import TOLERANCE, Comparison, conversion
+from palette4d.conversion_steps import ConversionError
 from palette4d.errors import Palette4dError
 
 STUDIO = "ocio://studio-config-v1.0.0_aces-v1.3_ocio-v2.1"

@@ -1,36 +1,23 @@
-"""Conversions between colour spaces as chains of matrices and curves, without OpenColorIO.
+"""OpenColorIO's transforms as the steps of a sidecar's conversion: matrices and curves.
 
-Input: OpenColorIO's processor from one colour space to another. Output: the steps that
+Input: one of OpenColorIO's transforms, or a list of steps. Output: the steps that
 `palette4d._core.ColourConversion` applies, in either direction; docs/sidecar.md explains them.
 
 What OpenColorIO clamps, a chain continues: below black and above the largest number that an
 encoding holds its curves go on, so that every number has a way there and back.
 """
 
-import json
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from palette4d import _core
 from palette4d.errors import Palette4dError
-from palette4d.ocio_config import failures
+from palette4d.ocio_processor import ExactProcessor
 
-F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 Step = dict[str, Any]
-
-#: The largest difference from OpenColorIO, relative to 1 or to the number, whichever is larger,
-#: beyond what OpenColorIO's single precision explains: two bits more or less of the colour that it
-#: was given, which a gamma makes large near 0.
-TOLERANCE = 1e-5
-
-#: OpenColorIO brings a number back that was there and back again by this, or its encoding has
-#: ended before it.
-_COMES_BACK = 2e-6
 
 #: Where a logarithm without a straight part of its own is continued straight: 2^-24.
 _DARKEST = 2.0**-24
@@ -46,126 +33,14 @@ class ConversionError(Palette4dError):
     """A conversion that is no chain of matrices and curves: what it contains, what to do."""
 
 
-@dataclass(frozen=True)
-class Conversion:
-    """A chain, and how far it is from OpenColorIO.
-
-    Attributes
-    ----------
-    steps : list of dict
-        Of the sidecar.
-    chain : ColourConversion
-        What applies them.
-    error : float
-        The largest |a - b| / max(|b|, 1) that was found between the chain and OpenColorIO, in
-        both directions, wherever OpenColorIO itself brings a colour back, beyond what its single
-        precision explains.
-    """
-
-    steps: list[Step]
-    chain: _core.ColourConversion
-    error: float
-
-
-def conversion(config: Any, source: str, target: str) -> Conversion:
-    """Return the chain from one colour space of a config to another.
+def steps_of(transform: Any) -> list[Step]:
+    """Return one of OpenColorIO's transforms as steps of a sidecar.
 
     Raises
     ------
     ConversionError
-        There is something else than matrices and curves between them, or the chain is further than
-        `TOLERANCE` from OpenColorIO, beyond what its single precision explains.
+        It is something else than matrices and curves of one channel, or has no way back.
     """
-
-    try:
-        forward = _Processor(config.getProcessor(source, target))
-        backward = _Processor(config.getProcessor(target, source))
-    except failures() as error:
-        raise ConversionError(
-            f"OpenColorIO has no way from {source!r} to {target!r} and back: {error}; choose "
-            "another --palette-space"
-        ) from error
-    steps: list[Step] = []
-    for transform in forward.transforms():
-        try:
-            steps += _steps_of(transform)
-        except ConversionError as error:
-            raise ConversionError(
-                f"from {source!r} to {target!r}: {error}; expected matrices and curves of one "
-                "channel only, which have a way back. Choose another --palette-space, or convert "
-                "the clip first"
-            ) from error
-    steps = list(_joined(steps))
-    chain = _core.ColourConversion(json.dumps(steps), f"{source} to {target}")
-    scene = [_is_scene_linear(config, name) for name in (source, target)]
-    error_ = max(
-        _difference(_Way(chain.to_palette, scene[0]), forward, backward, _probes(scene[0])),
-        _difference(_Way(chain.to_clip, scene[1]), backward, forward, _probes(scene[1])),
-    )
-    if error_ > TOLERANCE:
-        raise ConversionError(
-            f"from {source!r} to {target!r}: found a difference of {error_:.2g} between matrices "
-            f"and curves and OpenColorIO, expected at most {TOLERANCE:g}; choose another "
-            "--palette-space, or convert the clip first"
-        )
-    return Conversion(steps, chain, error_)
-
-
-class Comparison:
-    """How far a chain is from OpenColorIO on a clip's own colours."""
-
-    def __init__(self, config: Any, source: str, target: str, chain: _core.ColourConversion):
-        self._forward = _Processor(config.getProcessor(source, target))
-        self._backward = _Processor(config.getProcessor(target, source))
-        self._there = _Way(chain.to_palette, _is_scene_linear(config, source))
-        self._back = _Way(chain.to_clip, _is_scene_linear(config, target))
-        self.colours = 0  #: compared so far
-        self.beyond = 0  #: of them, where OpenColorIO brings no colour back
-        self.error = 0.0  #: the largest of the others, in both directions
-
-    def add(self, colours: F32) -> None:
-        """Compare (n, 3) finite colours of the clip."""
-        there = self._forward(colours)
-        back = self._backward(there)
-        inside = _comes_back(back, colours)
-        self.colours += len(colours)
-        # What OpenColorIO's rounding alone keeps from coming back is not beyond its encoding.
-        lost, reached = colours[~inside], there[~inside]
-        self.beyond += int((~_comes_back(back[~inside], lost, self._back.rounding(reached))).sum())
-        if inside.any():
-            kept, reached = colours[inside], there[inside]
-            self.error = max(
-                self.error,
-                _worst(self._there, kept, reached),
-                _worst(self._back, reached, back[inside]),
-            )
-
-
-class _Processor:
-    """OpenColorIO's own arithmetic, without its approximations of logarithms and powers."""
-
-    def __init__(self, processor: Any) -> None:
-        import PyOpenColorIO as ocio
-
-        self._processor = processor
-        self._optimized = processor.getOptimizedProcessor(ocio.OPTIMIZATION_LOSSLESS)
-        self._cpu = processor.getOptimizedCPUProcessor(ocio.OPTIMIZATION_LOSSLESS)
-
-    def transforms(self) -> list[Any]:
-        return list(self._optimized.createGroupTransform())
-
-    def __call__(self, colours: ArrayLike) -> F32:
-        """(n, 3) -> (n, 3) float32."""
-        result = np.array(colours, dtype=np.float32, order="C")
-        if result.size:
-            self._cpu.applyRGB(result.reshape(1, -1, 3))
-        return result
-
-
-# ------------------------------------------------------------------------------ transforms to steps
-
-
-def _steps_of(transform: Any) -> list[Step]:
     name = type(transform).__name__
     translate = {
         "MatrixTransform": _matrix,
@@ -309,8 +184,7 @@ def _table(transform: Any) -> list[Step]:
         at = np.arange(len(values), dtype=np.uint16).view(np.float16).astype(np.float64)
     else:
         at = np.linspace(0, 1, len(values))
-    same = np.array_equal(values[:, 0], values[:, 1]) and np.array_equal(values[:, 0], values[:, 2])
-    return [_curve_step(at, values[:, :1] if same else values, _direction(transform))]
+    return [_curve_step(at, values, _direction(transform))]
 
 
 def _sampled(transform: Any) -> list[Step]:
@@ -319,7 +193,7 @@ def _sampled(transform: Any) -> list[Step]:
 
     direction = _direction(transform)
     transform.setDirection(ocio.TRANSFORM_DIR_FORWARD)
-    apply = _Processor(ocio.Config.CreateRaw().getProcessor(transform))
+    apply = ExactProcessor(ocio.Config.CreateRaw().getProcessor(transform))
     at = np.arange(65536, dtype=np.uint16).view(np.float16)
     at = at[np.isfinite(at)]
     ramps = apply(np.repeat(at.astype(np.float32)[:, None], 3, axis=1))
@@ -330,14 +204,14 @@ def _sampled(transform: Any) -> list[Step]:
         if isinstance(transform, ocio.FixedFunctionTransform):
             what += f" ({str(transform.getStyle()).rpartition('.')[2]})"
         raise ConversionError(f"found a {what}, in which channels depend on each other")
-    values = ramps.astype(np.float64)
-    same = np.array_equal(ramps[:, 0], ramps[:, 1]) and np.array_equal(ramps[:, 0], ramps[:, 2])
-    return [_curve_step(at.astype(np.float64), values[:, :1] if same else values, direction)]
+    return [_curve_step(at.astype(np.float64), ramps.astype(np.float64), direction)]
 
 
 def _curve_step(at: F64, values: F64, direction: str) -> Step:
+    """Return a curve for each channel, or one where all three are the same."""
     curves = []
-    for y in values.T:
+    red, *others = values.T
+    for y in [red] if all(np.array_equal(red, other) for other in others) else values.T:
         x, rising = _rising(at, y)
         kept = _bends(x, rising)
         curves.append({"x": x[kept].tolist(), "y": rising[kept].tolist()})
@@ -389,7 +263,7 @@ def _bends(x: F64, y: F64) -> NDArray[np.intp]:
     return np.array(sorted(kept))
 
 
-def _joined(steps: list[Step]) -> Iterator[Step]:
+def joined(steps: list[Step]) -> Iterator[Step]:
     """Yield the steps with neighbouring matrices made one, and none that changes nothing."""
     held: tuple[F64, F64] | None = None
     for step in [*steps, None]:
@@ -405,71 +279,3 @@ def _joined(steps: list[Step]) -> Iterator[Step]:
             held = None
         if step is not None:
             yield step
-
-
-# --------------------------------------------------------------------------------- how far off
-
-
-def _is_scene_linear(config: Any, name: str) -> bool:
-    return bool(config.getColorSpace(name).getEncoding() == "scene-linear")
-
-
-def _probes(scene_linear: bool) -> F32:
-    """Return (n, 3) colours: neutral ones, each channel alone, and mixtures."""
-    if scene_linear:
-        light = np.concatenate([[0.0], np.exp2(np.linspace(-20, np.log2(65504), 1600))])
-        ramp = np.concatenate([-light[:-1:8], light])
-    else:
-        ramp = np.linspace(-0.25, 1.5, 3501)
-    random = np.random.default_rng(1234)
-    mixed = np.repeat(ramp[:, None], 3, axis=1)
-    mixed = mixed * random.uniform(0.2, 1, mixed.shape)
-    alone = [ramp[:, None] * axis for axis in np.eye(3)]
-    neutral = np.repeat(ramp[:, None], 3, axis=1)
-    return np.concatenate([neutral, mixed, *alone]).astype(np.float32)
-
-
-class _Way:
-    """A chain in one direction, and how far OpenColorIO's single precision may be from it."""
-
-    def __init__(self, apply: Callable[[ArrayLike], F64], scene_linear: bool) -> None:
-        self.apply = apply
-        # The constants of an encoding are about 1, so that its numbers near 0 are no finer.
-        self._least = 0.0 if scene_linear else 1.0
-
-    def rounding(self, colours: F32) -> F64:
-        """(n, 3) -> (n, 3): how far two bits more or less in each channel move the result.
-
-        They are the last bits of a colour's largest channel, as matrices mix the channels, and of
-        1 at least in an encoding.
-        """
-        exact = self.apply(colours)
-        moved = np.zeros_like(exact)
-        with np.errstate(invalid="ignore", over="ignore"):
-            size = np.maximum(np.abs(colours).max(axis=1, keepdims=True), self._least)
-            for shift in size.astype(np.float64) * 2.0**-22 * np.eye(3)[:, None]:
-                up, down = (np.abs(self.apply(colours + s) - exact) for s in (shift, -shift))
-                moved += np.maximum(up, down)
-        return moved
-
-
-def _comes_back(back: F32, colours: F32, rounding: F64 | float = 0.0) -> NDArray[np.bool_]:
-    with np.errstate(invalid="ignore", over="ignore"):
-        off = np.abs(back - colours)
-        near = off <= _COMES_BACK * np.maximum(np.abs(colours), 1) + rounding
-    return np.asarray(near.all(axis=1) & np.isfinite(back).all(axis=1))
-
-
-def _difference(way: _Way, forward: _Processor, backward: _Processor, colours: F32) -> float:
-    there = forward(colours)
-    inside = _comes_back(backward(there), colours) & np.isfinite(there).all(axis=1)
-    if not inside.any():
-        return float("inf")
-    return _worst(way, colours[inside], there[inside])
-
-
-def _worst(way: _Way, colours: F32, expected: F32) -> float:
-    """Return the largest |a - b| / max(|b|, 1) beyond what single precision explains."""
-    a, b = way.apply(colours), expected.astype(np.float64)
-    off = np.maximum(np.abs(a - b) - way.rounding(colours), 0) / np.maximum(np.abs(b), 1)
-    return float(off.max())

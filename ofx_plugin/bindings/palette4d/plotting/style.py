@@ -62,7 +62,8 @@ def shown(rgb: NDArray[np.floating], encoding: str) -> F64:
 @cache
 def _from_log(encoding: str) -> _core.ColourConversion | None:
     """Return the way from a log encoding to sRGB; None for other encodings."""
-    from palette4d.conversion_steps import ConversionError, conversion
+    from palette4d.colour_conversion import conversion
+    from palette4d.conversion_steps import ConversionError
     from palette4d.ocio_config import BUILT_IN, load_config, same_encodings
 
     if any(word in encoding.lower() for word in (*_LINEAR, "srgb")):
