@@ -9,15 +9,13 @@ import os
 import shlex
 import sys
 import time
-from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from palette4d.analysis import show_cli
-from palette4d.analysis.options import METHODS, METHODS_OF, AnalysisOptions
-from palette4d.arguments import checked, frame_range, number, whole
-from palette4d.errors import Palette4dError
+from palette4d.analysis.options import LIMITS, METHODS, METHODS_OF, AnalysisOptions
+from palette4d.arguments import frame_range, number, whole
 from palette4d.wording import counted
 
 if TYPE_CHECKING:
@@ -158,12 +156,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         group = parser.add_argument_group(title)
         for flag, metavar, field, text in table:
             default = getattr(defaults, field)
+            kind = whole if isinstance(default, int) else number
             methods = f"; method {', '.join(METHODS_OF[field])}" if field in METHODS_OF else ""
             group.add_argument(
                 flag,
                 dest=field,
                 metavar=metavar,
-                type=checked(whole() if isinstance(default, int) else number(), _check(field)),
+                type=kind(*LIMITS[field]),
                 default=argparse.SUPPRESS,  # what is there was given: `_options`
                 help=f"{text} (default {default:g}{methods})",
             )
@@ -195,19 +194,6 @@ def _add_space_options(parser: argparse.ArgumentParser) -> None:
         help="a config.ocio, .ocioz or ocio:// name (default: $OCIO, else OpenColorIO's built-in "
         "studio config)",
     )
-
-
-def _check(field: str) -> Callable[[float], None]:
-    """Return a function that refuses a value out of the option's range."""
-
-    def check(value: float) -> None:
-        given: dict[str, Any] = {field: value}
-        try:
-            AnalysisOptions(**given)
-        except Palette4dError as error:  # argparse has named the option already
-            raise Palette4dError(str(error).partition(": ")[2]) from None
-
-    return check
 
 
 def _rate(text: str) -> Fraction:

@@ -36,6 +36,33 @@ METHODS_OF: dict[str, tuple[str, ...]] = {
     "reach": ("skew", "paper", "static"),
 }
 
+#: The least and the largest value of each option that is a number.
+LIMITS: dict[str, tuple[float, float]] = {
+    "handle_cost": (0.0, 1e6),
+    "vertices": (0, 1e6),
+    "blocks": (1, 1e6),
+    "lambda_": (0.0, 1e6),
+    "k": (1, 1e9),
+    "alpha": (0.0, 1e6),
+    "beta": (0.0, 1e6),
+    "eta1": (1.0, 1e6),
+    "eta2": (1.0, 1e6),
+    "gamma": (0.0, 1e6),
+    "removal_candidates": (1, 1e6),
+    "refinement_box": (0.0, 10.0),
+    "refinement_cycles": (0, 1000),
+    "palette_size": (4, 24),
+    "merge_distance": (0.0, 1.0),
+    "hull_box": (0.0, 10.0),
+    "convexity": (0.0, 1e6),
+    "separation": (0.0, 1.0),
+    "reach": (0.0, 10.0),
+    "colours": (64, 1e8),
+    "coarse_colours": (64, 1e8),
+    "seed": (0, 2**63),
+    "threads": (0, 1024),
+}
+
 
 @dataclasses.dataclass(frozen=True)
 class AnalysisOptions:
@@ -65,8 +92,9 @@ class AnalysisOptions:
     separation : palette colours nearer than this repel each other (ours; 0 is the paper).
     reach : pixels this far outside count twice, farther ones still more (ours; 0 is the paper).
     colours : most colour bins kept of a frame; 8-bit frames with no more distinct colours are
-    exact. coarse_colours : the same for hulls, merging and removal, where speed counts (of clips
-    of less than 48 frames up to twice as many).
+        exact.
+    coarse_colours : the same for hulls, merging and removal, where speed counts; of short clips
+        more (`statistics.SHORT`).
     seed : seeds what is random (nothing at present: every step is deterministic).
     threads : threads of the loss evaluation; the result does not depend on it. 0: one a processor.
     """
@@ -98,36 +126,11 @@ class AnalysisOptions:
 
     def __post_init__(self) -> None:
         """Refuse values outside their range, naming the option."""
-        limits: dict[str, tuple[float, float]] = {
-            "handle_cost": (0.0, 1e6),
-            "vertices": (0, 1e6),
-            "blocks": (1, 1e6),
-            "lambda_": (0.0, 1e6),
-            "k": (1, 1e9),
-            "alpha": (0.0, 1e6),
-            "beta": (0.0, 1e6),
-            "eta1": (1.0, 1e6),
-            "eta2": (1.0, 1e6),
-            "gamma": (0.0, 1e6),
-            "removal_candidates": (1, 1e6),
-            "refinement_box": (0.0, 10.0),
-            "refinement_cycles": (0, 1000),
-            "palette_size": (4, 24),
-            "merge_distance": (0.0, 1.0),
-            "hull_box": (0.0, 10.0),
-            "convexity": (0.0, 1e6),
-            "separation": (0.0, 1.0),
-            "reach": (0.0, 10.0),
-            "colours": (64, 1e8),
-            "coarse_colours": (64, 1e8),
-            "seed": (0, 2**63),
-            "threads": (0, 1024),
-        }
         if self.method not in METHODS:
             raise Palette4dError(
                 f"option method: found {self.method!r}, expected one of {', '.join(METHODS)}"
             )
-        for name, (low, high) in limits.items():
+        for name, (low, high) in LIMITS.items():
             value = getattr(self, name)
             if not math.isfinite(value) or not low <= value <= high:
                 raise Palette4dError(

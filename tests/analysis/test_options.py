@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from analysis_frames import mixture, stats
 from palette4d.analysis import methods
-from palette4d.analysis.options import METHODS, METHODS_OF, AnalysisOptions
+from palette4d.analysis.options import LIMITS, METHODS, METHODS_OF, AnalysisOptions
+from palette4d.errors import Palette4dError
 
 CORNERS = np.array(
     [[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9], [0.9, 0.8, 0.7]]
@@ -62,3 +63,14 @@ def test_only_options_are_named():
     names = {field.name for field in dataclasses.fields(AnalysisOptions)}
     assert set(METHODS_OF) <= names
     assert {method for of in METHODS_OF.values() for method in of} == set(METHODS)
+    assert set(LIMITS) == names - {"method"}
+
+
+@pytest.mark.parametrize("option", LIMITS)
+def test_values_beyond_their_limits_are_refused(option):
+    low, high = LIMITS[option]
+    for value in (low, high):
+        AnalysisOptions(**{option: value})
+    for value in (low - 0.5, 2 * high, float("nan")):
+        with pytest.raises(Palette4dError, match=f"{option.rstrip('_').replace('_', '-')}: found"):
+            AnalysisOptions(**{option: value})

@@ -173,15 +173,20 @@ def test_few_vertices_are_given_when_asked_for(clip, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("option", "value"),
-    [("--method", "magic"), ("--vertices", "-1"), ("--handle-cost", "nan"), ("--blocks", "0")],
+    ("option", "value", "expected"),
+    [
+        ("--method", "magic", "invalid choice: 'magic'"),
+        ("--vertices", "-1", "found '-1', expected a whole number from 0 to 1000000"),
+        ("--blocks", "0", "found '0', expected a whole number from 1 to 1000000"),
+        ("--handle-cost", "nan", "found 'nan', expected a finite number from 0 to 1000000"),
+    ],
 )
-def test_wrong_options_are_wrong_usage(clip, tmp_path, option, value, capsys):
+def test_wrong_options_are_wrong_usage(clip, tmp_path, option, value, expected, capsys):
     out = tmp_path / "never.p4d.json"
     with pytest.raises(SystemExit) as stop:
         cli.main(["analyze", str(clip), "-o", str(out), option, value])
     assert stop.value.code == 2
-    assert option in capsys.readouterr().err
+    assert f"argument {option}: {expected}" in capsys.readouterr().err
     assert not out.exists()
 
 

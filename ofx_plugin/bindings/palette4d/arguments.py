@@ -164,4 +164,4 @@ def checked(parse: Callable[[str], Any], check: Callable[[Any], object]) -> Call
 def _limits(low: float, high: float) -> str:
     if low == -math.inf:
         return ""
-    return f" of at least {low:g}" if high == math.inf else f" from {low:g} to {high:g}"
+    return f" of at least {low:.10g}" if high == math.inf else f" from {low:.10g} to {high:.10g}"
