@@ -85,6 +85,13 @@ class SkewPolytope:
             after[u].append(v)
         return before, after
 
+    def colours_at(self, block: Section, time: float) -> F64:
+        """Return the (n, 3) colours of a block's tracks at a time, held beyond their ends."""
+        tracks = (self.vertices[list(track)] for track in block.tracks)
+        return np.array(
+            [[np.interp(time, t[:, 3], t[:, channel]) for channel in range(3)] for t in tracks]
+        )
+
     def extended_tracks(self) -> list[list[list[int]]]:
         """Return each block's tracks, each going on to the next vertex before and after it.
 

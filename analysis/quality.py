@@ -200,16 +200,15 @@ def _narrow(frame: FrameStatistics) -> bool:
 
 
 def deepest_dent(polytope: SkewPolytope, statistics: Sequence[FrameStatistics]) -> float:
-    """Return the largest share of its convex hull that a frame's slice of a block lacks (frames
-    that are nearly of one colour do not count)."""
-    tracks = [[polytope.vertices[list(t)] for t in b.tracks] for b in polytope.blocks]
-    deepest = 0.0
-    for frame in statistics:
-        for block, chains in zip(polytope.blocks, tracks, strict=True):
-            if block.first <= frame.frame <= block.last and not _narrow(frame):
-                rgb = [[np.interp(frame.frame, v[:, 3], v[:, c]) for c in range(3)] for v in chains]
-                deepest = max(deepest, _dent(np.array(rgb), block.faces))
-    return deepest
+    """Return what `Report.dent` will be, of a polytope that is not finished: the largest share of
+    its convex hull that a frame's slice lacks."""
+    dents = (
+        _dent(polytope.colours_at(block, frame.frame), block.faces)
+        for frame in statistics
+        for block in polytope.blocks
+        if block.first <= frame.frame <= block.last and not _narrow(frame)
+    )
+    return max(dents, default=0.0)
 
 
 def _dent(rgb: F64, faces: NDArray[np.int32]) -> float:

@@ -3,8 +3,8 @@
 Input: the frames' statistics. Output: an `Analysis`. The configurations of one to `blocks` blocks
 are simplified each, their vertices removed while the others take over; what costs least with every
 handle paid for is kept, given stops for what single frames lack, and refined. Static hulls of the
-whole clip take part, and one simple hull, refined for the paper's loss alone, is what the result is
-held to: it is never worse than that by L'.
+whole clip, some of them refined for the paper's loss alone, are found as well: the best of them
+takes part, and is what the result is held to, which is never worse by L'.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ COMPARE_EVALUATIONS = 40
 FINAL_EVALUATIONS = 150
 # Where slices are dented all the same: times `convexity`.
 STIFFER = 10.0
-# Of the stops for single frames, how many are tried, where L' does not allow them all.
+# Shares of the stops for single frames that are tried in turn, until L' allows them.
 STOPS_KEPT = (1, 0.75, 0.5, 0.25, 0)
 # Where nothing else is as good as a simple hull: what its shape counts, as much as L' lets it.
 SHAPE_WEIGHTS = (1.0, 0.7, 0.5, 0.25, 0.1, 0.0)
@@ -96,10 +96,10 @@ class Skew(Road):
         )
         self.measure("vertex_removal", stops[-1].polytope)
         # All stops, else as many as L' lets: those that came first are the most wanted.
-        shares = sorted({round(part * (len(stops) - 1)) for part in STOPS_KEPT}, reverse=True)
+        kept = sorted({round(share * (len(stops) - 1)) for share in STOPS_KEPT}, reverse=True)
         ways = [
             functools.partial(self.refined, stops[i].polytope, self.options, stops[i].brief)
-            for i in shares
+            for i in kept
         ]
         polytope = self.never_worse(ways, simple, reference)
         remarks = chosen.remarks if len(polytope.blocks) > 1 else ()
@@ -128,8 +128,7 @@ class Skew(Road):
         return [
             hull
             for hull in hulls
-            if (not most or len(hull.vertices) <= most)
-            and quality.deepest_dent(hull, self.frames) <= quality.DENT
+            if (not most or len(hull.vertices) <= most) and not self.dented(hull)
         ]
 
     def never_worse(
@@ -137,22 +136,24 @@ class Skew(Road):
     ) -> SkewPolytope:
         """Take the first of the ways to a refined polytope whose L' is not above `reference`, that
         of `simple`; if there is none, `simple` itself, kept in shape as far as that allows."""
-        polytopes = itertools.chain(
-            (way() for way in ways),
-            # What is in no better shape than `simple` is not worth it.
-            filter(
-                lambda found: quality.deepest_dent(found, self.frames) <= quality.DENT,
-                (self.refined(simple, self.shaped(weight)) for weight in SHAPE_WEIGHTS),
-            ),
-        )
+        found = (way() for way in ways)
+        relaxed = (self.refined(simple, self.shaped(weight)) for weight in SHAPE_WEIGHTS)
+        # What is in no better shape than `simple` is not worth it.
+        in_shape = (p for p in relaxed if not self.dented(p))
+        polytopes = itertools.chain(found, in_shape)
         within = (p for p in polytopes if self.losses(p).L_prime <= reference)
         polytope = next(within, simple)
         self.measure("vertex_refinement", polytope)
         self.report("vertex_refinement", 1, 1)
         return polytope
 
+    def dented(self, polytope: SkewPolytope) -> bool:
+        """Return whether the report would warn of a dent."""
+        return quality.deepest_dent(polytope, self.frames) > quality.DENT
+
     def shaped(self, weight: float) -> AnalysisOptions:
-        """Return the options with what keeps palettes in shape weighed so much."""
+        """Return the options with what keeps palettes in shape weighed so much; with 0, those for
+        the paper's loss alone."""
         o = self.options
         return dataclasses.replace(
             o,
@@ -208,28 +209,23 @@ class Skew(Road):
     def refined(
         self, polytope: SkewPolytope, options: AnalysisOptions, brief: tuple[int, ...] = ()
     ) -> SkewPolytope:
-        """Return the polytope refined on all colours of all frames; where it has dents, refined
-        once more to have less of them."""
-
-        def once(start: SkewPolytope, o: AnalysisOptions) -> SkewPolytope:
-            out, _ = refine_jointly(
-                start,
-                self.frames,
-                self.low,
-                self.high,
-                o,
-                FINAL_EVALUATIONS,
-                coarse=False,
-                brief=brief,
-            )
-            return out
-
-        found = once(polytope, options)
+        """Return the polytope refined on all colours of all frames; where that is dented, refined
+        once more and `STIFFER`, if this makes the deepest dent less."""
+        refine = functools.partial(
+            refine_jointly,
+            statistics=self.frames,
+            low=self.low,
+            high=self.high,
+            most_evaluations=FINAL_EVALUATIONS,
+            coarse=False,
+            brief=brief,
+        )
+        found, _ = refine(polytope, options=options)
         deepest = quality.deepest_dent(found, self.frames)
         if not options.convexity or deepest <= quality.DENT:
             return found
         stiffer = dataclasses.replace(options, convexity=STIFFER * options.convexity)
-        mended = once(found, stiffer)
+        mended, _ = refine(found, options=stiffer)
         return mended if quality.deepest_dent(mended, self.frames) < deepest else found
 
 

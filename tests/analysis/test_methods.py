@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import itertools
+import gc
+import weakref
 
 import numpy as np
 import pytest
 from analysis_frames import constant, grey, mixture, noise, stats
-from palette4d.analysis import methods, static_hull, statistics, structure_search
-from palette4d.analysis.block_merging import Block
+from palette4d.analysis import methods, static_hull, statistics
 from palette4d.analysis.clip import open_clip
-from palette4d.analysis.frame_hulls import hull_mesh
 from palette4d.analysis.options import METHODS, AnalysisOptions
 
 FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
@@ -105,16 +104,12 @@ def test_an_unknown_method_is_refused():
         AnalysisOptions(method="magic")
 
 
-def test_search_frames_hold_the_ends_the_worst_and_the_blocks():
-    palette = hull_mesh(FOUR)
-    blocks = [Block(0, (palette,) * 70, (0.1,) * 70), Block(70, (palette,) * 30, (0.1,) * 30)]
-    losses = np.full(100, 0.1)
-    losses[37] = 0.5
-    chosen = structure_search.search_frames(losses, blocks)
-    assert {0, 99, 37, 69, 70} <= set(chosen)
-    assert len(chosen) <= structure_search.SEARCH_FRAMES + structure_search.WORST_FRAMES + 4
-    assert max(b - a for a, b in itertools.pairwise(chosen)) <= 5
-    assert structure_search.search_frames(losses[:2], [Block(0, (palette,) * 2, (0.1,) * 2)]) == [
-        0,
-        1,
-    ]
+@pytest.mark.parametrize("method", METHODS)
+def test_an_analysis_lets_go_of_its_frames(method):
+    """Of a show, the frames of one shot after the other are in memory, never of all."""
+    frames = stats(drifting(4))
+    gone = [weakref.ref(frame) for frame in frames] + [weakref.ref(f.coarse) for f in frames]
+    assert methods.analyze(frames, AnalysisOptions(method=method)).stages
+    del frames
+    gc.collect()
+    assert [ref() for ref in gone] == [None] * len(gone)

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import dataclasses
+import itertools
+
 import numpy as np
 import pytest
 from analysis_frames import constant, mixture, stats
-from palette4d.analysis.frame_hulls import frame_palette
+from palette4d.analysis.frame_hulls import frame_palette, hull_mesh
 from palette4d.analysis.losses import palette_loss
 from palette4d.analysis.options import AnalysisOptions
+from palette4d.analysis.polytope import Palette
+from palette4d.analysis.quality import deepest_dent
 from palette4d.analysis.static_hull import static_polytope
 from palette4d.analysis.statistics import pooled
 
+CORNERS = np.array(list(itertools.product((0.1, 0.9), repeat=3)))
 FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
 LOW, HIGH = np.zeros(3), np.ones(3)
 OPTIONS = AnalysisOptions()
@@ -53,3 +59,18 @@ def test_one_colour(frames):
     assert len(polytope.vertices) == min(frames, 2)
     for vertex in polytope.vertices:
         np.testing.assert_allclose(vertex[:3], [0.3, 0.4, 0.5], atol=3e-3)
+
+
+def test_a_mesh_that_has_folded_is_unfolded():
+    """Without `convexity` nothing keeps it from that, and the losses do not see it."""
+    frames = stats([mixture(CORNERS, i) for i in range(3)])
+    mesh = hull_mesh(CORNERS)
+    other = mesh.rgb[[1, 0, *range(2, len(mesh.rgb))]]  # two colours have changed places
+    plain = dataclasses.replace(OPTIONS, convexity=0.0, separation=0.0)
+    folded = Palette(other, mesh.faces)
+    polytope = static_polytope(folded, frames, LOW, HIGH, plain)
+    assert deepest_dent(polytope, frames) < 1e-9
+    # With a colour inside of the others it cannot be.
+    inside = Palette(np.vstack([other, CORNERS.mean(axis=0)]), mesh.faces)
+    polytope = static_polytope(inside, frames, LOW, HIGH, plain)
+    np.testing.assert_array_equal(polytope.blocks[0].faces, mesh.faces)

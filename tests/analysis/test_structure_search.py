@@ -1,0 +1,141 @@
+"""The default method's search: its frames, dents, and what the result is held to."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from analysis_frames import noise, stats
+from palette4d.analysis import quality, structure_search
+from palette4d.analysis.block_merging import Block
+from palette4d.analysis.frame_hulls import hull_mesh
+from palette4d.analysis.objective import refine_jointly
+from palette4d.analysis.options import AnalysisOptions
+from palette4d.analysis.polytope import Section, SkewPolytope
+from palette4d.analysis.structure_search import Skew
+
+FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
+CUBE = np.array(list(itertools.product((0.1, 0.9), repeat=3)))
+
+
+def cube_with_apex(height):
+    """A cube at rest for three frames, with a ninth colour over, in or under its top face."""
+    mesh = hull_mesh(np.vstack([CUBE, [0.5, 0.5, 0.95]]))
+    rgb = mesh.rgb.copy()
+    rgb[np.argmin(np.linalg.norm(rgb - [0.5, 0.5, 0.95], axis=1)), 2] = height
+    n = len(rgb)
+    vertices = np.array([[*c, t] for t in (0.0, 2.0) for c in rgb])
+    tracks = tuple((i, n + i) for i in range(n))
+    return SkewPolytope(vertices, (Section(0.0, 2.0, tracks, mesh.faces),), ())
+
+
+@pytest.fixture(scope="module")
+def frames():
+    """Colours in a cube, most of them in its middle, which draw a palette's colours (eq. 3)."""
+    images = [noise(i, 0.8, 0.1, (30, 30)) for i in range(3)]
+    for image in images:
+        image[10:] = 0.5
+    return stats(images)
+
+
+def dent(polytope, frames):
+    return quality.deepest_dent(polytope, frames)
+
+
+LIMP = AnalysisOptions(convexity=0.01, separation=0.0, reach=0.0, refinement_box=0.5)
+
+
+def refined_once(road, polytope, options):
+    evaluations = structure_search.FINAL_EVALUATIONS
+    return refine_jointly(
+        polytope, road.frames, road.low, road.high, options, evaluations, coarse=False
+    )[0]
+
+
+def test_what_is_dented_is_refined_again_to_be_less_so(frames):
+    road, start = Skew(frames, LIMP, None), cube_with_apex(0.9)
+    assert dent(refined_once(road, start, LIMP), frames) > quality.DENT
+    assert dent(road.refined(start, LIMP), frames) < 0.1 * quality.DENT
+
+
+@pytest.mark.parametrize(
+    ("convexity", "stiffer", "limit", "times"),
+    [(0.01, 0.01, 0.05, 2), (0.0, 10.0, 0.05, 1), (0.01, 10.0, 0.2, 1)],
+    ids=["where that is no use", "without convexity", "where nothing is dented"],
+)
+def test_else_it_stays(frames, monkeypatch, convexity, stiffer, limit, times):
+    calls = []
+
+    def counted(*args, **options):
+        calls.append(args)
+        return refine_jointly(*args, **options)
+
+    monkeypatch.setattr(structure_search, "refine_jointly", counted)
+    monkeypatch.setattr(structure_search, "STIFFER", stiffer)
+    monkeypatch.setattr(quality, "DENT", limit)
+    options = dataclasses.replace(LIMP, convexity=convexity)
+    road, start = Skew(frames, options, None), cube_with_apex(0.9)
+    once = refined_once(road, start, options)
+    np.testing.assert_array_equal(road.refined(start, options).vertices, once.vertices)
+    assert len(calls) == times
+
+
+def test_dented_static_hulls_are_no_measure(frames, monkeypatch):
+    road = Skew(frames, AnalysisOptions(), None)
+    hulls = itertools.cycle([cube_with_apex(0.95), cube_with_apex(0.5)])
+    monkeypatch.setattr(road, "static_from", lambda options, sparser: next(hulls))
+    found = road.plain_hulls()
+    assert len(found) >= 2
+    assert max(dent(hull, frames) for hull in found) < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("ways", "relaxed", "expected"),
+    [
+        ([2.0, 0.9, 0.5], [], 0.9),
+        ([2.0], [1.5, 0.8, 0.7], 0.7),  # the second of them is dented
+        ([2.0], [1.5, 1.4], 1.0),
+    ],
+    ids=["the first way that is as good", "the simple hull, relaxed", "the simple hull"],
+)
+def test_the_result_is_held_to_the_simple_hull(frames, monkeypatch, ways, relaxed, expected):
+    """Each palette is known by its L'; that of the simple hull is 1."""
+    road = Skew(frames, AnalysisOptions(), None)
+    values = {}
+
+    def palette(value):
+        out = cube_with_apex(0.5 if value == 0.8 else 0.95)
+        values[id(out)] = (value, out)
+        return out
+
+    simple = palette(1.0)
+    later = itertools.chain(relaxed, itertools.repeat(1.2))
+    monkeypatch.setattr(road, "refined", lambda polytope, options: palette(next(later)))
+    monkeypatch.setattr(
+        road, "losses", lambda polytope: SimpleNamespace(L_prime=values[id(polytope)][0])
+    )
+    measured = []
+    monkeypatch.setattr(road, "measure", lambda stage, polytope: measured.append(polytope))
+    calls = [lambda value=value: palette(value) for value in ways]
+    found = road.never_worse(calls, simple, 1.0)
+    assert values[id(found)][0] == expected
+    assert measured == [found]
+    assert 0.5 not in [value for value, _ in values.values()]  # nobody asked for it
+
+
+def test_search_frames_hold_the_ends_the_worst_and_the_blocks():
+    palette = hull_mesh(FOUR)
+    blocks = [Block(0, (palette,) * 70, (0.1,) * 70), Block(70, (palette,) * 30, (0.1,) * 30)]
+    losses = np.full(100, 0.1)
+    losses[37] = 0.5
+    chosen = structure_search.search_frames(losses, blocks)
+    assert {0, 99, 37, 69, 70} <= set(chosen)
+    assert len(chosen) <= structure_search.SEARCH_FRAMES + structure_search.WORST_FRAMES + 4
+    assert max(b - a for a, b in itertools.pairwise(chosen)) <= 5
+    assert structure_search.search_frames(losses[:2], [Block(0, (palette,) * 2, (0.1,) * 2)]) == [
+        0,
+        1,
+    ]
