@@ -77,6 +77,13 @@ def test_joint_refinement_finds_the_bend_and_never_worsens(frames):
     np.testing.assert_array_equal(same.vertices, start.vertices)
 
 
+def test_what_is_there_for_a_moment_stays_where_it_is_in_time(frames):
+    start = bent(5.3)  # the bend is at 4
+    found, _ = refine_jointly(start, frames, LOW, HIGH, AnalysisOptions(), 100, True, brief=(8,))
+    assert found.vertices[8, 3] == 5.3
+    assert np.abs(found.vertices[8, :3] - start.vertices[8, :3]).max() > 1e-3
+
+
 def test_separation_keeps_colours_apart():
     """Two of the clip's five colours nearly touch; the palette's must not."""
     near = np.vstack([FOUR, FOUR[1] + [0.0, 0.05, 0.0]])
