@@ -26,11 +26,11 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 import PyOpenColorIO as ocio
+from bench_recolour import HD, UHD, UHD8K, hull, rates
 from numpy.typing import NDArray
 from palette4d import _core
 
 F32 = NDArray[np.float32]
-UHD = (3840, 2160)
 OPTIMISATIONS = ("NONE", "LOSSLESS", "VERY_GOOD", "DEFAULT", "DRAFT", "ALL")
 
 
@@ -71,19 +71,6 @@ def best_processor(recolourer: _core.Recolourer, size: int, image: F32) -> ocio.
     return min(found)[2]
 
 
-def rates(
-    runs: int, image: F32, works: dict[str, Callable[[], object]], clock: Callable[[], float]
-) -> dict[str, float]:
-    """Run all in turn, several times; returns median million pixels a second by name."""
-    times: dict[str, list[float]] = {name: [] for name in works}
-    for _ in range(runs):
-        for name, work in works.items():
-            started = clock()
-            work()
-            times[name].append(clock() - started)
-    return {name: image.size / 3 / statistics.median(t) / 1e6 for name, t in times.items()}
-
-
 def measure(what: str, recolourer: _core.Recolourer, image: F32, runs: int) -> None:
     """Print one frame's figures."""
     four = with_alpha(image)
@@ -108,15 +95,15 @@ def measure(what: str, recolourer: _core.Recolourer, image: F32, runs: int) -> N
     for n, lut in luts.items():
         one[f"OCIO {n}"] = lambda lut=lut: lut.applyRGB(scratch[3])
         one[f"OCIO {n} RGBA"] = lambda lut=lut: lut.applyRGBA(scratch[4])
-    thread = rates(runs, image, one, time.process_time)
+    pixels = image.size // 3
+    thread = rates(pixels, runs, one)
     two: dict[str, Callable[[], object]] = {
         "exact": lambda: recolourer.apply(image, precision="single", threads=2, out=out),
         "made": lambda: _core.Lattice(recolourer).apply(image, threads=2, out=out),
         "ready": lambda: ready.apply(image, threads=2, out=out),
     }
-    wall = rates(runs, image, two, time.perf_counter)
-    work = rates(runs, image, two, time.process_time)
-    playing = 24 * image.size / 3 / 1e6
+    wall, work = rates(pixels, runs, two, time.perf_counter), rates(pixels, runs, two)
+    playing = 24 * pixels / 1e6
     print(f"{what}: {size}")
     print(
         f"  largest error {error.max():.5f} of every pixel, {seen:.5f} as the lattice says;"
@@ -146,14 +133,13 @@ def measure(what: str, recolourer: _core.Recolourer, image: F32, runs: int) -> N
 
 def growth(recolourer: _core.Recolourer, image: F32, runs: int, plot: Path | None) -> None:
     """Print how the last frame's cost grows with palettes, pictures, threads; draw it."""
-    from bench_recolour import HD, UHD8K, hull
 
     def work(cut: _core.Recolourer, picture: F32, threads: int, out: F32) -> dict[str, float]:
         ways: dict[str, Callable[[], object]] = {
             "exact": lambda: cut.apply(picture, precision="single", threads=threads, out=out),
             "lattice": lambda: _core.Lattice(cut).apply(picture, threads=threads, out=out),
         }
-        return rates(runs, picture, ways, time.process_time)
+        return rates(picture.size // 3, runs, ways)
 
     by_vertices: dict[int, dict[str, float]] = {}
     half = np.ascontiguousarray(image[: len(image) // 2])
