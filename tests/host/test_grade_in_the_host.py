@@ -4,12 +4,12 @@ edits in the sidecar, to the bit."""
 from __future__ import annotations
 
 import json
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+from host.strict_node import StrictNode
 from host.test_melt_render import palette4d
 from numpy.typing import NDArray
 
@@ -40,26 +40,6 @@ def picture() -> Float:
     return (random.random((29, 41, 3)) * 1.6 - 0.3).astype(np.float32)
 
 
-def through_the_node(
-    driver: Path, bundle: Path, folder: Path, sidecar: Path, picture: Float, *settings: str
-) -> Float:
-    picture.tofile(folder / "in.raw")
-    done = subprocess.run(
-        [
-            *(driver, "render", bundle, sidecar, "--frame", str(FRAME), "--components", "RGB"),
-            *("--width", str(picture.shape[1]), "--height", str(picture.shape[0])),
-            *(word for setting in settings for word in ("--set", setting)),
-            *(folder / "in.raw", folder / "out.raw"),
-        ],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    assert "message:" not in done.stdout, done.stdout
-    return np.fromfile(folder / "out.raw", np.float32).reshape(picture.shape)
-
-
 def test_handles_of_the_host_are_edits_of_the_sidecar(
     strict_host: Path, bundle: Path, repo_root: Path, tmp_path: Path, picture: Float
 ) -> None:
@@ -82,8 +62,11 @@ def test_handles_of_the_host_are_edits_of_the_sidecar(
     by_the_command = read_exr(tmp_path / "graded.0015.exr")
     assert not np.array_equal(by_the_command, picture)
 
+    through = StrictNode(strict_host, bundle, tmp_path)
+
     def node(sidecar: Path, *more: str) -> Float:
-        return through_the_node(strict_host, bundle, tmp_path, sidecar, picture, *more)
+        settings = (word for setting in more for word in ("--set", setting))
+        return through.render(sidecar, FRAME, picture, *settings)
 
     assert node(plain, *settings).tobytes() == by_the_command.tobytes()
     assert node(edited).tobytes() == by_the_command.tobytes()

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import json
 import math
-import subprocess
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from host.strict_node import StrictNode
 from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.render import RenderOptions, recoloured
@@ -34,13 +33,8 @@ GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
 SHAPES = [(3, False), (4, False), (4, True)]  # channels, premultiplied
 
 
-@dataclass(frozen=True)
-class Node:
+class Node(StrictNode):
     """The road from a sidecar to a picture, through the packaged bundle."""
-
-    driver: Path
-    bundle: Path
-    folder: Path
 
     def recolour(
         self,
@@ -50,26 +44,10 @@ class Node:
         strength: float = 1.0,
         premultiplied: bool = False,
     ) -> Picture:
-        sidecar, source, output = (self.folder / name for name in ("p4d.json", "in", "out"))
+        sidecar = self.folder / "p4d.json"
         sidecar.write_text(json.dumps(document), encoding="utf-8")
-        output.unlink(missing_ok=True)
-        image.tofile(source)
-        height, width, channels = image.shape
-        done = subprocess.run(
-            [
-                *(self.driver, "render", self.bundle, sidecar, "--depth", "float"),
-                *("--width", str(width), "--height", str(height)),
-                *("--components", {3: "RGB", 4: "RGBA"}[channels]),
-                *("--frame", repr(float(frame)), "--strength", repr(strength)),
-                *("--premultiplied", str(int(premultiplied)), source, output),
-            ],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert done.returncode == 0, done.stderr
-        assert "message:" not in done.stdout, done.stdout
-        return np.fromfile(output, np.float32).reshape(image.shape)
+        alpha = ("--premultiplied", int(premultiplied))
+        return self.render(sidecar, frame, image, "--strength", strength, *alpha)
 
 
 @pytest.fixture

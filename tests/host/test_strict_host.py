@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from host.strict_node import StrictNode
 from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.imageio import quantised
@@ -67,28 +68,15 @@ def test_the_nodes_bytes_are_the_cores(
 ) -> None:
     components, depth, options = FORMATS[name]
     image = picture(len(components), depth)
-    image.tofile(tmp_path / "in.raw")
+    node = StrictNode(strict_host, bundle, tmp_path)
     polytope = _core.read_sidecar(str(path)).polytope
     first, last = polytope.first_frame, polytope.last_frame
     for part in (0.0, 0.375, 0.5, 1.0):
         frame = float(first + round((last - first) * part * 4) / 4)
         strength = 0.75 if part == 0.5 else 1.0
-        done = subprocess.run(
-            [
-                *(strict_host, "render", bundle, path),
-                *("--frame", repr(frame), "--width", "31", "--height", "27"),
-                *("--components", components, "--depth", depth),
-                *("--strength", str(strength), *options),
-                *(tmp_path / "in.raw", tmp_path / "out.raw"),
-            ],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert done.returncode == 0, done.stderr
-        assert "message:" not in done.stdout
+        found = node.render(path, frame, image, "--strength", strength, *options)
         expected = through_the_core(path, frame, image, strength, "--premultiplied" in options)
-        assert (tmp_path / "out.raw").read_bytes() == expected
+        assert found.tobytes() == expected
 
 
 def test_the_driver_says_what_is_wrong(strict_host: Path, bundle: Path, tmp_path: Path) -> None:
