@@ -173,7 +173,7 @@ def _trials(
     for place, block in enumerate(polytope.blocks):
         if not block.first <= time <= block.last or len(block.faces) == 0:
             continue
-        rgb = _colours(polytope, block, time)
+        rgb = polytope.colours_at(block, time)
         target, share = _lost_colour(rgb, frame, scale)
         if target is None:
             continue
@@ -193,28 +193,17 @@ def _trials(
             shapes += [(lasting, beside, False), (lasting, beside, True)]
         nearest = np.argsort(np.linalg.norm(rgb - target, axis=1), kind="stable")[:NEAREST]
         for track, (peaks, pins, held) in itertools.product(nearest.tolist(), shapes):
-            chain = polytope.vertices[list(block.tracks[track])]
             stops = [(*target.tolist(), at) for at in peaks]
-            stops += [(*_colour(chain, at), at) for at in pins]
+            stops += [(*polytope.colours_at(block, at)[track], at) for at in pins]
             changed, new = _with_stops(polytope, place, track, stops, len(peaks))
             if new:
                 yield _Trial(changed, new, len(peaks), share, span, held)
 
 
-def _colour(track: F64, time: float) -> F64:
-    """(3,) colour of a track's (n, 4) vertices, held beyond its ends."""
-    return np.array([np.interp(time, track[:, 3], track[:, c]) for c in range(3)])
-
-
-def _colours(polytope: SkewPolytope, block: Section, time: float) -> F64:
-    """(n, 3) colours of a block's tracks."""
-    return np.array([_colour(polytope.vertices[list(t)], time) for t in block.tracks])
-
-
 def _slice(polytope: SkewPolytope, time: float) -> F64:
     """(n, 3) colours of the block there; between blocks, those of the nearest."""
     block = min(polytope.blocks, key=lambda b: max(b.first - time, time - b.last))
-    return _colours(polytope, block, min(max(time, block.first), block.last))
+    return polytope.colours_at(block, min(max(time, block.first), block.last))
 
 
 def _outside(rgb: F64, frame: FrameStatistics) -> F64:
