@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from analysis_frames import ArrayClip, mixture
 from palette4d.analysis import pipeline
-from palette4d.analysis.advice import warnings
+from palette4d.analysis.advice import AT_ONCE, warnings
 from palette4d.analysis.options import METHODS, METHODS_OF, AnalysisOptions
 from palette4d.analysis.quality import FrameFit, Report
 
@@ -107,6 +107,14 @@ def test_colours_that_simpler_palettes_hold_are_named():
     assert said(few, farthest={"static_hull": 0.02, "frame_hulls": 0.02}) == ()
 
 
+def test_what_a_flash_needs_is_advised_until_it_was_given():
+    (text,) = said({"fits": ONE_BAD})
+    assert "--gamma 0.001 --handle-cost 0.001 --blocks 6" in text
+    (text,) = said({"fits": ONE_BAD}, **AT_ONCE)
+    assert "--gamma" not in text
+    assert "--frames" in text
+
+
 def flashing(frames: int = 9) -> ArrayClip:
     """Dark frames, the middle one bright."""
     return ArrayClip([mixture(LIGHT if i == frames // 2 else DARK, i) for i in range(frames)])
@@ -120,8 +128,9 @@ def flashing(frames: int = 9) -> ArrayClip:
         (9, {"handle_cost": 1.0}, "--handle-cost", {}),
         (9, {"vertices": 9}, "--vertices", {"vertices": 24}),
         (15, {"gamma": 0.1}, "--gamma", {"gamma": 0.001}),
+        (15, {"gamma": 0.1}, "--blocks", AT_ONCE),
     ],
-    ids=["static", "rgbt", "handle cost", "vertices", "gamma"],
+    ids=["static", "rgbt", "handle cost", "vertices", "gamma", "at once"],
 )
 def test_what_is_advised_helps(frames, options, advised, better):
     clip = flashing(frames)
