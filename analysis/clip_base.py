@@ -22,8 +22,9 @@ from palette4d.errors import Palette4dError
 
 F32 = NDArray[np.float32]
 
-Fill = Callable[[_core.ColourBinner], None]
-"""Hands a frame's pixels over to a binner; FrameError when the frame is bad."""
+Fill = Callable[[_core.ColourBinner], bool]
+"""Hands a frame's pixels over to a binner; FrameError when the frame is bad. Returns whether the
+frame is `hidden`: its colours were then handed over as if it had no alpha."""
 
 LEAST_ALPHA = np.float32(1 / 255)
 """Below it a pixel does not show in 8 bit."""
@@ -180,14 +181,14 @@ class Clip(abc.ABC):
         Premultiplied colours are divided by alpha, as the node does. Pixels with an alpha below
         1/255 have no colour that shows, and dividing by it would magnify noise into colours far
         outside the clip's: they become NaN, which the analysis leaves out. A frame with nothing
-        else has an unused alpha channel, and keeps its colours as they are.
+        else (`hidden`) keeps its colours as they are: if all frames are like it, alpha is not used.
         """
         if pixels.shape[2] == 3:
             return pixels
+        if hidden(pixels):
+            return np.ascontiguousarray(pixels[..., :3])
         alpha = pixels[..., 3:]
         seen = alpha >= LEAST_ALPHA
-        if not seen.any():
-            return np.ascontiguousarray(pixels[..., :3])
         divisor = alpha if self.premultiplied else np.float32(1)
         colours = np.full_like(pixels[..., :3], np.nan)
         with np.errstate(over="ignore", invalid="ignore"):
@@ -206,6 +207,11 @@ class Clip(abc.ABC):
             f"{self.source}: found none readable of {named(self.frames)}; "
             "expected at least one good frame. Run without --skip-bad-frames to see the cause."
         )
+
+
+def hidden(pixels: F32) -> bool:
+    """Whether no pixel of (h, w, 3 or 4) shows: alpha is below 1/255 everywhere."""
+    return pixels.shape[2] == 4 and not (pixels[..., 3] >= LEAST_ALPHA).any()
 
 
 def even_step(numbers: Sequence[int]) -> int:

@@ -88,15 +88,17 @@ class ImageClip(Clip):
         for frame in frames:
             yield frame, functools.partial(self._fill, frame)
 
-    def _fill(self, frame: int, binner: _core.ColourBinner) -> None:
+    def _fill(self, frame: int, binner: _core.ColourBinner) -> bool:
         path, what = self._path(frame), f"frame {frame}"
         source, spec = _open(path, what)
         self._check(_header(path, spec, _channel_choice(spec)), frame)
         _bin_image(source, path, what, binner, self.row_step, self.has_alpha)
-        if self.has_alpha and 0 < binner.transparent == binner.pixels + binner.ignored:
-            # Nothing shows: an unused alpha channel, see `straight_colours`.
-            binner.clear()
-            _bin_image(_open(path, what)[0], path, what, binner, self.row_step, False)
+        if not self.has_alpha or not 0 < binner.transparent == binner.pixels + binner.ignored:
+            return False
+        # Nothing shows: see `straight_colours`.
+        binner.clear()
+        _bin_image(_open(path, what)[0], path, what, binner, self.row_step, False)
+        return True
 
     def _path(self, frame: int) -> Path:
         if frame not in self.sequence.files:

@@ -319,7 +319,7 @@ def _upright(pixels: F32, picture: av.VideoFrame) -> F32:
     return np.ascontiguousarray(np.rot90(pixels, turns)) if turns else pixels
 
 
-def _fail(error: FrameError, binner: _core.ColourBinner) -> None:
+def _fail(error: FrameError, binner: _core.ColourBinner) -> bool:
     """Stand in for the filling of a bad frame."""
     raise error
 
@@ -340,8 +340,9 @@ def _bits(picture: av.VideoFrame) -> int:
     return max(component.bits for component in picture.format.components)
 
 
-def _bin_picture(picture: av.VideoFrame, row_step: int, binner: _core.ColourBinner) -> None:
-    """Bin every `row_step`-th row of a picture, with the colours of `picture_pixels`."""
+def _bin_picture(picture: av.VideoFrame, row_step: int, binner: _core.ColourBinner) -> bool:
+    """Bin every `row_step`-th row of a picture, with the colours of `picture_pixels`; returns
+    whether none of them shows (`Fill`)."""
     picture = _thinned(picture, row_step)
     how = _luma_chroma(picture)
     if how is not None and not how.alpha:
@@ -356,18 +357,23 @@ def _bin_picture(picture: av.VideoFrame, row_step: int, binner: _core.ColourBinn
             bits=how.bits,
             full_range=how.full_range,
         )
-        return
+        return False
     packed, convert = _packed(picture), _converter(picture)
     strip = max(STRIP_BYTES // (16 * picture.width), 1)
-    for channels in (4, 3) if _has_alpha(picture) else (3,):
-        binner.clear()
+
+    def add(channels: int) -> None:
         for top in range(0, picture.height, strip):
             rows = slice(top, top + strip)
             pixels = convert(rows) if packed is None else packed[rows]
             binner.add(pixels[..., :channels])
-        # Nothing shows: an unused alpha channel, see `Clip.straight_colours`.
-        if binner.transparent < binner.pixels + binner.ignored:
-            break
+
+    add(4 if _has_alpha(picture) else 3)
+    if not 0 < binner.transparent == binner.pixels + binner.ignored:
+        return False
+    # Nothing shows: see `Clip.straight_colours`.
+    binner.clear()
+    add(3)
+    return True
 
 
 def _thinned(picture: av.VideoFrame, row_step: int) -> av.VideoFrame:

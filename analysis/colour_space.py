@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from palette4d import _core
-from palette4d.analysis.clip_base import Clip, Fill, FrameError, Image
+from palette4d.analysis.clip_base import Clip, Fill, FrameError, Image, hidden
 from palette4d.colour_conversion import TOLERANCE, Comparison, Conversion, conversion
 from palette4d.errors import Palette4dError
 from palette4d.ocio_config import chosen_config, colour_space, same_encodings
@@ -180,12 +180,13 @@ class ConvertedClip(Clip):
                     fill = functools.partial(_fail, error)
             yield frame, fill
 
-    def _fill(self, frame: int, binner: _core.ColourBinner) -> None:
-        self._bin(self._clip.load(frame).pixels, binner)
+    def _fill(self, frame: int, binner: _core.ColourBinner) -> bool:
+        return self._bin(self._clip.load(frame).pixels, binner)
 
-    def _bin(self, pixels: F32, binner: _core.ColourBinner) -> None:
+    def _bin(self, pixels: F32, binner: _core.ColourBinner) -> bool:
         rows = pixels[self.row_step // 2 :: self.row_step]
         binner.add(np.ascontiguousarray(self.straight_colours(rows)))
+        return hidden(rows)
 
     def straight_colours(self, pixels: F32) -> F32:
         """(h, w, 3) float32 straight colours in the palette's numbers."""
@@ -197,7 +198,7 @@ class ConvertedClip(Clip):
         return self._chain.to_palette(colours).astype(np.float32)
 
 
-def _fail(error: FrameError, binner: _core.ColourBinner) -> None:
+def _fail(error: FrameError, binner: _core.ColourBinner) -> bool:
     """Stand in for the filling of a bad frame."""
     raise error
 

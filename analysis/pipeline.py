@@ -112,7 +112,7 @@ def _usable(
     if not have:
         raise Palette4dError(
             f"no frame of the clip has a pixel to go by: found {counted(len(numbers), 'frame')} "
-            "empty, fully transparent or not finite; expected at least one with colours"
+            "empty or not finite; expected at least one with colours"
         )
     remarks = []
     blank = sorted(n for n, s in gathered.items() if s is None)

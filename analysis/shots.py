@@ -10,7 +10,7 @@ import itertools
 from collections.abc import Callable, Iterable, Iterator
 
 from palette4d.analysis import cuts, statistics
-from palette4d.analysis.clip_base import Clip, even_step
+from palette4d.analysis.clip_base import Clip, even_step, hidden
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.errors import Palette4dError
 from palette4d.wording import file_safe
@@ -144,14 +144,28 @@ def cuts_of(clip: Clip, progress: Callable[[int, int], None] | None = None) -> l
     tell = progress or (lambda done, total: None)
     options = AnalysisOptions(colours=BINS, coarse_colours=BINS)
 
-    def histograms() -> Iterator[tuple[int, cuts.F64]]:
-        for done, (number, image) in enumerate(clip.iter_colours(), start=1):
+    def histograms() -> Iterator[tuple[int, cuts.F64, bool]]:
+        for done, image in enumerate(clip.iter_images(), start=1):
             tell(done, len(clip.frames))
-            found = statistics.gather(number, image, options)
+            found = statistics.gather(image.frame, clip.straight_colours(image.pixels), options)
             if found is not None:
-                yield number, found.histogram
+                yield image.frame, found.histogram, hidden(image.pixels)
 
-    return cuts.find_cuts_of(histograms())
+    frames = histograms()
+    shown: list[tuple[int, cuts.F64]] = []  # the first frame of which anything shows
+
+    def before() -> Iterator[tuple[int, cuts.F64]]:
+        for number, histogram, is_hidden in frames:
+            if not is_hidden:
+                shown.append((number, histogram))
+                return
+            yield number, histogram
+
+    starts = cuts.find_cuts_of(before())
+    if not shown:  # alpha is not used
+        return starts
+    rest = ((number, histogram) for number, histogram, is_hidden in frames if not is_hidden)
+    return cuts.find_cuts_of(itertools.chain(shown, rest))
 
 
 def trimmed(shot: Shot, clip: Clip) -> Shot:

@@ -2,7 +2,8 @@
 
 Input: a clip, or an image. Output: for each frame weighted colours in k-d trees, of bounded size,
 so that memory grows neither with resolution nor, beyond `MOST_COLOURS`, with the number of frames.
-Pixels that are not finite or have an alpha below 1/255 do not count.
+Pixels that are not finite or have an alpha below 1/255 do not count; where that leaves no pixel of
+any frame, alpha is not used.
 
 The losses of section 3 measured on a frame of 8-bit colours of which no more than the kept number
 differ are exact. Else the colours are a sample (`colour_sample.hpp`), dense where the colours of
@@ -85,7 +86,8 @@ class FrameStatistics:
 class ClipStatistics:
     """The statistics of a clip's frames, by their number; None where no pixel counts.
 
-    remarks says what was left out to stay within bounds. Bad frames are listed by the clip.
+    remarks says what was left out to stay within bounds, and whether alpha was. Bad frames are
+    listed by the clip.
     """
 
     frames: dict[int, FrameStatistics | None]
@@ -119,10 +121,12 @@ def gather_clip(
     report = progress or (lambda done, total: None)
     pixels = clip.width * clip.height
     found: dict[int, FrameStatistics | None] = {}
+    hidden: set[int] = set()
 
     def taken(number: int, fill: Fill, binner: _core.ColourBinner) -> FrameStatistics | None:
         try:
-            fill(binner)
+            if fill(binner):
+                hidden.add(number)
             return _taken(number, binner, colours, coarse, pixels)
         finally:
             binner.clear()
@@ -143,7 +147,13 @@ def gather_clip(
         report(done, len(chosen))
     if not found:
         raise clip.none_readable()
-    return ClipStatistics(found, tuple(_remarks(clip.frames, chosen)))
+    remarks = list(_remarks(clip.frames, chosen))
+    if any(found[number] is not None for number in found.keys() - hidden):
+        for number in hidden:  # alpha is used: there is nothing to be seen in these
+            found[number] = None
+    elif hidden:
+        remarks.append(_unused_alpha(clip.premultiplied))
+    return ClipStatistics(found, tuple(remarks))
 
 
 def chosen_frames(frames: Sequence[int]) -> list[int]:
@@ -238,6 +248,17 @@ def _remarks(frames: Sequence[int], chosen: Sequence[int]) -> Iterator[str]:
             f"the clip has {counted(len(frames), 'frame')}: one in {step} and the last are "
             f"analysed, {len(chosen)} in all; in between, colours are taken to change evenly"
         )
+
+
+def _unused_alpha(premultiplied: bool) -> str:
+    """Say that no pixel of a clip shows, and what that means for recolouring it."""
+    text = "alpha is 0 in every pixel of the clip: it was taken for unused, and the clip for opaque"
+    if premultiplied:
+        text += (
+            "; but recolouring leaves premultiplied pixels with alpha 0 as they are: write the "
+            "frames without alpha, or with an alpha of 1, before they are graded"
+        )
+    return text
 
 
 def gamut_box(

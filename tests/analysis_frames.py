@@ -23,6 +23,7 @@ class ArrayClip:
         self.height, self.width = frames[0].shape[:2]
         self.skipped: list[int] = []
         self.skip_bad_frames = False
+        self.premultiplied = False
 
     def iter_colours(self):
         yield from zip(self.frames, self.images, strict=True)
@@ -30,7 +31,11 @@ class ArrayClip:
     def fills(self, frames):
         for number in frames:
             image = self.images[self.frames.index(number)]
-            yield number, lambda binner, image=image: binner.add(image)
+            yield number, lambda binner, image=image: self._fill(binner, image)
+
+    def _fill(self, binner, image) -> bool:
+        binner.add(image)
+        return False
 
 
 def noise(seed: int, scale: float = 1.0, offset: float = 0.0, size: tuple[int, int] = (20, 30)):

@@ -19,7 +19,7 @@ def filled(clip, frame: int) -> _core.ColourBinner:
     binner = _core.ColourBinner()
     ((number, fill),) = clip.fills([frame])
     assert number == frame
-    fill(binner)
+    assert fill(binner) == clip_base.hidden(clip.read(frame))
     return binner
 
 

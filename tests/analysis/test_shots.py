@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
+from analysis_frames import mixture
+from clip_files import write_image
 from edits import movie, picture, sequence
 from palette4d.analysis import shots
 from palette4d.analysis.clip import open_clip
 from palette4d.analysis.shots import Shot
 from palette4d.errors import Palette4dError
+
+CORNERS = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
 
 
 def shot(name: str, first: int = 0, last: int = 9) -> Shot:
@@ -41,6 +46,20 @@ def test_bad_frames_are_passed_over(tmp_path: Path) -> None:
     (tmp_path / "a.0004.png").unlink()
     clip = open_clip(str(pattern), skip_bad_frames=True)
     assert [one.frames for one in shots.detect(clip)] == ["1-8"]
+
+
+def test_frames_of_which_nothing_shows_are_no_shots(tmp_path: Path) -> None:
+    shown = np.concatenate([mixture(CORNERS, 1), np.ones((20, 30, 1), np.float32)], axis=2)
+    black = np.zeros_like(shown)
+    for i, pixels in enumerate([black] * 4 + [shown] * 5 + [black] * 4 + [shown] * 5, start=1):
+        write_image(tmp_path / "fades" / f"a.{i}.exr", pixels)
+    assert [one.frames for one in shots.detect(open_clip(str(tmp_path / "fades")))] == ["1-18"]
+    # Where none shows anywhere alpha is not used, and colours alone tell.
+    shown[..., 3] = 0
+    for i, pixels in enumerate([black] * 5 + [shown] * 5, start=1):
+        write_image(tmp_path / "cut" / f"a.{i}.exr", pixels)
+    found = shots.detect(open_clip(str(tmp_path / "cut")))
+    assert [one.frames for one in found] == ["1-5", "6-10"]
 
 
 def test_frames_that_are_not_even_are_refused(tmp_path: Path) -> None:

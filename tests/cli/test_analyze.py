@@ -101,6 +101,50 @@ def test_bad_frames(clip, tmp_path, capsys):
     assert json.loads(out.read_text())["clip"]["frames"]["skipped"] == [1003]
 
 
+def with_alpha(folder: Path, alphas: list[float], extension: str = "exr") -> Path:
+    """Write a frame for each alpha, the same in all of its pixels."""
+    for i, alpha in enumerate(alphas, start=1):
+        colours = mixture(CORNERS + 0.01 * i, i)
+        stored = colours * alpha if extension == "exr" and alpha else colours
+        pixels = np.concatenate([stored, np.full_like(stored[..., :1], alpha)], axis=2)
+        if extension == "png":
+            pixels = np.rint(255 * pixels).astype(np.uint8)
+        write_image(folder / f"shot.{i}.{extension}", pixels, oiio__UnassociatedAlpha=1)
+    return folder
+
+
+@pytest.mark.parametrize("extension", ["exr", "png"])
+def test_alpha_that_is_0_everywhere_counts_as_unused(extension, tmp_path, capsys):
+    palettes = []
+    for alpha in (0.0, 1.0):
+        folder = with_alpha(tmp_path / f"alpha{alpha:g}", [alpha] * 4, extension)
+        out = tmp_path / "shot.p4d.json"
+        assert cli.main(["analyze", str(folder), "-o", str(out), "--json"]) == 0
+        printed = capsys.readouterr()
+        palettes.append(json.loads(out.read_text())["polytope"])
+        said = "alpha is 0 in every pixel of the clip"
+        assert (said in printed.err) == (alpha == 0)
+        notes = json.loads(printed.out)["notes"]
+        assert len([note for note in notes if said in note]) == (alpha == 0)
+        # What a recolouring does with such pixels depends on how the file holds its colours.
+        asked = any("write the frames without alpha" in note for note in notes)
+        assert asked == (alpha == 0 and extension == "exr")
+        out.unlink()
+    assert palettes[0] == palettes[1]
+
+
+def test_a_frame_of_which_nothing_shows_is_passed_over(tmp_path, capsys):
+    out = tmp_path / "shot.p4d.json"
+    folder = with_alpha(tmp_path / "clip", [0, 1, 1, 0, 1, 1])
+    assert cli.main(["analyze", str(folder), "-o", str(out), "--json"]) == 0
+    printed = capsys.readouterr()
+    notes = json.loads(printed.out)["notes"]
+    assert "2 frames have no usable pixel and were passed over: 1, 4" in notes
+    assert "frame 1 takes the palette of frame 2" in notes
+    assert not any("taken for unused" in note for note in notes)
+    assert json.loads(out.read_text())["clip"]["frames"]["first"] == 1
+
+
 def test_wrong_usage(clip, tmp_path, capsys):
     out = str(tmp_path / "x.p4d.json")
     for arguments in (
