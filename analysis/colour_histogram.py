@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 F64 = NDArray[np.float64]
 
-#: So many of a frame's colours must be looked at: with 1024 noise comes near to what a cut is.
+#: So many of a frame's colours must be looked at: with 1024 noise comes near to what a cut is. All
+#: that are kept are looked at where they are more, since drawing fewer of them costs more.
 LEAST_COLOURS = 2048
 
 CELLS = 12

@@ -197,11 +197,8 @@ def _taken(
     if taken is None:
         return None
     fine, few, low, high = taken
-    seen = few
-    if coarse < least:  # of a long clip
-        seen = fine if len(fine) < 2 * least else pooled([fine], least)
-    histogram = colour_histogram.histogram(seen.rgb, seen.counts)
-    if colours < least:
+    histogram = colour_histogram.histogram(fine.rgb, fine.counts)
+    if colours < least:  # of a very long clip
         fine = pooled([fine], colours)
     return FrameStatistics(frame, fine, few, histogram, low, high, count, ignored)
 

@@ -186,6 +186,14 @@ def test_cuts_are_found_by_enough_colours_of_however_long_a_clip(monkeypatch):
         assert error < 0.1
 
 
+@pytest.mark.parametrize("coarse", [512, 4096])
+def test_cuts_are_found_by_all_colours_that_are_kept(coarse):
+    found = gather(0, noise(1, size=(90, 90)), AnalysisOptions(colours=6000, coarse_colours=coarse))
+    assert len(found.colours) > 5000
+    kept = histogram(found.colours.rgb, found.colours.counts)
+    np.testing.assert_array_equal(found.histogram, kept)
+
+
 @pytest.fixture(scope="module")
 def palettes(seasons):
     """Refined hulls of some frames, with all colours of these."""
