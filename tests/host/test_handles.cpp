@@ -228,6 +228,10 @@ TEST(what_the_node_sets_is_undone_in_one_step) {
     Instance& node = *graded.node;
     // Choosing the sidecar has given colours to its 17 handles, and the clip's folder.
     CHECK(node.undo_steps().size() == 1 && node.undo_steps()[0].before.size() == 18);
+    // What is as it should be already is no step.
+    const int folders = node.settings("clipFolder");
+    graded.choose(graded.path);
+    CHECK(node.settings("clipFolder") == folders && node.undo_steps().size() == 1);
     // To say which frame is shown is no step.
     node.shown_time = 3;
     CHECK(node.changed("", "", kOfxChangeTime) == kOfxStatOK);
@@ -286,6 +290,28 @@ TEST(colours_that_the_host_takes_back_are_no_edits) {
     node.set("handle03", Colour{0, 0, 0});
     CHECK(node.changed("handle03") == kOfxStatOK);
     CHECK(std::get<int>(node.value("handle03On")) == 1);
+}
+
+TEST(colours_that_were_given_later_are_taken_back_by_themselves) {
+    Graded graded;
+    Instance& node = *graded.node;
+    write("clip.p4d.json", sidecar_text(false));
+    CHECK(node.changed("reload") == kOfxStatOK);
+    CHECK(node.undo_steps().size() == 2);
+    CHECK(std::get<Colour>(node.value("handle02")) == (Colour{0.9, 0.1, 0.1}));
+    node.undo();
+    CHECK(std::get<Colour>(node.value("handle02")) == (Colour{0.2, 0.7, 0.1}));
+    for (const char* use : {"handle01On", "handle02On"}) {
+        CHECK(std::get<int>(node.value(use)) == 0);
+    }
+}
+
+TEST(keyframes_that_begin_with_the_colour_shown_are_an_edit) {
+    Graded graded;
+    Instance& node = *graded.node;
+    node.animate("handle02", {{0.0, Colour{0.2, 0.7, 0.1}}, {8.0, Colour{1, 1, 1}}});
+    CHECK(node.changed("handle02") == kOfxStatOK);
+    CHECK(std::get<int>(node.value("handle02On")) == 1);
 }
 
 TEST(a_host_without_undo_steps_has_the_same_node) {
