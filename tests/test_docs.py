@@ -41,11 +41,25 @@ def test_every_command_is_one(repo_root: Path, capsys: pytest.CaptureFixture[str
             pytest.fail(f"{page.name}: palette4d {shlex.join(words)}: {said}")
 
 
+def anchors(text: str) -> set[str]:
+    """What links may name of a page: its headings as GitHub writes them."""
+    headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
 def test_every_link_leads_somewhere(repo_root: Path) -> None:
-    seen = 0
+    files, places = 0, 0
     for page in pages(repo_root):
-        for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text("utf-8")):
-            if "://" not in target:
-                assert (page.parent / target).exists(), f"{page.name}: {target}"
-                seen += 1
-    assert seen > 20
+        for target, place in re.findall(
+            r"\]\(([^)#\s]*)(?:#([^)\s]*))?\)", page.read_text("utf-8")
+        ):
+            if "://" in target:
+                continue
+            there = page.parent / target if target else page
+            assert there.exists(), f"{page.name}: {target}"
+            files += bool(target)
+            if place:
+                assert place in anchors(there.read_text("utf-8")), f"{page.name}: {target}#{place}"
+                places += 1
+    assert files > 20
+    assert places > 10
