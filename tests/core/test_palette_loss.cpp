@@ -89,6 +89,13 @@ TEST(reconstruction_is_the_mean_over_all_pixels) {
     CHECK_NEAR(loss.max_distance, 0.5, 1e-15);
 }
 
+TEST(what_is_outside_by_rounding_only_is_not_outside) {
+    const FrameLoss loss =
+        loss_of({{1 + 1e-5, 0.5, 0.5}, {1 + 1e-7, 0.5, 0.5}, {0.5, 0.5, 0.5}}, shapes::cube().rgb);
+    CHECK_EQUAL(loss.outside, 1.0 / 3);
+    CHECK_NEAR(loss.max_distance, 1e-5, 1e-12);
+}
+
 TEST(flat_lines_and_points_have_distances_too) {
     CHECK_NEAR(loss_of({{0.2, 0.6, 0.5}}, {{0.2, 0.2, 0.2}}).R, 0.5, 1e-15);
     CHECK_NEAR(loss_of({{0.2, 0.6, 0.5}}, {{0.2, 0.2, 0.2}, {0.2, 0.2, 0.2}}).R, 0.5, 1e-15);

@@ -30,7 +30,7 @@ struct FrameLoss {
     double D = 0;
     double S = 0;
     double E = 0;
-    double outside = 0;       ///< share of pixels outside
+    double outside = 0;       ///< share of pixels outside, by more than 1e-6
     double max_distance = 0;  ///< of a pixel outside
 };
 
