@@ -13,7 +13,7 @@ import dataclasses
 import functools
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +49,10 @@ STIFFER = 10.0
 # Shares of the stops for single frames that are tried in turn, until L' allows them.
 STOPS_KEPT = (1, 0.75, 0.5, 0.25, 0)
 # Where nothing else is as good as a simple hull: what its shape counts, as much as L' lets it.
-SHAPE_WEIGHTS = (1.0, 0.7, 0.5, 0.25, 0.1, 0.0)
+SHAPE_WEIGHTS = (1.0, 0.7, 0.5)
+LOOSE_WEIGHTS = (0.25, 0.1, 0.0)
+# With these colours may look alike. Before, they are pushed apart only as far as the eye needs.
+APART = 0.07
 
 
 @dataclasses.dataclass(frozen=True)
@@ -137,7 +140,7 @@ class Skew(Road):
         """Take the first of the ways to a refined polytope whose L' is not above `reference`, that
         of `simple`; if there is none, `simple` itself, kept in shape as far as that allows."""
         found = (way() for way in ways)
-        relaxed = (self.refined(simple, self.shaped(weight)) for weight in SHAPE_WEIGHTS)
+        relaxed = (self.refined(simple, options) for options in self.shapes())
         # What is in no better shape than `simple` is not worth it.
         in_shape = (p for p in relaxed if not self.dented(p))
         polytopes = itertools.chain(found, in_shape)
@@ -150,6 +153,13 @@ class Skew(Road):
     def dented(self, polytope: SkewPolytope) -> bool:
         """Return whether the report would warn of a dent."""
         return quality.deepest_dent(polytope, self.frames) > quality.DENT
+
+    def shapes(self) -> Iterator[AnalysisOptions]:
+        """Yield options that keep a simple hull in shape less and less."""
+        o = self.options
+        yield from (self.shaped(weight) for weight in SHAPE_WEIGHTS)
+        yield dataclasses.replace(o, separation=min(o.separation, APART), reach=0.0)
+        yield from (self.shaped(weight) for weight in LOOSE_WEIGHTS)
 
     def shaped(self, weight: float) -> AnalysisOptions:
         """Return the options with what keeps palettes in shape weighed so much; with 0, those for
