@@ -136,6 +136,8 @@ def _lookalikes(x: Report, options: AnalysisOptions) -> str:
     ways = "ask for a smaller --palette-size, or raise --separation or --merge-distance"
     if options.method == "rgbt":
         ways = f"{DEFAULT} keeps them apart"
+    elif options.method == "skew":  # in a short clip the result may be a static palette
+        ways += ", or, where little moves, take --method static"
     return (
         f"near frame {frame} the handles {one} and {other} are hard to tell apart "
         f"({distance:.2f} apart): {ways}"

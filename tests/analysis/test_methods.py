@@ -65,31 +65,6 @@ def test_where_little_moves_the_default_beats_eight_static_colours(seasons, firs
         assert default.L_prime < methods.analyze(frames, options).stages[-1].losses.L_prime
 
 
-def nearest(polytope) -> float:
-    """The least distance of two colours of a static palette at its first frame."""
-    rgb = polytope.vertices[[track[0] for track in polytope.blocks[0].tracks], :3]
-    gaps = np.linalg.norm(rgb[:, None] - rgb[None], axis=2)
-    return float(gaps[~np.eye(len(rgb), dtype=bool)].min())
-
-
-def test_look_alikes_of_a_static_palette_are_pushed_apart_as_far_as_allowed():
-    generator = np.random.default_rng(1)
-    corners = np.vstack([FOUR, [0.8, 0.8, 0.85], [0.9, 0.242, 0.242]])
-    images = [mixture(corners, 10 + i, 3000) for i in range(3)]
-    frames = stats([(i + 0.01 * generator.standard_normal(i.shape)).astype("f4") for i in images])
-    skew = structure_search.Skew(frames, AnalysisOptions(), None)
-    simple = min(skew.plain_hulls(), key=lambda hull: skew.losses(hull).L_prime)
-    bound = skew.losses(simple).L_prime
-    assert nearest(simple) < 0.04
-    found = skew.never_worse([], simple, bound)
-    assert skew.losses(found).L_prime <= bound
-    # With a little room they need not look alike.
-    apart = skew.never_worse([], simple, 1.03 * bound)
-    assert skew.losses(apart).L_prime <= 1.03 * bound
-    assert nearest(apart) > 0.06
-    assert skew.losses(skew.refined(simple, skew.shaped(0.5))).L_prime > 1.03 * bound
-
-
 @pytest.mark.parametrize("most", [8, 10, 12])
 def test_few_vertices_mean_few_colours(most):
     """A colour has one at either end of the clip at least."""

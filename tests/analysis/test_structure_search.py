@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from analysis_frames import noise, stats
+from analysis_frames import mixture, noise, stats
 from palette4d.analysis import quality, structure_search
 from palette4d.analysis.block_merging import Block
 from palette4d.analysis.frame_hulls import hull_mesh
@@ -139,3 +139,28 @@ def test_search_frames_hold_the_ends_the_worst_and_the_blocks():
         0,
         1,
     ]
+
+
+def nearest(polytope) -> float:
+    """The least distance of two colours of a static palette at its first frame."""
+    rgb = polytope.vertices[[track[0] for track in polytope.blocks[0].tracks], :3]
+    gaps = np.linalg.norm(rgb[:, None] - rgb[None], axis=2)
+    return float(gaps[~np.eye(len(rgb), dtype=bool)].min())
+
+
+def test_look_alikes_of_a_static_palette_are_pushed_apart_as_far_as_allowed():
+    generator = np.random.default_rng(1)
+    corners = np.vstack([FOUR, [0.8, 0.8, 0.85], [0.9, 0.242, 0.242]])
+    images = [mixture(corners, 10 + i, 3000) for i in range(3)]
+    frames = stats([(i + 0.01 * generator.standard_normal(i.shape)).astype("f4") for i in images])
+    skew = Skew(frames, AnalysisOptions(), None)
+    simple = min(skew.plain_hulls(), key=lambda hull: skew.losses(hull).L_prime)
+    bound = skew.losses(simple).L_prime
+    assert nearest(simple) < 0.04
+    found = skew.never_worse([], simple, bound)
+    assert skew.losses(found).L_prime <= bound
+    # With a little room they need not look alike.
+    apart = skew.never_worse([], simple, 1.03 * bound)
+    assert skew.losses(apart).L_prime <= 1.03 * bound
+    assert nearest(apart) > 0.06
+    assert skew.losses(skew.refined(simple, skew.shaped(0.5))).L_prime > 1.03 * bound
