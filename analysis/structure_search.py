@@ -4,7 +4,8 @@ Input: the frames' statistics. Output: an `Analysis`. The configurations of one 
 are simplified each, their vertices removed while the others take over; what costs least with every
 handle paid for is kept, given stops for what single frames lack, and refined. Static hulls of the
 whole clip, some of them refined for the paper's loss alone, are found as well: the best of them
-takes part, and is what the result is held to, which is never worse by L'.
+takes part, and is what the result is held to, which is never worse by L'. Some are dented: none of
+these is the result, but what beats them is looked for among palettes of more vertices.
 """
 
 from __future__ import annotations
@@ -51,6 +52,8 @@ STOPS_KEPT = (1, 0.75, 0.5, 0.25, 0)
 # Where nothing else is as good as a simple hull: what its shape counts, as much as L' lets it.
 SHAPE_WEIGHTS = (1.0, 0.7, 0.5)
 LOOSE_WEIGHTS = (0.25, 0.1, 0.0)
+# Where a dented hull has a lower L' than all that: how many of more vertices are tried.
+RICHER = 12
 # With these colours may look alike. Before, they are pushed apart only as far as the eye needs.
 APART = 0.07
 
@@ -58,11 +61,13 @@ APART = 0.07
 @dataclasses.dataclass(frozen=True)
 class Candidate:
     """A structure and what became of it: blocks before removal (none for a static hull); the price
-    when it was searched on some frames; the edges that blocks have between them."""
+    when it was searched on some frames, and what it was until then, with more and more vertices
+    (`steps`, most first); the edges that blocks have between them."""
 
     merged: SkewPolytope
     removed: Step
     price: float = math.inf
+    steps: tuple[Step, ...] = ()
     remarks: tuple[str, ...] = ()
 
 
@@ -81,10 +86,12 @@ class Skew(Road):
         """Search, insert stops, refine, and compare with what is simple."""
         static = self.static()
         self.measure("static_hull", static)
-        simple, reference = static, self.stages[-1].losses.L_prime
-        for hull in self.plain_hulls():
-            if (found := self.losses(hull).L_prime) < reference:
-                simple, reference = hull, found
+        hulls = [static, *self.plain_hulls()]
+        values = [self.losses(hull).L_prime for hull in hulls]
+        lowest = min(values)
+        in_shape = [0, *(i for i in range(1, len(hulls)) if not self.dented(hulls[i]))]
+        reference = min(values[i] for i in in_shape)
+        simple = hulls[values.index(reference)]
         configurations = self.configurations()
         candidates: list[Candidate] = []
         for i, blocks in enumerate(reversed(configurations)):  # those of few blocks cost least
@@ -105,6 +112,11 @@ class Skew(Road):
             for i in kept
         ]
         polytope = self.never_worse(ways, simple, reference)
+        if self.losses(polytope).L_prime > lowest:  # that of a dented hull
+            polytope = self.richer(polytope, candidates, lowest)
+        self.measure("vertex_refinement", polytope)
+        self.report("vertex_refinement", 1, 1)
+        bound = lowest if self.stages[-1].losses.L_prime <= lowest else reference
         remarks = chosen.remarks if len(polytope.blocks) > 1 else ()
         if 0 < self.options.vertices < len(polytope.vertices):
             remarks = (
@@ -112,14 +124,14 @@ class Skew(Road):
                 f"the palette has {len(polytope.vertices)} vertices, not {self.options.vertices}: "
                 "it has four colours at least, and each of them two",
             )
-        return Analysis(polytope, tuple(self.stages), remarks, bound=reference)
+        return Analysis(polytope, tuple(self.stages), remarks, bound=bound)
 
     def plain_hulls(self) -> list[SkewPolytope]:
-        """Return plain static hulls of no more vertices than asked for, all of them corners.
+        """Return plain static hulls of no more vertices than asked for.
 
         In a short clip little moves, and such a hull is hard to beat: several starts are tried.
         Without shape terms a colour may end inside of the others' hull, where it costs less and is
-        of no use: such a palette is dented.
+        of no use: such a palette is dented. It is never the result, but is to be beaten.
         """
         starts = STARTS if len(self.frames) < statistics.SHORT else STARTS[:1]
         hulls = [
@@ -128,11 +140,7 @@ class Skew(Road):
             for sparser in starts
         ]
         most = self.options.vertices
-        return [
-            hull
-            for hull in hulls
-            if (not most or len(hull.vertices) <= most) and not self.dented(hull)
-        ]
+        return [hull for hull in hulls if not most or len(hull.vertices) <= most]
 
     def never_worse(
         self, ways: Sequence[Callable[[], SkewPolytope]], simple: SkewPolytope, reference: float
@@ -145,10 +153,24 @@ class Skew(Road):
         in_shape = (p for p in relaxed if not self.dented(p))
         polytopes = itertools.chain(found, in_shape)
         within = (p for p in polytopes if self.losses(p).L_prime <= reference)
-        polytope = next(within, simple)
-        self.measure("vertex_refinement", polytope)
-        self.report("vertex_refinement", 1, 1)
-        return polytope
+        return next(within, simple)
+
+    def richer(
+        self, polytope: SkewPolytope, candidates: Sequence[Candidate], lowest: float
+    ) -> SkewPolytope:
+        """Return a polytope of more vertices, as few as will do, whose L' is not above `lowest`,
+        and which is in shape; `polytope` where what the candidates were on their way has none."""
+        count, most = len(polytope.vertices), self.options.vertices or math.inf
+        steps = [
+            step
+            for candidate in candidates
+            for step in candidate.steps
+            if count < len(step.polytope.vertices) <= most
+        ]
+        steps.sort(key=lambda step: (len(step.polytope.vertices), step.value))
+        tries = (self.refined(step.polytope, self.options) for step in steps[:RICHER])
+        within = (p for p in tries if self.losses(p).L_prime <= lowest and not self.dented(p))
+        return next(within, polytope)
 
     def dented(self, polytope: SkewPolytope) -> bool:
         """Return whether the report would warn of a dent."""
@@ -200,7 +222,8 @@ class Skew(Road):
         best = handle_removal.choose(steps, self.options)
         self.report("vertex_removal", (place + 1) * 1000, of * 1000)
         price = best.price(self.options)
-        return Candidate(merged, self.compared(best.polytope), price, glued.remarks())
+        until = tuple(steps[: steps.index(best) + 1])
+        return Candidate(merged, self.compared(best.polytope), price, until, glued.remarks())
 
     def compared(self, polytope: SkewPolytope) -> Step:
         """Return the polytope refined a little on all frames, with its value there."""

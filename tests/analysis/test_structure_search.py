@@ -12,10 +12,11 @@ from analysis_frames import mixture, noise, stats
 from palette4d.analysis import quality, structure_search
 from palette4d.analysis.block_merging import Block
 from palette4d.analysis.frame_hulls import hull_mesh
+from palette4d.analysis.handle_removal import Step
 from palette4d.analysis.objective import refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Section, SkewPolytope
-from palette4d.analysis.structure_search import Skew
+from palette4d.analysis.structure_search import Candidate, Skew
 
 FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
 CUBE = np.array(list(itertools.product((0.1, 0.9), repeat=3)))
@@ -83,13 +84,69 @@ def test_else_it_stays(frames, monkeypatch, convexity, stiffer, limit, times):
     assert len(calls) == times
 
 
-def test_dented_static_hulls_are_no_measure(frames, monkeypatch):
-    road = Skew(frames, AnalysisOptions(), None)
-    hulls = itertools.cycle([cube_with_apex(0.95), cube_with_apex(0.5)])
-    monkeypatch.setattr(road, "static_from", lambda options, sparser: next(hulls))
-    found = road.plain_hulls()
-    assert len(found) >= 2
-    assert max(dent(hull, frames) for hull in found) < 1e-6
+def moving(count: int) -> SkewPolytope:
+    """Four colours with so many vertices; if odd, a dented palette of 18."""
+    if count % 2:
+        return cube_with_apex(0.5)
+    mesh = hull_mesh(FOUR)
+    times = np.linspace(0, 2, count // 4)
+    vertices = np.array([[*c, t] for t in times for c in mesh.rgb])
+    tracks = tuple(tuple(range(i, len(vertices), 4)) for i in range(4))
+    return SkewPolytope(vertices, (Section(0.0, 2.0, tracks, mesh.faces),), ())
+
+
+@pytest.mark.parametrize(
+    ("most", "lowest", "expected"),
+    [(0, 0.75, 16), (0, 0.55, 24), (20, 0.55, 8), (0, 0.1, 8)],
+    ids=["as few as will do", "more", "no more than asked for", "none is as good"],
+)
+def test_what_beats_a_dented_hull_is_looked_for_among_more_vertices(
+    frames, monkeypatch, most, lowest, expected
+):
+    """Palettes of 12, 16, 20 and 24 vertices, each of a lower L' than the last; one is dented."""
+    values = {8: 1.0, 12: 0.8, 16: 0.7, 18: 0.2, 20: 0.6, 24: 0.5}
+    road = Skew(frames, AnalysisOptions(vertices=most), None)
+    monkeypatch.setattr(road, "refined", lambda polytope, options: polytope)
+    monkeypatch.setattr(
+        road, "losses", lambda polytope: SimpleNamespace(L_prime=values[len(polytope.vertices)])
+    )
+
+    def candidate(*counts):
+        steps = tuple(Step(moving(count), values.get(count, 0.2)) for count in counts)
+        return Candidate(steps[0].polytope, steps[-1], 1.0, steps)
+
+    candidates = [
+        candidate(20, 12, 8),
+        candidate(24, 17, 16),
+        Candidate(moving(8), Step(moving(8), 1.0)),
+    ]
+    assert len(moving(17).vertices) == 18
+    found = road.richer(moving(8), candidates, lowest)
+    assert len(found.vertices) == expected
+
+
+def test_a_dented_static_hull_is_to_be_beaten_and_no_result(frames, monkeypatch):
+    dented = cube_with_apex(0.5)
+    asked = []
+    monkeypatch.setattr(Skew, "plain_hulls", lambda self: [dented])
+
+    def richer(self, polytope, candidates, lowest):
+        asked.append(lowest)
+        return polytope
+
+    monkeypatch.setattr(Skew, "richer", richer)
+    losses = Skew.losses
+
+    def lower(self, polytope):
+        found = losses(self, polytope)
+        return dataclasses.replace(found, L_prime=0.01) if polytope is dented else found
+
+    monkeypatch.setattr(Skew, "losses", lower)
+    found = Skew(frames, AnalysisOptions(), None).run()
+    assert asked == [0.01]
+    assert dent(found.polytope, frames) <= quality.DENT
+    assert found.bound is not None
+    assert 0.01 < found.stages[-1].losses.L_prime <= found.bound
 
 
 @pytest.mark.parametrize(
@@ -117,12 +174,9 @@ def test_the_result_is_held_to_the_simple_hull(frames, monkeypatch, ways, relaxe
     monkeypatch.setattr(
         road, "losses", lambda polytope: SimpleNamespace(L_prime=values[id(polytope)][0])
     )
-    measured = []
-    monkeypatch.setattr(road, "measure", lambda stage, polytope: measured.append(polytope))
     calls = [lambda value=value: palette(value) for value in ways]
     found = road.never_worse(calls, simple, 1.0)
     assert values[id(found)][0] == expected
-    assert measured == [found]
     assert 0.5 not in [value for value, _ in values.values()]  # nobody asked for it
 
 
@@ -154,7 +208,8 @@ def test_look_alikes_of_a_static_palette_are_pushed_apart_as_far_as_allowed():
     images = [mixture(corners, 10 + i, 3000) for i in range(3)]
     frames = stats([(i + 0.01 * generator.standard_normal(i.shape)).astype("f4") for i in images])
     skew = Skew(frames, AnalysisOptions(), None)
-    simple = min(skew.plain_hulls(), key=lambda hull: skew.losses(hull).L_prime)
+    hulls = [hull for hull in skew.plain_hulls() if not skew.dented(hull)]
+    simple = min(hulls, key=lambda hull: skew.losses(hull).L_prime)
     bound = skew.losses(simple).L_prime
     assert nearest(simple) < 0.04
     found = skew.never_worse([], simple, bound)
