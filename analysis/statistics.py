@@ -16,15 +16,15 @@ import collections
 import concurrent.futures
 import dataclasses
 import functools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.analysis import colour_histogram
-from palette4d.analysis.clip_base import Fill, FrameError
-from palette4d.analysis.losses import thread_count
+from palette4d.analysis.clip_base import Fill, FrameError, describe
+from palette4d.analysis.losses import LOST_SHARE, thread_count
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.wording import counted
 
@@ -54,6 +54,13 @@ MEMORY, MOST_WORKERS = 400 << 20, 8
 
 TABLE = 64 << 20
 """Most bytes of a binner's table."""
+
+FEWEST_OUTSIDE, MOST_OUTSIDE_SHARE = 5, 0.01
+"""A colour outside 0..1 counts on so many pixels of a small frame, of a tiny one on this share."""
+
+OUTLYING = 0.1
+"""Outliers are those farther outside than this share of what the clip's other colours span: less
+than that hardly changes a hull, and the end of an honest highlight stays as it is."""
 
 Progress = Callable[[int, int], None]
 
@@ -86,8 +93,8 @@ class FrameStatistics:
 class ClipStatistics:
     """The statistics of a clip's frames, by their number; None where no pixel counts.
 
-    remarks says what was left out to stay within bounds, and whether alpha was. Bad frames are
-    listed by the clip.
+    remarks says what was left out to stay within bounds, whether alpha was, and which colours were
+    moved (`without_outliers`). Bad frames are listed by the clip.
     """
 
     frames: dict[int, FrameStatistics | None]
@@ -153,7 +160,9 @@ def gather_clip(
             found[number] = None
     elif hidden:
         remarks.append(_unused_alpha(clip.premultiplied))
-    return ClipStatistics(found, tuple(remarks))
+    usable = {number: one for number, one in found.items() if one is not None}
+    kept, outliers = without_outliers(usable, options, colours, coarse)
+    return ClipStatistics({**found, **kept}, (*remarks, *outliers))
 
 
 def chosen_frames(frames: Sequence[int]) -> list[int]:
@@ -183,6 +192,80 @@ def pooled(trees: Sequence[_core.ColourTree], most: int) -> _core.ColourTree:
     taken = binner.take(most, most)
     assert taken is not None  # a tree has at least one colour
     return taken[0]
+
+
+def without_outliers(
+    frames: Mapping[int, FrameStatistics], options: AnalysisOptions, colours: int, coarse: int
+) -> tuple[dict[int, FrameStatistics], tuple[str, ...]]:
+    """Return frames whose outliers are taken at the border of the other colours, and a remark.
+
+    The border is, for each channel and side, what enough pixels of some frame reach, never inside
+    0..1. Enough are `LOST_SHARE` of a frame, and `options.k`, which hold a handle, at most. They
+    are counted in each frame, since a hot pixel is in all of a clip's; but the border is the
+    clip's, so that a light may begin small. Frames without outliers are returned as they are;
+    others with at most `colours` and `coarse` colours.
+    """
+    if not frames:
+        return {}, ()
+    reached = np.array([_reached(one, options) for one in frames.values()])  # (n, 2, 3)
+    low, high = reached[:, 0].min(axis=0), reached[:, 1].max(axis=0)
+    margin = OUTLYING * (high - low)
+    least = np.min([one.low for one in frames.values()], axis=0)
+    most = np.max([one.high for one in frames.values()], axis=0)
+    low = np.where(least < low - margin, low, -np.inf)
+    high = np.where(most > high + margin, high, np.inf)
+    kept: dict[int, FrameStatistics] = {}
+    pixels, farthest = 0.0, 0.0
+    for number, one in frames.items():
+        if np.all(one.low >= low) and np.all(one.high <= high):
+            continue
+        rgb, counts = one.colours.rgb, one.colours.counts
+        clipped = np.clip(rgb, low, high)
+        distance = np.abs(rgb - clipped).max(axis=1)
+        pixels += counts[distance > 0].sum()
+        farthest = max(farthest, float(distance.max()))
+        binner = _core.ColourBinner()
+        binner.add_colours(clipped, counts)
+        taken = binner.take(colours, coarse)
+        assert taken is not None  # there were colours
+        fine, few, lowest, highest = taken
+        kept[number] = dataclasses.replace(one, colours=fine, coarse=few, low=lowest, high=highest)
+    return dict(frames) | kept, _outliers(list(kept), max(1, round(pixels)), farthest)
+
+
+def _reached(frame: FrameStatistics, options: AnalysisOptions) -> NDArray[np.float64]:
+    """Return (2, 3) the least and the largest value of each channel that enough pixels reach, 0
+    and 1 where these are farther out."""
+    enough = min(
+        options.k,
+        max(FEWEST_OUTSIDE, LOST_SHARE * frame.pixels),
+        MOST_OUTSIDE_SHARE * frame.pixels,
+    )
+    out = np.array([[0.0] * 3, [1.0] * 3])
+    for channel in range(3):
+        for side, (sign, extreme) in enumerate(((-1, frame.low), (1, frame.high))):
+            border = sign * out[side, channel]
+            if sign * extreme[channel] <= border:
+                continue
+            values = sign * frame.colours.rgb[:, channel]
+            outside = np.flatnonzero(values > border)
+            outside = outside[np.argsort(-values[outside], kind="stable")]
+            # Means of counts may fall short of a whole number by rounding.
+            there = np.flatnonzero(np.cumsum(frame.colours.counts[outside]) >= enough - 1e-6)
+            if len(there):
+                out[side, channel] = sign * values[outside[there[0]]]
+    return out
+
+
+def _outliers(frames: Sequence[int], pixels: int, farthest: float) -> tuple[str, ...]:
+    if not frames:
+        return ()
+    what = counted(pixels, "pixel lies", "pixels lie")
+    where = f"{'frame' if len(frames) == 1 else 'frames'} {describe(frames)}"
+    return (
+        f"{what} far outside the clip's other colours and 0..1, by up to {farthest:.3g} "
+        f"({where}): for the palette taken at the others' border; --k 1 takes them as they are",
+    )
 
 
 def _taken(

@@ -6,10 +6,10 @@ import dataclasses
 
 import numpy as np
 import pytest
-from analysis_frames import ArrayClip, noise
+from analysis_frames import ArrayClip, mixture, noise
 from clip_files import grey_levels, write_image
 from palette4d import _core
-from palette4d.analysis import frame_hulls, statistics
+from palette4d.analysis import frame_hulls, pipeline, statistics
 from palette4d.analysis.clip import FrameError, open_clip
 from palette4d.analysis.colour_histogram import histogram
 from palette4d.analysis.cuts import difference
@@ -61,6 +61,74 @@ def test_gamut_grows_only_for_colours_outside():
     low, high = gamut_box([inside, outside])
     assert low.max() < -0.9
     assert high.min() > 1.9
+
+
+def with_outliers(pixels: int, colour=(-10, 0.5, 0.5), seed: int = 5):
+    image = noise(seed, size=(80, 100))
+    image[0, :pixels] = colour
+    return image
+
+
+@pytest.mark.parametrize(
+    ("pixels", "k", "kept"), [(1, 50, False), (4, 50, False), (5, 50, True), (4, 4, True)]
+)
+def test_only_enough_pixels_set_the_box(pixels, k, kept):
+    images = [noise(4, size=(80, 100)), with_outliers(pixels), noise(6, size=(80, 100))]
+    found = gather_clip(ArrayClip(images, first=10), AnalysisOptions(k=k))
+    frames = list(found.frames.values())
+    low, high = gamut_box(frames)
+    np.testing.assert_allclose(low, [-10 if kept else 0, 0, 0])
+    np.testing.assert_array_equal(high, 1)
+    assert frames[1].low[0] == frames[1].colours.rgb.min() == frames[1].coarse.rgb.min() == low[0]
+    assert frames[1].colours.total == frames[1].coarse.total == frames[1].pixels == 8000
+    for image, frame in zip(images[::2], frames[::2], strict=True):
+        assert same(frame.colours, gather(0, image, AnalysisOptions()).colours)
+    if kept:
+        assert found.remarks == ()
+    else:
+        (remark,) = found.remarks
+        assert remark.startswith(f"{pixels} pixel")
+        assert "by up to 10 (frame 11)" in remark
+
+
+def test_a_hot_pixel_of_every_frame_is_an_outlier():
+    images = [with_outliers(1, (0.5, 0.5, 40), seed) for seed in range(60)]
+    found = gather_clip(ArrayClip(images, first=0), AnalysisOptions())
+    np.testing.assert_array_equal(gamut_box(list(found.frames.values()))[1], 1)
+    assert "60 pixels" in found.remarks[0]
+    assert "frames 0-59" in found.remarks[0]
+
+
+def test_a_light_that_begins_small_is_no_outlier():
+    images = [with_outliers(pixels, (3, 2, 1)) for pixels in (1, 90)]
+    found = gather_clip(ArrayClip(images, first=0), AnalysisOptions())
+    for frame in found.frames.values():
+        np.testing.assert_allclose(frame.high, [3, 2, 1], rtol=1e-6)
+    assert found.remarks == ()
+
+
+def test_outliers_are_taken_at_the_border_of_what_others_reach():
+    image = with_outliers(99, (4, 2, 1))
+    image[1, 0] = (60, 0.5, -0.05)
+    found = gather_clip(ArrayClip([image], first=0), AnalysisOptions())
+    np.testing.assert_allclose(found.frames[0].high, [4, 2, 1], rtol=1e-6)
+    assert found.frames[0].low[2] == pytest.approx(-0.05)  # near enough to stay
+    assert "by up to 56 " in found.remarks[0]
+
+
+def test_an_outlier_hardly_changes_the_palette():
+    corners = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.1], [0.2, 0.8, 0.3], [0.1, 0.2, 0.9]])
+    palettes = {}
+    for name, pixels in (("none", 0), ("one", 1), ("many", 60)):
+        images = [mixture(corners + 0.01 * i, i, 9000) for i in range(4)]
+        images[2].reshape(-1, 3)[-pixels or 9000 :] = (0.5, -10, 0.5)
+        _, done = pipeline.analyze_clip(ArrayClip(images), AnalysisOptions())
+        palettes[name] = done.polytope.vertices, done.stages[-1].losses.L
+    (clean, loss), (one, loss_of_one) = palettes["none"], palettes["one"]
+    np.testing.assert_allclose(one[:, :3].min(axis=0), clean[:, :3].min(axis=0), atol=0.05)
+    np.testing.assert_allclose(one[:, :3].max(axis=0), clean[:, :3].max(axis=0), atol=0.05)
+    assert loss_of_one < loss + 0.01
+    assert palettes["many"][0][:, 1].min() < -5
 
 
 def test_trees_are_pooled():
