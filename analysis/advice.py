@@ -22,7 +22,7 @@ LOOKALIKE = 0.06  # RGB distance of two handles
 UNUSED = 0.001  # largest mean weight of a handle in any frame
 FARTHER = 1.4  # times as far out as a simpler palette leaves them: lost pixels
 # What lets colours change at once: less held against a jump, handles cheaper, more blocks.
-AT_ONCE = {"gamma": 0.001, "handle_cost": 0.001, "blocks": 6}
+AT_ONCE = {"gamma": 0.0003, "handle_cost": 0.001, "blocks": 9}
 # No display-referred picture and no log goes so far.
 BRIGHT = 2.0
 
