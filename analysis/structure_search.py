@@ -5,7 +5,8 @@ are simplified each, their vertices removed while the others take over; what cos
 handle paid for is kept, given stops for what single frames lack, and refined. Static hulls of the
 whole clip, some of them refined for the paper's loss alone, are found as well: the best of them
 takes part, and is what the result is held to, which is never worse by L'. Some are dented: none of
-these is the result, but what beats them is looked for among palettes of more vertices.
+these is the result, but what beats them is looked for among palettes of more vertices, and by a
+search that starts otherwise.
 """
 
 from __future__ import annotations
@@ -92,12 +93,7 @@ class Skew(Road):
         in_shape = [0, *(i for i in range(1, len(hulls)) if not self.dented(hulls[i]))]
         reference = min(values[i] for i in in_shape)
         simple = hulls[values.index(reference)]
-        configurations = self.configurations()
-        candidates: list[Candidate] = []
-        for i, blocks in enumerate(reversed(configurations)):  # those of few blocks cost least
-            bound = min((c.price for c in candidates), default=math.inf)
-            candidates.append(self.simplified(blocks, i, len(configurations), bound))
-        candidates.append(Candidate(simple, self.compared(simple)))
+        candidates = [*self.candidates(), Candidate(simple, self.compared(simple))]
         steps = [c.removed for c in candidates]
         chosen = candidates[steps.index(handle_removal.choose(steps, self.options))]
         self.measure("block_merging", chosen.merged)
@@ -112,8 +108,11 @@ class Skew(Road):
             for i in kept
         ]
         polytope = self.never_worse(ways, simple, reference)
-        if self.losses(polytope).L_prime > lowest:  # that of a dented hull
-            polytope = self.richer(polytope, candidates, lowest)
+        searches: tuple[Callable[[], list[Candidate]], ...]
+        searches = (lambda: candidates, self.started_otherwise)
+        for others in searches:
+            if self.losses(polytope).L_prime > lowest:  # that of a dented hull
+                polytope = self.richer(polytope, others(), lowest)
         self.measure("vertex_refinement", polytope)
         self.report("vertex_refinement", 1, 1)
         bound = lowest if self.stages[-1].losses.L_prime <= lowest else reference
@@ -172,6 +171,15 @@ class Skew(Road):
         within = (p for p in tries if self.losses(p).L_prime <= lowest and not self.dented(p))
         return next(within, polytope)
 
+    def started_otherwise(self) -> list[Candidate]:
+        """Return candidates that were searched by half of the coarse colours: the search is greedy,
+        and from elsewhere it may find what it has missed."""
+        frames = [
+            dataclasses.replace(f, coarse=statistics.pooled([f.coarse], -(-len(f.coarse) // 2)))
+            for f in self.frames
+        ]
+        return Skew(frames, self.options, self.report).candidates()
+
     def dented(self, polytope: SkewPolytope) -> bool:
         """Return whether the report would warn of a dent."""
         return quality.deepest_dent(polytope, self.frames) > quality.DENT
@@ -193,6 +201,15 @@ class Skew(Road):
             separation=weight * o.separation,
             reach=o.reach if weight else 0.0,
         )
+
+    def candidates(self) -> list[Candidate]:
+        """Return what becomes of each configuration."""
+        configurations = self.configurations()
+        out: list[Candidate] = []
+        for i, blocks in enumerate(reversed(configurations)):  # those of few blocks cost least
+            bound = min((c.price for c in out), default=math.inf)
+            out.append(self.simplified(blocks, i, len(configurations), bound))
+        return out
 
     def configurations(self) -> list[list[Block]]:
         """Return the configurations of at most `blocks` blocks, most blocks first."""

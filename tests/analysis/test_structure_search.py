@@ -131,7 +131,7 @@ def test_a_dented_static_hull_is_to_be_beaten_and_no_result(frames, monkeypatch)
     monkeypatch.setattr(Skew, "plain_hulls", lambda self: [dented])
 
     def richer(self, polytope, candidates, lowest):
-        asked.append(lowest)
+        asked.append((lowest, candidates))
         return polytope
 
     monkeypatch.setattr(Skew, "richer", richer)
@@ -143,7 +143,11 @@ def test_a_dented_static_hull_is_to_be_beaten_and_no_result(frames, monkeypatch)
 
     monkeypatch.setattr(Skew, "losses", lower)
     found = Skew(frames, AnalysisOptions(), None).run()
-    assert asked == [0.01]
+    assert [lowest for lowest, _ in asked] == [0.01, 0.01]
+    (_, first), (_, other) = asked  # searched by all, then by half of the coarse colours
+    assert first[0].steps
+    assert other[0].steps
+    assert first[0].removed.value != other[0].removed.value
     assert dent(found.polytope, frames) <= quality.DENT
     assert found.bound is not None
     assert 0.01 < found.stages[-1].losses.L_prime <= found.bound
