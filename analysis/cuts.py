@@ -113,8 +113,22 @@ def refusal(frames: Sequence[int], cuts: Sequence[int]) -> str:
         f"found {counted(len(cuts), 'sudden cut')}: a new shot begins at {_places(cuts)}; expected "
         "one shot, since a palette is followed through time and must not span a cut. Analyse each "
         f"shot apart ({_some(shots)}; --detect-shots does all), or give --allow-cuts to analyse "
-        "all as one."
+        f"all as one.{_flash(frames, cuts)}"
     )
+
+
+def _flash(frames: Sequence[int], cuts: Sequence[int]) -> str:
+    """Say what to do if what looks like a shot at the clip's end is a flash."""
+    step = frames[1] - frames[0]
+    bounds = [frames[0], *cuts, frames[-1] + step]
+    lasting = [
+        shot
+        for shot, (first, end) in zip(_shots(frames, cuts), itertools.pairwise(bounds), strict=True)
+        if end - first > LONGEST_FLASH * step
+    ]
+    if len(lasting) != 1:
+        return ""
+    return f" If it is a flash at the clip's end, leave that out: --frames {lasting[0]}."
 
 
 def refusal_inside(cuts: Sequence[int]) -> str:

@@ -217,6 +217,11 @@ def test_the_refusal_names_ranges_that_the_command_reads():
     assert "--frames 1001-1007x2, --frames 1009-1017x2, --frames 1019; --detect-shots" in text
     assert "--allow-cuts" in text
     assert "--frames 0-4, --frames 5-9;" in cuts.refusal(range(10), [5])
+    assert "flash" not in cuts.refusal(range(10), [3])
+    for found, rest in (([1], "1-9"), ([2], "2-9"), ([8], "0-7"), ([2, 9], "2-8")):
+        assert f"flash at the clip's end, leave that out: --frames {rest}." in cuts.refusal(
+            range(10), found
+        )
     many = cuts.refusal(range(100), list(range(5, 100, 5)))
     assert many.count("--frames") == 8
     assert "19 sudden cuts" in many
