@@ -13,6 +13,7 @@ PALETTE4D_REQUIRE_HOST
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Generator
 from pathlib import Path
 
@@ -108,7 +109,11 @@ class HostWatch:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Watch the host tests when they are required."""
+    """Watch the host tests when they are required; let tests of Ctrl-C see one."""
+    # A shell has its background jobs ignore Ctrl-C, which Python and all that it starts inherit:
+    # the tests of what Ctrl-C leaves behind would have nothing to see.
+    if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     if host_tests_required():
         config.pluginmanager.register(HostWatch(), "palette4d-host-watch")
 
