@@ -75,7 +75,7 @@ def _fit(x: Report, options: AnalysisOptions) -> str:
         what = f"the palette fits the clip loosely (mean L {x.mean_loss:.2f})"
     else:
         return ""
-    at_once = " ".join(f"--{name.replace('_', '-')} {x:g}" for name, x in AT_ONCE.items())
+    at_once = " ".join(f"--{name.replace('_', '-')} {at:g}" for name, at in AT_ONCE.items())
     if options.method in ("static", "rgbt"):
         ways = f"{DEFAULT} follows the colours"
         if bad:
@@ -89,7 +89,11 @@ def _fit(x: Report, options: AnalysisOptions) -> str:
     elif options.handle_cost > AnalysisOptions().handle_cost:
         ways = "lower --handle-cost for more handles"
     elif bad:
-        if options.gamma <= AT_ONCE["gamma"] and options.blocks >= AT_ONCE["blocks"]:
+        if (
+            options.gamma <= AT_ONCE["gamma"]
+            and options.handle_cost <= AT_ONCE["handle_cost"]
+            and options.blocks >= AT_ONCE["blocks"]
+        ):
             return f"{what}; analyse parts of the clip apart with --frames"
         ways = f"with {at_once} colours may change at once, as in a flash"
     else:

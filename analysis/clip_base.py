@@ -214,6 +214,11 @@ def hidden(pixels: F32) -> bool:
     return pixels.shape[2] == 4 and not (pixels[..., 3] >= LEAST_ALPHA).any()
 
 
+def all_hidden(binner: _core.ColourBinner) -> bool:
+    """Whether no pixel of what was binned, with its alpha, shows: as `hidden`."""
+    return 0 < binner.transparent == binner.pixels + binner.ignored
+
+
 def even_step(numbers: Sequence[int]) -> int:
     """Distance between neighbours of the (rising) numbers, 1 for one number, 0 when it varies."""
     steps = {after - before for before, after in itertools.pairwise(numbers)} or {1}

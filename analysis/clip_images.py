@@ -22,6 +22,7 @@ from palette4d.analysis.clip_base import (
     Fill,
     FrameError,
     Image,
+    all_hidden,
     as_rate,
     describe,
     named,
@@ -93,7 +94,7 @@ class ImageClip(Clip):
         source, spec = _open(path, what)
         self._check(_header(path, spec, _channel_choice(spec)), frame)
         _bin_image(source, path, what, binner, self.row_step, self.has_alpha)
-        if not self.has_alpha or not 0 < binner.transparent == binner.pixels + binner.ignored:
+        if not self.has_alpha or not all_hidden(binner):
             return False
         # Nothing shows: see `straight_colours`.
         binner.clear()

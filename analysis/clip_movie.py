@@ -29,6 +29,7 @@ from palette4d.analysis.clip_base import (
     Fill,
     FrameError,
     Image,
+    all_hidden,
     describe,
     named,
 )
@@ -368,7 +369,7 @@ def _bin_picture(picture: av.VideoFrame, row_step: int, binner: _core.ColourBinn
             binner.add(pixels[..., :channels])
 
     add(4 if _has_alpha(picture) else 3)
-    if not 0 < binner.transparent == binner.pixels + binner.ignored:
+    if not all_hidden(binner):
         return False
     # Nothing shows: see `Clip.straight_colours`.
     binner.clear()

@@ -107,16 +107,17 @@ class Skew(Road):
             functools.partial(self.refined, stops[i].polytope, self.options, stops[i].brief)
             for i in kept
         ]
-        polytope = self.never_worse(ways, simple, reference)
+        polytope, remarks = self.never_worse(ways, simple, reference), chosen.remarks
         searches: tuple[Callable[[], list[Candidate]], ...]
         searches = (lambda: candidates, self.started_otherwise)
         for others in searches:
             if self.losses(polytope).L_prime > lowest:  # that of a dented hull
-                polytope = self.richer(polytope, others(), lowest)
+                polytope, remarks = self.richer(polytope, remarks, others(), lowest)
         self.measure("vertex_refinement", polytope)
         self.report("vertex_refinement", 1, 1)
         bound = lowest if self.stages[-1].losses.L_prime <= lowest else reference
-        remarks = chosen.remarks if len(polytope.blocks) > 1 else ()
+        if len(polytope.blocks) == 1:
+            remarks = ()
         if 0 < self.options.vertices < len(polytope.vertices):
             remarks = (
                 *remarks,
@@ -155,21 +156,28 @@ class Skew(Road):
         return next(within, simple)
 
     def richer(
-        self, polytope: SkewPolytope, candidates: Sequence[Candidate], lowest: float
-    ) -> SkewPolytope:
+        self,
+        polytope: SkewPolytope,
+        remarks: tuple[str, ...],
+        candidates: Sequence[Candidate],
+        lowest: float,
+    ) -> tuple[SkewPolytope, tuple[str, ...]]:
         """Return a polytope of more vertices, as few as will do, whose L' is not above `lowest`,
-        and which is in shape; `polytope` where what the candidates were on their way has none."""
+        and which is in shape, with its candidate's remarks; what was given where what the
+        candidates were on their way has none."""
         count, most = len(polytope.vertices), self.options.vertices or math.inf
         steps = [
-            step
+            (step, candidate)
             for candidate in candidates
             for step in candidate.steps
             if count < len(step.polytope.vertices) <= most
         ]
-        steps.sort(key=lambda step: (len(step.polytope.vertices), step.value))
-        tries = (self.refined(step.polytope, self.options) for step in steps[:RICHER])
-        within = (p for p in tries if self.losses(p).L_prime <= lowest and not self.dented(p))
-        return next(within, polytope)
+        steps.sort(key=lambda pair: (len(pair[0].polytope.vertices), pair[0].value))
+        for step, candidate in steps[:RICHER]:
+            found = self.refined(step.polytope, self.options)
+            if self.losses(found).L_prime <= lowest and not self.dented(found):
+                return found, candidate.remarks
+        return polytope, remarks
 
     def started_otherwise(self) -> list[Candidate]:
         """Return candidates that were searched by half of the coarse colours: the search is greedy,

@@ -110,6 +110,10 @@ def test_colours_that_simpler_palettes_hold_are_named():
 def test_what_a_flash_needs_is_advised_until_it_was_given():
     (text,) = said({"fits": ONE_BAD})
     assert "--gamma 0.0003 --handle-cost 0.001 --blocks 9" in text
+    for missing in AT_ONCE:
+        given = {name: value for name, value in AT_ONCE.items() if name != missing}
+        (text,) = said({"fits": ONE_BAD}, **given)
+        assert "--gamma 0.0003 --handle-cost 0.001 --blocks 9" in text
     (text,) = said({"fits": ONE_BAD}, **AT_ONCE)
     assert "--gamma" not in text
     assert "--frames" in text

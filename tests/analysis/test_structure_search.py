@@ -113,7 +113,7 @@ def test_what_beats_a_dented_hull_is_looked_for_among_more_vertices(
 
     def candidate(*counts):
         steps = tuple(Step(moving(count), values.get(count, 0.2)) for count in counts)
-        return Candidate(steps[0].polytope, steps[-1], 1.0, steps)
+        return Candidate(steps[0].polytope, steps[-1], 1.0, steps, (str(counts),))
 
     candidates = [
         candidate(20, 12, 8),
@@ -121,8 +121,10 @@ def test_what_beats_a_dented_hull_is_looked_for_among_more_vertices(
         Candidate(moving(8), Step(moving(8), 1.0)),
     ]
     assert len(moving(17).vertices) == 18
-    found = road.richer(moving(8), candidates, lowest)
+    found, remarks = road.richer(moving(8), ("as given",), candidates, lowest)
     assert len(found.vertices) == expected
+    of = {8: "as given", 16: "(24, 17, 16)", 24: "(24, 17, 16)"}
+    assert remarks == (of[expected],)
 
 
 def test_a_dented_static_hull_is_to_be_beaten_and_no_result(frames, monkeypatch):
@@ -130,9 +132,9 @@ def test_a_dented_static_hull_is_to_be_beaten_and_no_result(frames, monkeypatch)
     asked = []
     monkeypatch.setattr(Skew, "plain_hulls", lambda self: [dented])
 
-    def richer(self, polytope, candidates, lowest):
+    def richer(self, polytope, remarks, candidates, lowest):
         asked.append((lowest, candidates))
-        return polytope
+        return polytope, remarks
 
     monkeypatch.setattr(Skew, "richer", richer)
     losses = Skew.losses
