@@ -186,6 +186,13 @@ def test_the_result_is_held_to_the_simple_hull(frames, monkeypatch, ways, relaxe
     assert 0.5 not in [value for value, _ in values.values()]  # nobody asked for it
 
 
+def test_a_palette_of_one_block_has_no_remark_of_blocks(frames, monkeypatch):
+    monkeypatch.setattr(structure_search.Glued, "remarks", lambda self: ("of blocks",))
+    found = Skew(frames, AnalysisOptions(), None).run()
+    assert len(found.polytope.blocks) == 1
+    assert found.remarks == ()
+
+
 def test_search_frames_hold_the_ends_the_worst_and_the_blocks():
     palette = hull_mesh(FOUR)
     blocks = [Block(0, (palette,) * 70, (0.1,) * 70), Block(70, (palette,) * 30, (0.1,) * 30)]
