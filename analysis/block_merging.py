@@ -12,7 +12,7 @@ from __future__ import annotations
 import dataclasses
 import heapq
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -163,8 +163,10 @@ def merge_sequence(
     low: F64,
     high: F64,
     options: AnalysisOptions,
+    apart: Collection[int] = (),
 ) -> Iterator[tuple[float, list[Block]]]:
-    """Yield the configurations of greedy merging, from the given one down to one block.
+    """Yield the configurations of greedy merging, from the given one down to one block, or to those
+    that begin with the frames (indices) of `apart`: they are never merged with the one before.
 
     Each with its loss, the sum of theta_i L_i. A merge is followed only as far as it may still be
     the best: what it adds can but grow with its frames, since losses are never negative.
@@ -177,11 +179,15 @@ def merge_sequence(
     while len(current) > 1:
         queue = []
         for i, (a, b) in enumerate(itertools.pairwise(current)):
+            if b.first in apart:
+                continue
             for keep, adopt in ((a, b), (b, a)):
                 key = (id(keep), id(adopt), keep is a)
                 if key not in tried:
                     tried[key] = Merge(keep, adopt, statistics, low, high, options)
                 queue.append((tried[key].change, i, keep is b, tried[key]))
+        if not queue:
+            break
         heapq.heapify(queue)  # changes, then places: merges themselves are never compared
         while not queue[0][3].done:
             _, i, backwards, best = queue[0]

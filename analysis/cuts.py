@@ -1,6 +1,7 @@
 """Sudden cuts, found from the frames' colours alone: a palette must not span one (section 7.1).
 
-Input: the frames' statistics. Output: the frame numbers with which new shots begin.
+Input: the frames' statistics. Output: the frame numbers with which new shots begin; and the flashes
+inside of a shot, which are found by the same limits.
 
 The measure is the share of pixels whose colour has no counterpart in the other frame: one minus the
 intersection of two histograms (`colour_histogram`), in which a small shift of all colours
@@ -57,8 +58,32 @@ def find_cuts(statistics: Sequence[FrameStatistics]) -> list[int]:
 
 def find_cuts_of(histograms: Iterable[tuple[int, F64]]) -> list[int]:
     """Return the same for frame numbers with their histograms, of which few are held at a time."""
+    numbers, gaps = _gaps(histograms)
+    return [numbers[i] for i in range(1, len(numbers)) if _is_cut(gaps, i)]
+
+
+def find_flashes(statistics: Sequence[FrameStatistics]) -> list[range]:
+    """Return the flashes, rising: runs of one or two frames (indices) that differ from the frames
+    around as a cut would, which agree with each other."""
+    _, gaps = _gaps((frame.frame, frame.histogram) for frame in statistics)
+    jumps, out = gaps[1], list[range]()
+    lengths = range(1, LONGEST_FLASH + 1)
+    for first, length in itertools.product(range(1, len(statistics)), lengths):
+        end = first + length
+        if end >= len(statistics) or (out and first <= out[-1].stop):
+            continue
+        jump = min(jumps[first - 1], jumps[end - 1])
+        usual = max(_activity([*jumps[: first - 1], jump, *jumps[end:]], first - 1), NOISE)
+        sudden = jump >= LEAST_DIFFERENCE and jump >= LEAST_RATIO * usual
+        if sudden and gaps[length + 1][first - 1] <= AGREEMENT * jump:
+            out.append(range(first, end))
+    return out
+
+
+def _gaps(histograms: Iterable[tuple[int, F64]]) -> tuple[list[int], dict[int, list[float]]]:
+    """Return the frames' numbers, and their differences: `gaps[d][i]` is that of frame i + d from
+    frame i, for d up to what spans a flash."""
     numbers = []
-    # gaps[d][i] is the difference of frame i + d from frame i.
     gaps: dict[int, list[float]] = {d: [] for d in range(1, LONGEST_FLASH + 2)}
     recent: deque[F64] = deque(maxlen=LONGEST_FLASH + 1)
     for number, here in histograms:
@@ -66,7 +91,7 @@ def find_cuts_of(histograms: Iterable[tuple[int, F64]]) -> list[int]:
             gaps[d].append(difference(before, here))
         recent.append(here)
         numbers.append(number)
-    return [numbers[i] for i in range(1, len(numbers)) if _is_cut(gaps, i)]
+    return numbers, gaps
 
 
 def _is_cut(gaps: dict[int, list[float]], at: int) -> bool:

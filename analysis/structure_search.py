@@ -1,12 +1,13 @@
 """The default method: section 5, its structure chosen by what each handle is worth.
 
-Input: the frames' statistics. Output: an `Analysis`. The configurations of one to `blocks` blocks
-are simplified each, their vertices removed while the others take over; what costs least with every
-handle paid for is kept, given stops for what single frames lack, and refined. Static hulls of the
-whole clip, some of them refined for the paper's loss alone, are found as well: the best of them
-takes part, and is what the result is held to, which is never worse by L'. Some are dented: none of
-these is the result, but what beats them is looked for among palettes of more vertices, and by a
-search that starts otherwise.
+Input: the frames' statistics. Output: an `Analysis`. The configurations of one to `blocks` blocks,
+some with flashes kept apart, are simplified each, their vertices removed while the others take
+over; what costs least with every handle paid for is kept, given stops for what single frames lack,
+and refined. Static hulls of the whole clip, some of them refined for the paper's loss alone, are
+found as well: the best of them takes part, and is what the result is held to, which is never worse
+by L'. Some are dented: none of these is the result, but what beats them is looked for among
+palettes of more vertices, and by a search that starts otherwise. Where the result itself is dented,
+a stiffer search has the last word.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from palette4d.analysis import (
     block_merging,
+    cuts,
     handle_removal,
     quality,
     static_hull,
@@ -48,6 +50,8 @@ COMPARE_EVALUATIONS = 40
 FINAL_EVALUATIONS = 150
 # Where slices are dented all the same: times `convexity`.
 STIFFER = 10.0
+# Of what L' gains over a static hull, a stiffer search may lose so much.
+STIFFER_COST = 0.5
 # Shares of the stops for single frames that are tried in turn, until L' allows them.
 STOPS_KEPT = (1, 0.75, 0.5, 0.25, 0)
 # Where nothing else is as good as a simple hull: what its shape counts, as much as L' lets it.
@@ -72,6 +76,19 @@ class Candidate:
     remarks: tuple[str, ...] = ()
 
 
+@dataclasses.dataclass(frozen=True)
+class Simple:
+    """The best static hull that is not dented, its L', and the lowest L' of all static hulls."""
+
+    hull: SkewPolytope
+    L_prime: float
+    lowest: float
+
+    def bound(self, value: float) -> float:
+        """Return the lowest L' of a static hull that a palette of L' `value` keeps to."""
+        return self.lowest if value <= self.lowest else self.L_prime
+
+
 class Skew(Road):
     """Section 5, its structure chosen by what each handle is worth."""
 
@@ -84,16 +101,34 @@ class Skew(Road):
         super().__init__(frames, options, progress)
 
     def run(self) -> Analysis:
-        """Search, insert stops, refine, and compare with what is simple."""
+        """Find what is simple, then search; where the result is dented, search once more."""
         static = self.static()
         self.measure("static_hull", static)
         hulls = [static, *self.plain_hulls()]
         values = [self.losses(hull).L_prime for hull in hulls]
-        lowest = min(values)
         in_shape = [0, *(i for i in range(1, len(hulls)) if not self.dented(hulls[i]))]
         reference = min(values[i] for i in in_shape)
-        simple = hulls[values.index(reference)]
-        candidates = [*self.candidates(), Candidate(simple, self.compared(simple))]
+        simple = Simple(hulls[values.index(reference)], reference, min(values))
+        polytope, remarks = self.searched(simple)
+        if self.options.convexity and self.dented(polytope):
+            polytope, remarks = self.searched_stiffer(polytope, remarks, simple)
+        self.measure("vertex_refinement", polytope)
+        self.report("vertex_refinement", 1, 1)
+        if len(polytope.blocks) == 1:
+            remarks = ()
+        if 0 < self.options.vertices < len(polytope.vertices):
+            remarks = (
+                *remarks,
+                f"the palette has {len(polytope.vertices)} vertices, not {self.options.vertices}: "
+                "it has four colours at least, and each of them two",
+            )
+        bound = simple.bound(self.stages[-1].losses.L_prime)
+        return Analysis(polytope, tuple(self.stages), remarks, bound=bound)
+
+    def searched(self, simple: Simple) -> tuple[SkewPolytope, tuple[str, ...]]:
+        """Search, insert stops, refine, and compare with what is simple: the refined polytope, and
+        what the user should know of its blocks."""
+        candidates = [*self.candidates(), Candidate(simple.hull, self.compared(simple.hull))]
         steps = [c.removed for c in candidates]
         chosen = candidates[steps.index(handle_removal.choose(steps, self.options))]
         self.measure("block_merging", chosen.merged)
@@ -107,24 +142,28 @@ class Skew(Road):
             functools.partial(self.refined, stops[i].polytope, self.options, stops[i].brief)
             for i in kept
         ]
-        polytope, remarks = self.never_worse(ways, simple, reference), chosen.remarks
+        polytope, remarks = self.never_worse(ways, simple.hull, simple.L_prime), chosen.remarks
         searches: tuple[Callable[[], list[Candidate]], ...]
         searches = (lambda: candidates, self.started_otherwise)
         for others in searches:
-            if self.losses(polytope).L_prime > lowest:  # that of a dented hull
-                polytope, remarks = self.richer(polytope, remarks, others(), lowest)
-        self.measure("vertex_refinement", polytope)
-        self.report("vertex_refinement", 1, 1)
-        bound = lowest if self.stages[-1].losses.L_prime <= lowest else reference
-        if len(polytope.blocks) == 1:
-            remarks = ()
-        if 0 < self.options.vertices < len(polytope.vertices):
-            remarks = (
-                *remarks,
-                f"the palette has {len(polytope.vertices)} vertices, not {self.options.vertices}: "
-                "it has four colours at least, and each of them two",
-            )
-        return Analysis(polytope, tuple(self.stages), remarks, bound=bound)
+            if self.losses(polytope).L_prime > simple.lowest:  # that of a dented hull
+                polytope, remarks = self.richer(polytope, remarks, others(), simple.lowest)
+        return polytope, remarks
+
+    def searched_stiffer(
+        self, polytope: SkewPolytope, remarks: tuple[str, ...], simple: Simple
+    ) -> tuple[SkewPolytope, tuple[str, ...]]:
+        """Return what a search finds that is `STIFFER`, and its remarks; what was given where that
+        is dented too, or loses more than `STIFFER_COST` of what is gained over a static hull."""
+        stiffer = dataclasses.replace(self.options, convexity=STIFFER * self.options.convexity)
+        road = Skew(self.frames, stiffer, self.report)
+        found, its_remarks = road.searched(simple)
+        value = self.losses(polytope).L_prime
+        most = value + STIFFER_COST * (simple.bound(value) - value)
+        if self.dented(found) or self.losses(found).L_prime > most:
+            return polytope, remarks
+        self.stages[-len(road.stages) :] = road.stages
+        return found, its_remarks
 
     def plain_hulls(self) -> list[SkewPolytope]:
         """Return plain static hulls of no more vertices than asked for.
@@ -220,16 +259,24 @@ class Skew(Road):
         return out
 
     def configurations(self) -> list[list[Block]]:
-        """Return the configurations of at most `blocks` blocks, most blocks first."""
+        """Return the configurations of at most `blocks` blocks, most blocks first.
+
+        Merging takes a flash into the blocks beside it before it merges these. So it is also tried
+        with every flash kept apart.
+        """
         blocks = self.first_blocks()
-        out = []
-        for _, configuration in block_merging.merge_sequence(
-            blocks, self.frames, self.low, self.high, self.options
-        ):
-            self.report("block_merging", len(blocks) - len(configuration), len(blocks) - 1)
-            if len(configuration) <= self.options.blocks:
-                out.append(configuration)
-        return out
+        flashes = cuts.find_flashes(self.frames)
+        found: dict[tuple[int, ...], list[Block]] = {}
+        for apart in ([], [at for flash in flashes for at in (flash.start, flash.stop)]):
+            if found and not apart:
+                continue
+            for _, configuration in block_merging.merge_sequence(
+                blocks, self.frames, self.low, self.high, self.options, apart
+            ):
+                self.report("block_merging", len(blocks) - len(configuration), len(blocks) - 1)
+                if len(configuration) <= self.options.blocks:
+                    found.setdefault(tuple(block.first for block in configuration), configuration)
+        return sorted(found.values(), key=len, reverse=True)
 
     def simplified(self, blocks: list[Block], place: int, of: int, bound: float) -> Candidate:
         """Remove vertices from a configuration; compare on all frames."""

@@ -106,6 +106,16 @@ def test_the_greedy_choice_is_that_of_trying_every_merge(clip):
     assert len(current) == 1
 
 
+def test_what_is_kept_apart_is_never_merged(clip):
+    singles = initial_blocks(clip, [hull_mesh(FOUR)] * 6, [None] * 5, OPTIONS)
+    for apart in ([2, 3], [5], [1, 2, 3, 4, 5]):
+        *_, (total, last) = merge_sequence(singles, clip, LOW, HIGH, OPTIONS, apart)
+        assert [block.first for block in last] == [0, *apart]
+        assert total == pytest.approx(sum(b.weighted_loss(6, OPTIONS) for b in last))
+    *_, (_, free) = merge_sequence(singles, clip, LOW, HIGH, OPTIONS)
+    assert [block.first for block in free] == [0]
+
+
 def test_the_bound_of_an_unfinished_merge_never_falls(clip):
     early = Block(0, (hull_mesh(FOUR),), (1.0,))
     late = Block(1, (hull_mesh(FIVE),) * 4, (1.0,) * 4)

@@ -14,13 +14,17 @@ from palette4d.analysis.colour_histogram import histogram
 from palette4d.analysis.options import AnalysisOptions
 
 
-def found(pictures, first: int = 0, step: int = 1) -> list[int]:
-    """Return the cuts of (h, w, 3) pictures."""
-    gathered = [
+def gathered(pictures, first: int = 0, step: int = 1) -> list[statistics.FrameStatistics]:
+    """Return the statistics of (h, w, 3) pictures."""
+    return [
         statistics.gather(first + step * i, np.ascontiguousarray(p, np.float32), AnalysisOptions())
         for i, p in enumerate(pictures)
     ]
-    return cuts.find_cuts(gathered)
+
+
+def found(pictures, first: int = 0, step: int = 1) -> list[int]:
+    """Return the cuts of (h, w, 3) pictures."""
+    return cuts.find_cuts(gathered(pictures, first, step))
 
 
 def frames(count: int) -> list:
@@ -159,6 +163,39 @@ SINGLE_SHOTS = {
 @pytest.mark.parametrize("name", SINGLE_SHOTS)
 def test_a_single_shot_has_no_cut(name):
     assert found(SINGLE_SHOTS[name]()) == []
+
+
+def two_flashes() -> list:
+    pictures = frames(30)
+    for i in (6, 20, 21):
+        pictures[i] = 0.1 * pictures[i] + 0.9
+    return pictures
+
+
+FLASHES = {
+    "one flash frame": [range(6, 7)],
+    "two flash frames": [range(6, 8)],
+    "two flashes": [range(6, 7), range(20, 22)],
+    "another picture": [range(4, 5)],
+    "in the second frame": [range(1, 2)],
+}
+WITH_FLASHES = {
+    **SINGLE_SHOTS,
+    "two flashes": two_flashes,
+    "another picture": lambda: [*frames(4), *night(1), *frames(4)],
+    "in the second frame": lambda: [*frames(1), *night(1), *frames(4)],
+    "three flash frames": lambda: flashes(3),
+    "cut": lambda: frames(6) + night(6),
+    "cut to one frame": lambda: frames(6) + night(1),
+    "short shot": lambda: frames(6) + night(2) + snow(4),
+    "three frames": lambda: frames(1) + night(1) + frames(1),
+}
+
+
+@pytest.mark.parametrize("name", WITH_FLASHES)
+def test_flashes_are_short_sudden_and_between_frames_that_agree(name):
+    """What changes all the time, as in lightning, has no flashes."""
+    assert cuts.find_flashes(gathered(WITH_FLASHES[name]())) == FLASHES.get(name, [])
 
 
 def test_repeated_frames_are_no_stand_still():

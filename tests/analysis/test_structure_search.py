@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from analysis_frames import mixture, noise, stats
-from palette4d.analysis import quality, structure_search
+from palette4d.analysis import block_merging, quality, structure_search
 from palette4d.analysis.block_merging import Block
 from palette4d.analysis.frame_hulls import hull_mesh
 from palette4d.analysis.handle_removal import Step
@@ -17,6 +17,7 @@ from palette4d.analysis.objective import refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Section, SkewPolytope
 from palette4d.analysis.structure_search import Candidate, Skew
+from palette4d.sample_scene import Scene
 
 FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
 CUBE = np.array(list(itertools.product((0.1, 0.9), repeat=3)))
@@ -156,6 +157,85 @@ def test_a_dented_static_hull_is_to_be_beaten_and_no_result(frames, monkeypatch)
 
 
 @pytest.mark.parametrize(
+    ("first", "stiffer", "lowest", "convexity", "expected"),
+    [
+        (("dented", 0.5), ("in shape", 0.7), 0.9, 3.0, 0.7),
+        (("dented", 0.5), ("in shape", 0.76), 0.9, 3.0, 0.5),
+        (("dented", 0.8), ("in shape", 0.85), 0.9, 3.0, 0.85),
+        (("dented", 0.8), ("in shape", 0.91), 0.9, 3.0, 0.8),
+        (("dented", 0.92), ("in shape", 0.95), 0.9, 3.0, 0.95),
+        (("dented", 0.5), ("dented", 0.4), 0.9, 3.0, 0.5),
+        (("in shape", 0.5), ("in shape", 0.4), 0.9, 3.0, 0.5),
+        (("dented", 0.5), ("in shape", 0.4), 0.9, 0.0, 0.5),
+    ],
+    ids=[
+        "in shape, for less than half of what is gained",
+        "for more",
+        "for less, where a dented hull is to be beaten",
+        "for more there",
+        "where that hull is not beaten anyway",
+        "dented as well",
+        "where nothing is dented",
+        "where nobody asks for convexity",
+    ],
+)
+def test_where_the_result_is_dented_a_stiffer_search_follows(
+    frames, monkeypatch, first, stiffer, lowest, convexity, expected
+):
+    """Results of two searches, each known by its L'; static hulls have 1.0 and, dented, 0.9."""
+    shapes = {"dented": lambda: cube_with_apex(0.5), "in shape": lambda: cube_with_apex(0.95)}
+    made, values = [], {}
+
+    def searched(self, simple):
+        assert (simple.L_prime, simple.lowest) == (1.0, lowest)
+        name, value = first if self.options.convexity == convexity else stiffer
+        made.append(self.options.convexity)
+        out = shapes[name]()
+        values[id(out)] = (value, out)
+        self.measure("block_merging", out)
+        return out, (f"of {value}",)
+
+    losses = Skew.losses
+
+    def known(self, polytope):
+        value, _ = values.get(id(polytope), (1.0, None))
+        return dataclasses.replace(losses(self, polytope), L_prime=value)
+
+    hull = cube_with_apex(0.5)
+    values[id(hull)] = (lowest, hull)
+    monkeypatch.setattr(Skew, "plain_hulls", lambda self: [hull])
+    monkeypatch.setattr(Skew, "searched", searched)
+    monkeypatch.setattr(Skew, "losses", known)
+    found = Skew(frames, AnalysisOptions(convexity=convexity), None).run()
+    again = first[0] == "dented" and convexity
+    assert made == ([3.0, 30.0] if again else [convexity])
+    assert [stage.stage for stage in found.stages] == [
+        "static_hull",
+        "block_merging",
+        "vertex_refinement",
+    ]
+    # What is reported of the stages is of the search whose result is taken.
+    assert [stage.losses.L_prime for stage in found.stages] == [1.0, expected, expected]
+    assert found.bound == (lowest if expected <= lowest else 1.0)
+
+
+def test_a_clip_whose_palette_is_dented_gets_that_of_a_stiffer_search():
+    """Eight frames of the sample clip: what is found with little convexity lacks 20 %."""
+    scene = Scene(96, 54)
+    frames = stats([scene.picture(i / 7) for i in range(8)])
+    few, enough = AnalysisOptions(convexity=0.3), AnalysisOptions(convexity=3.0)
+    road = Skew(frames, few, None)
+    static = road.static()
+    bound = road.losses(static).L_prime
+    once, _ = road.searched(structure_search.Simple(static, bound, bound))
+    assert dent(once, frames) > 3 * quality.DENT
+    found = Skew(frames, few, None).run()
+    expected = Skew(frames, enough, None).run()
+    np.testing.assert_array_equal(found.polytope.vertices, expected.polytope.vertices)
+    assert dent(found.polytope, frames) <= quality.DENT
+
+
+@pytest.mark.parametrize(
     ("ways", "relaxed", "expected"),
     [
         ([2.0, 0.9, 0.5], [], 0.9),
@@ -191,6 +271,23 @@ def test_a_palette_of_one_block_has_no_remark_of_blocks(frames, monkeypatch):
     found = Skew(frames, AnalysisOptions(), None).run()
     assert len(found.polytope.blocks) == 1
     assert found.remarks == ()
+
+
+@pytest.mark.parametrize(("blocks", "apart"), [(3, True), (2, False)])
+def test_a_flash_is_tried_apart_from_all_other_frames(blocks, apart):
+    """A flash is merged into its neighbours sooner than colours that are others from then on."""
+    images = [mixture(FOUR if i < 9 else 1 - FOUR, i) for i in range(12)]
+    images[5] = mixture(np.vstack([0.6 * FOUR + 0.4, [[0.9, 0.9, 0.5]]]), 5)
+    skew = Skew(stats(images), AnalysisOptions(blocks=blocks), None)
+    merged = block_merging.merge_sequence(
+        skew.first_blocks(), skew.frames, skew.low, skew.high, skew.options
+    )
+    plain = [[b.first for b in configuration] for _, configuration in merged]
+    assert [0, 5, 6] not in plain
+    found = [[b.first for b in configuration] for configuration in skew.configurations()]
+    assert ([0, 5, 6] in found) == apart
+    assert [c for c in plain if len(c) <= blocks] == [c for c in found if c != [0, 5, 6]]
+    assert [len(c) for c in found] == sorted((len(c) for c in found), reverse=True)
 
 
 def test_search_frames_hold_the_ends_the_worst_and_the_blocks():
