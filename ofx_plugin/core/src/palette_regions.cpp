@@ -10,9 +10,6 @@
 namespace palette4d {
 namespace {
 
-/// Faces that are closer to one plane than this (the cosine of the angle between them, from 1) have
-/// no edge to be closest to.
-constexpr double kFlat = 1e-6;
 /// What the rounding of an affine displacement's numbers may come to.
 constexpr double kRounding = 2e-5;
 /// Displacements that differ by no more than this are taken for the same.
@@ -111,10 +108,9 @@ bool PaletteRegions::add_surface(const PaletteBody& body, const std::vector<Vec3
         const Vec3& start = body.rgb()[from];
         const Vec3 along = body.rgb()[to] - start;
         const auto normal_of = [&](const Side& side) { return body.normal(index(side.face) - 1); };
-        if (two.size() != 2 || norm(along) <= 0 ||
-            dot(normal_of(two[0]), normal_of(two[1])) > 1 - kFlat) {
-            return false;
-        }
+        if (two.size() != 2 || norm(along) <= 0) return false;
+        // Of faces in one plane as well: no colour is closest to their edge, whose region has no
+        // width then, but a box that lies across it is known by it.
         AffineSum moved{start, {displacement[from]}};
         moved.add((1 / dot(along, along)) * along, displacement[to] - displacement[from]);
         const int edge = add_region(moved.sum);

@@ -31,8 +31,7 @@ public:
     using Affine = std::array<Vec3, 4>;
 
     /// For boxes whose half widths are multiples of `unit`, with colours no farther than `size`
-    /// from 0. Null for a palette that is not convex, or where neighbouring faces lie in one plane,
-    /// or where single precision is not enough.
+    /// from 0. Null for a palette that is not convex, or where single precision is not enough.
     static std::unique_ptr<const PaletteRegions> of(const PaletteBody& body,
                                                     const std::vector<Vec3>& displacement,
                                                     const float* unit, double size);
