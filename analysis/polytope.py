@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -110,17 +111,35 @@ class SkewPolytope:
     def with_vertices(self, vertices: F64) -> SkewPolytope:
         """Return the same edges with other vertices, whose times may have moved inside their
         blocks."""
-        blocks = []
-        for block, extended in zip(self.blocks, self.extended_tracks(), strict=True):
-            tracks = []
-            for track in extended:
-                times = vertices[track, 3]
-                # The shortest run that covers the block.
-                start = max(int(np.searchsorted(times, block.first, side="right")) - 1, 0)
-                end = int(np.searchsorted(times, block.last, side="left"))
-                tracks.append(tuple(track[start : end + 1]))
-            blocks.append(dataclasses.replace(block, tracks=tuple(tracks)))
+        blocks = [
+            dataclasses.replace(
+                block, tracks=tuple(_covering(block, track, vertices) for track in extended)
+            )
+            for block, extended in zip(self.blocks, self.extended_tracks(), strict=True)
+        ]
         return dataclasses.replace(self, vertices=vertices, blocks=tuple(blocks))
+
+    def with_stop(self, edge: tuple[int, int], stop: Sequence[float]) -> SkewPolytope:
+        """Return the polytope with one vertex more, the last one, (r, g, b, frame) on an edge: in
+        all tracks that run along it, across blocks as well."""
+        vertices = np.vstack([self.vertices, stop])
+        new = len(self.vertices)
+
+        def parted(old: Section) -> Section:
+            tracks = []
+            for track in old.tracks:
+                for at, pair in enumerate(itertools.pairwise(track), 1):
+                    if pair == edge:
+                        track = _covering(old, [*track[:at], new, *track[at:]], vertices)
+                        break
+                tracks.append(track)
+            return dataclasses.replace(old, tracks=tuple(tracks))
+
+        return SkewPolytope(
+            vertices,
+            tuple(parted(b) for b in self.blocks),
+            tuple(parted(t) for t in self.transitions),
+        )
 
     def removable(self) -> list[int]:
         """Return the vertices that section 5.4.1 lets go: neither at the clip's ends nor splitting
@@ -198,6 +217,14 @@ class SkewPolytope:
                 for t in self.transitions
             ],
         }
+
+
+def _covering(section: Section, track: Sequence[int], vertices: F64) -> tuple[int, ...]:
+    """Return the shortest run of a track that covers the section."""
+    times = vertices[list(track), 3]
+    start = max(int(np.searchsorted(times, section.first, side="right")) - 1, 0)
+    end = int(np.searchsorted(times, section.last, side="left"))
+    return tuple(track[start : end + 1])
 
 
 def _number(x: float) -> int | float:

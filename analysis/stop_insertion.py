@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from palette4d.analysis.losses import LOST, LOST_SHARE, colour_scale, reach_weights, thread_count
 from palette4d.analysis.objective import LEAST_GAP, Objective, loss_of, move
 from palette4d.analysis.options import AnalysisOptions
-from palette4d.analysis.polytope import Section, SkewPolytope
+from palette4d.analysis.polytope import SkewPolytope
 from palette4d.analysis.statistics import FrameStatistics
 from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.distance import cdist
@@ -247,14 +247,15 @@ def _with_stops(
     """
     block = polytope.blocks[place]
     chain = list(block.tracks[track])
-    vertices = polytope.vertices.copy()
     before, after = polytope.neighbours()
-    added: list[int] = []
+    changed, added = polytope, list[int]()
     for i, stop in enumerate(stops):
-        times = vertices[chain, 3]
+        times = changed.vertices[chain, 3]
         end = chain[0] if stop[3] == times[0] else chain[-1] if stop[3] == times[-1] else None
         if end is not None and i < peaks and len(before[end]) + len(after[end]) == 1:
+            vertices = changed.vertices.copy()
             vertices[end] = stop
+            changed = dataclasses.replace(changed, vertices=vertices)
             added.append(end)
             continue
         inside = max(block.first, times[0]) < stop[3] < min(block.last, times[-1])
@@ -262,15 +263,14 @@ def _with_stops(
             if i < peaks:
                 return polytope, []
             continue
-        chain.insert(int(np.searchsorted(times, stop[3])), len(vertices))
-        added.append(len(vertices))
-        vertices = np.vstack([vertices, stop])
+        at = int(np.searchsorted(times, stop[3]))
+        new = len(changed.vertices)
+        changed = changed.with_stop((chain[at - 1], chain[at]), stop)
+        chain.insert(at, new)
+        added.append(new)
     if len(added) <= peaks and min(added) < len(polytope.vertices):  # all of the track would change
         return polytope, []
-    tracks = (*block.tracks[:track], tuple(chain), *block.tracks[track + 1 :])
-    section: Section = dataclasses.replace(block, tracks=tracks)
-    blocks = (*polytope.blocks[:place], section, *polytope.blocks[place + 1 :])
-    return dataclasses.replace(polytope, vertices=vertices, blocks=blocks), added
+    return changed, added
 
 
 def _settled(

@@ -6,7 +6,8 @@ from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d.analysis import statistics
+from palette4d import _core
+from palette4d.analysis import sidecar, statistics
 from palette4d.analysis.options import AnalysisOptions
 
 F32 = NDArray[np.float32]
@@ -65,3 +66,19 @@ def stats(images: list[F32], options: AnalysisOptions | None = None, first: int 
     out = [statistics.gather(first + i, image, options) for i, image in enumerate(images)]
     assert all(s is not None for s in out)
     return out
+
+
+def in_core(polytope, frames):
+    """The polytope as the core reads it from a sidecar."""
+    clip = {
+        "name": "hand",
+        "source": "hand.####.png",
+        "frames": {"first": frames[0].frame, "last": frames[-1].frame, "step": 1, "skipped": []},
+        "rate": [24, 1],
+        "size": [30, 20],
+        "encoding": "unknown",
+    }
+    document = sidecar.new_document(
+        clip, polytope.fields(), {"stages": [], "options": {}, "versions": {}}
+    )
+    return _core.parse_sidecar(sidecar.dumps(document)).polytope

@@ -6,9 +6,8 @@ import itertools
 
 import numpy as np
 import pytest
-from analysis_frames import ArrayClip, mixture, noise, stats
-from palette4d import _core
-from palette4d.analysis import pipeline, quality, sidecar
+from analysis_frames import ArrayClip, in_core, mixture, noise, stats
+from palette4d.analysis import pipeline, quality
 from palette4d.analysis.frame_hulls import hull_mesh
 from palette4d.analysis.losses import NO_FACES, palette_loss
 from palette4d.analysis.options import AnalysisOptions
@@ -16,22 +15,6 @@ from palette4d.analysis.polytope import Section, SkewPolytope
 
 FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
 OPTIONS = AnalysisOptions()
-
-
-def in_core(polytope, frames):
-    """The polytope as the core reads it from a sidecar."""
-    clip = {
-        "name": "hand",
-        "source": "hand.####.png",
-        "frames": {"first": frames[0].frame, "last": frames[-1].frame, "step": 1, "skipped": []},
-        "rate": [24, 1],
-        "size": [30, 20],
-        "encoding": "unknown",
-    }
-    document = sidecar.new_document(
-        clip, polytope.fields(), {"stages": [], "options": {}, "versions": {}}
-    )
-    return _core.parse_sidecar(sidecar.dumps(document)).polytope
 
 
 def resting(corners, faces, last=4):

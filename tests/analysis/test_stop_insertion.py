@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
-from analysis_frames import mixture, stats
+from analysis_frames import in_core, mixture, stats
 from bent_track import colours_at
+from palette4d import _core
 from palette4d.analysis import methods
 from palette4d.analysis.clip import open_clip
 from palette4d.analysis.frame_hulls import hull_mesh
@@ -43,6 +46,18 @@ def clip(lit, pixels=30):
     return stats(pictures)
 
 
+def in_parts(polytope, starts=(9, 15)):
+    """The same edges in blocks of which all but the first begin at `starts`."""
+    (whole,) = polytope.blocks
+    firsts, lasts = [0, *starts], [*(start - 1 for start in starts), FRAMES - 1]
+    blocks = [
+        dataclasses.replace(whole, first=float(first), last=float(last))
+        for first, last in zip(firsts, lasts, strict=True)
+    ]
+    between = [dataclasses.replace(whole, first=start - 1.0, last=float(start)) for start in starts]
+    return dataclasses.replace(polytope, blocks=tuple(blocks), transitions=tuple(between))
+
+
 def value(polytope, frames, options, brief=()):
     everything = list(range(len(frames)))
     objective = Objective(polytope, frames, options, 1.0, coarse=True, brief=brief)
@@ -76,6 +91,22 @@ def test_a_light_gets_a_stop(lit):
     for t in dark:
         moved = np.abs(colours_at(after.polytope, t) - colours_at(before, t)).max()
         assert moved < 0.3
+
+
+@pytest.mark.parametrize("lit", [(10,), (9, 10, 11), (3, 16), (8, 12), (7, 8)])
+def test_a_stop_is_on_all_tracks_that_run_along_its_edge(lit):
+    """Edges go on across blocks: what is read back is what was made."""
+    frames = clip(lit)
+    for step in insert_stops(in_parts(rest()), frames, LOW, HIGH, AnalysisOptions())[1:]:
+        core = in_core(step.polytope, frames)
+        assert len(core.edges) == len(step.polytope.edges())
+        for block in step.polytope.blocks:
+            for t in np.linspace(block.first, block.last, 13):
+                expected = step.polytope.colours_at(block, t)
+                np.testing.assert_allclose(_core.slice_at(core, t).rgb, expected, atol=1e-12)
+    for t in lit:
+        block = next(b for b in step.polytope.blocks if b.first <= t <= b.last)
+        assert np.linalg.norm(step.polytope.colours_at(block, t) - LIGHT, axis=1).min() < 0.3
 
 
 @pytest.mark.parametrize(("reach", "added"), [(0.0, False), (0.1, True)])
