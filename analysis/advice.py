@@ -95,7 +95,10 @@ def _fit(x: Report, options: AnalysisOptions) -> str:
             and options.blocks >= AT_ONCE["blocks"]
         ):
             return f"{what}; analyse parts of the clip apart with --frames"
-        ways = f"with {at_once} colours may change at once, as in a flash"
+        return (
+            f"{what}; analyse parts of the clip apart with --frames, or try {at_once}, with which "
+            "colours may change at once, as in a flash"
+        )
     else:
         ways = "lower --handle-cost or raise --blocks for more handles"
     return f"{what}; {ways}, or analyse parts of the clip apart with --frames"

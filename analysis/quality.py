@@ -24,6 +24,8 @@ F64 = NDArray[np.float64]
 # Frames on which the use of handles is measured, evenly spaced: mean value coordinates of every
 # colour of every frame would cost more than the rest of the analysis.
 USE_FRAMES = 12
+# Thinner than this, two steps of 8 bits, nobody sees how deep a dent is.
+FLAT = 2 / 255
 # Farther outside than this a pixel counts as outside in the report: one step of 8 bits.
 VISIBLE = 1 / 255
 # Share of its convex hull that a slice may lack before it is worth a warning.
@@ -212,17 +214,19 @@ def deepest_dent(polytope: SkewPolytope, statistics: Sequence[FrameStatistics]) 
 
 
 def _dent(rgb: F64, faces: NDArray[np.int32]) -> float:
-    """Return the share of its convex hull that a mesh lacks, 0 where it fills no volume."""
+    """Return the share of its convex hull that a mesh lacks, 0 where that is practically flat."""
     if len(rgb) < 4 or len(faces) == 0:
         return 0.0
     a, b, c = (rgb[faces[:, i]] for i in range(3))
     volume = float(np.einsum("ij,ij->i", a - rgb[0], np.cross(b - a, c - a)).sum()) / 6
     try:
-        hull = float(ConvexHull(rgb).volume)
+        hull = ConvexHull(rgb)
     except QhullError:
         return 0.0
+    if hull.volume <= FLAT * hull.area / 2:  # its mean thickness
+        return 0.0
     # A mesh that is turned inside out has a negative volume: it lacks everything.
-    return float(np.clip(1 - volume / hull, 0.0, 1.0)) if hull > 1e-9 else 0.0
+    return float(np.clip(1 - volume / hull.volume, 0.0, 1.0))
 
 
 def _closest(

@@ -217,6 +217,8 @@ def test_where_the_result_is_dented_a_stiffer_search_follows(
     # What is reported of the stages is of the search whose result is taken.
     assert [stage.losses.L_prime for stage in found.stages] == [1.0, expected, expected]
     assert found.bound == (lowest if expected <= lowest else 1.0)
+    taken = again and expected == stiffer[1]
+    assert [f"{first[1]:.3f}" in text for text in found.remarks] == [True] * bool(taken)
 
 
 def test_a_clip_whose_palette_is_dented_gets_that_of_a_stiffer_search():
@@ -233,6 +235,9 @@ def test_a_clip_whose_palette_is_dented_gets_that_of_a_stiffer_search():
     expected = Skew(frames, enough, None).run()
     np.testing.assert_array_equal(found.polytope.vertices, expected.polytope.vertices)
     assert dent(found.polytope, frames) <= quality.DENT
+    (remark,) = found.remarks
+    assert "--convexity 3:" in remark
+    assert expected.remarks == ()
 
 
 @pytest.mark.parametrize(
