@@ -8,6 +8,7 @@
 #include <fstream>
 #include <new>
 #include <optional>
+#include <thread>
 #include <utility>
 
 #include "palette4d/lineage.hpp"
@@ -18,10 +19,8 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = fs::file_time_type::clock;
 
-/// Lattices that a sidecar keeps: each takes up to some ten megabytes.
-constexpr std::size_t kMaxLattices = 8;
-constexpr std::size_t kMaxFrames =
-    32;  ///< prepared frames a sidecar: more than a machine's threads
+/// Prepared frames that a sidecar keeps: more than a host has in work at a time.
+std::size_t most_frames() { return std::max<std::size_t>(32, 4 * LoadedSidecar::most_lattices()); }
 constexpr std::size_t kMaxSidecars = 32;
 constexpr std::size_t kMaxTexts = 8;
 // File systems store times as coarsely as two seconds (FAT): younger files may change unseen.
@@ -237,7 +236,7 @@ std::shared_ptr<LoadedSidecar::Prepared> LoadedSidecar::entry(const Key& key) {
     }
     recent_.push_front(&at->first);
     const std::shared_ptr<Prepared> found = at->second;
-    while (recent_.size() > kMaxFrames) {
+    while (recent_.size() > most_frames()) {
         const Key* oldest = recent_.back();
         recent_.pop_back();
         frames_.erase(frames_.find(*oldest));
@@ -254,21 +253,28 @@ std::shared_ptr<const Recolourer> LoadedSidecar::prepared(const Key& wanted) {
     return prepared->recolourer;
 }
 
+std::size_t LoadedSidecar::most_lattices() {
+    return std::max<std::size_t>(12, std::thread::hardware_concurrency() + 4);
+}
+
 std::shared_ptr<const Lattice> LoadedSidecar::lattice_at(double frame, const AppliedEdits& edits) {
     const Key key = clamped({frame, Purpose::kEdit, 0, edits});
     const std::shared_ptr<Prepared> prepared = entry(key);
     std::shared_ptr<const Lattice> lattice;
     {
         const std::lock_guard<std::mutex> lock(prepared->building);
-        if (prepared->lattice) return prepared->lattice;
         if (!prepared->recolourer) prepared->recolourer = prepare(key);
-        lattice = prepared->lattice = std::make_shared<const Lattice>(prepared->recolourer);
+        if (!prepared->lattice) {
+            prepared->lattice = std::make_shared<const Lattice>(prepared->recolourer);
+        }
+        lattice = prepared->lattice;
     }
     std::shared_ptr<Prepared> oldest;
     {
         const std::lock_guard<std::mutex> lock(mutex_);
+        with_lattice_.remove(prepared);
         with_lattice_.push_front(prepared);
-        if (with_lattice_.size() > kMaxLattices) {
+        if (with_lattice_.size() > most_lattices()) {
             oldest = with_lattice_.back();
             with_lattice_.pop_back();
         }

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstddef>
-#include <deque>
 #include <list>
 #include <map>
 #include <memory>
@@ -40,8 +39,11 @@ public:
     /// the same frame with the same edits share one, built once. Throws what slicing throws, and
     /// std::invalid_argument for a handle that is not there.
     std::shared_ptr<const Recolourer> recolourer_at(double frame, const AppliedEdits& edits = {});
-    /// Likewise: the lattice of that. The few that were made last are kept.
+    /// Likewise: the lattice of that. Those that were used last are kept.
     std::shared_ptr<const Lattice> lattice_at(double frame, const AppliedEdits& edits = {});
+    /// So many: of each frame that a host may render at a time, by whole pictures or by tiles, one
+    /// a thread, and a few more. Each takes some ten megabytes.
+    static std::size_t most_lattices();
     /// The same where it is there already; else null.
     std::shared_ptr<const Lattice> ready_lattice_at(double frame, const AppliedEdits& edits = {});
     /// Likewise: it adds the weight of a handle's lineage to the first channel (lineage.hpp).
@@ -70,8 +72,8 @@ private:
     const std::string revision_;
     std::mutex mutex_;
     std::map<Key, std::shared_ptr<Prepared>> frames_;
-    std::list<const Key*> recent_;                        ///< keys of frames_, latest first
-    std::deque<std::shared_ptr<Prepared>> with_lattice_;  ///< latest first
+    std::list<const Key*> recent_;                       ///< keys of frames_, latest first
+    std::list<std::shared_ptr<Prepared>> with_lattice_;  ///< latest first
 };
 
 /// Either a sidecar or the sentence that says why there is none.

@@ -269,9 +269,20 @@ TEST(threads_and_tiles_share_a_lattice) {
     CHECK(std::set<std::shared_ptr<const Lattice>>(seen.begin(), seen.end()).size() == 1);
     CHECK(&seen[0]->recolourer() == loaded->recolourer_at(12).get());
     CHECK(loaded->ready_lattice_at(12) == seen[0]);
-    // Those made long ago make room; edits of the host make another one.
+    // Edits of the host make another one.
     using palette4d::plugin::AppliedEdits;
     CHECK(loaded->lattice_at(12, AppliedEdits{true, {{3, {1, 0, 0}}}}) != seen[0]);
-    for (int i = 0; i < 20; ++i) loaded->lattice_at(12.5 + i / 8.0);
-    CHECK(loaded->ready_lattice_at(12) == nullptr);
+    // Tiles of as many frames as there is room for, in turn; and what is used in between stays.
+    const auto most = static_cast<int>(palette4d::plugin::LoadedSidecar::most_lattices());
+    CHECK(most >= static_cast<int>(std::thread::hardware_concurrency()));
+    std::vector<std::shared_ptr<const Lattice>> frames;
+    for (int i = 0; i < most; ++i) frames.push_back(loaded->lattice_at(12 + i / 512.0));
+    for (int i = most - 1; i >= 0; --i) CHECK(loaded->lattice_at(12 + i / 512.0) == frames[i]);
+    CHECK(frames[0] == seen[0]);
+    for (int i = 0; i < most; ++i) {
+        loaded->lattice_at(14 + i / 512.0);
+        CHECK(loaded->lattice_at(12) == seen[0]);
+    }
+    // Those that were used long ago make room.
+    CHECK(loaded->ready_lattice_at(12 + 1 / 512.0) == nullptr);
 }

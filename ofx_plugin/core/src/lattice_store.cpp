@@ -17,6 +17,10 @@ constexpr std::size_t kMostStates =
 static_assert(kMostNodes < 1 << 24 && kMostStates < 1 << 24, "floats count nodes and parts");
 static_assert(PaletteRegions::kMostRegions <= kLatticeMostRegions, "their nodes have room");
 
+/// For what filters and codecs add; so many cells that no node, not even a brick's, lies at 0 or 1:
+/// palettes often have faces in those planes, where coordinates need double precision.
+constexpr double kMarginCells = 4.1, kMargin = kMarginCells / (kLatticeSide - 2 * kMarginCells);
+
 }  // namespace
 
 #if defined(__linux__)
@@ -59,8 +63,7 @@ Lattice::Store::Store(const Recolourer& recolourer)
             low = std::min(low, colour[c]);
             high = std::max(high, colour[c]);
         }
-        // A margin for what filters and codecs add.
-        const double margin = (high - low) / 16;
+        const double margin = kMargin * (high - low);
         domain_.low[c] = static_cast<float>(low - margin);
         domain_.high[c] = static_cast<float>(high + margin);
         const double width = high - low + 2 * margin;

@@ -4,52 +4,72 @@
 #include <cstdint>
 
 #include "kernel_choice.hpp"
-#include "recolour_plan.hpp"
+#include "vec3.hpp"
 
 namespace palette4d {
-namespace {
 
-RecolourOptions with(InstructionSet instructions) {
-    RecolourOptions options;
-    options.instructions = instructions;
-    return options;
-}
+template <class T>
+MeanValueWorker::Stage<T>::Stage(const PlanMemory<T>& memory, const Kernels<T>& of)
+    : plan(memory.plan()),
+      usable(memory.usable()),
+      kernels(of),
+      scratch(usable ? plan : Plan<T>{}) {}
 
-}  // namespace
-
-MeanValueWorker::MeanValueWorker(const Recolourer& recolourer, InstructionSet instructions)
-    : plan_(recolourer.plan().single.plan()),
-      usable_(recolourer.plan().single.usable()),
-      kernels_(kernels_of(instructions).single),
-      exact_(recolourer, with(instructions)),
-      scratch_(usable_ ? plan_ : Plan<float>{}) {}
-
-void MeanValueWorker::displacements(const float* colours, std::size_t count, float* moved) {
-    constexpr std::size_t kSize = Block<float>::kSize;
-    const float tolerance = static_cast<float>(kSingleTolerance) * std::max(1.0f, plan_.spread);
-    for (std::size_t at = 0; at < count; at += kSize, colours += 3 * kSize, moved += 3 * kSize) {
+template <class T>
+template <class From, class To, class Failed>
+void MeanValueWorker::Stage<T>::run(std::size_t count, const From& from, const To& to,
+                                    const Failed& failed) {
+    constexpr std::size_t kSize = Block<T>::kSize;
+    const T tolerance = static_cast<T>(kSingleTolerance) * std::max(T(1), plan.spread);
+    for (std::size_t at = 0; at < count; at += kSize) {
         const std::size_t size = std::min(kSize, count - at);
-        if (usable_) {
+        if (usable) {
             for (std::size_t i = 0; i < size; ++i) {
-                for (std::size_t c = 0; c < 3; ++c) block_.high[c][i] = colours[3 * i + c];
+                for (std::size_t c = 0; c < 3; ++c) block.high[c][i] = from(at + i)[c];
             }
-            kernels_.mean_value(plan_, block_, static_cast<int>(size), tolerance, scratch_.data());
+            kernels.mean_value(plan, block, static_cast<int>(size), tolerance, scratch.data());
         }
         for (std::size_t i = 0; i < size; ++i) {
-            float* const to = moved + 3 * i;
-            if (usable_ && block_.verdict[i] > 0) {
-                for (std::size_t c = 0; c < 3; ++c) to[c] = block_.moved[c][i];
+            if (usable && block.verdict[i] > 0) {
+                for (std::size_t c = 0; c < 3; ++c) {
+                    to(at + i)[c] = static_cast<float>(block.moved[c][i]);
+                }
             } else {
-                others_.push_back({colours + 3 * i, to});
-                exact_.pixel(colours + 3 * i, to, 3);
+                failed(at + i);
             }
         }
     }
-    exact_.finish();
-    for (const auto& [colour, to] : others_) {
-        for (std::size_t c = 0; c < 3; ++c) to[c] -= colour[c];
-    }
+}
+
+MeanValueWorker::MeanValueWorker(const Recolourer& recolourer, InstructionSet instructions)
+    : recolourer_(recolourer),
+      single_(recolourer.plan().single, kernels_of(instructions).single),
+      twofold_(recolourer.plan().twofold, kernels_of(instructions).twofold),
+      weights_(recolourer.original().size()) {}
+
+void MeanValueWorker::displacements(const float* colours, std::size_t count, float* moved) {
     others_.clear();
+    single_.run(
+        count, [&](std::size_t i) { return colours + 3 * i; },
+        [&](std::size_t i) { return moved + 3 * i; },
+        [&](std::size_t i) { others_.push_back({colours + 3 * i, moved + 3 * i}); });
+    twofold_.run(
+        others_.size(), [&](std::size_t i) { return others_[i].first; },
+        [&](std::size_t i) { return others_[i].second; },
+        [&](std::size_t i) { one_by_one(others_[i].first, others_[i].second); });
+}
+
+/// In a face's plane, for one. Outside that is not what the closest point does, which bends at the
+/// surface: a node with it between others would be seen by half only.
+void MeanValueWorker::one_by_one(const float* colour, float* moved) {
+    const Vec3 p{static_cast<double>(colour[0]), static_cast<double>(colour[1]),
+                 static_cast<double>(colour[2])};
+    recolourer_.body().mean_value(p, weights_.data(), workspace_);
+    Vec3 sum{};
+    for (std::size_t i = 0; i < weights_.size(); ++i) {
+        sum = sum + weights_[i] * recolourer_.displacement()[i];
+    }
+    for (std::size_t c = 0; c < 3; ++c) moved[c] = static_cast<float>(sum[c]);
 }
 
 }  // namespace palette4d
