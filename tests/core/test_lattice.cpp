@@ -108,6 +108,63 @@ TEST(pictures_are_within_the_tolerance_of_the_exact_ones) {
 
 namespace {
 
+/// A palette from which two faces look down that nearly lie in one plane; that of one of them is
+/// one of the planes that the lattice's nodes lie in.
+Mesh nearly_flat_below() {
+    constexpr double kLow = 0.9 / 63.8;  // five cells above the domain's end, 4.1 below 0
+    Mesh mesh{{{0.0, 0.067, 0.0},
+               {0.1916, 0.0082, 0.0},
+               {0.3465, 0.7537, 0.0},
+               {0.9292, 0.8469, 0.021},
+               {0.5802, 0.7382, 0.98},
+               {0.8503, 1.0, 0.98},
+               {0.9752, 0.842, 0.9638},
+               {1.0, 1.0, 0.98}},
+              {{0, 1, 4},
+               {4, 1, 6},
+               {6, 1, 3},
+               {0, 4, 2},
+               {2, 1, 0},
+               {2, 3, 1},
+               {5, 2, 4},
+               {3, 2, 5},
+               {6, 3, 7},
+               {3, 5, 7},
+               {7, 4, 6},
+               {7, 5, 4}}};
+    for (Vec3& colour : mesh.rgb) colour[2] += kLow;
+    return mesh;
+}
+
+}  // namespace
+
+TEST(colours_beside_a_face_in_a_plane_of_nodes_are_within_the_tolerance) {
+    for (std::uint64_t seed = 0; seed < 12; ++seed) {
+        Edited palette{nearly_flat_below(), nearly_flat_below().rgb};
+        Random random(seed);
+        for (Vec3& colour : palette.colours) {
+            if (random.uniform() < 0.6) continue;
+            const Vec3 step = random.colour(-0.3, 0.3);
+            for (std::size_t c = 0; c < 3; ++c) colour[c] += step[c];
+        }
+        const auto recolourer = palette.recolourer();
+        if (!recolourer->moves()) continue;
+        Image image(400, 100, 3);
+        for (std::size_t i = 0; i < image.data.size(); i += 3) {
+            const Vec3 place = random.colour();
+            image.data[i] = static_cast<float>(0.2 + 0.5 * place[0]);
+            image.data[i + 1] = static_cast<float>(0.2 + 0.5 * place[1]);
+            image.data[i + 2] = static_cast<float>(0.01 + 0.02 * place[2]);
+        }
+        Image expected(400, 100, 3), found(400, 100, 3);
+        recolourer->apply(image.in(), expected.out(), {});
+        Lattice(recolourer).apply(image.in(), found.out(), {});
+        CHECK(difference(found, expected) <= Lattice::kTolerance);
+    }
+}
+
+namespace {
+
 void check_that_bits_depend_on_pixels_only(const Edited& palette) {
     const auto recolourer = palette.recolourer();
     for (const int channels : {3, 4}) {
