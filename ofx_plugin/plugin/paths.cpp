@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cstdlib>
+#include <cstring>
 #include <vector>
 
 namespace palette4d::plugin {
@@ -37,6 +38,33 @@ std::size_t variable_at(const std::string& path, std::size_t at, std::string& na
 bool is_file(const fs::path& path) {
     std::error_code error;
     return fs::is_regular_file(path, error);
+}
+
+/// What a path means that was pasted with a blank or a line's end around it, in quotes, or as a
+/// URL.
+std::string unpasted(std::string path) {
+    const auto blank = [](char c) { return std::isspace(static_cast<unsigned char>(c)) != 0; };
+    while (!path.empty() && blank(path.back())) path.pop_back();
+    path.erase(path.begin(), std::find_if_not(path.begin(), path.end(), blank));
+    if (path.size() > 1 && path.front() == path.back() &&
+        (path.front() == '"' || path.front() == '\'')) {
+        path = path.substr(1, path.size() - 2);
+    }
+    constexpr const char* kUrl = "file://";
+    if (path.rfind(kUrl, 0) != 0) return path;
+    std::string plain;
+    for (std::size_t at = std::strlen(kUrl); at < path.size(); ++at) {
+        const auto hex = [&](std::size_t i) {
+            return i < path.size() && std::isxdigit(static_cast<unsigned char>(path[i])) != 0;
+        };
+        if (path[at] == '%' && hex(at + 1) && hex(at + 2)) {
+            plain += static_cast<char>(std::stoi(path.substr(at + 1, 2), nullptr, 16));
+            at += 2;
+        } else {
+            plain += path[at];
+        }
+    }
+    return plain;
 }
 
 std::vector<fs::path> search_folders(const std::string& folder) {
@@ -85,6 +113,13 @@ std::string expanded(const std::string& path) {
 }
 
 std::optional<std::string> find_file(const std::string& path, const std::string& folder) {
+    const std::string plain = unpasted(path);
+    if (plain != path) {
+        if (const auto found = find_file(plain, folder)) return found;
+    }
+    if (const std::string plain_folder = unpasted(folder); plain_folder != folder) {
+        return find_file(path, plain_folder);
+    }
     const fs::path given = fs::u8path(expanded(path));
     if (given.empty()) return std::nullopt;
     if (given.is_absolute() && is_file(given)) return given.u8string();
@@ -113,7 +148,7 @@ std::string words_of_missing(const std::string& path) {
         at = end - 1;
     }
     std::error_code error;
-    const fs::path given = fs::u8path(expanded(path));
+    const fs::path given = fs::u8path(expanded(unpasted(path)));
     if (fs::exists(given, error)) return "";
     const bool relative = given.is_relative();
     std::string words = "the file does not exist";

@@ -72,6 +72,17 @@ TEST(files_are_found_where_they_are_and_where_they_went) {
     CHECK(find_file(beside, "") == beside);
     CHECK(find_file(beside, in_folder("other")) == beside);
     CHECK(find_file("sub/b.p4d.json", in_folder("clip")) == deep);
+    // As people paste them.
+    const std::string spaced = write("clip/c d%20.p4d.json", "x");
+    const std::string clip = in_folder("clip");
+    for (const std::string& pasted : {beside + "\n", " " + beside + "\t", '"' + beside + '"',
+                                      "'" + beside + "' ", "file://" + beside}) {
+        EXPECT(find_file(pasted, "") == beside, pasted);
+    }
+    CHECK(find_file("\"sub/b.p4d.json\"", "'" + clip + "'\n") == deep);
+    CHECK(find_file("file://" + clip + "/c%20d%2520.p4d.json", "") == spaced);
+    CHECK(find_file(spaced, "") == spaced);  // no URL
+    CHECK(!find_file("'", "") && !find_file("file://", "") && !find_file(" \n", clip));
     CHECK(find_file("a.p4d.json", in_folder("clip")) == beside);
     // Moved: a file of its name beside the clip.
     CHECK(find_file("/old/place/a.p4d.json", in_folder("clip")) == beside);
