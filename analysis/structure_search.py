@@ -271,10 +271,9 @@ class Skew(Road):
         """
         blocks = self.first_blocks()
         flashes = cuts.find_flashes(self.frames)
+        edges = [at for flash in flashes for at in (flash.start, flash.stop)]
         found: dict[tuple[int, ...], list[Block]] = {}
-        for apart in ([], [at for flash in flashes for at in (flash.start, flash.stop)]):
-            if found and not apart:
-                continue
+        for apart in ([], edges) if edges else ([],):
             for _, configuration in block_merging.merge_sequence(
                 blocks, self.frames, self.low, self.high, self.options, apart
             ):

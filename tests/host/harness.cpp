@@ -1,6 +1,7 @@
 #include "harness.hpp"
 
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <exception>
 #include <fstream>
@@ -27,6 +28,8 @@ void failed(const char* file, int line, const std::string& what) {
     ++g_failures;
     std::cerr << file << ":" << line << ": " << what << "\n";
 }
+
+long every(long step) { return std::getenv("PALETTE4D_EVERY_CALL") ? 1 : step; }
 
 void figure(const std::string& what) { std::cout << "      " << what << std::endl; }
 

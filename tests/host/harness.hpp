@@ -40,6 +40,10 @@ void failed(const char* file, int line, const std::string& what);
 /// A figure of a test, for docs: printed above its line.
 void figure(const std::string& what);
 
+/// A step between the many calls that are refused one after the other; 1, for all of them, where
+/// PALETTE4D_EVERY_CALL is set.
+long every(long step);
+
 /// The bundle under test, and a folder of the running test's own.
 const std::string& bundle();
 std::filesystem::path folder();

@@ -188,7 +188,7 @@ TEST(every_call_refused_in_turn) {
     CHECK(plugin.describe(kOfxImageEffectContextFilter) != nullptr);
     const long described = Host::get().calls();
     long refused = 0, whole = 0;
-    for (long n = 0;; n += n >= loaded + 100 && n < described - 100 ? 13 : 1) {
+    for (long n = 0;; n += n >= loaded + 100 && n < described - 100 ? every(13) : 1) {
         Config config;
         config.refused_call = n;
         config.processors =
