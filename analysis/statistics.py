@@ -14,9 +14,10 @@ from __future__ import annotations
 
 import collections
 import concurrent.futures
+import contextlib
 import dataclasses
 import functools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -141,17 +142,19 @@ def gather_clip(
     workers = min(
         thread_count(options), MOST_WORKERS, max(1, MEMORY // (TABLE + 12 * pixels)), len(chosen)
     )
-    results = _in_order(clip.fills(chosen), taken, workers)
-    for done, (number, result) in enumerate(results, start=1):
-        try:
-            found[number] = result()
-        except FrameError:
-            if not clip.skip_bad_frames:
-                raise
-            clip.skip(number)
-        if done % max(1, TRIM_EVERY // pixels) == 0:
-            _core.return_memory()
-        report(done, len(chosen))
+    # Its threads end here, whatever comes: an error's traceback would keep them until it is
+    # garbage, and the collector, wherever it happens to run, would wait for them.
+    with contextlib.closing(_in_order(clip.fills(chosen), taken, workers)) as results:
+        for done, (number, result) in enumerate(results, start=1):
+            try:
+                found[number] = result()
+            except FrameError:
+                if not clip.skip_bad_frames:
+                    raise
+                clip.skip(number)
+            if done % max(1, TRIM_EVERY // pixels) == 0:
+                _core.return_memory()
+            report(done, len(chosen))
     if not found:
         raise clip.none_readable()
     remarks = list(_remarks(clip.frames, chosen))
@@ -290,7 +293,7 @@ def _in_order(
     fills: Iterator[tuple[int, Fill]],
     taken: Callable[[int, Fill, _core.ColourBinner], FrameStatistics | None],
     workers: int,
-) -> Iterator[tuple[int, Callable[[], FrameStatistics | None]]]:
+) -> Generator[tuple[int, Callable[[], FrameStatistics | None]], None, None]:
     """(number, what returns or raises its result) of each frame, in order."""
     if workers == 1:
         binner = _core.ColourBinner()

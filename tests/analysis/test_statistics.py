@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import threading
 
 import numpy as np
 import pytest
@@ -185,8 +186,11 @@ def test_bad_frames_are_skipped_or_end_the_reading(tmp_path, threads):
     found = gather_clip(clip, options)
     assert list(found.frames) == [1, 2, 3, 5, 7, 8]
     assert clip.skipped == [4, 6]
-    with pytest.raises(FrameError, match="frame 6 cannot be read"):
+    with pytest.raises(FrameError, match="frame 6 cannot be read") as kept:
         gather_clip(open_clip(str(folder), frames="5-8"), options)
+    # Its threads have ended, although the error is kept, and with it all that it passed through.
+    assert kept.tb is not None
+    assert not [t for t in threading.enumerate() if t.name.startswith("palette4d-read")]
     for frame in folder.iterdir():
         if frame.name != "clip.0001.png":
             frame.write_bytes(b"no picture")
