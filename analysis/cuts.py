@@ -73,8 +73,7 @@ def find_flashes(statistics: Sequence[FrameStatistics]) -> list[range]:
         if end >= len(statistics) or (out and first <= out[-1].stop):
             continue
         jump = min(jumps[first - 1], jumps[end - 1])
-        usual = max(_activity([*jumps[: first - 1], jump, *jumps[end:]], first - 1), NOISE)
-        sudden = jump >= LEAST_DIFFERENCE and jump >= LEAST_RATIO * usual
+        sudden = _is_sudden(jump, jumps, first - 1, end)
         if sudden and gaps[length + 1][first - 1] <= AGREEMENT * jump:
             out.append(range(first, end))
     return out
@@ -98,9 +97,7 @@ def _is_cut(gaps: dict[int, list[float]], at: int) -> bool:
     """Whether a shot begins with frame `at`, an index from 1."""
     jumps = gaps[1]
     jump = jumps[at - 1]
-    if jump < LEAST_DIFFERENCE:
-        return False
-    if jump < LEAST_RATIO * max(_activity(jumps, at - 1), NOISE):
+    if not _is_sudden(jump, jumps, at - 1, at):
         return False
     for length in range(1, LONGEST_FLASH + 1):
         # The flash lies between `start` and `start + length + 1`; the jump is one of its edges.
@@ -110,9 +107,16 @@ def _is_cut(gaps: dict[int, list[float]], at: int) -> bool:
     return True
 
 
-def _activity(jumps: list[float], place: int) -> float:
-    """Return how much the frames change around a jump; infinite where there are no others."""
-    before, after = jumps[max(0, place - AROUND) : place], jumps[place + 1 : place + 1 + AROUND]
+def _is_sudden(jump: float, jumps: list[float], start: int, end: int) -> bool:
+    """Whether a jump is large beside what goes on around `jumps[start:end]`."""
+    return jump >= LEAST_DIFFERENCE and (
+        jump >= LEAST_RATIO * max(_activity(jumps, start, end), NOISE)
+    )
+
+
+def _activity(jumps: list[float], start: int, end: int) -> float:
+    """Return how much the frames change around some jumps; infinite where there are no others."""
+    before, after = jumps[max(0, start - AROUND) : start], jumps[end : end + AROUND]
     if not before and not after:
         return np.inf
     activity = max(_usual(side) for side in (before, after) if side)

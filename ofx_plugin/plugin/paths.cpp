@@ -136,7 +136,8 @@ std::optional<std::string> find_file(const std::string& path, const std::string&
     return std::nullopt;
 }
 
-std::string words_of_missing(const std::string& path) {
+std::string words_of_missing(const std::string& pasted) {
+    const std::string path = unpasted(pasted);
     std::string name;
     for (std::size_t at = 0; at < path.size(); ++at) {
         if (path[at] != '$' && path[at] != '%') continue;
@@ -148,7 +149,7 @@ std::string words_of_missing(const std::string& path) {
         at = end - 1;
     }
     std::error_code error;
-    const fs::path given = fs::u8path(expanded(unpasted(path)));
+    const fs::path given = fs::u8path(expanded(path));
     if (fs::exists(given, error)) return "";
     const bool relative = given.is_relative();
     std::string words = "the file does not exist";

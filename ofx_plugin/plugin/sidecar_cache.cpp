@@ -254,7 +254,9 @@ std::shared_ptr<const Recolourer> LoadedSidecar::prepared(const Key& wanted) {
 }
 
 std::size_t LoadedSidecar::most_lattices() {
-    return std::max<std::size_t>(12, std::thread::hardware_concurrency() + 4);
+    static const std::size_t most =
+        std::max<std::size_t>(12, std::thread::hardware_concurrency() + 4);
+    return most;  // asked for every tile, and the processors are the system's to count
 }
 
 std::shared_ptr<const Lattice> LoadedSidecar::lattice_at(double frame, const AppliedEdits& edits) {

@@ -41,11 +41,11 @@ public:
     std::shared_ptr<const Recolourer> recolourer_at(double frame, const AppliedEdits& edits = {});
     /// Likewise: the lattice of that. Those that were used last are kept.
     std::shared_ptr<const Lattice> lattice_at(double frame, const AppliedEdits& edits = {});
-    /// So many: of each frame that a host may render at a time, by whole pictures or by tiles, one
-    /// a thread, and a few more. Each takes some ten megabytes.
-    static std::size_t most_lattices();
     /// The same where it is there already; else null.
     std::shared_ptr<const Lattice> ready_lattice_at(double frame, const AppliedEdits& edits = {});
+    /// How many lattices are kept: of each frame that a host may render at a time, by whole
+    /// pictures or by tiles, one a thread, and a few more. Each takes some ten megabytes.
+    static std::size_t most_lattices();
     /// Likewise: it adds the weight of a handle's lineage to the first channel (lineage.hpp).
     std::shared_ptr<const Recolourer> weight_at(double frame, int handle);
     /// Likewise: it adds the closest colour of the palette (lineage.hpp).

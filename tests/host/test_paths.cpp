@@ -157,6 +157,7 @@ TEST(a_missing_file_is_said_with_where_it_was_looked_for) {
         says(path, "no variable P4D_NONE");
     }
     for (const char* path : {"$/a.json", "100%/%", "${/a.json"}) says(path, "does not exist");
+    says("file:///nowhere/a%20b%20c.json", "does not exist");  // no variable is called 20b
     // A folder is there, and says itself what is wrong with it.
     CHECK(words_of_missing("$P4D_SHOW").empty());
 }
