@@ -1,5 +1,7 @@
 #include "files.hpp"
 
+#include <utility>
+
 #include "palette4d/sidecar.hpp"
 #include "paths.hpp"
 
@@ -35,7 +37,8 @@ void define_file_params(ParamDefiner& define) {
         .set_int(kOfxParamPropStringFilePathExists, 0);
     define.button({kParamReload, "Reload", "Looks at the sidecar's file again, now."});
     define.flag({kParamEmbed, "Embed",
-                 "Keeps a copy of the sidecar in the project, for use where there is no file."},
+                 "Keeps a copy of the sidecar in the project, for use where there is no file, or "
+                 "one that cannot be read."},
                 false);
     for (const char* name : {kParamEmbedded, kParamRevision}) {
         const Properties hidden = define.text(
@@ -54,19 +57,24 @@ Chosen chosen_sidecar(const Params& params, std::optional<OfxTime> time) {
     const std::string given = text(kParamSidecar);
     chosen.any = !given.empty();
     if (!chosen.any) return chosen;
-    const std::string folder = text(kParamClipFolder);
-    if (const auto found = find_file(given, folder)) {
+    const auto found = find_file(given, text(kParamClipFolder));
+    if (found) {
         chosen.path = *found;
         chosen.result = load_sidecar(chosen.path);
-        return chosen;
+        if (chosen.result.loaded) return chosen;
     }
     const std::string copy = text(kParamEmbedded);
     if (!copy.empty()) {
-        chosen.embedded = true;
-        chosen.path = given;
-        chosen.result = load_sidecar_text(copy, given + " (the project's copy)");
-        return chosen;
+        SidecarResult kept = load_sidecar_text(copy, given + " (the project's copy)");
+        if (kept.loaded || !found) {
+            chosen.embedded = true;
+            chosen.broken = std::move(chosen.result.problem);
+            chosen.path = given;
+            chosen.result = std::move(kept);
+            return chosen;
+        }
     }
+    if (found) return chosen;
     // It says what is wrong.
     chosen.path = expanded(given);
     chosen.result = load_sidecar(chosen.path);
@@ -91,7 +99,10 @@ std::string keep_files(const Params& params, Chosen& chosen, const std::string& 
         if (chosen.embedded) chosen = chosen_sidecar(params, std::nullopt);
         return "";
     }
-    if (chosen.embedded) return "the project's copy, since there is no file";
+    if (chosen.embedded) {
+        return "the project's copy, since " +
+               (chosen.broken.empty() ? "there is no file" : chosen.broken);
+    }
     if (!loaded) return "";
     const std::optional<std::string> file = sidecar_text(chosen.path);
     if (!file) return "";

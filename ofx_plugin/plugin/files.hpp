@@ -22,7 +22,8 @@ struct Chosen {
     bool any = false;  ///< a sidecar was asked for
     SidecarResult result;
     std::string path;       ///< where it was found, or where it was expected
-    bool embedded = false;  ///< it is the project's copy, since there is no file
+    bool embedded = false;  ///< it is the project's copy, since there is no file that can be read
+    std::string broken;     ///< what is wrong with that file, where there is one
 };
 /// The sidecar that the parameters name; with a time in the way that is allowed while rendering.
 Chosen chosen_sidecar(const Params& params, std::optional<OfxTime> time);

@@ -168,6 +168,15 @@ void notice_undone(const Params& params, ShownHandles& shown) {
     }
 }
 
+void show_no_handles(const Params& params) {
+    for (const Slot& slot : slots()) {
+        set_text(params.properties(slot.colour.c_str()), kOfxPropLabel, slot.colour_label);
+        for (const char* name : {slot.colour.c_str(), slot.use.c_str(), slot.id.c_str()}) {
+            set_secret(params.properties(name), false);
+        }
+    }
+}
+
 void show_handles(const Params& params, const Sidecar* sidecar, ShownHandles& shown) {
     if (!sidecar) return;
     bool given_one = false;

@@ -49,6 +49,8 @@ using ShownHandles = std::array<ShownHandle, kHandleSlots>;
 /// taken it out of use, or has changed it and the host is about to say so. Without a sidecar all
 /// stay as they are.
 void show_handles(const Params& params, const Sidecar* sidecar, ShownHandles& shown);
+/// For instance changes only, where no sidecar is chosen: the slots look as they were described.
+void show_no_handles(const Params& params);
 /// For instance changes only, first of all. A host may undo what show_handles() has set, and tell
 /// of it as of the user's edits, which it is not: all colours that were given together are what
 /// they were before. They are not given again at once, or there would be no way back beyond that

@@ -131,7 +131,11 @@ void update_instance(const Suites& suites, OfxImageEffectHandle effect, const st
     }
     notice_undone(params, shown_handles);
     if (!param.empty()) handle_changed(params, sidecar, param, shown_handles);
-    show_handles(params, sidecar, shown_handles);
+    if (chosen.any) {
+        show_handles(params, sidecar, shown_handles);
+    } else {
+        show_no_handles(params);
+    }
     if (instance) {
         const std::lock_guard<std::mutex> lock(instance->mutex);
         instance->shown = shown_handles;

@@ -47,7 +47,7 @@ void prepare(Look& look, const Params& params, LoadedSidecar& loaded, double fra
         return;
     }
     EditsAt edits = edits_at(params, sidecar, time);
-    look.note = std::move(edits.note);
+    if (!edits.note.empty()) look.note = std::move(edits.note);
     drawing.recolourer = loaded.recolourer_at(frame, edits.edits);
     if (drawing.recolourer->identity() || settings.strength == 0) drawing.recolourer = nullptr;
     if (drawing.recolourer &&
@@ -76,6 +76,7 @@ Look look_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time,
         look.problem = result.problem;
         return look;
     }
+    look.note = chosen.broken;
     look.drawing.settings = output_settings_at(params, time);
     OutputSettings& settings = look.drawing.settings;
     if (settings.passes()) return look;

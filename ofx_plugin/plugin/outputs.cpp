@@ -39,6 +39,13 @@ bool finite(const float* rgb) {
     return std::isfinite(rgb[0]) && std::isfinite(rgb[1]) && std::isfinite(rgb[2]);
 }
 
+/// As far away as can be; not where a channel is no number.
+bool infinite(const float* rgb) {
+    const auto is_infinite = [](float c) { return std::isinf(c); };
+    return std::none_of(rgb, rgb + 3, [](float c) { return std::isnan(c); }) &&
+           std::any_of(rgb, rgb + 3, is_infinite);
+}
+
 /// Rows of pixels in floats, and what is done to them.
 struct Rows {
     const float* source;
@@ -104,6 +111,7 @@ double weight_of(const float* colour, const float* read, const Recolourer& reade
 /// What a matte says of one colour, from 0 to 1; `read` is the colour plus what its reader adds.
 double matte_of(const float* colour, const float* read, const Drawing& drawing) {
     const OutputSettings& settings = drawing.settings;
+    if (settings.output == Output::kOutside && infinite(colour)) return 1;
     if (!finite(colour) || !finite(read)) return 0;
     if (settings.output == Output::kWeight) {
         return std::clamp(weight_of(colour, read, *drawing.recolourer), 0.0, 1.0);

@@ -84,6 +84,31 @@ TEST(the_copy_that_goes_last_is_missed_at_once) {
     CHECK(project.node->text("status").find("does not exist") != std::string::npos);
 }
 
+TEST(the_copy_stands_in_for_a_file_that_cannot_be_read) {
+    Project project;
+    const std::string path = sidecar();
+    project.choose(path);
+    project.node->set("embed", 1);
+    CHECK(project.node->changed("embed") == kOfxStatOK);
+    write("clip.p4d.json", sidecar_text().substr(0, 300));
+    CHECK(project.render(*project.node) == project.edited());
+    // The user hears of the file, and the copy is not replaced by what is broken.
+    const std::string& said = project.node->effect().persistent_message;
+    EXPECT(said.find(path) != std::string::npos, said);
+    CHECK(project.node->changed("reload") == kOfxStatOK);
+    CHECK(project.says("the project's copy, since " + path));
+    CHECK(project.node->text("embedded") == sidecar_text());
+    const std::string plain = sidecar_text(false);
+    write("clip.p4d.json", plain);
+    CHECK(project.render(*project.node) == project.unchanged());
+    CHECK(project.node->effect().persistent_message.empty());
+    // Of two that are broken the file is named.
+    write("clip.p4d.json", "no JSON");
+    project.node->set("embedded", std::string("no JSON either"));
+    CHECK(project.render(*project.node) == project.unchanged());
+    EXPECT(said.find(path) == 0 && said.find("project") == std::string::npos, said);
+}
+
 TEST(a_broken_copy_is_said_to_be_one) {
     Project project;
     project.node->set("sidecar", std::string("/nowhere/at.all"));

@@ -157,6 +157,24 @@ TEST(handles_show_what_the_sidecar_holds) {
     CHECK(std::get<int>(node.value("handle01On")) == 1);
 }
 
+TEST(without_a_sidecar_the_slots_are_as_they_were_described) {
+    Graded graded;
+    Instance& node = *graded.node;
+    const auto shows_handles = [&] {
+        return secret(node, "handle18") &&
+               node.properties("handle01").text(kOfxPropLabel) == "v0, frame 10";
+    };
+    const std::string path = node.text("sidecar");
+    // One that cannot be read leaves all as it is: it may come back.
+    graded.choose("/nowhere/at.all");
+    CHECK(shows_handles());
+    graded.choose("");
+    CHECK(node.properties("handle01").text(kOfxPropLabel) == "Handle 1");
+    for (const char* name : {"handle01", "handle18", "handle32On"}) CHECK(!secret(node, name));
+    graded.choose(path);
+    CHECK(shows_handles());
+}
+
 TEST(changing_a_colour_brings_it_into_use) {
     Graded graded;
     Instance& node = *graded.node;

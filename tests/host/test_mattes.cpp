@@ -1,5 +1,6 @@
 // The node's mattes: the weight of a handle, and what the palette does not enclose, against the
 // core's palette weights in double precision.
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -19,6 +20,10 @@ bool finite(const Vec3& p) {
     return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]);
 }
 
+bool is_number(const Vec3& p) {
+    return !std::isnan(p[0]) && !std::isnan(p[1]) && !std::isnan(p[2]);
+}
+
 /// The matte of one straight colour, worked out anew.
 class Reference {
 public:
@@ -27,6 +32,7 @@ public:
           lineage_(sidecar.polytope, sidecar.edits, handle),
           body_(slice_.rgb, slice_.faces) {}
     double weight(const Vec3& p) const {
+        if (!finite(p)) return 0;
         std::vector<double> weights(slice_.rgb.size());
         body_.project(p, weights.data(), workspace_);
         double sum = 0;
@@ -36,6 +42,7 @@ public:
         return std::min(std::max(sum, 0.0), 1.0);
     }
     double outside(const Vec3& p, double reach) const {
+        if (!finite(p)) return 1;
         std::vector<double> weights(slice_.rgb.size());
         const double away = body_.project(p, weights.data(), workspace_).distance;
         return std::min(std::max((away - 1e-3) / reach, 0.0), 1.0);
@@ -65,7 +72,7 @@ void check_matte(const Layout& layout, const Picture& source, const Picture& out
         const double alpha = channels == 4 && !(opaque && in_alpha) ? p[3] : 1.0;
         const double divisor = premultiplied ? alpha : 1.0;
         const Vec3 straight = {p[0] / divisor, p[1] / divisor, p[2] / divisor};
-        const double m = divisor == 0 || !finite(straight) ? 0 : matte(straight);
+        const double m = divisor == 0 || !is_number(straight) ? 0 : matte(straight);
         lowest = std::min(lowest, m);
         highest = std::max(highest, m);
         const float* found = &out[i * channels];
@@ -204,6 +211,27 @@ TEST(what_the_palette_does_not_enclose) {
                     2 * kTolerance / reach);
             }
         }
+    }
+}
+
+TEST(what_is_infinite_is_outside_and_what_is_no_number_is_not) {
+    Ready node;
+    node.set("output", 3);
+    Layout layout;
+    Picture source(layout), output(layout);
+    fill(source);
+    const float infinite = HUGE_VALF, not_a_number = std::nanf("");
+    const float cases[4][3] = {{infinite, 0.5f, 0.5f},
+                               {0.5f, -infinite, infinite},
+                               {not_a_number, 0.5f, 0.5f},
+                               {infinite, not_a_number, 0.5f}};
+    for (int x = 0; x < 4; ++x) {
+        std::copy_n(cases[x], 3, source.floats(x, 0));
+        source.floats(x, 0)[3] = 1;
+    }
+    CHECK(node.instance->render(0, &source, output, layout.bounds) == kOfxStatOK);
+    for (int x = 0; x < 4; ++x) {
+        for (int c = 0; c < 3; ++c) CHECK(output.floats(x, 0)[c] == (x < 2 ? 1 : 0));
     }
 }
 
