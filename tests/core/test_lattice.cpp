@@ -1,7 +1,10 @@
 #include "palette4d/lattice.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cstring>
 #include <memory>
+#include <set>
 #include <stdexcept>
 #include <thread>
 
@@ -98,7 +101,7 @@ TEST(pictures_are_within_the_tolerance_of_the_exact_ones) {
         }
         CHECK(lattice.largest_error() > 0 && lattice.largest_error() <= Lattice::kTolerance);
         const Lattice::Size size = lattice.size();
-        CHECK(size.cells > 0 && size.cut <= size.cells);
+        CHECK(size.cells > 0 && size.cut <= 9 * size.cells);
         CHECK(size.parts == 8 * size.cut && size.exact <= size.parts);
     }
     // Both ways were taken, the fast one by most.
@@ -160,6 +163,43 @@ TEST(colours_beside_a_face_in_a_plane_of_nodes_are_within_the_tolerance) {
         recolourer->apply(image.in(), expected.out(), {});
         Lattice(recolourer).apply(image.in(), found.out(), {});
         CHECK(difference(found, expected) <= Lattice::kTolerance);
+    }
+}
+
+TEST(parts_are_halved_where_there_is_room_for_all_of_the_inside) {
+    for (const double width : {0.5, 1.0}) {
+        Edited palette = edited(cube(), 2);
+        for (std::vector<Vec3>* colours : {&palette.mesh.rgb, &palette.colours}) {
+            for (Vec3& colour : *colours) {
+                for (double& channel : colour) channel = 0.25 + width * channel;
+            }
+        }
+        // Beside an edge, over the length of some cells.
+        Image image(600, 200, 3);
+        Random random(3);
+        const double cell = std::max(1.0, 0.25 + width) / 63.8;
+        std::set<std::array<int, 3>> cells;
+        for (std::size_t i = 0; i < image.data.size(); i += 3) {
+            const Vec3 place = random.colour();
+            const Vec3 colour = {0.3 + 0.1 * place[0], 0.25 + 0.01 * place[1],
+                                 0.25 + 0.01 * place[2]};
+            std::array<int, 3> in_cell;
+            for (std::size_t c = 0; c < 3; ++c) {
+                image.data[i + c] = static_cast<float>(colour[c]);
+                in_cell[c] = static_cast<int>(colour[c] / cell + 4.1);
+            }
+            cells.insert(in_cell);
+        }
+        const auto recolourer = palette.recolourer();
+        const Lattice lattice(recolourer);
+        Image expected(600, 200, 3), found(600, 200, 3);
+        recolourer->apply(image.in(), expected.out(), {});
+        lattice.apply(image.in(), found.out(), {});
+        CHECK(difference(found, expected) <= Lattice::kTolerance);
+        // A cube of half the width has some 32^3 cells, of the whole some 50^3: too many.
+        const auto asked_for = static_cast<long long>(cells.size());
+        CHECK(asked_for < 40 && lattice.size().cut > 0);
+        CHECK((lattice.size().cut > asked_for) == (width < 1));
     }
 }
 

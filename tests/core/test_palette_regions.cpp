@@ -124,6 +124,31 @@ TEST(colours_of_a_box_are_in_the_regions_that_are_said_of_it) {
     CHECK(inside > 1000 && whole > 1000 && split > 300 && by_edges > 30 && several > 10);
 }
 
+TEST(no_more_boxes_of_a_grid_have_some_of_the_inside_than_is_said) {
+    Random random(4);
+    std::uint64_t palette = 0;
+    for (const Mesh& mesh : convex_meshes(random)) {
+        const auto regions = Subject(mesh, palette++).regions();
+        CHECK(regions != nullptr);
+        constexpr float kLow[3] = {-0.13f, -0.11f, -0.12f};
+        for (const auto& [width, side] : {std::pair{8.0f, 40}, {2.5f, 31}}) {  // it cuts some off
+            std::size_t found = 0;
+            for (int box = 0; box < side * side * side; ++box) {
+                const int place[3] = {box / side / side, box / side % side, box % side};
+                float centre[3];
+                for (int c = 0; c < 3; ++c) {
+                    centre[c] = kLow[c] + (static_cast<float>(place[c]) + 0.5f) * width * kUnit[c];
+                }
+                found += regions->within(centre, width / 2).inside;
+            }
+            const std::size_t said = regions->most_inside(kLow, width, side);
+            CHECK(found <= said);
+            // Those near sharp edges as well that no wall tells to be outside.
+            CHECK(said <= found + found / 10 + 200);
+        }
+    }
+}
+
 TEST(there_are_none_where_they_would_not_hold) {
     CHECK(Subject(tetrahedron(), 1).regions() != nullptr);
     CHECK(Subject(dented_cube(), 2).regions() == nullptr);

@@ -94,6 +94,15 @@ PaletteRegions::Within Lattice::Store::Builder::within(const LatticePlace& place
     return store_.regions_->within(centre.at, half, start);
 }
 
+PaletteRegions::Within Lattice::Store::Builder::within_part(int brick,
+                                                            const LatticePlace& place) const {
+    const PaletteRegions::Within found =
+        within(place, store_.bricks_[brick].half / 2, PaletteRegions::kInside);
+    // Without nodes nothing is interpolated, should a rounding find some of the inside after all.
+    if (brick >= kLatticeBricks && found.inside) return {PaletteRegions::kSeveral, -1, false};
+    return found;
+}
+
 /// False where none of its cells is interpolated, nor cut.
 bool Lattice::Store::Builder::find_regions(Group& group) const {
     const Cell cell = cell_at(group.number);
@@ -223,9 +232,12 @@ void Lattice::Store::Builder::make_jobs() {
     to_cut_.clear();
     middles_.clear();
     long long exact = 0;
+    const auto is_last = [&](const Job& job) {
+        return job.half <= store_.finest_half_ || (!job.is_cell() && !job.within.inside);
+    };
     const auto needs_no_nodes = [&](const Job& job) {
         if (job.within.region != PaletteRegions::kSeveral) return false;
-        if (job.number >= kLatticeCells) {
+        if (is_last(job)) {
             ++exact;
             publish(job.number, kExact);
             return true;
@@ -239,10 +251,10 @@ void Lattice::Store::Builder::make_jobs() {
     const float most = store_.regions_ ? kMostSmooth : kMostCreased;
     for (const Job& job : jobs_) {
         const float error = error_of(job, moved);
-        const bool last = job.number >= kLatticeCells;
-        const bool good = job.within.region != PaletteRegions::kSeveral &&
-                          (job.within.edge ? last && error <= kMostAtEdge : error <= most);
-        if (good || last) {
+        const bool good =
+            job.within.region != PaletteRegions::kSeveral &&
+            (job.within.edge ? !job.is_cell() && error <= kMostAtEdge : error <= most);
+        if (good || is_last(job)) {
             if (good) largest = std::max(largest, error);
             exact += !good;
             publish(job.number, state_of(job.within, good));
@@ -272,18 +284,19 @@ Lattice::Store::Builder::Job Lattice::Store::Builder::job_of(int number) const {
                 kNodeSide,
                 within(place_of(cell), kCellWidth / 2, PaletteRegions::kInside)};
     }
-    const int brick = (number - kLatticeFirstPart) / kBrickParts;
+    const int number_of_brick = (number - kLatticeFirstPart) / kBrickParts;
     const int part = (number - kLatticeFirstPart) % kBrickParts;
-    LatticePlace place = store_.bricks_[brick];
-    for (int c = 0; c < 3; ++c) place.at[c] += static_cast<float>(bit(part, c)) * kCellWidth / 2;
-    const int first = kLatticeFirstBrick + brick * kBrickNodes;
+    const LatticeBrick& brick = store_.bricks_[number_of_brick];
+    LatticePlace place = brick.place;
+    for (int c = 0; c < 3; ++c) place.at[c] += static_cast<float>(bit(part, c)) * brick.half;
+    const int first = kLatticeFirstBrick + number_of_brick * kBrickNodes;
     return {place,
-            kCellWidth / 4,
+            brick.half / 2,
             number,
             first + bit(part, 0) * 9 + bit(part, 1) * 3 + bit(part, 2),
             9,
             3,
-            within(place, kCellWidth / 4, PaletteRegions::kInside)};
+            within_part(number_of_brick, place)};
 }
 
 const float* Lattice::Store::Builder::probe(const std::vector<Job>& jobs, std::size_t first,
@@ -327,14 +340,15 @@ float Lattice::Store::Builder::error_of(const Job& job, const float* moved) cons
 }
 
 void Lattice::Store::Builder::cut(const Job& job, const float* middles, const float* edges) {
-    const std::int32_t brick = store_.cut_++;
-    store_.bricks_[brick] = job.place;
-    float* const nodes = store_.node(kLatticeFirstBrick + brick * kBrickNodes);
-    for (int k = 0; middles && k < 8; ++k) {
+    const bool empty = !middles;
+    const std::int32_t brick = empty ? kLatticeBricks + store_.cut_empty_++ : store_.cut_++;
+    store_.bricks_[brick] = {job.place, job.half};
+    float* const nodes = empty ? nullptr : store_.node(kLatticeFirstBrick + brick * kBrickNodes);
+    for (int k = 0; !empty && k < 8; ++k) {
         const int node = 18 * bit(k, 0) + 6 * bit(k, 1) + 2 * bit(k, 2);
         std::copy_n(store_.node(job.corner(k)), 4, nodes + 4 * node);
     }
-    for (std::size_t p = 0; middles && p < Probes::kAll; ++p) {
+    for (std::size_t p = 0; !empty && p < Probes::kAll; ++p) {
         const float* const moved =
             p < Probes::kMiddles ? middles + 3 * p : edges + 3 * (p - Probes::kMiddles);
         std::copy_n(moved, 3, nodes + 4 * kProbes.all[p].node);
@@ -343,8 +357,7 @@ void Lattice::Store::Builder::cut(const Job& job, const float* middles, const fl
     for (int part = 0; part < kBrickParts; ++part) {
         LatticePlace place = job.place;
         for (int c = 0; c < 3; ++c) place.at[c] += static_cast<float>(bit(part, c)) * job.half;
-        parts[static_cast<std::size_t>(part)] =
-            within(place, job.half / 2, PaletteRegions::kInside);
+        parts[static_cast<std::size_t>(part)] = within_part(brick, place);
     }
     std::int32_t states[kBrickParts];
     judge(job.place, job.half, [&](int n) { return nodes + 4 * n; }, parts, states);

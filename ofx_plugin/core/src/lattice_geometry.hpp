@@ -12,7 +12,6 @@ namespace palette4d {
 namespace {
 
 constexpr int kSide = kLatticeSide, kNodeSide = kSide + 1;
-constexpr float kCellWidth = 4;  ///< in half widths of a part
 
 /// Of one of the eight corners or parts of something, along an axis: number 4 x + 2 y + z.
 constexpr int bit(int corner, int axis) { return corner >> (2 - axis) & 1; }

@@ -7,10 +7,12 @@
 
 namespace palette4d {
 
-/// A cube of cells spans the domain. One that is too coarse is cut in half along each axis. Nodes
-/// in memory: those of the cells, one that is always 0, four for each region of the palette's
-/// surface, then those of each cut cell (a brick). Cells, parts and nodes are numbered with blue
-/// running fastest; the number of a part is its brick's, counted from the cells on.
+/// A cube of cells spans the domain. One that is too coarse is cut in half along each axis (into a
+/// brick of parts), and so are, for some palettes, parts. Nodes in memory: those of the cells, one
+/// that is always 0, four for each region of the palette's surface, then those of each brick.
+/// Cells, parts and nodes are numbered with blue running fastest; the number of a part is its
+/// brick's, counted from the cells on. Bricks that have no nodes, since nothing is interpolated in
+/// them, follow all that have.
 constexpr int kLatticeSide = 72;  ///< cells along each axis
 constexpr int kLatticeCells = kLatticeSide * kLatticeSide * kLatticeSide;
 constexpr int kLatticeNodes = (kLatticeSide + 1) * (kLatticeSide + 1) * (kLatticeSide + 1);
@@ -20,6 +22,8 @@ constexpr int kLatticeMostRegions = 256;
 constexpr int kLatticeFirstBrick = kLatticeFirstRegion + 4 * kLatticeMostRegions;
 constexpr int kBrickParts = 8;
 constexpr int kBrickNodes = 27;
+constexpr int kLatticeBricks = ((1 << 24) - kLatticeFirstBrick) / kBrickNodes;  ///< floats count
+static_assert(kLatticeBricks >= kLatticeCells, "each cell may be cut");
 /// Numbers: the cells, what lies outside of the domain, the parts.
 constexpr int kLatticeOutside = kLatticeCells;
 constexpr int kLatticeFirstPart = kLatticeCells + 1;

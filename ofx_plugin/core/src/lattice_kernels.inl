@@ -65,7 +65,8 @@ void locate(const LatticeDomain& domain, LatticeBlock& block, const float* from,
 
 void descend(LatticeBlock& block, int count) {
     constexpr float kFirst = palette4d::kLatticeFirstPart, kParts = palette4d::kBrickParts,
-                    kFirstNode = palette4d::kLatticeFirstBrick, kNodes = palette4d::kBrickNodes;
+                    kFirstNode = palette4d::kLatticeFirstBrick, kNodes = palette4d::kBrickNodes,
+                    kLastBrick = palette4d::kLatticeBricks - 1;
     const Lanes<float> zero = all(0.0f), one = all(1.0f), two = all(2.0f), three = all(3.0f);
     for (int at = 0; at < count; at += Lanes<float>::kCount) {
         const Lanes<float> brick = zero - one - load_whole(block.state + at);
@@ -80,8 +81,9 @@ void descend(LatticeBlock& block, int count) {
                            node = (half[0] * three + half[1]) * three + half[2];
         store_whole(block.number + at, select(cut, all(kFirst) + all(kParts) * brick + part,
                                               load_whole(block.number + at)));
-        store(block.first + at,
-              select(cut, all(kFirstNode) + all(kNodes) * brick + node, load(block.first + at)));
+        // Of bricks without nodes none is asked for; this one is there, whatever it holds.
+        const Lanes<float> nodes = all(kFirstNode) + all(kNodes) * min(brick, all(kLastBrick));
+        store(block.first + at, select(cut, nodes + node, load(block.first + at)));
         store(block.cut + at, select(cut, one, load(block.cut + at)));
     }
 }

@@ -11,10 +11,10 @@ namespace {
 
 [[maybe_unused]] constexpr std::size_t kHugePage = 2 << 20;
 constexpr std::size_t kMostNodes =
-    kLatticeFirstBrick + static_cast<std::size_t>(kLatticeCells) * kBrickNodes;
-constexpr std::size_t kMostStates =
-    kLatticeFirstPart + static_cast<std::size_t>(kLatticeCells) * kBrickParts;
-static_assert(kMostNodes < 1 << 24 && kMostStates < 1 << 24, "floats count nodes and parts");
+    kLatticeFirstBrick + static_cast<std::size_t>(kLatticeBricks) * kBrickNodes;
+constexpr std::size_t kMostBricks = kLatticeBricks + kLatticeCells;
+constexpr std::size_t kMostStates = kLatticeFirstPart + kMostBricks * kBrickParts;
+static_assert(kMostNodes <= 1 << 24 && kMostStates <= 1 << 24, "floats count nodes and parts");
 static_assert(PaletteRegions::kMostRegions <= kLatticeMostRegions, "their nodes have room");
 
 /// For what filters and codecs add; so many cells that no node, not even a brick's, lies at 0 or 1:
@@ -49,12 +49,13 @@ Lattice::Store::Store(const Recolourer& recolourer)
     : recolourer_(recolourer),
       low_{},
       step_{},
-      memory_(kMostNodes * 4 * sizeof(float) + kLatticeCells * sizeof(LatticePlace) +
+      memory_(kMostNodes * 4 * sizeof(float) + kMostBricks * sizeof(LatticeBrick) +
               kMostStates * sizeof(State) + kLatticeNodes),
       nodes_(memory_.take<float>(4 * kMostNodes)),
-      bricks_(memory_.take<LatticePlace>(kLatticeCells)),
+      bricks_(memory_.take<LatticeBrick>(kMostBricks)),
       states_(memory_.take<State>(kMostStates)),
-      node_states_(memory_.take<std::atomic<std::uint8_t>>(kLatticeNodes)) {
+      node_states_(memory_.take<std::atomic<std::uint8_t>>(kLatticeNodes)),
+      finest_half_(kPartWidth / 2) {
     state(kLatticeOutside) = kExact;
     double farthest = 0;
     for (std::size_t c = 0; c < 3; ++c) {
@@ -69,11 +70,16 @@ Lattice::Store::Store(const Recolourer& recolourer)
         const double width = high - low + 2 * margin;
         domain_.scale[c] = static_cast<float>(kLatticeSide / width);
         low_[c] = domain_.low[c];
-        step_[c] = static_cast<float>(width / (4 * kLatticeSide));
+        step_[c] = static_cast<float>(width / (static_cast<double>(kCellWidth) * kLatticeSide));
         farthest = std::max({farthest, -low + margin, high + margin});
     }
     regions_ = PaletteRegions::of(recolourer.body(), recolourer.displacement(), step_, farthest);
-    if (regions_) add_regions();
+    if (!regions_) return;
+    add_regions();
+    // Parts are cut too where all those of the inside could be: that depends on the palette alone,
+    // never on what pictures have asked for.
+    const std::size_t most = regions_->most_inside(low_, kCellWidth, kLatticeSide);
+    if (most * (1 + kBrickParts) <= kLatticeBricks) finest_half_ = kPartWidth / 4;
 }
 
 void Lattice::Store::add_regions() {
@@ -110,7 +116,7 @@ void Lattice::Store::saw_error(double error) {
 }
 
 Lattice::Size Lattice::Store::size() const {
-    const long long cut = cut_;
+    const long long cut = cut_ + cut_empty_;
     return {cells_, cut, kBrickParts * cut, exact_, colours_};
 }
 

@@ -48,9 +48,16 @@ inline double lattice_error(double colour, double displacement, double error) {
     return std::abs(error) / size;
 }
 
-/// In half widths of a part; the last is 0.
+/// In quarters of a cell, so that nodes lie at whole numbers, or half ones; the last is 0.
 struct LatticePlace {
     float at[4];
+};
+constexpr float kCellWidth = 4, kPartWidth = kCellWidth / 2;
+
+/// Of what is cut: where it is, and half of its width, which is that of its parts.
+struct LatticeBrick {
+    LatticePlace place;
+    float half;
 };
 
 class Lattice::Store {
@@ -85,13 +92,14 @@ private:
     std::unique_ptr<const PaletteRegions> regions_;
     std::vector<LatticePlane> planes_;  ///< between them; then all again, with an exact inside
     LatticeDomain domain_;
-    float low_[4], step_[4];  ///< of the domain; half of a part's width
+    float low_[4], step_[4];  ///< of the domain; a quarter of a cell
     Zeros memory_;
-    float* const nodes_;          ///< 4 numbers each
-    LatticePlace* const bricks_;  ///< where they are
+    float* const nodes_;  ///< 4 numbers each
+    LatticeBrick* const bricks_;
     State* const states_;
     std::atomic<std::uint8_t>* const node_states_;  ///< of the cells; a brick is made in one piece
-    std::atomic<std::int32_t> cut_{0};
+    float finest_half_;                             ///< of the width of what is not cut any more
+    std::atomic<std::int32_t> cut_{0}, cut_empty_{0};  ///< bricks with nodes, and without
     std::atomic<long long> cells_{0}, exact_{0}, colours_{0};
     std::atomic<double> largest_error_{0};
 };
@@ -117,6 +125,7 @@ private:
         float half;  ///< of its width
         int number, node, step_x, step_y;
         PaletteRegions::Within within;
+        bool is_cell() const { return number < kLatticeCells; }
         int corner(int k) const {
             return node + (k >> 2) * step_x + (k >> 1 & 1) * step_y + (k & 1);
         }
@@ -130,6 +139,7 @@ private:
 
     void make_groups();
     PaletteRegions::Within within(const LatticePlace& place, float half, int start) const;
+    PaletteRegions::Within within_part(int brick, const LatticePlace& place) const;
     bool find_regions(Group& group) const;
     void take_nodes(int group);
     void publish_group(const Group& group);

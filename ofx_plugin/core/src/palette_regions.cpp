@@ -184,6 +184,14 @@ bool PaletteRegions::alike(int a, int b, const float* centre, float half_width) 
     return true;
 }
 
+bool PaletteRegions::touches_inside(const float* centre, float half_width) const {
+    const Rooms rooms(walls_[kInside], centre, half_width);
+    for (std::size_t i = 0; i < rooms.count; ++i) {
+        if (rooms.centre[i] + rooms.box[i] < 0) return false;
+    }
+    return true;
+}
+
 /// Adds the regions that the box touches, `region` and from it on; false where they are too many.
 bool PaletteRegions::find(int region, const float* centre, float half_width, Found& found) const {
     const Walls& walls = walls_[index(region)];
@@ -230,6 +238,40 @@ PaletteRegions::Around PaletteRegions::around(const float* centre, float half_wi
     return {kSeveral, 0, 0};
 }
 
+std::size_t PaletteRegions::most_inside(const float* low, float width, int side) const {
+    // A row of boxes along blue goes behind each of the inside's walls once, so that those which
+    // are behind none follow each other.
+    const Walls& walls = walls_[kInside];
+    const double half = width / 2;
+    constexpr double kSlack = 1e-3;  // of a box, for what single precision rounds
+    std::size_t most = 0;
+    for (int x = 0; x < side; ++x) {
+        const double red = low[0] + (2 * x + 1) * half * unit_[0];
+        for (int y = 0; y < side; ++y) {
+            const double green = low[1] + (2 * y + 1) * half * unit_[1];
+            double first = 0, last = side - 1;
+            for (std::size_t i = 0; i < walls.offset.size(); ++i) {
+                const double blue = low[2] + half * unit_[2];
+                const double room = walls.normal[0][i] * red + walls.normal[1][i] * green +
+                                    walls.normal[2][i] * blue - walls.offset[i] +
+                                    half * walls.reach[i];
+                const double step = walls.normal[2][i] * width * unit_[2];
+                const double slack = kSlack * half * walls.reach[i];
+                if (step > 0) {
+                    first = std::max(first, -(room + slack) / step);
+                } else if (step < 0) {
+                    last = std::min(last, -(room + slack) / step);
+                } else if (room + slack < 0) {
+                    last = -1;
+                }
+            }
+            most +=
+                static_cast<std::size_t>(std::max(0.0, std::floor(last) - std::ceil(first) + 1));
+        }
+    }
+    return most;
+}
+
 bool PaletteRegions::within_two(int region, int other, const float* centre,
                                 float half_width) const {
     const Walls& walls = walls_[index(other)];
@@ -242,18 +284,20 @@ bool PaletteRegions::within_two(int region, int other, const float* centre,
 
 PaletteRegions::Within PaletteRegions::within(const float* centre, float half_width,
                                               int start) const {
-    const auto [region, crossings, crossed] = around(centre, half_width, start);
-    if (region == kSeveral) return {kSeveral, -1, true};
-    if (crossings == 0) return {region, -1, region == kInside};
+    const Around at_centre = around(centre, half_width, start);
+    const int region = at_centre.region;
+    if (region == kSeveral) return {kSeveral, -1, touches_inside(centre, half_width)};
+    if (at_centre.crossings == 0) return {region, -1, region == kInside};
     const Walls& walls = walls_[index(region)];
     Found found;
     // The most frequent ones need no search.
-    if (crossings == 1 && within_two(region, walls.beyond[crossed], centre, half_width)) {
+    const int beyond_one = walls.beyond[at_centre.crossed];
+    if (at_centre.crossings == 1 && within_two(region, beyond_one, centre, half_width)) {
         found.count = 2;
         found.regions[0] = region;
-        found.regions[1] = walls.beyond[crossed];
+        found.regions[1] = beyond_one;
     } else if (!find(region, centre, half_width, found)) {
-        return {kSeveral, -1, true};
+        return {kSeveral, -1, touches_inside(centre, half_width)};
     }
     const bool inside = found.has(kInside);
     const Within neither{kSeveral, -1, inside};

@@ -26,9 +26,10 @@ struct LatticeCounts {
 /// every side. It is made while it is used: of its 72^3 cells only those that pixels lie in, eight
 /// (2 x 2 x 2) at a time. Where these tell by their 27 nodes that the interpolation in one is good,
 /// it is. Others are looked at in seven more points that are evaluated exactly, and those that err
-/// by too much are halved along each axis. Their parts are treated alike; parts that are not good
-/// enough, and all that lies outside, are recoloured exactly. What a cell holds depends on the
-/// palette and the edit only. Used by many threads at a time.
+/// by too much are halved along each axis. Their parts are treated alike; those of convex palettes
+/// of no more than a sixth of the lattice are halved once more. Parts that are not good enough, and
+/// all that lies outside, are recoloured exactly. What a cell holds depends on the palette and the
+/// edit only. Used by many threads at a time.
 ///
 /// Where the palette is convex (PaletteRegions), colours outside of it are not interpolated: their
 /// displacement is an affine function of them, region by region. Nodes are then the inside's mean
@@ -62,7 +63,7 @@ public:
     /// What the lattice holds at the moment.
     struct Size {
         long long cells = 0;    ///< made
-        long long cut = 0;      ///< those of them that were halved
+        long long cut = 0;      ///< cells and parts that were halved
         long long parts = 0;    ///< of these
         long long exact = 0;    ///< parts that are not good enough, among those in use
         long long colours = 0;  ///< evaluated exactly for all this

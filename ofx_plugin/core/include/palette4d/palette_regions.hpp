@@ -57,6 +57,10 @@ public:
     };
     Around around(const float* centre, float half_width, int start) const;
 
+    /// At least as many of the boxes of a grid, `side` along each axis, `width` wide and from `low`
+    /// on, as within() says have some of the inside.
+    std::size_t most_inside(const float* low, float width, int side) const;
+
 private:
     /// Of one region, a number each.
     struct Walls {
@@ -75,6 +79,7 @@ private:
     void add_walls(const float* unit);
     bool precise(double size) const;
     bool alike(int a, int b, const float* centre, float half_width) const;
+    bool touches_inside(const float* centre, float half_width) const;
     bool within_two(int region, int other, const float* centre, float half_width) const;
     bool find(int region, const float* centre, float half_width, Found& found) const;
 
