@@ -1,6 +1,8 @@
 // strict_host render BUNDLE SIDECAR --frame T --width W --height H [options] IN.raw OUT.raw
 // One picture through the node, for tests in other languages. Raw files hold rows of interleaved
 // pixels without gaps: float32 of this machine or bytes.
+// strict_host describe BUNDLE
+// The node's parameters as it describes them, a JSON object of names.
 #include <cstring>
 #include <exception>
 #include <fstream>
@@ -8,13 +10,15 @@
 #include <map>
 #include <stdexcept>
 
+#include "describe_json.hpp"
 #include "palette4d/sidecar.hpp"
 #include "strict_host.hpp"
 
 namespace {
 
 constexpr const char* kUsage =
-    "usage: strict_host render BUNDLE SIDECAR [options] IN.raw OUT.raw\n"
+    "usage: strict_host describe BUNDLE\n"
+    "       strict_host render BUNDLE SIDECAR [options] IN.raw OUT.raw\n"
     "  --width W --height H     size of the picture\n"
     "  --frame T                frame of the sidecar (or --time T: the host's, 0 at the clip's "
     "first)\n"
@@ -30,7 +34,8 @@ constexpr const char* kUsage =
     "  --tile N                 render in tiles of N x N pixels (the whole picture at once)\n"
     "  --processors N           of the host (4)\n"
     "  --context Filter|General (Filter)\n"
-    "prints the status line, and the persistent message if there is one; exit status 3: faults\n";
+    "describe prints the parameters as JSON; render prints the status line, and the persistent\n"
+    "message if there is one; exit status 3: faults\n";
 
 using Options = std::map<std::string, std::string>;
 using Settings = std::vector<std::string>;
@@ -62,6 +67,24 @@ void set(strict::Instance& instance, const std::string& setting) {
     } else {
         instance.set(name, value);
     }
+}
+
+/// Says what the plugin has done wrong; whether it has.
+bool faulty() {
+    const std::vector<std::string> faults = strict::Host::get().take_faults();
+    for (const std::string& fault : faults) std::cerr << "fault: " << fault << "\n";
+    return !faults.empty();
+}
+
+int describe(const std::string& bundle) {
+    strict::Host::get().configure({});
+    strict::Plugin plugin(bundle);
+    plugin.load();
+    const auto descriptor = plugin.describe(kOfxImageEffectContextFilter);
+    plugin.unload();
+    if (!descriptor) throw std::runtime_error(bundle + ": the plugin does not describe itself");
+    std::cout << strict::described_json(*descriptor) << "\n";
+    return faulty() ? 3 : 0;
 }
 
 int render(const std::vector<std::string>& names, const Options& options,
@@ -133,10 +156,8 @@ int render(const std::vector<std::string>& names, const Options& options,
     file.write(reinterpret_cast<const char*>(result.data()),
                static_cast<std::streamsize>(result.size()));
     if (!file.flush()) throw std::runtime_error(names[3] + ": cannot be written");
-    const std::vector<std::string> faults = strict::Host::get().take_faults();
-    for (const std::string& fault : faults) std::cerr << "fault: " << fault << "\n";
     if (failed) std::cerr << "the render failed\n";
-    return faults.empty() ? failed : 3;
+    return faulty() ? 3 : failed;
 }
 
 }  // namespace
@@ -155,11 +176,13 @@ int main(int argc, char** argv) {
             names.emplace_back(argv[i]);
         }
     }
-    if (argc < 2 || std::strcmp(argv[1], "render") != 0 || names.size() != 4) {
+    const std::string verb = argc < 2 ? "" : argv[1];
+    if (!(verb == "render" && names.size() == 4) && !(verb == "describe" && names.size() == 1)) {
         std::cerr << kUsage;
         return 2;
     }
     try {
+        if (verb == "describe") return describe(names[0]);
         return render(names, options, settings);
     } catch (const std::exception& error) {
         std::cerr << "strict_host: " << error.what() << "\n";

@@ -1,7 +1,8 @@
-"""Pictures through the node in the strict host, each in a process of its own."""
+"""The node in the strict host: its description, and pictures, each in a process of its own."""
 
 from __future__ import annotations
 
+import json
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 Picture = NDArray[Any]  # (h, w, 3 or 4) float32 or uint8
+
+
+def described(driver: Path, bundle: Path) -> dict[str, dict[str, Any]]:
+    """The parameters that the node describes, by their names (`describe_json.hpp`)."""
+    done = subprocess.run([driver, "describe", bundle], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    parameters: dict[str, dict[str, Any]] = json.loads(done.stdout)
+    return parameters
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,8 @@
 """The verb `install-plugin`: puts the OpenFX bundle where hosts look for it.
 
 The bundle lies inside the package (`palette4d/_ofx`). It is copied beside its destination first and
-then renamed into place, so that a host never scans half a bundle.
+then renamed into place, so that a host never scans half a bundle. For Kdenlive and Shotcut the
+verb also writes the files that let them show the node's parameters (`palette4d.host_ui`).
 """
 
 from __future__ import annotations
@@ -14,8 +15,10 @@ import sys
 import tempfile
 from importlib import resources
 from pathlib import Path
+from typing import Literal
 
 from palette4d.errors import Palette4dError
+from palette4d.host_ui.install import data_folder, install_kdenlive, install_shotcut
 
 BUNDLE = "Palette4D.ofx.bundle"
 
@@ -24,7 +27,21 @@ examples:
   sudo palette4d install-plugin                   for every user, where all hosts look
   palette4d install-plugin --dest ~/OFX           for yourself; then export OFX_PLUGIN_PATH=~/OFX
   palette4d install-plugin --dest ~/OFX --link    follows this installation when it is upgraded
+  palette4d install-plugin --dest ~/OFX --kdenlive --shotcut
+                                                  the node, and files for these two programs
+  palette4d install-plugin --kdenlive             that file alone, in ~/.local/share (or where
+                                                  XDG_DATA_HOME says); not with sudo
+
+Without its file Kdenlive has no way to choose a sidecar, and its choices do nothing. Without its
+filter Shotcut has to be started with --experimental, and the sidecar's path has to be typed; with
+it or without, Settings > Allow External Plugins must be on.
 """
+
+_KDENLIVE_NOTE = """\
+Restart Kdenlive; the effect is 'Palette4D', in the group Misc."""
+
+_SHOTCUT_NOTE = """\
+Restart Shotcut with Settings > Allow External Plugins on; the filter is 'Palette4D'."""
 
 
 def default_destination(platform: str = sys.platform) -> Path:
@@ -158,14 +175,38 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help=f"folder of plugins (default here: {default_destination()})",
     )
     parser.add_argument("--link", action="store_true", help="make a symbolic link, not a copy")
+    for program, what in (("kdenlive", "effect file"), ("shotcut", "filter")):
+        parser.add_argument(
+            f"--{program}",
+            nargs="?",
+            type=Path,
+            const=True,
+            metavar="DIR",
+            help=f"write {program.capitalize()}'s {what}, into DIR or where the program looks for "
+            "your own; without --dest, the node itself is not installed",
+        )
     parser.add_argument(
-        "--force", action="store_true", help="replace whatever has the bundle's name there"
+        "--force", action="store_true", help="replace whatever has these names there"
     )
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Install, and say what to do in the host."""
+    if args.dest or not (args.kdenlive or args.shotcut):
+        _install_node(args)
+    elif args.link:
+        raise Palette4dError("--link is for the node; add --dest DIR, or leave it out")
+    if args.kdenlive:
+        folder = _program_folder(args.kdenlive, "kdenlive")
+        _tell(install_kdenlive(folder, force=args.force), _KDENLIVE_NOTE)
+    if args.shotcut:
+        folder = _program_folder(args.shotcut, "shotcut")
+        _tell(install_shotcut(folder, force=args.force), _SHOTCUT_NOTE)
+    return 0
+
+
+def _install_node(args: argparse.Namespace) -> None:
     standard = default_destination()
     destination = args.dest.expanduser().absolute() if args.dest else standard
     target = install(find_bundle(), destination, link=args.link, force=args.force)
@@ -176,4 +217,14 @@ def run(args: argparse.Namespace) -> int:
         "Restart the host (DaVinci Resolve, Nuke, Natron, Fusion, Kdenlive, …), add the node\n"
         "'Palette4D' (group Color) and choose a sidecar made by 'palette4d analyze'."
     )
-    return 0
+
+
+def _program_folder(given: Path | Literal[True], program: str) -> Path:
+    """The folder that was named, or the program's own where none was."""
+    return data_folder(program) if given is True else given.expanduser().absolute()
+
+
+def _tell(written: list[Path], note: str) -> None:
+    for path in written:
+        print(f"installed {path}")
+    print(note)
