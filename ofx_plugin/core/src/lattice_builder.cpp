@@ -13,6 +13,9 @@ namespace {
 /// it bends most between the probes; and what going on beyond the surface may be off.
 constexpr float kMostSmooth = 0.0012f, kMostSmoothInLine = 2.0f * kMostSmooth,
                 kMostAtEdge = 0.0004f, kMostBeyond = 0.0003f;
+/// What is off by no more than so much of that at the middles is good. Else the middles of the
+/// edges are looked at as well, where it may be off by half as much again.
+constexpr float kSurely = 0.75f;
 /// Elsewhere a crease may lie between the probes. Between three nodes in a line an interpolation is
 /// better than across all three: an error that is smooth by four times.
 constexpr float kMostCreased = 0.0008f, kMostCreasedInLine = 1.25f * kMostCreased;
@@ -209,9 +212,12 @@ void Lattice::Store::Builder::judge(const LatticePlace& place, float half, const
         farthest = max(farthest, beyond[i]);
     }
     const bool all_good = largest_of(farthest) <= 0;
+    // What was cut bends too much for the lines to tell of one part beside others that are not
+    // good.
+    const bool is_brick = half < kCellWidth;
     for (std::size_t part = 0; part < 8; ++part) {
         bool good = all_good;
-        if (!all_good) {
+        if (!all_good && !is_brick) {
             Four worst = all_four(-1);
             for (const int line : kLines.of_part[part]) worst = max(worst, beyond[line]);
             good = largest_of(worst) <= 0;
@@ -229,7 +235,8 @@ void Lattice::Store::Builder::judge(const LatticePlace& place, float half, const
 
 void Lattice::Store::Builder::make_jobs() {
     constexpr std::size_t kMiddles = Probes::kMiddles, kAll = Probes::kAll;
-    to_cut_.clear();
+    to_look_at_.clear();
+    errors_.clear();
     middles_.clear();
     long long exact = 0;
     const auto is_last = [&](const Job& job) {
@@ -246,30 +253,43 @@ void Lattice::Store::Builder::make_jobs() {
         return !job.within.inside;
     };
     jobs_.erase(std::remove_if(jobs_.begin(), jobs_.end(), needs_no_nodes), jobs_.end());
-    const float* moved = probe(jobs_, 0, kMiddles);
+    const auto most_of = [&](const Job& job) {
+        if (job.within.region == PaletteRegions::kSeveral) return -1.0f;
+        if (job.within.edge) return job.is_cell() ? -1.0f : kMostAtEdge;
+        return store_.regions_ ? kMostSmooth : kMostCreased;
+    };
     float largest = 0;
-    const float most = store_.regions_ ? kMostSmooth : kMostCreased;
+    const auto settle = [&](const Job& job, float error) {
+        const bool good = error <= most_of(job);
+        if (good) largest = std::max(largest, error);
+        exact += !good;
+        publish(job.number, state_of(job.within, good));
+    };
+    const float* moved = probe(jobs_, 0, kMiddles);
     for (const Job& job : jobs_) {
-        const float error = error_of(job, moved);
-        const bool good =
-            job.within.region != PaletteRegions::kSeveral &&
-            (job.within.edge ? !job.is_cell() && error <= kMostAtEdge : error <= most);
-        if (good || is_last(job)) {
-            if (good) largest = std::max(largest, error);
-            exact += !good;
-            publish(job.number, state_of(job.within, good));
+        const float error = error_of(job, moved, 0, kMiddles), most = most_of(job);
+        if (error <= kSurely * most || (error > most && is_last(job))) {
+            settle(job, error);
         } else {
-            to_cut_.push_back(job);
+            to_look_at_.push_back(job);
+            errors_.push_back(error);
             middles_.insert(middles_.end(), moved, moved + 3 * kMiddles);
         }
         moved += 3 * kMiddles;
     }
+    const float* edges = probe(to_look_at_, kMiddles, kAll);
+    for (std::size_t i = 0; i < to_look_at_.size(); ++i) {
+        const Job& job = to_look_at_[i];
+        const float error = std::max(errors_[i], error_of(job, edges, kMiddles, kAll));
+        if (error <= most_of(job) || is_last(job)) {
+            settle(job, error);
+        } else {
+            cut(job, &middles_[3 * kMiddles * i], edges);
+        }
+        edges += 3 * (kAll - kMiddles);
+    }
     store_.saw_error(static_cast<double>(largest));
     store_.exact_ += exact;
-    const float* edges = probe(to_cut_, kMiddles, kAll);
-    for (std::size_t i = 0; i < to_cut_.size(); ++i) {
-        cut(to_cut_[i], &middles_[3 * kMiddles * i], edges + 3 * (kAll - kMiddles) * i);
-    }
     jobs_.clear();
 }
 
@@ -314,8 +334,9 @@ const float* Lattice::Store::Builder::probe(const std::vector<Job>& jobs, std::s
     return node_displacements(colours_.data(), count);
 }
 
-/// At the middles, which have moved so far.
-float Lattice::Store::Builder::error_of(const Job& job, const float* moved) const {
+/// At the probes `first` to `last` - 1, which have moved so far.
+float Lattice::Store::Builder::error_of(const Job& job, const float* moved, std::size_t first,
+                                        std::size_t last) const {
     Four corners[8];
     for (int k = 0; k < 8; ++k) corners[k] = load_four(store_.node(job.corner(k)));
     // How far the corners are from affine, face by face, is seen where no probe is: a quarter of it
@@ -328,7 +349,7 @@ float Lattice::Store::Builder::error_of(const Job& job, const float* moved) cons
     }
     twist = 0.25f * twist;
     Four worst{};
-    for (std::size_t p = 0; p < Probes::kMiddles; ++p, moved += 3) {
+    for (std::size_t p = first; p < last; ++p, moved += 3) {
         const Probes::Probe& probe = kProbes.all[p];
         const Four halves = load_four(kPlaces.at[probe.node]), exact = load_four(moved);
         const Four colour =

@@ -147,7 +147,7 @@ private:
     Job job_of(int number) const;
     /// What the probes `first` to `last` - 1 of jobs have moved.
     const float* probe(const std::vector<Job>& jobs, std::size_t first, std::size_t last);
-    float error_of(const Job& job, const float* moved) const;
+    float error_of(const Job& job, const float* moved, std::size_t first, std::size_t last) const;
     void cut(const Job& job, const float* middles, const float* edges);
     template <class NodeAt>
     void judge(const LatticePlace& place, float half, const NodeAt& node_at, const Parts& within,
@@ -166,8 +166,8 @@ private:
     std::unique_ptr<MeanValueWorker> mean_value_;  ///< where there are regions
     std::vector<Group> groups_;
     std::vector<int> taken_;
-    std::vector<Job> jobs_, to_cut_;
-    std::vector<float> colours_, moved_, middles_;
+    std::vector<Job> jobs_, to_look_at_;
+    std::vector<float> colours_, moved_, errors_, middles_;
 };
 
 }  // namespace palette4d

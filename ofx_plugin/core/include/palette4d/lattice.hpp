@@ -25,11 +25,12 @@ struct LatticeCounts {
 /// The lattice spans the unit cube and the palette's bounding box, and a sixteenth of that more on
 /// every side. It is made while it is used: of its 72^3 cells only those that pixels lie in, eight
 /// (2 x 2 x 2) at a time. Where these tell by their 27 nodes that the interpolation in one is good,
-/// it is. Others are looked at in seven more points that are evaluated exactly, and those that err
-/// by too much are halved along each axis. Their parts are treated alike; those of convex palettes
-/// of no more than a sixth of the lattice are halved once more. Parts that are not good enough, and
-/// all that lies outside, are recoloured exactly. What a cell holds depends on the palette and the
-/// edit only. Used by many threads at a time.
+/// it is. Others are looked at in seven more points that are evaluated exactly, in twelve more
+/// where that does not settle it, and those that err by too much are halved along each axis. Their
+/// parts are treated alike; those of convex palettes of no more than a sixth of the lattice are
+/// halved once more. Parts that are not good enough, and all that lies outside, are recoloured
+/// exactly. What a cell holds depends on the palette and the edit only. Used by many threads at a
+/// time.
 ///
 /// Where the palette is convex (PaletteRegions), colours outside of it are not interpolated: their
 /// displacement is an affine function of them, region by region. Nodes are then the inside's mean
