@@ -13,6 +13,9 @@ CXX ?= g++
 # Passed on to pytest: make test-py PYTEST_ARGS="-k slice -x"
 PYTEST_ARGS ?=
 
+# How long libFuzzer may look: make test-fuzz FUZZ_SECONDS=3600
+FUZZ_SECONDS ?= 60
+
 # An OpenFX SDK whose headers the C++ tests are to be built with: make test OPENFX_ROOT=/path/to/openfx
 OPENFX_ROOT ?=
 
@@ -31,7 +34,8 @@ SOURCES := pyproject.toml README.md LICENSE $(shell find ofx_plugin analysis lut
 CXX_FILES = $(shell find ofx_plugin tests -name '*.cpp' -o -name '*.hpp' -o -name '*.h' -o -name '*.inl')
 
 .PHONY: help demo test install dev wheel lint style types build-cpp build-sanitize build-threads \
-	test-cpp test-sanitize test-threads test-threads-short test-py format clean compiler
+	build-fuzz test-cpp test-sanitize test-threads test-threads-short test-fuzz test-py format clean \
+	compiler fuzz-compiler
 
 help: ## this list
 	@echo "make demo            from nothing to results in demo_output/"
@@ -44,6 +48,7 @@ help: ## this list
 	@echo "make test-cpp        C++ tests, warnings as errors"
 	@echo "make test-sanitize   the same under AddressSanitizer and UndefinedBehaviorSanitizer"
 	@echo "make test-threads    the node's tests in the strict host under ThreadSanitizer (not part of make test)"
+	@echo "make test-fuzz       libFuzzer over the sidecar's reader for FUZZ_SECONDS (needs Clang; not part of make test)"
 	@echo "make test-py         pytest on the wheel in a fresh environment (PYTEST_ARGS=... is passed on)"
 	@echo "make format          rewrite the sources as ruff and clang-format want them"
 	@echo "make clean           remove everything that was built"
@@ -64,6 +69,11 @@ endef
 compiler:
 	@command -v $(firstword $(CXX)) >/dev/null 2>&1 || { \
 		echo "palette4d needs a C++17 compiler: $(CXX) was not found (install g++, or set CXX)" >&2; \
+		exit 1; }
+
+fuzz-compiler:
+	@command -v clang++ >/dev/null 2>&1 || { \
+		echo "libFuzzer is Clang's, and clang++ was not found (Debian: clang and libclang-rt-dev)" >&2; \
 		exit 1; }
 
 $(VENV)/.created:
@@ -144,7 +154,9 @@ define preset
 	@PATH="$(CURDIR)/$(TOOLS)/bin:$$PATH" && export PATH && cd ofx_plugin && $(2) --preset $(1)
 endef
 
-build-cpp build-sanitize build-threads: build-%: $(TOOLS)/.installed compiler
+build-cpp build-sanitize build-threads: compiler
+build-fuzz: fuzz-compiler
+build-cpp build-sanitize build-threads build-fuzz: build-%: $(TOOLS)/.installed
 	@echo "== C++ (preset $(PRESET_$*))"
 	$(call preset,$(PRESET_$*),cmake -DPython_EXECUTABLE="$(CURDIR)/$(TOOLS)/bin/python" \
 		-DOPENFX_ROOT="$(abspath $(OPENFX_ROOT))")
@@ -153,12 +165,21 @@ PRESET_cpp := test
 PRESET_sanitize := sanitize
 PRESET_threads := threads
 PRESET_threads-short := threads-short
+PRESET_fuzz := fuzz
 
 test-threads-short: build-threads
 test-cpp test-sanitize test-threads: test-%: build-%
 test-cpp test-sanitize test-threads test-threads-short: test-%:
 	@echo "== C++ tests (preset $(PRESET_$*))"
 	$(call preset,$(PRESET_$*),ctest)
+
+# What it finds new goes on from run to run in build/fuzz/; a crash leaves its input there.
+test-fuzz: build-fuzz
+	@echo "== libFuzzer, $(FUZZ_SECONDS) s"
+	@mkdir -p build/fuzz/found
+	build/cmake/fuzz/tests/fuzz/fuzz_sidecar -max_total_time=$(FUZZ_SECONDS) -max_len=16384 -timeout=30 \
+		-verbosity=0 -print_final_stats=1 -artifact_prefix=build/fuzz/ \
+		build/fuzz/found tests/fuzz/corpus tests/golden/sidecars
 
 # From a folder of its own, so that no file of the tree can stand in for the installed package.
 # build-cpp: the strict host, which the tests of the packaged node drive.
