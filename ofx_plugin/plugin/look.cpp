@@ -18,6 +18,12 @@ namespace palette4d::plugin {
 
 namespace {
 
+/// One more thing for the user to know.
+void add_note(Look& look, const std::string& note) {
+    if (!look.note.empty() && !note.empty()) look.note += "; ";
+    look.note += note;
+}
+
 /// Prepares what the output asks for. Throws what slicing throws.
 void prepare(Look& look, const Params& params, LoadedSidecar& loaded, double frame, OfxTime time,
              Interpolation interpolation) {
@@ -47,13 +53,17 @@ void prepare(Look& look, const Params& params, LoadedSidecar& loaded, double fra
         return;
     }
     EditsAt edits = edits_at(params, sidecar, time);
-    if (!edits.note.empty()) look.note = std::move(edits.note);
+    add_note(look, edits.note);
     drawing.recolourer = loaded.recolourer_at(frame, edits.edits);
     if (drawing.recolourer->identity() || settings.strength == 0) drawing.recolourer = nullptr;
     if (drawing.recolourer &&
         (interpolation == Interpolation::kAlways ||
          (interpolation == Interpolation::kWithoutConversion && !drawing.conversion))) {
-        drawing.lattice = loaded.lattice_at(frame, edits.edits);
+        try {
+            drawing.lattice = loaded.lattice_at(frame, edits.edits);
+        } catch (const std::bad_alloc&) {
+            add_note(look, "there is no memory for a lattice: computed exactly");
+        }
     }
     if (settings.output == Output::kPalette) {
         std::tie(drawing.original, drawing.edited) = loaded.palette_at(frame, edits.edits);

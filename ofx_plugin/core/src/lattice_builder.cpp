@@ -53,16 +53,17 @@ Lattice::Store::Builder::Builder(Store& store, InstructionSet instructions)
     }
 }
 
+Lattice::Store::Builder::~Builder() { give_up(); }
+
 void Lattice::Store::Builder::claim(int number, std::int32_t state) {
+    // On the list first: what is claimed and on none would be waited for for ever.
     if (state == kUnknown) {  // its group's first cell stands for all
-        const Cell cell = cell_at(number);
-        const int group = number - (cell.x % 2 * kSide + cell.y % 2) * kSide - cell.z % 2;
-        if (store_.state(group).compare_exchange_strong(state, kClaimed))
-            groups_.push_back({group, {}});
+        const int group = group_of(number);
+        groups_.push_back({group, {}});
+        if (!store_.state(group).compare_exchange_strong(state, kClaimed)) groups_.pop_back();
     } else if (state == kSuspect) {
-        if (store_.state(number).compare_exchange_strong(state, kClaimed)) {
-            jobs_.push_back(job_of(number));
-        }
+        jobs_.push_back(job_of(number));
+        if (!store_.state(number).compare_exchange_strong(state, kClaimed)) jobs_.pop_back();
     }
 }
 
@@ -71,23 +72,26 @@ void Lattice::Store::Builder::run() noexcept {
         make_groups();
         make_jobs();
     } catch (...) {
-        // Out of memory: what stays undone is recoloured exactly.
-        for (const int node : taken_) {
-            std::uint8_t taken = kTaken;
-            store_.node_states_[node].compare_exchange_strong(taken, kFailed);
-        }
-        for (const Job& job : jobs_) {
-            std::int32_t claimed = kClaimed;
-            store_.state(job.number).compare_exchange_strong(claimed, kExact);
-        }
-        for (const Group& group : groups_) {
-            for (int part = 0; part < 8; ++part) {
-                publish(group_cell(group.number, part), kExact);
-            }
-        }
+        give_up();  // out of memory
+    }
+}
+
+/// What is claimed and undone is recoloured exactly.
+void Lattice::Store::Builder::give_up() noexcept {
+    for (const int node : taken_) {
+        std::uint8_t taken = kTaken;
+        store_.node_states_[node].compare_exchange_strong(taken, kFailed);
+    }
+    for (const Job& job : jobs_) {
+        std::int32_t claimed = kClaimed;
+        store_.state(job.number).compare_exchange_strong(claimed, kExact);
+    }
+    for (const Group& group : groups_) {
+        for (int part = 0; part < 8; ++part) publish(group_cell(group.number, part), kExact);
     }
     groups_.clear();
     jobs_.clear();
+    taken_.clear();
 }
 
 PaletteRegions::Within Lattice::Store::Builder::within(const LatticePlace& place, float half,
@@ -296,13 +300,18 @@ void Lattice::Store::Builder::make_jobs() {
 Lattice::Store::Builder::Job Lattice::Store::Builder::job_of(int number) const {
     if (number < kLatticeCells) {
         const Cell cell = cell_at(number);
+        // What its group was made by, which has no nodes where it found none of the inside: from
+        // elsewhere, a box that touches a wall may be found on the other side of it.
+        Group group{group_of(number), {}};
+        find_regions(group);
+        const int part = 4 * (cell.x % 2) + 2 * (cell.y % 2) + cell.z % 2;
         return {place_of(cell),
                 kCellWidth / 2,
                 number,
                 cell.first_node(),
                 kNodeSide * kNodeSide,
                 kNodeSide,
-                within(place_of(cell), kCellWidth / 2, PaletteRegions::kInside)};
+                group.within[static_cast<std::size_t>(part)]};
     }
     const int number_of_brick = (number - kLatticeFirstPart) / kBrickParts;
     const int part = (number - kLatticeFirstPart) % kBrickParts;
@@ -363,6 +372,10 @@ float Lattice::Store::Builder::error_of(const Job& job, const float* moved, std:
 void Lattice::Store::Builder::cut(const Job& job, const float* middles, const float* edges) {
     const bool empty = !middles;
     const std::int32_t brick = empty ? kLatticeBricks + store_.cut_empty_++ : store_.cut_++;
+    if (!empty && brick >= kLatticeBricks) {  // never, by most_inside(); but it would be memory
+        publish(job.number, kExact);
+        return;
+    }
     store_.bricks_[brick] = {job.place, job.half};
     float* const nodes = empty ? nullptr : store_.node(kLatticeFirstBrick + brick * kBrickNodes);
     for (int k = 0; !empty && k < 8; ++k) {

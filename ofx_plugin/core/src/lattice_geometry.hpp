@@ -101,6 +101,12 @@ inline int group_cell(int group, int part) {
     return group + (bit(part, 0) * kSide + bit(part, 1)) * kSide + bit(part, 2);
 }
 
+/// Of the group that a cell is in.
+inline int group_of(int number) {
+    const Cell cell = cell_at(number);
+    return number - (cell.x % 2 * kSide + cell.y % 2) * kSide - cell.z % 2;
+}
+
 inline LatticePlace place_of(const Cell& cell) {
     return {{kCellWidth * static_cast<float>(cell.x), kCellWidth * static_cast<float>(cell.y),
              kCellWidth * static_cast<float>(cell.z), 0}};

@@ -48,7 +48,8 @@ inline double lattice_error(double colour, double displacement, double error) {
     return std::abs(error) / size;
 }
 
-/// In quarters of a cell, so that nodes lie at whole numbers, or half ones; the last is 0.
+/// In quarters of a cell, so that nodes lie at whole numbers and probes at half ones at least; the
+/// last is 0.
 struct LatticePlace {
     float at[4];
 };
@@ -108,6 +109,10 @@ private:
 class Lattice::Store::Builder {
 public:
     Builder(Store& store, InstructionSet instructions);
+    /// What was claimed and not made is recoloured exactly.
+    ~Builder();
+    Builder(const Builder&) = delete;
+    Builder& operator=(const Builder&) = delete;
 
     /// To be made by run(): what is unknown or suspect, unless another thread was faster.
     void claim(int number, std::int32_t state);
@@ -137,6 +142,7 @@ private:
         Parts within;  ///< its cells
     };
 
+    void give_up() noexcept;
     void make_groups();
     PaletteRegions::Within within(const LatticePlace& place, float half, int start) const;
     PaletteRegions::Within within_part(int brick, const LatticePlace& place) const;
