@@ -166,6 +166,37 @@ TEST(colours_beside_a_face_in_a_plane_of_nodes_are_within_the_tolerance) {
     }
 }
 
+TEST(beside_a_dent_colours_are_within_the_tolerance) {
+    // Faces that see each other, and beyond them colours that jump from one to the other.
+    Random random(3);
+    for (std::uint64_t seed = 0; seed < 10; ++seed) {
+        Mesh mesh = random_convex(random, 8 + static_cast<int>(seed % 8));
+        Vec3 centre{};
+        for (const Vec3& colour : mesh.rgb) {
+            for (std::size_t c = 0; c < 3; ++c) {
+                centre[c] += colour[c] / static_cast<double>(mesh.rgb.size());
+            }
+        }
+        Vec3& dent = mesh.rgb[seed % mesh.rgb.size()];
+        for (std::size_t c = 0; c < 3; ++c) dent[c] += 0.5 * (centre[c] - dent[c]);
+        Image image(400, 100, 3);
+        for (std::size_t i = 0; i < image.data.size(); i += 3) {
+            const bool near = i % 2 == 0;
+            for (std::size_t c = 0; c < 3; ++c) {
+                const double colour =
+                    near ? dent[c] + random.uniform(-0.08, 0.08) : random.uniform(-0.05, 1.05);
+                image.data[i + c] = static_cast<float>(colour);
+            }
+        }
+        const auto recolourer = edited(mesh, seed).recolourer();
+        Image expected(400, 100, 3), found(400, 100, 3);
+        recolourer->apply(image.in(), expected.out(), {});
+        const Lattice lattice(recolourer);
+        lattice.apply(image.in(), found.out(), {});
+        CHECK(difference(found, expected) <= Lattice::kTolerance);
+    }
+}
+
 TEST(parts_are_halved_where_there_is_room_for_all_of_the_inside) {
     for (const double width : {0.5, 1.0}) {
         Edited palette = edited(cube(), 2);

@@ -221,7 +221,9 @@ int main(int argc, char** argv) {
         for (int i = 3; i < argc; ++i) wanted |= std::strstr(test_case.name, argv[i]) != nullptr;
         if (!wanted) continue;
         ++run;
-        test::g_folder = std::filesystem::u8path(argv[2]) / test_case.name;
+        // Whole: what the node is given and what it says are compared as texts.
+        test::g_folder =
+            std::filesystem::absolute(std::filesystem::u8path(argv[2])) / test_case.name;
         std::filesystem::remove_all(test::g_folder);
         std::filesystem::create_directories(test::g_folder);
         const int before = test::g_failures;

@@ -186,7 +186,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
             "your own; without --dest, the node itself is not installed",
         )
     parser.add_argument(
-        "--force", action="store_true", help="replace whatever has these names there"
+        "--force",
+        action="store_true",
+        help="replace whatever has the bundle's name, or the files' names, there",
     )
     parser.set_defaults(run=run)
 

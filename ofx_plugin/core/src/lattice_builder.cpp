@@ -13,12 +13,12 @@ namespace {
 /// it bends most between the probes; and what going on beyond the surface may be off.
 constexpr float kMostSmooth = 0.0012f, kMostSmoothInLine = 2.0f * kMostSmooth,
                 kMostAtEdge = 0.0004f, kMostBeyond = 0.0003f;
-/// What is off by no more than so much of that at the middles is good. Else the middles of the
-/// edges are looked at as well, where it may be off by half as much again.
+/// What is off by no more than so much of that at the middles of the body and of its faces is good.
+/// Else those of its edges are looked at as well, which may be half as much again.
 constexpr float kSurely = 0.75f;
-/// Elsewhere a crease may lie between the probes. Between three nodes in a line an interpolation is
-/// better than across all three: an error that is smooth by four times.
-constexpr float kMostCreased = 0.0008f, kMostCreasedInLine = 1.25f * kMostCreased;
+/// Elsewhere a crease may lie between the nodes, or a jump beyond a dent: every cell is looked at
+/// itself, in all of these middles.
+constexpr float kMostCreased = 0.0006f;
 
 /// Whether, in one of the eight parts of a cube of 3 x 3 x 3 nodes that have `moved`, the
 /// displacement goes on beyond the plane as below it: above, it is that of four columns.
@@ -187,27 +187,29 @@ void Lattice::Store::Builder::publish_group(const Group& group) {
     store_.cells_ += 8;
 }
 
-/// The states of the eight parts of a cube of 3 x 3 x 3 nodes, `half` of its width apart. A part is
-/// not worse than the whole: along a line, what a crease is off in a half of it is no more than at
-/// its middle, and what is smooth is off by a quarter of that.
+/// The states of the eight parts of a cube of 3 x 3 x 3 nodes, `half` of its width apart. What is
+/// smooth is off in a half of a line by a quarter of what it is off at the line's middle.
 template <class NodeAt>
 void Lattice::Store::Builder::judge(const LatticePlace& place, float half, const NodeAt& node_at,
                                     const Parts& within, std::int32_t* states) const {
-    if (std::none_of(within.begin(), within.end(), [](const auto& one) { return one.inside; })) {
+    const auto judge_alike = [&](bool good) {
         for (std::size_t part = 0; part < 8; ++part) {
-            states[part] = first_state_of(within[part], true);
+            states[part] = first_state_of(within[part], good);
         }
-        return;
+    };
+    if (std::none_of(within.begin(), within.end(), [](const auto& one) { return one.inside; })) {
+        return judge_alike(true);
     }
-    const float most = store_.regions_ ? kMostSmoothInLine : kMostCreasedInLine;
     Four moved[kBrickNodes];
-    for (int n = 0; n < kBrickNodes; ++n) moved[n] = load_four(node_at(n));
+    for (int n = 0; n < kBrickNodes; ++n) moved[n] = load_four(node_at(n));  // waits for some
+    if (!store_.regions_) return judge_alike(false);
     const auto colour_of = [&](int n) {
         return colour_at(store_.low_, store_.step_,
                          load_four(place.at) + half * load_four(kPlaces.at[n]));
     };
     Four allowed[kBrickNodes];
-    for (int n = 0; n < kBrickNodes; ++n) allowed[n] = most * size_of(colour_of(n), moved[n]);
+    for (int n = 0; n < kBrickNodes; ++n)
+        allowed[n] = kMostSmoothInLine * size_of(colour_of(n), moved[n]);
     Four beyond[Lines::kCount], farthest = all_four(-1);
     for (std::size_t i = 0; i < Lines::kCount; ++i) {
         const auto [middle, step] = kLines.all[i];
@@ -272,7 +274,7 @@ void Lattice::Store::Builder::make_jobs() {
     const float* moved = probe(jobs_, 0, kMiddles);
     for (const Job& job : jobs_) {
         const float error = error_of(job, moved, 0, kMiddles), most = most_of(job);
-        if (error <= kSurely * most || (error > most && is_last(job))) {
+        if ((store_.regions_ && error <= kSurely * most) || (error > most && is_last(job))) {
             settle(job, error);
         } else {
             to_look_at_.push_back(job);
