@@ -1,6 +1,8 @@
 // A lattice whose making runs out of memory, once, at each allocation in turn: nothing of it is
 // waited for afterwards, and its picture is right.
+#include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <cstdlib>
 #include <memory>
 #include <new>
@@ -16,7 +18,8 @@ std::atomic<long> g_left{-1};  ///< allocations until the one that fails
 
 }  // namespace
 
-void* operator new(std::size_t bytes) {
+// Not inlined: compilers that see one of a pair alone take the two for strangers.
+[[gnu::noinline]] void* operator new(std::size_t bytes) {
     if (g_left > 0 && --g_left == 0) {
         g_left = -1;
         throw std::bad_alloc();
@@ -24,8 +27,8 @@ void* operator new(std::size_t bytes) {
     if (void* const memory = std::malloc(bytes ? bytes : 1)) return memory;
     throw std::bad_alloc();
 }
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 using namespace palette4d;
 using namespace images;
