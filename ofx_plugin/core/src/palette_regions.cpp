@@ -42,6 +42,13 @@ struct PaletteRegions::Rooms {
             box[i] = half_width * reach[i];
         }
     }
+    /// Whether the whole box is behind one of the walls.
+    bool behind_one() const {
+        for (std::size_t i = 0; i < count; ++i) {
+            if (centre[i] + box[i] < 0) return true;
+        }
+        return false;
+    }
 };
 
 struct PaletteRegions::Found {
@@ -185,20 +192,14 @@ bool PaletteRegions::alike(int a, int b, const float* centre, float half_width) 
 }
 
 bool PaletteRegions::touches_inside(const float* centre, float half_width) const {
-    const Rooms rooms(walls_[kInside], centre, half_width);
-    for (std::size_t i = 0; i < rooms.count; ++i) {
-        if (rooms.centre[i] + rooms.box[i] < 0) return false;
-    }
-    return true;
+    return !Rooms(walls_[kInside], centre, half_width).behind_one();
 }
 
 /// Adds the regions that the box touches, `region` and from it on; false where they are too many.
 bool PaletteRegions::find(int region, const float* centre, float half_width, Found& found) const {
     const Walls& walls = walls_[index(region)];
     const Rooms rooms(walls, centre, half_width);
-    for (std::size_t i = 0; i < rooms.count; ++i) {
-        if (rooms.centre[i] + rooms.box[i] < 0) return true;
-    }
+    if (rooms.behind_one()) return true;
     if (found.count == Found::kMost) return false;
     found.regions[found.count++] = region;
     for (std::size_t i = 0; i < rooms.count; ++i) {
@@ -242,7 +243,7 @@ std::size_t PaletteRegions::most_inside(const float* low, float width, int side)
     // A row of boxes along blue goes behind each of the inside's walls once, so that those which
     // are behind none follow each other.
     const Walls& walls = walls_[kInside];
-    const double half = width / 2;
+    const double half = width / 2, blue = low[2] + half * unit_[2];
     constexpr double kSlack = 1e-3;  // of a box, for what single precision rounds
     std::size_t most = 0;
     for (int x = 0; x < side; ++x) {
@@ -251,7 +252,6 @@ std::size_t PaletteRegions::most_inside(const float* low, float width, int side)
             const double green = low[1] + (2 * y + 1) * half * unit_[1];
             double first = 0, last = side - 1;
             for (std::size_t i = 0; i < walls.offset.size(); ++i) {
-                const double blue = low[2] + half * unit_[2];
                 const double room = walls.normal[0][i] * red + walls.normal[1][i] * green +
                                     walls.normal[2][i] * blue - walls.offset[i] +
                                     half * walls.reach[i];
