@@ -8,9 +8,9 @@
 
 #include "arrays.hpp"
 #include "binders.hpp"
-#include "palette4d/colour_conversion.hpp"
-#include "palette4d/lattice.hpp"
-#include "palette4d/recolour.hpp"
+#include "lattice/converted_recolour.hpp"
+#include "lattice/lattice.hpp"
+#include "recolour/recolour.hpp"
 
 using namespace palette4d;
 using namespace palette4d::bindings;
