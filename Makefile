@@ -150,7 +150,7 @@ types: $(TOOLS)/.installed $(TEST_VENV)/.installed
 	$(TOOLS)/bin/mypy --python-executable $(TEST_VENV)/bin/python tools
 	@echo "== import-linter: who may import whom"
 	@PYTHONPATH=$$($(TEST_VENV)/bin/python -c 'import sysconfig; print(sysconfig.get_path("platlib"))') \
-		$(TOOLS)/bin/lint-imports --no-cache --config pyproject.toml | tail -n 4
+		$(TOOLS)/bin/lint-imports --no-cache --config pyproject.toml
 
 # $(call preset,NAME,COMMAND): run a command of CMake's with our tools, where the presets are
 define preset
