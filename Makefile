@@ -29,7 +29,7 @@ WHEELS := build/wheels
 PIP := -m pip --quiet --disable-pip-version-check
 
 # Folders are listed too, so that a removed file counts as a change.
-SOURCES := pyproject.toml README.md LICENSE $(shell find ofx_plugin analysis lut_export \
+SOURCES := pyproject.toml README.md LICENSE $(shell find src ofx_plugin analysis lut_export \
 	! -name '__pycache__*' ! -name '*.pyc')
 CXX_FILES = $(shell find ofx_plugin tests -name '*.cpp' -o -name '*.hpp' -o -name '*.h' -o -name '*.inl')
 
@@ -148,6 +148,9 @@ types: $(TOOLS)/.installed $(TEST_VENV)/.installed
 	@echo "== mypy --strict on the installed wheel"
 	$(TOOLS)/bin/mypy --python-executable $(TEST_VENV)/bin/python -p palette4d
 	$(TOOLS)/bin/mypy --python-executable $(TEST_VENV)/bin/python tools
+	@echo "== import-linter: who may import whom"
+	@PYTHONPATH=$$($(TEST_VENV)/bin/python -c 'import sysconfig; print(sysconfig.get_path("platlib"))') \
+		$(TOOLS)/bin/lint-imports --no-cache --config pyproject.toml
 
 # $(call preset,NAME,COMMAND): run a command of CMake's with our tools, where the presets are
 define preset
@@ -197,4 +200,4 @@ format: $(TOOLS)/.installed ## rewrite the sources as ruff and clang-format want
 
 clean: ## remove everything that was built
 	rm -rf $(VENV) build dist demo_output .cache .mypy_cache .ruff_cache .pytest_cache .hypothesis
-	find ofx_plugin analysis lut_export tests tools -name __pycache__ -type d -exec rm -rf {} +
+	find src ofx_plugin analysis lut_export tests tools -name __pycache__ -type d -exec rm -rf {} +

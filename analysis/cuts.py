@@ -30,7 +30,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 from palette4d.analysis.statistics import FrameStatistics
-from palette4d.wording import counted
+
+from palette4d.common.text import counted
 
 F64 = NDArray[np.float64]
 

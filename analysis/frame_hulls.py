@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d import _core
 from palette4d.analysis.losses import colour_scale, palette_loss, refine_palette
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Palette
 from scipy.spatial import ConvexHull, QhullError
+
+from palette4d import _core
 
 F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]

@@ -12,8 +12,9 @@ from collections.abc import Callable
 import nlopt
 import numpy as np
 from numpy.typing import NDArray
-from palette4d import _core
 from palette4d.analysis.options import AnalysisOptions
+
+from palette4d import _core
 
 F64 = NDArray[np.float64]
 Objective = Callable[[F64], tuple[float, F64]]

@@ -7,7 +7,8 @@ what section 6.2 compares with.
 
 from __future__ import annotations
 
-from palette4d.analysis import block_merging, rgbt_hull, vertex_refinement, vertex_removal
+from palette4d.analysis import block_merging, vertex_refinement, vertex_removal
+from palette4d.analysis.baselines import rgbt_hull
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.road import STAGES, Analysis, Glued, Progress, Road, StageResult
 from palette4d.analysis.statistics import FrameStatistics

@@ -10,7 +10,6 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d import _core
 from palette4d.analysis.losses import (
     colour_scale,
     minimise,
@@ -21,6 +20,8 @@ from palette4d.analysis.losses import (
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import SkewPolytope
 from palette4d.analysis.statistics import FrameStatistics
+
+from palette4d import _core
 
 F64 = NDArray[np.float64]
 

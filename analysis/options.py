@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 
-from palette4d.errors import Palette4dError
+from palette4d.common.errors import Palette4dError
 
 METHODS = {
     "skew": "a 4D skew polytope; its structure by what each handle is worth (the default)",

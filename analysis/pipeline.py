@@ -9,17 +9,20 @@ import dataclasses
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from palette4d import _core
-from palette4d.analysis import advice, cuts, methods, quality, sidecar, statistics
-from palette4d.analysis.clip_base import describe, even_step
+from palette4d.analysis import cuts, methods, statistics
 from palette4d.analysis.methods import Analysis, Progress
 from palette4d.analysis.options import AnalysisOptions
+from palette4d.analysis.report import advice, quality
 from palette4d.analysis.statistics import FrameStatistics
-from palette4d.errors import Palette4dError
-from palette4d.wording import counted
+
+from palette4d import _core
+from palette4d.common.errors import Palette4dError
+from palette4d.common.text import counted
+from palette4d.grade import sidecar
+from palette4d.media.clip_base import describe, even_step
 
 if TYPE_CHECKING:
-    from palette4d.analysis.clip import Clip
+    from palette4d.media.clip import Clip
 
 
 def analyze_clip(

@@ -11,17 +11,19 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d import _core
-from palette4d.analysis import block_merging, frame_hulls, glue, static_hull, statistics
+from palette4d.analysis import block_merging, frame_hulls, glue, statistics
+from palette4d.analysis.baselines import static_hull
 from palette4d.analysis.block_merging import Block
 from palette4d.analysis.losses import Losses, loss_weights, smoothness, summarise, thread_count
 from palette4d.analysis.objective import loss_of
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Palette, SkewPolytope
-from palette4d.analysis.quality import Report
+from palette4d.analysis.report.quality import Report
 from palette4d.analysis.statistics import FrameStatistics
 from palette4d.analysis.strands import Strands
-from palette4d.wording import counted
+
+from palette4d import _core
+from palette4d.common.text import counted
 
 F64 = NDArray[np.float64]
 

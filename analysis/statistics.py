@@ -22,15 +22,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d import _core
 from palette4d.analysis import colour_histogram
-from palette4d.analysis.clip_base import Fill, FrameError, describe
 from palette4d.analysis.losses import LOST_SHARE, thread_count
 from palette4d.analysis.options import AnalysisOptions
-from palette4d.wording import counted
+
+from palette4d import _core
+from palette4d.common.text import counted
+from palette4d.media.clip_base import Fill, FrameError, describe
 
 if TYPE_CHECKING:
-    from palette4d.analysis.clip import Clip
+    from palette4d.media.clip import Clip
 
 TRIM_EVERY = 50_000_000
 """Pixels after which freed memory is given back: glibc keeps what frames of changing sizes leave

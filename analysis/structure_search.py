@@ -24,17 +24,17 @@ from palette4d.analysis import (
     block_merging,
     cuts,
     handle_removal,
-    quality,
-    static_hull,
     statistics,
     stop_insertion,
     vertex_removal,
 )
+from palette4d.analysis.baselines import static_hull
 from palette4d.analysis.block_merging import Block
 from palette4d.analysis.handle_removal import Step
 from palette4d.analysis.objective import refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import SkewPolytope
+from palette4d.analysis.report import quality
 from palette4d.analysis.road import STARTS, Analysis, Glued, Progress, Road
 from palette4d.analysis.statistics import FrameStatistics
 

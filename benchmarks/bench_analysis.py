@@ -27,7 +27,7 @@ from evaluator import TimedPalette, say, table
 
 READ = """
 import sys
-from palette4d.analysis.clip import open_clip
+from palette4d.media.clip import open_clip
 for _ in open_clip(sys.argv[1], frames=sys.argv[2] or None).iter_colours():
     pass
 """

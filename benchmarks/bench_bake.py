@@ -19,16 +19,17 @@ from pathlib import Path
 
 import numpy as np
 import PyOpenColorIO as ocio
-from palette4d import _core
 from palette4d.lut_export import lattice
 from palette4d.lut_export.bake import BakeOptions, bake
-from palette4d.lut_export.colour_difference import viewing_of
 from palette4d.lut_export.error import Figures, measure
 from palette4d.lut_export.frame_edit import frame_edit
 from palette4d.lut_export.reading import load
 from palette4d.lut_export.shaper import UNSHAPED
 from palette4d.lut_export.writers import Description, by_baker, by_transforms
-from palette4d.source_clip import frame_colours
+
+from palette4d import _core
+from palette4d.colour.difference import viewing_of
+from palette4d.media.source_clip import frame_colours
 
 CUBE = by_baker("resolve_cube")
 CLF = by_transforms("Academy/ASC Common LUT Format")

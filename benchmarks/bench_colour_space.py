@@ -25,9 +25,10 @@ import numpy as np
 import OpenImageIO as oiio
 import PyOpenColorIO as ocio
 from numpy.typing import NDArray
+
 from palette4d import _core
-from palette4d.cli import main as palette4d
-from palette4d.ocio_config import BUILT_IN
+from palette4d.cli.main import main as palette4d
+from palette4d.colour.ocio_config import BUILT_IN
 
 FRAMES, HEIGHT, WIDTH = 6, 72, 128
 F32 = NDArray[np.float32]

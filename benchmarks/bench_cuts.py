@@ -25,9 +25,10 @@ import numpy as np
 import scenedetect
 from numpy.typing import NDArray
 from palette4d.analysis import cuts, statistics
-from palette4d.analysis.clip import open_clip
 from palette4d.analysis.options import AnalysisOptions
-from palette4d.analysis.shots import BINS
+
+from palette4d.media.clip import open_clip
+from palette4d.shows.shots import BINS
 
 Frames = list[NDArray[np.uint8]]
 Case = tuple[str, Frames, list[int]]

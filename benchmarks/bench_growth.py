@@ -74,7 +74,8 @@ def draw(path: Path, frames: int, width: int, height: int) -> None:
     """Encode one movie; always the same for the same arguments."""
     import av
     import numpy as np
-    from palette4d.sample_scene import Scene
+
+    from palette4d.demo.scene import Scene
 
     scene, keys = Scene(480, 270), 25
     pictures = [scene.picture(i / (keys - 1)) for i in range(keys)]

@@ -27,8 +27,9 @@ import evaluator
 import numpy as np
 from evaluator import PAPER_RULES, Figures, Runs, TimedPalette, say, table
 from palette4d.analysis import frame_hulls, statistics
-from palette4d.analysis.clip import open_clip
 from palette4d.analysis.options import AnalysisOptions
+
+from palette4d.media.clip import open_clip
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

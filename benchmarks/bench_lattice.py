@@ -30,6 +30,7 @@ import OpenImageIO as oiio
 import PyOpenColorIO as ocio
 from bench_recolour import HD, UHD, UHD8K, hull, rates
 from numpy.typing import NDArray
+
 from palette4d import _core
 
 F32 = NDArray[np.float32]
@@ -237,7 +238,7 @@ def main() -> None:
     width, height = map(int, args.size.split("x"))
     if args.growth and (width, height) != UHD:
         parser.error("--growth goes by pictures of {}x{}".format(*UHD))
-    from palette4d.analysis.clip import open_clip
+    from palette4d.media.clip import open_clip
 
     last = None
     for k, (path, clip) in enumerate(zip(args.pairs[::2], args.pairs[1::2], strict=True)):

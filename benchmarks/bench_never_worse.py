@@ -19,9 +19,10 @@ from pathlib import Path
 
 import evaluator
 from evaluator import Figures, Runs, say, table
-from palette4d.analysis import static_hull
+from palette4d.analysis.baselines import static_hull
 from palette4d.analysis.options import AnalysisOptions
-from palette4d.arguments import frame_range
+
+from palette4d.common.arguments import frame_range
 
 STATIC = ("--method", "static")
 # What the command and these measurements may differ by: a sample of the colours is searched.

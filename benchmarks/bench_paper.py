@@ -22,9 +22,10 @@ from typing import Any
 import evaluator
 import numpy as np
 from evaluator import PAPER_RULES, Figures, Runs, TimedPalette, say, table
-from palette4d import _core
-from palette4d.analysis.clip import open_clip
 from palette4d.analysis.options import METHODS
+
+from palette4d import _core
+from palette4d.media.clip import open_clip
 
 MERGING_ALONE = ("--eta2", "1", "--refinement-cycles", "0")
 UNREFINED = ("--refinement-cycles", "0")
@@ -188,6 +189,7 @@ def draw_timelines(sidecars: Sequence[tuple[str, Path]], output: Path, width: in
     """Draw the timelines of some sidecars above each other."""
     import matplotlib.style
     from matplotlib.figure import Figure
+
     from palette4d.plotting import layout, style, timeline
     from palette4d.plotting.panel import Frame, Palette
 

@@ -26,8 +26,9 @@ from pathlib import Path
 import numpy as np
 import PyOpenColorIO as ocio
 from numpy.typing import NDArray
-from palette4d import _core
 from scipy.spatial import ConvexHull
+
+from palette4d import _core
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -224,7 +225,7 @@ def main() -> None:
         palette = hull(8)
         against_peers("8 vertices, inside, HD", palette, inside(palette, *HD), peer, args.runs)
         if args.sidecar and args.clip:
-            from palette4d.analysis.clip import open_clip
+            from palette4d.media.clip import open_clip
 
             sidecar = _core.read_sidecar(args.sidecar)
             cut = _core.slice_at(sidecar.polytope, args.frame)

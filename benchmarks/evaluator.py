@@ -23,10 +23,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d import _core
-from palette4d.analysis.clip import open_clip
 from palette4d.analysis.losses import NO_FACES, smoothness
 from scipy.spatial import ConvexHull, QhullError
+
+from palette4d import _core
+from palette4d.media.clip import open_clip
 
 F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
-SCHEMAS = ROOT / "ofx_plugin" / "bindings" / "palette4d"
+SCHEMAS = ROOT / "src" / "palette4d"
 PAGE = ROOT / "docs" / "sidecar.md"
 PAGES = {
     PAGE: SCHEMAS / "sidecar_v2.schema.json",

@@ -13,9 +13,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d import _core
-from palette4d.conversion_steps import Step
-from palette4d.errors import Palette4dError
 from palette4d.lut_export import cdl as cdls
 from palette4d.lut_export import lattice as lattices
 from palette4d.lut_export.bake_options import (
@@ -24,7 +21,6 @@ from palette4d.lut_export.bake_options import (
     check_target,
     choose_shaper,
 )
-from palette4d.lut_export.colour_difference import Viewing, viewing_of
 from palette4d.lut_export.error import Measure, figures_info, figures_text, measure, stated
 from palette4d.lut_export.formats import LutFormat, format_of, with_shaper
 from palette4d.lut_export.frame_edit import FrameEdit, frame_edit, frame_text
@@ -32,7 +28,12 @@ from palette4d.lut_export.reading import LoadedLut, load
 from palette4d.lut_export.shaper import UNSHAPED, Shaper
 from palette4d.lut_export.spaces import BakeSpace, space_of
 from palette4d.lut_export.writers import Description
-from palette4d.replacing import replacing
+
+from palette4d import _core
+from palette4d.colour.conversion_steps import Step
+from palette4d.colour.difference import Viewing, viewing_of
+from palette4d.common.errors import Palette4dError
+from palette4d.common.files import replacing
 
 __all__ = ["PREVIEW_TIER", "BakeOptions", "BakeResult", "bake"]
 

@@ -6,15 +6,16 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d import _core
-from palette4d.errors import Palette4dError
 from palette4d.lut_export import lattice as lattices
 from palette4d.lut_export import shaper as shapers
 from palette4d.lut_export.formats import LutFormat, with_shaper
 from palette4d.lut_export.frame_edit import frame_edit
 from palette4d.lut_export.shaper import Choice, Kind, Shaper
 from palette4d.lut_export.spaces import INPUT
-from palette4d.replacing import refuse_existing
+
+from palette4d import _core
+from palette4d.common.errors import Palette4dError
+from palette4d.common.files import refuse_existing
 
 F32 = NDArray[np.float32]
 

@@ -16,8 +16,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from palette4d import _core
-from palette4d.errors import Palette4dError
 from palette4d.lut_export import series
 from palette4d.lut_export.config_base import (
     ANY_SHOT,
@@ -30,9 +28,12 @@ from palette4d.lut_export.config_base import (
 from palette4d.lut_export.error import stated
 from palette4d.lut_export.formats import LutFormat, format_named
 from palette4d.lut_export.spaces import PALETTE
-from palette4d.ocio_config import BUILT_IN, failures
-from palette4d.replacing import make_folder, refuse_existing, replacing
-from palette4d.wording import checked_name, counted, file_safe
+
+from palette4d import _core
+from palette4d.colour.ocio_config import BUILT_IN, failures
+from palette4d.common.errors import Palette4dError
+from palette4d.common.files import make_folder, refuse_existing, replacing
+from palette4d.common.text import checked_name, counted, file_safe
 
 #: What FRAME is when a host does not set it, and the name of the file for that.
 NO_FRAME = "default"

@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from palette4d import _core
-from palette4d.errors import Palette4dError
-from palette4d.ocio_config import (
+from palette4d.colour.ocio_config import (
     BUILT_IN,
     colour_space,
     failures,
@@ -15,6 +14,7 @@ from palette4d.ocio_config import (
     near_spaces,
     same_encodings,
 )
+from palette4d.common.errors import Palette4dError
 
 #: The folder of the tables, beside the config.
 TABLES = "luts"

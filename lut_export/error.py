@@ -19,8 +19,9 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d.lut_export.colour_difference import Viewing, delta_e_2000
 from palette4d.lut_export.frame_edit import FrameEdit
+
+from palette4d.colour.difference import Viewing, delta_e_2000
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]

@@ -11,9 +11,10 @@ import difflib
 from dataclasses import dataclass
 from pathlib import Path
 
-from palette4d.errors import Palette4dError
 from palette4d.lut_export.lattice import LARGEST, SMALLEST
 from palette4d.lut_export.writers import Writer, by_baker, by_transforms
+
+from palette4d.common.errors import Palette4dError
 
 _TEXT = "six decimals, 5e-7"
 _INTEGERS = "12-bit integers from 0 to 1, 1.3e-4"

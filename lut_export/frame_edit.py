@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
 from palette4d import _core
-from palette4d.errors import Palette4dError
+from palette4d.common.errors import Palette4dError
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d.conversion_steps import Step
-from palette4d.errors import Palette4dError
 from palette4d.lut_export.frame_edit import FrameEdit
 from palette4d.lut_export.shaper import UNSHAPED, Shaper
+
+from palette4d.colour.conversion_steps import Step
+from palette4d.common.errors import Palette4dError
 
 F32 = NDArray[np.float32]
 

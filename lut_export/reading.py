@@ -5,9 +5,10 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d.errors import Palette4dError
-from palette4d.ocio_config import failures
-from palette4d.ocio_processor import ExactProcessor
+
+from palette4d.colour.ocio_config import failures
+from palette4d.colour.ocio_processor import ExactProcessor
+from palette4d.common.errors import Palette4dError
 
 F32 = NDArray[np.float32]
 

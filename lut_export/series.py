@@ -17,8 +17,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from palette4d import _core
-from palette4d.errors import Palette4dError, WriteError
 from palette4d.lut_export.bake import bake
 from palette4d.lut_export.bake_options import BakeOptions, check_options, check_target
 from palette4d.lut_export.formats import format_named
@@ -31,11 +29,14 @@ from palette4d.lut_export.series_index import (
     read_index,
     write_index,
 )
-from palette4d.ocio_config import from_anywhere
-from palette4d.replacing import make_folder, replacing
-from palette4d.source_clip import frame_colours
-from palette4d.wording import checked_name, file_safe
-from palette4d.workers import Failed, Workers
+
+from palette4d import _core
+from palette4d.colour.ocio_config import from_anywhere
+from palette4d.common.errors import Palette4dError, WriteError
+from palette4d.common.files import make_folder, replacing
+from palette4d.common.text import checked_name, file_safe
+from palette4d.jobs.workers import Failed, Workers
+from palette4d.media.source_clip import frame_colours
 
 #: Seconds between two writings of the index while frames are baked.
 INDEX_EVERY = 2.0

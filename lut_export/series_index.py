@@ -6,11 +6,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from palette4d import _core
-from palette4d.errors import Palette4dError
 from palette4d.lut_export.bake import BakeOptions, BakeResult
-from palette4d.replacing import replacing
-from palette4d.wording import counted
+
+from palette4d import _core
+from palette4d.common.errors import Palette4dError
+from palette4d.common.files import replacing
+from palette4d.common.text import counted
 
 SCHEMA, VERSION = "palette4d.series", 1
 

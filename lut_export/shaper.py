@@ -18,7 +18,8 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from palette4d.errors import Palette4dError
+
+from palette4d.common.errors import Palette4dError
 
 F64 = NDArray[np.float64]
 

@@ -13,11 +13,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
 from palette4d import _core
-from palette4d.colour_conversion import conversion
-from palette4d.conversion_steps import Step
-from palette4d.errors import Palette4dError
-from palette4d.ocio_config import chosen_config, colour_space, load_config, same_encodings
+from palette4d.colour.conversion import conversion
+from palette4d.colour.conversion_steps import Step
+from palette4d.colour.ocio_config import chosen_config, colour_space, load_config, same_encodings
+from palette4d.common.errors import Palette4dError
 
 F32 = NDArray[np.float32]
 

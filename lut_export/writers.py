@@ -10,9 +10,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from palette4d.errors import Palette4dError
 from palette4d.lut_export.lattice import Lattice
 from palette4d.lut_export.spaces import transforms
+
+from palette4d.common.errors import Palette4dError
 
 
 @dataclass(frozen=True)

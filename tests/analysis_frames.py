@@ -6,9 +6,11 @@ from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d import _core
-from palette4d.analysis import sidecar, statistics
+from palette4d.analysis import statistics
 from palette4d.analysis.options import AnalysisOptions
+
+from palette4d import _core
+from palette4d.grade import sidecar
 
 F32 = NDArray[np.float32]
 

@@ -12,10 +12,12 @@ PALETTE4D_REQUIRE_HOST
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import signal
 from collections.abc import Generator
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -58,10 +60,10 @@ def real_frame() -> NDArray[np.float32]:
     """A real clip's frame, (h, w, 3) within 0..1: autumn of SEASONS, or else of the sample clip."""
     seasons = shared_folder() / "clips" / "seasons"
     if not seasons.is_dir():
-        from palette4d.sample_scene import Scene
+        from palette4d.demo.scene import Scene
 
         return Scene(320, 180).picture(0.6)
-    from palette4d.analysis.clip import open_clip
+    from palette4d.media.clip import open_clip
 
     return np.ascontiguousarray(open_clip(str(seasons)).read(40)[..., :3], dtype=np.float32)
 
@@ -135,3 +137,16 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     terminalreporter.section("host tests were required (PALETTE4D_REQUIRE_HOST) but could not run")
     for complaint in watch.complaints():
         terminalreporter.line(complaint)
+
+
+@pytest.fixture(scope="session")
+def tool(repo_root: Path) -> ModuleType:
+    """`docs/sidecar_fields.py`, which writes a schema's table into its page."""
+    spec = importlib.util.spec_from_file_location(
+        "sidecar_fields", repo_root / "docs/sidecar_fields.py"
+    )
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

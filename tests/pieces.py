@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 
-from palette4d.errors import Palette4dError
+from palette4d.common.errors import Palette4dError
 
 
 def piece(value: int, threads: int) -> tuple[int, int]:

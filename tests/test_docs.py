@@ -7,7 +7,8 @@ import shlex
 from pathlib import Path
 
 import pytest
-from palette4d.cli import build_parser
+
+from palette4d.cli.main import build_parser
 
 PAGES = ["README.md", "CONTRIBUTING.md", "benchmarks/README.md"]
 

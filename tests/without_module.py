@@ -11,7 +11,7 @@ def run_without(module: str, folder: Path, *words: str) -> subprocess.CompletedP
     """Run the command in a folder as if a module were not installed."""
     program = (
         f"import sys; sys.modules[{module!r}] = None\n"
-        "from palette4d.cli import main\n"
+        "from palette4d.cli.main import main\n"
         f"sys.exit(main({list(words)!r}))"
     )
     return subprocess.run(

@@ -59,6 +59,7 @@ def read(path: Path) -> NDArray[np.float32]:
 def before_after(clip: Path, graded: Path, out: Path) -> None:
     """Draw frames of the clip above the same frames graded, and print how far they moved."""
     from matplotlib.figure import Figure
+
     from palette4d.plotting import style
 
     pairs = [

@@ -20,7 +20,7 @@ void translate(std::exception_ptr thrown) {
     try {
         if (thrown) std::rethrow_exception(thrown);
     } catch (const palette4d::SidecarError& problem) {
-        const py::object type = py::module_::import("palette4d.errors").attr("SidecarError");
+        const py::object type = py::module_::import("palette4d.common.errors").attr("SidecarError");
         const py::object error = type(decoded(problem.file()), decoded(problem.pointer()),
                                       decoded(problem.found()), decoded(problem.expected()));
         PyErr_SetObject(type.ptr(), error.ptr());
@@ -31,9 +31,9 @@ void translate(std::exception_ptr thrown) {
 
 }  // namespace
 
-/// palette4d.errors holds the classes, so that code without the core can name them; SidecarError is
+/// palette4d.common.errors holds the classes, so that code without the core can name them; SidecarError is
 /// a Palette4dError with the attributes file, pointer, found and expected.
 void bind_errors(py::module_& module) {
-    module.attr("SidecarError") = py::module_::import("palette4d.errors").attr("SidecarError");
+    module.attr("SidecarError") = py::module_::import("palette4d.common.errors").attr("SidecarError");
     py::register_local_exception_translator(&translate);
 }

@@ -14,12 +14,13 @@ import sys
 
 import numpy as np
 import pytest
-from palette4d import _core
 from palette4d.analysis import statistics
-from palette4d.analysis.clip import open_clip
 from palette4d.analysis.losses import loss_weights, smoothness, summarise
 from palette4d.analysis.options import AnalysisOptions
 from scipy.spatial import ConvexHull
+
+from palette4d import _core
+from palette4d.media.clip import open_clip
 
 EXACT = AnalysisOptions(colours=10**6)
 AGREE = 1e-6

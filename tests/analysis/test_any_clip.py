@@ -14,12 +14,15 @@ from typing import Any
 import any_clips
 import numpy as np
 import pytest
-from palette4d import _core, cli
-from palette4d.analysis import cuts, pipeline, sidecar, statistics
-from palette4d.analysis.clip import Clip, open_clip
+from palette4d.analysis import cuts, pipeline, statistics
 from palette4d.analysis.methods import Analysis
 from palette4d.analysis.options import AnalysisOptions
 from scipy.spatial import ConvexHull
+
+from palette4d import _core
+from palette4d.cli import main
+from palette4d.grade import sidecar
+from palette4d.media.clip import Clip, open_clip
 
 # kind: most of L, most handles, most distance of a pixel outside. Each is about one and a half
 # times what was measured, which docs/clips.md states.
@@ -243,7 +246,7 @@ def test_fields_are_read_as_they_are_woven(analysed):
 def test_the_command_refuses_cuts(kind, starts, tmp_path, capsys):
     spec = getattr(any_clips, kind)(tmp_path / "clip")
     out = tmp_path / "out.p4d.json"
-    assert cli.main(["analyze", spec, "-o", str(out), "--quiet"]) == 1
+    assert main.main(["analyze", spec, "-o", str(out), "--quiet"]) == 1
     message = capsys.readouterr().err
     assert not out.exists()
     for start in starts:
@@ -253,13 +256,13 @@ def test_the_command_refuses_cuts(kind, starts, tmp_path, capsys):
     assert len(ranges) == len(starts) + 1
     for part in ranges:  # what the message names can be analysed
         arguments = ["analyze", spec, "-o", str(out), "--quiet", "--frames", part]
-        assert cli.main(arguments) == 0
+        assert main.main(arguments) == 0
 
 
 def test_the_command_spans_a_cut_when_told_to(tmp_path, capsys):
     spec = any_clips.cut(tmp_path / "clip")
     out = tmp_path / "out.p4d.json"
-    assert cli.main(["analyze", spec, "-o", str(out), "--json", "--allow-cuts"]) == 0
+    assert main.main(["analyze", spec, "-o", str(out), "--json", "--allow-cuts"]) == 0
     printed = capsys.readouterr()
     assert "the palette spans 1 sudden cut, at frame 7" in printed.err
     assert any("the palette spans" in note for note in json.loads(printed.out)["notes"])
@@ -283,7 +286,7 @@ def test_through_the_command(kind, tmp_path, capsys):
     out = tmp_path / "out.p4d.json"
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert cli.main(["analyze", spec, "-o", str(out), "--json"]) == 0
+        assert main.main(["analyze", spec, "-o", str(out), "--json"]) == 0
     report = json.loads(capsys.readouterr().out)
     assert report["stages"][-1]["L"] <= KINDS[kind][0]
     assert len(report["frames"]) == any_clips.FRAMES

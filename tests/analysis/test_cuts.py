@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from any_clips import harbour, landscape, linear
 from palette4d.analysis import cuts, statistics
-from palette4d.analysis.clip import open_clip
 from palette4d.analysis.colour_histogram import histogram
 from palette4d.analysis.options import AnalysisOptions
+
+from palette4d.media.clip import open_clip
 
 
 def gathered(pictures, first: int = 0, step: int = 1) -> list[statistics.FrameStatistics]:
@@ -61,7 +62,11 @@ def test_frame_numbers_are_the_clips_own():
     assert found(frames(4) + night(4), first=1001, step=2) == [1009]
 
 
-@pytest.mark.parametrize("encode", [np.sqrt, linear, lambda p: 40 * linear(p)], ids=str)
+@pytest.mark.parametrize(
+    "encode",
+    [np.sqrt, linear, lambda p: 40 * linear(p)],
+    ids=["sqrt", "linear", "bright"],
+)
 def test_cuts_in_any_encoding(encode):
     assert found([encode(p) for p in frames(6) + night(6)]) == [6]
     assert found([encode(p) for p in frames(12)]) == []

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from analysis_frames import constant, grey, mixture, noise, stats
-from palette4d import _core
 from palette4d.analysis.frame_hulls import frame_palette, hull_mesh, merge_close
 from palette4d.analysis.losses import palette_loss
 from palette4d.analysis.options import AnalysisOptions
 from scipy.spatial import ConvexHull
+
+from palette4d import _core
 
 LOW, HIGH = np.zeros(3), np.ones(3)
 OPTIONS = AnalysisOptions()

@@ -8,11 +8,12 @@ import weakref
 
 import numpy as np
 import pytest
-from palette4d import _core
 from palette4d.analysis.losses import NO_FACES, minimise, refine_palette, smoothness
 from palette4d.analysis.options import AnalysisOptions
 from scipy.optimize import minimize
 from scipy.spatial import ConvexHull
+
+from palette4d import _core
 
 WEIGHTS = _core.LossWeights(50.0, 50.0)
 BOX = np.array(list(itertools.product([0.25, 0.75], repeat=3)))

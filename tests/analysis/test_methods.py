@@ -8,9 +8,11 @@ import weakref
 import numpy as np
 import pytest
 from analysis_frames import constant, grey, mixture, noise, stats
-from palette4d.analysis import methods, static_hull, statistics
-from palette4d.analysis.clip import open_clip
+from palette4d.analysis import methods, statistics
+from palette4d.analysis.baselines import static_hull
 from palette4d.analysis.options import METHODS, AnalysisOptions
+
+from palette4d.media.clip import open_clip
 
 FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
 
@@ -98,7 +100,7 @@ def test_blocks_are_limited():
 
 
 def test_an_unknown_method_is_refused():
-    from palette4d.errors import Palette4dError
+    from palette4d.common.errors import Palette4dError
 
     with pytest.raises(Palette4dError, match="magic"):
         AnalysisOptions(method="magic")

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from analysis_frames import mixture, stats
 from bent_track import FACES, FOUR, bent, colours_at
-from palette4d import _core
 from palette4d.analysis.frame_hulls import hull_mesh
 from palette4d.analysis.objective import Objective, loss_of, move, refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Section, SkewPolytope
+
+from palette4d import _core
 
 LOW, HIGH = np.zeros(3), np.ones(3)
 

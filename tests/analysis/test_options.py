@@ -9,7 +9,8 @@ import pytest
 from analysis_frames import mixture, stats
 from palette4d.analysis import methods
 from palette4d.analysis.options import LIMITS, METHODS, METHODS_OF, AnalysisOptions
-from palette4d.errors import Palette4dError
+
+from palette4d.common.errors import Palette4dError
 
 CORNERS = np.array(
     [[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9], [0.9, 0.8, 0.7]]

@@ -9,10 +9,12 @@ import sys
 import numpy as np
 import pytest
 from analysis_frames import ArrayClip, constant, grey, mixture, noise
-from palette4d import _core
-from palette4d.analysis import methods, pipeline, sidecar
+from palette4d.analysis import methods, pipeline
 from palette4d.analysis.options import AnalysisOptions
-from palette4d.errors import Palette4dError
+
+from palette4d import _core
+from palette4d.common.errors import Palette4dError
+from palette4d.grade import sidecar
 
 
 def two_colours(seed):

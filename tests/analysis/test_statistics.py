@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 from analysis_frames import ArrayClip, mixture, noise
 from clip_files import grey_levels, write_image
-from palette4d import _core
 from palette4d.analysis import frame_hulls, pipeline, statistics
-from palette4d.analysis.clip import FrameError, open_clip
 from palette4d.analysis.colour_histogram import histogram
 from palette4d.analysis.cuts import difference
 from palette4d.analysis.losses import palette_loss
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.statistics import budget, chosen_frames, gamut_box, gather, gather_clip
+
+from palette4d import _core
+from palette4d.media.clip import FrameError, open_clip
 
 
 def same(a: _core.ColourTree, b: _core.ColourTree) -> bool:
@@ -148,7 +149,7 @@ def test_trees_are_pooled():
 
 @pytest.mark.parametrize("rows", [1, 3])
 def test_threads_do_not_change_the_statistics(tmp_path, monkeypatch, rows):
-    monkeypatch.setattr("palette4d.analysis.clip_base.COUNTED_PIXELS", 90 * 120 // rows)
+    monkeypatch.setattr("palette4d.media.clip_base.COUNTED_PIXELS", 90 * 120 // rows)
     generator = np.random.default_rng(8)
     for frame in range(12):
         write_image(tmp_path / f"a.{frame}.png", generator.integers(0, 256, (90, 120, 3), np.uint8))

@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 from analysis_frames import in_core, mixture, stats
 from bent_track import colours_at
-from palette4d import _core
 from palette4d.analysis import methods
-from palette4d.analysis.clip import open_clip
 from palette4d.analysis.frame_hulls import hull_mesh
 from palette4d.analysis.losses import loss_weights
 from palette4d.analysis.objective import Objective, loss_of
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Section, SkewPolytope
 from palette4d.analysis.stop_insertion import insert_stops
+
+from palette4d import _core
+from palette4d.media.clip import open_clip
 
 FIVE = np.array(
     [[0.1, 0.1, 0.1], [0.6, 0.2, 0.2], [0.2, 0.6, 0.2], [0.2, 0.2, 0.6], [0.6, 0.6, 0.55]]

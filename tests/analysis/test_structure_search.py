@@ -9,15 +9,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from analysis_frames import mixture, noise, stats
-from palette4d.analysis import block_merging, quality, structure_search
+from palette4d.analysis import block_merging, structure_search
 from palette4d.analysis.block_merging import Block
 from palette4d.analysis.frame_hulls import hull_mesh
 from palette4d.analysis.handle_removal import Step
 from palette4d.analysis.objective import refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Section, SkewPolytope
+from palette4d.analysis.report import quality
 from palette4d.analysis.structure_search import Candidate, Skew
-from palette4d.sample_scene import Scene
+
+from palette4d.demo.scene import Scene
 
 FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
 CUBE = np.array(list(itertools.product((0.1, 0.9), repeat=3)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from interpreter import assert_interpreter_runs_on
+
 from palette4d import _core
 
 MANY = 10**9

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from interpreter import assert_interpreter_runs_on
 from numpy.typing import NDArray
-from palette4d import _core
 from parity.cases import DOCUMENTS, cube, picture, same_bits
+
+from palette4d import _core
 
 Image = NDArray[np.float32]
 

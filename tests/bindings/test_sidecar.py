@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import palette4d
 import pytest
+
+import palette4d
 from palette4d import Palette4dError, SidecarError, _core
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"

@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 from analysis_frames import mixture
 from clip_files import write_image
-from palette4d import cli
+
+from palette4d.cli import main
 
 CORNERS = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
 
@@ -30,7 +31,7 @@ def clip(tmp_path) -> Path:
 
 def test_writes_a_sidecar_and_a_report(clip, tmp_path, capsys):
     out = tmp_path / "shot.p4d.json"
-    assert cli.main(["analyze", str(clip), "-o", str(out), "--rate", "24000/1001"]) == 0
+    assert main.main(["analyze", str(clip), "-o", str(out), "--rate", "24000/1001"]) == 0
     printed = capsys.readouterr().out
     for stage in ("frame_hulls", "block_merging", "vertex_removal", "vertex_refinement"):
         assert stage in printed
@@ -45,7 +46,7 @@ def test_writes_a_sidecar_and_a_report(clip, tmp_path, capsys):
 def test_json_report_and_frames(clip, tmp_path, capsys):
     out = tmp_path / "shot.p4d.json"
     assert (
-        cli.main(["analyze", str(clip), "-o", str(out), "--frames", "1002-1006x2", "--json"]) == 0
+        main.main(["analyze", str(clip), "-o", str(out), "--frames", "1002-1006x2", "--json"]) == 0
     )
     report = json.loads(capsys.readouterr().out)
     assert report["stages"][-1]["stage"] == "vertex_refinement"
@@ -61,42 +62,42 @@ def test_json_report_and_frames(clip, tmp_path, capsys):
 def test_other_methods_are_held_to_nothing(clip, tmp_path, capsys):
     for method in ("paper", "static", "rgbt"):
         out = str(tmp_path / f"{method}.p4d.json")
-        assert cli.main(["analyze", str(clip), "-o", out, "--method", method, "--json"]) == 0
+        assert main.main(["analyze", str(clip), "-o", out, "--method", method, "--json"]) == 0
         assert json.loads(capsys.readouterr().out)["held_to_L_prime"] is None
 
 
 def test_the_files_bytes_are_the_same_every_time(clip, tmp_path):
     for name, threads in (("a", "1"), ("b", "1"), ("c", "4")):
         arguments = ["analyze", str(clip), "-o", str(tmp_path / name), "--threads", threads]
-        assert cli.main([*arguments, "--quiet"]) == 0
+        assert main.main([*arguments, "--quiet"]) == 0
     texts = {(tmp_path / name).read_bytes() for name in "abc"}
     assert len(texts) == 1
 
 
 def test_edits_are_not_lost(clip, tmp_path, capsys):
     out = tmp_path / "shot.p4d.json"
-    assert cli.main(["analyze", str(clip), "-o", str(out), "--quiet"]) == 0
+    assert main.main(["analyze", str(clip), "-o", str(out), "--quiet"]) == 0
     edit = ["edit", str(out), "set", "--near", "0.9,0.2,0.2", "--frame", "1001"]
-    assert cli.main([*edit, "--rgb", "1", "0.5", "0"]) == 0
+    assert main.main([*edit, "--rgb", "1", "0.5", "0"]) == 0
     edited = out.read_bytes()
-    assert cli.main(["analyze", str(clip), "-o", str(out), "--quiet"]) == 1
+    assert main.main(["analyze", str(clip), "-o", str(out), "--quiet"]) == 1
     error = capsys.readouterr().err
     assert "--keep-edits" in error
     assert "--drop-edits" in error
     assert out.read_bytes() == edited
-    assert cli.main(["analyze", str(clip), "-o", str(out), "--quiet", "--keep-edits"]) == 0
+    assert main.main(["analyze", str(clip), "-o", str(out), "--quiet", "--keep-edits"]) == 0
     assert out.read_bytes() == edited
-    assert cli.main(["analyze", str(clip), "-o", str(out), "--quiet", "--drop-edits"]) == 0
+    assert main.main(["analyze", str(clip), "-o", str(out), "--quiet", "--drop-edits"]) == 0
     assert json.loads(out.read_text())["edits"] == {"vertices": [], "stops": []}
 
 
 def test_bad_frames(clip, tmp_path, capsys):
     out = tmp_path / "shot.p4d.json"
     (clip / "shot.1003.png").write_bytes((clip / "shot.1003.png").read_bytes()[:60])
-    assert cli.main(["analyze", str(clip), "-o", str(out), "--quiet"]) == 1
+    assert main.main(["analyze", str(clip), "-o", str(out), "--quiet"]) == 1
     assert "1003" in capsys.readouterr().err
     assert not out.exists()
-    assert cli.main(["analyze", str(clip), "-o", str(out), "--quiet", "--skip-bad-frames"]) == 0
+    assert main.main(["analyze", str(clip), "-o", str(out), "--quiet", "--skip-bad-frames"]) == 0
     assert "1003" in capsys.readouterr().err
     assert json.loads(out.read_text())["clip"]["frames"]["skipped"] == [1003]
 
@@ -119,7 +120,7 @@ def test_alpha_that_is_0_everywhere_counts_as_unused(extension, tmp_path, capsys
     for alpha in (0.0, 1.0):
         folder = with_alpha(tmp_path / f"alpha{alpha:g}", [alpha] * 4, extension)
         out = tmp_path / "shot.p4d.json"
-        assert cli.main(["analyze", str(folder), "-o", str(out), "--json"]) == 0
+        assert main.main(["analyze", str(folder), "-o", str(out), "--json"]) == 0
         printed = capsys.readouterr()
         palettes.append(json.loads(out.read_text())["polytope"])
         said = "alpha is 0 in every pixel of the clip"
@@ -136,7 +137,7 @@ def test_alpha_that_is_0_everywhere_counts_as_unused(extension, tmp_path, capsys
 def test_a_frame_of_which_nothing_shows_is_passed_over(tmp_path, capsys):
     out = tmp_path / "shot.p4d.json"
     folder = with_alpha(tmp_path / "clip", [0, 1, 1, 0, 1, 1])
-    assert cli.main(["analyze", str(folder), "-o", str(out), "--json"]) == 0
+    assert main.main(["analyze", str(folder), "-o", str(out), "--json"]) == 0
     printed = capsys.readouterr()
     notes = json.loads(printed.out)["notes"]
     assert "2 frames have no usable pixel and were passed over: 1, 4" in notes
@@ -153,11 +154,11 @@ def test_wrong_usage(clip, tmp_path, capsys):
         ["analyze", str(clip), "-o", out, "--keep-edits", "--drop-edits"],
     ):
         with pytest.raises(SystemExit) as stop:
-            cli.main(arguments)
+            main.main(arguments)
         assert stop.value.code == 2
-    assert cli.main(["analyze", str(clip), "-o", out, "--frames", "1001,1002,1004"]) == 1
+    assert main.main(["analyze", str(clip), "-o", out, "--frames", "1001,1002,1004"]) == 1
     assert "not evenly spaced" in capsys.readouterr().err
-    assert cli.main(["analyze", str(tmp_path / "nothing"), "-o", out]) == 1
+    assert main.main(["analyze", str(tmp_path / "nothing"), "-o", out]) == 1
     assert not Path(out).exists()
 
 
@@ -189,10 +190,10 @@ def test_ctrl_c_leaves_nothing(clip, tmp_path):
 def test_the_source_is_found_from_the_sidecar(clip, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "sidecars").mkdir()
-    assert cli.main(["analyze", "clip", "-o", "sidecars/a.p4d.json", "--quiet"]) == 0
+    assert main.main(["analyze", "clip", "-o", "sidecars/a.p4d.json", "--quiet"]) == 0
     source = json.loads(Path("sidecars/a.p4d.json").read_text())["clip"]["source"]
     assert source == "../clip/shot.####.png"
-    assert cli.main(["analyze", str(clip), "-o", "b.p4d.json", "--quiet"]) == 0
+    assert main.main(["analyze", str(clip), "-o", "b.p4d.json", "--quiet"]) == 0
     source = json.loads(Path("b.p4d.json").read_text())["clip"]["source"]
     assert source == str(clip / "shot.####.png")
 
@@ -200,10 +201,10 @@ def test_the_source_is_found_from_the_sidecar(clip, tmp_path, monkeypatch):
 @pytest.mark.parametrize("method", ["paper", "static", "rgbt"])
 def test_other_methods(clip, tmp_path, method, capsys):
     out = tmp_path / f"{method}.p4d.json"
-    assert cli.main(["analyze", str(clip), "-o", str(out), "--method", method]) == 0
+    assert main.main(["analyze", str(clip), "-o", str(out), "--method", method]) == 0
     document = json.loads(out.read_text())
     assert document["quality"]["options"]["method"] == method
-    assert cli.main(["info", str(out)]) == 0  # one stage or four, the tables are not torn
+    assert main.main(["info", str(out)]) == 0  # one stage or four, the tables are not torn
     assert max(map(len, capsys.readouterr().out.splitlines())) < 130
 
 
@@ -211,7 +212,7 @@ def test_few_vertices_are_given_when_asked_for(clip, tmp_path):
     counts = []
     for wanted in ("0", "10"):
         out = tmp_path / f"{wanted}.p4d.json"
-        assert cli.main(["analyze", str(clip), "-o", str(out), "--vertices", wanted]) == 0
+        assert main.main(["analyze", str(clip), "-o", str(out), "--vertices", wanted]) == 0
         counts.append(len(json.loads(out.read_text())["polytope"]["vertices"]))
     assert counts[1] <= 10
 
@@ -228,7 +229,7 @@ def test_few_vertices_are_given_when_asked_for(clip, tmp_path):
 def test_wrong_options_are_wrong_usage(clip, tmp_path, option, value, expected, capsys):
     out = tmp_path / "never.p4d.json"
     with pytest.raises(SystemExit) as stop:
-        cli.main(["analyze", str(clip), "-o", str(out), option, value])
+        main.main(["analyze", str(clip), "-o", str(out), option, value])
     assert stop.value.code == 2
     assert f"argument {option}: {expected}" in capsys.readouterr().err
     assert not out.exists()
@@ -248,7 +249,7 @@ def test_options_of_another_method_are_wrong_usage(clip, tmp_path, method, optio
     out = tmp_path / "never.p4d.json"
     with pytest.raises(SystemExit) as stop:
         # Its own default, too: it would not count.
-        cli.main(["analyze", str(clip), "-o", str(out), "--method", method, option, "3"])
+        main.main(["analyze", str(clip), "-o", str(out), "--method", method, option, "3"])
     assert stop.value.code == 2
     error = capsys.readouterr().err
     assert f"{option} has no effect with --method {method}; it belongs to {of}\n" in error
@@ -262,12 +263,12 @@ def test_a_cut_is_refused_and_the_shots_are_named(tmp_path, capsys):
         rgb = CORNERS + 0.005 * i if i < 7 else 1 - 0.3 * CORNERS
         write_image(folder / f"cut.{1001 + i}.png", mixture(rgb, i))
     out = tmp_path / "cut.p4d.json"
-    assert cli.main(["analyze", str(folder), "-o", str(out)]) == 1
+    assert main.main(["analyze", str(folder), "-o", str(out)]) == 1
     message = capsys.readouterr().err
     assert "1008" in message
     assert "--frames 1001-1007" in message
     assert "--frames 1008-1012" in message
     assert not out.exists()
-    assert cli.main(["analyze", str(folder), "-o", str(out), "--frames", "1008-1012"]) == 0
-    assert cli.main(["analyze", str(folder), "-o", str(out), "--allow-cuts"]) == 0
+    assert main.main(["analyze", str(folder), "-o", str(out), "--frames", "1008-1012"]) == 0
+    assert main.main(["analyze", str(folder), "-o", str(out), "--allow-cuts"]) == 0
     assert "spans 1 sudden cut" in capsys.readouterr().err

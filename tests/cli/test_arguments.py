@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from analysis_frames import mixture
 from clip_files import grey_levels, write_image
-from palette4d import cli
-from palette4d.arguments import times
-from palette4d.wording import counted
+
+from palette4d.cli import main
+from palette4d.common.arguments import times
+from palette4d.common.text import counted
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
 EDITED = str(GOLDEN / "v1_edited.p4d.json")
@@ -32,7 +33,7 @@ RANGE_VERBS = (
 def test_ranges_that_make_no_sense(capsys, monkeypatch, tmp_path, words, text):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit) as stop:
-        cli.main([*words, "--frames", text])
+        main.main([*words, "--frames", text])
     assert stop.value.code == 2
     assert "--frames: frame range" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
@@ -69,7 +70,7 @@ def test_ranges_that_make_no_sense(capsys, monkeypatch, tmp_path, words, text):
 def test_values_that_no_file_makes_right_are_wrong_usage(capsys, monkeypatch, tmp_path, words):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit) as stop:
-        cli.main(list(words))
+        main.main(list(words))
     assert stop.value.code == 2
     error = capsys.readouterr().err
     assert f"argument {words[-2]}" in error or f"/{words[-2]}" in error
@@ -89,7 +90,7 @@ def test_values_that_no_file_makes_right_are_wrong_usage(capsys, monkeypatch, tm
 )
 def test_wrong_usage_is_two_lines(capsys, words, verb, wrong):
     with pytest.raises(SystemExit) as stop:
-        cli.main(list(words))
+        main.main(list(words))
     assert stop.value.code == 2
     first, second = capsys.readouterr().err.splitlines()
     assert first == f"usage: {verb} … ({verb.removesuffix(' VERB')} --help)"
@@ -102,22 +103,22 @@ def test_negative_frames_of_every_verb(tmp_path, capsys):
         write_image(folder / f"c.{frame:04d}.png", mixture(CORNERS, frame + 9))
     out = tmp_path / "a.p4d.json"
     analyze = ["analyze", str(folder), "-o", str(out), "--quiet"]
-    assert cli.main([*analyze, "--frames", "-5--4"]) == 0
+    assert main.main([*analyze, "--frames", "-5--4"]) == 0
     frames = json.loads(out.read_text())["clip"]["frames"]
     assert (frames["first"], frames["last"]) == (-5, -4)
 
     graded = tmp_path / "graded"
     render = ["render", str(out), str(folder), "-o", str(graded / "o.####.png"), "--quiet"]
-    assert cli.main([*render, "--frames", "-5--4"]) == 0
+    assert main.main([*render, "--frames", "-5--4"]) == 0
     assert sorted(path.name for path in graded.iterdir()) == ["o.-004.png", "o.-005.png"]
 
     picture, table = tmp_path / "a.png", tmp_path / "a.cube"
     plot = ["plot", str(out), "-o", str(picture), "--width", "400"]
-    assert cli.main([*plot, "--frames", "-5,-4"]) == 0
+    assert main.main([*plot, "--frames", "-5,-4"]) == 0
     assert picture.stat().st_size > 0
     bake = ["bake", BEYOND, "-o", str(table), "--size", "2", "--json"]
     capsys.readouterr()
-    assert cli.main([*bake, "--frame", "-3"]) == 0
+    assert main.main([*bake, "--frame", "-3"]) == 0
     assert json.loads(capsys.readouterr().out)["frame"] == -3
 
 
@@ -125,16 +126,16 @@ def test_one_frame_is_not_1_frames(tmp_path, capsys):
     folder = grey_levels(tmp_path / "in", range(5, 6))
     sample = tmp_path / "sample"
     words = ["sample-clip", "-o", str(sample / "o.##.png"), "--size", "32x32", "--quiet"]
-    assert cli.main([*words, "--frames", "1"]) == 0
+    assert main.main([*words, "--frames", "1"]) == 0
     assert "wrote 1 frame, " in capsys.readouterr().out
-    assert cli.main(["analyze", str(sample), "-o", str(tmp_path / "a.p4d.json")]) == 0
+    assert main.main(["analyze", str(sample), "-o", str(tmp_path / "a.p4d.json")]) == 0
     assert "sample: 1 frame, 32x32" in capsys.readouterr().out
-    assert cli.main(["info", str(tmp_path / "a.p4d.json")]) == 0
+    assert main.main(["info", str(tmp_path / "a.p4d.json")]) == 0
     printed = capsys.readouterr().out
     assert ", 1 block: " in printed
     assert "0 vertices, 0 stops" in printed
     render = ["render", EDITED, str(folder), "-o", str(tmp_path / "o.png"), "--quiet"]
-    assert cli.main(render) == 0
+    assert main.main(render) == 0
     assert "1 frames" not in capsys.readouterr().out
 
 

@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from clip_files import write_image
-from palette4d.analysis.manifest import Manifest, write
-from palette4d.cli import main
 from palette4d.lut_export.lattice import nearer
+
+from palette4d.cli.main import main
+from palette4d.shows.manifest import Manifest, write
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
 EDITED = GOLDEN / "v1_edited.p4d.json"

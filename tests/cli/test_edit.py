@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from palette4d import Palette4dError, _core, cli, edits
-from palette4d.analysis import sidecar
+
+from palette4d import Palette4dError, _core
+from palette4d.cli import main
+from palette4d.grade import edits, sidecar
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
 
@@ -44,7 +46,7 @@ def edited_slice(path: str, frame: float) -> list[list[float]]:
 
 def test_set_a_vertex(plain: str, capsys: pytest.CaptureFixture[str]) -> None:
     before = sidecar.load(plain)
-    assert cli.main(["edit", plain, "set", "v4", "--rgb", "0.9", "0.1", "0.1"]) == 0
+    assert main.main(["edit", plain, "set", "v4", "--rgb", "0.9", "0.1", "0.1"]) == 0
     after = sidecar.load(plain)
     assert after["edits"] == {"vertices": [{"vertex": "v4", "rgb": [0.9, 0.1, 0.1]}], "stops": []}
     assert {**after, "edits": 0} == {**before, "edits": 0}
@@ -58,7 +60,7 @@ def test_set_again_replaces_and_order_does_not_matter(plain: str, tmp_path: Path
     Path(other).write_bytes(Path(plain).read_bytes())
     for path, ids in ((plain, ["v9", "v2", "v9"]), (other, ["v2", "v9"])):
         for name in ids:
-            assert cli.main(["edit", path, "set", name, "--rgb", "1,0,0.5"]) == 0
+            assert main.main(["edit", path, "set", name, "--rgb", "1,0,0.5"]) == 0
     assert Path(plain).read_bytes() == Path(other).read_bytes()
     assert [entry["vertex"] for entry in edits_of(plain)["vertices"]] == ["v2", "v9"]
 
@@ -73,12 +75,12 @@ def test_set_again_replaces_and_order_does_not_matter(plain: str, tmp_path: Path
     ],
 )
 def test_colours_in_all_forms(plain: str, words: list[str], colour: list[float]) -> None:
-    assert cli.main(["edit", plain, "set", "v1", "--rgb", *words]) == 0
+    assert main.main(["edit", plain, "set", "v1", "--rgb", *words]) == 0
     assert edits_of(plain)["vertices"] == [{"vertex": "v1", "rgb": colour}]
 
 
 def test_set_a_stop(edited: str) -> None:
-    assert cli.main(["edit", edited, "set", "s1", "--rgb", "0", "0", "1"]) == 0
+    assert main.main(["edit", edited, "set", "s1", "--rgb", "0", "0", "1"]) == 0
     assert edits_of(edited)["stops"][0] == {
         "id": "s1", "edge": "e3", "frame": 4.5, "rgb": [0.0, 0.0, 1.0]
     }  # fmt: skip
@@ -86,7 +88,7 @@ def test_set_a_stop(edited: str) -> None:
 
 def test_near_on_a_vertex(plain: str, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["edit", plain, "set", "--near", "0.2,0.2,1.0", "--frame", "9"]
-    assert cli.main([*arguments, "--rgb", "1", "1", "1"]) == 0
+    assert main.main([*arguments, "--rgb", "1", "1", "1"]) == 0
     assert edits_of(plain)["vertices"] == [{"vertex": "v8", "rgb": [1.0, 1.0, 1.0]}]
     out = capsys.readouterr().out
     assert "vertex v8 (frame 9)" in out
@@ -98,7 +100,7 @@ def test_near_on_an_edge_takes_the_nearest_end(
     plain: str, capsys: pytest.CaptureFixture[str], frame: str, vertex: str
 ) -> None:
     arguments = ["edit", plain, "set", "--near", "#e61a1a", "--frame", frame, "--rgb", "#ffffff"]
-    assert cli.main(arguments) == 0
+    assert main.main(arguments) == 0
     assert [entry["vertex"] for entry in edits_of(plain)["vertices"]] == [vertex]
     out = capsys.readouterr().out
     assert f"chose its nearest handle in time, vertex {vertex}" in out
@@ -108,7 +110,7 @@ def test_near_on_an_edge_takes_the_nearest_end(
 def test_the_suggestion_is_an_exact_hit(plain: str, capsys: pytest.CaptureFixture[str]) -> None:
     """What the output suggests can be pasted into a shell and does what it says."""
     near = ["edit", plain, "set", "--near", "-1,1,-0.5", "--frame", "3", "--rgb", "-0.5", "1", "0"]
-    assert cli.main(near) == 0
+    assert main.main(near) == 0
     line = next(text for text in capsys.readouterr().out.splitlines() if "exact hit: " in text)
     command = line.split("exact hit: ")[1].replace("palette4d", "-m palette4d", 1)
     done = subprocess.run(
@@ -119,18 +121,18 @@ def test_the_suggestion_is_an_exact_hit(plain: str, capsys: pytest.CaptureFixtur
 
 
 def test_near_chooses_an_existing_stop(edited: str) -> None:
-    assert cli.main(
+    assert main.main(
         ["edit", edited, "set", "--near", "0.1,0.9,0.1", "--frame", "6.5", "--rgb", "1,1,1"]
     ) == 0  # fmt: skip
     assert edits_of(edited)["stops"][1]["rgb"] == [1.0, 1.0, 1.0]
-    assert cli.main(
+    assert main.main(
         ["edit", edited, "set", "--near", "0.1,0.9,0.1", "--frame", "4.5", "--rgb", "0,0,0"]
     ) == 0  # fmt: skip
     assert edited_slice(edited, 4.5)[2] == [0.0, 0.0, 0.0]
 
 
 def test_stop_changes_its_moment_and_fades(plain: str) -> None:
-    assert cli.main(["edit", plain, "stop", "e2", "--frame", "3", "--rgb", "0", "0", "1"]) == 0
+    assert main.main(["edit", plain, "stop", "e2", "--frame", "3", "--rgb", "0", "0", "1"]) == 0
     assert edits_of(plain)["stops"] == [
         {"id": "s1", "edge": "e2", "frame": 3, "rgb": [0.0, 0.0, 1.0]}
     ]
@@ -143,62 +145,62 @@ def test_stop_changes_its_moment_and_fades(plain: str) -> None:
 
 def test_stop_near(plain: str, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["edit", plain, "stop", "--near", "0.6,0.6,0.6", "--frame", "15.5"]
-    assert cli.main([*arguments, "--rgb", "-0.25", "0", "2"]) == 0
+    assert main.main([*arguments, "--rgb", "-0.25", "0", "2"]) == 0
     (stop,) = edits_of(plain)["stops"]
     assert (stop["edge"], stop["frame"], stop["rgb"]) == ("e9", 15.5, [-0.25, 0.0, 2.0])
     assert "on edge e9" in capsys.readouterr().out
     assert (
-        cli.main(["edit", plain, "stop", "--near", "1,0,0", "--frame", "0", "--rgb", "1,1,1"]) == 1
+        main.main(["edit", plain, "stop", "--near", "1,0,0", "--frame", "0", "--rgb", "1,1,1"]) == 1
     )
     assert "set v2" in capsys.readouterr().err
 
 
 def test_stop_again_recolours(plain: str) -> None:
     for colour in ("1,0,0", "0,1,0"):
-        assert cli.main(["edit", plain, "stop", "e2", "--frame", "3", "--rgb", colour]) == 0
+        assert main.main(["edit", plain, "stop", "e2", "--frame", "3", "--rgb", colour]) == 0
     assert [stop["rgb"] for stop in edits_of(plain)["stops"]] == [[0.0, 1.0, 0.0]]
 
 
 def test_stop_ids_are_stable_and_new(edited: str) -> None:
-    assert cli.main(["edit", edited, "reset", "s1"]) == 0
-    assert cli.main(["edit", edited, "stop", "e1", "--frame", "3", "--rgb", "1,1,1"]) == 0
+    assert main.main(["edit", edited, "reset", "s1"]) == 0
+    assert main.main(["edit", edited, "stop", "e1", "--frame", "3", "--rgb", "1,1,1"]) == 0
     assert [stop["id"] for stop in edits_of(edited)["stops"]] == ["s3", "s2", "s4"]
 
 
 def test_move(edited: str) -> None:
-    assert cli.main(["edit", edited, "move", "s1", "--frame", "6"]) == 0
+    assert main.main(["edit", edited, "move", "s1", "--frame", "6"]) == 0
     assert edits_of(edited)["stops"][0]["frame"] == 6
     assert (
-        cli.main(["edit", edited, "move", "s1", "--frame", "2", "--by", "-0.5", "0", "-.25"]) == 0
+        main.main(["edit", edited, "move", "s1", "--frame", "2", "--by", "-0.5", "0", "-.25"]) == 0
     )
     stop = edits_of(edited)["stops"][0]
     assert (stop["frame"], stop["rgb"]) == (2, pytest.approx([-0.3, 0.4, 0.65]))
-    assert cli.main(["edit", edited, "move", "v4", "--by", "0.05", "0", "-0.1"]) == 0
+    assert main.main(["edit", edited, "move", "v4", "--by", "0.05", "0", "-0.1"]) == 0
     assert edits_of(edited)["vertices"][0]["rgb"] == pytest.approx([0.95, 0.1, 0.0])
-    assert cli.main(["edit", edited, "move", "v1", "--by", "-1", "0", "0"]) == 0
+    assert main.main(["edit", edited, "move", "v1", "--by", "-1", "0", "0"]) == 0
     assert edits_of(edited)["vertices"][0] == {
         "vertex": "v1", "rgb": pytest.approx([-0.9, 0.1, 0.1])
     }  # fmt: skip
 
 
 def test_reset(edited: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["edit", edited, "reset", "v4"]) == 0
+    assert main.main(["edit", edited, "reset", "v4"]) == 0
     assert [entry["vertex"] for entry in edits_of(edited)["vertices"]] == ["v17"]
-    assert cli.main(["edit", edited, "reset", "s3"]) == 0
+    assert main.main(["edit", edited, "reset", "s3"]) == 0
     assert [stop["id"] for stop in edits_of(edited)["stops"]] == ["s1", "s2"]
     assert "removed" in capsys.readouterr().out
-    assert cli.main(["edit", edited, "reset"]) == 0
+    assert main.main(["edit", edited, "reset"]) == 0
     assert edits_of(edited) == {"vertices": [], "stops": []}
     capsys.readouterr()
-    assert cli.main(["edit", edited, "reset", "v4"]) == 0
+    assert main.main(["edit", edited, "reset", "v4"]) == 0
     assert capsys.readouterr().out == "nothing to reset\n"
 
 
 def test_reset_gives_the_file_back(plain: str) -> None:
     before = Path(plain).read_bytes()
-    assert cli.main(["edit", plain, "set", "v4", "--rgb", "1,1,1"]) == 0
-    assert cli.main(["edit", plain, "stop", "e3", "--frame", "2.5", "--rgb", "1,1,1"]) == 0
-    assert cli.main(["edit", plain, "reset"]) == 0
+    assert main.main(["edit", plain, "set", "v4", "--rgb", "1,1,1"]) == 0
+    assert main.main(["edit", plain, "stop", "e3", "--frame", "2.5", "--rgb", "1,1,1"]) == 0
+    assert main.main(["edit", plain, "reset"]) == 0
     assert Path(plain).read_bytes() == before
 
 
@@ -245,7 +247,7 @@ def test_errors_leave_the_file_alone(
     edited: str, capsys: pytest.CaptureFixture[str], words: list[str], part: str
 ) -> None:
     before = Path(edited).read_bytes()
-    assert cli.main(["edit", edited, *words]) == 1
+    assert main.main(["edit", edited, *words]) == 1
     captured = capsys.readouterr()
     assert captured.out == ""
     assert captured.err.startswith("palette4d: error: ")
@@ -269,7 +271,7 @@ def test_errors_leave_the_file_alone(
 def test_wrong_usage_is_2(edited: str, words: list[str]) -> None:
     before = Path(edited).read_bytes()
     with pytest.raises(SystemExit) as caught:
-        cli.main(["edit", edited, *words])
+        main.main(["edit", edited, *words])
     assert caught.value.code == 2
     assert Path(edited).read_bytes() == before
 
@@ -305,7 +307,7 @@ def test_a_read_only_folder(edited: str, capsys: pytest.CaptureFixture[str]) -> 
     try:
         if (folder / "probe").exists() or _writable(folder):
             pytest.skip("this user may write everywhere")
-        assert cli.main(["edit", edited, "set", "v1", "--rgb", "1,1,1"]) == 1
+        assert main.main(["edit", edited, "set", "v1", "--rgb", "1,1,1"]) == 1
         assert "cannot be written" in capsys.readouterr().err
     finally:
         folder.chmod(0o755)

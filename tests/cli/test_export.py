@@ -12,7 +12,8 @@ import termios
 from pathlib import Path
 
 import pytest
-from palette4d.cli import main
+
+from palette4d.cli.main import main
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
 EDITED, SPLIT = GOLDEN / "v1_edited.p4d.json", GOLDEN / "v1_split.p4d.json"

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+
 from palette4d import _core
-from palette4d.cli import main
+from palette4d.cli.main import main
 from palette4d.plotting import discs, figure, layout, style
 from palette4d.plotting.panel import Frame, Palette
 

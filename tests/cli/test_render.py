@@ -11,10 +11,12 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 from clip_files import grey_levels, write_image, write_movie
-from palette4d import _core, render
-from palette4d.analysis.clip import open_clip
-from palette4d.errors import Palette4dError
-from palette4d.imageio import FramePattern, OutputError, sample_type, write_frame
+
+from palette4d import _core
+from palette4d.cli import render
+from palette4d.common.errors import Palette4dError
+from palette4d.media.clip import open_clip
+from palette4d.media.frame_writer import FramePattern, OutputError, sample_type, write_frame
 
 GOLDEN = Path(__file__).resolve().parent.parent / "golden" / "sidecars"
 EDITED, PLAIN = GOLDEN / "v1_edited.p4d.json", GOLDEN / "v1_split.p4d.json"

@@ -7,13 +7,14 @@ from pathlib import Path
 
 import pytest
 from host.melt import MeltUnavailableError, bring_melt
-from palette4d import plugin_install
+
+from palette4d.cli import install_plugin
 
 
 @pytest.fixture(scope="session")
 def bundle() -> Path:
     """The OpenFX bundle inside the installed package."""
-    return plugin_install.find_bundle()
+    return install_plugin.find_bundle()
 
 
 @pytest.fixture(scope="session")

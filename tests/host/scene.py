@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
+
 from palette4d import _core
-from palette4d.imageio import quantised
+from palette4d.media.frame_writer import quantised
 
 SERVICE = "openfx.org.palette4d.Palette4D"
 RATE = 25  # melt's own idea of the rate of numbered pictures

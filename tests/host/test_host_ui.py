@@ -12,7 +12,8 @@ import pytest
 from host.scene import Scene
 from host.strict_node import described
 from host.test_melt import box_sidecar, moving_clip
-from palette4d.host_ui import SERVICE, kdenlive, parameters, shotcut
+
+from palette4d.hosts import SERVICE, kdenlive, parameters, shotcut
 
 Described = dict[str, dict[str, Any]]
 

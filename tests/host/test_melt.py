@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from host.scene import RATE, SERVICE, Image, Scene, read_image, recolour
+
 from palette4d import _core
 
 # Corners 0..7 count in red, green, blue bits; anticlockwise from outside.

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from host.scene import SERVICE, Image, Scene, read_image, recolour, run_until_it_writes
 from host.test_melt import box_sidecar, moving_clip
+
 from palette4d import _core
 
 DEPTHS = {"8bit": ("rgba", "rgba"), "16bit": ("rgba64", "rgba64be")}  # melt's format, the file's

@@ -14,8 +14,6 @@ import numpy as np
 import pytest
 from host.strict_node import StrictNode
 from numpy.typing import NDArray
-from palette4d import _core
-from palette4d.render import RenderOptions, recoloured
 from parity.cases import (
     DOCUMENTS,
     EDITED,
@@ -27,6 +25,9 @@ from parity.cases import (
     times_of,
 )
 from parity.implementations import FAST, REFERENCE
+
+from palette4d import _core
+from palette4d.cli.render import RenderOptions, recoloured
 
 Picture = NDArray[np.float32]  # (h, w, 3 or 4)
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"

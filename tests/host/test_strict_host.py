@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from host.strict_node import StrictNode
 from numpy.typing import NDArray
+
 from palette4d import _core
-from palette4d.imageio import quantised
+from palette4d.media.frame_writer import quantised
 
 FORMATS = {
     "float RGBA": ("RGBA", "float", ()),

@@ -12,12 +12,13 @@ import numpy as np
 import PyOpenColorIO as ocio
 import pytest
 from numpy.typing import NDArray
-from palette4d import Palette4dError, SidecarError, _core
-from palette4d.cli import main
 from palette4d.lut_export import lattice as lattices
 from palette4d.lut_export.bake import BakeOptions, bake
 from palette4d.lut_export.error import stated
 from palette4d.lut_export.reading import load
+
+from palette4d import Palette4dError, SidecarError, _core
+from palette4d.cli.main import main
 
 F32 = NDArray[np.float32]
 

@@ -11,10 +11,11 @@ import numpy as np
 import PyOpenColorIO as ocio
 import pytest
 from numpy.typing import NDArray
-from palette4d import Palette4dError, _core
 from palette4d.lut_export.bake import BakeOptions, bake
 from palette4d.lut_export.cdl import Cdl, fit
 from palette4d.lut_export.frame_edit import frame_edit
+
+from palette4d import Palette4dError, _core
 
 F32 = NDArray[np.float32]
 EXTENSIONS = ["cc", "ccc", "cdl"]

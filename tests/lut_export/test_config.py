@@ -10,14 +10,15 @@ import numpy as np
 import PyOpenColorIO as ocio
 import pytest
 from numpy.typing import NDArray
-from palette4d import Palette4dError, _core
 from palette4d.lut_export import series
 from palette4d.lut_export.bake import BakeOptions
 from palette4d.lut_export.config import ConfigOptions, WrittenConfig, write_config
 from palette4d.lut_export.frame_edit import frame_edit
 from palette4d.lut_export.series import SeriesOptions
-from palette4d.ocio_config import BUILT_IN
-from palette4d.workers import Workers
+
+from palette4d import Palette4dError, _core
+from palette4d.colour.ocio_config import BUILT_IN
+from palette4d.jobs.workers import Workers
 
 F32 = NDArray[np.float32]
 

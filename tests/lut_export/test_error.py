@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from palette4d import Palette4dError, _core
-from palette4d.lut_export.colour_difference import delta_e_2000, viewing_of
 from palette4d.lut_export.error import Figures, measure, stated, table
 from palette4d.lut_export.frame_edit import FrameEdit, frame_edit
+
+from palette4d import Palette4dError, _core
+from palette4d.colour.difference import delta_e_2000, viewing_of
 
 F32 = NDArray[np.float32]
 SRGB = viewing_of("sRGB")

@@ -12,9 +12,10 @@ import av
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from palette4d import _core
 from palette4d.lut_export.bake import BakeOptions, BakeResult, bake
 from palette4d.lut_export.frame_edit import frame_edit
+
+from palette4d import _core
 
 F32 = NDArray[np.float32]
 

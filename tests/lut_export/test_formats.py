@@ -10,10 +10,11 @@ import numpy as np
 import PyOpenColorIO as ocio
 import pytest
 from numpy.typing import NDArray
-from palette4d import Palette4dError, _core
 from palette4d.lut_export.bake import BakeOptions, BakeResult, bake
 from palette4d.lut_export.formats import FORMATS, LutFormat, format_named, format_of
 from palette4d.lut_export.frame_edit import frame_edit
+
+from palette4d import Palette4dError, _core
 
 F32 = NDArray[np.float32]
 TABLES = [known for known in FORMATS if not known.is_cdl]

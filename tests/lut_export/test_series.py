@@ -17,13 +17,14 @@ from pathlib import Path
 import numpy as np
 import PyOpenColorIO as ocio
 import pytest
-from palette4d import Palette4dError, _core
-from palette4d.errors import WriteError
 from palette4d.lut_export import series
 from palette4d.lut_export.bake import BakeOptions
 from palette4d.lut_export.frame_edit import frame_edit
 from palette4d.lut_export.series import SeriesOptions, export
-from palette4d.workers import Workers
+
+from palette4d import Palette4dError, _core
+from palette4d.common.errors import WriteError
+from palette4d.jobs.workers import Workers
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
 EDITED = GOLDEN / "v1_edited.p4d.json"
@@ -181,7 +182,7 @@ class TestResuming:
 class TestInterrupted:
     PROGRAM = """
 import sys
-from palette4d.cli import main
+from palette4d.cli.main import main
 if __name__ == "__main__":
     sys.exit(main(sys.argv[1:]))
 """

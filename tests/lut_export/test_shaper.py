@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import PyOpenColorIO as ocio
 import pytest
-from palette4d import Palette4dError
 from palette4d.lut_export.shaper import UNSHAPED, Shaper, choose
+
+from palette4d import Palette4dError
 
 SHAPERS = [
     UNSHAPED,

@@ -14,16 +14,18 @@ import numpy as np
 import PyOpenColorIO as ocio
 import pytest
 from numpy.typing import NDArray
-from palette4d import Palette4dError, _core, ocio_config
-from palette4d.analysis import sidecar as sidecars
 from palette4d.lut_export.bake import BakeOptions, bake
 from palette4d.lut_export.config import ConfigOptions, write_config
 from palette4d.lut_export.error import stated
 from palette4d.lut_export.frame_edit import frame_edit
 from palette4d.lut_export.series import SeriesOptions
 from palette4d.lut_export.spaces import space_of, transforms
-from palette4d.render import RenderOptions, recoloured
-from palette4d.workers import Workers
+
+from palette4d import Palette4dError, _core
+from palette4d.cli.render import RenderOptions, recoloured
+from palette4d.colour import ocio_config
+from palette4d.grade import sidecar as sidecars
+from palette4d.jobs.workers import Workers
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
 SIDECAR = GOLDEN / "v2_scene_linear.p4d.json"  # lin_rec709, its palette in ACEScct

@@ -7,8 +7,9 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from palette4d import _core
 from parity import reference
+
+from palette4d import _core
 
 F64 = NDArray[np.float64]
 Document = dict[str, Any]

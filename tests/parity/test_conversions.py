@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from palette4d import _core
 from parity import reference
+
+from palette4d import _core
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
 Document = dict[str, Any]

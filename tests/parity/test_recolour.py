@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from palette4d import _core
 from parity.cases import (
     DOCUMENTS,
     EDITED,
@@ -25,6 +24,8 @@ from parity.implementations import (
     Implementation,
     Lattice,
 )
+
+from palette4d import _core
 
 IMPLEMENTED = pytest.mark.parametrize("code", IMPLEMENTATIONS, ids=lambda code: code.name)
 

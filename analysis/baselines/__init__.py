@@ -1,0 +1,1 @@
+"""The methods that section 6.2 of the paper compares with."""

@@ -1,0 +1,316 @@
+"""The compiled core: polytope slicing, mean value coordinates, recolouring, the sidecar reader."""
+
+import os
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from palette4d.common.errors import SidecarError as SidecarError
+
+F64 = NDArray[np.float64]
+F32 = NDArray[np.float32]
+I32 = NDArray[np.int32]
+
+__version__: str
+SIDECAR_VERSION: int
+
+class Polytope:
+    """The 4D skew polytope (section 4.1). Build one with `parse_sidecar` or `read_sidecar`."""
+
+    @property
+    def vertices(self) -> F64:
+        """(n, 4) float64, columns r, g, b, t; t is a frame number."""
+    @property
+    def vertex_ids(self) -> list[str]: ...
+    @property
+    def edges(self) -> I32:
+        """(m, 2) int32 vertex indices, earlier end first."""
+    @property
+    def edge_ids(self) -> list[str]: ...
+    @property
+    def sections(self) -> list[dict[str, Any]]:
+        """Blocks and transitions in order: first, last, transition, tracks, faces."""
+    @property
+    def first_frame(self) -> float: ...
+    @property
+    def last_frame(self) -> float: ...
+
+class Edits:
+    """Edited colours of vertices and colour stops on edges."""
+
+    @property
+    def vertex_rgb(self) -> dict[str, tuple[float, float, float]]: ...
+    @property
+    def stops(self) -> list[dict[str, Any]]:
+        """id, edge (its id), frame, rgb."""
+
+class ColourConversion:
+    """A chain of matrices and curves; see docs/sidecar.md."""
+
+    def __init__(self, steps: str, name: str = ...) -> None:
+        """From the JSON text of the steps; SidecarError when they are no such chain."""
+    @property
+    def identity(self) -> bool: ...
+    def to_palette(self, colours: ArrayLike) -> F64:
+        """(..., 3) clip numbers -> (..., 3) float64 palette numbers."""
+    def to_clip(self, colours: ArrayLike) -> F64:
+        """(..., 3) palette numbers -> (..., 3) float64 clip numbers."""
+
+class ClipConversion:
+    """How a sidecar's clip becomes what its palette is in."""
+
+    @property
+    def input_space(self) -> str: ...
+    @property
+    def config(self) -> str: ...
+    @property
+    def error(self) -> float:
+        """The largest difference from OpenColorIO that the analysis measured."""
+    @property
+    def steps(self) -> ColourConversion: ...
+
+class Sidecar:
+    """A validated sidecar file."""
+
+    @property
+    def version(self) -> int: ...
+    @property
+    def clip(self) -> dict[str, Any]:
+        """name, source, first, last, step, rate (num, den), width, height, encoding."""
+    @property
+    def polytope(self) -> Polytope: ...
+    @property
+    def edits(self) -> Edits: ...
+    @property
+    def conversion(self) -> ClipConversion | None:
+        """None where the palette is in the clip's own numbers."""
+
+class Slice:
+    """The polyhedral palette at one time (eq. 5)."""
+
+    @property
+    def frame(self) -> float: ...
+    @property
+    def section(self) -> int: ...
+    @property
+    def rgb(self) -> F64:
+        """(n, 3) float64 original palette colours."""
+    @property
+    def faces(self) -> I32:
+        """(f, 3) int32, anticlockwise from outside; (0, 3) for one or two colours."""
+    @property
+    def edges(self) -> I32:
+        """(n,) int32 edge of each vertex, -1 when it lies on a polytope vertex."""
+    @property
+    def ends(self) -> I32:
+        """(n, 2) int32 polytope vertices from, to."""
+    @property
+    def weights(self) -> F64:
+        """(n,) float64 weight of `to` (eq. 6)."""
+
+def read_sidecar(path: str | os.PathLike[str]) -> Sidecar: ...
+def parse_sidecar(text: str | bytes, name: str = ...) -> Sidecar: ...
+def slice_at(polytope: Polytope, frame: float) -> Slice: ...
+def edited_colours(polytope: Polytope, edits: Edits, slice: Slice) -> F64:
+    """(n, 3) float64 edited colours of the slice's vertices."""
+
+def mean_value_coordinates(points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> F64:
+    """(m, 3), (n, 3), (f, 3) -> (m, n) weights. Points that are not finite give NaN."""
+
+def palette_weights(points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> tuple[F64, F64]:
+    """(m, 3), (n, 3), (f, 3) -> (m, n) weights of q(p) and (m,) distances |p - q|, 0 inside.
+
+    Points that are not finite give NaN.
+    """
+
+def polytope_weights(points: ArrayLike, polytope: Polytope, frame: float) -> F64:
+    """Eq. 7: (m, 3) colours at one time -> (m, N) weights of the N polytope vertices."""
+
+class Recolourer:
+    """One frame's recolouring: p' = p + strength * sum_i w_i(q) (v'_i - v_i)."""
+
+    def __init__(self, original: ArrayLike, edited: ArrayLike, faces: ArrayLike) -> None: ...
+    @property
+    def identity(self) -> bool: ...
+    def apply(
+        self,
+        image: NDArray[np.float32],
+        *,
+        strength: float = ...,
+        premultiplied: bool = ...,
+        threads: int = ...,
+        out: NDArray[np.float32] | None = ...,
+        precision: Literal["single", "double"] = ...,
+        instructions: str = ...,
+        conversion: ColourConversion | None = ...,
+    ) -> F32:
+        """(h, w, 3 or 4) float32 in and out; threads 0 means one per processor.
+
+        Pixels must be packed within a row, rows may lie anywhere (``image[::-1]``, a crop); `out`
+        may be `image` itself. `precision` "single" is what the node and `palette4d render` use:
+        some twenty times as fast as "double" (the default) and within 1e-4 of it. `instructions`
+        is "best" or one of `instruction_sets`; the result is the same. With a `conversion` the
+        image is in the clip's numbers, and the palette in those that it leads to.
+        """
+
+class Lattice:
+    """One frame's recolouring by tetrahedral interpolation where that is exact enough.
+
+    Made while it is used, by any number of threads: cells are halved where they err, and what errs
+    still, or lies outside, is recoloured as `Recolourer.apply` does.
+    """
+
+    def __init__(self, recolourer: Recolourer) -> None: ...
+    def apply(
+        self,
+        image: NDArray[np.float32],
+        *,
+        strength: float = ...,
+        premultiplied: bool = ...,
+        threads: int = ...,
+        out: NDArray[np.float32] | None = ...,
+        precision: Literal["single", "double"] = ...,
+        instructions: str = ...,
+        conversion: ColourConversion | None = ...,
+    ) -> F32:
+        """As `Recolourer.apply`; all is exact with precision "double" or strength beyond 0 to 1.
+
+        With a `conversion`, `LATTICE_TOLERANCE` is of the palette's numbers.
+        """
+    @property
+    def largest_error(self) -> float:
+        """Largest abs(interpolated - exact) / max(abs(exact), 0.1) seen so far, at strength 1."""
+    @property
+    def size(self) -> dict[str, int]:
+        """Cells made, cut, their parts, exact parts in use, colours evaluated exactly."""
+
+LATTICE_TOLERANCE: float
+"""What `Lattice.largest_error` is held against."""
+
+def instruction_sets() -> list[str]:
+    """Return the instruction sets that `Recolourer.apply` can use here, slowest first."""
+
+def return_memory() -> None:
+    """Give freed memory back to the system, where the C library keeps it (glibc)."""
+
+class ColourBinner:
+    """Gathers a frame's pixels, strip by strip, to a bounded number of colours.
+
+    8-bit samples are told apart exactly; others fall into cells 1/255 wide (wider beyond 0..1),
+    which keep their means. What is not finite or has an alpha below 1/255 does not count. A frame's
+    samples are of one kind. Methods may be called in any thread, in one at a time.
+    """
+
+    def __init__(self) -> None: ...
+    def add(self, image: NDArray[Any], *, bits: int = ..., premultiplied: bool = ...) -> None:
+        """Add (h, w, 3 or 4) uint8, uint16 or float32 pixels.
+
+        Integers are taken over their largest value; `bits` says how many of a uint16's upper bits
+        are in use. `premultiplied` colours are divided by alpha.
+        """
+    def add_luma_chroma(
+        self,
+        luma: NDArray[Any],
+        blue: NDArray[Any],
+        red: NDArray[Any],
+        *,
+        red_weight: float,
+        blue_weight: float,
+        bits: int,
+        full_range: bool,
+    ) -> None:
+        """Add (h, w) planes Y', Cb, Cr, uint8 or uint16; the colours are clamped to 0..1."""
+    def add_colours(self, rgb: ArrayLike, counts: ArrayLike) -> None:
+        """Add (n, 3) colours with (n,) counts."""
+    @property
+    def pixels(self) -> float:
+        """How many pixels count."""
+    @property
+    def ignored(self) -> float:
+        """How many do not."""
+    @property
+    def transparent(self) -> float:
+        """How many of those are ignored for their alpha."""
+    def take(
+        self, colours: int, coarse: int, scale: float = ...
+    ) -> tuple[ColourTree, ColourTree, F64, F64] | None:
+        """Return at most so many colours, fewer coarse ones, and their (3,) box, low and high.
+
+        None when no pixel counts. Counts are multiplied by `scale`. The frame is forgotten.
+        """
+    def clear(self) -> None:
+        """Forget the frame."""
+
+class ColourTree:
+    """Weighted colours in a k-d tree: what the losses are measured on."""
+
+    def __init__(self, rgb: ArrayLike, counts: ArrayLike) -> None: ...
+    @property
+    def rgb(self) -> F64:
+        """(n, 3) float64 colours, in the tree's order."""
+    @property
+    def counts(self) -> F64:
+        """(n,) float64 pixels of each colour."""
+    @property
+    def total(self) -> float: ...
+    def nearest_mean(self, v: ArrayLike, k: float) -> F64:
+        """(m, 3) -> (m, 3) means of the k pixels nearest to each colour (v_N of eq. 3)."""
+    def __len__(self) -> int: ...
+
+class LossWeights:
+    """What the losses weigh: lambda of eq. 4, k of eq. 3, and how a palette should be shaped.
+
+    `convexity` weighs the concavity of the mesh; colours nearer than `separation` repel each other;
+    a pixel that lies `reach` outside counts twice, farther ones still more (0: all as they lie).
+    """
+
+    def __init__(
+        self,
+        lambda_: float,
+        k: float,
+        convexity: float = ...,
+        separation: float = ...,
+        reach: float = ...,
+    ) -> None: ...
+
+def palette_loss(
+    colours: ColourTree, palette: ArrayLike, faces: ArrayLike, weights: LossWeights
+) -> tuple[float, float, float, float, float, F64]:
+    """R (eq. 2), C (eq. 3), shape, share of pixels outside, largest distance, and gradient.
+
+    `palette` is (n, 3); `shape` is what convexity, separation and reach add; the (n, 3) gradient is
+    that of lambda R + C + shape.
+    """
+
+class PolytopeLoss:
+    """Losses of a 4D skew polytope of fixed structure, frame by frame."""
+
+    def __init__(
+        self,
+        blocks: Sequence[tuple[float, float, Sequence[Sequence[int]], ArrayLike]],
+        frames: ArrayLike,
+        colours: Sequence[ColourTree],
+    ) -> None:
+        """Blocks (first, last, tracks, faces), (n,) frame numbers and their n colour trees."""
+    def evaluate(
+        self,
+        vertices: ArrayLike,
+        which: Sequence[int],
+        weights: LossWeights,
+        threads: int,
+        gradient: bool,
+    ) -> tuple[F64, F64]:
+        """Rows R, C, shape, outside, largest distance of each frame; the summed (N, 4) gradient."""
+
+def progressive_hull(rgb: ArrayLike, faces: ArrayLike, target: int) -> F64:
+    """Simplify a closed convex mesh, (n, 3) and (f, 3), to at most `target` enclosing vertices."""
+
+def progressive_hull_nd(
+    points: ArrayLike, simplices: ArrayLike, target: int, limits: ArrayLike
+) -> F64:
+    """Simplify a convex hull in 2, 3 or 4 dimensions to at most `target` enclosing vertices.
+
+    (n, d) points, (m, d) facets, (l, d + 1) limits a, b on new vertices: a . x >= b.
+    """

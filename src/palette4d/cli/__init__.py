@@ -1,0 +1,1 @@
+"""The command `palette4d`: one module a verb."""

@@ -1,0 +1,246 @@
+"""The part of `analyze` that takes many shots: an edit, or a movie with cuts."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from palette4d.colour.ocio_config import from_anywhere
+from palette4d.common.arguments import whole
+from palette4d.common.errors import Palette4dError
+from palette4d.common.text import counted
+from palette4d.jobs import workers
+from palette4d.shows.timeline_files import is_timeline
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from palette4d.analysis.options import AnalysisOptions
+    from palette4d.media.colour_space import SpaceOptions
+    from palette4d.shows.batch import Show, Source
+    from palette4d.shows.shots import Shot
+
+DESCRIPTION = """\
+For many shots at once, CLIP is an edit (.otio, .otioz, .otiod, .edl) or, with --detect-shots, a
+movie or sequence that is split at its cuts; OUT is then a folder, for a sidecar a shot and a
+manifest, NAME.shots.json. The same command again does only what is missing or failed.
+"""
+
+EPILOG = """\
+  palette4d analyze rushes.mov --detect-shots -o shots
+  palette4d analyze edit.otio --media plates/ --handles 8 -o shots
+  palette4d analyze edit.edl --rate 25 --media plates/ -o shots --only sh010,sh020
+  palette4d analyze edit.otio --media plates/ -o shots --cluster tcp://farm:8786
+"""
+
+MOST_LISTED = 40
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of many shots."""
+    group = parser.add_argument_group("many shots")
+    group.add_argument(
+        "--detect-shots", action="store_true", help="split CLIP at its cuts, a sidecar a shot"
+    )
+    group.add_argument(
+        "--media",
+        metavar="FOLDER",
+        type=Path,
+        help="where an edit's media lies, found by name in all folders below "
+        "(default: where the edit says)",
+    )
+    group.add_argument(
+        "--handles",
+        metavar="N",
+        type=whole(0, 100_000),
+        default=None,
+        help="frames more before and after what the edit shows, as far as the media goes and does "
+        "not cut (default 0)",
+    )
+    group.add_argument(
+        "--only", metavar="A,B", type=_names, default=(), help="only the shots of these names"
+    )
+    group.add_argument(
+        "--anew", action="store_true", help="analyse again also the shots that are there already"
+    )
+    workers.add_options(group, "shots")
+
+
+def _names(text: str) -> tuple[str, ...]:
+    names = tuple(name.strip() for name in text.split(","))
+    if not all(names):
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected names with commas between")
+    return names
+
+
+def is_show(args: argparse.Namespace) -> bool:
+    """Whether many shots are asked for; options that do not go together are wrong usage."""
+    edit = is_timeline(args.clip)
+    for_edits = {"--media": args.media is not None, "--handles": args.handles is not None}
+    for_shows = {
+        "--only": bool(args.only),
+        "--anew": args.anew,
+        "--jobs": args.jobs != 0,
+        "--cluster": args.cluster is not None,
+    }
+    if not edit:
+        _refuse(args, for_edits, "needs an edit (.otio, .edl) as CLIP")
+    if not edit and not args.detect_shots:
+        _refuse(args, for_shows, "needs an edit (.otio, .edl) as CLIP, or --detect-shots")
+        return False
+    if edit and args.detect_shots:
+        args.usage_error(
+            "--detect-shots splits a movie; an edit says itself where its shots begin and end"
+        )
+    if edit and args.frames is not None:
+        args.usage_error("--frames names frames of one clip; an edit says which it shows of each")
+    if args.output.name.endswith(".json"):
+        args.usage_error(f"-o {args.output}: expected a folder, for a sidecar a shot")
+    return True
+
+
+def _refuse(args: argparse.Namespace, given: dict[str, bool], needs: str) -> None:
+    for option, there in given.items():
+        if there:
+            args.usage_error(f"{option} {needs}")
+
+
+def run(args: argparse.Namespace, options: AnalysisOptions) -> int:
+    """Analyse many shots; print what was written, and raise what failed."""
+    from palette4d.shows import batch
+
+    hidden = args.quiet or args.json
+    if is_timeline(args.clip):
+        source, shots, notes = _of_edit(args)
+    else:
+        source, shots, notes = _of_movie(args, hidden)
+    show_options = batch.ShowOptions(
+        analysis=options,
+        spaces=_spaces(args),
+        rate=None if is_timeline(args.clip) else args.rate,
+        skip_bad_frames=args.skip_bad_frames,
+        allow_cuts=args.allow_cuts,
+        on_edits=args.on_edits,
+        anew=args.anew,
+        only=args.only,
+        workers=workers.Workers(args.jobs, args.cluster),
+    )
+    done = _with_bar(
+        hidden,
+        lambda progress: batch.analyse(source, shots, args.output, show_options, progress),
+    )
+    for note in notes:
+        print(f"palette4d: note: {note}", file=sys.stderr)
+    for name, remarks in done.remarks.items():
+        for remark in remarks:
+            print(f"palette4d: note: {name}: {remark}", file=sys.stderr)
+    if args.json:
+        print(done.path.read_text(encoding="utf-8"), end="")
+    elif not args.quiet:
+        print("\n".join(report(done)))
+    if failed := failures(done):
+        raise Palette4dError(failed)
+    return 0
+
+
+def _spaces(args: argparse.Namespace) -> SpaceOptions:
+    """Return the colour spaces with the config by name: workers may run elsewhere."""
+    from palette4d.media.colour_space import SpaceOptions
+
+    config = args.ocio_config or os.environ.get("OCIO") or None
+    return SpaceOptions(args.input_space, args.palette_space, from_anywhere(config))
+
+
+def _of_edit(args: argparse.Namespace) -> tuple[Source, list[Shot], list[str]]:
+    from palette4d.shows import find_media, timeline, timeline_files
+    from palette4d.shows.batch import Source
+    from palette4d.shows.shots import numbered
+
+    path = Path(args.clip)
+    document = timeline_files.read(path, args.rate)
+    folder = None if args.media is None else find_media.Folder(args.media)
+    edit = timeline.shots_of(document, folder, args.handles or 0)
+    shots, renamed = numbered(edit.shots)
+    notes = [f"not analysed: {note}" for note in edit.notes]
+    if path.suffix.lower() == ".edl" and args.rate is None:
+        notes.append("an EDL does not say its rate: 24 frames a second were taken (--rate)")
+    if renamed:
+        some = ", ".join(renamed[:8]) + (", …" if len(renamed) > 8 else "")
+        notes.append(
+            f"{counted(len(renamed), 'shot has the name', 'shots have the names')} of others and "
+            f"{'was' if len(renamed) == 1 else 'were'} renamed by the first frame: {some}"
+        )
+    return Source(edit.name, args.clip, timeline_files.sha256(path), edit.rate), shots, notes
+
+
+def _of_movie(args: argparse.Namespace, hidden: bool) -> tuple[Source, list[Shot], list[str]]:
+    from palette4d.cli.progress import frames_bar
+    from palette4d.common.text import file_safe
+    from palette4d.media.clip import open_clip
+    from palette4d.shows.batch import Source
+    from palette4d.shows.shots import detect
+
+    clip = open_clip(
+        args.clip, frames=args.frames, rate=args.rate, skip_bad_frames=args.skip_bad_frames
+    )
+    with frames_bar("cuts", hidden=hidden, total=len(clip.frames)) as bar:
+        shots = detect(clip, lambda done, total: bar.update(done - bar.n))
+    return Source(file_safe(clip.name), clip.source, "", clip.rate), shots, list(clip.notes)
+
+
+def _with_bar(hidden: bool, work: Callable[[Callable[[int, int, str], None]], Show]) -> Show:
+    """Do `work` with a progress bar of frames."""
+    from palette4d.cli.progress import frames_bar
+
+    with frames_bar("shots", hidden=hidden) as bar:
+
+        def progress(done: int, total: int, words: str) -> None:
+            if bar.total != total:
+                # What is there already costs no time: the bar starts behind it.
+                bar.total, bar.initial, bar.n = total, done, done
+            bar.set_description(words, refresh=False)
+            bar.update(done - bar.n)
+            bar.refresh()
+
+        return work(progress)
+
+
+def report(done: Show) -> list[str]:
+    """Return the lines that say what was written."""
+    from palette4d.shows.manifest import DONE
+
+    entries = [entry for entry in done.manifest.entries if entry.status == DONE]
+    lines = [
+        f"{counted(len(entries), 'shot')} of {len(done.manifest.entries)}: "
+        f"{len(done.analysed)} analysed, {len(done.kept)} there already"
+    ]
+    width = max((len(entry.shot.name) for entry in entries), default=0)
+    for entry in entries[:MOST_LISTED]:
+        assert entry.frames is not None
+        where = f"   {entry.shot.place.record}" if entry.shot.place else ""
+        first, last = entry.frames
+        lines.append(f"  {entry.shot.name:<{width}}  frames {first} to {last}{where}")
+    if len(entries) > MOST_LISTED:
+        lines.append(f"  and {len(entries) - MOST_LISTED} more")
+    lines.append(f"wrote {done.path}")
+    if entries:
+        lines.append(f"next: palette4d edit {done.path.parent / entries[0].sidecar} set …, then")
+        lines.append(f"      palette4d export {done.path} --every 10 -o luts")
+    return lines
+
+
+def failures(done: Show) -> str:
+    """Return what failed, a line a shot; "" when nothing did."""
+    from palette4d.shows.manifest import FAILED
+
+    failed = [entry for entry in done.manifest.entries if entry.status == FAILED]
+    if not failed:
+        return ""
+    lines = "\n".join(f"  {entry.shot.name}: {entry.error}" for entry in failed)
+    return (
+        f"{counted(len(failed), 'shot')} of {len(done.manifest.entries)} could not be analysed; "
+        f"the same command tries only {'it' if len(failed) == 1 else 'these'} again:\n{lines}"
+    )

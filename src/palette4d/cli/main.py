@@ -1,0 +1,100 @@
+"""The command ``palette4d``: one parser, one verb a module.
+
+A verb's module has ``add_parser(subparsers)``, which sets ``run`` as the parser's default; ``run``
+takes the parsed arguments and returns the exit status.
+"""
+
+import argparse
+import importlib
+import os
+import sys
+from collections.abc import Callable, Sequence
+
+from palette4d import __version__
+from palette4d.common.arguments import Parser, accept_negative_values
+from palette4d.common.errors import Palette4dError, SidecarError
+
+#: The modules of the verbs, in the order of a day's work (and of ``palette4d --help``).
+VERB_MODULES = (
+    "palette4d.cli.sample_clip",
+    "palette4d.cli.analyze",
+    "palette4d.cli.edit",
+    "palette4d.cli.render",
+    "palette4d.cli.bake",
+    "palette4d.cli.export",
+    "palette4d.cli.config",
+    "palette4d.cli.plot",
+    "palette4d.cli.install_plugin",
+)
+
+EPILOG = """\
+example:
+  palette4d sample-clip -o clip/frame.####.png
+  palette4d analyze clip/ -o clip.p4d.json
+  palette4d info clip.p4d.json
+  palette4d edit clip.p4d.json set --near 0.9,0.5,0.2 --frame 40 --rgb 0.7 0.2 0.6
+  palette4d render clip.p4d.json clip/ -o graded/frame.####.exr
+
+`palette4d VERB --help` explains a verb and shows an example.
+"""
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Return the parser of the whole command."""
+    parser = Parser(
+        prog="palette4d",
+        description="Time-varying palettes for colour grading: analyse a clip, edit its colours, "
+        "render or bake the result.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"palette4d {__version__}")
+    subparsers = parser.add_subparsers(title="verbs", metavar="VERB", dest="verb", required=True)
+    for name in VERB_MODULES:
+        importlib.import_module(name).add_parser(subparsers)
+    accept_negative_values(subparsers)
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit status.
+
+    0 done, 1 an error that was reported on stderr, 2 wrong usage, 130 interrupted.
+
+    Raises
+    ------
+    SystemExit
+        From argparse: wrong usage (2), ``--help`` and ``--version`` (0).
+    """
+    args = build_parser().parse_args(argv)
+    run: Callable[[argparse.Namespace], int] = args.run
+    try:
+        status = run(args)
+        sys.stdout.flush()
+    except Palette4dError as error:
+        return _report(error)
+    except BrokenPipeError:
+        # The reader of our output went away (`palette4d info … | head`): not our error, but
+        # Python would complain when it flushes stdout at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except OSError as error:
+        return _report(error)
+    except KeyboardInterrupt:
+        print("palette4d: interrupted", file=sys.stderr)
+        return 130
+    return status
+
+
+def _report(error: Exception) -> int:
+    text = str(error).encode("utf-8", "backslashreplace").decode("utf-8")
+    broken = isinstance(error, SidecarError) and (error.pointer or "JSON" in error.expected)
+    if isinstance(error, SidecarError) and '"palette4d.shots"' in error.found:
+        text += (
+            "; this is a manifest of shots: name the sidecar (.p4d.json) of one, or use `palette4d "
+            "export` or `palette4d config`, which take them all"
+        )
+    elif broken and "update palette4d" not in text:
+        text += "; mend it there, take an earlier copy of the file, or analyse the clip again"
+    print(f"palette4d: error: {text}", file=sys.stderr)
+    return 1

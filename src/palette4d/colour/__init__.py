@@ -1,0 +1,1 @@
+"""Colour spaces, conversions and colour difference, through OpenColorIO."""

@@ -1,0 +1,182 @@
+"""OpenColorIO configs and the names in them, with errors that name what is near."""
+
+import difflib
+import os
+from pathlib import Path
+from typing import Any
+
+from palette4d.common.errors import Palette4dError
+
+#: The oldest of OpenColorIO's configs with camera encodings: read by every host with 2.1 or later.
+BUILT_IN = "ocio://studio-config-v1.0.0_aces-v1.3_ocio-v2.1"
+
+#: The names of one encoding in files and in OpenColorIO configs of different years.
+SAME_ENCODINGS = (
+    (
+        "sRGB",
+        "srgb_tx",
+        "srgb_texture",
+        "srgb_rec709_scene",
+        "sRGB - Texture",
+        "Utility - sRGB - Texture",
+        "Output - sRGB",
+    ),
+    (
+        "Rec.709",
+        "Rec709",
+        "g24_rec709",
+        "g24_rec709_scene",
+        "rec709_display",
+        "Gamma 2.4 Rec.709 - Texture",
+        "Utility - Rec.709 - Display",
+        "Output - Rec.709",
+    ),
+    ("g22_rec709", "g22_rec709_scene", "Gamma 2.2 Rec.709 - Texture"),
+    (
+        "lin_rec709",
+        "Linear",
+        "lin_rec709_scene",
+        "lin_srgb",
+        "Linear Rec.709 (sRGB)",
+        "Utility - Linear - Rec.709",
+        "Utility - Linear - sRGB",
+    ),
+    ("ACEScg", "lin_ap1", "lin_ap1_scene", "ACES - ACEScg"),
+    ("ACES2065-1", "lin_ap0", "lin_ap0_scene", "ACES - ACES2065-1"),
+    ("ACEScct", "acescct_ap1", "acescct_ap1_scene", "ACES - ACEScct"),
+)
+
+
+def failures() -> tuple[type[Exception], ...]:
+    """Return what OpenColorIO raises: that for a missing file is no kind of its Exception."""
+    import PyOpenColorIO as ocio
+
+    return ocio.Exception, ocio.ExceptionMissingFile
+
+
+def load_config(name: str, option: str) -> Any:
+    """Return the config of a name.
+
+    Parameters
+    ----------
+    name : str
+        A config.ocio, an .ocioz archive, or a built-in ``ocio://`` name.
+    option : str
+        How the user said it ("--ocio-config", "$OCIO"), for errors.
+
+    Raises
+    ------
+    Palette4dError
+        There is none, or OpenColorIO cannot use it.
+    """
+    import PyOpenColorIO as ocio
+
+    if name.startswith("ocio://"):
+        known = [f"ocio://{entry[0]}" for entry in ocio.BuiltinConfigRegistry().getBuiltinConfigs()]
+        try:
+            return ocio.Config.CreateFromBuiltinConfig(name)
+        except failures() as error:
+            raise Palette4dError(
+                f"{name}: OpenColorIO {ocio.__version__} has no such config; expected one such as "
+                f"{' or '.join(near(name, known))}"
+            ) from error
+    if not Path(name).is_file():
+        raise Palette4dError(
+            f"{name}: found no config there; expected a config.ocio, an .ocioz archive or a "
+            f"built-in ocio:// name with {option}"
+        )
+    try:
+        config = ocio.Config.CreateFromFile(name)
+        config.validate()
+    except failures() as error:
+        raise Palette4dError(
+            f"{name}: OpenColorIO cannot use it as a config: {error}; mend it, or choose another "
+            f"with {option}"
+        ) from error
+    return config
+
+
+def from_anywhere(name: str | None) -> str | None:
+    """Return a config's name as it holds in every folder; None, "" and names of no file stay."""
+    return str(Path(name).absolute()) if name and Path(name).is_file() else name
+
+
+def chosen_config(given: str | None) -> tuple[Any, str]:
+    """Return the config that was given, else that of ``$OCIO``, else `BUILT_IN`; and its name.
+
+    The name of a file is absolute.
+
+    Raises
+    ------
+    Palette4dError
+        It cannot be used.
+    """
+    for name, option in ((given, "--ocio-config"), (os.environ.get("OCIO") or None, "$OCIO")):
+        if name is not None:
+            return load_config(name, option), from_anywhere(name) or name
+    return load_config(BUILT_IN, "--ocio-config"), BUILT_IN
+
+
+def colour_space(config: Any, config_name: str, name: str, option: str) -> Any:
+    """Return the colour space of a name, an alias or a role.
+
+    Raises
+    ------
+    Palette4dError
+        There is none, with the names that are near; or it holds data and no colours.
+    """
+    found = config.getColorSpace(name)
+    if found is None:
+        raise Palette4dError(
+            f"{option} {name!r}: found no such colour space in {config_name}; expected a name, "
+            f"an alias or a role of it, such as {near_spaces(config, name)}"
+        )
+    if found.isData():
+        raise Palette4dError(
+            f"{option} {name!r}: in {config_name} that holds data, not colours; expected a colour "
+            "space"
+        )
+    return found
+
+
+def near_spaces(config: Any, name: str) -> str:
+    """Return the config's spaces of colours whose name, alias or role is near, for an error."""
+    known: dict[str, str] = {}
+    for space in config.getColorSpaces():
+        if not space.isData():
+            names = [space.getName(), *space.getAliases()]
+            known |= {str(entry): str(space.getName()) for entry in names}
+    for role, _ in config.getRoles():
+        space = config.getColorSpace(role)
+        if space is not None and not space.isData():
+            known[str(role)] = str(role)
+    names = list(dict.fromkeys(known[match] for match in near(name, list(known), 6)))[:4]
+    return " or ".join(repr(entry) for entry in names)
+
+
+def same_encodings(encoding: str) -> list[str]:
+    """Return the names under which files and configs know an encoding, its own first.
+
+    >>> same_encodings("lin_ap1")[:2]
+    ['lin_ap1', 'ACEScg']
+    """
+    for names in SAME_ENCODINGS:
+        if encoding.strip().lower() in (name.lower() for name in names):
+            return [encoding, *names]
+    return [encoding]
+
+
+def near(name: str, known: list[str], most: int = 3) -> list[str]:
+    """Return the known names nearest to one, the first few of them all when none is near.
+
+    >>> near("acesct", ["ACEScg", "ACEScct", "Raw"], 1)
+    ['ACEScct']
+    """
+    lower: dict[str, str] = {}
+    for entry in known:
+        lower.setdefault(entry.lower(), entry)
+    wanted = name.lower()
+    holding = [entry for entry in lower if wanted and wanted in entry]
+    matches = difflib.get_close_matches(wanted, list(lower), n=most, cutoff=0.4)
+    found = list(dict.fromkeys([*matches[:1], *holding, *matches]))[:most]
+    return [lower[entry] for entry in found] or known[:8]

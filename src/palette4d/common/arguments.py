@@ -1,0 +1,167 @@
+"""What several verbs read from the command line alike: frames, times, numbers, negative ones too.
+
+A value that is wrong whatever the files hold is refused here, as an argparse type: exit status 2.
+"""
+
+import argparse
+import math
+import re
+from collections.abc import Callable, Iterable
+from typing import Any, NoReturn
+
+from palette4d.common.errors import Palette4dError
+
+#: Longer than any clip; stops numbers that are dates or ids from being taken for frames.
+MAX_FRAMES = 1_000_000
+
+# argparse takes "-3", "-5--4" and "-0.1,0.2,0.3" for options unless told that they are values.
+_NEGATIVE = re.compile(r"-(?:\.?[0-9][0-9.,eEx+-]*|inf|nan)$")
+_RANGE = re.compile(r"(-?[0-9]{1,12})(?:-(-?[0-9]{1,12})(?:x([0-9]{1,12}))?)?")
+
+_FRAMES_ARE = "expected A, A-B or A-BxN with A <= B, or several with commas, such as 1001-1100x2"
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser that says what is wrong in two lines, and where the help is: of a verb with dozens
+    of options argparse would print the whole usage before it. Verbs and their actions inherit it.
+    """
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong on stderr and exit with 2."""
+        verb = " VERB" if self.prog == "palette4d" else ""
+        self.exit(
+            2,
+            f"usage: {self.prog}{verb} … ({self.prog} --help)\n{self.prog}: error: {message}\n",
+        )
+
+    def parse_known_args(
+        self, args: Iterable[str] | None = None, namespace: Any = None
+    ) -> tuple[Any, list[str]]:
+        """As argparse, but what a verb does not know is the verb's error, not the command's."""
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return found, unknown
+
+
+def accept_negative_values(subparsers: "argparse._SubParsersAction[Any]") -> None:
+    """Let the values of these parsers' options begin with a minus."""
+    for parser in subparsers.choices.values():
+        parser._negative_number_matcher = _NEGATIVE
+
+
+def parse_frames(text: str) -> list[int]:
+    """Return the frame numbers of `A`, `A-B`, `A-BxN` or several with commas, in rising order.
+
+    Raises
+    ------
+    Palette4dError
+        The text is no such list, a range falls, or it holds more than `MAX_FRAMES`.
+
+    >>> parse_frames("1001-1007x2,1003-1004")
+    [1001, 1003, 1004, 1005, 1007]
+    >>> parse_frames("-2-1")
+    [-2, -1, 0, 1]
+    """
+    frames: set[int] = set()
+    for part in text.split(","):
+        found = _range(part)
+        if found is None:
+            raise Palette4dError(f'frame range "{text}" cannot be understood; {_FRAMES_ARE}')
+        if len(frames) + len(found) > MAX_FRAMES:
+            raise Palette4dError(
+                f'frame range "{text}" holds more than {MAX_FRAMES} frames; choose fewer'
+            )
+        frames.update(found)
+    return sorted(frames)
+
+
+def _range(part: str) -> range | None:
+    match = _RANGE.fullmatch(part.strip())
+    if match is None:
+        return None
+    first, last, step = int(match[1]), int(match[2] or match[1]), int(match[3] or 1)
+    return range(first, last + 1, step) if first <= last and step else None
+
+
+def frame_range(text: str) -> str:
+    """Argparse type of --frames: the text itself, once `parse_frames` has understood it."""
+    try:
+        parse_frames(text)
+    except Palette4dError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return text
+
+
+def frame_range_or_all(text: str) -> str:
+    """Argparse type: a frame range, or the word "all"."""
+    return text if text == "all" else frame_range(text)
+
+
+def times(text: str) -> list[float]:
+    """Argparse type: rising times, written as a frame range whose single numbers may be fractions.
+
+    >>> times("12.5,0-4x2")
+    [0.0, 2.0, 4.0, 12.5]
+    """
+    found: set[float] = set()
+    for part in text.split(","):
+        try:
+            found.add(number()(part))
+        except argparse.ArgumentTypeError:
+            found.update(map(float, parse_frames(frame_range(part))))
+    return sorted(found)
+
+
+def number(low: float = -math.inf, high: float = math.inf) -> Callable[[str], float]:
+    """Return an argparse type for finite numbers from low to high."""
+
+    def parse(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value) or not low <= value <= high:
+            raise argparse.ArgumentTypeError(
+                f"found {text!r}, expected a finite number{_limits(low, high)}"
+            )
+        return value
+
+    return parse
+
+
+def whole(low: float = -math.inf, high: float = math.inf) -> Callable[[str], int]:
+    """Return an argparse type for whole numbers from low to high."""
+
+    def parse(text: str) -> int:
+        try:
+            value: int | None = int(text)
+        except ValueError:
+            value = None
+        if value is None or not low <= value <= high:
+            raise argparse.ArgumentTypeError(
+                f"found {text!r}, expected a whole number{_limits(low, high)}"
+            )
+        return value
+
+    return parse
+
+
+def checked(parse: Callable[[str], Any], check: Callable[[Any], object]) -> Callable[[str], Any]:
+    """Return an argparse type that parses, and refuses what `check` raises a Palette4dError for."""
+
+    def both(text: str) -> Any:
+        try:
+            value = parse(text)
+            check(value)
+        except Palette4dError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+        return value
+
+    return both
+
+
+def _limits(low: float, high: float) -> str:
+    if low == -math.inf:
+        return ""
+    return f" of at least {low:.10g}" if high == math.inf else f" from {low:.10g} to {high:.10g}"

@@ -1,0 +1,1 @@
+"""The document: palette and edits, and the one place that writes sidecars."""

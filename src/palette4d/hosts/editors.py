@@ -1,0 +1,95 @@
+"""Puts the files of `kdenlive` and `shotcut` into the folders in which those programs look."""
+
+import os
+import sys
+from pathlib import Path
+
+from palette4d import __version__
+from palette4d.common.errors import Palette4dError
+from palette4d.common.files import make_folder, replacing
+from palette4d.hosts import MARK, kdenlive, shotcut
+
+
+def data_folder(program: str, platform: str = sys.platform) -> Path:
+    """Return the folder of the user's that a program reads its additions from.
+
+    Parameters
+    ----------
+    program : str
+        "kdenlive" or "shotcut".
+    platform : str
+        As `sys.platform`.
+
+    Raises
+    ------
+    Palette4dError
+        On platforms other than Linux, where nobody has tried it: the user has to name the folder.
+    """
+    below = {
+        "kdenlive": "kdenlive/effects",
+        "shotcut": "Meltytech/Shotcut/extensions/filters",
+    }[program]
+    if platform != "linux":
+        raise Palette4dError(
+            f"found the platform {platform}, expected linux: the folder {below} of the program's "
+            f"data is not known here; name it, --{program} DIR"
+        )
+    # The standard of the XDG folders has relative ones ignored.
+    home = Path(os.environ.get("XDG_DATA_HOME", ""))
+    return (home if home.is_absolute() else Path.home() / ".local/share") / below
+
+
+def install_kdenlive(folder: Path, *, force: bool = False) -> list[Path]:
+    """Write Kdenlive's effect file into a folder of effects.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder; made when it is missing.
+    force : bool
+        Replace a file of that name that palette4d has not written.
+
+    Returns
+    -------
+    list of Path
+        What was written.
+
+    Raises
+    ------
+    Palette4dError
+        A file of somebody else's is there, or the folder may not be written to.
+    """
+    return _write(folder, {kdenlive.FILE: kdenlive.effect_file(__version__)}, force)
+
+
+def install_shotcut(folder: Path, *, force: bool = False) -> list[Path]:
+    """Write Shotcut's filter, a folder of its own, into a folder of filters.
+
+    Parameters, result and errors are as for `install_kdenlive`.
+    """
+    return _write(folder / shotcut.FOLDER, shotcut.filter_files(__version__), force)
+
+
+def _write(folder: Path, texts: dict[str, str], force: bool) -> list[Path]:
+    """Write all files, or none where one of them is somebody else's."""
+    make_folder(folder)
+    paths = [folder / name for name in texts]
+    for path in paths:
+        if os.path.lexists(path) and not force and not _is_ours(path):
+            raise Palette4dError(
+                f"{path}: found something that palette4d has not written, expected nothing or an "
+                "earlier version; pass --force to replace it"
+            )
+    for path, text in zip(paths, texts.values(), strict=True):
+        with replacing(path, force=True) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    return paths
+
+
+def _is_ours(path: Path) -> bool:
+    """Whether a file says in its first lines that palette4d wrote it."""
+    try:
+        with path.open("rb") as file:
+            return MARK.encode() in file.read(500)
+    except OSError:
+        return False

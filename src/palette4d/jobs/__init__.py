@@ -1,0 +1,1 @@
+"""Many pieces of work at a time: processes on this machine, or a Dask farm."""

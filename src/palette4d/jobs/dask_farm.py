@@ -1,0 +1,256 @@
+"""Many pieces of work on a farm: the workers of a Dask scheduler, or some on this machine.
+
+A worker that dies costs its pieces another try elsewhere, and nothing else: results come back to
+this process, which alone writes files. Scheduler and workers need the same palette4d, and the
+workers see the clips and sidecars under the same paths.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import concurrent.futures
+import contextlib
+import logging
+import os
+import re
+import sys
+import threading
+import time
+import uuid
+from collections.abc import Callable, Iterator, Mapping
+from multiprocessing import resource_tracker
+from typing import Any
+
+from palette4d import _core
+from palette4d.colour.ocio_config import from_anywhere
+from palette4d.common.errors import Palette4dError
+from palette4d.jobs.pool import (
+    Failed,
+    Key,
+    Result,
+    Task,
+    later_interrupts,
+    outcome,
+    without_interrupts,
+)
+
+LOCAL = re.compile(r"local:([1-9][0-9]{0,2})")
+
+#: Seconds to wait for a scheduler to answer, and for the first worker to come.
+ANSWERS_WITHIN = 15
+WORKERS_WITHIN = 120
+
+#: Seconds until it is told that there is no worker, and between looks for one.
+TOLD_AFTER = 3
+ASKED_EVERY = 0.2
+
+
+def check_address(text: str) -> str:
+    """Return an address of --cluster: `local:N` or that of a scheduler.
+
+    Raises
+    ------
+    Palette4dError
+        It is neither.
+    """
+    if LOCAL.fullmatch(text) or re.fullmatch(r"([a-z]+://)?[^/:\s]+:[0-9]+", text):
+        if text.startswith("local:") and not LOCAL.fullmatch(text):
+            raise Palette4dError(f"found {text!r}, expected local:N with N workers from 1 to 999")
+        return text
+    raise Palette4dError(
+        f"found {text!r}, expected local:N for N workers on this machine, or a Dask scheduler's "
+        "address such as tcp://farm.example:8786"
+    )
+
+
+def run(
+    address: str,
+    work: Callable[[Task, int], Result],
+    tasks: Mapping[Key, Task],
+    take: Callable[[Key, Result | Failed], None],
+) -> None:
+    """Work on each task on a farm, and call `take` with each outcome as it is done.
+
+    Parameters
+    ----------
+    address : str
+        As `check_address` takes it.
+    work, tasks, take
+        As in `pool.run`; a worker works at one piece at a time, with all threads it has.
+
+    Raises
+    ------
+    Palette4dError
+        Dask is not installed, no scheduler answers, it has no worker, or one with another
+        palette4d.
+    """
+    if not tasks:
+        return
+    with _connected(check_address(address)) as client:
+        from distributed import as_completed
+
+        _check_scheduler(client, address)
+        config = from_anywhere(os.environ.get("OCIO"))
+        keys = {}
+        futures = []
+        for key, task in tasks.items():
+            name = f"palette4d-{uuid.uuid4().hex}"
+            keys[name] = key
+            futures.append(client.submit(_piece, work, task, config, key=name, pure=False))
+        _check_workers(client, address)
+        try:
+            for future in as_completed(futures, loop=client.loop):
+                found = _outcome(future)
+                with later_interrupts():
+                    take(keys[future.key], found)
+                future.release()  # what it brought may be large
+        finally:
+            with contextlib.suppress(Exception):  # the scheduler may have gone
+                client.cancel(futures)
+
+
+# One piece at a time in a process: a worker's threads are used inside of a piece.
+_at_work = threading.Lock()
+
+
+def _piece(work: Callable[[Task, int], Result], task: Task, config: str | None) -> Result:
+    """Do one piece of work on a worker, with $OCIO as it is where the command runs."""
+    from distributed import get_worker
+
+    with _at_work:
+        before = os.environ.pop("OCIO", None)
+        try:
+            if config is not None:
+                os.environ["OCIO"] = config
+            return work(task, max(1, get_worker().state.nthreads))
+        finally:
+            os.environ.pop("OCIO", None)
+            if before is not None:
+                os.environ["OCIO"] = before
+
+
+def _version() -> str:
+    """Return the version of palette4d where this is run."""
+    return _core.__version__
+
+
+def _outcome(future: Any) -> Any:
+    from distributed import KilledWorker
+
+    try:
+        return outcome(future.result)
+    except KilledWorker:
+        return Failed(
+            "every worker that tried it was ended from outside (too little memory?); run the same "
+            "command again, on workers with more"
+        )
+    except (concurrent.futures.CancelledError, asyncio.CancelledError):
+        return Failed("the farm's scheduler went away; run the same command again")
+
+
+@contextlib.contextmanager
+def _connected(address: str) -> Iterator[Any]:
+    """Yield a client of the scheduler at an address, or of one of our own."""
+    try:
+        import distributed
+    except ImportError as error:
+        raise Palette4dError(
+            "--cluster needs Dask, which is not installed; run: pip install 'palette4d[farm]'"
+        ) from error
+    local = LOCAL.fullmatch(address)
+    if not local:
+        with _client(distributed, address, f"no Dask scheduler answers at {address}") as client:
+            yield client
+        return
+    # The workers inherit that Ctrl-C does not end them: this process does. What Python starts with
+    # the first process lets Ctrl-C through again, so that it is started before.
+    resource_tracker.ensure_running()
+    with without_interrupts():
+        cluster = distributed.LocalCluster(
+            n_workers=int(local[1]),
+            threads_per_worker=1,
+            processes=True,
+            host="127.0.0.1",
+            dashboard_address=None,
+            memory_limit=0,
+            silence_logs=logging.CRITICAL,
+        )
+    with cluster, _client(distributed, cluster, "the local workers cannot be reached") as client:
+        yield client
+
+
+@contextlib.contextmanager
+def _without_log() -> Iterator[None]:
+    """Keep Dask's log from standard error: what matters is told with the piece it concerns."""
+    loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
+    before = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        for logger, level in zip(loggers, before, strict=True):
+            logger.setLevel(level)
+
+
+@contextlib.contextmanager
+def _client(distributed: Any, target: Any, otherwise: str) -> Iterator[Any]:
+    try:
+        client = distributed.Client(target, timeout=ANSWERS_WITHIN, set_as_default=False)
+    except (OSError, TimeoutError, ValueError) as error:
+        raise Palette4dError(
+            f"{otherwise} ({error}); start one with `dask scheduler` and workers with `dask "
+            "worker`, check the address, or use --cluster local:N"
+        ) from error
+    with _without_log(), client:
+        yield client
+
+
+def _check_workers(client: Any, address: str) -> None:
+    """Wait for the first worker that answers, and refuse workers with another palette4d."""
+    from tqdm import tqdm
+
+    started = time.monotonic()
+    told = False
+    while (waited := time.monotonic() - started) < WORKERS_WITHIN:
+        found = client.run(_version, on_error="return")
+        # One that died, or lost its connection, does not lack palette4d: Dask does without it.
+        there = {who: it for who, it in found.items() if not isinstance(it, OSError)}
+        for worker, version in sorted(there.items()):
+            _check_version(f"the worker {worker}", version)
+        if there:
+            return
+        if not told and waited >= TOLD_AFTER:
+            told = True
+            tqdm.write(
+                f"palette4d: note: the scheduler at {address} has no worker yet; start one with "
+                f"`dask worker {address}` (waiting for {WORKERS_WITHIN - waited:.0f} more seconds)",
+                file=sys.stderr,
+            )
+        time.sleep(ASKED_EVERY)
+    raise Palette4dError(
+        f"the scheduler at {address} has had no worker for {WORKERS_WITHIN} seconds; start some "
+        f"with `dask worker {address}`"
+    )
+
+
+def _check_scheduler(client: Any, address: str) -> None:
+    """Refuse a scheduler with another palette4d: it, too, must know what is sent."""
+    try:
+        found: object = client.run_on_scheduler(_version)
+    except Exception as error:  # whatever the scheduler's import raised
+        found = error
+    _check_version(f"the scheduler at {address}", found)
+
+
+def _check_version(who: str, found: object) -> None:
+    if isinstance(found, Exception):
+        raise Palette4dError(
+            f"{who} cannot import palette4d ({found}); install palette4d {_core.__version__} where "
+            "it runs"
+        )
+    if found != _core.__version__:
+        raise Palette4dError(
+            f"{who} has palette4d {found}, expected {_core.__version__} as here, so that results "
+            "are the same; install that where it runs"
+        )

@@ -1,0 +1,151 @@
+"""Many pieces of work on this machine, in processes of their own."""
+
+import contextlib
+import itertools
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from typing import TypeVar
+
+from palette4d.common.errors import Palette4dError
+
+Key = TypeVar("Key")
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True)
+class Failed:
+    """What kept a piece of work from its result, in words for the user."""
+
+    text: str
+
+
+def run(
+    work: Callable[[Task, int], Result],
+    tasks: Mapping[Key, Task],
+    take: Callable[[Key, Result | Failed], None],
+    jobs: int = 0,
+    *,
+    patient: bool = True,
+) -> None:
+    """Work on each task, several at a time, and call `take` with each outcome as it is done.
+
+    Parameters
+    ----------
+    work : callable
+        (task, threads to use) -> result; a function of a module, so that it can be sent.
+    tasks : mapping
+        What to do, by any key.
+    take : callable
+        Called in this process with a key and the result, or `Failed` for a `Palette4dError`, an
+        `OSError`, or a process that was ended from outside.
+    jobs : int
+        Processes; 0: one a processor; with 1 all is done in this process.
+    patient : bool
+        After Ctrl-C, let the pieces that are worked on be done and told; else they are dropped.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        Ctrl-C.
+    """
+
+    def told(key: Key, found: Result | Failed) -> None:
+        with later_interrupts():
+            take(key, found)
+
+    processors = os.cpu_count() or 1
+    jobs = min(jobs or processors, max(1, len(tasks)))
+    threads = max(1, processors // jobs)
+    if jobs == 1:
+        for key, task in tasks.items():
+            told(key, outcome(work, task, threads))
+        return
+    # Spawned, not forked: the libraries here have threads of their own.
+    pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"))
+    left = iter(tasks.items())
+    order = {key: i for i, key in enumerate(tasks)}
+    running: dict[Future[Result], Key] = {}
+    others = set(multiprocessing.active_children())
+    try:
+        while True:
+            # No more than are worked on, so that Ctrl-C waits for those alone. It goes to all
+            # processes: the workers, who inherit this, finish the piece they are at.
+            with without_interrupts():
+                for key, task in itertools.islice(left, jobs - len(running)):
+                    running[_submitted(pool, work, task, threads)] = key
+            if not running:
+                break
+            done, _ = wait(running, return_when=FIRST_COMPLETED)
+            for future in sorted(done, key=lambda f: order[running[f]]):
+                told(running.pop(future), outcome(future.result))
+    except KeyboardInterrupt:
+        if not patient:
+            for process in set(multiprocessing.active_children()) - others:
+                process.terminate()
+        raise
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+        # After Ctrl-C: what was finished meanwhile.
+        for future, key in running.items():
+            if not future.cancelled() and (patient or not future.exception()):
+                told(key, outcome(future.result))
+
+
+def _submitted(
+    pool: ProcessPoolExecutor, work: Callable[[Task, int], Result], task: Task, threads: int
+) -> Future[Result]:
+    try:
+        return pool.submit(work, task, threads)
+    except BrokenProcessPool as error:
+        broken: Future[Result] = Future()
+        broken.set_exception(error)
+        return broken
+
+
+def outcome(call: Callable[..., Result], *arguments: object) -> Result | Failed:
+    """Return what a call returns, or why it cannot."""
+    try:
+        return call(*arguments)
+    except (Palette4dError, OSError) as error:
+        return Failed(str(error))
+    except BrokenProcessPool:
+        return Failed(
+            "its process was ended from outside (too little memory?); run the same command again, "
+            "with fewer --jobs"
+        )
+
+
+@contextlib.contextmanager
+def later_interrupts() -> Iterator[None]:
+    """Let Ctrl-C wait for the body's end: what is being written is written and noted."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    held: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, frame: held.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+        if held and callable(before):
+            before(held[0], None)
+
+
+@contextlib.contextmanager
+def without_interrupts() -> Iterator[None]:
+    """Keep Ctrl-C from this thread and from processes that are started meanwhile."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -1,0 +1,1 @@
+"""Clips in, frames and movies out."""

@@ -1,0 +1,85 @@
+"""Clip reading, the first stage: image sequences and movies as numbered float32 frames.
+
+Input: a pattern, a folder, an image or a movie file. Output: a `Clip`, which yields one frame at a
+time, (h, w, 3 or 4) float32 with frame numbers that rise. Colours keep the file's own
+encoding: nothing is converted, and alpha is left as it is stored (`Clip.premultiplied`).
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+from palette4d.media import clip_sequence
+from palette4d.media.clip_base import Clip, ClipError, FrameError, Image
+
+__all__ = ["Clip", "ClipError", "FrameError", "Image", "open_clip"]
+
+
+def open_clip(
+    spec: str,
+    *,
+    frames: str | None = None,
+    rate: Fraction | None = None,
+    skip_bad_frames: bool = False,
+) -> Clip:
+    """Open a clip; pixels are read later, one frame at a time.
+
+    Parameters
+    ----------
+    spec : str
+        `name.####.exr` (one # a digit), `name.%04d.exr`, `name.@@@@.exr`, `name.1-10x2#.exr`, a
+        folder with one image sequence, a single image, or a movie file.
+    frames : str, optional
+        `A-B`, `A-BxN`, single numbers or comma lists (`common.arguments.parse_frames`); the
+        whole clip by default.
+    rate : Fraction, optional
+        Frames a second; the file's own by default, 24 where it has none.
+    skip_bad_frames : bool
+        Pass over missing, unreadable or odd-sized frames and list them in `Clip.skipped`.
+
+    Raises
+    ------
+    ClipError
+        When there is no such clip, the range does not fit, or the format is not supported.
+    Palette4dError
+        When the range cannot be understood.
+    FrameError
+        When a frame is missing or unreadable and `skip_bad_frames` is not set.
+    """
+    from palette4d.media import clip_images
+
+    if rate is not None and rate <= 0:
+        raise ClipError(f"rate {rate}: expected frames a second above 0, such as 24 or 24000/1001")
+    if not spec.strip():
+        raise ClipError(
+            "the clip's name is empty; expected a pattern such as name.####.exr, a folder (. is "
+            "the working folder), an image or a movie file"
+        )
+    path = Path(spec)
+    if path.is_dir():
+        found = clip_sequence.in_folder(path)
+        if isinstance(found, clip_sequence.Sequence):
+            return clip_images.open_images(found, frames, None, rate, skip_bad_frames)
+        path = found
+    extension = clip_sequence.extension(path)
+    if path.is_file():
+        if extension in clip_sequence.IMAGE_EXTENSIONS:
+            sequence, _ = clip_sequence.of_file(path)
+            return clip_images.open_images(sequence, frames, None, rate, skip_bad_frames, True)
+        if extension in clip_sequence.MOVIE_EXTENSIONS:
+            from palette4d.media import clip_movie
+
+            return clip_movie.open_movie(path, frames, rate, skip_bad_frames)
+        raise ClipError(
+            f'{path}: found a file with the extension "{extension}", expected an image '
+            f"({', '.join(sorted(clip_sequence.IMAGE_EXTENSIONS))}) or a movie "
+            f"({', '.join(sorted(clip_sequence.MOVIE_EXTENSIONS))})"
+        )
+    if any(mark in path.name for mark in "#@%$<"):
+        sequence, embedded = clip_sequence.of_pattern(spec)
+        return clip_images.open_images(sequence, frames, embedded, rate, skip_bad_frames)
+    raise ClipError(
+        f"{spec}: no such file or folder; expected a pattern such as name.####.exr, a folder with "
+        "one image sequence, an image or a movie file. Check the path."
+    )

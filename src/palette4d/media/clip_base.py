@@ -1,0 +1,262 @@
+"""What a clip is: frame numbers, a rate, a size, and pixels that are read one frame at a time.
+
+`clip.py` opens one, `clip_images.py` and `clip_movie.py` implement it. Memory holds one frame,
+however long the clip; the analysis, which only counts pixels, reads strips of one (`Clip.fills`).
+"""
+
+from __future__ import annotations
+
+import abc
+import itertools
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palette4d import _core
+from palette4d.common.errors import Palette4dError
+
+F32 = NDArray[np.float32]
+
+Fill = Callable[[_core.ColourBinner], bool]
+"""Hands a frame's pixels over to a binner; FrameError when the frame is bad. Returns whether the
+frame is `hidden`: its colours were then handed over as if it had no alpha."""
+
+LEAST_ALPHA = np.float32(1 / 255)
+"""Below it a pixel does not show in 8 bit."""
+
+DEFAULT_RATE = Fraction(24)
+
+COUNTED_PIXELS = 4_000_000
+"""Of larger frames the analysis counts every n-th row, so that about as many pixels are left."""
+
+STRIP_BYTES = 32 << 20
+"""Most bytes of the strips in which frames are read for counting."""
+
+
+class ClipError(Palette4dError):
+    """A clip that cannot be opened: what was found, what was expected, what to do."""
+
+
+class FrameError(ClipError):
+    """One frame is missing, unreadable or unlike the others; `--skip-bad-frames` skips it."""
+
+
+@dataclass(frozen=True)
+class Image:
+    """One frame as it is stored, upright.
+
+    pixels is (h, w, 3 or 4) float32, integer formats scaled to 0..1 by their largest value, float
+    formats untouched (negative, above 1, NaN and infinities included). metadata holds
+    (name, OpenImageIO type, value) of what is worth carrying into a recoloured file.
+    """
+
+    frame: int
+    pixels: F32
+    metadata: tuple[tuple[str, Any, Any], ...] = ()
+
+
+@dataclass
+class Clip(abc.ABC):
+    """An opened clip; see `palette4d.media.clip.open_clip`.
+
+    Attributes
+    ----------
+    name : str
+        Short name, for people.
+    source : str
+        The sequence with one `#` for each digit, the movie, or the single image.
+    frames : list of int
+        Frame numbers in rising order; includes the bad frames that `skip_bad_frames` will pass
+        over.
+    rate : Fraction
+        Frames a second.
+    width, height : int
+        Pixels, after the orientation that the file states has been applied.
+    encoding : str
+        Colour encoding as the file states it ("sRGB", "Rec.709", …), or "unknown".
+    has_alpha : bool
+        The pixels have four channels, the last is alpha.
+    premultiplied : bool
+        Colours are multiplied by alpha (EXR and DPX by convention, TIFF if it says so). PNG and
+        movies hold them straight. Nothing is converted on reading: see `straight_colours`.
+    depth : str
+        Stored sample: "uint8", "uint10", "uint12", "uint16", "half", "float", …
+    is_movie : bool
+        The clip is a movie file: its frame numbers start at 0.
+    notes : list of str
+        Remarks for the user, such as a variable frame rate.
+    skipped : list of int
+        Frames passed over so far, in rising order.
+    """
+
+    name: str
+    source: str
+    frames: list[int]
+    rate: Fraction
+    width: int
+    height: int
+    encoding: str
+    has_alpha: bool
+    premultiplied: bool
+    depth: str
+    skip_bad_frames: bool = False
+    is_movie: bool = False
+    notes: list[str] = field(default_factory=list)
+    skipped: list[int] = field(default_factory=list)
+
+    @property
+    def step(self) -> int:
+        """Distance between neighbouring frame numbers (1 for a single frame); 0 when it varies."""
+        return even_step(self.frames)
+
+    @abc.abstractmethod
+    def load(self, frame: int) -> Image:
+        """Read one frame with its metadata; FrameError when it is missing or unreadable."""
+
+    @abc.abstractmethod
+    def file(self, frame: int) -> Path:
+        """File that holds a frame, whether it exists or not."""
+
+    @abc.abstractmethod
+    def fills(self, frames: Sequence[int]) -> Iterator[tuple[int, Fill]]:
+        """For each of the frames, in order: its number and what fills a binner with its colours.
+
+        They are the colours that a recolouring sees (`straight_colours`), and may be binned in any
+        thread, each with a binner of its own. What is iterated over must be consumed in order.
+        """
+
+    @property
+    def row_step(self) -> int:
+        """Every how many rows are counted: 1 up to 6 million pixels, 8 for 8K."""
+        return max(1, round(self.width * self.height / COUNTED_PIXELS))
+
+    def iter_images(self) -> Iterator[Image]:
+        """Read the frames in order, one at a time.
+
+        Raises
+        ------
+        FrameError
+            For the first bad frame, or, with `skip_bad_frames`, when every frame is bad.
+        """
+        good = 0
+        for frame in self.frames:
+            try:
+                image = self.load(frame)
+            except FrameError:
+                if not self.skip_bad_frames:
+                    raise
+                self.skip(frame)
+                continue
+            good += 1
+            yield image
+        if not good:
+            raise self.none_readable()
+
+    def iter_frames(self) -> Iterator[tuple[int, F32]]:
+        """(frame number, (h, w, 3 or 4) float32 pixels), in order, one frame at a time."""
+        for image in self.iter_images():
+            yield image.frame, image.pixels
+
+    def iter_colours(self) -> Iterator[tuple[int, F32]]:
+        """(frame number, (h, w, 3) float32 straight colours): see `straight_colours`."""
+        for image in self.iter_images():
+            yield image.frame, self.straight_colours(image.pixels)
+
+    def read(self, frame: int) -> F32:
+        """(h, w, 3 or 4) float32 pixels of one frame; ClipError when it is not in the clip."""
+        if frame not in self.frames:
+            raise ClipError(
+                f"{self.source}: frame {frame} was asked for, the clip has {describe(self.frames)}"
+            )
+        return self.load(frame).pixels
+
+    def straight_colours(self, pixels: F32) -> F32:
+        """(h, w, 3) float32 colours that a recolouring sees.
+
+        Premultiplied colours are divided by alpha, as the node does. Pixels with an alpha below
+        1/255 have no colour that shows, and dividing by it would magnify noise into colours far
+        outside the clip's: they become NaN, which the analysis leaves out. A frame with nothing
+        else (`hidden`) keeps its colours as they are: if all frames are like it, alpha is not used.
+        """
+        if pixels.shape[2] == 3:
+            return pixels
+        if hidden(pixels):
+            return np.ascontiguousarray(pixels[..., :3])
+        alpha = pixels[..., 3:]
+        seen = alpha >= LEAST_ALPHA
+        divisor = alpha if self.premultiplied else np.float32(1)
+        colours = np.full_like(pixels[..., :3], np.nan)
+        with np.errstate(over="ignore", invalid="ignore"):
+            np.divide(pixels[..., :3], divisor, out=colours, where=seen)
+        return colours
+
+    def skip(self, frame: int) -> None:
+        """List a bad frame in `skipped`."""
+        if frame not in self.skipped:
+            self.skipped.append(frame)
+            self.skipped.sort()
+
+    def none_readable(self) -> FrameError:
+        """Return the error that says that no frame is good."""
+        return FrameError(
+            f"{self.source}: found none readable of {named(self.frames)}; "
+            "expected at least one good frame. Run without --skip-bad-frames to see the cause."
+        )
+
+
+def hidden(pixels: F32) -> bool:
+    """Whether no pixel of (h, w, 3 or 4) shows: alpha is below 1/255 everywhere."""
+    return pixels.shape[2] == 4 and not (pixels[..., 3] >= LEAST_ALPHA).any()
+
+
+def all_hidden(binner: _core.ColourBinner) -> bool:
+    """Whether no pixel of what was binned, with its alpha, shows: as `hidden`."""
+    return 0 < binner.transparent == binner.pixels + binner.ignored
+
+
+def even_step(numbers: Sequence[int]) -> int:
+    """Distance between neighbours of the (rising) numbers, 1 for one number, 0 when it varies."""
+    steps = {after - before for before, after in itertools.pairwise(numbers)} or {1}
+    return steps.pop() if len(steps) == 1 else 0
+
+
+def progression_step(numbers: Sequence[int]) -> int:
+    """Largest step with which a range holds all of the (rising) numbers; 1 for one number."""
+    step = 0
+    for before, after in itertools.pairwise(numbers):
+        step = math.gcd(step, after - before)
+    return step or 1
+
+
+def describe(frames: Sequence[int]) -> str:
+    """Frames for a message, short: `3`, `1-10`, `1-9x2`, or a list that ends in an ellipsis."""
+    if len(frames) == 1:
+        return f"{frames[0]}"
+    step = frames[1] - frames[0]
+    if len(frames) > 2 and all(b - a == step for a, b in itertools.pairwise(frames)):
+        return f"{frames[0]}-{frames[-1]}" + (f"x{step}" if step != 1 else "")
+    if len(frames) == 2 and step == 1:
+        return f"{frames[0]}-{frames[1]}"
+    shown = ", ".join(str(frame) for frame in frames[:8])
+    return shown + (f", … ({len(frames)} in all)" if len(frames) > 8 else "")
+
+
+def named(frames: Sequence[int]) -> str:
+    """Frames for a message, with the noun: `frame 3`, `frames 1-10`."""
+    return f"frame{'s' * (len(frames) != 1)} {describe(frames)}"
+
+
+def as_rate(value: float) -> Fraction | None:
+    """Nearest usual rate of a floating-point one: 23.976 -> 24000/1001; None if it is no rate."""
+    if not math.isfinite(value) or value <= 0:
+        return None
+    for whole in range(1, 241):
+        if abs(value - whole * 1000 / 1001) < 2e-4 * whole / 24:
+            return Fraction(whole * 1000, 1001)
+    return Fraction(value).limit_denominator(1001) or None

@@ -1,0 +1,569 @@
+"""Clips of movie files, decoded in order through PyAV (FFmpeg's libraries).
+
+Frame numbers start at 0 and count pictures in presentation order. A first pass reads the packets'
+time stamps without decoding, so that a picture which cannot be decoded later is named by its own
+number and moves no other. Damage is named where the decoder reports it (H.264, ProRes and most
+others do); FFV1 and VP9 conceal it, and FFmpeg passes no word of it on.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+from av.error import FFmpegError
+from numpy.typing import NDArray
+
+from palette4d import _core
+from palette4d.common.arguments import parse_frames
+from palette4d.media.clip_base import (
+    DEFAULT_RATE,
+    F32,
+    STRIP_BYTES,
+    Clip,
+    ClipError,
+    Fill,
+    FrameError,
+    Image,
+    all_hidden,
+    describe,
+    named,
+)
+
+# H.273 code points; libswscale and PyAV use the same numbers.
+_TRANSFERS = {
+    1: "Rec.709",
+    4: "gamma 2.2",
+    5: "gamma 2.8",
+    6: "Rec.601",
+    7: "SMPTE 240M",
+    8: "linear",
+    13: "sRGB",
+    14: "Rec.2020",
+    15: "Rec.2020",
+    16: "Rec.2100 PQ",
+    18: "Rec.2100 HLG",
+}
+_UNSPECIFIED = 2
+# Weights of red and blue in luma, by matrix coefficients.
+_LUMA = {
+    1: (0.2126, 0.0722),
+    4: (0.30, 0.11),
+    5: (0.299, 0.114),
+    6: (0.299, 0.114),
+    7: (0.212, 0.087),
+    9: (0.2627, 0.0593),
+    10: (0.2627, 0.0593),
+}
+_FULL_RANGE = 2
+_PLANAR_DEPTHS = (8, 9, 10, 12, 14, 16)
+#: How the names of Y'CbCr layouts start.
+_LUMA_CHROMA = ("yuv", "nv", "p0", "p2", "p4", "yuyv", "uyvy", "yvyu", "y2", "xv", "v")
+
+
+@dataclass
+class MovieClip(Clip):
+    """A movie file. Reading in order decodes each picture once; going back seeks."""
+
+    path: Path = field(kw_only=True)
+    count: int = field(kw_only=True)
+    #: Presentation time stamps in order; None where the file has none, and pictures are counted.
+    stamps: list[int] | None = field(kw_only=True, default=None)
+    _decoder: Iterator[tuple[int, av.VideoFrame]] | None = field(default=None, init=False)
+    _next: int = field(default=0, init=False)
+    _held: tuple[int, av.VideoFrame] | None = field(default=None, init=False)
+    _problem: str = field(default="", init=False)
+
+    def file(self, frame: int) -> Path:
+        """Return the movie file, which holds every frame."""
+        return self.path
+
+    def load(self, frame: int) -> Image:
+        """Decode one picture; FrameError when it is damaged, missing or of another size."""
+        picture = self._picture(frame)
+        return Image(frame, _upright(picture_pixels(picture), picture))
+
+    def fills(self, frames: Sequence[int]) -> Iterator[tuple[int, Fill]]:
+        """Decode the frames in order; binning one may go on while the next is decoded."""
+        for frame in frames:
+            try:
+                fill: Fill = functools.partial(_bin_picture, self._picture(frame), self.row_step)
+            except FrameError as error:
+                fill = functools.partial(_fail, error)
+            yield frame, fill
+
+    def _picture(self, frame: int) -> av.VideoFrame:
+        picture = self._find(frame)
+        if picture is None:
+            why = f" ({self._problem})" if self._problem else ""
+            raise FrameError(
+                f"{self.path}: frame {frame} cannot be decoded{why}; expected {self.count} whole "
+                "frames. Bring a good copy, choose a range with --frames, or leave such frames "
+                "out with --skip-bad-frames."
+            )
+        shape = _shape(picture)
+        if shape != (self.height, self.width, 4 if self.has_alpha else 3):
+            height, width, channels = shape
+            raise FrameError(
+                f"{self.path}: frame {frame} is {width}x{height} pixels with {channels} channels, "
+                f"expected {self.width}x{self.height} with {4 if self.has_alpha else 3} as in the "
+                "frames before. Choose a range with --frames, or leave such frames out with "
+                "--skip-bad-frames."
+            )
+        return picture
+
+    def _find(self, frame: int) -> av.VideoFrame | None:
+        if self._decoder is None or frame < self._next:
+            seek = self.stamps is not None and frame > 0
+            self._start(frame if seek else 0)
+            picture = self._advance(frame)
+            if picture is not None or not seek:
+                return picture
+            # Some containers seek past their mark: only the way from the start is sure.
+            self._start(0)
+        return self._advance(frame)
+
+    def _start(self, frame: int) -> None:
+        self._decoder = self._decode(frame)
+        self._next, self._held, self._problem = 0, None, ""
+
+    def _advance(self, frame: int) -> av.VideoFrame | None:
+        """Decode up to a picture; one that comes too early is kept for the next call."""
+        assert self._decoder is not None
+        self._next = frame + 1
+        if self._held is None:
+            self._held = next(self._decoder, None)
+        while self._held is not None and self._held[0] < frame:
+            self._held = next(self._decoder, None)
+        if self._held is None or self._held[0] > frame:
+            return None
+        picture = self._held[1]
+        self._held = None
+        if picture.is_corrupt:
+            self._problem = "the decoder marks it as damaged"
+            return None
+        return picture
+
+    def _decode(self, start: int) -> Iterator[tuple[int, av.VideoFrame]]:
+        """(number, picture) from the key frame before `start`, or a little later."""
+        numbers = {stamp: index for index, stamp in enumerate(self.stamps or ())}
+        counted = 0
+        with _open(self.path) as container:
+            stream = _video_stream(container, self.path)
+            # Say so when a picture is damaged, instead of painting over it.
+            stream.codec_context.options = {"err_detect": "crccheck+explode"}
+            stream.thread_type = "AUTO"
+            if start and self.stamps:
+                try:
+                    container.seek(self.stamps[start], stream=stream, backward=True)
+                except FFmpegError:
+                    container.seek(0)
+            for pictures in self._packets(container, stream):
+                for picture in pictures:
+                    if self.stamps is None:
+                        yield counted, picture
+                        counted += 1
+                    elif picture.pts in numbers:
+                        yield numbers[picture.pts], picture
+
+    def _packets(self, container: Any, stream: Any) -> Iterator[list[av.VideoFrame]]:
+        """Decoded pictures of each packet; a damaged one is noted and passed over."""
+        packets = container.demux(stream)
+        while True:
+            try:
+                packet = next(packets, None)
+                if packet is None:
+                    return
+            except FFmpegError as error:  # the file ends in the middle
+                self._problem = error.strerror or str(error)
+                return
+            try:
+                yield packet.decode()
+            except FFmpegError as error:
+                self._problem = error.strerror or str(error)
+
+
+def open_movie(
+    path: Path, frames: str | None, rate: Fraction | None, skip_bad_frames: bool
+) -> MovieClip:
+    """Open a movie file over the asked range; ClipError or FrameError as `open_clip` says."""
+    with _open(path) as container:
+        stream = _video_stream(container, path)
+        first, promised, stamps, packets = _index(container, stream, path)
+        own_rate = stream.average_rate or stream.guessed_rate or stream.base_rate
+        base = stream.time_base
+    count = max(promised, packets)
+    wanted = list(range(count))
+    if frames is not None:
+        wanted = parse_frames(frames)
+        if wanted[0] < 0 or wanted[-1] >= count:
+            raise ClipError(
+                f"{path}: asked for {named(wanted)}, the movie has "
+                f"{describe(range(count))} (its frame numbers start at 0). Choose a range inside."
+            )
+    if wanted[-1] >= packets and not skip_bad_frames:
+        raise FrameError(
+            f"{path}: frame {packets} is missing: the file ends after {packets} of {count} frames. "
+            "Bring a whole copy, choose a range with --frames, or leave such frames out with "
+            "--skip-bad-frames."
+        )
+    height, width, channels = _shape(first)
+    notes = []
+    if stamps is not None and base is not None and _varies(stamps, base, own_rate):
+        notes.append(f"{path}: the frame rate varies; frames are counted, their times are not used")
+    bits = max((component.bits for component in first.format.components), default=8)
+    return MovieClip(
+        name=path.stem,
+        source=str(path),
+        frames=wanted,
+        rate=rate or (Fraction(own_rate) if own_rate else DEFAULT_RATE),
+        width=width,
+        height=height,
+        encoding=_encoding(first),
+        has_alpha=channels == 4,
+        premultiplied=False,
+        depth="float" if bits == 32 else f"uint{max(bits, 8)}",
+        skip_bad_frames=skip_bad_frames,
+        is_movie=True,
+        notes=notes,
+        path=path,
+        count=count,
+        stamps=stamps,
+    )
+
+
+def _open(path: Path) -> Any:
+    try:
+        # Without the protocol a name such as "cam:01.mov" would be taken for an address.
+        return av.open(f"file:{path}", mode="r")
+    except (FFmpegError, OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        if path.is_file() and path.stat().st_size == 0:
+            reason = "the file is empty"
+        raise ClipError(
+            f"{path}: the movie cannot be opened ({reason}); expected a whole movie file that "
+            "FFmpeg can read. Bring a good copy, or convert it to an image sequence."
+        ) from error
+
+
+def _video_stream(container: Any, path: Path) -> Any:
+    stream = container.streams.best("video")
+    if stream is None:
+        raise ClipError(f"{path}: found no video stream, expected one; give a movie with a picture")
+    return stream
+
+
+def _index(
+    container: Any, stream: Any, path: Path
+) -> tuple[av.VideoFrame, int, list[int] | None, int]:
+    """First good picture, number of frames the header promises, stamps in order, and packets."""
+    first: av.VideoFrame | None = None
+    stamps: list[int | None] = []
+    discarded = 0
+    # Old VP8 files have packets without a picture: only decoding tells.
+    by_decoding = stream.codec_context.name == "vp8"
+    try:
+        for packet in container.demux(stream):
+            pictures: list[Any] = []
+            if first is None or by_decoding:
+                try:
+                    pictures = packet.decode()
+                except FFmpegError:
+                    pictures = []
+                first = first or next(iter(pictures), None)
+            if packet.size == 0:
+                stamps += [picture.pts for picture in pictures if by_decoding]
+            elif packet.is_discard:
+                discarded += 1
+            elif by_decoding:
+                stamps += [picture.pts for picture in pictures]
+            elif not packet.is_corrupt or packet.pts is not None:
+                stamps.append(packet.pts)
+    except FFmpegError:
+        pass  # the file ends in the middle; what came before counts
+    if first is None:
+        raise ClipError(
+            f"{path}: no frame can be decoded (codec {stream.codec_context.name}); expected a "
+            "movie with at least one whole frame. Bring a good copy, or convert it to images."
+        )
+    promised = 0 if by_decoding else max(stream.frames - discarded, 0)
+    known = [stamp for stamp in stamps if stamp is not None]
+    if len(known) == len(stamps) == len(set(known)):
+        return first, promised, sorted(known), len(stamps)
+    return first, promised, None, len(stamps)
+
+
+def _varies(stamps: list[int], base: Fraction, rate: Fraction | None) -> bool:
+    """Whether the time between frames changes by more than the rounding of time stamps."""
+    if len(stamps) < 3 or not rate:
+        return False
+    gaps = np.diff(np.asarray(stamps, dtype=np.int64))
+    return bool(np.ptp(gaps) > max(2, float(Fraction(1, 4) / (rate * base))))
+
+
+def _encoding(picture: av.VideoFrame) -> str:
+    if named := _TRANSFERS.get(int(picture.color_trc)):
+        return named
+    if int(picture.color_primaries) == 1 or int(picture.colorspace) == 1:
+        return "Rec.709"
+    return "unknown"
+
+
+def _upright(pixels: F32, picture: av.VideoFrame) -> F32:
+    """Apply the display matrix' rotation (anticlockwise degrees) where it is a quarter turn."""
+    turns = round(picture.rotation / 90)
+    return np.ascontiguousarray(np.rot90(pixels, turns)) if turns else pixels
+
+
+def _fail(error: FrameError, binner: _core.ColourBinner) -> bool:
+    """Stand in for the filling of a bad frame."""
+    raise error
+
+
+def _shape(picture: av.VideoFrame) -> tuple[int, int, int]:
+    """(h, w, 3 or 4) of its pixels, upright."""
+    turned = round(picture.rotation / 90) % 2
+    size = (picture.width, picture.height) if turned else (picture.height, picture.width)
+    return (*size, 4 if _has_alpha(picture) else 3)
+
+
+def _has_alpha(picture: av.VideoFrame) -> bool:
+    layout = picture.format
+    return layout.has_palette or any(component.is_alpha for component in layout.components)
+
+
+def _bits(picture: av.VideoFrame) -> int:
+    return max(component.bits for component in picture.format.components)
+
+
+def _bin_picture(picture: av.VideoFrame, row_step: int, binner: _core.ColourBinner) -> bool:
+    """Bin every `row_step`-th row of a picture, with the colours of `picture_pixels`; returns
+    whether none of them shows (`Fill`)."""
+    picture = _thinned(picture, row_step)
+    how = _luma_chroma(picture)
+    if how is not None and not how.alpha:
+        luma, blue, red = _planes_of(how.planar, how.samples)
+        red_weight, blue_weight = _LUMA[how.matrix]
+        binner.add_luma_chroma(
+            luma,
+            blue,
+            red,
+            red_weight=red_weight,
+            blue_weight=blue_weight,
+            bits=how.bits,
+            full_range=how.full_range,
+        )
+        return False
+    packed, convert = _packed(picture), _converter(picture)
+    strip = max(STRIP_BYTES // (16 * picture.width), 1)
+
+    def add(channels: int) -> None:
+        for top in range(0, picture.height, strip):
+            rows = slice(top, top + strip)
+            pixels = convert(rows) if packed is None else packed[rows]
+            binner.add(pixels[..., :channels])
+
+    add(4 if _has_alpha(picture) else 3)
+    if not all_hidden(binner):
+        return False
+    # Nothing shows: see `Clip.straight_colours`.
+    binner.clear()
+    add(3)
+    return True
+
+
+def _thinned(picture: av.VideoFrame, row_step: int) -> av.VideoFrame:
+    """Every `row_step`-th row, where the layout's planes allow it: chroma that is halved from row
+    to row (4:2:0) becomes that of 4:2:2, from the nearest row."""
+    if row_step == 1 or picture.format.has_palette:
+        return picture
+    rows = np.arange(row_step // 2, picture.height, row_step)
+    layout = picture.format.name.replace("420p", "422p")
+    thin = av.VideoFrame(picture.width, len(rows), layout)
+    widths = [plane.width for plane in picture.planes]
+    if any(plane.height != len(rows) for plane in thin.planes) or widths != [
+        plane.width for plane in thin.planes
+    ]:
+        return picture
+    thin.colorspace, thin.color_range = _matrix(picture), picture.color_range
+    for source, target in zip(picture.planes, thin.planes, strict=True):
+        lines = _plane(source, np.uint8, source.line_size, source.height)
+        fitted = np.zeros((len(rows), target.line_size), np.uint8)
+        length = min(source.line_size, target.line_size)
+        fitted[:, :length] = lines[rows * source.height // picture.height, :length]
+        target.update(fitted.tobytes())
+    return thin
+
+
+@dataclass(frozen=True)
+class _LumaChroma:
+    """A Y'CbCr picture at full chroma resolution, and how it becomes R'G'B'."""
+
+    planar: av.VideoFrame
+    samples: type
+    bits: int
+    matrix: int
+    full_range: bool
+    alpha: bool
+
+
+def picture_pixels(picture: av.VideoFrame) -> F32:
+    """(h, w, 3 or 4) float32 R'G'B'(A) in 0..1 of a decoded picture, alpha straight.
+
+    Y'CbCr is converted here in floating point with the stream's own matrix and range (Rec.709 above
+    576 lines and Rec.601 below where it states none, limited range likewise); libswscale, which
+    rounds on the way, only brings chroma to full size. Float formats are not clamped.
+    """
+    return _converter(picture)(slice(None))
+
+
+def _packed(picture: av.VideoFrame) -> NDArray[np.uint8] | None:
+    """(h, w, 3 or 4) samples of R'G'B' of up to 8 bits; None for everything else."""
+    layout = picture.format
+    if not (layout.is_rgb or layout.has_palette) or _bits(picture) > 8:
+        return None
+    packed = _to(picture, "rgba" if _has_alpha(picture) else "rgb24").to_ndarray()
+    return np.asarray(packed, np.uint8)
+
+
+def _converter(picture: av.VideoFrame) -> Callable[[slice], F32]:
+    """Return a function from rows to their pixels, see `picture_pixels`."""
+    layout = picture.format
+    bits = _bits(picture)
+    alpha = any(component.is_alpha for component in layout.components)
+    name = layout.name
+    if bits == 32 and name.startswith("gbr"):
+        planar = _to(picture, "gbrapf32le" if alpha else "gbrpf32le")
+        return lambda rows: _planes(planar, np.float32, "gbr", rows)
+    if name.startswith(("gray", "ya")) and bits in (8, 10, 12, 14, 16):
+        return _grey(picture, bits, alpha)
+    packed = _packed(picture)
+    if packed is not None:
+        return lambda rows: packed[rows].astype(np.float32) / np.float32(255)
+    if layout.is_rgb and bits in _PLANAR_DEPTHS and not (alpha and bits == 9):
+        planar = _to(picture, f"gbr{'a' if alpha else ''}p{bits}le")
+        largest = np.float32((1 << bits) - 1)
+        return lambda rows: _planes(planar, np.uint16, "gbr", rows) / largest
+    how = _luma_chroma(picture)
+    if how is not None:
+        return functools.partial(_from_luma_chroma, how)
+    wide = _to(picture, "rgba64le" if alpha else "rgb48le").to_ndarray()
+    return lambda rows: wide[rows].astype(np.float32) / np.float32(65535)
+
+
+def _to(picture: av.VideoFrame, layout: str) -> av.VideoFrame:
+    """Another sample layout of the same depth, with neither matrix nor range changed."""
+    if picture.format.name == layout:
+        return picture
+    matrix = int(picture.colorspace) if int(picture.colorspace) in (1, 4, 5, 7, 9) else 5
+    # libswscale supposes limited range for Y'CbCr and full range for R'G'B' where none is stated.
+    full = int(picture.color_range) == _FULL_RANGE or picture.format.is_rgb
+    return picture.reformat(
+        format=layout,
+        src_colorspace=matrix,
+        dst_colorspace=matrix,
+        src_color_range=2 if full else 1,
+        dst_color_range=2 if full or layout.startswith(("rgb", "gbr")) else 1,
+        interpolation="BICUBIC",
+    )
+
+
+def _plane(plane: Any, dtype: type, width: int, height: int) -> NDArray[Any]:
+    samples = np.frombuffer(plane, dtype=np.dtype(dtype).newbyteorder("<"))
+    row = plane.line_size // np.dtype(dtype).itemsize
+    return samples[: row * height].reshape(height, row)[:, :width]
+
+
+def _planes_of(picture: av.VideoFrame, dtype: type) -> list[NDArray[Any]]:
+    return [_plane(plane, dtype, picture.width, picture.height) for plane in picture.planes]
+
+
+def _planes(picture: av.VideoFrame, dtype: type, order: str, rows: slice) -> F32:
+    """Rows as (h, w, c) float32; `order` names the first three planes, "gbr" comes out as RGB."""
+    planes = _planes_of(picture, dtype)
+    if order == "gbr":
+        planes[:3] = [planes[2], planes[0], planes[1]]
+    return np.stack([plane[rows].astype(np.float32) for plane in planes], axis=-1)
+
+
+def _grey(picture: av.VideoFrame, bits: int, alpha: bool) -> Callable[[slice], F32]:
+    """Grey, full range unless limited range is stated, as three equal channels."""
+    suffix = "" if bits == 8 else f"{bits}le"
+    samples: type = np.uint8 if bits == 8 else np.uint16
+    largest = np.float32((1 << bits) - 1)
+    planar = _to(picture, f"ya{bits}{suffix[-2:]}" if alpha else f"gray{suffix}")
+
+    def convert(rows: slice) -> F32:
+        if alpha:
+            packed = _plane(planar.planes[0], samples, planar.width * 2, planar.height)
+            pairs = packed.reshape(planar.height, planar.width, 2)
+            values = pairs[rows].astype(np.float32)
+        else:
+            values = _planes(planar, samples, "y", rows)
+        values /= largest
+        if int(picture.color_range) == 1:
+            unit = np.float32(1 << (bits - 8)) / largest
+            values[..., 0] = np.clip((values[..., 0] - 16 * unit) / (219 * unit), 0, 1)
+        return np.ascontiguousarray(values[..., [0, 0, 0, 1] if alpha else [0, 0, 0]])
+
+    return convert
+
+
+def _luma_chroma(picture: av.VideoFrame) -> _LumaChroma | None:
+    """Bring Y'CbCr of a known matrix to full chroma resolution; None for everything else."""
+    name, bits = picture.format.name, _bits(picture)
+    alpha = any(component.is_alpha for component in picture.format.components)
+    matrix = _matrix(picture)
+    if (
+        not name.startswith(_LUMA_CHROMA)
+        or picture.format.is_rgb
+        or matrix not in _LUMA
+        or bits not in _PLANAR_DEPTHS
+        or (alpha and bits == 14)
+    ):
+        return None
+    depth = "" if bits == 8 else f"{bits}le"
+    return _LumaChroma(
+        planar=_to(picture, f"yuv{'a' if alpha else ''}444p{depth}"),
+        samples=np.uint8 if bits == 8 else np.uint16,
+        bits=bits,
+        matrix=matrix,
+        full_range=int(picture.color_range) == _FULL_RANGE,
+        alpha=alpha,
+    )
+
+
+def _matrix(picture: av.VideoFrame) -> int:
+    """Matrix coefficients; where none are stated, by the number of lines."""
+    stated = int(picture.colorspace)
+    return (1 if picture.height > 576 else 5) if stated == _UNSPECIFIED else stated
+
+
+def _from_luma_chroma(how: _LumaChroma, rows: slice) -> F32:
+    """Y'CbCr -> R'G'B' in floating point (ITU-T H.273, section 8.3), clamped to 0..1."""
+    samples = _planes(how.planar, how.samples, "yuv", rows)
+    unit = float(1 << (how.bits - 8))
+    if how.full_range:
+        largest = float((1 << how.bits) - 1)
+        luma = samples[..., 0] / np.float32(largest)
+        chroma = (samples[..., 1:3] - np.float32(128 * unit)) / np.float32(largest)
+    else:
+        luma = (samples[..., 0] - np.float32(16 * unit)) / np.float32(219 * unit)
+        chroma = (samples[..., 1:3] - np.float32(128 * unit)) / np.float32(224 * unit)
+    red_weight, blue_weight = _LUMA[how.matrix]
+    green_weight = 1 - red_weight - blue_weight
+    out = np.empty_like(samples)
+    out[..., 0] = luma + np.float32(2 * (1 - red_weight)) * chroma[..., 1]
+    out[..., 2] = luma + np.float32(2 * (1 - blue_weight)) * chroma[..., 0]
+    out[..., 1] = (
+        luma - np.float32(red_weight) * out[..., 0] - np.float32(blue_weight) * out[..., 2]
+    ) / np.float32(green_weight)
+    if how.alpha:
+        out[..., 3] = samples[..., 3] / np.float32((1 << how.bits) - 1)
+    return np.clip(out, 0, 1, out=out)

@@ -1,0 +1,264 @@
+"""Which files make up an image sequence: patterns, folders and single files, by name only."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from palette4d.common.text import counted
+from palette4d.media.clip_base import ClipError, describe
+
+# fmt: off
+IMAGE_EXTENSIONS = frozenset({
+    "avif", "bmp", "cin", "dpx", "exr", "hdr", "heic", "j2k", "jp2", "jpe", "jpeg", "jpg", "jxl",
+    "pgm", "pic", "png", "pnm", "ppm", "psd", "rgb", "sgi", "tga", "tif", "tiff", "webp",
+})
+MOVIE_EXTENSIONS = frozenset({
+    "3gp", "avi", "flv", "gif", "m2ts", "m4v", "mkv", "mov", "mp4", "mpeg", "mpg", "mts",
+    "mxf", "nut", "ogv", "ts", "webm", "wmv", "y4m",
+})
+# fmt: on
+
+# The last number of a stem. A minus is a sign only at the start or after another separator:
+# "shot-0010" is frame 10 of "shot-", "shot.-0010" is frame -10 of "shot.".
+_NUMBER = re.compile(r"((?:(?<=[._ ])|\A)-)?[0-9]+\Z")
+# Names that say what a file is, not what it shows; one letter, or a letter and a digit, say nothing
+# anyway. Two letters (cg, bg) do.
+_ANONYMOUS = re.compile(
+    r".?|.?[\W\d_].?|(frame|image|img|out|output|pic|picture|plate|render|still)s?|seq(uence)?"
+    r"|dpx|exr|jpe?g|png|tiff?",
+    re.IGNORECASE,
+)
+_FOLDERS_TO_NAME_BY = 3
+# "shot_v2" is version 2, not frame 2.
+_VERSION = re.compile(r"(^|.*[._ -])[vV]\Z", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Sequence:
+    """Numbered files in one folder: `prefix` + zero-padded number + `suffix`."""
+
+    folder: Path
+    prefix: str
+    suffix: str
+    width: int
+    files: dict[int, Path]
+
+    @property
+    def pattern(self) -> str:
+        """The path with one `#` for each digit."""
+        return str(self.folder / f"{self.prefix}{'#' * self.width}{self.suffix}")
+
+    @property
+    def numbers(self) -> list[int]:
+        """Frame numbers found, rising."""
+        return sorted(self.files)
+
+    @property
+    def name(self) -> str:
+        """The prefix without its separator; the nearest folder's whose name tells more, of files
+        such as f.0001.png."""
+        own = self.prefix.rstrip("._- ")
+        if not self.width:  # an image of its own, not one of a sequence
+            return own or "clip"
+        folder = self.folder.resolve()
+        above = [folder, *folder.parents][:_FOLDERS_TO_NAME_BY]
+        names = [own, *(parent.name for parent in above)]
+        telling = (name for name in names if not _ANONYMOUS.fullmatch(name))
+        return next(telling, own or folder.name or "clip")
+
+    def path(self, frame: int) -> Path:
+        """The file of a frame, whether it exists or not."""
+        found = self.files.get(frame)
+        return found or self.folder / f"{self.prefix}{frame:0{self.width}d}{self.suffix}"
+
+    def __str__(self) -> str:
+        """Pattern and frames, for a message."""
+        return f"{Path(self.pattern).name} ({describe(self.numbers)})"
+
+
+def extension(path: str | Path) -> str:
+    """File name extension in lower case without its dot."""
+    return Path(path).suffix.lower().lstrip(".")
+
+
+def frame_number(stem: str) -> tuple[str, str] | None:
+    """(prefix, number as written) of a numbered stem, or None.
+
+    >>> frame_number("beach.0012"), frame_number("beach_v2"), frame_number("beach.-0003")
+    (('beach.', '0012'), None, ('beach.', '-0003'))
+    """
+    match = _NUMBER.search(stem)
+    if match is None or _VERSION.fullmatch(stem[: match.start()]):
+        return None
+    return stem[: match.start()], match[0]
+
+
+def _digits_fit(number: str, width: int) -> bool:
+    """Whether a number as written is one of a sequence padded to `width` digits."""
+    digits = number.lstrip("-")
+    return (
+        len(digits) == width or len(number) == width or (len(digits) > width and digits[0] != "0")
+    )
+
+
+def _file_names(folder: Path) -> list[str]:
+    try:
+        with os.scandir(folder) as entries:
+            return sorted(entry.name for entry in entries if not entry.name.startswith("."))
+    except OSError as error:
+        raise ClipError(
+            f"{folder}: the folder cannot be listed ({error.strerror}); expected a folder that "
+            "exists and may be read. Check the path."
+        ) from error
+
+
+def sequences_in(folder: Path) -> list[Sequence]:
+    """All image sequences of a folder, single numbered images included, by name."""
+    groups: dict[tuple[str, str], list[tuple[str, str]]] = {}
+    for name in _file_names(folder):
+        if extension(name) not in IMAGE_EXTENSIONS:
+            continue
+        stem, suffix = Path(name).stem, Path(name).suffix
+        numbered = frame_number(stem)
+        if numbered is not None:
+            groups.setdefault((numbered[0], suffix), []).append((numbered[1], name))
+    return [
+        sequence
+        for (prefix, suffix), members in sorted(groups.items())
+        for sequence in _by_width(folder, prefix, suffix, members)
+    ]
+
+
+def _by_width(
+    folder: Path, prefix: str, suffix: str, members: list[tuple[str, str]]
+) -> Iterator[Sequence]:
+    """Split names that differ only in their number into sequences of one padding each."""
+    rest = members
+    while rest:
+        lengths = [len(number.lstrip("-")) for number, _ in rest]
+        padded = [
+            len(number.lstrip("-"))
+            for number, _ in rest
+            if number.lstrip("-")[0] == "0" and len(number.lstrip("-")) > 1
+        ]
+        same = min(lengths) == max(lengths)
+        width = max(padded) if padded else (lengths[0] if same else 1)
+        fits = [(number, name) for number, name in rest if _digits_fit(number, width)]
+        files = {int(number): folder / name for number, name in fits}
+        yield Sequence(folder, prefix, suffix, width, files)
+        rest = [member for member in rest if member not in fits]
+
+
+def in_folder(folder: Path) -> Sequence | Path:
+    """The one image sequence of a folder, or its one image when that has no number."""
+    found = sequences_in(folder)
+    names = _file_names(folder)
+    images = [name for name in names if extension(name) in IMAGE_EXTENSIONS]
+    if len(found) == 1:
+        # One numbered image among others (beach.png, sky2.png) is no sequence, but one of them.
+        if len(found[0].files) == 1 and len(images) > 1:
+            listed = "\n".join(f"  {folder / name}" for name in images[:12])
+            more = f"\n  … and {len(images) - 12} more" if len(images) > 12 else ""
+            raise ClipError(
+                f"{folder}: found {len(images)} images that are no sequence, expected one image "
+                f"sequence such as name.0001.exr, name.0002.exr, …:\n{listed}{more}\n"
+                "Give the image or the pattern that you mean."
+            )
+        return found[0]
+    if len(found) > 1:
+        listed = "\n".join(
+            f"  {folder / Path(one.pattern).name}  {describe(one.numbers)}" for one in found[:12]
+        )
+        more = f"\n  … and {len(found) - 12} more" if len(found) > 12 else ""
+        raise ClipError(
+            f"{folder}: found {len(found)} image sequences, expected one:\n{listed}{more}\n"
+            "Give the pattern of the one you mean."
+        )
+    if len(images) == 1:
+        return folder / images[0]
+    movies = [name for name in names if extension(name) in MOVIE_EXTENSIONS]
+    if movies:
+        raise ClipError(
+            f"{folder}: found {counted(len(movies), 'movie file')} such as {movies[0]} and no "
+            "image sequence; give the movie file itself."
+        )
+    what = (
+        f"{len(images)} images without frame numbers"
+        if images
+        else (
+            f"{counted(len(names), 'file')}, none of them an image" if names else "an empty folder"
+        )
+    )
+    raise ClipError(
+        f"{folder}: found {what}, expected one image sequence such as name.0001.exr, "
+        "name.0002.exr, …"
+    )
+
+
+def of_pattern(spec: str) -> tuple[Sequence, str | None]:
+    """(sequence, embedded range or None) of `name.####.exr`, `%04d`, `@@@`, `1-10x2#`."""
+    from fileseq.constants import PAD_STYLE_HASH1
+    from fileseq.exceptions import FileSeqException
+    from fileseq.filesequence import FileSequence
+
+    path = Path(spec)
+    folder = path.parent
+    try:
+        # One `#` stands for one digit, as in the sidecar's source.
+        parsed = FileSequence(path.name, pad_style=PAD_STYLE_HASH1)
+    except FileSeqException as error:
+        raise ClipError(
+            f"{spec}: the pattern cannot be understood; expected one such as name.####.exr, "
+            "name.%04d.exr, name.@@@@.exr or name.1001-1100#.exr"
+        ) from error
+    prefix, suffix = str(parsed.basename()), str(parsed.extension())
+    width = int(parsed.zfill())
+    if extension(path.name) not in IMAGE_EXTENSIONS:
+        raise ClipError(
+            f'{spec}: found the extension "{extension(path.name)}", expected an image format '
+            f"({', '.join(sorted(IMAGE_EXTENSIONS))})"
+        )
+    embedded = str(parsed.frameSet()) if parsed.frameSet() else None
+    if not folder.is_dir():
+        raise ClipError(f"{spec}: the folder {folder} does not exist; check the path")
+
+    number = re.compile(re.escape(prefix) + r"(-?[0-9]+)" + re.escape(suffix))
+    names = _file_names(folder)
+    matches = [(match[1], name) for name in names if (match := number.fullmatch(name))]
+
+    # A lone `#` means any number in some programs and four digits in others: what lies there tells.
+    if str(parsed.padding()) == "#" and matches:
+        found = list(_by_width(folder, prefix, suffix, matches))
+        sequence = max(found, key=lambda one: len(one.files))
+    else:
+        files = {int(n): folder / name for n, name in matches if _digits_fit(n, width)}
+        sequence = Sequence(folder, prefix, suffix, width, files)
+    if not sequence.files:
+        raise ClipError(f"{spec}: no file matches the pattern; {_near(spec, folder)}")
+    return sequence, embedded
+
+
+def _near(spec: str, folder: Path) -> str:
+    """What lies in the folder instead, the most similar first."""
+    patterns = {Path(one.pattern).name: str(one) for one in sequences_in(folder)}
+    if not patterns:
+        return f"{folder} holds no image sequence"
+    wanted = Path(spec).name
+    ranked = sorted(patterns, key=lambda name: -difflib.SequenceMatcher(None, wanted, name).ratio())
+    return "found there: " + ", ".join(patterns[name] for name in ranked[:5])
+
+
+def of_file(path: Path) -> tuple[Sequence, int]:
+    """A single image as a one-frame sequence, with its frame number (0 when it has none)."""
+    numbered = frame_number(path.stem)
+    if numbered is None:
+        return Sequence(path.parent, path.stem, path.suffix, 0, {0: path}), 0
+    prefix, number = numbered
+    frame = int(number)
+    width = len(number.lstrip("-"))
+    return Sequence(path.parent, prefix, path.suffix, width, {frame: path}), frame

@@ -1,0 +1,265 @@
+"""In which numbers a palette is found: colour spaces of a clip, through OpenColorIO.
+
+Input: a clip, and what the user said about colour spaces. Output: the same clip in the palette's
+numbers, and what the sidecar records of the way there. The paper's palettes are hulls of
+display-referred colours, which this leaves as they are; scene-linear light goes to a log encoding
+first, where a stop of light has the same length everywhere.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import os
+import threading
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palette4d import _core
+from palette4d.colour.conversion import TOLERANCE, Comparison, Conversion, conversion
+from palette4d.colour.ocio_config import chosen_config, colour_space, same_encodings
+from palette4d.common.errors import Palette4dError
+from palette4d.media.clip_base import Clip, Fill, FrameError, Image, hidden
+
+F32 = NDArray[np.float32]
+
+#: Colours of each frame that the conversion is compared with OpenColorIO's on.
+COMPARED = 4096
+
+#: Samples that may be scene-linear light.
+FLOATS = ("half", "float", "double")
+
+#: The log encoding for scene-linear light: these roles where they are logs, else this space.
+LOG_ROLES = ("color_timing", "compositing_log")
+LOG_SPACE = "ACEScct"
+
+
+@dataclasses.dataclass(frozen=True)
+class SpaceOptions:
+    """What the user said: names of colour spaces and of the config that has them."""
+
+    input_space: str | None = None
+    palette_space: str | None = None
+    ocio_config: str | None = None
+
+    @property
+    def asked(self) -> bool:
+        """Whether colour spaces play a part at all: an option was given, or ``$OCIO`` is set."""
+        return any(dataclasses.astuple(self)) or bool(os.environ.get("OCIO"))
+
+
+@dataclasses.dataclass(frozen=True)
+class Spaces:
+    """The colour spaces of a clip; `conversion` is None where they are one and the same."""
+
+    config: Any
+    config_name: str
+    input_space: str
+    palette_space: str
+    conversion: Conversion | None
+
+
+def spaces_of(clip: Clip, options: SpaceOptions) -> Spaces | None:
+    """Return the colour spaces of a clip and its palette.
+
+    The input space is, in this order: what the user said; what a rule of the config says of the
+    file's name; what the file says of itself; the config's default rule, for float files only. The
+    palette space is what the user said; for scene-linear light a log encoding; else the input
+    space: camera logs and display-referred encodings are fit for palettes as they are.
+
+    Returns
+    -------
+    Spaces or None
+        None when nothing is said and nothing known: then the clip's numbers stay as they are.
+
+    Raises
+    ------
+    Palette4dError
+        A config that cannot be used, a name that it lacks, a conversion that is no chain of
+        matrices and curves.
+    """
+    if not options.asked:
+        return None
+    config, config_name = chosen_config(options.ocio_config)
+    source = _input_space(clip, options, config, config_name)
+    if source is None:
+        if options.palette_space is None:
+            return None
+        raise Palette4dError(
+            f"{clip.source}: found no colour space of the clip (its files say {clip.encoding!r}, "
+            f"and no rule of {config_name} applies), expected one to go to "
+            f"{options.palette_space!r} from; give it with --input-space"
+        )
+    target = _palette_space(options, config, config_name, source)
+    names = str(source.getName()), str(target.getName())
+    chain = None if names[0] == names[1] else conversion(config, *names)
+    return Spaces(config, config_name, *names, chain if chain and chain.steps else None)
+
+
+def _input_space(clip: Clip, options: SpaceOptions, config: Any, config_name: str) -> Any:
+    if options.input_space is not None:
+        return colour_space(config, config_name, options.input_space, "--input-space")
+    path = str(clip.file(clip.frames[0]))
+    if not config.filepathOnlyMatchesDefaultRule(path):
+        name, _ = config.getColorSpaceFromFilepath(path)
+        return colour_space(config, config_name, name, f"a file rule for {path}:")
+    for name in same_encodings(clip.encoding):
+        space = config.getColorSpace(name)
+        if space is not None and not space.isData():
+            return space
+    if clip.depth not in FLOATS:
+        return None
+    name, _ = config.getColorSpaceFromFilepath(path)
+    return colour_space(config, config_name, name, "the default file rule:")
+
+
+def _palette_space(options: SpaceOptions, config: Any, config_name: str, source: Any) -> Any:
+    if options.palette_space is not None:
+        return colour_space(config, config_name, options.palette_space, "--palette-space")
+    if source.getEncoding() != "scene-linear" and not _is_the_role(config, source, "scene_linear"):
+        return source
+    for name in (*LOG_ROLES, *same_encodings(LOG_SPACE)):
+        space = config.getColorSpace(name)
+        if space is not None and space.getEncoding() in ("log", "") and not space.isData():
+            return space
+    raise Palette4dError(
+        f"{config_name}: {source.getName()!r} is scene-linear, in which palettes are of no use, "
+        f"and the config has neither the roles {' and '.join(LOG_ROLES)} nor {LOG_SPACE}; name a "
+        "log encoding with --palette-space"
+    )
+
+
+def _is_the_role(config: Any, space: Any, role: str) -> bool:
+    return bool(config.hasRole(role)) and bool(
+        config.getColorSpace(role).getName() == space.getName()
+    )
+
+
+class ConvertedClip(Clip):
+    """A clip whose colours, for the analysis, are in its palette's numbers.
+
+    Images stay as they are stored; `comparison` says how far the conversion of the colours that
+    went by is from OpenColorIO's.
+    """
+
+    def __init__(self, clip: Clip, spaces: Spaces) -> None:
+        assert spaces.conversion is not None
+        fields = {field.name: getattr(clip, field.name) for field in dataclasses.fields(clip)}
+        super().__init__(**{name: fields[name] for name in _CLIP_FIELDS})
+        self.encoding = spaces.palette_space
+        self._clip = clip
+        self._chain = spaces.conversion.chain
+        self._lock = threading.Lock()
+        self.comparison = Comparison(
+            spaces.config, spaces.input_space, spaces.palette_space, self._chain
+        )
+
+    def file(self, frame: int) -> Path:
+        """As the clip itself."""
+        return self._clip.file(frame)
+
+    def load(self, frame: int) -> Image:
+        """As the clip itself: pixels in the clip's numbers."""
+        return self._clip.load(frame)
+
+    def iter_images(self) -> Iterator[Image]:
+        """As the clip itself."""
+        return self._clip.iter_images()
+
+    def fills(self, frames: Sequence[int]) -> Iterator[tuple[int, Fill]]:
+        """For each frame its number and what bins it; movies are decoded in order, images there."""
+        for frame in frames:
+            fill: Fill = functools.partial(self._fill, frame)
+            if self.is_movie:
+                try:
+                    fill = functools.partial(self._bin, self._clip.load(frame).pixels)
+                except FrameError as error:
+                    fill = functools.partial(_fail, error)
+            yield frame, fill
+
+    def _fill(self, frame: int, binner: _core.ColourBinner) -> bool:
+        return self._bin(self._clip.load(frame).pixels, binner)
+
+    def _bin(self, pixels: F32, binner: _core.ColourBinner) -> bool:
+        rows = pixels[self.row_step // 2 :: self.row_step]
+        binner.add(np.ascontiguousarray(self.straight_colours(rows)))
+        return hidden(rows)
+
+    def straight_colours(self, pixels: F32) -> F32:
+        """(h, w, 3) float32 straight colours in the palette's numbers."""
+        colours = self._clip.straight_colours(pixels)
+        flat = colours.reshape(-1, 3)
+        some = flat[:: max(1, len(flat) // COMPARED)]
+        with self._lock:
+            self.comparison.add(some[np.isfinite(some).all(axis=1)])
+        return self._chain.to_palette(colours).astype(np.float32)
+
+
+def _fail(error: FrameError, binner: _core.ColourBinner) -> bool:
+    """Stand in for the filling of a bad frame."""
+    raise error
+
+
+_CLIP_FIELDS = tuple(field.name for field in dataclasses.fields(Clip))
+
+
+def converted(clip: Clip, spaces: Spaces | None) -> Clip:
+    """Return the clip as its palette is to see it."""
+    if spaces is None:
+        return clip
+    if spaces.conversion is None:
+        clip.encoding = spaces.palette_space
+        return clip
+    return ConvertedClip(clip, spaces)
+
+
+def record(document: dict[str, Any], clip: Clip, spaces: Spaces | None) -> list[str]:
+    """Write the conversion into a sidecar's document; returns remarks for the user.
+
+    Raises
+    ------
+    Palette4dError
+        On the clip's own colours the conversion is further than 1e-5 from OpenColorIO's, beyond
+        what its single precision explains.
+    """
+    if not isinstance(clip, ConvertedClip):
+        return []
+    assert spaces is not None
+    assert spaces.conversion is not None
+    seen = clip.comparison
+    ways = f"from {spaces.input_space!r} to {spaces.palette_space!r}"
+    if seen.error > TOLERANCE:
+        raise Palette4dError(
+            f"{ways}: found a difference of {seen.error:.2g} from OpenColorIO on the clip's "
+            f"colours, expected at most {TOLERANCE:g}; choose another --palette-space"
+        )
+    document["version"] = 2
+    document["clip"]["conversion"] = {
+        "input_space": spaces.input_space,
+        "config": spaces.config_name,
+        "error": float(f"{max(spaces.conversion.error, seen.error):.2e}"),
+        "steps": spaces.conversion.steps,
+    }
+    remarks = []
+    if seen.beyond:
+        remarks.append(
+            f"{seen.beyond / seen.colours:.2%} of the clip's colours lie beyond what OpenColorIO "
+            f"brings back {ways}; there the curves are continued"
+        )
+    return remarks
+
+
+def described(spaces: Spaces | None) -> str | None:
+    """Return one line for the report, None when there is nothing to say."""
+    if spaces is None:
+        return None
+    if spaces.conversion is None:
+        return f"the palette is in the clip's own {spaces.palette_space}"
+    return (
+        f"from {spaces.input_space} to {spaces.palette_space}, within "
+        f"{max(spaces.conversion.error, 1e-7):.1g} of OpenColorIO"
+    )

@@ -1,0 +1,260 @@
+"""Writing frames: EXR, PNG and TIFF through OpenImageIO, to a temporary name and then renamed.
+
+Colours are written as they are: no encoding is changed. Alpha follows each format's convention:
+premultiplied in EXR, straight in PNG, and in TIFF whichever the frame has (and the file says so).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palette4d.common.errors import Palette4dError
+
+FORMATS = ("exr", "png", "tif", "tiff")
+# What each format can hold of the metadata that `palette4d.media.clip_images.CARRIED` names.
+_TEXT = ("oiio:ColorSpace", "ICCProfile", "DateTime", "Copyright", "Artist", "ImageDescription")
+_METADATA: dict[str, tuple[str, ...]] = {"png": _TEXT, "tif": (*_TEXT, "Make", "Model")}
+_HALF_MAX = float(np.finfo(np.float16).max)
+
+
+class OutputError(Palette4dError):
+    """Frames that cannot be written: what was found, what was expected, what to do."""
+
+
+@dataclass(frozen=True)
+class FramePattern:
+    """Names of output frames: `folder/prefix0012suffix`, or one plain name (width None)."""
+
+    folder: Path
+    prefix: str
+    suffix: str
+    width: int | None
+
+    @classmethod
+    def parse(cls, text: str) -> FramePattern:
+        """Read `name.####.exr` (one # a digit), `name.%04d.exr`, `name.@@@@.exr` or `name.exr`.
+
+        Raises
+        ------
+        OutputError
+            When the extension is not one that can be written, or the pattern has a range.
+        """
+        from fileseq.constants import PAD_STYLE_HASH1
+        from fileseq.exceptions import FileSeqException
+        from fileseq.filesequence import FileSequence
+
+        path = Path(text)
+        if path.suffix.lower().lstrip(".") not in FORMATS:
+            raise OutputError(
+                f'output {text}: found the extension "{path.suffix}", expected .exr, .png or .tif; '
+                "name the frames as in OUT.####.exr"
+            )
+        if not any(mark in path.name for mark in "#@%$"):
+            return cls(path.parent, path.stem, path.suffix, None)
+        try:
+            parsed = FileSequence(path.name, pad_style=PAD_STYLE_HASH1)
+        except FileSeqException as error:
+            raise OutputError(
+                f"output {text}: the pattern cannot be understood; expected one such as "
+                "OUT.####.exr"
+            ) from error
+        if not parsed.padding():
+            return cls(path.parent, path.stem, path.suffix, None)
+        if parsed.frameSet():
+            raise OutputError(
+                f"output {text}: found the range {parsed.frameSet()} in its name, expected "
+                "a pattern such as OUT.####.exr; choose the frames with --frames"
+            )
+        return cls(
+            path.parent, str(parsed.basename()), str(parsed.extension()), int(parsed.zfill())
+        )
+
+    @property
+    def extension(self) -> str:
+        """Lower case, without the dot, `tif` for both spellings."""
+        return self.suffix.lower().lstrip(".").replace("tiff", "tif")
+
+    def path(self, frame: int) -> Path:
+        """File of a frame; the sign of a negative number counts as a digit, as in C's printf."""
+        number = "" if self.width is None else f"{frame:0{self.width}d}"
+        return self.folder / f"{self.prefix}{number}{self.suffix}"
+
+
+def sample_type(extension: str, depth: str, *, half: bool = False, bits: int | None = None) -> str:
+    """Sample type of an output file: "half", "float", "uint8" or "uint16".
+
+    Parameters
+    ----------
+    extension : str
+        "exr", "png" or "tif".
+    depth : str
+        `Clip.depth` of the source.
+    half : bool
+        16-bit float, EXR only.
+    bits : int, optional
+        8 or 16 for PNG, 8, 16 or 32 for TIFF; by default what holds the source: 8 bits for an
+        8-bit one, else 16, or 32 (float) in a TIFF of a float source.
+
+    Raises
+    ------
+    OutputError
+        When the format has no such samples.
+    """
+    if extension == "exr":
+        if bits not in (None, 16, 32) or (bits == 32 and half):
+            raise OutputError(
+                f"found --bits {bits} for EXR, expected 32-bit float, or 16 with --half"
+            )
+        return "half" if half or bits == 16 else "float"
+    if half:
+        raise OutputError(f"found --half for {extension.upper()}, expected it for EXR alone")
+    if bits is None:
+        if extension == "tif" and depth in ("float", "half", "double"):
+            return "float"
+        return "uint8" if depth == "uint8" else "uint16"
+    if bits not in ((8, 16, 32) if extension == "tif" else (8, 16)):
+        raise OutputError(
+            f"found --bits {bits} for {extension.upper()}, expected 8 or 16"
+            + (" or 32" if extension == "tif" else "")
+        )
+    return "float" if bits == 32 else f"uint{bits}"
+
+
+def quantised(pixels: NDArray[np.float32], samples: str) -> NDArray[Any]:
+    """Float32 pixels as they are stored: clamped to 0..1 and rounded for integers (NaN is 0)."""
+    if samples == "float":
+        return pixels.astype(np.float32, copy=False)
+    if samples == "half":
+        # Finite values stay finite; NaN and infinities stay what they are.
+        finite = np.clip(pixels, -_HALF_MAX, _HALF_MAX)
+        return np.where(np.isinf(pixels), pixels, finite).astype(np.float16)
+    kind = np.dtype(samples)
+    largest = np.float32(np.iinfo(kind).max)
+    clamped = np.clip(np.nan_to_num(pixels, nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0)
+    return np.asarray(np.rint(clamped * largest).astype(kind))
+
+
+def with_alpha_of(
+    extension: str, pixels: NDArray[np.float32], premultiplied: bool
+) -> tuple[NDArray[np.float32], bool]:
+    """(pixels, premultiplied) as the format expects alpha; unchanged where it already fits."""
+    if pixels.shape[2] != 4 or extension == "tif" or premultiplied == (extension == "exr"):
+        return pixels, premultiplied
+    alpha = pixels[..., 3:]
+    out = pixels.copy()
+    if premultiplied:
+        with np.errstate(over="ignore", invalid="ignore"):
+            np.divide(pixels[..., :3], alpha, out=out[..., :3], where=alpha != 0)
+        return out, False
+    out[..., :3] *= alpha
+    return out, True
+
+
+def write_frame(
+    path: Path,
+    pixels: NDArray[np.float32],
+    samples: str,
+    *,
+    premultiplied: bool = False,
+    metadata: Iterable[tuple[str, Any, Any]] = (),
+) -> None:
+    """Write one frame under a temporary name in the same folder and rename it.
+
+    Parameters
+    ----------
+    path : Path
+        `.exr`, `.png`, `.tif` or `.tiff`; a file that is there is replaced.
+    pixels : (h, w, 3 or 4) float32
+        RGB or RGBA.
+    samples : str
+        As `sample_type` gives it.
+    premultiplied : bool
+        Whether the colours of RGBA pixels are multiplied by alpha.
+    metadata : iterable of (name, OpenImageIO type, value)
+        What the format cannot hold is left out.
+
+    Raises
+    ------
+    OutputError
+        When the folder cannot be written to or the disk is full; nothing half written remains.
+    """
+    import OpenImageIO as oiio
+
+    extension = path.suffix.lower().lstrip(".").replace("tiff", "tif")
+    pixels, premultiplied = with_alpha_of(extension, pixels, premultiplied)
+    stored = np.ascontiguousarray(quantised(pixels, samples))
+    height, width, channels = stored.shape
+    spec = oiio.ImageSpec(width, height, channels, samples)
+    allowed = _METADATA.get(extension)
+    for name, kind, value in metadata:
+        if allowed is None or name in allowed:
+            spec.attribute(name, kind, value)
+    spec.attribute("compression", "zip")
+    if extension == "png":
+        # Fast: level 9 takes many times longer for a few per cent.
+        spec.attribute("png:compressionLevel", 4)
+    if channels == 4:
+        spec.alpha_channel = 3
+        spec.attribute("oiio:UnassociatedAlpha", 0 if premultiplied else 1)
+
+    temporary = path.with_name(f".{path.stem[:100]}.{os.getpid()}.tmp{path.suffix}")
+    target = oiio.ImageOutput.create(str(temporary))
+    if target is None:
+        raise OutputError(f"{path}: {oiio.geterror()}; expected .exr, .png or .tif")
+    try:
+        if not target.open(str(temporary), spec):
+            raise _cannot_write(path, target.geterror())
+        written = target.write_image(stored)
+        problem = target.geterror()  # PNG reports a full disk here, and still returns true
+        closed = target.close()
+        if problem or not written or not closed or not _is_whole(temporary):
+            raise _cannot_write(path, problem or target.geterror())
+        temporary.replace(path)
+    except OSError as error:
+        raise _cannot_write(path, error.strerror or str(error)) from error
+    finally:
+        # Where the folder cannot be written, not even this can be asked.
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def _is_whole(path: Path) -> bool:
+    """Whether the file's last row can be read: a full disk is not always reported on writing."""
+    import OpenImageIO as oiio
+
+    source = oiio.ImageInput.open(str(path))
+    if source is None:
+        oiio.geterror()
+        return False
+    spec = source.spec()
+    last = spec.y + spec.height - 1
+    row = source.read_scanlines(0, 0, last, last + 1, 0, 0, spec.nchannels, spec.format)
+    problem = source.geterror()
+    source.close()
+    return row is not None and not problem
+
+
+def _cannot_write(path: Path, reason: str) -> OutputError:
+    said = reason.strip().splitlines()[0] if reason.strip() else "the file was cut short"
+    return OutputError(
+        f"{path}: the frame cannot be written ({said}); expected a folder that may be written to "
+        "on a disk with free space. Check both, or choose another place."
+    )
+
+
+def make_folder(folder: Path) -> None:
+    """Create an output folder and the ones above it; OutputError when that is not possible."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(
+            f"{folder}: the folder cannot be created ({error.strerror}); choose another place"
+        ) from error

@@ -1,0 +1,90 @@
+"""The clip that a sidecar was made from: given by the user, or found where the sidecar says."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palette4d.common.errors import Palette4dError
+from palette4d.media.clip import Clip, open_clip
+
+
+def candidates(sidecar_path: Path, source: str) -> list[str]:
+    """Where the stored source may lie: as it is when absolute, else beside the sidecar or here."""
+    if not source:
+        return []
+    if Path(source).is_absolute():
+        return [source]
+    beside = str(sidecar_path.absolute().parent / source)
+    here = str(Path.cwd() / source)
+    return [beside] if beside == here else [beside, here]
+
+
+def find_clip(sidecar_path: Path, clip: Mapping[str, Any], given: str | None) -> Clip | None:
+    """Open the clip of a sidecar.
+
+    Parameters
+    ----------
+    sidecar_path : Path
+        The sidecar file; a relative source is looked up in its folder, then in the working folder.
+    clip : mapping
+        `Sidecar.clip`: ``source`` and the size.
+    given : str or None
+        What the user said instead; then it must open.
+
+    Returns
+    -------
+    Clip or None
+        None when nothing was given and the stored source is not to be found.
+
+    Raises
+    ------
+    Palette4dError
+        The clip that was given cannot be opened.
+    """
+    if given is not None:
+        return open_clip(given, skip_bad_frames=True)
+    for spec in candidates(sidecar_path, str(clip["source"])):
+        try:
+            # A frame that is missing elsewhere does not matter to who needs one or a few.
+            return open_clip(spec, skip_bad_frames=True)
+        except (Palette4dError, OSError):
+            continue
+    return None
+
+
+def nearest_frame(clip: Clip, frame: float) -> int:
+    """Return the clip's frame number nearest to `frame`; the earlier of two."""
+    return min(clip.frames, key=lambda number: (abs(number - frame), number))
+
+
+def frame_colours(
+    sidecar_path: Path, clip: Mapping[str, Any], frame: float, given: str | None
+) -> tuple[NDArray[np.float32] | None, int | None]:
+    """Read the colours of the clip's frame nearest to a time.
+
+    Returns
+    -------
+    colours : (h, w, 3) float32 or None
+        As a recolouring sees them (`Clip.straight_colours`): NaN where alpha is 0. None when no
+        clip was given and the stored one cannot be found or read.
+    number : int or None
+        The frame that was read.
+
+    Raises
+    ------
+    Palette4dError
+        The clip that was given cannot be opened or its frame not read.
+    """
+    opened = find_clip(sidecar_path, clip, given)
+    if opened is None:
+        return None, None
+    number = nearest_frame(opened, frame)
+    try:
+        return opened.straight_colours(opened.read(number)), number
+    except (Palette4dError, OSError):
+        if given is not None:
+            raise
+        return None, None

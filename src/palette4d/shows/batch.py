@@ -1,0 +1,391 @@
+"""A show: many shots analysed, a sidecar each, several at a time, with a manifest beside them.
+
+Shots are analysed in other processes or on other machines; what they find comes back to this one,
+which alone writes. What is there and was made from the same frames with the same options is left
+alone, so that the same command again does what is missing or failed.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Callable, Collection
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from palette4d import _core
+from palette4d.analysis import pipeline
+from palette4d.analysis.options import AnalysisOptions
+from palette4d.common.errors import Palette4dError
+from palette4d.common.files import make_folder
+from palette4d.common.text import counted
+from palette4d.grade import sidecar
+from palette4d.jobs.workers import Failed, Workers
+from palette4d.media import colour_space
+from palette4d.media.clip import open_clip
+from palette4d.media.clip_base import describe
+from palette4d.media.colour_space import SpaceOptions
+from palette4d.shows import manifest as manifests
+from palette4d.shows.manifest import DONE, FAILED, TO_DO, Entry, Manifest
+from palette4d.shows.shots import Shot, trimmed
+
+
+@dataclasses.dataclass(frozen=True)
+class ShowOptions:
+    """How a show is analysed.
+
+    Attributes
+    ----------
+    analysis : AnalysisOptions
+        For every shot.
+    spaces : SpaceOptions
+        What the clips' numbers are, and what the palettes are found in.
+    rate : Fraction or None
+        Frames a second of image sequences.
+    skip_bad_frames, allow_cuts : bool
+        As for one clip.
+    on_edits : {"refuse", "keep", "drop"}
+        What to do with edits of sidecars that are analysed again.
+    anew : bool
+        Analyse also shots that are there already.
+    only : tuple of str
+        The names of the shots to analyse; empty: all.
+    workers : Workers
+        Who analyses.
+    """
+
+    analysis: AnalysisOptions
+    spaces: SpaceOptions = dataclasses.field(default_factory=SpaceOptions)
+    rate: Fraction | None = None
+    skip_bad_frames: bool = False
+    allow_cuts: bool = False
+    on_edits: sidecar.OnEdits = "refuse"
+    anew: bool = False
+    only: tuple[str, ...] = ()
+    workers: Workers = dataclasses.field(default_factory=Workers)
+
+
+@dataclasses.dataclass(frozen=True)
+class Source:
+    """What the shots come from: a timeline (with its hash) or a movie, and its rate."""
+
+    name: str
+    file: str
+    sha256: str
+    rate: Fraction
+
+
+@dataclasses.dataclass(frozen=True)
+class Show:
+    """What was analysed.
+
+    Attributes
+    ----------
+    path : Path
+        The manifest.
+    manifest : Manifest
+        Its content.
+    analysed, kept : list of str
+        Names of the shots analysed now, and of those that were there already.
+    remarks : dict of str to tuple of str
+        Remarks of the analysis, by shot.
+    """
+
+    path: Path
+    manifest: Manifest
+    analysed: list[str]
+    kept: list[str]
+    remarks: dict[str, tuple[str, ...]]
+
+
+@dataclasses.dataclass(frozen=True)
+class ShotTask:
+    """One shot to analyse; can be sent to another process or machine."""
+
+    shot: Shot
+    clip: str
+    options: ShowOptions
+
+
+@dataclasses.dataclass(frozen=True)
+class Analysed:
+    """A shot's sidecar document, and remarks for the user."""
+
+    document: dict[str, Any]
+    remarks: tuple[str, ...]
+
+
+def analyse(
+    source: Source,
+    shots: list[Shot],
+    folder: Path,
+    options: ShowOptions,
+    progress: Callable[[int, int, str], None] | None = None,
+) -> Show:
+    """Analyse shots into a folder.
+
+    Parameters
+    ----------
+    source : Source
+        What they come from.
+    shots : list of Shot
+        With names unlike each other's.
+    folder : Path
+        For sidecars and the manifest; made when it is missing.
+    options : ShowOptions
+        How.
+    progress : callable, optional
+        Called with (frames done, frames in all, words on the shots), the first time before any
+        shot is analysed.
+
+    Returns
+    -------
+    Show
+        Also when shots failed: the others are there.
+
+    Raises
+    ------
+    Palette4dError
+        The folder cannot be written, its manifest is not one, or there is no shot of a name in
+        `only`.
+    KeyboardInterrupt
+        Ctrl-C; the sidecars that are there are whole, and the manifest lists them.
+    """
+    _check_only(shots, options.only)
+    make_folder(folder)
+    run = _Run(source, shots, folder, options)
+    run.save()  # early: what cannot be written is refused before hours of work
+    tell = progress or (lambda done, total, words: None)
+
+    def take(name: str, outcome: Analysed | Failed) -> None:
+        run.take(name, outcome)
+        tell(*run.progress())
+
+    tell(*run.progress())
+    try:
+        # A shot may take minutes: Ctrl-C does not wait for it.
+        options.workers.run(analyse_shot, run.tasks, take, patient=False)
+    finally:
+        run.save()
+    return run.show()
+
+
+class _Run:
+    """A show on its way."""
+
+    def __init__(
+        self, source: Source, shots: list[Shot], folder: Path, options: ShowOptions
+    ) -> None:
+        self.folder, self.options = folder, options
+        self.path = manifests.path_of(folder, source.name)
+        before = manifests.read(self.path) if self.path.exists() else None
+        known = {} if before is None else {entry.shot.name: entry for entry in before.entries}
+        here = os.path.relpath(source.file, folder.absolute())
+        self.manifest = Manifest(
+            source=Path(here if not Path(source.file).is_absolute() else source.file).as_posix(),
+            source_sha256=source.sha256,
+            rate=source.rate,
+            options=options.analysis.recorded() | _asked(options.spaces),
+            entries=(),
+        )
+        self.same_edit = (
+            before is not None
+            and self.manifest.is_timeline
+            and (before.source_sha256, before.rate) == (source.sha256, source.rate)
+        )
+        self.same_options = before is not None and before.options == self.manifest.options
+        self.entries: dict[str, Entry] = {}
+        self.tasks: dict[str, ShotTask] = {}
+        self.kept: list[str] = []
+        self.analysed: list[str] = []
+        self.remarks: dict[str, tuple[str, ...]] = {}
+        for shot in shots:
+            self.plan(shot, known.get(shot.name))
+
+    def plan(self, shot: Shot, before: Entry | None) -> None:
+        """Decide what to do with a shot."""
+        own = dataclasses.replace(shot, clip=self.beside(shot.clip), problem="")
+        entry = Entry(own)
+        chosen = not self.options.only or shot.name in self.options.only
+        if before is not None and not chosen and self.stays(before, own):
+            entry = before if self.same_edit else _placed(before, own)
+            if entry.status == DONE:
+                self.kept.append(shot.name)
+        elif shot.problem:
+            entry = Entry(own, FAILED, error=shot.problem)
+        elif not self.options.anew and (frames := self.there(own, before)) is not None:
+            entry = Entry(own, DONE, frames)
+            self.kept.append(shot.name)
+        elif chosen:
+            try:
+                self.check_target(entry, before)
+                self.tasks[shot.name] = ShotTask(shot, str(Path.cwd() / shot.clip), self.options)
+            except Palette4dError as error:
+                entry = Entry(own, FAILED, error=str(error))
+        self.entries[shot.name] = entry
+
+    def stays(self, before: Entry, shot: Shot) -> bool:
+        """Whether what is known of a shot that is not asked for still holds."""
+        own = before.shot
+        if before.status != DONE:
+            # The cause of a failure may be mended, and a sidecar there although it is not noted.
+            return self.same_edit and own.clip == shot.clip and self.there(shot, before) is None
+        if self.same_edit:
+            return True  # with other handles, or with its media away, it is what it was
+        first, last = before.frames or (0, -1)
+        shown = first <= shot.used[0] and shot.used[1] <= last
+        return (own.clip, own.step) == (shot.clip, shot.step) and shown
+
+    def check_target(self, entry: Entry, before: Entry | None) -> None:
+        """Refuse a sidecar that may not be replaced."""
+        target = self.folder / entry.sidecar
+        sidecar.check_target(target, on_edits=self.options.on_edits)
+        if before is not None or self.options.anew or not target.exists():
+            return
+        if sidecar.load(target)["clip"]["source"] != entry.shot.clip:
+            raise Palette4dError(
+                f"{target}: a sidecar of another clip is there already; choose another folder, or "
+                "replace it with --anew"
+            )
+
+    def there(self, shot: Shot, before: Entry | None) -> tuple[int, int] | None:
+        """Return the frames of a sidecar that was made from this shot with these options."""
+        target = self.folder / Entry(shot).sidecar
+        try:
+            document = sidecar.load(target)
+        except Palette4dError:
+            return None
+        clip = document["clip"]
+        found = (int(clip["frames"]["first"]), int(clip["frames"]["last"]))
+        expected = {(shot.first, shot.last)}
+        if before and before.frames and _media(before.shot) == _media(shot):
+            expected.add(before.frames)
+        same = (
+            (self.same_options if before else not self.options.spaces.asked)
+            and found in expected
+            and clip["source"] == shot.clip
+            and clip["frames"]["step"] == shot.step
+            and document["generator"] == f"palette4d {_core.__version__}"
+            and document["quality"]["options"] == self.options.analysis.recorded()
+        )
+        return found if same else None
+
+    def beside(self, clip: str) -> str:
+        """Return a relative clip as seen from the folder: both may then move together."""
+        if not clip or Path(clip).is_absolute():
+            return clip
+        return Path(os.path.relpath(clip, self.folder.absolute())).as_posix()
+
+    def take(self, name: str, outcome: Analysed | Failed) -> None:
+        """Write a sidecar, or note why there is none."""
+        entry = self.entries[name]
+        try:
+            if isinstance(outcome, Failed):
+                raise Palette4dError(outcome.text)
+            document = outcome.document
+            document["clip"]["source"] = entry.shot.clip
+            target = self.folder / entry.sidecar
+            sidecar.save(document, target, on_edits=self.options.on_edits)
+            frames = document["clip"]["frames"]
+            self.entries[name] = Entry(entry.shot, DONE, (frames["first"], frames["last"]))
+            self.analysed.append(name)
+            self.remarks[name] = outcome.remarks
+        except (Palette4dError, OSError) as error:
+            self.entries[name] = Entry(entry.shot, FAILED, error=str(error))
+        self.save()
+
+    def save(self) -> None:
+        """Write the manifest."""
+        manifests.write(self.content(), self.path)
+
+    def content(self) -> Manifest:
+        """Return the manifest as it stands."""
+        return dataclasses.replace(self.manifest, entries=tuple(self.entries.values()))
+
+    def progress(self) -> tuple[int, int, str]:
+        """Return frames done, frames in all, and words."""
+        counts = {name: entry.shot.count for name, entry in self.entries.items()}
+        left = sum(counts[name] for name in self.tasks if self.entries[name].status == TO_DO)
+        total = sum(counts[name] for name in [*self.kept, *self.tasks])
+        ready = sum(entry.status == DONE for entry in self.entries.values())
+        return total - left, total, f"{ready} of {counted(len(self.entries), 'shot')}"
+
+    def show(self) -> Show:
+        """Return what was analysed."""
+        return Show(self.path, self.content(), self.analysed, self.kept, self.remarks)
+
+
+def analyse_shot(task: ShotTask, threads: int) -> Analysed:
+    """Analyse one shot.
+
+    Raises
+    ------
+    Palette4dError
+        Its frames cannot be read, there is a cut inside of what the edit shows, or the analysis
+        failed.
+    """
+    options = task.options
+    shot = task.shot
+    remarks: list[str] = []
+    # A shot of a movie is what lies between its cuts: there is nothing to look for again.
+    if shot.place is not None and not options.allow_cuts:
+        shot = trimmed(shot, _open(task, shot))
+        if shot != task.shot:
+            remarks.append(
+                f"the media cuts inside of the handles: frames {shot.frames} are analysed instead "
+                f"of {task.shot.frames}"
+            )
+    clip = _open(task, shot)
+    spaces = colour_space.spaces_of(clip, options.spaces)
+    clip = colour_space.converted(clip, spaces)
+    analysis_options = dataclasses.replace(options.analysis, threads=threads)
+    try:
+        document, analysis = pipeline.analyze_clip(clip, analysis_options, allow_cuts=True)
+    except (Palette4dError, OSError):
+        raise
+    except Exception as error:  # one shot must not end a night's work
+        raise Palette4dError(
+            f"the analysis ended with {type(error).__name__}: {error}; please report this"
+        ) from error
+    document["clip"]["name"] = shot.name
+    remarks += colour_space.record(document, clip, spaces)
+    if clip.skipped:
+        remarks.append(
+            f"{counted(len(clip.skipped), 'bad frame')} skipped: {describe(clip.skipped)}"
+        )
+    return Analysed(document, (*remarks, *analysis.remarks))
+
+
+def _open(task: ShotTask, shot: Shot) -> Any:
+    return open_clip(
+        task.clip,
+        frames=shot.frames,
+        rate=task.options.rate,
+        skip_bad_frames=task.options.skip_bad_frames,
+    )
+
+
+def _asked(spaces: SpaceOptions) -> dict[str, str | None]:
+    """Return what a manifest notes of the colour spaces that were asked for."""
+    return dataclasses.asdict(spaces) if spaces.asked else {}
+
+
+def _media(shot: Shot) -> tuple[object, ...]:
+    """Return what of a shot its palette depends on."""
+    return shot.clip, shot.first, shot.last, shot.used, shot.step
+
+
+def _placed(entry: Entry, shot: Shot) -> Entry:
+    """Return an entry with its shot's place in the edit as it is now."""
+    place = dataclasses.replace(entry.shot, used=shot.used, place=shot.place)
+    return dataclasses.replace(entry, shot=place)
+
+
+def _check_only(shots: list[Shot], only: Collection[str]) -> None:
+    names = {shot.name for shot in shots}
+    if unknown := [name for name in only if name not in names]:
+        some = ", ".join(sorted(names)[:8]) + (", …" if len(names) > 8 else "")
+        raise Palette4dError(
+            f"--only: there is no shot {unknown[0]!r}; expected names such as {some}"
+        )

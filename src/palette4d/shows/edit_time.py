@@ -1,0 +1,102 @@
+"""What an edit shows of a clip's media: its range, transitions, speed and enclosing stacks.
+
+Input: a clip of an OpenTimelineIO timeline. Output: ranges of time, in the edit and in the media.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from palette4d.common.errors import Palette4dError
+from palette4d.shows.timeline_files import library
+
+#: Of a frame: times in double precision are no surer.
+ROUNDING = 1e-3
+
+
+def shown(clip: Any) -> tuple[Any, Any] | None:
+    """Return where in the edit a clip begins, and the range of media that the edit shows.
+
+    None when nothing of it is left. The first is in time of the timeline's stack, the second
+    in the media's.
+    """
+    schema = library().schema
+    whole = _with_transitions(clip)
+    window, item = whole, clip
+    while item.parent() is not None:
+        parent = item.parent()
+        if item is not clip and any(
+            isinstance(effect, schema.TimeEffect) for effect in item.effects
+        ):
+            raise Palette4dError(
+                f"the clip {clip.name!r} lies in a compound {item.name!r} that plays at "
+                "another speed, which is not followed; change the speed of the clip itself"
+            )
+        window = item.transformed_time_range(window, parent)
+        if parent.source_range is not None:
+            window = _common(window, parent.source_range)
+            if window is None:
+                return None
+        item = parent
+    left = item.transformed_time_range(window, clip)
+    left = _common(left, whole)
+    if left is None or left.duration.value <= 0:
+        return None
+    return window.start_time, _with_speed(clip, left)
+
+
+def _with_transitions(clip: Any) -> Any:
+    """Return a clip's range with what the transitions beside it take of its media."""
+    shown = clip.trimmed_range()
+    parent = clip.parent()
+    if not isinstance(parent, library().schema.Track):
+        return shown
+    before, after = parent.neighbors_of(clip)
+    start, end = shown.start_time, shown.end_time_exclusive()
+    if isinstance(before, library().schema.Transition):
+        start -= before.in_offset
+    if isinstance(after, library().schema.Transition):
+        end += after.out_offset
+    return library().opentime.range_from_start_end_time(start, end)
+
+
+def _with_speed(clip: Any, shown: Any) -> Any:
+    """Return the media that a clip plays in a range of its own time."""
+    schema, opentime = library().schema, library().opentime
+    speed = 1.0
+    for effect in clip.effects:
+        if isinstance(effect, schema.LinearTimeWarp):  # a freeze frame, too
+            speed *= effect.time_scalar
+        elif isinstance(effect, schema.TimeEffect):
+            raise Palette4dError(
+                f"the clip {clip.name!r} has the time effect {effect.effect_name!r}, which is "
+                "not followed; expected a constant speed or a freeze frame"
+            )
+    if speed == 1:
+        return shown
+    if speed < 0 or not math.isfinite(speed):
+        raise Palette4dError(
+            f"the clip {clip.name!r} plays at {speed:g} times its speed, which is not "
+            "followed; expected 0 (a freeze frame) or more. Render it, or analyse its media "
+            "apart"
+        )
+    # The in-point stays what it is; time counts from there, in whole frames.
+    origin = clip.trimmed_range().start_time
+    rate = shown.duration.rate
+    begin = origin.value_rescaled_to(rate)
+    start = begin + speed * (shown.start_time.value_rescaled_to(rate) - begin)
+    last = start + speed * (shown.duration.value - 1)
+    first, end = math.floor(start + ROUNDING), math.floor(last + ROUNDING) + 1
+    return opentime.TimeRange(
+        opentime.RationalTime(first, rate), opentime.RationalTime(max(1, end - first), rate)
+    )
+
+
+def _common(one: Any, other: Any) -> Any:
+    """Return what two time ranges have in common; None when that is nothing."""
+    start = max(one.start_time, other.start_time)
+    end = min(one.end_time_exclusive(), other.end_time_exclusive())
+    if end <= start:
+        return None
+    return library().opentime.range_from_start_end_time(start, end)

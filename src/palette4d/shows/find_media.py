@@ -1,0 +1,147 @@
+"""Where an edit's media lies: the file that a timeline names, or one of that name in a folder.
+
+A folder is searched once, with all folders in it, by name alone. What a timeline names may have
+another extension there (a proxy), or be a sequence whose first file or pattern it names.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import urllib.parse
+import urllib.request
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from palette4d.common.errors import Palette4dError
+from palette4d.media import clip_sequence
+
+# name.####.exr, name.%04d.exr, name.@@@@.exr, name.[1001-1100].exr, name.1001.exr
+_NUMBERS = re.compile(r"(%0?[0-9]*d|#+|@+|\[[0-9]+-[0-9]+\]|(?<![0-9])[0-9]+)(?=\.[A-Za-z0-9]+$)")
+
+
+def local_path(url: str) -> Path:
+    """Return the path of a media reference's URL, or of what is a path already.
+
+    Raises
+    ------
+    Palette4dError
+        It is not a file's.
+    """
+    parts = urllib.parse.urlsplit(url)
+    if parts.scheme in ("", "file") or len(parts.scheme) == 1:  # a drive's letter
+        if parts.scheme != "file":
+            return Path(url)
+        return Path(urllib.request.url2pathname(parts.path))
+    raise Palette4dError(f"found the media {url!r}, expected a file; relink it with --media FOLDER")
+
+
+class Folder:
+    """The media under a folder, by name.
+
+    Attributes
+    ----------
+    path : Path
+        The folder.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """List it; `Palette4dError` when it is no folder."""
+        if not path.is_dir():
+            raise Palette4dError(
+                f"{path}: there is no such folder; --media expects one with media in it"
+            )
+        self.path = path
+        self._by_name: dict[str, list[Path]] = {}
+        for folder, folders, files in os.walk(path):
+            folders.sort()
+            for found in _in_folder(Path(folder), sorted(files)):
+                self._by_name.setdefault(_plain(found.name), []).append(found)
+
+    def find(self, names: Iterable[str]) -> Path | None:
+        """Return the media of the first of several names that is there.
+
+        With its own extension before others; of several in different folders the one whose
+        folders are most like the name's.
+
+        Raises
+        ------
+        Palette4dError
+            There are several, and nothing tells them apart.
+        """
+        for name in names:
+            path = Path(name)
+            found = self._by_name.get(_plain(path.name), [])
+            same = [f for f in found if f.suffix.lower() == path.suffix.lower()]
+            if best := _most_alike(same or found, path):
+                if len(best) > 1:
+                    listed = " and ".join(str(one) for one in best[:4])
+                    raise Palette4dError(
+                        f"found {len(best)} media named {path.name!r} under {self.path}: {listed}; "
+                        "expected one, keep the others out of --media"
+                    )
+                return best[0]
+        return None
+
+
+def _in_folder(folder: Path, files: list[str]) -> Iterator[Path]:
+    """Yield movies, image sequences as patterns, and single images."""
+    numbered = set()
+    for sequence in clip_sequence.sequences_in(folder):
+        numbered |= {path.name for path in sequence.files.values()}
+        yield Path(sequence.pattern)
+    for name in files:
+        extension = clip_sequence.extension(name)
+        known = clip_sequence.MOVIE_EXTENSIONS | clip_sequence.IMAGE_EXTENSIONS
+        if extension in known and name not in numbered and not name.startswith("."):
+            yield folder / name
+
+
+def _plain(name: str) -> str:
+    """Return a file's name without extension and frame number, to compare names by.
+
+    >>> _plain("A001C003.mov"), _plain("sh010.1001.exr"), _plain("sh010.####.exr"), _plain("v2.mov")
+    ('a001c003', 'sh010', 'sh010', 'v2')
+    """
+    path = Path(name)
+    suffix = path.suffix.lower().lstrip(".")
+    known = clip_sequence.MOVIE_EXTENSIONS | clip_sequence.IMAGE_EXTENSIONS
+    # What follows the last dot of a clip's name need not be an extension.
+    stem = path.stem if suffix in known | {"mxf", "r3d", "braw", "ari", "arx"} else name
+    if suffix in clip_sequence.IMAGE_EXTENSIONS:
+        stem = re.sub(r"[._ -]?(%0?[0-9]*d|#+|@+|\[[0-9]+-[0-9]+\])$", "", stem)
+        if numbered := clip_sequence.frame_number(stem):
+            stem = numbered[0].rstrip("._- ") or stem
+    return stem.lower()
+
+
+def _most_alike(found: list[Path], path: Path) -> list[Path]:
+    """Return those whose folders agree longest with a path's, from the file upwards."""
+    if len(found) < 2:
+        return found
+
+    def agreement(one: Path) -> int:
+        count = 0
+        for a, b in zip(reversed(one.parent.parts), reversed(path.parent.parts), strict=False):
+            if a.lower() != b.lower():
+                break
+            count += 1
+        return count
+
+    most = max(agreement(one) for one in found)
+    return [one for one in found if agreement(one) == most]
+
+
+def as_clip(path: Path) -> str | None:
+    """Return what `open_clip` takes for a path that a timeline names; None when it is not there.
+
+    The first file of a sequence, or a pattern with a range, stands for the whole of it.
+    """
+    match = _NUMBERS.search(path.name)
+    image = clip_sequence.extension(path) in clip_sequence.IMAGE_EXTENSIONS
+    if match and image and path.parent.is_dir():
+        before, after = path.name[: match.start()], path.name[match.end() :]
+        for sequence in clip_sequence.sequences_in(path.parent):
+            if (sequence.prefix, sequence.suffix) == (before, after):
+                return sequence.pattern
+    return str(path) if path.exists() else None

@@ -1,0 +1,221 @@
+"""A show's manifest, ``NAME.shots.json``: its shots, their sidecars, and what failed.
+
+`docs/shots.md` explains the format, `shots_v1.schema.json` is its JSON Schema. It is replaced whole
+whenever a shot is done, so that a run that ends early leaves what it reached.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from palette4d import _core
+from palette4d.common.errors import Palette4dError
+from palette4d.common.files import replacing
+from palette4d.shows.shots import Place, Shot
+
+SCHEMA, VERSION = "palette4d.shots", 1
+ENDING = ".shots.json"
+
+DONE, FAILED, TO_DO = "done", "failed", "to do"
+
+
+@dataclasses.dataclass(frozen=True)
+class Entry:
+    """A shot and what became of it.
+
+    Attributes
+    ----------
+    shot : Shot
+        As it was asked for.
+    status : str
+        `DONE`, `FAILED` or `TO_DO`.
+    frames : (int, int) or None
+        The first and last frame of the sidecar: the shot's, less of a handle where the media cuts.
+    error : str
+        Why it failed.
+    """
+
+    shot: Shot
+    status: str = TO_DO
+    frames: tuple[int, int] | None = None
+    error: str = ""
+
+    @property
+    def sidecar(self) -> str:
+        """The sidecar's file, beside the manifest."""
+        return f"{self.shot.name}.p4d.json"
+
+
+@dataclasses.dataclass(frozen=True)
+class Manifest:
+    """A show.
+
+    Attributes
+    ----------
+    source : str
+        The timeline or the movie, as seen from the manifest's folder.
+    source_sha256 : str
+        Of a timeline's file; "" for a movie.
+    rate : Fraction
+        Frames a second of the timeline, or of the movie.
+    options : dict
+        Those of the analysis, as sidecars record them.
+    entries : tuple of Entry
+        In the order of the edit.
+    """
+
+    source: str
+    source_sha256: str
+    rate: Fraction
+    options: dict[str, Any]
+    entries: tuple[Entry, ...]
+
+    @property
+    def is_timeline(self) -> bool:
+        """Whether the shots are those of an edit, not of a movie."""
+        return bool(self.source_sha256)
+
+
+def path_of(folder: Path, name: str) -> Path:
+    """Return the manifest's file for a show of a name."""
+    return folder / f"{name}{ENDING}"
+
+
+def is_manifest(path: Path) -> bool:
+    """Whether a file is a manifest, by its name."""
+    return path.name.endswith(ENDING)
+
+
+def write(manifest: Manifest, path: Path) -> None:
+    """Replace a manifest, whole; a line a shot.
+
+    Raises
+    ------
+    Palette4dError
+        It cannot be written.
+    """
+    head = {
+        "schema": SCHEMA,
+        "version": VERSION,
+        "generator": f"palette4d {_core.__version__}",
+        "source": {"file": manifest.source, "sha256": manifest.source_sha256},
+        "rate": [manifest.rate.numerator, manifest.rate.denominator],
+        "options": manifest.options,
+    }
+    lines = [json.dumps(_row(entry), ensure_ascii=False) for entry in manifest.entries]
+    text = json.dumps(head, indent=2, ensure_ascii=False).removesuffix("\n}")
+    text += ',\n  "shots": [\n    ' + ",\n    ".join(lines) + "\n  ]\n}\n"
+    with replacing(path, force=True) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def _row(entry: Entry) -> dict[str, Any]:
+    shot, place = entry.shot, entry.shot.place
+    row: dict[str, Any] = {
+        "name": shot.name,
+        "status": entry.status,
+        "sidecar": entry.sidecar,
+        "clip": shot.clip,
+        "asked": [shot.first, shot.last],
+        **({} if entry.frames is None else {"frames": list(entry.frames)}),
+        "step": shot.step,
+        "used": list(shot.used),
+    }
+    if place is not None:
+        row["edit"] = {"track": place.track, "record": place.record, "path": list(place.path)}
+    if entry.error:
+        row["error"] = entry.error
+    return row
+
+
+def read(path: Path) -> Manifest:
+    """Read a manifest.
+
+    Raises
+    ------
+    Palette4dError
+        There is none, or it is of another kind, newer, or broken.
+    """
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise Palette4dError(f"{path}: there is no such manifest; check the path") from error
+    except (ValueError, OSError) as error:
+        raise Palette4dError(f"{path}: the manifest cannot be read: {error}{_MEND}") from error
+    schema = document.get("schema") if isinstance(document, dict) else None
+    if schema != SCHEMA:
+        raise Palette4dError(
+            f"{path}: found the schema {schema!r}, expected {SCHEMA!r}: a manifest that `palette4d "
+            "analyze` wrote beside the sidecars of a show"
+        )
+    if document.get("version") != VERSION:
+        raise Palette4dError(
+            f"{path}: found a manifest of version {document.get('version')!r}, expected {VERSION}; "
+            "use the palette4d that wrote it, or analyse again with this one"
+        )
+    try:
+        return Manifest(
+            source=str(document["source"]["file"]),
+            source_sha256=str(document["source"]["sha256"]),
+            rate=Fraction(*document["rate"]),
+            options=dict(document["options"]),
+            entries=tuple(_entry(row) for row in document["shots"]),
+        )
+    except (AttributeError, KeyError, TypeError, ValueError, ZeroDivisionError) as error:
+        raise Palette4dError(
+            f"{path}: the manifest is broken ({type(error).__name__}: {error}){_MEND}"
+        ) from error
+
+
+_MEND = "; move it away and run `palette4d analyze` again, which keeps the sidecars"
+
+
+def _entry(row: dict[str, Any]) -> Entry:
+    place = None
+    if edit := row.get("edit"):
+        place = Place(str(edit["track"]), str(edit["record"]), tuple(map(int, edit["path"])))
+    first, last = map(int, row["asked"])
+    used_first, used_last = map(int, row["used"])
+    if row["status"] not in (DONE, FAILED, TO_DO) or (row["status"] == DONE) != ("frames" in row):
+        raise ValueError(f"status {row['status']!r}")
+    name = str(row["name"])
+    if row["sidecar"] != f"{name}.p4d.json" or "/" in name:
+        raise ValueError(f"sidecar {row['sidecar']!r} of the shot {name!r}")
+    shot = Shot(
+        name, str(row["clip"]), first, last, (used_first, used_last), int(row["step"]), place
+    )
+    frames = row.get("frames")
+    return Entry(
+        shot=shot,
+        status=row["status"],
+        frames=None if frames is None else (int(frames[0]), int(frames[1])),
+        error=str(row.get("error", "")),
+    )
+
+
+def sidecars(path: Path) -> tuple[list[Path], list[str]]:
+    """Return the sidecars of a show's shots that are done, and the names of the other shots.
+
+    Raises
+    ------
+    Palette4dError
+        The manifest cannot be read, no shot of it is done, or the sidecar of one is gone.
+    """
+    manifest = read(path)
+    done = [path.parent / e.sidecar for e in manifest.entries if e.status == DONE]
+    others = [e.shot.name for e in manifest.entries if e.status != DONE]
+    if gone := [file.name for file in done if not file.exists()]:
+        some = ", ".join(gone[:8]) + (", …" if len(gone) > 8 else "")
+        raise Palette4dError(
+            f"{path}: found no sidecar {some} beside it, expected those of shots that are done; "
+            "bring them back, or run `palette4d analyze` again, which makes what is missing"
+        )
+    if not done:
+        raise Palette4dError(
+            f"{path}: none of its {len(others)} shots is analysed; run `palette4d analyze` again"
+        )
+    return done, others

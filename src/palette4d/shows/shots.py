@@ -1,0 +1,194 @@
+"""Shots: the stretches of media that get a palette each, named, with the frames that are analysed.
+
+Input: a clip with cuts, here, or an edit (`timeline`). Output: `Shot`s, which `show` analyses.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Callable, Iterable, Iterator
+
+from palette4d.analysis import cuts, statistics
+from palette4d.analysis.options import AnalysisOptions
+from palette4d.common.errors import Palette4dError
+from palette4d.common.text import file_safe
+from palette4d.media.clip_base import Clip, even_step, hidden
+
+#: Colour bins of a frame that the search for cuts looks at.
+BINS = 4096
+
+
+@dataclasses.dataclass(frozen=True)
+class Place:
+    """Where an edit shows a shot.
+
+    Attributes
+    ----------
+    track : str
+        The name of the video track.
+    record : str
+        The timecode, or the frame number, at which it begins in the edit.
+    path : tuple of int
+        The clip's place in the timeline: indices of children, from the timeline's stack down.
+    """
+
+    track: str
+    record: str
+    path: tuple[int, ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class Shot:
+    """A stretch of one clip that gets a palette.
+
+    Attributes
+    ----------
+    name : str
+        Of the sidecar, the look and the files; unlike any other's, upper and lower case alike.
+    clip : str
+        What `open_clip` reads; "" where the media is missing.
+    first, last : int
+        The frames that are analysed, handles included; the clip's own numbers.
+    used : (int, int)
+        The first and the last frame that the edit shows.
+    step : int
+        The distance between frames.
+    place : Place or None
+        Where in the edit.
+    problem : str
+        Why it cannot be analysed; "" when it can.
+    """
+
+    name: str
+    clip: str
+    first: int
+    last: int
+    used: tuple[int, int]
+    step: int = 1
+    place: Place | None = None
+    problem: str = ""
+
+    @property
+    def frames(self) -> str:
+        """The frames as `open_clip` takes them."""
+        return f"{self.first}-{self.last}" + (f"x{self.step}" if self.step != 1 else "")
+
+    @property
+    def count(self) -> int:
+        """How many frames are analysed."""
+        return (self.last - self.first) // self.step + 1
+
+
+def numbered(shots: Iterable[Shot]) -> tuple[list[Shot], list[str]]:
+    """Return the shots with names unlike each other's, and the names that had to change.
+
+    Of several shots of one name the first keeps it, the others get their first frame: `A`,
+    `A_f120`. So a name stays when another shot is cut in before or after it.
+    """
+    taken: set[str] = set()
+    out, changed = [], []
+    for shot in shots:
+        name = shot.name
+        if name.lower() in taken:
+            name = f"{shot.name}_f{shot.used[0]}"
+            for again in itertools.count(2):
+                if name.lower() not in taken:
+                    break
+                name = f"{shot.name}_f{shot.used[0]}_{again}"
+            changed.append(name)
+        taken.add(name.lower())
+        out.append(dataclasses.replace(shot, name=name))
+    return out, changed
+
+
+def detect(clip: Clip, progress: Callable[[int, int], None] | None = None) -> list[Shot]:
+    """Split a clip at its cuts.
+
+    Returns
+    -------
+    list of Shot
+        Rising, without gaps; one for a clip without cuts. Named NAME_s001 and so on.
+
+    Raises
+    ------
+    Palette4dError
+        A frame cannot be read, or the frames are not evenly spaced.
+    """
+    step = even_step(clip.frames)
+    if not step:
+        raise Palette4dError(
+            f"{clip.source}: the frames are not evenly spaced; expected a range such as 1-10 or "
+            "1-10x3"
+        )
+    starts = cuts_of(clip, progress)
+    bounds = [clip.frames[0], *starts, clip.frames[-1] + step]
+    digits = max(3, len(str(len(bounds) - 1)))
+    shots = []
+    for i, (first, end) in enumerate(itertools.pairwise(bounds), start=1):
+        shots.append(
+            Shot(
+                name=f"{file_safe(clip.name)}_s{i:0{digits}d}",
+                clip=clip.source,
+                first=first,
+                last=end - step,
+                used=(first, end - step),
+                step=step,
+            )
+        )
+    return shots
+
+
+def cuts_of(clip: Clip, progress: Callable[[int, int], None] | None = None) -> list[int]:
+    """Return the frames that begin a new shot; memory holds a histogram a frame."""
+    tell = progress or (lambda done, total: None)
+    options = AnalysisOptions(colours=BINS, coarse_colours=BINS)
+
+    def histograms() -> Iterator[tuple[int, cuts.F64, bool]]:
+        for done, image in enumerate(clip.iter_images(), start=1):
+            tell(done, len(clip.frames))
+            found = statistics.gather(image.frame, clip.straight_colours(image.pixels), options)
+            if found is not None:
+                yield image.frame, found.histogram, hidden(image.pixels)
+
+    frames = histograms()
+    shown: list[tuple[int, cuts.F64]] = []  # the first frame of which anything shows
+
+    def before() -> Iterator[tuple[int, cuts.F64]]:
+        for number, histogram, is_hidden in frames:
+            if not is_hidden:
+                shown.append((number, histogram))
+                return
+            yield number, histogram
+
+    starts = cuts.find_cuts_of(before())
+    if not shown:  # alpha is not used
+        return starts
+    rest = ((number, histogram) for number, histogram, is_hidden in frames if not is_hidden)
+    return cuts.find_cuts_of(itertools.chain(shown, rest))
+
+
+def trimmed(shot: Shot, clip: Clip) -> Shot:
+    """Return a shot of an edit whose handles end at the media's cuts.
+
+    Parameters
+    ----------
+    shot : Shot
+        The shot.
+    clip : Clip
+        Its media, over the shot's frames.
+
+    Raises
+    ------
+    Palette4dError
+        There is a cut inside of what the edit shows.
+    """
+    starts = cuts_of(clip)
+    first, last = shot.used
+    if inside := [cut for cut in starts if first < cut <= last]:
+        raise Palette4dError(cuts.refusal_inside(inside))
+    return dataclasses.replace(
+        shot,
+        first=max([shot.first, *(cut for cut in starts if cut <= first)]),
+        last=min([shot.last, *(cut - shot.step for cut in starts if cut > last)]),
+    )

@@ -1,0 +1,282 @@
+"""The shots of an edit: a timeline of OpenTimelineIO, or an EDL, in; `Shot`s out.
+
+Each clip of each video track that is on is a shot, nested ones too, with the frames that the edit
+shows of it: its in-point and its length, what transitions on either side take more, what a change
+of speed takes more or less, and what an enclosing stack leaves of it. Gaps and generators are
+none. Times are turned into the frame numbers of the media's files, as `clip` counts them: those of
+an image sequence's names, and from 0 in a movie.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from palette4d.common.errors import Palette4dError
+from palette4d.common.text import counted, file_safe
+from palette4d.media.clip import Clip, open_clip
+from palette4d.media.clip_base import describe
+from palette4d.media.timecode import start_timecode
+from palette4d.shows import edit_time, find_media
+from palette4d.shows.shots import Place, Shot
+from palette4d.shows.timeline_files import Document, library
+
+
+@dataclasses.dataclass(frozen=True)
+class Edit:
+    """What a timeline shows: its shots in the order of the tracks, and what is no shot."""
+
+    name: str
+    rate: Fraction
+    shots: tuple[Shot, ...]
+    notes: tuple[str, ...]
+
+
+def shots_of(document: Document, folder: find_media.Folder | None = None, handles: int = 0) -> Edit:
+    """Return the shots of a timeline.
+
+    Parameters
+    ----------
+    document : Document
+        As `read` returns it; relative media lie beside its file.
+    folder : find_media.Folder, optional
+        Where to look for media first.
+    handles : int
+        Frames more on either side, as far as the media goes.
+
+    Returns
+    -------
+    Edit
+        Shots whose media is missing or cannot be used say so in `Shot.problem`.
+
+    Raises
+    ------
+    Palette4dError
+        There is no shot at all.
+    """
+    otio = library()
+    timeline, path = document.timeline, document.path
+    reader = _Reader(otio, document, folder, handles)
+    for index, track in enumerate(timeline.tracks):
+        if not isinstance(track, otio.schema.Track):
+            reader.walk(track, (index,), f"layer {index + 1}")
+        elif track.kind != otio.schema.TrackKind.Video:
+            continue
+        elif not track.enabled:
+            reader.passed_over("track is off", "tracks are off")
+        else:
+            reader.walk(track, (index,), track.name or f"V{index + 1}")
+    if not reader.shots:
+        raise Palette4dError(
+            f"{path}: the timeline shows no clip: found {counted(len(timeline.tracks), 'track')}"
+            + "".join(f", {note}" for note in reader.notes())
+            + "; expected at least one clip with media on a video track"
+        )
+    return Edit(
+        name=file_safe(path.stem),
+        rate=reader.rate,
+        shots=tuple(reader.shots),
+        notes=tuple(reader.notes()),
+    )
+
+
+class _Reader:
+    """Walks a timeline and gathers its shots."""
+
+    def __init__(
+        self, otio: Any, document: Document, folder: find_media.Folder | None, handles: int
+    ) -> None:
+        self.otio, self.timeline, self.path = otio, document.timeline, document.path
+        self.folder, self.handles = folder, handles
+        self.clips: dict[str, Clip] = {}
+        self.shots: list[Shot] = []
+        self.others: dict[tuple[str, str], int] = {}
+        start = self.timeline.global_start_time
+        rate = start.rate if start else _rate(self.timeline)
+        self.rate = Fraction(rate).limit_denominator(1001)
+
+    def passed_over(self, one: str, several: str) -> None:
+        key = (one, several)
+        self.others[key] = self.others.get(key, 0) + 1
+
+    def notes(self) -> list[str]:
+        return [counted(count, *words) for words, count in self.others.items()]
+
+    def walk(self, parent: Any, path: tuple[int, ...], track: str) -> None:
+        """Gather the shots in a track or a stack."""
+        schema = self.otio.schema
+        for index, item in enumerate(parent):
+            here = (*path, index)
+            if isinstance(item, schema.Transition):
+                continue
+            if isinstance(item, schema.Gap):
+                self.passed_over("gap", "gaps")
+            elif not item.enabled:
+                self.passed_over("clip is off", "clips are off")
+            elif isinstance(item, schema.Clip):
+                self.clip(item, here, track)
+            else:
+                self.walk(item, here, track)
+
+    def clip(self, clip: Any, path: tuple[int, ...], track: str) -> None:
+        reference = clip.media_reference
+        if isinstance(reference, self.otio.schema.GeneratorReference):
+            self.passed_over("generated picture", "generated pictures")
+            return
+        try:
+            shown = edit_time.shown(clip)
+        except Palette4dError as error:
+            self.add(clip, path, track, "", str(error))
+            return
+        if shown is None:
+            self.passed_over("clip is cut away", "clips are cut away")
+            return
+        record, used = shown
+        place = Place(track, self.record_of(record), path)
+        try:
+            spec, opened = self.opened(clip)
+            first, last = self.frames(clip, used, opened)
+        except Palette4dError as error:
+            self.add(clip, path, track, place.record, str(error))
+            return
+        low, high = opened.frames[0], opened.frames[-1]
+        if not low <= first <= last <= high:
+            self.add(
+                clip,
+                path,
+                track,
+                place.record,
+                f"{spec}: the edit shows frames {first} to {last}, the media has "
+                f"{describe(opened.frames)}; bring the whole media, or the right take",
+            )
+            return
+        self.shots.append(
+            Shot(
+                name=file_safe(clip.name or Path(spec).stem),
+                clip=spec,
+                first=max(low, first - self.handles),
+                last=min(high, last + self.handles),
+                used=(first, last),
+                place=place,
+            )
+        )
+
+    def add(self, clip: Any, path: tuple[int, ...], track: str, record: str, problem: str) -> None:
+        """Note a shot that cannot be analysed."""
+        place = Place(track, record, path)
+        name = file_safe(clip.name or "shot")
+        self.shots.append(Shot(name, "", 0, 0, (0, 0), place=place, problem=problem))
+
+    def record_of(self, time: Any) -> str:
+        """Return a time of the timeline as a timecode, or a number where there is none."""
+        opentime = self.otio.opentime
+        start = self.timeline.global_start_time
+        rate = float(self.rate)
+        at = time.rescaled_to(rate)
+        if start is not None:
+            at += start.rescaled_to(rate)
+        try:
+            return str(opentime.to_timecode(at, rate))
+        except ValueError:  # a rate that timecodes do not have, or before 0
+            return f"{at.value:g}"
+
+    # ----------------------------------------------------------------------------- media
+
+    def opened(self, clip: Any) -> tuple[str, Clip]:
+        """Return what `open_clip` takes for a clip's media, and the clip."""
+        spec = self.found(clip)
+        if spec not in self.clips:
+            self.clips[spec] = open_clip(spec, skip_bad_frames=True)
+        return spec, self.clips[spec]
+
+    def found(self, clip: Any) -> str:
+        """Find a clip's media: in the folder by name, else where the timeline says."""
+        schema, reference = self.otio.schema, clip.media_reference
+        names: list[str] = []
+        named = ""
+        if isinstance(reference, schema.ExternalReference) and reference.target_url:
+            named = str(find_media.local_path(reference.target_url))
+        elif isinstance(reference, schema.ImageSequenceReference):
+            base = find_media.local_path(reference.target_url_base or ".")
+            digits = "#" * max(1, reference.frame_zero_padding)
+            named = str(base / f"{reference.name_prefix}{digits}{reference.name_suffix}")
+        if named:
+            names.append(named)
+        reel = dict(clip.metadata.get("cmx_3600", {})).get("reel", "")
+        names += [name for name in (clip.name, str(reel)) if name]
+        if named and self.folder is not None and (there := self.folder.find([named])):
+            return str(there)
+        if named and (spec := find_media.as_clip(self.path.parent / named)) is not None:
+            return spec
+        if self.folder is not None and (there := self.folder.find(names)):
+            return str(there)
+        what = f"{named!r} is not there" if named else "the edit names no file for it"
+        if self.folder is None:
+            help_ = "name the folder that holds it with --media FOLDER"
+        else:
+            looked = " or ".join(map(repr, names)) or "its name"
+            what += f", and nothing under {self.folder.path} is called {looked}"
+            help_ = "bring it there, or name another folder with --media"
+        raise Palette4dError(f"the media is missing: {what}; {help_}")
+
+    def frames(self, clip: Any, used: Any, opened: Clip) -> tuple[int, int]:
+        """Return the first and the last of the media's frame numbers in a range of its time."""
+        if len(opened.frames) == 1 and not opened.is_movie:
+            return opened.frames[0], opened.frames[0]  # a still, however long it is shown
+        reference = clip.media_reference
+        rate = self.media_rate(reference, used)
+        start = Fraction(used.start_time.value).limit_denominator(10**6)
+        start *= rate / Fraction(used.start_time.rate).limit_denominator(1001)
+        length = Fraction(used.duration.value).limit_denominator(10**6)
+        length *= rate / Fraction(used.duration.rate).limit_denominator(1001)
+        rounding = Fraction(edit_time.ROUNDING).limit_denominator(1000)
+        first = math.floor(start + rounding)
+        last = max(first, math.ceil(start + length - rounding) - 1)
+        offset = self.offset(reference, opened, first, last, rate)
+        return first + offset, last + offset
+
+    def media_rate(self, reference: Any, used: Any) -> Fraction:
+        """Return the media's frames a second, by which its frames are counted."""
+        if isinstance(reference, self.otio.schema.ImageSequenceReference) and reference.rate > 0:
+            return Fraction(reference.rate).limit_denominator(1001)
+        known = getattr(reference, "available_range", None)
+        time = known.start_time if known is not None else used.start_time
+        return Fraction(time.rate).limit_denominator(1001)
+
+    def offset(self, reference: Any, opened: Clip, first: int, last: int, rate: Fraction) -> int:
+        """Return what to add to a frame of the media's time to get the file's number of it."""
+        known = getattr(reference, "available_range", None)
+        begins = None
+        if known is not None:
+            begins = round(known.start_time.rescaled_to(float(rate)).value)
+        if isinstance(reference, self.otio.schema.ImageSequenceReference):
+            return int(reference.start_frame) - (begins or 0)
+        low, high = opened.frames[0], opened.frames[-1]
+        if not opened.is_movie and low <= first <= last <= high:
+            return 0  # a sequence's numbers are the media's time
+        if begins is None:
+            begins = self.stated(opened, rate)
+        return 0 if begins is None else low - begins
+
+    def stated(self, opened: Clip, rate: Fraction) -> int | None:
+        """Return the frame count of the timecode with which a clip's files say that they begin."""
+        text = start_timecode(opened)
+        if text is None:
+            return None
+        try:
+            return int(self.otio.opentime.from_timecode(text, float(rate)).to_frames())
+        except ValueError:  # a rate that timecodes do not have
+            return None
+
+
+def _rate(timeline: Any) -> float:
+    """Return the rate of a timeline that states no start: that of its first clip."""
+    for clip in timeline.find_clips():
+        try:
+            return float(clip.trimmed_range().duration.rate)
+        except Exception:  # a clip without any range
+            continue
+    return 24.0

@@ -1,0 +1,127 @@
+"""Timelines as files: what OpenTimelineIO and its adapter for EDLs read."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from palette4d.common.errors import Palette4dError
+from palette4d.common.text import counted
+
+EXTENSIONS = frozenset({"otio", "otioz", "otiod", "edl"})
+
+
+def library() -> Any:
+    """Return OpenTimelineIO.
+
+    Raises
+    ------
+    Palette4dError
+        It is not installed.
+    """
+    try:
+        import opentimelineio
+    except ImportError as error:
+        raise Palette4dError(
+            "timelines need OpenTimelineIO, which is not installed; run: "
+            "pip install 'palette4d[timeline]'"
+        ) from error
+    return opentimelineio
+
+
+@dataclasses.dataclass(frozen=True)
+class Document:
+    """A timeline that was read: its file and OpenTimelineIO's object."""
+
+    path: Path
+    timeline: Any
+
+
+def is_timeline(spec: str) -> bool:
+    """Whether a file is an edit, by its extension."""
+    return Path(spec).suffix.lower().lstrip(".") in EXTENSIONS
+
+
+def read(path: Path, rate: Fraction | None = None) -> Document:
+    """Read a timeline.
+
+    Parameters
+    ----------
+    path : Path
+        .otio, .otioz, .otiod or .edl.
+    rate : Fraction, optional
+        Of an EDL's timecodes, 24 by default; the others say theirs.
+
+    Raises
+    ------
+    Palette4dError
+        No such file, or nothing in it that can be read as one timeline.
+    """
+    otio = library()
+    if not path.exists():
+        raise Palette4dError(f"{path}: there is no such timeline; check the path")
+    extension = path.suffix.lower().lstrip(".")
+    known = otio.adapters.suffixes_with_defined_adapters(read=True)
+    if extension not in known:
+        raise Palette4dError(
+            f"{path}: OpenTimelineIO has no adapter for .{extension}; run: "
+            "pip install 'palette4d[timeline]'"
+        )
+    arguments = {"rate": float(rate)} if rate is not None and extension == "edl" else {}
+    try:
+        found = otio.adapters.read_from_file(str(path), **arguments)
+    except Exception as error:  # an adapter may raise anything on a broken file
+        raise Palette4dError(
+            f"{path}: it cannot be read as a timeline ({_first_line(error)}); expected a whole "
+            f".{extension} file"
+            + (", and its timecodes' rate in --rate" if extension == "edl" else "")
+        ) from error
+    if isinstance(found, otio.schema.SerializableCollection):
+        timelines = [one for one in found if isinstance(one, otio.schema.Timeline)]
+        if len(timelines) != 1:
+            raise Palette4dError(
+                f"{path}: found a collection of {counted(len(timelines), 'timeline')}, expected "
+                "one; write the timeline to a file of its own"
+            )
+        found = timelines[0]
+    if not isinstance(found, otio.schema.Timeline):
+        raise Palette4dError(
+            f"{path}: found a {type(found).__name__}, expected a timeline; write the edit to a "
+            "file as a whole"
+        )
+    if extension == "edl":
+        _rebase(found)
+    return Document(path, found)
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip().partition("\n")[0] or type(error).__name__
+
+
+def _rebase(timeline: Any) -> None:
+    """Let an EDL's tracks begin with the first of them, those that start later with a gap.
+
+    The EDL adapter notes a track's first record timecode as a start before the track's own; taken
+    as a range, as OpenTimelineIO does, it shows nothing of the track.
+    """
+    otio = library()
+    starts = [t.source_range.start_time for t in timeline.tracks if t.source_range is not None]
+    if not starts:
+        return
+    first = max(starts)  # the least record timecode: they are its negative
+    for track in timeline.tracks:
+        if track.source_range is not None:
+            late = first - track.source_range.start_time
+            track.source_range = None
+            if late.value > 0:
+                track.insert(0, otio.schema.Gap(duration=late))
+    timeline.global_start_time = otio.opentime.RationalTime(-first.value, first.rate)
+
+
+def sha256(path: Path) -> str:
+    """Return the hash of a timeline's file; of a folder (.otiod) that of the timeline in it."""
+    file = path / "content.otio" if path.is_dir() else path
+    return hashlib.sha256(file.read_bytes()).hexdigest()

@@ -1,0 +1,184 @@
+"""What was exported for the shots of an edit, noted in the edit: metadata of a timeline's clips.
+
+Only the member `palette4d` of `metadata` is written, of each clip that has a sidecar and of the
+timeline; all else stays as it is in the file. The notes are in docs/shots.md.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from palette4d import _core
+from palette4d.common.errors import Palette4dError
+from palette4d.common.files import refuse_existing, replacing
+from palette4d.lut_export.series import Series
+from palette4d.shows import timeline_files
+from palette4d.shows.manifest import DONE, Entry, Manifest
+
+NAMESPACE, VERSION = "palette4d", 1
+
+
+def check(manifest: Manifest, manifest_path: Path, target: Path, force: bool) -> Path:
+    """Return the timeline of a show, and refuse early what `write` would refuse.
+
+    Raises
+    ------
+    Palette4dError
+        The show is no edit's, its timeline is not there or is another than the one that was
+        analysed, or `target` cannot be written.
+    """
+    if not manifest.is_timeline:
+        raise Palette4dError(
+            f"{manifest_path}: its shots are those of the movie {manifest.source}; --otio expects "
+            "those of a timeline"
+        )
+    if target.suffix.lower() != ".otio":
+        raise Palette4dError(f"{target}: expected the name of an .otio file")
+    refuse_existing(target, force)
+    source = Path(manifest.source)
+    if not source.is_absolute():
+        source = manifest_path.absolute().parent / source
+    if not source.exists():
+        raise Palette4dError(
+            f"{source}: the timeline of {manifest_path} is not there; bring it back"
+        )
+    if timeline_files.sha256(source) != manifest.source_sha256:
+        raise Palette4dError(
+            f"{source}: the timeline was changed since its shots were analysed; run `palette4d "
+            "analyze` again, which does the shots that changed"
+        )
+    return source
+
+
+def write(
+    source: Path,
+    manifest: Manifest,
+    manifest_path: Path,
+    exported: Mapping[str, Series],
+    target: Path,
+    *,
+    force: bool = False,
+) -> int:
+    """Write a copy of a timeline with references to what was exported.
+
+    Parameters
+    ----------
+    source : Path
+        The timeline, as `check` returns it.
+    manifest, manifest_path : Manifest, Path
+        The show.
+    exported : mapping
+        The series of each shot, by its name.
+    target : Path
+        The new timeline, an .otio file; files are named as seen from its folder.
+    force : bool
+        Replace an existing file.
+
+    Returns
+    -------
+    int
+        How many clips have references.
+
+    Raises
+    ------
+    Palette4dError
+        A shot is not where the manifest says, or the file cannot be written.
+    """
+    document = _document(source)
+    timeline = _timeline(document, source)
+    folder = target.absolute().parent
+    count = 0
+    for entry in manifest.entries:
+        if entry.status != DONE or entry.shot.place is None:
+            continue
+        clip = _clip(timeline, entry, source)
+        _metadata(clip)[NAMESPACE] = _references(
+            entry, manifest_path.parent, exported.get(entry.shot.name), folder
+        )
+        count += 1
+    _metadata(timeline)[NAMESPACE] = {
+        "version": VERSION,
+        "generator": f"palette4d {_core.__version__}",
+        "manifest": _seen_from(folder, manifest_path),
+    }
+    text = json.dumps(document, indent=4, ensure_ascii=False) + "\n"
+    otio = timeline_files.library()
+    with replacing(target, force=force) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+        otio.adapters.read_from_string(text, "otio_json")  # what is written can be read
+    return count
+
+
+def _document(source: Path) -> Any:
+    """Return a timeline's JSON: the file's own, or what OpenTimelineIO makes of another kind."""
+    if source.suffix.lower() == ".otio":
+        return json.loads(source.read_text(encoding="utf-8"))
+    otio = timeline_files.library()
+    timeline = timeline_files.read(source).timeline
+    return json.loads(otio.adapters.write_to_string(timeline, "otio_json"))
+
+
+def _timeline(document: Any, source: Path) -> Any:
+    """Return the timeline in a document: itself, or the one in a collection."""
+    found = [document]
+    if str(document.get("OTIO_SCHEMA", "")).startswith("SerializableCollection."):
+        found = document["children"]
+    found = [one for one in found if str(one.get("OTIO_SCHEMA", "")).startswith("Timeline.")]
+    if len(found) != 1:
+        raise Palette4dError(f"{source}: found {len(found)} timelines, expected one")
+    return found[0]
+
+
+def _clip(timeline: Any, entry: Entry, source: Path) -> Any:
+    """Return the clip of a shot."""
+    assert entry.shot.place is not None
+    item = timeline["tracks"]
+    try:
+        for index in entry.shot.place.path:
+            item = item["children"][index]
+        schema = str(item["OTIO_SCHEMA"])
+    except (KeyError, IndexError, TypeError):
+        schema = "nothing"
+    if not schema.startswith("Clip."):
+        raise Palette4dError(
+            f"{source}: found {schema} where the manifest has the shot {entry.shot.name}, expected "
+            "its clip; run `palette4d analyze` again"
+        )
+    return item
+
+
+def _metadata(item: Any) -> Any:
+    if not isinstance(item.get("metadata"), dict):
+        item["metadata"] = {}
+    return item["metadata"]
+
+
+def _references(entry: Entry, shots: Path, series: Series | None, folder: Path) -> dict[str, Any]:
+    assert entry.frames is not None
+    found: dict[str, Any] = {
+        "version": VERSION,
+        "shot": entry.shot.name,
+        "sidecar": _seen_from(folder, shots / entry.sidecar),
+        "frames": list(entry.frames),
+        "used": list(entry.shot.used),
+    }
+    if series is not None:
+        listed = {*series.baked, *series.kept}
+        found["series"] = _seen_from(folder, series.index)
+        found["luts"] = [
+            {"frame": row["frame"], "file": _seen_from(folder, series.index.parent / row["file"])}
+            for row in series.document["frames"]
+            if row["frame"] in listed
+        ]
+    return found
+
+
+def _seen_from(folder: Path, file: Path) -> str:
+    try:
+        return Path(os.path.relpath(file.absolute(), folder)).as_posix()
+    except ValueError:  # on another drive
+        return file.absolute().as_posix()

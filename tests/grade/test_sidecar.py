@@ -1,0 +1,349 @@
+"""The writer: deterministic text, atomic replacement, edits that are never lost unasked."""
+
+import copy
+import json
+import os
+import stat
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from palette4d import Palette4dError, SidecarError, _core
+from palette4d.grade import sidecar
+
+GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
+FILES = sorted(GOLDEN.glob("v1_*.p4d.json"))
+
+Document = dict[str, Any]
+
+
+def golden(name: str) -> Document:
+    return sidecar.load(GOLDEN / f"v1_{name}.p4d.json")
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(entry.name for entry in folder.iterdir())
+
+
+@pytest.fixture
+def edited(tmp_path: Path) -> Path:
+    path = tmp_path / "clip.p4d.json"
+    path.write_bytes((GOLDEN / "v1_edited.p4d.json").read_bytes())
+    return path
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
+def test_golden_files_are_written_as_they_are(path: Path, tmp_path: Path) -> None:
+    document = sidecar.load(path)
+    sidecar.save(document, tmp_path / "out.p4d.json")
+    assert (tmp_path / "out.p4d.json").read_bytes() == path.read_bytes()
+    assert names(tmp_path) == ["out.p4d.json"]
+
+
+def test_equal_documents_give_equal_text() -> None:
+    document = golden("edited")
+    shuffled = json.loads(json.dumps(document, sort_keys=True))
+    shuffled["extra"] = document["extra"]
+    shuffled["quality"] = document["quality"]
+    shuffled["polytope"]["vertices"][0]["frame"] = 0.0
+    shuffled["polytope"]["vertices"][0]["rgb"] = np.array([0.1, 0.1, 0.1])
+    shuffled["clip"]["size"] = (np.int32(64), np.int64(36))
+    assert sidecar.dumps(shuffled) == sidecar.dumps(document)
+
+
+def test_every_double_survives(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    document = golden("split")
+    for vertex in document["polytope"]["vertices"]:
+        vertex["rgb"] = (rng.standard_normal(3) * 10.0 ** rng.integers(-300, 5, 3)).tolist()
+    sidecar.save(document, tmp_path / "out.p4d.json")
+    read = _core.read_sidecar(tmp_path / "out.p4d.json").polytope.vertices
+    expected = np.array([[*v["rgb"], v["frame"]] for v in document["polytope"]["vertices"]])
+    assert read.tobytes() == expected.tobytes()
+
+
+def test_one_vertex_a_line() -> None:
+    document = golden("split")
+    other = copy.deepcopy(document)
+    other["polytope"]["vertices"][3]["rgb"][1] = 1 / 3
+    a, b = sidecar.dumps(document).splitlines(), sidecar.dumps(other).splitlines()
+    assert len(a) == len(b)
+    assert [y for x, y in zip(a, b, strict=True) if x != y] == [
+        '      {"id": "v4", "frame": 0, "rgb": [0.1, 0.3333333333333333, 0.9]},'
+    ]
+
+
+def test_new_document_is_complete() -> None:
+    old = golden("tetrahedron")
+    document = sidecar.new_document(old["clip"], old["polytope"], {"options": {"k": np.int64(50)}})
+    assert sidecar.validate(document).version == 1
+    assert document["generator"] == f"palette4d {_core.__version__}"
+    assert document["quality"] == {"stages": [], "options": {"k": 50}, "versions": {}}
+    assert not sidecar.has_edits(document)
+
+
+@pytest.mark.parametrize("wrong", [float("nan"), float("inf"), "red", None, 10**400])
+def test_a_bad_document_leaves_no_file(tmp_path: Path, wrong: Any) -> None:
+    document = golden("tetrahedron")
+    document["polytope"]["vertices"][1]["rgb"][2] = wrong
+    with pytest.raises(SidecarError) as caught:
+        sidecar.save(document, tmp_path / "out.p4d.json")
+    assert caught.value.pointer == "/polytope/vertices/1/rgb/2"
+    assert caught.value.file == str(tmp_path / "out.p4d.json")
+    assert names(tmp_path) == []
+
+
+def test_a_name_that_is_no_unicode_is_refused_in_its_place(tmp_path: Path) -> None:
+    document = golden("tetrahedron")
+    document["clip"]["name"] = os.fsdecode(b"\xff")
+    with pytest.raises(SidecarError) as caught:
+        sidecar.save(document, tmp_path / "out.p4d.json")
+    assert caught.value.pointer == "/clip/name"
+
+
+class Interrupted(KeyboardInterrupt):
+    pass
+
+
+FULL = OSError(28, "No space left on device")
+
+
+@pytest.mark.parametrize(
+    ("moment", "problem"),
+    [
+        ("fsync", FULL),
+        ("fsync", Interrupted()),
+        ("chmod", Interrupted()),
+        ("replace", FULL),
+        ("replace", Interrupted()),
+    ],
+)
+def test_failure_at_any_moment_leaves_the_old_file(
+    edited: Path, monkeypatch: pytest.MonkeyPatch, moment: str, problem: BaseException
+) -> None:
+    def fail(*_args: Any, **_keywords: Any) -> None:
+        raise problem
+
+    before = edited.read_bytes()
+    if moment == "fsync":
+        monkeypatch.setattr(os, "fsync", fail)
+    else:
+        monkeypatch.setattr(Path, moment, fail)
+    expected = Interrupted if isinstance(problem, Interrupted) else Palette4dError
+    with pytest.raises(expected):
+        sidecar.save(golden("split"), edited, on_edits="drop")
+    assert edited.read_bytes() == before
+    assert names(edited.parent) == [edited.name]
+
+
+def test_what_reads_back_differently_is_not_kept(
+    edited: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A disk that loses a bit: the temporary file is damaged between writing and reading."""
+    before = edited.read_bytes()
+    real = os.fsync
+
+    def corrupt(handle: int) -> None:
+        real(handle)
+        for temporary in edited.parent.glob(".*.tmp"):
+            data = temporary.read_bytes()
+            temporary.write_bytes(data.replace(b"0.9,", b"0.8,", 1))
+
+    monkeypatch.setattr(os, "fsync", corrupt)
+    with pytest.raises(Palette4dError, match="reads back differently"):
+        sidecar.save(golden("split"), edited, on_edits="drop")
+    assert edited.read_bytes() == before
+    assert names(edited.parent) == [edited.name]
+
+
+def test_edits_are_not_lost_unasked(edited: Path) -> None:
+    before = edited.read_bytes()
+    for attempt in (
+        lambda: sidecar.save(golden("split"), edited),
+        lambda: sidecar.check_target(edited),
+    ):
+        with pytest.raises(Palette4dError) as caught:
+            attempt()
+        message = str(caught.value)
+        assert "2 edited vertices and 3 stops" in message
+        assert "--keep-edits" in message
+        assert "--drop-edits" in message
+    assert edited.read_bytes() == before
+
+
+def test_edits_are_dropped_on_request(edited: Path) -> None:
+    sidecar.check_target(edited, on_edits="drop")
+    sidecar.save(golden("split"), edited, on_edits="drop")
+    assert sidecar.load(edited) == golden("split")
+
+
+def test_edits_are_kept_with_the_same_palette(edited: Path) -> None:
+    old = sidecar.load(edited)
+    document = golden("split")
+    document["quality"]["options"]["seed"] = 1
+    sidecar.check_target(edited, on_edits="keep")
+    sidecar.save(document, edited, on_edits="keep")
+    new = sidecar.load(edited)
+    assert new["edits"] == old["edits"]
+    assert new["extra"] == old["extra"]
+    assert new["quality"]["options"]["seed"] == 1
+
+
+def test_edits_are_not_kept_with_another_palette(edited: Path) -> None:
+    before = edited.read_bytes()
+    document = golden("split")
+    document["polytope"]["vertices"][0]["rgb"][0] += 1e-12
+    with pytest.raises(Palette4dError, match="cannot be kept"):
+        sidecar.save(document, edited, on_edits="keep")
+    assert edited.read_bytes() == before
+
+
+@pytest.mark.parametrize("on_edits", ["refuse", "keep"])
+def test_a_file_without_edits_is_replaced(tmp_path: Path, on_edits: Any) -> None:
+    path = tmp_path / "clip.p4d.json"
+    sidecar.save(golden("merge"), path)
+    sidecar.save(golden("split"), path, on_edits=on_edits)
+    assert sidecar.load(path) == golden("split")
+
+
+def test_a_file_that_is_no_sidecar_is_not_replaced_unasked(tmp_path: Path) -> None:
+    path = tmp_path / "notes.json"
+    path.write_text('{"my": "notes"}', encoding="utf-8")
+    with pytest.raises(Palette4dError, match="cannot be read as a sidecar"):
+        sidecar.save(golden("split"), path)
+    assert path.read_text(encoding="utf-8") == '{"my": "notes"}'
+    sidecar.save(golden("split"), path, on_edits="drop")
+    empty = tmp_path / "empty.json"
+    empty.touch()
+    sidecar.save(golden("split"), empty)
+
+
+def test_targets_that_cannot_be_written(tmp_path: Path) -> None:
+    for target in (tmp_path, tmp_path / "missing" / "clip.p4d.json"):
+        with pytest.raises(Palette4dError):
+            sidecar.check_target(target)
+        with pytest.raises(Palette4dError):
+            sidecar.save(golden("split"), target)
+    with pytest.raises(ValueError, match="on_edits"):
+        sidecar.save(golden("split"), tmp_path / "x.json", on_edits="maybe")  # type: ignore[arg-type]
+    assert names(tmp_path) == []
+
+
+def test_permissions_and_links_are_kept(edited: Path) -> None:
+    edited.chmod(0o640)
+    link = edited.with_name("link.p4d.json")
+    link.symlink_to(edited.name)
+    sidecar.save(golden("split"), link, on_edits="drop")
+    assert link.is_symlink()
+    assert sidecar.load(edited) == golden("split")
+    assert stat.S_IMODE(edited.stat().st_mode) == 0o640
+
+
+def test_a_new_file_has_the_usual_permissions(tmp_path: Path) -> None:
+    (tmp_path / "reference").touch()
+    sidecar.save(golden("split"), tmp_path / "clip.p4d.json")
+    assert (tmp_path / "clip.p4d.json").stat().st_mode == (tmp_path / "reference").stat().st_mode
+
+
+# ------------------------------------------------------------------------------------ update_edits
+
+
+def add_stop(document: Document, name: str, frame: float) -> Document:
+    document["edits"]["stops"].append(
+        {"id": name, "edge": "e1", "frame": frame, "rgb": [0.0, 0.0, 0.0]}
+    )
+    return document
+
+
+def test_update_changes_the_edits_only(edited: Path) -> None:
+    before = sidecar.load(edited)
+    sidecar.update_edits(edited, lambda document: add_stop(document, "s9", 2))
+    after = sidecar.load(edited)
+    assert after["edits"]["stops"][-1]["id"] == "s9"
+    assert {**after, "edits": None} == {**before, "edits": None}
+
+    def meddle(document: Document) -> Document:
+        document["clip"]["name"] = "other"
+        return document
+
+    with pytest.raises(ValueError, match="more than the edits"):
+        sidecar.update_edits(edited, meddle)
+
+
+def test_update_refuses_what_the_core_refuses(edited: Path) -> None:
+    before = edited.read_bytes()
+    with pytest.raises(SidecarError) as caught:
+        sidecar.update_edits(edited, lambda document: add_stop(document, "s9", 900))
+    assert caught.value.pointer == "/edits/stops/3/frame"
+    assert edited.read_bytes() == before
+    assert names(edited.parent) == [edited.name]
+
+
+def test_update_notices_another_program(edited: Path) -> None:
+    def meanwhile(document: Document) -> Document:
+        edited.write_text(sidecar.dumps(golden("split")), encoding="utf-8")
+        return add_stop(document, "s9", 2)
+
+    with pytest.raises(Palette4dError, match="changed by another program"):
+        sidecar.update_edits(edited, meanwhile)
+    assert sidecar.load(edited) == golden("split")
+    assert names(edited.parent) == [edited.name]
+
+
+def test_update_notices_a_file_that_went_away(edited: Path) -> None:
+    def meanwhile(document: Document) -> Document:
+        edited.unlink()
+        return add_stop(document, "s9", 2)
+
+    with pytest.raises(Palette4dError, match="changed by another program"):
+        sidecar.update_edits(edited, meanwhile)
+    assert names(edited.parent) == []
+
+
+def test_editors_at_the_same_time_wait_for_each_other(edited: Path) -> None:
+    """Eight threads and a second process add a stop each; none is lost."""
+    code = (
+        "import sys\n"
+        "from palette4d.grade import sidecar\n"
+        "def add(document):\n"
+        "    document['edits']['stops'].append(\n"
+        "        {'id': 'p', 'edge': 'e1', 'frame': 8.5, 'rgb': [0.0, 0.0, 0.0]})\n"
+        "    return document\n"
+        "sidecar.update_edits(sys.argv[1], add)\n"
+    )
+    process = subprocess.Popen([sys.executable, "-c", code, str(edited)])
+    problems: list[BaseException] = []
+
+    def work(i: int) -> None:
+        try:
+            sidecar.update_edits(edited, lambda d: add_stop(d, f"t{i}", 0.5 + i / 2))
+        except BaseException as error:
+            problems.append(error)
+
+    threads = [threading.Thread(target=work, args=(i,)) for i in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert process.wait(60) == 0
+    assert problems == []
+    ids = {stop["id"] for stop in sidecar.load(edited)["edits"]["stops"]}
+    assert ids == {"s1", "s2", "s3", "p", *(f"t{i}" for i in range(8))}
+
+
+def test_a_lock_that_stays_is_reported(edited: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fcntl = pytest.importorskip("fcntl")
+    monkeypatch.setattr(sidecar, "LOCK_SECONDS", 0.2)
+    handle = os.open(edited.parent, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX)
+        with pytest.raises(Palette4dError, match="locked"):
+            sidecar.update_edits(edited, lambda document: document)
+    finally:
+        os.close(handle)
+    sidecar.update_edits(edited, lambda document: document)

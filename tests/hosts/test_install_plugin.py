@@ -1,0 +1,154 @@
+"""`palette4d install-plugin`: into a fresh folder, over an earlier version, over something else."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+
+import pytest
+
+from palette4d.cli import install_plugin
+from palette4d.common.errors import Palette4dError
+
+BUNDLE = install_plugin.BUNDLE
+
+
+def make_bundle(root: Path, content: bytes = b"code") -> Path:
+    bundle = root / BUNDLE
+    binary = bundle / "Contents" / "Linux-x86-64" / "Palette4D.ofx"
+    binary.parent.mkdir(parents=True)
+    binary.write_bytes(content)
+    binary.chmod(0o755)
+    return bundle
+
+
+def files(root: Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(root)): path.read_bytes()
+        for path in sorted(root.rglob("*"))
+        if path.is_file()
+    }
+
+
+@pytest.fixture
+def bundle(tmp_path: Path) -> Path:
+    return make_bundle(tmp_path / "package")
+
+
+def test_copies_the_whole_bundle_and_leaves_nothing_else(bundle: Path, tmp_path: Path) -> None:
+    destination = tmp_path / "new" / "OFX"
+    target = install_plugin.install(bundle, destination)
+    assert target == destination / BUNDLE
+    assert not target.is_symlink()
+    assert files(target) == files(bundle)
+    assert os.access(target / "Contents/Linux-x86-64/Palette4D.ofx", os.X_OK)
+    assert [path.name for path in destination.iterdir()] == [BUNDLE]
+
+
+def test_replaces_an_earlier_version(bundle: Path, tmp_path: Path) -> None:
+    destination = tmp_path / "OFX"
+    old = make_bundle(destination, b"old code")
+    (old / "Contents" / "left-over").write_text("of an older version")
+    target = install_plugin.install(bundle, destination)
+    assert files(target) == files(bundle)
+    assert [path.name for path in destination.iterdir()] == [BUNDLE]
+
+
+def test_links(bundle: Path, tmp_path: Path) -> None:
+    destination = tmp_path / "OFX"
+    for _ in range(2):
+        target = install_plugin.install(bundle, destination, link=True)
+        assert target.is_symlink()
+        assert target.resolve() == bundle.resolve()
+    # A copy replaces the link, not what it leads to.
+    target = install_plugin.install(bundle, destination)
+    assert not target.is_symlink()
+    assert files(target) == files(bundle)
+
+
+def test_a_link_that_leads_nowhere_is_replaced(bundle: Path, tmp_path: Path) -> None:
+    destination = tmp_path / "OFX"
+    destination.mkdir()
+    (destination / BUNDLE).symlink_to(tmp_path / "gone")
+    assert files(install_plugin.install(bundle, destination)) == files(bundle)
+
+
+@pytest.mark.parametrize("kind", ["file", "folder"])
+def test_refuses_to_replace_something_else(bundle: Path, tmp_path: Path, kind: str) -> None:
+    destination = tmp_path / "OFX"
+    other = destination / BUNDLE
+    if kind == "file":
+        destination.mkdir()
+        other.write_text("precious")
+    else:
+        other.mkdir(parents=True)
+        (other / "precious").write_text("precious")
+    with pytest.raises(Palette4dError, match="--force"):
+        install_plugin.install(bundle, destination)
+    assert other.exists()
+    assert [path.name for path in destination.iterdir()] == [BUNDLE]
+    install_plugin.install(bundle, destination, force=True)
+    assert files(other) == files(bundle)
+
+
+def test_says_what_to_do_without_the_right_to_write(
+    bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    destination = tmp_path / "OFX"
+    destination.mkdir()
+    old = make_bundle(destination, b"old code")
+    if os.geteuid() == 0:
+        # The superuser may write anywhere: let the copying meet the refusal instead.
+        def refuse(*_: object, **__: object) -> None:
+            raise PermissionError(13, "Permission denied", str(destination))
+
+        monkeypatch.setattr(install_plugin.shutil, "copytree", refuse)
+    else:
+        destination.chmod(0o555)
+    with pytest.raises(Palette4dError, match=r"sudo.*--dest.*OFX_PLUGIN_PATH"):
+        install_plugin.install(bundle, destination)
+    destination.chmod(0o755)
+    assert files(old) == {"Contents/Linux-x86-64/Palette4D.ofx": b"old code"}
+    assert [path.name for path in destination.iterdir()] == [BUNDLE]
+
+
+def test_a_failed_rename_puts_the_old_bundle_back(
+    bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    destination = tmp_path / "OFX"
+    make_bundle(destination, b"old code")
+    rename = Path.rename
+
+    def fail_on_the_fresh_one(self: Path, target: Path) -> Path:
+        if self.name == BUNDLE and self.parent.name.startswith(".palette4d-"):
+            raise OSError(28, "No space left on device")
+        return rename(self, target)
+
+    monkeypatch.setattr(Path, "rename", fail_on_the_fresh_one)
+    with pytest.raises(Palette4dError, match="No space left"):
+        install_plugin.install(bundle, destination)
+    assert files(destination / BUNDLE) == {"Contents/Linux-x86-64/Palette4D.ofx": b"old code"}
+
+
+def test_default_destinations() -> None:
+    assert install_plugin.default_destination("linux") == Path("/usr/OFX/Plugins")
+    assert install_plugin.default_destination("darwin") == Path("/Library/OFX/Plugins")
+    windows = install_plugin.default_destination("win32")
+    assert windows.as_posix() == "C:/Program Files/Common Files/OFX/Plugins"
+
+
+def test_the_verb_installs_the_packaged_node(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    parser = argparse.ArgumentParser()
+    install_plugin.add_parser(parser.add_subparsers())
+    args = parser.parse_args(["install-plugin", "--dest", str(tmp_path / "OFX")])
+    assert args.run(args) == 0
+    out = capsys.readouterr().out
+    assert f"OFX_PLUGIN_PATH={tmp_path / 'OFX'}" in out
+    packaged = install_plugin.find_bundle()
+    assert files(tmp_path / "OFX" / BUNDLE) == files(packaged)
+    binaries = list((tmp_path / "OFX" / BUNDLE).glob("Contents/*/Palette4D.ofx"))
+    assert len(binaries) == 1
+    assert binaries[0].stat().st_size > 100_000

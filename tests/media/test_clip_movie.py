@@ -1,0 +1,221 @@
+"""Movies: numbers, rates, exact values from lossless files, colour matrices, damage, rotation."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from av.video.reformatter import ColorRange, Colorspace
+from clip_files import damage, write_movie
+
+from palette4d.media.clip import ClipError, FrameError, open_clip
+
+HEIGHT, WIDTH = 48, 64
+
+
+def noise(count: int, kind: type = np.uint8, channels: int = 3, largest: int = 0):
+    """Different random frames."""
+    generator = np.random.default_rng(3)
+    top = largest or np.iinfo(kind).max
+    shape = (HEIGHT, WIDTH, channels) if channels else (HEIGHT, WIDTH)
+    return [generator.integers(0, top, shape, kind, endpoint=True) for _ in range(count)]
+
+
+def test_lossless_eight_bit_is_exact(tmp_path):
+    frames = noise(6)
+    path = write_movie(
+        tmp_path / "rém i.avi", "rawvideo", "bgr24", frames, "rgb24", rate=Fraction(25)
+    )
+    clip = open_clip(str(path))
+    assert clip.frames == list(range(6))
+    assert (clip.rate, clip.width, clip.height, clip.depth) == (25, WIDTH, HEIGHT, "uint8")
+    assert clip.is_movie
+    assert (clip.name, clip.source) == ("rém i", str(path))
+    for frame, pixels in clip.iter_frames():
+        np.testing.assert_array_equal(pixels, frames[frame].astype(np.float32) / np.float32(255))
+
+
+def test_lossless_sixteen_bit_is_exact(tmp_path):
+    frames = noise(4, np.uint16)
+    path = write_movie(tmp_path / "a.mkv", "ffv1", "gbrp16le", frames, "gbrp16le")
+    clip = open_clip(str(path))
+    assert clip.depth == "uint16"
+    for frame, pixels in clip.iter_frames():
+        np.testing.assert_array_equal(pixels, frames[frame].astype(np.float32) / np.float32(65535))
+
+
+def test_alpha_is_straight(tmp_path):
+    frames = noise(2, channels=4)
+    path = write_movie(tmp_path / "a.mov", "qtrle", "argb", frames, "argb")
+    clip = open_clip(str(path))
+    assert (clip.has_alpha, clip.premultiplied) == (True, False)
+    argb = frames[1]
+    np.testing.assert_array_equal(np.rint(clip.read(1) * 255), argb[..., [1, 2, 3, 0]])
+
+
+def test_grey(tmp_path):
+    frames = noise(2, channels=0)
+    clip = open_clip(str(write_movie(tmp_path / "a.mkv", "ffv1", "gray", frames, "gray")))
+    np.testing.assert_array_equal(
+        np.rint(clip.read(1) * 255), np.repeat(frames[1][..., None], 3, axis=2)
+    )
+
+
+MATRICES = {
+    Colorspace.ITU709: (0.2126, 0.0722),
+    Colorspace.ITU601: (0.299, 0.114),
+    Colorspace.BT2020: (0.2627, 0.0593),
+}
+
+
+@pytest.mark.parametrize("matrix", list(MATRICES))
+@pytest.mark.parametrize("color_range", [ColorRange.MPEG, ColorRange.JPEG])
+@pytest.mark.parametrize("bits", [8, 10])
+def test_luma_and_chroma_by_the_streams_own_matrix(tmp_path, matrix, color_range, bits):
+    """Y'CbCr is made here from known R'G'B' by the standard's formula, and must come back."""
+    generator = np.random.default_rng(5)
+    rgb = generator.random((HEIGHT, WIDTH, 3))
+    red_weight, blue_weight = MATRICES[matrix]
+    luma = rgb @ [red_weight, 1 - red_weight - blue_weight, blue_weight]
+    blue = (rgb[..., 2] - luma) / (2 * (1 - blue_weight))
+    red = (rgb[..., 0] - luma) / (2 * (1 - red_weight))
+    unit = 2 ** (bits - 8)
+    if color_range == ColorRange.MPEG:
+        planes = [219 * luma + 16, 224 * blue + 128, 224 * red + 128]
+        codes = [np.rint(plane * unit) for plane in planes]
+    else:
+        top = 2**bits - 1
+        codes = [
+            np.rint(plane)
+            for plane in (top * luma, top * blue + 128 * unit, top * red + 128 * unit)
+        ]
+    layout, kind = ("yuv444p", np.uint8) if bits == 8 else ("yuv444p10le", np.uint16)
+    planar = np.stack([np.clip(code, 0, 2**bits - 1) for code in codes]).astype(kind)
+    path = write_movie(
+        tmp_path / "a.mkv",
+        "ffv1",
+        layout,
+        [planar, planar],
+        layout,
+        size=(HEIGHT, WIDTH),
+        colorspace=matrix,
+        color_range=color_range,
+    )
+    clip = open_clip(str(path))
+    assert clip.depth == f"uint{bits}"
+    assert clip.encoding == ("Rec.709" if matrix == Colorspace.ITU709 else "unknown")
+    step = 1 / (219 * unit)
+    np.testing.assert_allclose(clip.read(1), rgb, atol=1.6 * step)
+
+
+def flat(colours) -> list:
+    """One flat frame a colour."""
+    return [np.full((HEIGHT, WIDTH, 3), colour, np.uint8) for colour in colours]
+
+
+def test_compressed_movie_with_reordered_frames(tmp_path):
+    levels = [20 + 9 * n for n in range(24)]
+    path = write_movie(
+        tmp_path / "a.mp4",
+        "libx264",
+        "yuv420p",
+        flat([(v, v, v) for v in levels]),
+        "rgb24",
+        rate=Fraction(24000, 1001),
+        options={"crf": "8", "bf": "3", "g": "8"},
+    )
+    clip = open_clip(str(path))
+    assert (clip.frames, clip.rate) == (list(range(24)), Fraction(24000, 1001))
+    read = {frame: float(p.mean()) * 255 for frame, p in clip.iter_frames()}
+    assert list(read) == clip.frames
+    np.testing.assert_allclose(list(read.values()), levels, atol=3)
+    for frame in (20, 3, 4, 23, 0):  # back and forth
+        assert float(clip.read(frame).mean()) * 255 == pytest.approx(levels[frame], abs=3)
+    part = open_clip(str(path), frames="5-20x5")
+    assert part.frames == [5, 10, 15, 20]
+    assert [frame for frame, _ in part.iter_frames()] == [5, 10, 15, 20]
+    with pytest.raises(ClipError, match="the movie has 0-23"):
+        open_clip(str(path), frames="20-24")
+    assert clip.notes == []
+
+
+def test_variable_rate_is_noted(tmp_path):
+    stamps = [0, 1, 2, 8, 9, 30]
+    path = write_movie(
+        tmp_path / "a.mkv", "ffv1", "bgr0", noise(6, channels=4), "bgr0", stamps=stamps
+    )
+    clip = open_clip(str(path))
+    assert clip.frames == [0, 1, 2, 3, 4, 5]
+    assert any("rate varies" in note for note in clip.notes)
+    assert len(list(clip.iter_frames())) == 6
+
+
+@pytest.mark.parametrize(("degrees", "turns"), [(90, 1), (-90, -1), (180, 2)])
+def test_rotation_is_applied(tmp_path, degrees, turns):
+    frames = noise(2)
+    path = write_movie(
+        tmp_path / "a.mov",
+        "qtrle",
+        "rgb24",
+        frames,
+        "rgb24",
+        prepare=lambda stream: stream.set_display_rotation(degrees),
+    )
+    clip = open_clip(str(path))
+    expected = np.rot90(frames[1], turns)
+    assert (clip.height, clip.width) == expected.shape[:2]
+    np.testing.assert_array_equal(np.rint(clip.read(1) * 255), expected)
+
+
+@pytest.mark.parametrize(
+    ("name", "codec", "layout"),
+    [("a.mp4", "libx264", "yuv420p"), ("a.mov", "prores_ks", "yuv422p10le")],
+)
+def test_damaged_frame_is_named_or_skipped(tmp_path, name, codec, layout):
+    options = {"g": "1", "bf": "0"} if codec == "libx264" else {}
+    path = write_movie(tmp_path / name, codec, layout, noise(6), "rgb24", options=options)
+    whole_clip = open_clip(str(path))
+    good = dict(whole_clip.iter_frames())
+    damage(path, 3)
+    with pytest.raises(FrameError, match="frame 3 cannot be decoded"):
+        list(open_clip(str(path)).iter_frames())
+    clip = open_clip(str(path), skip_bad_frames=True)
+    read = dict(clip.iter_frames())
+    assert list(read) == [0, 1, 2, 4, 5]
+    assert clip.skipped == [3]
+    for frame, pixels in read.items():  # no other frame has moved or changed
+        np.testing.assert_array_equal(pixels, good[frame])
+
+
+def test_movie_that_ends_early(tmp_path):
+    path = write_movie(
+        tmp_path / "a.mp4",
+        "libx264",
+        "yuv420p",
+        flat([(40 * n, 99, 30) for n in range(6)]),
+        "rgb24",
+        options={"crf": "1", "bf": "0", "g": "1"},
+    )
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(ClipError, match=r"a\.mp4"):
+        list(open_clip(str(path)).iter_frames())
+
+
+def test_what_is_no_movie(tmp_path):
+    path = tmp_path / "a.mov"
+    path.write_bytes(b"this is no movie" * 100)
+    with pytest.raises(ClipError, match="cannot be opened"):
+        open_clip(str(path))
+    path.write_bytes(b"")
+    with pytest.raises(ClipError, match="cannot be opened"):
+        open_clip(str(path))
+    with pytest.raises(ClipError, match="movie file"):
+        open_clip(str(tmp_path))
+
+
+def test_an_empty_file_is_said_to_be_empty(tmp_path):
+    (tmp_path / "a.mov").touch()
+    with pytest.raises(ClipError, match="the file is empty"):
+        open_clip(str(tmp_path / "a.mov"))
