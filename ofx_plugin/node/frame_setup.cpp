@@ -34,6 +34,16 @@ void prepare(Look& look, const Params& params, LoadedSidecar& loaded, double fra
     if (sidecar.conversion && !settings.in_palette_space) {
         // Shares its ownership: a sidecar may be read anew while this is drawn.
         drawing.conversion = {sidecar.conversion, &sidecar.conversion->steps};
+    } else if (settings.scene_linear) {
+        drawing.conversion = linear_picture(params, sidecar, time);
+        if (!drawing.conversion) {
+            look.passes = true;
+            look.problem = "Picture is in: found a palette in '" + sidecar.clip.encoding +
+                           "', expected sRGB, Rec.709 or another display encoding; choose Input "
+                           "space and give the node its picture in that encoding";
+            return;
+        }
+        if (drawing.conversion->identity()) drawing.conversion = nullptr;
     }
     if (settings.output == Output::kOutside) {
         drawing.recolourer = loaded.surface_at(frame);

@@ -16,6 +16,10 @@
 #define kOfxImageEffectPropNoSpatialAwareness "OfxImageEffectPropNoSpatialAwareness"
 #endif
 
+// From Nuke's extension, which Natron knows too: the next parameter stays on this one's row.
+#define kOfxParamPropLayoutHint "OfxParamPropLayoutHint"
+#define kOfxParamPropLayoutHintNoNewLine 2
+
 // From OFX 1.5: headers of older SDKs lack all of it, and those of newer ones bring a configuration
 // of some thousand lines along that is not needed here.
 #if defined(__has_include)

@@ -227,11 +227,12 @@ void define_output_params(ParamDefiner& define) {
                    "is known."},
                   {"Auto", "Rec.709", "Rec.2020", "P3", "ACES AP1", "Rec.601"});
     define.choice({kParamPictureIn, "Picture is in",
-                   "Input space: the numbers of the clip that was analysed, such as scene-linear "
-                   "light; the sidecar knows the way to the palette's and back. Palette space: the "
-                   "palette's own numbers, such as ACEScct, as a host that converts by itself has "
-                   "them. Without a conversion in the sidecar both are the same."},
-                  {"Input space", "Palette space"});
+                   "Input space: the code values of the analysed clip. Palette space: those of the "
+                   "palette, such as ACEScct, for hosts that convert by themselves. Without a "
+                   "conversion in the sidecar both are the same. Scene-linear: linear light, for a "
+                   "palette in sRGB, Rec.709 or another display encoding; the handles' colours are "
+                   "linear too."},
+                  {"Input space", "Palette space", "Scene-linear"});
     define.number({kParamMix, "Mix", "From the source (0) to what is put out (1)."},
                   {1, 0, 1, 0, 1}, 0.01, 3, true);
     define.end_group();
@@ -253,8 +254,15 @@ OutputSettings output_settings_at(const Params& params, OfxTime time) {
         settings.lightness = of > spaces ? kRec601 : luminance_weights(kLightnessOf[of - 1]);
     }
     settings.in_palette_space = params.int_at(kParamPictureIn, time).value_or(0) == 1;
+    settings.scene_linear = params.int_at(kParamPictureIn, time).value_or(0) == 2;
     settings.mix = clamped(params.double_at(kParamMix, time), 1, 0, 1);
     return settings;
+}
+
+std::shared_ptr<const ColourConversion> linear_picture(const Params& params, const Sidecar& sidecar,
+                                                       OfxTime time) {
+    if (sidecar.conversion || params.int_at(kParamPictureIn, time).value_or(0) != 2) return nullptr;
+    return from_linear(sidecar.clip.encoding);
 }
 
 const std::string& encoding_of(const Sidecar& sidecar, bool in_palette_space) {

@@ -40,6 +40,7 @@ struct OutputSettings {
     Vec3 lightness{0, 0, 0};        ///< weights of red, green and blue; they sum to 1
     double mix = 1;                 ///< 0 the source, 1 what is put out
     bool in_palette_space = false;  ///< the picture has the palette's numbers already
+    bool scene_linear = false;      ///< the picture and the host's colours are linear light
 
     /// The source comes out, whatever else is set.
     bool passes() const { return mix == 0 || (output == Output::kRecoloured && strength == 0); }
@@ -50,6 +51,10 @@ OutputSettings output_settings_at(const Params& params, OfxTime time);
 /// that the output is not opaque even where the source is.
 void prefer_alpha(const Suites& suites, OfxImageEffectHandle effect, const Properties& out_args);
 
+/// From scene-linear numbers to the palette's, where *Picture is in* says so and the sidecar has no
+/// conversion of its own; else null, also for a palette whose encoding has no known curve.
+std::shared_ptr<const ColourConversion> linear_picture(const Params& params, const Sidecar& sidecar,
+                                                       OfxTime time);
 /// What the node's picture is in: the sidecar's input, or with the choice its palette's space.
 const std::string& encoding_of(const Sidecar& sidecar, bool in_palette_space);
 

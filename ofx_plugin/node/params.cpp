@@ -18,9 +18,8 @@ void define_params(const Suites& suites, OfxParamSetHandle params) {
         define.text({kParamStatus, "Status",
                      "What was loaded, which of its frames is shown, or what is wrong with the "
                      "sidecar."},
-                    kOfxParamStringIsLabel, "No sidecar chosen");
+                    kOfxParamStringIsMultiLine, "No sidecar chosen");
     status.set_int(kOfxParamPropEnabled, 0);
-    status.set_int(kOfxParamPropPersistant, 0);
     status.set_int(kOfxParamPropEvaluateOnChange, 0);
     status.set_int(kOfxParamPropCanUndo, 0);
     define.number({kParamStrength, "Strength",
@@ -175,6 +174,12 @@ bool Params::set_rgb(const char* name, const std::array<double, 3>& value) const
     const OfxParamHandle param = find(name);
     return param && suite_->paramSetValue &&
            suite_->paramSetValue(param, value[0], value[1], value[2]) == kOfxStatOK;
+}
+
+bool Params::remove_keys(const char* name) const {
+    begin_step();
+    const OfxParamHandle param = find(name);
+    return param && suite_->paramDeleteAllKeys && suite_->paramDeleteAllKeys(param) == kOfxStatOK;
 }
 
 }  // namespace palette4d::node

@@ -47,6 +47,7 @@ public:
     bool set_string(const char* name, const std::string& value) const;
     bool set_int(const char* name, int value) const;
     bool set_rgb(const char* name, const std::array<double, 3>& value) const;
+    bool remove_keys(const char* name) const;
     /// The same for a parameter that cannot be undone: it is no step's.
     bool note_string(const char* name, const std::string& value) const;
     /// An instance's parameter's own properties (label, secret, enabled, hint).

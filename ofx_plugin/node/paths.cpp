@@ -67,6 +67,26 @@ std::string unpasted(std::string path) {
     return plain;
 }
 
+/// Natron puts its project's folder before every path that does not start with a slash. This takes
+/// the folder away where the whole is no file and the rest is one of the forms that are ours.
+std::string without_project(const std::string& path) {
+    std::error_code error;
+    const fs::path whole = fs::u8path(path);
+    if (whole.is_relative() || fs::exists(whole, error)) return path;
+    std::string name;
+    for (std::size_t at = path.find('/', 1); at != std::string::npos; at = path.find('/', at + 1)) {
+        const std::string rest = path.substr(at + 1);
+        const auto starts = [&](const char* with) { return rest.rfind(with, 0) == 0; };
+        name.clear();
+        if (starts("$") || starts("%")) variable_at(rest, 0, name);
+        if (!name.empty() || rest == "~" || starts("~/") || starts("file:/") || starts("\"") ||
+            starts("'")) {
+            return rest;
+        }
+    }
+    return path;
+}
+
 std::vector<fs::path> search_folders(const std::string& folder) {
     std::vector<fs::path> folders;
     if (!folder.empty()) folders.push_back(fs::u8path(expanded(folder)));
@@ -81,6 +101,8 @@ std::vector<fs::path> search_folders(const std::string& folder) {
 }
 
 }  // namespace
+
+std::string meant(const std::string& path) { return unpasted(without_project(path)); }
 
 std::string expanded(const std::string& path) {
     std::string result, name;
@@ -113,17 +135,14 @@ std::string expanded(const std::string& path) {
 }
 
 std::optional<std::string> find_file(const std::string& path, const std::string& folder) {
-    const std::string plain = unpasted(path);
+    const std::string plain = meant(path);
     if (plain != path) {
         if (const auto found = find_file(plain, folder)) return found;
-    }
-    if (const std::string plain_folder = unpasted(folder); plain_folder != folder) {
-        return find_file(path, plain_folder);
     }
     const fs::path given = fs::u8path(expanded(path));
     if (given.empty()) return std::nullopt;
     if (given.is_absolute() && is_file(given)) return given.u8string();
-    const std::vector<fs::path> folders = search_folders(folder);
+    const std::vector<fs::path> folders = search_folders(meant(folder));
     if (given.is_relative()) {
         for (const fs::path& base : folders) {
             if (is_file(base / given)) return (base / given).u8string();
@@ -136,8 +155,8 @@ std::optional<std::string> find_file(const std::string& path, const std::string&
     return std::nullopt;
 }
 
-std::string words_of_missing(const std::string& pasted) {
-    const std::string path = unpasted(pasted);
+std::string words_of_missing(const std::string& given_path) {
+    const std::string path = meant(given_path);
     std::string name;
     for (std::size_t at = 0; at < path.size(); ++at) {
         if (path[at] != '$' && path[at] != '%') continue;

@@ -103,7 +103,8 @@ OfxStatus render(const Suites& suites, OfxImageEffectHandle effect, const Proper
     Look look;
     try {
         const Mode mode = mode_at(Params(suites, effect), *time);
-        look = look_at(suites, effect, *time, interpolation_of(mode, in_args, out.definition));
+        look =
+            look_at(suites, effect, *time, interpolation_of(suites, mode, in_args, out.definition));
     } catch (...) {
         copy(in, out, window);
         throw;

@@ -21,16 +21,19 @@ std::string describe(const Sidecar& sidecar) {
          << static_cast<double>(clip.rate_num) / static_cast<double>(clip.rate_den) << " fps, "
          << counted(sidecar.polytope.vertices().size(), "palette vertex", "palette vertices")
          << ", " << counted(edits, "edit", "edits");
-    if (sidecar.conversion) {
-        text << "; " << sidecar.conversion->input_space << ", palette in " << clip.encoding;
-    }
     return text.str();
 }
 
 }  // namespace
 
-std::string status_of(const Chosen& chosen, int handles, const std::string& copy,
-                      const std::string& shown) {
+std::string words_of_picture(const Sidecar& sidecar, const std::string& picture) {
+    std::string text = "expects the picture in " + picture;
+    if (picture != sidecar.clip.encoding) text += "; the palette is in " + sidecar.clip.encoding;
+    return text;
+}
+
+std::string status_of(const Chosen& chosen, int handles, const std::string& expects,
+                      const std::string& copy, const std::string& shown) {
     if (!chosen.any) return "No sidecar chosen";
     if (!chosen.result.loaded) return chosen.result.problem;
     std::string text = describe(chosen.result.loaded->sidecar());
@@ -38,8 +41,9 @@ std::string status_of(const Chosen& chosen, int handles, const std::string& copy
         text +=
             ", " + counted(static_cast<std::size_t>(handles), "handle", "handles") + " in use here";
     }
-    if (!copy.empty()) text += "; " + copy;
-    if (!shown.empty()) text += "; " + shown;
+    for (const std::string& line : {expects, copy, shown}) {
+        if (!line.empty()) text += "\n" + line;
+    }
     return text;
 }
 

@@ -34,6 +34,7 @@ const std::map<std::string, Rule>& rules() {
         {kOfxPropVersionLabel, {kString, 1, kHost | kEffectDescriptor, kEffectDescriptor}},
         {kOfxPropPluginDescription, {kString, 1, kEffectDescriptor, kEffectDescriptor}},
         {kOfxPropAPIVersion, {kInt, 0, kHost, 0}},
+        {"NatronOfxHostIsNatron", {kInt, 1, kHost, 0}},  // its own
         {kOfxPluginPropFilePath, {kString, 1, kEffectDescriptor, 0}},
         {kOfxPropTime, {kDouble, 1, kInArgs | kOutArgs, kOutArgs}},
         {kOfxPropIsInteractive, {kInt, 1, kEffect | kInArgs, 0}},
@@ -115,6 +116,7 @@ const std::map<std::string, Rule>& rules() {
         {kOfxParamPropHint, {kString, 1, kAnyParam, kParamDescriptor | kParam}},
         {kOfxParamPropParent, {kString, 1, kAnyParam, kParamDescriptor}},
         {kOfxParamPropEnabled, {kInt, 1, kAnyParam, kParamDescriptor | kParam}},
+        {"OfxParamPropLayoutHint", {kInt, 1, kAnyParam, kParamDescriptor}},  // Nuke's, Natron's
         {kOfxParamPropIncrement, {kDouble, 1, kAnyParam, kParamDescriptor}},
         {kOfxParamPropDigits, {kInt, 1, kAnyParam, kParamDescriptor}},
         {kOfxParamPropDoubleType, {kString, 1, kAnyParam, kParamDescriptor}},

@@ -237,7 +237,8 @@ TEST(the_status_names_both_spaces) {
     Node node;
     CHECK(node.instance->changed("sidecar") == kOfxStatOK);
     const std::string status = node.instance->text("status");
-    EXPECT(status.find("ACEScg, palette in ACEScct") != std::string::npos, status);
+    EXPECT(status.find("the picture in ACEScg; the palette is in ACEScct") != std::string::npos,
+           status);
 }
 
 TEST(a_host_that_negotiates_colour_is_asked_for_what_the_picture_is_to_be_in) {
