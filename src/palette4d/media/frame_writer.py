@@ -6,8 +6,6 @@ premultiplied in EXR, straight in PNG, and in TIFF whichever the frame has (and 
 
 from __future__ import annotations
 
-import contextlib
-import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Palette4dError, WriteError
+from palette4d.common.files import replacing
 
 FORMATS = ("exr", "png", "tif", "tiff")
 # What each format can hold of the metadata that `palette4d.media.clip_images.CARRIED` names.
@@ -183,7 +182,7 @@ def write_frame(
 
     Raises
     ------
-    OutputError
+    WriteError
         When the folder cannot be written to or the disk is full; nothing half written remains.
     """
     import OpenImageIO as oiio
@@ -205,11 +204,10 @@ def write_frame(
         spec.alpha_channel = 3
         spec.attribute("oiio:UnassociatedAlpha", 0 if premultiplied else 1)
 
-    temporary = path.with_name(f".{path.stem[:100]}.{os.getpid()}.tmp{path.suffix}")
-    target = oiio.ImageOutput.create(str(temporary))
-    if target is None:
-        raise OutputError(f"{path}: {oiio.geterror()}; expected .exr, .png or .tif")
-    try:
+    with replacing(path, force=True) as temporary:
+        target = oiio.ImageOutput.create(str(temporary))
+        if target is None:
+            raise OutputError(f"{path}: {oiio.geterror()}; expected .exr, .png or .tif")
         if not target.open(str(temporary), spec):
             raise _cannot_write(path, target.geterror())
         written = target.write_image(stored)
@@ -217,13 +215,6 @@ def write_frame(
         closed = target.close()
         if problem or not written or not closed or not _is_whole(temporary):
             raise _cannot_write(path, problem or target.geterror())
-        temporary.replace(path)
-    except OSError as error:
-        raise _cannot_write(path, error.strerror or str(error)) from error
-    finally:
-        # Where the folder cannot be written, not even this can be asked.
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
 
 
 def _is_whole(path: Path) -> bool:
@@ -242,9 +233,9 @@ def _is_whole(path: Path) -> bool:
     return row is not None and not problem
 
 
-def _cannot_write(path: Path, reason: str) -> OutputError:
+def _cannot_write(path: Path, reason: str) -> WriteError:
     said = reason.strip().splitlines()[0] if reason.strip() else "the file was cut short"
-    return OutputError(
+    return WriteError(
         f"{path}: the frame cannot be written ({said}); expected a folder that may be written to "
         "on a disk with free space. Check both, or choose another place."
     )
