@@ -41,7 +41,7 @@ OfxStatus dispatch(const char* action, OfxImageEffectHandle effect, OfxPropertyS
     }
     if (is(kOfxImageEffectActionGetOutputColourspace)) return output_colour(out);
     if (is(kOfxActionDescribe)) return describe(host, effect);
-    if (is(kOfxImageEffectActionDescribeInContext)) return describe_in_context(host, effect);
+    if (is(kOfxImageEffectActionDescribeInContext)) return describe_in_context(host, effect, in);
     if (is(kOfxActionCreateInstance)) {
         create_instance(host, effect);
         return kOfxStatOK;

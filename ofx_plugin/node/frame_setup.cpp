@@ -86,7 +86,7 @@ void prepare(FrameSetup& setup, const Params& params, LoadedSidecar& loaded, dou
 }  // namespace
 
 FrameSetup frame_setup_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time,
-                          Interpolation interpolation) {
+                          Interpolation interpolation, std::optional<double> source_frame) {
     FrameSetup setup;
     const Params params(suites, effect);
     const Chosen chosen = chosen_sidecar(params, time);
@@ -105,8 +105,8 @@ FrameSetup frame_setup_at(const Suites& suites, OfxImageEffectHandle effect, Ofx
     if (settings.keep > 0 && settings.own_lightness) {
         settings.lightness = luminance_weights(encoding_of(sidecar, settings.in_palette_space));
     }
-    const FrameAt at =
-        frame_at(sidecar.clip, time_settings_at(params, time), host_clip(suites, effect), time);
+    const FrameAt at = frame_at(sidecar.clip, time_settings_at(params, time),
+                                host_clip(suites, effect, source_frame), time);
     if (!std::isfinite(at.frame)) {
         setup.problem = path +
                         ": the host's time and the node's parameters of time give no frame; "

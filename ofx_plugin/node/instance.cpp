@@ -107,9 +107,11 @@ void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const P
     // Not under the instance's lock: setting a parameter may have the host wait for a render.
     const std::shared_ptr<Instance> instance = find(effect);
     ShownHandles handles;
+    std::optional<double> source_less_time;
     if (instance) {
         const std::lock_guard<std::mutex> lock(instance->mutex);
         handles = instance->shown;
+        source_less_time = instance->source_less_time;
     }
     notice_undone(params, handles);
     handle_changed(params, chosen, param, handles);
@@ -124,7 +126,12 @@ void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const P
     const std::optional<OfxTime> time = args.get_double(kOfxPropTime);
     if (sidecar && time) {
         const TimeSettings settings = time_settings_at(params, *time);
-        const FrameAt at = frame_at(sidecar->clip, settings, host_clip(suites, effect), *time);
+        // Before the first render the two are the same, as on Resolve's Edit and Color pages.
+        if (!source_less_time && !chosen.media.empty()) source_less_time = 0;
+        std::optional<double> source_frame;
+        if (source_less_time) source_frame = *time + *source_less_time;
+        const FrameAt at =
+            frame_at(sidecar->clip, settings, host_clip(suites, effect, source_frame), *time);
         shown = words_of(*time, at);
         if (mode_at(params, *time) != Mode::kExact && std::isfinite(at.frame)) {
             const auto lattice = chosen.result.loaded->ready_lattice_at(
@@ -141,6 +148,15 @@ void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const P
     }
     const std::string text = status_of(chosen, handles_in_use(params), expects, copy, shown);
     if (params.string_now(kParamStatus) != text) params.note_string(kParamStatus, text);
+}
+
+void note_source_frame(OfxImageEffectHandle effect, OfxTime time,
+                       std::optional<double> source_frame) {
+    if (!source_frame) return;
+    const std::shared_ptr<Instance> instance = find(effect);
+    if (!instance) return;
+    const std::lock_guard<std::mutex> lock(instance->mutex);
+    instance->source_less_time = *source_frame - time;
 }
 
 void report(const Suites& suites, OfxImageEffectHandle effect, const std::string& problem) {

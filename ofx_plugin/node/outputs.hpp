@@ -70,10 +70,12 @@ struct Drawing {
     /// at whose foot they stand.
     std::vector<Vec3> original, edited;
     OfxRectI picture{};
+    /// Where the result shows, by its alpha or its only channel; null: everywhere.
+    const Image* mask = nullptr;
 };
 
 /// Draws what `in` covers of `area`; the rest becomes transparent black. Both images have the same
-/// format, of three or four channels in bytes or floats.
+/// format, of three or four channels.
 void draw(const Image& in, const Image& out, const OfxRectI& area, const Drawing& drawing);
 
 }  // namespace palette4d::node

@@ -32,7 +32,7 @@ void define_params(const Suites& suites, OfxParamSetHandle params) {
 }
 
 Params::Params(const Suites& suites, OfxImageEffectHandle effect)
-    : suites_(suites), suite_(suites.parameter) {
+    : suites_(suites), effect_(effect), suite_(suites.parameter) {
     if (!suites.effect->getParamSet || suites.effect->getParamSet(effect, &set_) != kOfxStatOK) {
         set_ = nullptr;
     }
@@ -65,6 +65,15 @@ Properties Params::properties(const char* name) const {
         handle = nullptr;
     }
     return {suites_, handle};
+}
+
+std::string Params::media() const {
+    OfxPropertySetHandle handle = nullptr;
+    if (!suites_.effect->getPropertySet ||
+        suites_.effect->getPropertySet(effect_, &handle) != kOfxStatOK) {
+        return "";
+    }
+    return Properties(suites_, handle).get_string(kResolvePropSrcFilePath).value_or("");
 }
 
 std::optional<std::string> Params::string_at(const char* name, OfxTime time) const {

@@ -52,12 +52,15 @@ public:
     bool note_string(const char* name, const std::string& value) const;
     /// An instance's parameter's own properties (label, secret, enabled, hint).
     Properties properties(const char* name) const;
+    /// The file of the media, in a host that tells it; else empty.
+    std::string media() const;
 
 private:
     OfxParamHandle find(const char* name) const;
     void begin_step() const;
 
     const Suites& suites_;
+    OfxImageEffectHandle effect_;
     const OfxParameterSuiteV1* suite_;
     OfxParamSetHandle set_ = nullptr;
     mutable const char* step_ = nullptr;  ///< the label of one that is to begin

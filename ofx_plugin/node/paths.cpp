@@ -100,7 +100,63 @@ std::vector<fs::path> search_folders(const std::string& folder) {
     return folders;
 }
 
+constexpr const char* kEnding = ".p4d.json";
+
+bool is_still(const fs::path& media) {
+    std::string ending = media.extension().u8string();
+    for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    for (const char* known : {".exr", ".dpx", ".tif", ".tiff", ".png", ".jpg", ".jpeg", ".cin",
+                              ".tga", ".sgi", ".ari", ".dng", ".jp2", ".j2k", ".j2c", ".bmp"}) {
+        if (ending == known) return true;
+    }
+    return false;
+}
+
+/// The length of a name without a frame's number or the place of one at its end.
+std::size_t without_number(const std::string& stem) {
+    const std::size_t end = stem.find_last_not_of("0123456789#@%d[]-");
+    if (end == std::string::npos || end + 1 == stem.size()) return stem.size();
+    const std::size_t name = stem.find_last_not_of("._- ", end);
+    return name == std::string::npos ? stem.size() : name + 1;
+}
+
+/// A clip's name without ending and, of a sequence, without number.
+std::string clip_name(const std::string& path) {
+    const fs::path file = fs::u8path(path);
+    const std::string stem = file.stem().u8string();
+    return is_still(file) ? stem.substr(0, without_number(stem)) : stem;
+}
+
 }  // namespace
+
+std::optional<std::string> find_beside(const std::string& media, const std::string& folder) {
+    const fs::path file = fs::u8path(media);
+    if (!file.has_filename()) return std::nullopt;
+    std::vector<fs::path> folders = search_folders(meant(folder));
+    folders.insert(folders.begin(), file.parent_path());
+    for (const fs::path& base : folders) {
+        for (const std::string& name : {file.stem().u8string(), clip_name(media)}) {
+            const fs::path path = base / fs::u8path(name + kEnding);
+            if (is_file(path)) return path.u8string();
+        }
+    }
+    return std::nullopt;
+}
+
+std::optional<double> first_number(const std::string& media) {
+    const fs::path file = fs::u8path(media);
+    if (!is_still(file)) return std::nullopt;
+    const std::string stem = file.stem().u8string();
+    const std::string rest = stem.substr(without_number(stem));
+    const std::size_t digit = rest.find_first_of("0123456789");
+    if (digit == std::string::npos) return std::nullopt;
+    return std::strtod(
+        rest.substr(digit, rest.find_first_not_of("0123456789", digit) - digit).c_str(), nullptr);
+}
+
+bool same_clip(const std::string& media, const std::string& source) {
+    return clip_name(media) == clip_name(source);
+}
 
 std::string meant(const std::string& path) { return unpasted(without_project(path)); }
 

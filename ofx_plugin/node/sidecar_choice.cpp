@@ -37,6 +37,24 @@ void note_revision(const Params& params, const Chosen& chosen, bool reloaded) {
     note_text(params, kParamRevision, state + "#" + std::to_string(count + 1));
 }
 
+/// The sidecar of the clip's name, or the project's copy of one of that name: a node that was
+/// copied to another clip carries the copy of the first.
+void find_by_name(Chosen& chosen, const std::string& folder, const std::string& copy) {
+    if (const auto found = find_beside(chosen.media, folder)) {
+        chosen.any = true;
+        chosen.path = *found;
+        chosen.result = load_sidecar(chosen.path);
+        if (chosen.result.loaded) return;
+    }
+    if (copy.empty()) return;
+    SidecarResult kept = load_sidecar_text(copy, chosen.media + " (the project's copy)");
+    if (!kept.loaded || !same_clip(chosen.media, kept.loaded->sidecar().clip.source)) return;
+    chosen.any = chosen.embedded = true;
+    chosen.broken = std::move(chosen.result.problem);
+    chosen.path = chosen.media;
+    chosen.result = std::move(kept);
+}
+
 }  // namespace
 
 void define_file_params(ParamDefiner& define) {
@@ -54,6 +72,11 @@ void define_file_params(ParamDefiner& define) {
                "sidecar whose clip it finds."},
               kOfxParamStringIsDirectoryPath)
         .set_int(kOfxParamPropStringFilePathExists, 0);
+    define.flag({kParamFindByName, "Find by clip's name",
+                 "While Sidecar is empty, the node uses the sidecar that has the clip's name: for "
+                 "shot.mov it searches shot.p4d.json beside the clip, in Clip's folder and in "
+                 "PALETTE4D_PATH. Works in hosts that tell the clip's file: DaVinci Resolve."},
+                true);
     define.button({kParamReload, "Reload",
                    "Reads the sidecar's file again and makes the host render its frames again."});
     define.flag({kParamEmbed, "Embed",
@@ -74,16 +97,23 @@ Chosen chosen_sidecar(const Params& params, std::optional<OfxTime> time) {
         return (time ? params.string_at(name, *time) : params.string_now(name)).value_or("");
     };
     Chosen chosen;
-    const std::string given = text(kParamSidecar);
-    chosen.any = !given.empty();
-    if (!chosen.any) return chosen;
+    const std::string given = text(kParamSidecar), copy = text(kParamEmbedded);
+    chosen.media = params.media();
+    if (given.empty()) {
+        const int by_name =
+            (time ? params.int_at(kParamFindByName, *time) : params.int_now(kParamFindByName))
+                .value_or(1);
+        if (by_name == 0 || chosen.media.empty()) return chosen;
+        find_by_name(chosen, text(kParamClipFolder), copy);
+        return chosen;
+    }
+    chosen.any = true;
     const auto found = find_file(given, text(kParamClipFolder));
     if (found) {
         chosen.path = *found;
         chosen.result = load_sidecar(chosen.path);
         if (chosen.result.loaded) return chosen;
     }
-    const std::string copy = text(kParamEmbedded);
     if (!copy.empty()) {
         SidecarResult kept = load_sidecar_text(copy, given + " (the project's copy)");
         if (kept.loaded || !found) {

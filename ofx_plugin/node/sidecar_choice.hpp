@@ -11,6 +11,7 @@
 namespace palette4d::node {
 
 inline constexpr const char* kParamClipFolder = "clipFolder";
+inline constexpr const char* kParamFindByName = "findByName";
 inline constexpr const char* kParamReload = "reload";
 inline constexpr const char* kParamEmbed = "embed";
 inline constexpr const char* kParamEmbedded = "embedded";
@@ -19,11 +20,12 @@ inline constexpr const char* kParamRevision = "revision";
 void define_file_params(ParamDefiner& define);
 
 struct Chosen {
-    bool any = false;  ///< a sidecar was asked for
+    bool any = false;  ///< a sidecar was asked for, or found by the clip's name
     SidecarResult result;
     std::string path;       ///< where it was found, or where it was expected
     bool embedded = false;  ///< it is the project's copy, since there is no file that can be read
     std::string broken;     ///< what is wrong with that file, where there is one
+    std::string media;      ///< the clip's file, in a host that tells it
 
     /// Null where there is none, or none that can be read.
     const Sidecar* sidecar() const { return result.loaded ? &result.loaded->sidecar() : nullptr; }

@@ -246,6 +246,7 @@ std::unique_ptr<OfxImageEffectStruct> Plugin::describe(const std::string& contex
     if (call(kOfxActionDescribe, effect.get(), nullptr, nullptr) != kOfxStatOK) return nullptr;
     OfxPropertySetStruct in(kInArgs);
     in.put(kOfxImageEffectPropContext, context);
+    activity().context = context;
     if (call(kOfxImageEffectActionDescribeInContext, effect.get(), &in, nullptr) != kOfxStatOK) {
         return nullptr;
     }

@@ -128,7 +128,8 @@ namespace strict {
 
 // ---------------------------------------------------------------- pictures
 
-enum class Depth { kByte, kFloat };
+enum class Depth { kByte, kShort, kHalf, kFloat };
+inline constexpr Depth kDepths[] = {Depth::kByte, Depth::kShort, Depth::kHalf, Depth::kFloat};
 
 struct Layout {
     OfxRectI bounds{0, 0, 16, 16};
@@ -142,7 +143,8 @@ struct Layout {
 
     int width() const { return bounds.x2 - bounds.x1; }
     int height() const { return bounds.y2 - bounds.y1; }
-    int pixel_bytes() const { return channels * (depth == Depth::kByte ? 1 : 4); }
+    int number_bytes() const { return depth == Depth::kByte ? 1 : depth == Depth::kFloat ? 4 : 2; }
+    int pixel_bytes() const { return channels * number_bytes(); }
 };
 
 /// Pixels between guard bytes, in any layout.
@@ -239,7 +241,9 @@ struct Activity {
     bool locked = false;  ///< by the host: an action that it sends now waits for ever
     Picture* output = nullptr;
     const Picture* source = nullptr;
+    const Picture* brush = nullptr;
     std::set<OfxPropertySetHandle>* images = nullptr;
+    std::string context{};  ///< that is being described
 };
 Activity& activity();
 
@@ -355,6 +359,8 @@ public:
     std::vector<unsigned char> cached(double time, const Picture& source);
     /// What the next renders' arguments say besides the ordinary.
     std::map<std::string, Value> extra_arguments;
+    /// Of the Paint context.
+    const Picture* brush = nullptr;
     /// Every render is done twice, and a difference is a fault.
     bool twice = false;
 

@@ -297,7 +297,7 @@ OfxStatus Instance::render_once(double time, const Picture* source, Picture& out
     const std::vector<unsigned char> output_before = output.storage();
     std::set<OfxPropertySetHandle> images;
     const Activity before = activity();
-    activity() = {"", false, false, &output, source, &images};
+    activity() = {"", false, false, &output, source, brush, &images};
     OfxPropertySetStruct in = render_arguments(time, window);
     in.put_all(kOfxImageEffectPropRenderScale, {output.layout().scale, output.layout().scale});
     for (const auto& [name, value] : extra_arguments) in.put(name, value);

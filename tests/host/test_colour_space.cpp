@@ -70,7 +70,7 @@ TEST(the_picture_goes_to_the_palettes_space_and_back) {
     Node node;
     palette4d::Sidecar plain = node.parsed;
     plain.conversion = nullptr;
-    for (const Depth depth : {Depth::kFloat, Depth::kByte}) {
+    for (const Depth depth : kDepths) {
         for (const int channels : {3, 4}) {
             for (const char* alpha : {kOfxImageUnPreMultiplied, kOfxImagePreMultiplied}) {
                 if (channels == 3 && alpha == std::string(kOfxImagePreMultiplied)) continue;
