@@ -18,6 +18,8 @@ from palette4d.common.errors import Palette4dError, SidecarError
 VERB_MODULES = (
     "palette4d.cli.sample_clip",
     "palette4d.cli.analyze",
+    "palette4d.cli.info",
+    "palette4d.cli.slice",
     "palette4d.cli.edit",
     "palette4d.cli.render",
     "palette4d.cli.bake",
