@@ -6,7 +6,8 @@ premultiplied in EXR, straight in PNG, and in TIFF whichever the frame has (and 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import os
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -85,6 +86,51 @@ class FramePattern:
         """File of a frame; the sign of a negative number counts as a digit, as in C's printf."""
         number = "" if self.width is None else f"{frame:0{self.width}d}"
         return self.folder / f"{self.prefix}{number}{self.suffix}"
+
+    def paths(self, frames: Sequence[int]) -> list[Path]:
+        """Files of several frames; OutputError when they would all go into one."""
+        if self.width is None and len(frames) > 1:
+            raise OutputError(
+                f"output {self.path(0)}: {len(frames)} frames would go into one file; expected a "
+                f"pattern such as {self.prefix}.####{self.suffix}, or one frame (--frames)"
+            )
+        return [self.path(frame) for frame in frames]
+
+
+def check_targets(
+    targets: Sequence[Path], inputs: Iterable[Path] = (), force: bool = False
+) -> None:
+    """Refuse outputs before the first is written.
+
+    Raises
+    ------
+    OutputError
+        One is a folder or one of the `inputs`, or exists and `force` is false.
+    """
+    existing = [target for target in targets if os.path.lexists(target)]
+    own = {_identity(path) for path in inputs} if existing else set()
+    for target in existing:
+        if _identity(target) in own:
+            raise OutputError(
+                f"output {target}: it is a file of the clip itself; choose another folder or name"
+            )
+        if target.is_dir():
+            raise OutputError(f"output {target}: it is a folder; choose another name")
+    if existing and not force:
+        more = f" ({len(existing)} of {len(targets)} files do)" if len(existing) > 1 else ""
+        raise OutputError(
+            f"output {existing[0]}: it exists already{more}; choose another place, or replace "
+            "with --force"
+        )
+
+
+def _identity(path: Path) -> tuple[int, int] | str:
+    """Device and inode of a file, links followed; its name where there is none."""
+    try:
+        status = path.stat()
+    except OSError:
+        return str(path.absolute())
+    return status.st_dev, status.st_ino
 
 
 def sample_type(extension: str, depth: str, *, half: bool = False, bits: int | None = None) -> str:
@@ -239,13 +285,3 @@ def _cannot_write(path: Path, reason: str) -> WriteError:
         f"{path}: the frame cannot be written ({said}); expected a folder that may be written to "
         "on a disk with free space. Check both, or choose another place."
     )
-
-
-def make_folder(folder: Path) -> None:
-    """Create an output folder and the ones above it; OutputError when that is not possible."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(
-            f"{folder}: the folder cannot be created ({error.strerror}); choose another place"
-        ) from error
