@@ -37,7 +37,7 @@ def test_other_errors_are_said_as_they_are() -> None:
 @pytest.mark.parametrize(
     "words",
     [
-        ("export", "{folder}/x.p4d.json", "-o", "{folder}"),
+        ("export", "{folder}/x.p4d.json", "--every", "1", "-o", "{folder}"),
         ("analyze", "{folder}", "-o", "{folder}/x/y.p4d.json"),
         ("config", "{folder}", "-o", "{folder}/x.ocio"),
         ("render", "{folder}", "{folder}", "-o", "{folder}/o.png"),
