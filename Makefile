@@ -167,6 +167,7 @@ style: $(TOOLS)/.installed
 	$(TOOLS)/bin/ruff check .
 	$(TOOLS)/bin/ruff format --check .
 	@$(TOOLS)/bin/clang-format --dry-run --Werror $(CXX_FILES)
+	$(TOOLS)/bin/python tools/check_core_rooms.py
 
 # mypy sees palette4d as its users do: the installed wheel, never the source tree.
 types: $(TOOLS)/.installed $(TEST_VENV)/.installed
