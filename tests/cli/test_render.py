@@ -16,7 +16,7 @@ from clip_files import grey_levels, write_image, write_movie
 
 from palette4d import _core
 from palette4d.cli import render
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Palette4dError, WriteError
 from palette4d.grade import rendering
 from palette4d.media.clip import open_clip
 from palette4d.media.frame_writer import FramePattern, sample_type, write_frame
@@ -288,7 +288,7 @@ def test_full_disk_is_said_and_nothing_half_written_stays(tmp_path, extension):
     try:
         resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, limit[1]))
         samples = sample_type(extension, "uint16")
-        with pytest.raises(Palette4dError):
+        with pytest.raises(WriteError):
             write_frame(tmp_path / f"o.{extension}", pixels, samples)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limit)
@@ -306,7 +306,7 @@ def test_folders_that_cannot_be_written_are_named(tmp_path):
             write_frame(tmp_path / folder / "o.png", colours(2, 2, 3), "uint8")
     if os.geteuid() != 0:  # root may write everywhere
         (tmp_path / "locked").mkdir(mode=0o500)
-        with pytest.raises(Palette4dError):
+        with pytest.raises(WriteError):
             write_frame(tmp_path / "locked" / "o.png", colours(2, 2, 3), "uint8")
 
 

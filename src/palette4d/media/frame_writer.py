@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Palette4dError, WriteError
 from palette4d.common.files import replacing
 
 FORMATS = ("exr", "png", "tif", "tiff")
@@ -228,7 +228,7 @@ def write_frame(
 
     Raises
     ------
-    OutputError
+    WriteError
         When the folder cannot be written to or the disk is full; nothing half written remains.
     """
     import OpenImageIO as oiio
@@ -279,9 +279,9 @@ def _is_whole(path: Path) -> bool:
     return row is not None and not problem
 
 
-def _cannot_write(path: Path, reason: str) -> OutputError:
+def _cannot_write(path: Path, reason: str) -> WriteError:
     said = reason.strip().splitlines()[0] if reason.strip() else "the file was cut short"
-    return OutputError(
+    return WriteError(
         f"{path}: the frame cannot be written ({said}); expected a folder that may be written to "
         "on a disk with free space. Check both, or choose another place."
     )
