@@ -1,6 +1,6 @@
 """A show's manifest, ``NAME.shots.json``: its shots, their sidecars, and what failed.
 
-`docs/shots.md` explains the format, `shots_v1.schema.json` is its JSON Schema. It is replaced whole
+`docs/files.md` explains the format, `shots_v1.schema.json` is its JSON Schema. It is replaced whole
 whenever a shot is done, so that a run that ends early leaves what it reached.
 """
 
