@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "binders.hpp"
-#include "palette4d/sidecar.hpp"
+#include "sidecar/sidecar.hpp"
 
 using palette4d::Edits;
 using palette4d::Sidecar;

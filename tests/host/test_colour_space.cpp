@@ -5,7 +5,7 @@
 #include <string>
 
 #include "harness.hpp"
-#include "palette4d/lattice.hpp"
+#include "lattice/lattice.hpp"
 
 using namespace strict;
 using namespace test;

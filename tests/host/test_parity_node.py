@@ -27,7 +27,7 @@ from parity.cases import (
 from parity.implementations import FAST, REFERENCE
 
 from palette4d import _core
-from palette4d.cli.render import RenderOptions, recoloured
+from palette4d.grade.rendering import RenderOptions, recoloured
 
 Picture = NDArray[np.float32]  # (h, w, 3 or 4)
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"

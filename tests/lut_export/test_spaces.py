@@ -22,9 +22,9 @@ from palette4d.lut_export.series import SeriesOptions
 from palette4d.lut_export.spaces import space_of, transforms
 
 from palette4d import Palette4dError, _core
-from palette4d.cli.render import RenderOptions, recoloured
 from palette4d.colour import ocio_config
 from palette4d.grade import sidecar as sidecars
+from palette4d.grade.rendering import RenderOptions, recoloured
 from palette4d.jobs.workers import Workers
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"

@@ -317,7 +317,7 @@ def test_without_options_and_without_ocio_nothing_changes(
 def test_unedited_pixels_keep_their_bits_and_edited_ones_come_back(
     linear_clip: str, tmp_path: Path
 ) -> None:
-    from palette4d.cli.render import RenderOptions, recoloured
+    from palette4d.grade.rendering import RenderOptions, recoloured
 
     path = tmp_path / "cg.p4d.json"
     document = analyse(linear_clip, path, "--input-space", "ACEScg")
@@ -355,7 +355,7 @@ def test_unedited_pixels_keep_their_bits_and_edited_ones_come_back(
 
 
 def test_the_neutral_stays_monotone_and_finite(linear_clip: str, tmp_path: Path) -> None:
-    from palette4d.cli.render import RenderOptions, recoloured
+    from palette4d.grade.rendering import RenderOptions, recoloured
 
     path = tmp_path / "cg.p4d.json"
     document = analyse(linear_clip, path, "--input-space", "ACEScg")
@@ -432,7 +432,7 @@ def test_other_encodings_in_a_common_palette_space(
     tmp_path: Path, space: str, extension: str, samples: str
 ) -> None:
     """Camera logs and displays, palettes in ACEScct: as OpenColorIO there, our edit, and back."""
-    from palette4d.cli.render import RenderOptions, recoloured
+    from palette4d.grade.rendering import RenderOptions, recoloured
 
     config = ocio_config.load_config(STUDIO, "test")
     for frame in (1, 2):
@@ -492,7 +492,7 @@ def test_colours_beyond_an_encoding_s_end_are_told_and_come_back(
     tmp_path: Path, capsys: Any
 ) -> None:
     """Canon's log ends at code 1, where OpenColorIO clamps: our curves go on."""
-    from palette4d.cli.render import RenderOptions, recoloured
+    from palette4d.grade.rendering import RenderOptions, recoloured
 
     codes = np.random.default_rng(6).uniform(0.1, 1.2, (24, 32, 3)).astype(np.float32)
     write_image(tmp_path / "c.0001.exr", codes, "float")

@@ -52,7 +52,7 @@ _TRANSFERS = {
 }
 _UNSPECIFIED = 2
 # Weights of red and blue in luma, by matrix coefficients.
-_LUMA = {
+LUMA_WEIGHTS = {
     1: (0.2126, 0.0722),
     4: (0.30, 0.11),
     5: (0.299, 0.114),
@@ -349,7 +349,7 @@ def _bin_picture(picture: av.VideoFrame, row_step: int, binner: _core.ColourBinn
     how = _luma_chroma(picture)
     if how is not None and not how.alpha:
         luma, blue, red = _planes_of(how.planar, how.samples)
-        red_weight, blue_weight = _LUMA[how.matrix]
+        red_weight, blue_weight = LUMA_WEIGHTS[how.matrix]
         binner.add_luma_chroma(
             luma,
             blue,
@@ -523,7 +523,7 @@ def _luma_chroma(picture: av.VideoFrame) -> _LumaChroma | None:
     if (
         not name.startswith(_LUMA_CHROMA)
         or picture.format.is_rgb
-        or matrix not in _LUMA
+        or matrix not in LUMA_WEIGHTS
         or bits not in _PLANAR_DEPTHS
         or (alpha and bits == 14)
     ):
@@ -556,7 +556,7 @@ def _from_luma_chroma(how: _LumaChroma, rows: slice) -> F32:
     else:
         luma = (samples[..., 0] - np.float32(16 * unit)) / np.float32(219 * unit)
         chroma = (samples[..., 1:3] - np.float32(128 * unit)) / np.float32(224 * unit)
-    red_weight, blue_weight = _LUMA[how.matrix]
+    red_weight, blue_weight = LUMA_WEIGHTS[how.matrix]
     green_weight = 1 - red_weight - blue_weight
     out = np.empty_like(samples)
     out[..., 0] = luma + np.float32(2 * (1 - red_weight)) * chroma[..., 1]
