@@ -92,7 +92,7 @@ def test_at_beside_and_between_all_that_happens_the_node_is_the_core(node: Node,
 @pytest.mark.parametrize(("channels", "premultiplied"), SHAPES)
 def test_the_node_converts_as_render_does(node: Node, channels: int, premultiplied: bool) -> None:
     """Scene-linear light from below 0 to 50, a palette in ACEScct: every bit is the same."""
-    text = (GOLDEN / "v2_scene_linear.p4d.json").read_text(encoding="utf-8")
+    text = (GOLDEN / "v1_scene_linear.p4d.json").read_text(encoding="utf-8")
     document = Document(json.loads(text))
     random = np.random.default_rng(7)
     image = np.exp2(random.uniform(-9, 5.6, (20, 30, channels))).astype(np.float32)

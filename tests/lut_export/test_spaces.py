@@ -28,8 +28,8 @@ from palette4d.grade.document import Document
 from palette4d.jobs.workers import Workers
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
-SIDECAR = GOLDEN / "v2_scene_linear.p4d.json"  # lin_rec709, its palette in ACEScct
-EVERY_STEP = GOLDEN / "v2_every_step.p4d.json"
+SIDECAR = GOLDEN / "v1_scene_linear.p4d.json"  # lin_rec709, its palette in ACEScct
+EVERY_STEP = GOLDEN / "v1_every_step.p4d.json"
 PLAIN = GOLDEN / "v1_edited.p4d.json"
 FRAME = 6.0
 

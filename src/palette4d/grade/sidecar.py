@@ -104,8 +104,8 @@ def new_document(
     ----------
     clip : mapping
         ``name``, ``source``, ``frames`` (``first``, ``last``, ``step``, ``skipped``), ``rate``
-        (numerator, denominator), ``size`` (width, height in pixels), ``encoding``; with
-        ``conversion`` the document is of version 2, which older readers refuse.
+        (numerator, denominator), ``size`` (width, height in pixels), ``encoding``, and
+        ``conversion`` where the palette is in another space than the clip.
     polytope : mapping
         ``vertices``, ``edges``, ``blocks``, ``transitions`` as in `docs/sidecar.md`.
     quality : mapping, optional
@@ -120,7 +120,7 @@ def new_document(
     quality = quality or {}
     document: Fields = {
         "schema": SCHEMA,
-        "version": 2 if "conversion" in clip else 1,
+        "version": _core.SIDECAR_VERSION,
         "generator": f"palette4d {_core.__version__}",
         "clip": clip,
         "polytope": polytope,
