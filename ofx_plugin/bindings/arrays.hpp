@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "palette4d/polytope.hpp"
+#include "model/polytope.hpp"
 
 namespace py = pybind11;
 

@@ -7,11 +7,11 @@
 
 #include "arrays.hpp"
 #include "binders.hpp"
-#include "palette4d/colour_bins.hpp"
-#include "palette4d/colour_tree.hpp"
-#include "palette4d/palette_loss.hpp"
-#include "palette4d/polytope_loss.hpp"
-#include "palette4d/progressive_hull.hpp"
+#include "fit/colour_bins.hpp"
+#include "fit/colour_tree.hpp"
+#include "fit/palette_loss.hpp"
+#include "fit/polytope_loss.hpp"
+#include "fit/progressive_hull.hpp"
 
 using namespace palette4d;
 using namespace palette4d::bindings;

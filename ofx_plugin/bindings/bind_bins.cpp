@@ -12,8 +12,8 @@
 
 #include "arrays.hpp"
 #include "binders.hpp"
-#include "palette4d/colour_bins.hpp"
-#include "palette4d/colour_tree.hpp"
+#include "fit/colour_bins.hpp"
+#include "fit/colour_tree.hpp"
 
 using namespace palette4d;
 using namespace palette4d::bindings;

@@ -5,8 +5,8 @@
 
 #include "arrays.hpp"
 #include "binders.hpp"
-#include "palette4d/colour_conversion.hpp"
-#include "palette4d/sidecar.hpp"
+#include "convert/colour_conversion.hpp"
+#include "sidecar/sidecar.hpp"
 
 using palette4d::ClipConversion;
 using palette4d::ColourConversion;

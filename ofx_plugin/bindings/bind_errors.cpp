@@ -6,7 +6,7 @@
 #include <string>
 
 #include "binders.hpp"
-#include "palette4d/sidecar.hpp"
+#include "sidecar/sidecar.hpp"
 
 namespace {
 

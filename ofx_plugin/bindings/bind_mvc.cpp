@@ -1,8 +1,8 @@
 // Mean value coordinates and palette weights for Python, many colours a call.
 #include "arrays.hpp"
 #include "binders.hpp"
-#include "palette4d/palette_body.hpp"
-#include "palette4d/slice.hpp"
+#include "model/slice.hpp"
+#include "recolour/palette_body.hpp"
 
 using namespace palette4d;
 using namespace palette4d::bindings;

@@ -3,7 +3,7 @@
 
 #include "arrays.hpp"
 #include "binders.hpp"
-#include "palette4d/polytope.hpp"
+#include "model/polytope.hpp"
 
 using namespace palette4d;
 using namespace palette4d::bindings;

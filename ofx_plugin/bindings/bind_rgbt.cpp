@@ -7,7 +7,7 @@
 
 #include "arrays.hpp"
 #include "binders.hpp"
-#include "palette4d/progressive_hull_4d.hpp"
+#include "fit/progressive_hull_4d.hpp"
 
 using namespace palette4d;
 using namespace palette4d::bindings;

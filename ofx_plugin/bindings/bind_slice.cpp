@@ -3,7 +3,7 @@
 
 #include "arrays.hpp"
 #include "binders.hpp"
-#include "palette4d/slice.hpp"
+#include "model/slice.hpp"
 
 using namespace palette4d;
 using namespace palette4d::bindings;

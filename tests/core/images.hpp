@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-#include "palette4d/recolour.hpp"
+#include "recolour/recolour.hpp"
 
 namespace images {
 

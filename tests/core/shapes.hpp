@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "palette4d/polytope.hpp"
+#include "model/polytope.hpp"
 
 namespace shapes {
 

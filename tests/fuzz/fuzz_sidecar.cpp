@@ -7,10 +7,10 @@
 #include <string>
 
 #include "fuzz_sidecar.hpp"
-#include "palette4d/handles.hpp"
-#include "palette4d/lineage.hpp"
-#include "palette4d/recolour.hpp"
-#include "palette4d/sidecar.hpp"
+#include "model/handles.hpp"
+#include "model/lineage.hpp"
+#include "recolour/recolour.hpp"
+#include "sidecar/sidecar.hpp"
 
 namespace {
 

@@ -11,7 +11,7 @@
 #include <stdexcept>
 
 #include "describe_json.hpp"
-#include "palette4d/sidecar.hpp"
+#include "sidecar/sidecar.hpp"
 #include "strict_host.hpp"
 
 namespace {

@@ -138,9 +138,9 @@ std::vector<unsigned char> recoloured(const palette4d::Sidecar& sidecar, double 
     options.strength = strength;
     options.premultiplied =
         layout.channels == 4 && layout.premultiplication == kOfxImagePreMultiplied;
-    const auto* conversion = sidecar.conversion ? &sidecar.conversion->steps : nullptr;
-    apply_converted(recolourer, conversion, {values.data(), width, height, layout.channels, stride},
-                    {values.data(), width, height, layout.channels, stride}, options);
+    if (sidecar.conversion) options.conversion = &sidecar.conversion->steps;
+    recolourer.apply({values.data(), width, height, layout.channels, stride},
+                     {values.data(), width, height, layout.channels, stride}, options);
     std::vector<unsigned char> result(pixels.size());
     if (bytes) {
         for (std::size_t i = 0; i < values.size(); ++i) {

@@ -7,8 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "palette4d/recolour.hpp"
-#include "palette4d/sidecar.hpp"
+#include "model/slice.hpp"
+#include "recolour/recolour.hpp"
+#include "sidecar/sidecar.hpp"
 #include "strict_host.hpp"
 
 namespace test {

@@ -5,13 +5,13 @@
 #include <thread>
 #include <vector>
 
-#include "../../ofx_plugin/plugin/sidecar_cache.hpp"
+#include "../../ofx_plugin/node/sidecar_cache.hpp"
 #include "harness.hpp"
 
 using palette4d::Recolourer;
-using palette4d::plugin::load_sidecar;
-using palette4d::plugin::LoadedSidecar;
-using palette4d::plugin::SidecarResult;
+using palette4d::node::load_sidecar;
+using palette4d::node::LoadedSidecar;
+using palette4d::node::SidecarResult;
 
 TEST(threads_and_tiles_share_what_is_prepared_for_a_frame) {
     const std::string path = test::sidecar();
@@ -44,7 +44,7 @@ TEST(threads_and_tiles_share_what_is_prepared_for_a_frame) {
         all.insert(built.begin(), built.end());
     }
     // Edits of the host are of a frame's essence, whichever way they were put together.
-    using palette4d::plugin::AppliedEdits;
+    using palette4d::node::AppliedEdits;
     const auto loaded = load_sidecar(path).loaded;
     const auto red = loaded->recolourer_at(11.25, AppliedEdits{true, {{3, {1, 0, 0}}}});
     CHECK(red == loaded->recolourer_at(11.25, AppliedEdits{true, {{3, {1, 0, 0}}}}));
@@ -59,6 +59,6 @@ TEST(threads_and_tiles_share_what_is_prepared_for_a_frame) {
     CHECK(loaded->recolourer_at(11.25) == seen[0][0][0]);
     // Frames do not share, and a purge forgets.
     CHECK(all.size() == kFrames);
-    palette4d::plugin::purge_sidecars();
+    palette4d::node::purge_sidecars();
     CHECK(load_sidecar(path).loaded->recolourer_at(11.25).get() != seen[0][0][0].get());
 }

@@ -5,8 +5,8 @@
 #include <cstring>
 
 #include "harness.hpp"
-#include "palette4d/handles.hpp"
-#include "palette4d/lineage.hpp"
+#include "model/handles.hpp"
+#include "model/lineage.hpp"
 
 using namespace strict;
 using namespace test;

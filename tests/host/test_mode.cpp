@@ -5,9 +5,9 @@
 #include <thread>
 #include <utility>
 
-#include "../../ofx_plugin/plugin/sidecar_cache.hpp"
+#include "../../ofx_plugin/node/sidecar_cache.hpp"
 #include "harness.hpp"
-#include "palette4d/lattice.hpp"
+#include "lattice/lattice.hpp"
 
 using namespace strict;
 using namespace test;
@@ -257,7 +257,7 @@ TEST(the_status_says_the_largest_error_of_the_frame_that_is_shown) {
 }
 
 TEST(threads_and_tiles_share_a_lattice) {
-    const auto loaded = palette4d::plugin::load_sidecar(sidecar()).loaded;
+    const auto loaded = palette4d::node::load_sidecar(sidecar()).loaded;
     CHECK(loaded->ready_lattice_at(12) == nullptr);
     // Kept alive: the address of a second one could not be that of the first.
     std::vector<std::shared_ptr<const Lattice>> seen(8);
@@ -270,10 +270,10 @@ TEST(threads_and_tiles_share_a_lattice) {
     CHECK(&seen[0]->recolourer() == loaded->recolourer_at(12).get());
     CHECK(loaded->ready_lattice_at(12) == seen[0]);
     // Edits of the host make another one.
-    using palette4d::plugin::AppliedEdits;
+    using palette4d::node::AppliedEdits;
     CHECK(loaded->lattice_at(12, AppliedEdits{true, {{3, {1, 0, 0}}}}) != seen[0]);
     // Tiles of as many frames as there is room for, in turn; and what is used in between stays.
-    const auto most = static_cast<int>(palette4d::plugin::LoadedSidecar::most_lattices());
+    const auto most = static_cast<int>(palette4d::node::LoadedSidecar::most_lattices());
     CHECK(most >= static_cast<int>(std::thread::hardware_concurrency()));
     std::vector<std::shared_ptr<const Lattice>> frames;
     for (int i = 0; i < most; ++i) frames.push_back(loaded->lattice_at(12 + i / 512.0));

@@ -1,15 +1,15 @@
 // Where a sidecar is: ~, variables, relative and moved files.
 #include <cstdlib>
 
-#include "../../ofx_plugin/plugin/paths.hpp"
+#include "../../ofx_plugin/node/paths.hpp"
 #include "harness.hpp"
 
 using namespace strict;
 using namespace test;
-using palette4d::plugin::clip_folder;
-using palette4d::plugin::expanded;
-using palette4d::plugin::find_file;
-using palette4d::plugin::words_of_missing;
+using palette4d::node::clip_folder;
+using palette4d::node::expanded;
+using palette4d::node::find_file;
+using palette4d::node::words_of_missing;
 
 namespace {
 

@@ -5,10 +5,10 @@
 #include <filesystem>
 #include <memory>
 
-#include "palette4d/handles.hpp"
-#include "palette4d/recolour.hpp"
-#include "palette4d/sidecar.hpp"
+#include "model/handles.hpp"
+#include "recolour/recolour.hpp"
 #include "sdk_host.hpp"
+#include "sidecar/sidecar.hpp"
 
 using namespace sdk_host;
 

@@ -1,5 +1,5 @@
 // Colour spaces by name: what hosts are asked for, and what lightness weighs.
-#include "../../ofx_plugin/plugin/spaces.hpp"
+#include "../../ofx_plugin/node/colour_spaces.hpp"
 
 #include <cmath>
 
@@ -7,8 +7,8 @@
 
 using namespace test;
 using palette4d::Vec3;
-using palette4d::plugin::colourspaces_of;
-using palette4d::plugin::luminance_weights;
+using palette4d::node::colourspaces_of;
+using palette4d::node::luminance_weights;
 
 namespace {
 

@@ -2,18 +2,18 @@
 #include <cmath>
 #include <limits>
 
-#include "../../ofx_plugin/plugin/timing.hpp"
+#include "../../ofx_plugin/node/timing.hpp"
 #include "harness.hpp"
 
 using namespace strict;
 using namespace test;
 using palette4d::ClipInfo;
-using palette4d::plugin::frame_at;
-using palette4d::plugin::FrameAt;
-using palette4d::plugin::HostClip;
-using palette4d::plugin::TimeSettings;
-using palette4d::plugin::words_of;
-using Place = palette4d::plugin::FrameAt::Place;
+using palette4d::node::frame_at;
+using palette4d::node::FrameAt;
+using palette4d::node::HostClip;
+using palette4d::node::TimeSettings;
+using palette4d::node::words_of;
+using Place = palette4d::node::FrameAt::Place;
 
 namespace {
 

@@ -20,14 +20,14 @@ from palette4d.lut_export.frame_edit import frame_edit
 from palette4d.lut_export.spaces import space_of, transforms
 
 from palette4d import Palette4dError, _core
-from palette4d.cli.render import RenderOptions, recoloured
 from palette4d.colour import ocio_config
 from palette4d.grade import sidecar as sidecars
+from palette4d.grade.document import Document
 from palette4d.jobs.workers import Workers
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
-SIDECAR = GOLDEN / "v2_scene_linear.p4d.json"  # lin_rec709, its palette in ACEScct
-EVERY_STEP = GOLDEN / "v2_every_step.p4d.json"
+SIDECAR = GOLDEN / "v1_scene_linear.p4d.json"  # lin_rec709, its palette in ACEScct
+EVERY_STEP = GOLDEN / "v1_every_step.p4d.json"
 PLAIN = GOLDEN / "v1_edited.p4d.json"
 FRAME = 6.0
 
@@ -77,7 +77,7 @@ def through(source: str, target: str, colours: F32) -> F32:
 
 
 def rendered(path: Path, colours: F32) -> F32:
-    return recoloured(_core.read_sidecar(path), FRAME, colours, False, RenderOptions())
+    return Document.load(path).recolour(colours, FRAME)
 
 
 @pytest.mark.parametrize("extension", [".clf", ".ctf"])

@@ -235,7 +235,7 @@ def test_nothing_readable_says_so(tmp_path):
 def test_other_size_and_channels_mid_clip(tmp_path):
     for frame, shape in enumerate([(6, 8, 3), (6, 8, 3), (6, 9, 3), (6, 8, 4), (6, 8, 1)]):
         write_image(tmp_path / f"c.{frame}.png", np.full(shape, 128, np.uint8))
-    with pytest.raises(FrameError, match="frame 2 is 9x6 pixels, expected 8x6"):
+    with pytest.raises(FrameError, match="frame 2 has 9x6 pixels, expected 8x6"):
         list(open_clip(str(tmp_path)).iter_frames())
     with pytest.raises(FrameError, match="frame 3 has straight alpha, expected no alpha"):
         open_clip(str(tmp_path)).read(3)

@@ -251,5 +251,4 @@ def test_a_config_has_a_look_a_shot(show: Path, capsys: pytest.CaptureFixture[st
     document["shots"] = [shot for shot in document["shots"] if shot["name"] == "one"]
     show.write_text(json.dumps(document), "utf-8")
     verb = ["config", str(show), "-o", "lone", "--stops", "--size", "5", "--jobs", "1", "--quiet"]
-    verb.append("--anyway")
     assert main.main([*verb, "--process-space", "sRGB - Texture"]) == 0

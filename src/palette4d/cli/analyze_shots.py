@@ -8,11 +8,11 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from palette4d.cli.worker_options import add_worker_options
 from palette4d.colour.ocio_config import from_anywhere
 from palette4d.common.arguments import whole
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import counted
-from palette4d.jobs import workers
 from palette4d.shows.timeline_files import is_timeline
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--anew", action="store_true", help="analyse again also the shots that are there already"
     )
-    workers.add_options(group, "shots")
+    add_worker_options(group, "shots")
 
 
 def _names(text: str) -> tuple[str, ...]:
@@ -110,6 +110,7 @@ def _refuse(args: argparse.Namespace, given: dict[str, bool], needs: str) -> Non
 
 def run(args: argparse.Namespace, options: AnalysisOptions) -> int:
     """Analyse many shots; print what was written, and raise what failed."""
+    from palette4d.jobs.workers import Workers
     from palette4d.shows import batch
 
     hidden = args.quiet or args.json
@@ -126,7 +127,7 @@ def run(args: argparse.Namespace, options: AnalysisOptions) -> int:
         on_edits=args.on_edits,
         anew=args.anew,
         only=args.only,
-        workers=workers.Workers(args.jobs, args.cluster),
+        workers=Workers(args.jobs, args.cluster),
     )
     done = _with_bar(
         hidden,

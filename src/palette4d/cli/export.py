@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from palette4d.cli.lut_options import add_lut_options, lut_settings, wide_help
+from palette4d.cli.worker_options import add_worker_options
 from palette4d.common.arguments import frame_range, parse_frames, whole
 from palette4d.common.errors import Palette4dError
-from palette4d.jobs.workers import Workers, add_options
+from palette4d.jobs.workers import Workers
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -73,7 +74,7 @@ def add_frame_choice(parser: argparse.ArgumentParser, *, required: bool) -> None
 
 def add_run_options(parser: argparse.ArgumentParser) -> None:
     """Add --jobs, --cluster, --force and --quiet."""
-    add_options(parser, "frames")
+    add_worker_options(parser, "frames")
     parser.add_argument("--force", action="store_true", help="replace files that are there")
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
 

@@ -35,8 +35,11 @@ DEFAULT_RATE = Fraction(24)
 COUNTED_PIXELS = 4_000_000
 """Of larger frames the analysis counts every n-th row, so that about as many pixels are left."""
 
-STRIP_BYTES = 32 << 20
-"""Most bytes of the strips in which frames are read for counting."""
+LEAVE_OUT = (
+    "Bring a good copy, choose a range with --frames, or leave such frames out with "
+    "--skip-bad-frames."
+)
+"""The remedy for a bad frame."""
 
 
 class ClipError(Palette4dError):

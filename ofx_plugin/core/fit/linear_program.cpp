@@ -1,0 +1,169 @@
+#include "fit/linear_program.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+namespace palette4d {
+namespace {
+
+constexpr double kSlack = 1e-10;  // a constraint met this closely counts as met
+
+template <int N>
+using Point = std::array<double, N>;
+template <int N>
+using Solution = std::optional<Point<N>>;
+
+template <int N>
+double margin(const HalfSpace<N>& h, const Point<N>& x) {
+    double value = -h.b;
+    for (int i = 0; i < N; ++i) value += h.a[i] * x[i];
+    return value;
+}
+
+/// The optimum in the box alone.
+template <int N>
+Point<N> corner(const Point<N>& c, const Point<N>& low, const Point<N>& high) {
+    Point<N> x;
+    for (int i = 0; i < N; ++i) x[i] = c[i] >= 0 ? low[i] : high[i];
+    return x;
+}
+
+template <int N>
+Solution<N> on_boundary(const Point<N>& c, const HalfSpace<N>& h,
+                        const std::vector<HalfSpace<N>>& constraints, std::size_t count,
+                        const Point<N>& low, const Point<N>& high);
+
+template <int N>
+Solution<N> solve(const Point<N>& c, const std::vector<HalfSpace<N>>& constraints,
+                  const Point<N>& low, const Point<N>& high) {
+    Point<N> x = corner<N>(c, low, high);
+    for (std::size_t m = 0; m < constraints.size(); ++m) {
+        if (margin<N>(constraints[m], x) >= -kSlack) continue;
+        const auto next = on_boundary<N>(c, constraints[m], constraints, m, low, high);
+        if (!next) return std::nullopt;
+        x = *next;
+    }
+    return x;
+}
+
+template <>
+Solution<1> solve<1>(const Point<1>& c, const std::vector<HalfSpace<1>>& constraints,
+                     const Point<1>& low, const Point<1>& high) {
+    double lo = low[0], hi = high[0];
+    for (const auto& h : constraints) {
+        if (std::abs(h.a[0]) < 1e-13) {
+            if (h.b > kSlack) return std::nullopt;
+        } else if (h.a[0] > 0) {
+            lo = std::max(lo, h.b / h.a[0]);
+        } else {
+            hi = std::min(hi, h.b / h.a[0]);
+        }
+    }
+    if (lo > hi + kSlack) return std::nullopt;
+    return Point<1>{c[0] >= 0 ? lo : hi};
+}
+
+/// The optimum on the boundary of h, in the first `count` constraints and the box: a program of one
+/// dimension less, the variable with the largest coefficient in h eliminated.
+template <int N>
+Solution<N> on_boundary(const Point<N>& c, const HalfSpace<N>& h,
+                        const std::vector<HalfSpace<N>>& constraints, std::size_t count,
+                        const Point<N>& low, const Point<N>& high) {
+    // x_e = (b - sum a_i x_i) / a_e
+    int e = 0;
+    for (int i = 1; i < N; ++i)
+        if (std::abs(h.a[i]) > std::abs(h.a[e])) e = i;
+    if (std::abs(h.a[e]) < 1e-13) return std::nullopt;
+    auto project = [&](const Point<N>& a, double b) {
+        HalfSpace<N - 1> out;
+        const double s = a[e] / h.a[e];
+        for (int i = 0, j = 0; i < N; ++i)
+            if (i != e) out.a[j++] = a[i] - s * h.a[i];
+        out.b = b - s * h.b;
+        return out;
+    };
+    std::vector<HalfSpace<N - 1>> rest;
+    rest.reserve(count + 2);
+    for (std::size_t q = 0; q < count; ++q)
+        rest.push_back(project(constraints[q].a, constraints[q].b));
+    Point<N> unit{};
+    unit[e] = 1;
+    rest.push_back(project(unit, low[e]));
+    unit[e] = -1;
+    rest.push_back(project(unit, -high[e]));
+    const HalfSpace<N - 1> objective = project(c, 0);
+    Point<N - 1> sublow, subhigh;
+    for (int i = 0, j = 0; i < N; ++i)
+        if (i != e) {
+            sublow[j] = low[i];
+            subhigh[j++] = high[i];
+        }
+    const auto sub_x = solve<N - 1>(objective.a, rest, sublow, subhigh);
+    if (!sub_x) return std::nullopt;
+    Point<N> x;
+    double sum = h.b;
+    for (int i = 0, j = 0; i < N; ++i)
+        if (i != e) {
+            x[i] = (*sub_x)[j++];
+            sum -= h.a[i] * x[i];
+        }
+    x[e] = sum / h.a[e];
+    return x;
+}
+
+}  // namespace
+
+template <int N>
+std::optional<std::array<double, N>> minimise(const std::array<double, N>& c,
+                                              const std::vector<HalfSpace<N>>& constraints,
+                                              const std::array<double, N>& low,
+                                              const std::array<double, N>& high) {
+    return solve<N>(c, constraints, low, high);
+}
+
+template <int N>
+std::optional<std::array<double, N>> minimise_by_need(const std::array<double, N>& c,
+                                                      const std::vector<HalfSpace<N>>& constraints,
+                                                      const std::array<double, N>& low,
+                                                      const std::array<double, N>& high) {
+    Point<N> x = corner<N>(c, low, high);
+    std::vector<HalfSpace<N>> taken;
+    std::vector<bool> is_taken(constraints.size(), false);
+    while (true) {
+        double least = -kSlack;
+        std::size_t worst = constraints.size();
+        for (std::size_t m = 0; m < constraints.size(); ++m) {
+            if (is_taken[m]) continue;
+            const double value = margin<N>(constraints[m], x);
+            if (value >= least) continue;
+            least = value;
+            worst = m;
+        }
+        if (worst == constraints.size()) return x;
+        const auto next = on_boundary<N>(c, constraints[worst], taken, taken.size(), low, high);
+        if (!next) return std::nullopt;
+        x = *next;
+        taken.push_back(constraints[worst]);
+        is_taken[worst] = true;
+    }
+}
+
+template std::optional<std::array<double, 3>> minimise<3>(const std::array<double, 3>&,
+                                                          const std::vector<HalfSpace<3>>&,
+                                                          const std::array<double, 3>&,
+                                                          const std::array<double, 3>&);
+template std::optional<std::array<double, 2>> minimise_by_need<2>(const std::array<double, 2>&,
+                                                                  const std::vector<HalfSpace<2>>&,
+                                                                  const std::array<double, 2>&,
+                                                                  const std::array<double, 2>&);
+template std::optional<std::array<double, 3>> minimise_by_need<3>(const std::array<double, 3>&,
+                                                                  const std::vector<HalfSpace<3>>&,
+                                                                  const std::array<double, 3>&,
+                                                                  const std::array<double, 3>&);
+template std::optional<std::array<double, 4>> minimise_by_need<4>(const std::array<double, 4>&,
+                                                                  const std::vector<HalfSpace<4>>&,
+                                                                  const std::array<double, 4>&,
+                                                                  const std::array<double, 4>&);
+
+}  // namespace palette4d

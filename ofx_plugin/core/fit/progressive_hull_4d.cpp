@@ -1,0 +1,377 @@
+#include "fit/progressive_hull_4d.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <iterator>
+#include <map>
+#include <queue>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "fit/linear_program.hpp"
+
+namespace palette4d {
+namespace {
+
+constexpr double kBound = 4;  // new vertices stay within [-kBound, 1 + kBound] of a unit cube
+constexpr double kThin = 1e-14;
+
+template <int N>
+using Point = std::array<double, N>;
+template <int N>
+using Simplex = std::array<int, N>;
+/// A face of a link, or a ridge: at most three vertices, increasing, 21 bits each; none are 0.
+using FaceKey = std::uint64_t;
+constexpr int kKeyBits = 21;
+constexpr std::size_t kMostPoints = (std::size_t{1} << kKeyBits) - 1;
+
+FaceKey with_vertex(FaceKey key, int v) { return key << kKeyBits | (static_cast<FaceKey>(v) + 1); }
+
+/// Insertion sort (GCC 12 warns of std::sort on so few).
+void sort_few(int* numbers, int count) {
+    for (int i = 1; i < count; ++i)
+        for (int j = i; j > 0 && numbers[j] < numbers[j - 1]; --j)
+            std::swap(numbers[j], numbers[j - 1]);
+}
+
+template <int N>
+double dot(const Point<N>& a, const Point<N>& b) {
+    double sum = 0;
+    for (int i = 0; i < N; ++i) sum += a[i] * b[i];
+    return sum;
+}
+
+/// The vector at right angles to N - 1 vectors: the cofactors of a determinant's first row. Its
+/// product with x - p is N! times the volume of the simplex between the facet and x.
+template <int N>
+Point<N> normal_of(const std::array<Point<N>, N - 1>& rows);
+
+template <>
+Point<2> normal_of<2>(const std::array<Point<2>, 1>& rows) {
+    return {rows[0][1], -rows[0][0]};
+}
+
+template <>
+Point<3> normal_of<3>(const std::array<Point<3>, 2>& rows) {
+    const auto& [u, v] = rows;
+    return {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
+}
+
+template <>
+Point<4> normal_of<4>(const std::array<Point<4>, 3>& rows) {
+    Point<4> out;
+    for (int skip = 0; skip < 4; ++skip) {
+        std::array<Point<3>, 3> m;
+        for (int r = 0; r < 3; ++r)
+            for (int c = 0, to = 0; c < 4; ++c)
+                if (c != skip) m[r][to++] = rows[r][c];
+        const double minor = dot<3>(m[0], normal_of<3>({m[1], m[2]}));
+        out[skip] = skip % 2 == 0 ? minor : -minor;
+    }
+    return out;
+}
+
+template <int N>
+class Hull {
+public:
+    Hull(const std::vector<Point<N>>& points, const std::vector<Simplex<N>>& simplices,
+         const std::vector<HalfSpace<N>>& limits)
+        : points_(points),
+          simplices_(simplices),
+          planes_(simplices.size()),
+          stars_(points.size()),
+          links_(points.size()),
+          touched_(points.size(), 0),
+          limits_(limits) {
+        for (int s = 0; s < static_cast<int>(simplices_.size()); ++s)
+            for (int v : simplices_[s]) stars_[v].push_back(s);
+        Point<N> centre{};
+        for (std::size_t v = 0; v < points_.size(); ++v) {
+            if (stars_[v].empty()) continue;
+            ++left_;
+            for (int i = 0; i < N; ++i) centre[i] += points_[v][i];
+        }
+        for (double& x : centre) x /= left_;
+        for (int s = 0; s < static_cast<int>(simplices_.size()); ++s) {
+            planes_[s] = plane_of(simplices_[s]);
+            if (dot<N>(planes_[s].a, centre) < planes_[s].b) continue;
+            std::swap(simplices_[s][0], simplices_[s][1]);
+            planes_[s] = plane_of(simplices_[s]);
+        }
+    }
+
+    std::vector<Point<N>> simplify(int target) {
+        for (int v = 0; v < static_cast<int>(points_.size()); ++v)
+            for (int w : neighbours(v))
+                if (v < w) evaluate(v, w);
+        while (left_ > target && !queue_.empty()) {
+            const Entry entry = queue_.top();
+            queue_.pop();
+            const auto current = stamp_.find({entry.a, entry.b});
+            if (current == stamp_.end() || current->second != entry.stamp) continue;
+            // Facets around it changed since: what it costs now may not be the least any more.
+            if (std::max(touched_[entry.a], touched_[entry.b]) > entry.stamp)
+                evaluate(entry.a, entry.b);
+            else
+                contract(entry);
+        }
+        std::vector<Point<N>> out;
+        for (std::size_t v = 0; v < points_.size(); ++v)
+            if (!stars_[v].empty()) out.push_back(points_[v]);
+        return out;
+    }
+
+private:
+    struct Entry {
+        double volume;
+        int a, b;
+        long stamp;
+        Point<N> x;
+        bool operator<(const Entry& o) const {  // the queue's top is the smallest volume
+            if (volume != o.volume) return volume > o.volume;
+            return a != o.a ? a > o.a : b > o.b;
+        }
+    };
+
+    /// The facet's outward normal, of (N - 1)! times its area, and its place: a . x = b on it.
+    HalfSpace<N> plane_of(const Simplex<N>& s) const {
+        std::array<Point<N>, N - 1> rows;
+        for (int r = 1; r < N; ++r)
+            for (int i = 0; i < N; ++i) rows[r - 1][i] = points_[s[r]][i] - points_[s[0]][i];
+        const Point<N> a = normal_of<N>(rows);
+        return {a, dot<N>(a, points_[s[0]])};
+    }
+
+    std::vector<int> neighbours(int v) const {
+        std::vector<int> out;
+        for (int s : stars_[v])
+            for (int w : simplices_[s])
+                if (w != v) out.push_back(w);
+        std::sort(out.begin(), out.end());
+        out.erase(std::unique(out.begin(), out.end()), out.end());
+        return out;
+    }
+
+    bool has(int s, int v) const {
+        return std::find(simplices_[s].begin(), simplices_[s].end(), v) != simplices_[s].end();
+    }
+
+    /// All faces of the simplices around v (and w, unless w is v) without v and w.
+    std::vector<FaceKey> link(int v, int w) const {
+        std::vector<FaceKey> out;
+        for (int s : stars_[v]) {
+            if (!has(s, w)) continue;
+            std::array<int, N> rest;
+            int count = 0;
+            for (int u : simplices_[s])
+                if (u != v && u != w) rest[count++] = u;
+            sort_few(rest.data(), count);
+            for (int subset = 1; subset < 1 << count; ++subset) {
+                FaceKey face = 0;
+                for (int i = 0; i < count; ++i)
+                    if (subset >> i & 1) face = with_vertex(face, rest[i]);
+                out.push_back(face);
+            }
+        }
+        std::sort(out.begin(), out.end());
+        out.erase(std::unique(out.begin(), out.end()), out.end());
+        return out;
+    }
+
+    const std::vector<FaceKey>& link_of(int v) {
+        if (links_[v].empty()) links_[v] = link(v, v);
+        return links_[v];
+    }
+
+    /// Whether the hull stays a sphere when a and b become one: what both touch must be what the
+    /// edge between them touches (the link condition of Dey et al. 1999).
+    bool contractible(int a, int b) {
+        const std::vector<FaceKey>&of_a = link_of(a), &of_b = link_of(b);
+        std::vector<FaceKey> shared;
+        std::set_intersection(of_a.begin(), of_a.end(), of_b.begin(), of_b.end(),
+                              std::back_inserter(shared));
+        return shared == link(a, b);
+    }
+
+    /// Queues the edge with what its contraction adds now, or leaves it out where it cannot be.
+    void evaluate(int a, int b) {
+        if (a > b) std::swap(a, b);
+        stamp_.erase({a, b});
+        waiting_.insert({a, b});
+        if (!contractible(a, b)) return;
+        std::vector<int> around;
+        std::set_union(stars_[a].begin(), stars_[a].end(), stars_[b].begin(), stars_[b].end(),
+                       std::back_inserter(around));
+        Point<N> objective{};
+        double constant = 0;
+        std::vector<HalfSpace<N>> constraints(limits_);
+        for (int s : around) {
+            HalfSpace<N> plane = planes_[s];
+            for (int i = 0; i < N; ++i) objective[i] += plane.a[i];
+            constant -= plane.b;
+            const double length = std::sqrt(dot<N>(plane.a, plane.a));
+            if (length < kThin) continue;
+            for (double& x : plane.a) x /= length;
+            plane.b /= length;
+            constraints.push_back(plane);
+        }
+        Point<N> low, high;
+        low.fill(-kBound);
+        high.fill(1 + kBound);
+        const auto x = minimise_by_need<N>(objective, constraints, low, high);
+        if (!x) return;
+        waiting_.erase({a, b});
+        stamp_[{a, b}] = ++clock_;
+        queue_.push({std::max(0.0, dot<N>(objective, *x) + constant), a, b, clock_, *x});
+    }
+
+    void contract(const Entry& entry) {
+        const int a = entry.a, b = entry.b;
+        for (int w : neighbours(b)) {
+            const std::pair<int, int> edge{std::min(b, w), std::max(b, w)};
+            stamp_.erase(edge);
+            waiting_.erase(edge);
+        }
+        std::vector<int> star;
+        for (int s : stars_[a])
+            if (!has(s, b)) star.push_back(s);
+        for (int s : stars_[b]) {
+            if (has(s, a)) {
+                for (int v : simplices_[s])
+                    if (v != a && v != b)
+                        stars_[v].erase(std::find(stars_[v].begin(), stars_[v].end(), s));
+                continue;
+            }
+            std::replace(simplices_[s].begin(), simplices_[s].end(), b, a);
+            star.push_back(s);
+        }
+        std::sort(star.begin(), star.end());
+        stars_[a] = star;
+        stars_[b].clear();
+        points_[a] = entry.x;
+        --left_;
+        ++clock_;
+        for (int s : star) planes_[s] = plane_of(simplices_[s]);
+        const std::vector<int> ring = neighbours(a);
+        touched_[a] = clock_;
+        links_[a].clear();
+        for (int w : ring) {
+            touched_[w] = clock_;
+            links_[w].clear();
+        }
+        for (int w : ring) evaluate(a, w);
+        // Of the other edges whose facets changed, those in the queue wait until their turn; those
+        // that could not be contracted may be so now.
+        std::set<std::pair<int, int>> again;
+        for (int v : ring)
+            for (int w : neighbours(v)) {
+                const std::pair<int, int> edge{std::min(v, w), std::max(v, w)};
+                if (w != a && waiting_.count(edge) != 0) again.insert(edge);
+            }
+        for (const auto& [v, w] : again) evaluate(v, w);
+    }
+
+    std::vector<Point<N>> points_;
+    std::vector<Simplex<N>> simplices_;
+    std::vector<HalfSpace<N>> planes_;
+    std::vector<std::vector<int>> stars_;      // facets at each vertex, increasing
+    std::vector<std::vector<FaceKey>> links_;  // of those vertices that were asked for
+    std::vector<long> touched_;                // when a facet at the vertex last changed
+    std::vector<HalfSpace<N>> limits_;
+    std::map<std::pair<int, int>, long> stamp_;
+    std::set<std::pair<int, int>> waiting_;  // edges that cannot be contracted at present
+    std::priority_queue<Entry> queue_;
+    long clock_ = 0;
+    int left_ = 0;
+};
+
+template <int N>
+void check(const std::vector<Point<N>>& points, const std::vector<Simplex<N>>& simplices,
+           const std::vector<Limit<N>>& limits) {
+    for (const Point<N>& p : points)
+        for (double x : p)
+            if (!std::isfinite(x))
+                throw std::invalid_argument("a progressive hull needs finite points");
+    for (const Limit<N>& limit : limits)
+        if (!std::isfinite(limit.b) || !std::isfinite(dot<N>(limit.a, limit.a)))
+            throw std::invalid_argument("a progressive hull needs finite limits");
+    if (points.size() > kMostPoints)
+        throw std::invalid_argument("a progressive hull takes at most " +
+                                    std::to_string(kMostPoints) + " points, found " +
+                                    std::to_string(points.size()));
+    std::vector<FaceKey> ridges;
+    for (const Simplex<N>& s : simplices) {
+        for (int v : s)
+            if (v < 0 || v >= static_cast<int>(points.size()))
+                throw std::invalid_argument("a facet names point " + std::to_string(v) + " of " +
+                                            std::to_string(points.size()));
+        Simplex<N> sorted = s;
+        sort_few(sorted.data(), N);
+        for (int skip = 0; skip < N; ++skip) {
+            FaceKey ridge = 0;
+            for (int i = 0; i < N; ++i)
+                if (i != skip) ridge = with_vertex(ridge, sorted[i]);
+            ridges.push_back(ridge);
+        }
+    }
+    std::sort(ridges.begin(), ridges.end());
+    bool closed = !ridges.empty();
+    for (std::size_t i = 0; i < ridges.size(); i += 2)
+        closed &= i + 1 < ridges.size() && ridges[i] == ridges[i + 1] &&
+                  (i + 2 >= ridges.size() || ridges[i + 2] != ridges[i]);
+    if (!closed)
+        throw std::invalid_argument(
+            "a progressive hull needs a closed hull, each ridge between two facets");
+}
+
+}  // namespace
+
+template <int N>
+std::vector<std::array<double, N>> progressive_hull_nd(
+    const std::vector<std::array<double, N>>& points,
+    const std::vector<std::array<int, N>>& simplices, int target,
+    const std::vector<Limit<N>>& limits) {
+    check<N>(points, simplices, limits);
+    // The bounds and tolerances are meant for unit size; volumes keep their order.
+    Point<N> low = points[simplices[0][0]], extent{};
+    for (const Simplex<N>& s : simplices)
+        for (int v : s)
+            for (int i = 0; i < N; ++i) low[i] = std::min(low[i], points[v][i]);
+    for (const Simplex<N>& s : simplices)
+        for (int v : s)
+            for (int i = 0; i < N; ++i) extent[i] = std::max(extent[i], points[v][i] - low[i]);
+    for (double& x : extent)
+        if (!(x > 0)) x = 1;
+    std::vector<Point<N>> unit(points);
+    for (Point<N>& p : unit)
+        for (int i = 0; i < N; ++i) p[i] = (p[i] - low[i]) / extent[i];
+    std::vector<HalfSpace<N>> bounds;
+    for (const Limit<N>& limit : limits) {
+        HalfSpace<N> bound{limit.a, limit.b - dot<N>(limit.a, low)};
+        for (int i = 0; i < N; ++i) bound.a[i] *= extent[i];
+        const double length = std::sqrt(dot<N>(bound.a, bound.a));
+        if (!(length > 0)) continue;
+        for (double& x : bound.a) x /= length;
+        bound.b /= length;
+        bounds.push_back(bound);
+    }
+    std::vector<Point<N>> out = Hull<N>(unit, simplices, bounds).simplify(std::max(N + 1, target));
+    for (Point<N>& p : out)
+        for (int i = 0; i < N; ++i) p[i] = low[i] + extent[i] * p[i];
+    return out;
+}
+
+template std::vector<std::array<double, 2>> progressive_hull_nd<2>(
+    const std::vector<std::array<double, 2>>&, const std::vector<std::array<int, 2>>&, int,
+    const std::vector<Limit<2>>&);
+template std::vector<std::array<double, 3>> progressive_hull_nd<3>(
+    const std::vector<std::array<double, 3>>&, const std::vector<std::array<int, 3>>&, int,
+    const std::vector<Limit<3>>&);
+template std::vector<std::array<double, 4>> progressive_hull_nd<4>(
+    const std::vector<std::array<double, 4>>&, const std::vector<std::array<int, 4>>&, int,
+    const std::vector<Limit<4>>&);
+
+}  // namespace palette4d

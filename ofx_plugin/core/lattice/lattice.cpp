@@ -1,0 +1,210 @@
+#include "lattice/lattice.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "lattice/lattice_store.hpp"
+#include "recolour/exact_worker.hpp"
+#include "simd/kernel_choice.hpp"
+
+namespace palette4d {
+
+/// Blocks of pixels with some in cells that nobody has made yet wait until there are a few of them,
+/// for the cells to be made many at a time and yet before too many others wait for the same; pixels
+/// in parts that are not good enough go on to the exact worker.
+class Lattice::Worker final : public RowWorker {
+public:
+    Worker(const Recolourer& recolourer, Store& store, const RecolourOptions& options, int channels)
+        : store_(store),
+          kernels_(kernels_of<LatticeKernels>(options.instructions)),
+          strength_(static_cast<float>(options.strength)),
+          premultiplied_(options.premultiplied),
+          channels_(channels),
+          exact_(exact_worker(recolourer, options, channels)),
+          builder_(store, options.instructions) {
+        waiting_.reserve(kMostLeft + kWaiting);
+    }
+
+    void row(const float* in, float* out, int width) override {
+        for (int x = 0; x < width; x += kSize) {
+            const int count = std::min(kSize, width - x);
+            const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(x) * channels_;
+            const float* from = in + at;
+            float* to = out + at;
+            if (x + (kAhead + 1) * kSize <= width) {
+                fetch<0>(from + kAhead * kSize * channels_);
+                fetch<1>(to + kAhead * kSize * channels_);
+            }
+            if (!block(from, to, count)) waiting_.push_back({from, to, count});
+            if (waiting_.size() >= left_ + kWaiting) {
+                do_waiting(kMostLeft);
+                left_ = waiting_.size();
+            }
+        }
+    }
+
+    void finish() override {
+        do_waiting(0);
+        left_ = 0;
+        check_samples();
+        exact_->finish();
+    }
+
+    RecolourCounts counts() const override {
+        RecolourCounts all = exact_->counts();
+        all.interpolated = interpolated_;
+        return all;
+    }
+
+private:
+    static constexpr int kSize = LatticeBlock::kSize;
+    static constexpr std::size_t kWaiting = 16, kMostLeft = 256;
+    static constexpr int kSampleEvery = 16;  ///< blocks; a pixel of one is also evaluated exactly
+
+    /// Blocks that are asked of memory early: work on one takes as long as that.
+    static constexpr int kAhead = 2;
+
+    struct Waiting {
+        const float* from;
+        float* to;
+        int count;
+    };
+
+    template <int Write>
+    void fetch(const float* block) const {
+#if defined(__GNUC__)
+        constexpr int kLine = 64 / sizeof(float);
+        for (int i = 0; i < kSize * channels_; i += kLine) __builtin_prefetch(block + i, Write);
+#endif
+    }
+
+    /// False when some of its pixels' cells or parts have to be made first.
+    bool block(const float* from, float* to, int count) {
+        LatticeBlock& b = block_;
+        kernels_.locate(store_.domain(), b, from, channels_, count, premultiplied_);
+        std::int32_t others = look_up(count);
+        while (others < 0) {
+            kernels_.descend(b, count);
+            others = look_up(count);
+        }
+        if ((others & kLatticeKind) != 0 && !claim(count)) return false;
+        if (others >= kLatticeFirstPlane) {
+            others |= kernels_.choose_sides(store_.planes(), b, count);
+        }
+        kernels_.weigh(b, count);
+        if (blocks_++ % kSampleEvery == 0) sample(static_cast<int>(blocks_ % count));
+        kernels_.blend(store_.nodes(), b, count, from, to, channels_, strength_, premultiplied_);
+        interpolated_ += count;
+        if ((others & kLatticeKind) == 0) return true;
+        for (int i = 0; i < count; ++i) {
+            if (b.state[i] == Store::kExact) {
+                exact_->pixel(from + i * channels_, to + i * channels_);
+                --interpolated_;
+            }
+        }
+        return true;
+    }
+
+    /// The states in block_, and together in what they differ from kGood: below 0 when some are
+    /// cut.
+    std::int32_t look_up(int count) {
+        int* const states = block_.state;
+        const int* const numbers = block_.number;
+        const Store::State* const table = &store_.state(0);
+        for (int i = 0; i < count; ++i) {
+            states[i] = table[numbers[i]].load(std::memory_order_acquire);
+        }
+        std::int32_t others = 0;
+        for (int i = 0; i < count; ++i) others |= states[i] ^ Store::kGood;
+        return others;
+    }
+
+    /// What has to be made, by this thread unless another is at it. True when there is nothing.
+    bool claim(int count) {
+        bool made = true;
+        for (int i = 0; i < count; ++i) {
+            const std::int32_t state = block_.state[i];
+            if ((state & kLatticeKind) != Store::kGood && state != Store::kExact) {
+                made = false;
+                builder_.claim(block_.number[i], block_.state[i]);
+            }
+        }
+        return made;
+    }
+
+    /// Leaves no more than so many blocks, which wait for what other threads make.
+    void do_waiting(std::size_t most_left) {
+        const auto done = [&](const Waiting& w) { return block(w.from, w.to, w.count); };
+        for (;;) {
+            builder_.run();
+            waiting_.erase(std::remove_if(waiting_.begin(), waiting_.end(), done), waiting_.end());
+            if (builder_.claimed()) continue;
+            if (waiting_.size() <= most_left) return;
+            std::this_thread::yield();
+        }
+    }
+
+    void sample(int i) {
+        if (block_.state[i] == Store::kExact) return;
+        for (int c = 0; c < 3; ++c) {
+            float moved = 0;
+            for (int k = 0; k < 4; ++k) {
+                moved += block_.weight[k][i] * store_.nodes()[block_.corner[k][i] / 4 + c];
+            }
+            sampled_.push_back(block_.colour[c][i]);
+            sampled_moves_.push_back(moved);
+        }
+        if (sampled_.size() >= 3 * 1024) check_samples();
+    }
+
+    void check_samples() {
+        const float* const exact = builder_.displacements(sampled_.data(), sampled_.size() / 3);
+        double largest = 0;
+        for (std::size_t i = 0; i < sampled_.size(); ++i) {
+            largest = std::max(largest, lattice_error(static_cast<double>(sampled_[i]),
+                                                      static_cast<double>(exact[i]),
+                                                      static_cast<double>(sampled_moves_[i]) -
+                                                          static_cast<double>(exact[i])));
+        }
+        store_.saw_error(largest);
+        sampled_.clear();
+        sampled_moves_.clear();
+    }
+
+    Store& store_;
+    const LatticeKernels kernels_;
+    const float strength_;
+    const bool premultiplied_;
+    const int channels_;
+    std::unique_ptr<ExactWorker> exact_;
+    Store::Builder builder_;
+    LatticeBlock block_{};
+    std::vector<Waiting> waiting_;
+    std::size_t left_ = 0;  ///< of those, when some were done last
+    std::vector<float> sampled_, sampled_moves_;
+    long long interpolated_ = 0, blocks_ = 0;
+};
+
+Lattice::Lattice(std::shared_ptr<const Recolourer> recolourer)
+    : recolourer_(std::move(recolourer)) {
+    if (!recolourer_) throw std::invalid_argument("lattice: no recolourer");
+    if (recolourer_->moves()) store_ = std::make_unique<Store>(*recolourer_);
+}
+
+Lattice::~Lattice() = default;
+
+double Lattice::largest_error() const { return store_ ? store_->largest_error() : 0.0; }
+
+Lattice::Size Lattice::size() const { return store_ ? store_->size() : Size{}; }
+
+std::unique_ptr<RowWorker> Lattice::worker(const RecolourOptions& options, int channels) const {
+    if (options.precision == Precision::kDouble || options.strength <= 0 || options.strength > 1) {
+        return recolourer_->worker(options, channels);
+    }
+    return std::make_unique<Worker>(*recolourer_, *store_, options, channels);
+}
+
+}  // namespace palette4d

@@ -1,0 +1,144 @@
+// Where the nodes, cells and parts of a Lattice are, and how they lie to each other. In an unnamed
+// namespace, as four.hpp.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+
+#include "lattice/lattice_store.hpp"
+#include "simd/four.hpp"
+
+namespace palette4d {
+namespace {
+
+constexpr int kSide = kLatticeSide, kNodeSide = kSide + 1;
+
+/// Of one of the eight corners or parts of something, along an axis: number 4 x + 2 y + z.
+constexpr int bit(int corner, int axis) { return corner >> (2 - axis) & 1; }
+
+/// Of a brick: along each axis, in halves of what it cuts.
+struct BrickPlaces {
+    float at[kBrickNodes][4]{};
+    constexpr BrickPlaces() {
+        for (int node = 0; node < kBrickNodes; ++node) {
+            at[node][0] = static_cast<float>(node / 9);
+            at[node][1] = static_cast<float>(node / 3 % 3);
+            at[node][2] = static_cast<float>(node % 3);
+        }
+    }
+};
+constexpr BrickPlaces kPlaces;
+
+/// Where the interpolation of a cell or part is looked at: the other nodes of the brick that it
+/// would be cut into, the middles of it and of its faces, then those of its edges. Each corner has
+/// a part in one, so that a crease that cuts a corner off is seen as well.
+struct Probes {
+    static constexpr std::size_t kMiddles = 7, kAll = 19;
+    struct Probe {
+        int node;     ///< of the brick
+        int ends[2];  ///< it is half way between these two corners
+    };
+    Probe all[kAll]{};
+
+    constexpr Probes() {
+        std::size_t middles = 0, edges = kMiddles;
+        for (int node = 0; node < kBrickNodes; ++node) {
+            const int x = node / 9, y = node / 3 % 3, z = node % 3;
+            const int halves = (x == 1) + (y == 1) + (z == 1);
+            if (halves == 0) continue;
+            all[halves > 1 ? middles++ : edges++] = {
+                node,
+                {4 * (x / 2) + 2 * (y / 2) + z / 2,
+                 4 * ((x + 1) / 2) + 2 * ((y + 1) / 2) + (z + 1) / 2}};
+        }
+    }
+};
+constexpr Probes kProbes;
+
+/// The lines through 3 x 3 x 3 nodes that edges of the tetrahedra lie on, three nodes each.
+struct Lines {
+    static constexpr std::size_t kCount = 37, kTouching = 19;
+    struct Line {
+        int middle, step;
+    };
+    Line all[kCount]{};
+    int of_part[8][kTouching]{};  ///< those that touch one of the eight parts
+
+    constexpr Lines() {
+        int count = 0, touching[8] = {};
+        for (int direction = 1; direction < 8; ++direction) {
+            for (int node = 0; node < kBrickNodes; ++node) {
+                const int at[3] = {node / 9, node / 3 % 3, node % 3};
+                bool middle = true;
+                for (int c = 0; c < 3; ++c) middle &= !bit(direction, c) || at[c] == 1;
+                if (!middle) continue;
+                for (int part = 0; part < 8; ++part) {
+                    bool touches = true;
+                    for (int c = 0; c < 3; ++c) {
+                        touches &= bit(direction, c) || at[c] == 1 || at[c] / 2 == bit(part, c);
+                    }
+                    if (touches) of_part[part][touching[part]++] = count;
+                }
+                all[count++] = {node,
+                                9 * bit(direction, 0) + 3 * bit(direction, 1) + bit(direction, 2)};
+            }
+        }
+    }
+};
+constexpr Lines kLines;
+
+struct Cell {
+    int x, y, z;
+    int first_node() const { return (x * kNodeSide + y) * kNodeSide + z; }
+};
+
+inline Cell cell_at(int number) {
+    return {number / (kSide * kSide), number / kSide % kSide, number % kSide};
+}
+
+/// Of a group that is known by its first cell.
+inline int group_cell(int group, int part) {
+    return group + (bit(part, 0) * kSide + bit(part, 1)) * kSide + bit(part, 2);
+}
+
+/// Of the group that a cell is in.
+inline int group_of(int number) {
+    const Cell cell = cell_at(number);
+    return number - (cell.x % 2 * kSide + cell.y % 2) * kSide - cell.z % 2;
+}
+
+inline LatticePlace place_of(const Cell& cell) {
+    return {{kCellWidth * static_cast<float>(cell.x), kCellWidth * static_cast<float>(cell.y),
+             kCellWidth * static_cast<float>(cell.z), 0}};
+}
+
+/// Places are whole numbers, so that a place has one colour, whatever it is counted from.
+inline Four colour_at(const float* low, const float* step, Four place) {
+    return load_four(low) + place * load_four(step);
+}
+
+struct Point {
+    float at[4];
+};
+/// Of something that is so wide from there on.
+inline Point centre_of(const float* low, const float* step, const LatticePlace& place,
+                       float half_width) {
+    Point centre;
+    store_four(centre.at, colour_at(low, step, load_four(place.at) + all_four(half_width)));
+    return centre;
+}
+
+/// What errors are measured in, as lattice_error() does.
+inline Four size_of(Four colour, Four moved) {
+    const Four exact = colour + moved, least = all_four(0.1f);
+    return where_negative(colour * exact, least, max(abs(exact), least));
+}
+
+inline float largest_of(Four error) { return std::max(std::max(error[0], error[1]), error[2]); }
+
+inline Four relative(Four error, Four colour, Four moved) {
+    return abs(error) / size_of(colour, moved);
+}
+
+}  // namespace
+}  // namespace palette4d

@@ -1,0 +1,84 @@
+// The 4D skew polytope of section 4.1: vertices in RGB + time, inter-frame edges, and per-block
+// topology. Immutable once built; every constructor path goes through validation.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+namespace palette4d {
+
+using Vec3 = std::array<double, 3>;
+using Face = std::array<int, 3>;
+
+/// A palette colour at a time. `rgb` is in the clip's own encoding (any finite value), `frame` is
+/// the time t in the clip's frame numbers (not normalised; may be fractional).
+struct Vertex {
+    std::string id;
+    Vec3 rgb;
+    double frame;
+};
+
+/// An inter-frame edge; `from` and `to` index vertices and vertices[from].frame <
+/// vertices[to].frame.
+struct Edge {
+    std::string id;
+    int from;
+    int to;
+};
+
+/// A stretch of time in which the sliced palette has one topology: a block (section 5.3.1), closed
+/// [first, last], or the transition between two adjacent blocks, open (first, last).
+///
+/// A track is one palette colour through that time: vertex indices in increasing frame order, each
+/// consecutive pair joined by an edge, covering [first, last] (it may begin before and end after:
+/// an edge runs through block boundaries once boundary vertices were removed). A track of one
+/// vertex is allowed only when first == last == that vertex's frame. `faces` are triangles of track
+/// indices: a closed 2-manifold, each directed edge once, seen anticlockwise from outside. Palettes
+/// of one colour (1 track) and of a line of colours (2 tracks) have no faces; a flat palette is a
+/// two-sided polygon.
+struct Section {
+    double first;
+    double last;
+    bool transition;
+    std::vector<std::vector<int>> tracks;
+    std::vector<Face> faces;
+};
+
+/// What is wrong with a polytope, and where: `pointer` is relative to the polytope, in the terms of
+/// the sidecar ("/blocks/1/faces/3", "/transitions/0/tracks/2", "/edges/5/from").
+struct PolytopeProblem {
+    std::string pointer;
+    std::string found;
+    std::string expected;
+};
+
+class Polytope {
+public:
+    Polytope() = default;
+    /// Blocks and transitions alternate: sections[0] is a block, then transition, block, …
+    /// Throws SidecarError (empty file name) when an invariant does not hold.
+    Polytope(std::vector<Vertex> vertices, std::vector<Edge> edges, std::vector<Section> sections);
+
+    const std::vector<Vertex>& vertices() const { return vertices_; }
+    const std::vector<Edge>& edges() const { return edges_; }
+    const std::vector<Section>& sections() const { return sections_; }
+    double first_frame() const { return sections_.front().first; }
+    double last_frame() const { return sections_.back().last; }
+    /// Index of the edge from -> to, or -1.
+    int find_edge(int from, int to) const;
+    /// Index of the vertex / edge with that id, or -1.
+    int find_vertex(const std::string& id) const;
+    int find_edge(const std::string& id) const;
+    /// The section whose topology holds at `frame` (clamped to the clip). Blocks win at their ends.
+    int section_at(double frame) const;
+
+private:
+    std::vector<Vertex> vertices_;
+    std::vector<Edge> edges_;
+    std::vector<Section> sections_;
+    // Indices in sorted order, for binary searches.
+    std::vector<int> edges_by_ends_, vertices_by_id_, edges_by_id_;
+};
+
+}  // namespace palette4d

@@ -1,0 +1,360 @@
+#include "model/polytope_validation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <set>
+#include <unordered_set>
+#include <utility>
+
+#include "model/sidecar_error.hpp"
+
+namespace palette4d {
+namespace {
+
+constexpr std::size_t kMaxVertices = 100000;
+constexpr std::size_t kMaxTracks = 4096;
+constexpr double kMaxColour = 1e6;
+constexpr double kMaxFrame = 1e9;
+
+[[noreturn]] void fail(const std::string& pointer, const std::string& found,
+                       const std::string& expected) {
+    throw SidecarError("", pointer, found, expected);
+}
+
+std::string text(double number) {
+    char buffer[40];
+    std::snprintf(buffer, sizeof buffer, "%.15g", number);
+    return buffer;
+}
+
+std::string text(std::size_t count) { return std::to_string(count); }
+
+bool within(double number, double limit) {
+    return std::isfinite(number) && std::abs(number) <= limit;
+}
+
+/// Checks one section, and names its parts in problems.
+class SectionCheck {
+public:
+    SectionCheck(const Polytope& polytope, std::size_t index)
+        : polytope_(polytope),
+          section_(polytope.sections()[index]),
+          place_((section_.transition ? "/transitions/" : "/blocks/") + text(index / 2)) {}
+
+    const std::string& place() const { return place_; }
+    std::string track_place(std::size_t track) const { return place_ + "/tracks/" + text(track); }
+
+    void tracks() const {
+        const auto& tracks = section_.tracks;
+        if (tracks.empty() || tracks.size() > kMaxTracks) {
+            fail(place_ + "/tracks", text(tracks.size()) + " tracks",
+                 "between 1 and " + text(kMaxTracks) + " tracks");
+        }
+        for (std::size_t i = 0; i < tracks.size(); ++i) track(i);
+        std::set<std::vector<int>> seen;
+        for (std::size_t i = 0; i < tracks.size(); ++i) {
+            if (!seen.insert(tracks[i]).second) {
+                fail(track_place(i), "the same track a second time", "each track once");
+            }
+        }
+    }
+
+    void faces() const {
+        const std::size_t tracks = section_.tracks.size();
+        const auto& faces = section_.faces;
+        if (tracks < 3) {
+            if (!faces.empty()) {
+                fail(place_ + "/faces", text(faces.size()) + " faces",
+                     "no faces in a palette of " + text(tracks) +
+                         (tracks == 1 ? " colour" : " colours"));
+            }
+            return;
+        }
+        closed_surface(static_cast<int>(tracks));
+        sphere(static_cast<int>(tracks));
+    }
+
+    /// Where track i passes a boundary of the section: a vertex (twice the same index) or an edge.
+    std::pair<int, int> passage(std::size_t i, double frame) const {
+        const auto& track = section_.tracks[i];
+        const auto after =
+            std::upper_bound(track.begin(), track.end(), frame,
+                             [this](double t, int vertex) { return t < frame_of(vertex); });
+        const int before = *(after - 1);  // exists: the track covers the section
+        if (frame_of(before) == frame) return {before, before};
+        return {before, *after};
+    }
+
+private:
+    double frame_of(int vertex) const { return polytope_.vertices()[vertex].frame; }
+
+    void track(std::size_t i) const {
+        const auto& track = section_.tracks[i];
+        const std::string place = track_place(i);
+        if (track.empty()) fail(place, "an empty track", "at least one vertex");
+        const int count = static_cast<int>(polytope_.vertices().size());
+        for (std::size_t j = 0; j < track.size(); ++j) {
+            const std::string entry = place + "/" + text(j);
+            if (track[j] < 0 || track[j] >= count) {
+                fail(entry, "vertex index " + std::to_string(track[j]),
+                     "an index below " + std::to_string(count));
+            }
+            if (j > 0 && polytope_.find_edge(track[j - 1], track[j]) < 0) {
+                const auto& vertices = polytope_.vertices();
+                fail(entry,
+                     "no edge from \"" + vertices[track[j - 1]].id + "\" to \"" +
+                         vertices[track[j]].id + '"',
+                     "an edge between each two vertices of a track, forwards in time");
+            }
+        }
+        const double begins = frame_of(track.front()), ends = frame_of(track.back());
+        if (begins > section_.first || ends < section_.last) {
+            fail(place, "a track from frame " + text(begins) + " to " + text(ends),
+                 "a track that covers " + text(section_.first) + " to " + text(section_.last));
+        }
+        if (section_.transition && track.size() != 2) {
+            fail(place, "a track of " + text(track.size()) + " vertices",
+                 "exactly one edge through a transition");
+        }
+    }
+
+    /// Indices in range, and every directed edge exactly once with its opposite present.
+    void closed_surface(int tracks) const {
+        const auto& faces = section_.faces;
+        std::set<std::pair<int, int>> directed;
+        for (std::size_t f = 0; f < faces.size(); ++f) {
+            const Face& face = faces[f];
+            for (std::size_t k = 0; k < 3; ++k) {
+                if (face[k] < 0 || face[k] >= tracks) {
+                    fail(face_place(f) + "/" + text(k), "track index " + std::to_string(face[k]),
+                         "an index below " + std::to_string(tracks));
+                }
+            }
+            if (face[0] == face[1] || face[1] == face[2] || face[2] == face[0]) {
+                fail(face_place(f), "a corner twice", "three different tracks");
+            }
+            for (std::size_t k = 0; k < 3; ++k) {
+                if (!directed.insert({face[k], face[(k + 1) % 3]}).second) {
+                    fail(face_place(f),
+                         "the side " + side(face[k], face[(k + 1) % 3]) + " a second time",
+                         "each side once in each direction (faces anticlockwise from outside)");
+                }
+            }
+        }
+        for (std::size_t f = 0; f < faces.size(); ++f) {
+            for (std::size_t k = 0; k < 3; ++k) {
+                if (directed.count({faces[f][(k + 1) % 3], faces[f][k]}) == 0) {
+                    fail(face_place(f),
+                         "no neighbour across the side " + side(faces[f][k], faces[f][(k + 1) % 3]),
+                         "a closed surface");
+                }
+            }
+        }
+    }
+
+    /// Every track used, one ring of faces around each (so nothing is pinched), in one piece, and
+    /// vertices - edges + faces = 2. Needs a closed surface.
+    void sphere(int tracks) const {
+        const auto& faces = section_.faces;
+        std::vector<std::vector<std::pair<int, int>>> around(static_cast<std::size_t>(tracks));
+        for (const Face& face : faces) {
+            for (std::size_t k = 0; k < 3; ++k) {
+                around[face[k]].push_back({face[(k + 1) % 3], face[(k + 2) % 3]});
+            }
+        }
+        for (int track = 0; track < tracks; ++track) {
+            auto& ring = around[track];
+            if (ring.empty()) {
+                fail(track_place(static_cast<std::size_t>(track)), "a track without faces",
+                     "every track in at least one face");
+            }
+            std::sort(ring.begin(), ring.end());
+            std::size_t steps = 0;
+            int at = ring.front().first;
+            do {
+                at = std::lower_bound(ring.begin(), ring.end(), std::make_pair(at, -1))->second;
+                ++steps;
+            } while (at != ring.front().first && steps <= ring.size());
+            if (steps != ring.size()) {
+                fail(place_ + "/faces",
+                     "more than one ring of faces around track " + std::to_string(track),
+                     "one ring of faces around each track");
+            }
+        }
+        std::vector<int> pending{0};
+        std::vector<bool> reached(static_cast<std::size_t>(tracks), false);
+        reached[0] = true;
+        int count = 1;
+        while (!pending.empty()) {
+            const int track = pending.back();
+            pending.pop_back();
+            for (const auto& [next, unused] : around[track]) {
+                if (reached[next]) continue;
+                reached[next] = true;
+                ++count;
+                pending.push_back(next);
+            }
+        }
+        if (count != tracks) {
+            fail(place_ + "/faces",
+                 "faces in pieces (" + std::to_string(count) + " of " + std::to_string(tracks) +
+                     " tracks hang together with track 0)",
+                 "one connected surface");
+        }
+        // Closed: as many sides as 3 f / 2, so v - e + f = 2 is f = 2 v - 4.
+        const std::size_t expected = 2 * static_cast<std::size_t>(tracks) - 4;
+        if (faces.size() != expected) {
+            fail(place_ + "/faces", text(faces.size()) + " faces",
+                 text(expected) + " faces, a sphere of " + std::to_string(tracks) + " tracks");
+        }
+    }
+
+    std::string face_place(std::size_t f) const { return place_ + "/faces/" + text(f); }
+    static std::string side(int a, int b) { return std::to_string(a) + " to " + std::to_string(b); }
+
+    const Polytope& polytope_;
+    const Section& section_;
+    std::string place_;
+};
+
+/// What passes the boundary must be the same on both sides: every transition track starts (ends) on
+/// a track of the block, and every track of the block goes on.
+void check_continuity(const SectionCheck& block, std::size_t block_tracks,
+                      const SectionCheck& transition, std::size_t transition_tracks, double frame) {
+    std::set<std::pair<int, int>> of_block, of_transition;
+    for (std::size_t i = 0; i < block_tracks; ++i) of_block.insert(block.passage(i, frame));
+    for (std::size_t i = 0; i < transition_tracks; ++i) {
+        of_transition.insert(transition.passage(i, frame));
+    }
+    for (std::size_t i = 0; i < transition_tracks; ++i) {
+        if (of_block.count(transition.passage(i, frame)) == 0) {
+            fail(transition.track_place(i),
+                 "a track that meets no track of " + block.place() + " at frame " + text(frame),
+                 "the same vertex or edge on both sides of a boundary");
+        }
+    }
+    for (std::size_t i = 0; i < block_tracks; ++i) {
+        if (of_transition.count(block.passage(i, frame)) == 0) {
+            fail(
+                block.track_place(i),
+                "a track that meets no track of " + transition.place() + " at frame " + text(frame),
+                "the same vertex or edge on both sides of a boundary");
+        }
+    }
+}
+
+void check_times(const std::vector<Section>& sections) {
+    if (sections.empty()) fail("/blocks", "no blocks", "at least one block");
+    for (std::size_t i = 0; i < sections.size(); ++i) {
+        const Section& section = sections[i];
+        const bool transition = i % 2 == 1;
+        const std::string place = (transition ? "/transitions/" : "/blocks/") + text(i / 2);
+        if (section.transition != transition) {
+            fail(place, section.transition ? "a transition" : "a block",
+                 "blocks and transitions in turn");
+        }
+        if (!within(section.first, kMaxFrame) || !within(section.last, kMaxFrame)) {
+            fail(place, "frames " + text(section.first) + " to " + text(section.last),
+                 "frame numbers within +-" + text(kMaxFrame));
+        }
+        if (section.first > section.last) {
+            fail(place + "/last", text(section.last),
+                 "a frame at or after the block's first, " + text(section.first));
+        }
+        if (i == 0) continue;
+        if (section.first != sections[i - 1].last) {
+            fail(place, "a start at frame " + text(section.first),
+                 "a start at frame " + text(sections[i - 1].last) + ", where the " +
+                     (transition ? "block" : "transition") + " before ends");
+        }
+        if (transition && !(section.first < section.last)) {
+            fail("/blocks/" + text(i / 2 + 1) + "/first", text(section.last),
+                 "a frame after " + text(section.first) + ", the last of the block before");
+        }
+    }
+    if (sections.size() % 2 == 0) {
+        fail("/transitions/" + text(sections.size() / 2 - 1), "a transition at the end",
+             "a block after each transition");
+    }
+}
+
+}  // namespace
+
+void validate_vertices_and_edges(const std::vector<Vertex>& vertices,
+                                 const std::vector<Edge>& edges) {
+    if (vertices.empty() || vertices.size() > kMaxVertices) {
+        fail("/vertices", text(vertices.size()) + " vertices",
+             "between 1 and " + text(kMaxVertices) + " vertices");
+    }
+    std::unordered_set<std::string> ids;
+    for (std::size_t i = 0; i < vertices.size(); ++i) {
+        const Vertex& vertex = vertices[i];
+        const std::string place = "/vertices/" + text(i);
+        if (vertex.id.empty()) fail(place + "/id", "an empty id", "a non-empty id");
+        if (!ids.insert(vertex.id).second) {
+            fail(place + "/id", "the id \"" + vertex.id + "\" a second time", "an id of its own");
+        }
+        for (std::size_t c = 0; c < 3; ++c) {
+            if (!within(vertex.rgb[c], kMaxColour)) {
+                fail(place + "/rgb/" + text(c), text(vertex.rgb[c]),
+                     "a number within +-" + text(kMaxColour));
+            }
+        }
+        if (!within(vertex.frame, kMaxFrame)) {
+            fail(place + "/frame", text(vertex.frame),
+                 "a frame number within +-" + text(kMaxFrame));
+        }
+    }
+
+    ids.clear();
+    const int count = static_cast<int>(vertices.size());
+    std::set<std::pair<int, int>> ends;
+    for (std::size_t i = 0; i < edges.size(); ++i) {
+        const Edge& edge = edges[i];
+        const std::string place = "/edges/" + text(i);
+        if (edge.id.empty()) fail(place + "/id", "an empty id", "a non-empty id");
+        if (!ids.insert(edge.id).second) {
+            fail(place + "/id", "the id \"" + edge.id + "\" a second time", "an id of its own");
+        }
+        if (edge.from < 0 || edge.from >= count) {
+            fail(place + "/from", "vertex index " + std::to_string(edge.from),
+                 "an index below " + std::to_string(count));
+        }
+        if (edge.to < 0 || edge.to >= count) {
+            fail(place + "/to", "vertex index " + std::to_string(edge.to),
+                 "an index below " + std::to_string(count));
+        }
+        const double from = vertices[edge.from].frame, to = vertices[edge.to].frame;
+        if (!(from < to)) {
+            fail(place, "an edge from frame " + text(from) + " to frame " + text(to),
+                 "an edge forwards in time");
+        }
+        if (!ends.insert({edge.from, edge.to}).second) {
+            fail(place,
+                 "a second edge from \"" + vertices[edge.from].id + "\" to \"" +
+                     vertices[edge.to].id + '"',
+                 "at most one edge between two vertices");
+        }
+    }
+}
+
+void validate_sections(const Polytope& polytope) {
+    const auto& sections = polytope.sections();
+    check_times(sections);
+    std::vector<SectionCheck> checks;
+    for (std::size_t i = 0; i < sections.size(); ++i) {
+        checks.emplace_back(polytope, i);
+        checks.back().tracks();
+        checks.back().faces();
+    }
+    for (std::size_t i = 1; i < sections.size(); i += 2) {
+        const std::size_t tracks = sections[i].tracks.size();
+        check_continuity(checks[i - 1], sections[i - 1].tracks.size(), checks[i], tracks,
+                         sections[i].first);
+        check_continuity(checks[i + 1], sections[i + 1].tracks.size(), checks[i], tracks,
+                         sections[i].last);
+    }
+}
+
+}  // namespace palette4d

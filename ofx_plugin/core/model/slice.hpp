@@ -1,0 +1,38 @@
+// Slicing (section 4.1.2, eqs. 5 and 6): the polyhedral palette of one moment.
+#pragma once
+
+#include <vector>
+
+#include "model/edits.hpp"
+#include "model/polytope.hpp"
+
+namespace palette4d {
+
+/// Where a sliced vertex lies in 4D (a row of W_t in eq. 6):
+/// rgb = (1 - weight) * vertices[from].rgb + weight * vertices[to].rgb.
+/// On a vertex, from == to and weight == 0, and edge is -1.
+struct SlicePoint {
+    int edge;
+    int from;
+    int to;
+    double weight;  ///< in [0, 1)
+};
+
+/// A closed, consistently oriented triangle mesh (no faces for palettes of one or two colours).
+struct Slice {
+    double frame;  ///< after clamping to the clip
+    int section;
+    std::vector<Vec3> rgb;          ///< n original palette colours, one a track
+    std::vector<SlicePoint> where;  ///< n
+    std::vector<Face> faces;
+};
+
+/// Eq. 5 at any real frame; outside the clip, the first or last frame. NaN is an
+/// std::invalid_argument.
+Slice slice_at(const Polytope& polytope, double frame);
+
+/// The edited colours of a slice's n vertices: linear in time between edited vertices and stops.
+/// Bit-identical to slice.rgb[i] wherever neither end vertex nor a stop of the edge is edited.
+std::vector<Vec3> edited_colours(const Polytope& polytope, const Edits& edits, const Slice& slice);
+
+}  // namespace palette4d

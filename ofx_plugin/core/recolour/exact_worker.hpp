@@ -1,0 +1,20 @@
+// One thread's work in Precision::kSingle.
+#pragma once
+
+#include <memory>
+
+#include "recolour/recolour.hpp"
+
+namespace palette4d {
+
+/// Also takes single pixels; their bits are those of row().
+class ExactWorker : public RowWorker {
+public:
+    virtual void pixel(const float* from, float* to) = 0;
+};
+
+/// `recolourer` must outlive the worker and move some colour.
+std::unique_ptr<ExactWorker> exact_worker(const Recolourer& recolourer,
+                                          const RecolourOptions& options, int channels);
+
+}  // namespace palette4d

@@ -1,0 +1,63 @@
+#include "recolour/one_by_one.hpp"
+
+#include <cstdint>
+#include <cstring>
+
+namespace palette4d {
+namespace {
+
+constexpr std::size_t kSlots = 2048;
+
+std::size_t slot(const Vec3& p) {
+    std::uint64_t hash = 0;
+    for (const double value : p) {
+        std::uint64_t bits;
+        std::memcpy(&bits, &value, sizeof bits);
+        hash = (hash ^ bits) * 0x9E3779B97F4A7C15u;
+        hash ^= hash >> 29;
+    }
+    return static_cast<std::size_t>((hash * 0x9E3779B97F4A7C15u) >> 53);
+}
+
+}  // namespace
+
+OneByOne::OneByOne(const Recolourer& recolourer, const RecolourOptions& options, int channels)
+    : recolourer_(recolourer),
+      strength_(options.strength),
+      divide_(options.premultiplied),
+      channels_(channels),
+      weights_(recolourer.original().size()) {}
+
+void OneByOne::row(const float* from, float* to, int width) {
+    for (int x = 0; x < width; ++x, from += channels_, to += channels_) {
+        if (channels_ == 4) to[3] = from[3];
+        if (recolourable(from, divide_)) {
+            recolour(from, to);
+        } else {
+            for (int c = 0; c < 3; ++c) to[c] = from[c];
+        }
+    }
+}
+
+void OneByOne::recolour(const float* from, float* to) {
+    ++count_;
+    const double alpha = divide_ ? from[3] : 1.0;
+    const Vec3& moved = displacement(straight_colour(from, divide_));
+    for (std::size_t c = 0; c < 3; ++c) {
+        // Multiplying the displaced colour by alpha again is the same as this, less rounding.
+        const double step = alpha * (strength_ * moved[c]);
+        // Channels that do not move keep their bits, a negative zero included.
+        to[c] = step != 0 ? static_cast<float>(from[c] + step) : from[c];
+    }
+}
+
+const Vec3& OneByOne::displacement(const Vec3& p) {
+    if (memory_.empty()) memory_.assign(kSlots, Entry{{0, 0, 0}, {0, 0, 0}, false});
+    Entry& entry = memory_[slot(p)];
+    if (!entry.known || entry.colour != p) {
+        entry = {p, recolourer_.displacement_at(p, weights_, workspace_), true};
+    }
+    return entry.displacement;
+}
+
+}  // namespace palette4d

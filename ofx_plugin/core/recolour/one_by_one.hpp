@@ -1,0 +1,42 @@
+// One thread's work in Precision::kDouble, colour by colour.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "recolour/recolour.hpp"
+
+namespace palette4d {
+
+/// Colours repeat, in flat areas and in 8-bit images: a worker remembers some displacements. They
+/// depend on the colour alone, so the result does not change.
+class OneByOne final : public RowWorker {
+public:
+    /// `recolourer` must outlive this and move some colour.
+    OneByOne(const Recolourer& recolourer, const RecolourOptions& options, int channels);
+
+    void row(const float* from, float* to, int width) override;
+    void finish() override {}
+    RecolourCounts counts() const override { return {0, 0, 0, count_}; }
+    /// One pixel that is recolourable().
+    void recolour(const float* from, float* to);
+
+private:
+    struct Entry {
+        Vec3 colour, displacement;
+        bool known;
+    };
+
+    const Vec3& displacement(const Vec3& p);
+
+    const Recolourer& recolourer_;
+    const double strength_;
+    const bool divide_;
+    const int channels_;
+    std::vector<double> weights_;
+    PaletteBody::Workspace workspace_;
+    std::vector<Entry> memory_;
+    long long count_ = 0;
+};
+
+}  // namespace palette4d

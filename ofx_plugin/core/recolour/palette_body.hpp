@@ -1,0 +1,84 @@
+// A palette prepared for many queries: mean value coordinates inside, closest surface outside.
+#pragma once
+
+#include <vector>
+
+#include "recolour/mvc.hpp"
+
+namespace palette4d {
+
+/// What the one-shot functions of mvc.hpp compute, with everything that does not depend on the
+/// queried colour worked out once. Immutable; share it among threads, with a Workspace for each.
+class PaletteBody {
+public:
+    /// Memory that one thread's queries reuse.
+    class Workspace {
+        friend class PaletteBody;
+        std::vector<Vec3> to_vertex_;
+        std::vector<double> distance_;
+        std::vector<Vec3> edge_cross_;
+        std::vector<double> edge_dot_, edge_sine_, edge_angle_;
+    };
+
+    PaletteBody() = default;
+    /// n finite colours and the faces between them. Throws std::invalid_argument for no colours,
+    /// for a colour that is not finite, for a face with a bad index, for faces among fewer than
+    /// three colours and for three or more colours without faces.
+    PaletteBody(std::vector<Vec3> rgb, std::vector<Face> faces);
+
+    const std::vector<Vec3>& rgb() const { return rgb_; }
+    const std::vector<Face>& faces() const { return faces_; }
+    /// What the block kernels' plans are made of (recolour_plan.hpp).
+    bool convex() const { return convex_; }
+    bool flat() const { return flat_; }
+    double extent() const { return extent_; }
+    bool degenerate(std::size_t face) const { return planes_[face].degenerate; }
+    const Vec3& normal(std::size_t face) const { return planes_[face].normal; }
+    const std::vector<std::size_t>& skin() const { return skin_; }
+
+    /// mean_value_coordinates() of mvc.hpp; a p that is not finite gives NaN weights.
+    void mean_value(const Vec3& p, double* weights, Workspace& workspace) const;
+    /// palette_weights() of mvc.hpp; a p that is not finite gives NaN weights and distance.
+    Projection project(const Vec3& p, double* weights, Workspace& workspace) const;
+
+private:
+    struct Side {
+        int edge;     ///< of edges_
+        double sign;  ///< -1 where the face runs along the edge backwards
+    };
+    struct Plane {
+        Vec3 normal;  ///< unit, outwards
+        double twice_area;
+        bool degenerate;                ///< too thin for a normal
+        std::array<Vec3, 3> along;      ///< the side opposite each corner, from the next corner on
+        std::array<double, 3> length2;  ///< of those sides, squared
+        std::array<Side, 3> sides;
+    };
+    struct Closest {
+        Vec3 q;
+        double distance;
+        std::array<int, 3> corners;
+        std::array<double, 3> weights;
+    };
+
+    Closest closest_on_face(const Vec3& p, std::size_t face) const;
+    Closest closest_on_segment(const Vec3& p, int a, int b) const;
+    Closest closest_point(const Vec3& p, bool visible_only) const;
+    Vec3 within_reach(const Vec3& p) const;
+    bool mean_value_or_fail(const Vec3& p, double* weights, Workspace& workspace) const;
+    void prepare_edges(Workspace& workspace) const;
+    double winding_number(const Vec3& p) const;
+    void spread(const Closest& closest, double* weights) const;
+
+    std::vector<Vec3> rgb_;
+    std::vector<Face> faces_;
+    std::vector<Plane> planes_;
+    std::vector<std::array<int, 2>> edges_;
+    double extent_ = 0;     ///< diagonal of the bounding box
+    double tolerance_ = 0;  ///< distances below it are rounding
+    bool convex_ = false;
+    bool flat_ = false;              ///< all colours in one plane
+    std::vector<std::size_t> skin_;  ///< faces that make up the surface (one side of a flat body)
+};
+
+}  // namespace palette4d

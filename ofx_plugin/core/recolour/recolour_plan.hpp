@@ -1,0 +1,66 @@
+// A palette and its edit as the kernels of block_kernels.hpp want them.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "recolour/block_kernels.hpp"
+#include "recolour/palette_body.hpp"
+
+namespace palette4d {
+
+/// The memory behind a Plan.
+template <class T>
+class PlanMemory {
+public:
+    PlanMemory(const PaletteBody& body, const std::vector<Vec3>& displacement);
+    PlanMemory(const PlanMemory&) = delete;
+    PlanMemory& operator=(const PlanMemory&) = delete;
+
+    const Plan<T>& plan() const { return plan_; }
+    /// The palette's lengths, squared and multiplied, stay within the range of T.
+    bool usable() const { return usable_; }
+
+private:
+    void add_inside(const PaletteBody& body);
+    void add_surface(const PaletteBody& body, const std::vector<Vec3>& displacement);
+
+    std::vector<typename Plan<T>::Vertex> vertices_;
+    std::vector<typename Plan<T>::Mover> movers_;
+    std::vector<typename Plan<T>::Edge> edges_;
+    std::vector<typename Plan<T>::Face> faces_;
+    std::vector<typename Plan<T>::Plane> planes_;
+    std::vector<typename Plan<T>::Segment> segments_;
+    std::vector<typename Plan<T>::Triangle> triangles_;
+    Plan<T> plan_{};
+    bool usable_ = false;
+};
+
+extern template class PlanMemory<float>;
+extern template class PlanMemory<double>;
+
+/// What kernels want for scratch memory.
+template <class T>
+class Scratch {
+public:
+    explicit Scratch(const Plan<T>& plan)
+        : memory_(static_cast<std::size_t>(scratch_size(plan)) + kNumbers) {}
+    T* data() {
+        const auto misfit = reinterpret_cast<std::uintptr_t>(memory_.data()) % 64 / sizeof(T);
+        return memory_.data() + (kNumbers - misfit) % kNumbers;
+    }
+
+private:
+    static constexpr std::size_t kNumbers = 64 / sizeof(T);
+    std::vector<T> memory_;
+};
+
+/// Both precisions of one palette and edit.
+struct RecolourPlan {
+    RecolourPlan(const PaletteBody& body, const std::vector<Vec3>& displacement)
+        : single(body, displacement), twofold(body, displacement) {}
+    PlanMemory<float> single;
+    PlanMemory<double> twofold;
+};
+
+}  // namespace palette4d

@@ -1,0 +1,95 @@
+#include "describe.hpp"
+
+#include "colour_management.hpp"
+#include "outputs.hpp"
+#include "params.hpp"
+#include "sidecar_choice.hpp"
+
+namespace palette4d::node {
+namespace {
+
+bool define_clip(const Suites& suites, OfxImageEffectHandle effect, const char* name) {
+    OfxPropertySetHandle handle = nullptr;
+    if (!suites.effect->clipDefine ||
+        suites.effect->clipDefine(effect, name, &handle) != kOfxStatOK) {
+        return false;
+    }
+    const Properties clip(suites, handle);
+    // RGBA first: hosts that know one layout only take the first. Alpha alone passes through.
+    clip.set_strings(kOfxImageEffectPropSupportedComponents,
+                     {kOfxImageComponentRGBA, kOfxImageComponentRGB, kOfxImageComponentAlpha});
+    clip.set_int(kOfxImageEffectPropSupportsTiles, 1);
+    clip.set_int(kOfxImageEffectPropTemporalClipAccess, 0);
+    return true;
+}
+
+}  // namespace
+
+OfxStatus describe(const Suites& suites, OfxImageEffectHandle effect) {
+    OfxPropertySetHandle handle = nullptr;
+    if (!suites.effect->getPropertySet ||
+        suites.effect->getPropertySet(effect, &handle) != kOfxStatOK || !handle) {
+        return kOfxStatFailed;
+    }
+    // Properties that a host does not know or refuses keep that host's defaults.
+    const Properties node(suites, handle);
+    node.set_string(kOfxPropLabel, "Palette4D");
+    node.set_string(kOfxPropShortLabel, "Palette4D");
+    node.set_string(kOfxPropLongLabel, "Palette4D time-varying palette");
+    node.set_string(kOfxPropVersionLabel, PALETTE4D_VERSION);
+    node.set_string(kOfxPropPluginDescription,
+                    "Recolours a clip by the edits made to its time-varying colour palette.");
+    node.set_string(kOfxImageEffectPluginPropGrouping, "Color");
+
+    node.set_strings(kOfxImageEffectPropSupportedContexts,
+                     {kOfxImageEffectContextFilter, kOfxImageEffectContextGeneral});
+    // Float before byte. No short and no half: a host that has 16 bits then hands over float.
+    node.set_strings(kOfxImageEffectPropSupportedPixelDepths,
+                     {kOfxBitDepthFloat, kOfxBitDepthByte});
+
+    node.set_string(kOfxImageEffectPluginRenderThreadSafety, kOfxImageEffectRenderFullySafe);
+    node.set_int(kOfxImageEffectPluginPropSingleInstance, 0);
+    node.set_int(kOfxImageEffectPluginPropHostFrameThreading, 0);
+    node.set_int(kOfxImageEffectPropSupportsTiles, 1);
+    node.set_int(kOfxImageEffectPropSupportsMultiResolution, 1);
+    node.set_int(kOfxImageEffectPropTemporalClipAccess, 0);
+    node.set_int(kOfxImageEffectPropSupportsMultipleClipDepths, 0);
+    node.set_int(kOfxImageEffectPropSupportsMultipleClipPARs, 0);
+    node.set_string(kOfxImageEffectPropCPURenderSupported, "true");
+    // One pixel's result depends on that pixel only: a host may take the node into a LUT.
+    node.set_string(kOfxImageEffectPropNoSpatialAwareness, "true");
+    describe_colour(node);
+    return kOfxStatOK;
+}
+
+OfxStatus describe_in_context(const Suites& suites, OfxImageEffectHandle effect) {
+    if (!define_clip(suites, effect, kOfxImageEffectSimpleSourceClipName) ||
+        !define_clip(suites, effect, kOfxImageEffectOutputClipName)) {
+        return kOfxStatFailed;
+    }
+    OfxParamSetHandle params = nullptr;
+    if (!suites.effect->getParamSet || suites.effect->getParamSet(effect, &params) != kOfxStatOK ||
+        !params) {
+        return kOfxStatFailed;
+    }
+    define_params(suites, params);
+    OfxPropertySetHandle handle = nullptr;
+    if (suites.effect->getPropertySet &&
+        suites.effect->getPropertySet(effect, &handle) == kOfxStatOK) {
+        // Hosts ask for clip_preferences() again when one of these changes, and else never.
+        Properties(suites, handle)
+            .set_strings(kOfxImageEffectPropClipPreferencesSlaveParam,
+                         {kParamSidecar, kParamClipFolder, kParamRevision, kParamPictureIn,
+                          kParamOutput, kParamMatteIn});
+    }
+    return kOfxStatOK;
+}
+
+OfxStatus clip_preferences(const Suites& suites, OfxImageEffectHandle effect,
+                           const Properties& out_args) {
+    prefer_colour(suites, effect, out_args);
+    prefer_alpha(suites, effect, out_args);
+    return out_args.set_int(kOfxImageEffectFrameVarying, 1) ? kOfxStatOK : kOfxStatReplyDefault;
+}
+
+}  // namespace palette4d::node

@@ -1,0 +1,118 @@
+#include "frame_setup.hpp"
+
+#include <cmath>
+#include <exception>
+#include <new>
+#include <tuple>
+#include <utility>
+
+#include "colour_spaces.hpp"
+#include "handle_params.hpp"
+#include "host_time.hpp"
+#include "model/handles.hpp"
+#include "params.hpp"
+#include "sidecar_cache.hpp"
+#include "sidecar_choice.hpp"
+
+namespace palette4d::node {
+
+namespace {
+
+/// One more thing for the user to know.
+void add_note(FrameSetup& setup, const std::string& note) {
+    if (!setup.note.empty() && !note.empty()) setup.note += "; ";
+    setup.note += note;
+}
+
+/// Prepares what the output asks for. Throws what slicing throws.
+void prepare(FrameSetup& setup, const Params& params, LoadedSidecar& loaded, double frame,
+             OfxTime time, Interpolation interpolation) {
+    Drawing& drawing = setup.drawing;
+    const OutputSettings& settings = drawing.settings;
+    const Sidecar& sidecar = loaded.sidecar();
+    setup.passes = false;
+    if (sidecar.conversion && !settings.in_palette_space) {
+        // Shares its ownership: a sidecar may be read anew while this is drawn.
+        drawing.conversion = {sidecar.conversion, &sidecar.conversion->steps};
+    }
+    if (settings.output == Output::kOutside) {
+        drawing.reader = loaded.surface_at(frame);
+        return;
+    }
+    if (settings.output == Output::kWeight) {
+        const int handle = handle_at(params, sidecar, settings.weight_of, time);
+        if (handle < 0) {
+            setup.passes = true;
+            setup.problem = "Weight of a handle: the sidecar has no handle " +
+                            std::to_string(settings.weight_of) + ", expected one of its " +
+                            std::to_string(handles_of(sidecar.polytope, sidecar.edits).size()) +
+                            "; choose another number as Handle";
+            return;
+        }
+        drawing.reader = loaded.weight_at(frame, handle);
+        return;
+    }
+    EditsAt edits = edits_at(params, sidecar, time);
+    add_note(setup, edits.note);
+    const std::shared_ptr<const Recolourer> exact = loaded.recolourer_at(frame, edits.edits);
+    if (exact->moves() && settings.strength != 0) {
+        drawing.edit = exact;
+        if (interpolation == Interpolation::kAlways ||
+            (interpolation == Interpolation::kWithoutConversion && !drawing.conversion)) {
+            try {
+                drawing.edit = loaded.lattice_at(frame, edits.edits);
+            } catch (const std::bad_alloc&) {
+                add_note(setup, "there is no memory for a lattice: computed exactly");
+            }
+        }
+    }
+    if (settings.output == Output::kPalette) {
+        std::tie(drawing.original, drawing.edited) = loaded.palette_at(frame, edits.edits);
+    } else {
+        setup.passes = !drawing.edit;
+    }
+}
+
+}  // namespace
+
+FrameSetup frame_setup_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time,
+                          Interpolation interpolation) {
+    FrameSetup setup;
+    const Params params(suites, effect);
+    const Chosen chosen = chosen_sidecar(params, time);
+    if (!chosen.any) return setup;
+    const SidecarResult& result = chosen.result;
+    const std::string& path = chosen.path;
+    if (!result.loaded) {
+        setup.problem = result.problem;
+        return setup;
+    }
+    setup.note = chosen.broken;
+    setup.drawing.settings = output_settings_at(params, time);
+    OutputSettings& settings = setup.drawing.settings;
+    if (settings.passes()) return setup;
+    const Sidecar& sidecar = result.loaded->sidecar();
+    if (settings.keep > 0 && settings.own_lightness) {
+        settings.lightness = luminance_weights(encoding_of(sidecar, settings.in_palette_space));
+    }
+    const FrameAt at =
+        frame_at(sidecar.clip, time_settings_at(params, time), host_clip(suites, effect), time);
+    if (!std::isfinite(at.frame)) {
+        setup.problem = path +
+                        ": the host's time and the node's parameters of time give no frame; "
+                        "expected numbers";
+        return setup;
+    }
+    if (at.passes) return setup;
+    try {
+        prepare(setup, params, *result.loaded, at.frame, time, interpolation);
+    } catch (const std::bad_alloc&) {
+        throw;
+    } catch (const std::exception& error) {
+        setup.passes = true;
+        setup.problem = path + ": " + words_of(time, at) + ": " + error.what();
+    }
+    return setup;
+}
+
+}  // namespace palette4d::node

@@ -1,0 +1,97 @@
+#include "host_time.hpp"
+
+namespace palette4d::node {
+namespace {
+
+// A clip of four million frames is 48 hours at 24 frames a second; Resolve wants finite ranges.
+constexpr double kMostFrames = 4e6;
+constexpr Range<double> kFrames = {0, -kMostFrames, kMostFrames, -1000, 1000};
+
+}  // namespace
+
+void define_time_params(ParamDefiner& define) {
+    define.begin_group("time", "Time");
+    define.choice({kParamTiming, "Timing",
+                   "Auto: where the clip begins, and its rate, are what the host reports. Manual: "
+                   "the three parameters below say so. The status says which frame is shown."},
+                  {"Auto", "Manual"});
+    define.number({kParamFirstFrame, "First frame at",
+                   "Manual timing: the host's time at which the clip's first frame stands."},
+                  kFrames, 1, 2, false);
+    define.choice({kParamConform, "Conform",
+                   "Manual timing. Frame for frame: each frame of the host is one of the clip, "
+                   "whatever the rates, as where 24 frames a second were conformed to 23.976. By "
+                   "rates: seconds count, as where they play at their own speed on a timeline of "
+                   "60."},
+                  {"Frame for frame", "By rates"});
+    define.number({kParamHostRate, "Host's rate",
+                   "Manual timing by rates: frames a second of the host's timeline; 0 for what the "
+                   "host reports."},
+                  {0, 0, 1000, 0, 120}, 1, 3, false);
+    define.number(
+        {kParamInPoint, "In-point", "How many frames the host has cut off the clip's beginning."},
+        kFrames, 1, 2, false);
+    define.number({kParamFrameOffset, "Frame offset",
+                   "Frames added to the one that all else here gives, to put right what is left."},
+                  kFrames, 1, 2, false);
+    define.number(
+        {kParamSpeed, "Speed",
+         "Frames of the clip for each frame of the host: 2 where it plays twice as fast."},
+        {1, 0.001, 1000, 0.1, 10}, 0.1, 4, false);
+    define.flag({kParamReverse, "Reverse",
+                 "The host plays the clip backwards: its last frame comes first, and the in-point "
+                 "counts from there."},
+                false);
+    define.choice({kParamBefore, "Before the clip",
+                   "What times before the clip's first frame show: its first palette, or the "
+                   "source."},
+                  {"Hold", "Pass through"});
+    define.choice({kParamAfter, "After the clip",
+                   "What times after the clip's last frame show: its last palette, or the source."},
+                  {"Hold", "Pass through"});
+    define.end_group();
+}
+
+TimeSettings time_settings_at(const Params& params, OfxTime time) {
+    TimeSettings settings;
+    const auto number = [&](const char* name, double initial) {
+        return params.double_at(name, time).value_or(initial);
+    };
+    const auto chosen = [&](const char* name) { return params.int_at(name, time) == 1; };
+    settings.automatic = !chosen(kParamTiming);
+    settings.start = number(kParamFirstFrame, 0);
+    settings.by_rates = chosen(kParamConform);
+    settings.host_rate = number(kParamHostRate, 0);
+    settings.in_point = number(kParamInPoint, 0);
+    settings.offset = number(kParamFrameOffset, 0);
+    // 0 is what a host has that took no default from us: a clip that stands still is none.
+    settings.speed = number(kParamSpeed, 1);
+    if (!(settings.speed > 0)) settings.speed = 1;
+    settings.reverse = chosen(kParamReverse);
+    settings.pass_before = chosen(kParamBefore);
+    settings.pass_after = chosen(kParamAfter);
+    return settings;
+}
+
+HostClip host_clip(const Suites& suites, OfxImageEffectHandle effect) {
+    HostClip host;
+    OfxPropertySetHandle handle = nullptr;
+    if (suites.effect->getPropertySet &&
+        suites.effect->getPropertySet(effect, &handle) == kOfxStatOK) {
+        host.rate = Properties(suites, handle).get_double(kOfxImageEffectPropFrameRate);
+    }
+    OfxImageClipHandle clip = nullptr;
+    handle = nullptr;
+    if (!suites.effect->clipGetHandle ||
+        suites.effect->clipGetHandle(effect, kOfxImageEffectSimpleSourceClipName, &clip, &handle) !=
+            kOfxStatOK) {
+        return host;
+    }
+    const Properties source(suites, handle);
+    host.first = source.get_double(kOfxImageEffectPropFrameRange, 0);
+    host.last = source.get_double(kOfxImageEffectPropFrameRange, 1);
+    if (!host.rate) host.rate = source.get_double(kOfxImageEffectPropFrameRate);
+    return host;
+}
+
+}  // namespace palette4d::node

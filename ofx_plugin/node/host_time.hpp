@@ -1,0 +1,27 @@
+// The parameters of time, and what the host reports about its clip.
+#pragma once
+
+#include "param_define.hpp"
+#include "params.hpp"
+#include "timing.hpp"
+
+namespace palette4d::node {
+
+inline constexpr const char* kParamTiming = "timing";
+inline constexpr const char* kParamFirstFrame = "firstFrame";
+inline constexpr const char* kParamConform = "conform";
+inline constexpr const char* kParamHostRate = "hostRate";
+inline constexpr const char* kParamInPoint = "inPoint";
+inline constexpr const char* kParamSpeed = "speed";
+inline constexpr const char* kParamReverse = "reverse";
+inline constexpr const char* kParamBefore = "before";
+inline constexpr const char* kParamAfter = "after";
+
+void define_time_params(ParamDefiner& define);
+
+/// None of these is animated: `time` is for asking while rendering.
+TimeSettings time_settings_at(const Params& params, OfxTime time);
+/// What the host reports about the source clip. Allowed in every action of an instance.
+HostClip host_clip(const Suites& suites, OfxImageEffectHandle effect);
+
+}  // namespace palette4d::node

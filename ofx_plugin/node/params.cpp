@@ -1,0 +1,180 @@
+#include "params.hpp"
+
+#include <utility>
+
+#include "handle_params.hpp"
+#include "host_time.hpp"
+#include "outputs.hpp"
+#include "param_define.hpp"
+#include "sidecar_choice.hpp"
+#include "speed_mode.hpp"
+
+namespace palette4d::node {
+void define_params(const Suites& suites, OfxParamSetHandle params) {
+    ParamDefiner define(suites, params);
+    define_file_params(define);
+
+    const Properties status =
+        define.text({kParamStatus, "Status",
+                     "What was loaded, which of its frames is shown, or what is wrong with the "
+                     "sidecar."},
+                    kOfxParamStringIsLabel, "No sidecar chosen");
+    status.set_int(kOfxParamPropEnabled, 0);
+    status.set_int(kOfxParamPropPersistant, 0);
+    status.set_int(kOfxParamPropEvaluateOnChange, 0);
+    status.set_int(kOfxParamPropCanUndo, 0);
+    define.number({kParamStrength, "Strength",
+                   "How much of the edit is applied: 0 is the original picture, 1 the edit."},
+                  {1, 0, 1, 0, 1}, 0.01, 3, true);
+    define_mode_param(define);
+    define_output_params(define);
+    define_handle_params(define);
+    define_time_params(define);
+}
+
+Params::Params(const Suites& suites, OfxImageEffectHandle effect)
+    : suites_(suites), suite_(suites.parameter) {
+    if (!suites.effect->getParamSet || suites.effect->getParamSet(effect, &set_) != kOfxStatOK) {
+        set_ = nullptr;
+    }
+}
+
+Params::~Params() {
+    if (in_step_) suite_->paramEditEnd(set_);
+}
+
+void Params::begin_step() const {
+    const char* label = std::exchange(step_, nullptr);
+    if (!label || !set_ || !suite_->paramEditBegin || !suite_->paramEditEnd) return;
+    in_step_ = suite_->paramEditBegin(set_, label) == kOfxStatOK;
+}
+
+OfxParamHandle Params::find(const char* name) const {
+    OfxParamHandle param = nullptr;
+    if (!set_ || !suite_->paramGetHandle ||
+        suite_->paramGetHandle(set_, name, &param, nullptr) != kOfxStatOK) {
+        return nullptr;
+    }
+    return param;
+}
+
+Properties Params::properties(const char* name) const {
+    OfxPropertySetHandle handle = nullptr;
+    const OfxParamHandle param = find(name);
+    if (!param || !suite_->paramGetPropertySet ||
+        suite_->paramGetPropertySet(param, &handle) != kOfxStatOK) {
+        handle = nullptr;
+    }
+    return {suites_, handle};
+}
+
+std::optional<std::string> Params::string_at(const char* name, OfxTime time) const {
+    char* value = nullptr;
+    const OfxParamHandle param = find(name);
+    if (!param || !suite_->paramGetValueAtTime ||
+        suite_->paramGetValueAtTime(param, time, &value) != kOfxStatOK || !value) {
+        return std::nullopt;
+    }
+    return std::string(value);
+}
+
+std::optional<double> Params::double_at(const char* name, OfxTime time) const {
+    double value = 0;
+    const OfxParamHandle param = find(name);
+    if (!param || !suite_->paramGetValueAtTime ||
+        suite_->paramGetValueAtTime(param, time, &value) != kOfxStatOK) {
+        return std::nullopt;
+    }
+    return value;
+}
+
+std::optional<int> Params::int_at(const char* name, OfxTime time) const {
+    int value = 0;
+    const OfxParamHandle param = find(name);
+    if (!param || !suite_->paramGetValueAtTime ||
+        suite_->paramGetValueAtTime(param, time, &value) != kOfxStatOK) {
+        return std::nullopt;
+    }
+    return value;
+}
+
+std::optional<std::array<double, 3>> Params::rgb_at(const char* name, OfxTime time) const {
+    std::array<double, 3> value{};
+    const OfxParamHandle param = find(name);
+    if (!param || !suite_->paramGetValueAtTime ||
+        suite_->paramGetValueAtTime(param, time, &value[0], &value[1], &value[2]) != kOfxStatOK) {
+        return std::nullopt;
+    }
+    return value;
+}
+
+std::optional<std::string> Params::string_now(const char* name) const {
+    char* value = nullptr;
+    const OfxParamHandle param = find(name);
+    if (!param || !suite_->paramGetValue || suite_->paramGetValue(param, &value) != kOfxStatOK ||
+        !value) {
+        return std::nullopt;
+    }
+    return std::string(value);
+}
+
+std::optional<double> Params::double_now(const char* name) const {
+    double value = 0;
+    const OfxParamHandle param = find(name);
+    if (!param || !suite_->paramGetValue || suite_->paramGetValue(param, &value) != kOfxStatOK) {
+        return std::nullopt;
+    }
+    return value;
+}
+
+std::optional<int> Params::int_now(const char* name) const {
+    int value = 0;
+    const OfxParamHandle param = find(name);
+    if (!param || !suite_->paramGetValue || suite_->paramGetValue(param, &value) != kOfxStatOK) {
+        return std::nullopt;
+    }
+    return value;
+}
+
+std::optional<std::array<double, 3>> Params::rgb_now(const char* name) const {
+    std::array<double, 3> value{};
+    const OfxParamHandle param = find(name);
+    if (!param || !suite_->paramGetValue ||
+        suite_->paramGetValue(param, &value[0], &value[1], &value[2]) != kOfxStatOK) {
+        return std::nullopt;
+    }
+    return value;
+}
+
+bool Params::animated(const char* name) const {
+    unsigned int keys = 0;
+    const OfxParamHandle param = find(name);
+    return param && suite_->paramGetNumKeys &&
+           suite_->paramGetNumKeys(param, &keys) == kOfxStatOK && keys > 0;
+}
+
+bool Params::set_string(const char* name, const std::string& value) const {
+    begin_step();
+    return note_string(name, value);
+}
+
+bool Params::note_string(const char* name, const std::string& value) const {
+    const OfxParamHandle param = find(name);
+    return param && suite_->paramSetValue &&
+           suite_->paramSetValue(param, value.c_str()) == kOfxStatOK;
+}
+
+bool Params::set_int(const char* name, int value) const {
+    begin_step();
+    const OfxParamHandle param = find(name);
+    return param && suite_->paramSetValue && suite_->paramSetValue(param, value) == kOfxStatOK;
+}
+
+bool Params::set_rgb(const char* name, const std::array<double, 3>& value) const {
+    begin_step();
+    const OfxParamHandle param = find(name);
+    return param && suite_->paramSetValue &&
+           suite_->paramSetValue(param, value[0], value[1], value[2]) == kOfxStatOK;
+}
+
+}  // namespace palette4d::node

@@ -1,0 +1,172 @@
+#include "paths.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cstdlib>
+#include <cstring>
+#include <vector>
+
+namespace palette4d::node {
+namespace {
+
+namespace fs = std::filesystem;
+
+#if defined(_WIN32)
+constexpr char kSeparator = ';';
+constexpr const char* kHome = "USERPROFILE";
+#else
+constexpr char kSeparator = ':';
+constexpr const char* kHome = "HOME";
+#endif
+
+bool in_name(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; }
+
+/// The end of a variable that starts at `at`, and its name; an empty name for none.
+std::size_t variable_at(const std::string& path, std::size_t at, std::string& name) {
+    name.clear();
+    std::size_t begin = at + 1, end = begin;
+    const bool braced = path[at] == '$' && begin < path.size() && path[begin] == '{';
+    if (braced) end = ++begin;
+    while (end < path.size() && in_name(path[end])) ++end;
+    const char close = braced ? '}' : '%';
+    const bool closed = path[at] == '$' && !braced;
+    if (!closed && (end >= path.size() || path[end] != close)) return at + 1;
+    name = path.substr(begin, end - begin);
+    return closed ? end : end + 1;
+}
+
+bool is_file(const fs::path& path) {
+    std::error_code error;
+    return fs::is_regular_file(path, error);
+}
+
+/// What a path means that was pasted with a blank or a line's end around it, in quotes, or as a
+/// URL.
+std::string unpasted(std::string path) {
+    const auto blank = [](char c) { return std::isspace(static_cast<unsigned char>(c)) != 0; };
+    while (!path.empty() && blank(path.back())) path.pop_back();
+    path.erase(path.begin(), std::find_if_not(path.begin(), path.end(), blank));
+    if (path.size() > 1 && path.front() == path.back() &&
+        (path.front() == '"' || path.front() == '\'')) {
+        path = path.substr(1, path.size() - 2);
+    }
+    constexpr const char* kUrl = "file://";
+    if (path.rfind(kUrl, 0) != 0) return path;
+    std::string plain;
+    for (std::size_t at = std::strlen(kUrl); at < path.size(); ++at) {
+        const auto hex = [&](std::size_t i) {
+            return i < path.size() && std::isxdigit(static_cast<unsigned char>(path[i])) != 0;
+        };
+        if (path[at] == '%' && hex(at + 1) && hex(at + 2)) {
+            plain += static_cast<char>(std::stoi(path.substr(at + 1, 2), nullptr, 16));
+            at += 2;
+        } else {
+            plain += path[at];
+        }
+    }
+    return plain;
+}
+
+std::vector<fs::path> search_folders(const std::string& folder) {
+    std::vector<fs::path> folders;
+    if (!folder.empty()) folders.push_back(fs::u8path(expanded(folder)));
+    const char* list = std::getenv(kSearchPath);
+    std::string rest = list ? list : "";
+    while (!rest.empty()) {
+        const std::size_t end = std::min(rest.find(kSeparator), rest.size());
+        if (end > 0) folders.push_back(fs::u8path(expanded(rest.substr(0, end))));
+        rest.erase(0, end + 1);
+    }
+    return folders;
+}
+
+}  // namespace
+
+std::string expanded(const std::string& path) {
+    std::string result, name;
+    std::size_t at = 0;
+    if (!path.empty() && path[0] == '~' &&
+        (path.size() == 1 || path[1] == '/' || path[1] == '\\')) {
+        if (const char* home = std::getenv(kHome)) {
+            result = home;
+            at = 1;
+        }
+    }
+    while (at < path.size()) {
+        const char c = path[at];
+        if (c != '$' && c != '%') {
+            result += c;
+            ++at;
+            continue;
+        }
+        const std::size_t end = variable_at(path, at, name);
+        const char* value = name.empty() ? nullptr : std::getenv(name.c_str());
+        if (value) {
+            result += value;
+            at = end;
+        } else {
+            result += c;
+            ++at;
+        }
+    }
+    return result;
+}
+
+std::optional<std::string> find_file(const std::string& path, const std::string& folder) {
+    const std::string plain = unpasted(path);
+    if (plain != path) {
+        if (const auto found = find_file(plain, folder)) return found;
+    }
+    if (const std::string plain_folder = unpasted(folder); plain_folder != folder) {
+        return find_file(path, plain_folder);
+    }
+    const fs::path given = fs::u8path(expanded(path));
+    if (given.empty()) return std::nullopt;
+    if (given.is_absolute() && is_file(given)) return given.u8string();
+    const std::vector<fs::path> folders = search_folders(folder);
+    if (given.is_relative()) {
+        for (const fs::path& base : folders) {
+            if (is_file(base / given)) return (base / given).u8string();
+        }
+        if (is_file(given)) return given.u8string();
+    }
+    for (const fs::path& base : folders) {
+        if (is_file(base / given.filename())) return (base / given.filename()).u8string();
+    }
+    return std::nullopt;
+}
+
+std::string words_of_missing(const std::string& pasted) {
+    const std::string path = unpasted(pasted);
+    std::string name;
+    for (std::size_t at = 0; at < path.size(); ++at) {
+        if (path[at] != '$' && path[at] != '%') continue;
+        const std::size_t end = variable_at(path, at, name);
+        if (!name.empty() && !std::getenv(name.c_str())) {
+            return "the environment that the host was started in has no variable " + name +
+                   "; start the host where it is set, or write out what it stands for";
+        }
+        at = end - 1;
+    }
+    std::error_code error;
+    const fs::path given = fs::u8path(expanded(path));
+    if (fs::exists(given, error)) return "";
+    const bool relative = given.is_relative();
+    std::string words = "the file does not exist";
+    words +=
+        relative ? " in Clip's folder, " : ", and there is none of its name in Clip's folder or ";
+    words += kSearchPath;
+    if (relative) words += " or " + fs::current_path(error).u8string();
+    return words + "; choose the file again, or the folder that it is in as Clip's folder";
+}
+
+std::string clip_folder(const std::string& path, const std::string& source) {
+    std::error_code error;
+    const fs::path sidecar = fs::absolute(fs::u8path(path), error);
+    if (error || source.empty()) return "";
+    const fs::path frames = (sidecar.parent_path() / fs::u8path(source)).lexically_normal();
+    const fs::path folder = frames.parent_path();
+    return fs::is_directory(folder, error) ? folder.u8string() : "";
+}
+
+}  // namespace palette4d::node

@@ -1,0 +1,131 @@
+#include "render.hpp"
+
+#include <exception>
+#include <new>
+#include <optional>
+
+#include "frame_setup.hpp"
+#include "instance.hpp"
+#include "pixels.hpp"
+#include "speed_mode.hpp"
+#include "threads.hpp"
+
+namespace palette4d::node {
+namespace {
+
+/// One clip of an instance and its image at a time; releases the image whatever happens.
+class ClipImage {
+public:
+    ClipImage(const Suites& suites, OfxImageEffectHandle effect, const char* name, OfxTime time)
+        : suites_(suites) {
+        const OfxImageEffectSuiteV1& suite = *suites.effect;
+        OfxImageClipHandle clip = nullptr;
+        OfxPropertySetHandle clip_set = nullptr;
+        if (!suite.clipGetHandle || !suite.clipGetImage ||
+            suite.clipGetHandle(effect, name, &clip, &clip_set) != kOfxStatOK || !clip) {
+            return;
+        }
+        const OfxStatus status = suite.clipGetImage(clip, time, nullptr, &handle_);
+        if (status != kOfxStatOK) handle_ = nullptr;
+        absent_ = !handle_ && (status == kOfxStatOK || status == kOfxStatFailed);
+        if (handle_) {
+            pixels_ = read_image(Properties(suites, handle_), Properties(suites, clip_set));
+        }
+    }
+    ~ClipImage() {
+        if (handle_ && suites_.effect->clipReleaseImage) suites_.effect->clipReleaseImage(handle_);
+    }
+    ClipImage(const ClipImage&) = delete;
+    ClipImage& operator=(const ClipImage&) = delete;
+
+    /// The host has no picture here: transparent black, says the standard.
+    bool absent() const { return absent_; }
+    /// Empty also when there is a picture that cannot be read.
+    const std::optional<Image>& pixels() const { return pixels_; }
+
+private:
+    const Suites& suites_;
+    OfxPropertySetHandle handle_ = nullptr;
+    bool absent_ = false;
+    std::optional<Image> pixels_;
+};
+
+/// Draws the window; on an exception the source is copied instead, and the exception goes on.
+OfxStatus draw_window(const Suites& suites, OfxImageEffectHandle effect, const Image& in,
+                      const Image& out, const OfxRectI& window, const FrameSetup& setup) {
+    try {
+        for_each_band(
+            suites, window.y1, window.y2,
+            [&](int y1, int y2) { draw(in, out, {window.x1, y1, window.x2, y2}, setup.drawing); },
+            [&] { return suites.effect->abort && suites.effect->abort(effect) != 0; });
+    } catch (...) {
+        copy(in, out, window);
+        throw;
+    }
+    return kOfxStatOK;
+}
+
+}  // namespace
+
+OfxStatus is_identity(const Suites& suites, OfxImageEffectHandle effect, const Properties& in_args,
+                      const Properties& out_args) {
+    const std::optional<double> time = in_args.get_double(kOfxPropTime);
+    if (!time) return kOfxStatReplyDefault;
+    const FrameSetup setup = frame_setup_at(suites, effect, *time);
+    // With a problem there is something to render: the message.
+    if (!setup.passes || !setup.problem.empty() || !setup.note.empty()) return kOfxStatReplyDefault;
+    report(suites, effect, "");
+    if (!out_args.set_string(kOfxPropName, kOfxImageEffectSimpleSourceClipName)) {
+        return kOfxStatReplyDefault;
+    }
+    out_args.set_double(kOfxPropTime, *time);  // where it is refused it is this time already
+    return kOfxStatOK;
+}
+
+OfxStatus render(const Suites& suites, OfxImageEffectHandle effect, const Properties& in_args) {
+    const std::optional<double> time = in_args.get_double(kOfxPropTime);
+    if (!time) return kOfxStatFailed;
+    const ClipImage output(suites, effect, kOfxImageEffectOutputClipName, *time);
+    if (!output.pixels()) return kOfxStatFailed;
+    const Image& out = *output.pixels();
+    const OfxRectI window = intersect(
+        out.bounds, in_args.get_rect(kOfxImageEffectPropRenderWindow).value_or(out.bounds));
+    if (is_empty(window)) return kOfxStatOK;
+
+    const ClipImage source(suites, effect, kOfxImageEffectSimpleSourceClipName, *time);
+    if (!source.pixels() || !same_format(*source.pixels(), out)) {
+        // Never leave a host's uninitialised memory on the screen.
+        clear(out, window);
+        return source.absent() ? kOfxStatOK : kOfxStatFailed;
+    }
+    const Image& in = *source.pixels();
+
+    FrameSetup setup;
+    try {
+        const Mode mode = mode_at(Params(suites, effect), *time);
+        setup =
+            frame_setup_at(suites, effect, *time, interpolation_of(mode, in_args, out.definition));
+    } catch (...) {
+        copy(in, out, window);
+        throw;
+    }
+    report(suites, effect, setup.problem.empty() ? setup.note : setup.problem);
+    // Depths and layouts that the node did not ask for pass through too.
+    if (setup.passes || in.depth == Depth::kOther || in.channels < 3) {
+        copy(in, out, window);
+        return kOfxStatOK;
+    }
+    setup.drawing.picture = out.definition;
+    // A host that takes the node into a LUT asks for colours alone, whatever lies where.
+    if (in_args.get_string(kOfxImageEffectPropNoSpatialAwareness) == "true" &&
+        setup.drawing.settings.output == Output::kPalette) {
+        setup.drawing.settings.output = Output::kRecoloured;
+        if (!setup.drawing.edit) {
+            copy(in, out, window);
+            return kOfxStatOK;
+        }
+    }
+    return draw_window(suites, effect, in, out, window, setup);
+}
+
+}  // namespace palette4d::node

@@ -1,0 +1,374 @@
+#include "sidecar_cache.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <new>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include "model/lineage.hpp"
+
+namespace palette4d::node {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = fs::file_time_type::clock;
+
+/// Prepared frames that a sidecar keeps: more than a host has in work at a time.
+std::size_t most_frames() { return std::max<std::size_t>(32, 4 * LoadedSidecar::most_lattices()); }
+constexpr std::size_t kMaxSidecars = 32;
+constexpr std::size_t kMaxTexts = 8;
+// File systems store times as coarsely as two seconds (FAT): younger files may change unseen.
+constexpr auto kSettled = std::chrono::seconds(3);
+
+/// What the file system says about a file; a change of it means that the file is to be read again.
+struct Stamp {
+    fs::file_time_type modified{};
+    std::uintmax_t bytes = 0;
+    bool operator==(const Stamp& other) const {
+        return modified == other.modified && bytes == other.bytes;
+    }
+};
+
+/// One path's latest reading. Its mutex makes threads that want the same new file read it once.
+struct Entry {
+    std::mutex mutex;
+    bool read = false;
+    Stamp stamp;
+    bool settled = false;  ///< the stamp was old enough at the reading to be trusted
+    std::string text;      ///< kept until settled, to see whether a young file really changed
+    SidecarResult result;
+    std::uint64_t last_use = 0;
+};
+
+struct Cache {
+    std::mutex mutex;
+    std::map<std::string, std::shared_ptr<Entry>> entries;
+    std::list<std::pair<std::string, SidecarResult>> texts;  ///< those that projects carry
+    std::uint64_t uses = 0;
+};
+
+Cache& cache() {
+    static Cache instance;
+    return instance;
+}
+
+std::optional<Stamp> stamp_of(const fs::path& path, std::string& problem) {
+    std::error_code error;
+    const fs::file_status status = fs::status(path, error);
+    if (status.type() == fs::file_type::not_found) {
+        problem = "the file does not exist";
+        return std::nullopt;
+    }
+    if (!error && status.type() != fs::file_type::regular) {
+        problem = "it is not a file";
+        return std::nullopt;
+    }
+    Stamp stamp;
+    if (!error) stamp.modified = fs::last_write_time(path, error);
+    if (!error) stamp.bytes = fs::file_size(path, error);
+    if (error) {
+        problem = "the file cannot be examined (" + error.message() + ")";
+        return std::nullopt;
+    }
+    if (stamp.bytes > kMaxSidecarBytes) {
+        problem = "found " + std::to_string(stamp.bytes) + " bytes, expected at most " +
+                  std::to_string(kMaxSidecarBytes);
+        return std::nullopt;
+    }
+    return stamp;
+}
+
+/// The file's text, at most one byte more than a sidecar may have (the parser then refuses it).
+std::optional<std::string> text_of(const fs::path& path, std::uintmax_t expected) {
+    std::ifstream file(path, std::ios::binary);
+    if (!file) return std::nullopt;
+    std::string text;
+    text.reserve(static_cast<std::size_t>(expected));
+    char block[65536];
+    while (text.size() <= kMaxSidecarBytes) {
+        file.read(block, sizeof block);
+        text.append(block, static_cast<std::size_t>(file.gcount()));
+        if (!file) break;
+    }
+    if (file.bad()) return std::nullopt;
+    return text;
+}
+
+/// 64-bit FNV-1a in hexadecimal digits, and the length.
+std::string revision_of(const std::string& text) {
+    std::uint64_t hash = 0xcbf29ce484222325u;
+    for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
+    std::string digits;
+    for (int shift = 60; shift >= 0; shift -= 4) digits += "0123456789abcdef"[hash >> shift & 15];
+    return digits + "-" + std::to_string(text.size());
+}
+
+SidecarResult parse(const std::string& text, const std::string& path) {
+    SidecarResult result;
+    try {
+        result.loaded =
+            std::make_shared<LoadedSidecar>(parse_sidecar(text, path), revision_of(text));
+    } catch (const std::bad_alloc&) {
+        throw;
+    } catch (const std::exception& error) {
+        result.problem = error.what();
+    }
+    return result;
+}
+
+/// Brings an entry up to date with its file; its mutex is held.
+void refresh(Entry& entry, const fs::path& path, const std::string& name) {
+    std::string problem;
+    for (int attempt = 0; attempt < 3; ++attempt) {
+        const std::optional<Stamp> before = stamp_of(path, problem);
+        if (!before) break;
+        const bool same = entry.read && *before == entry.stamp;
+        if (same && entry.settled) return;
+        const bool settled = Clock::now() - before->modified > kSettled;
+        std::optional<std::string> text = text_of(path, before->bytes);
+        if (!text) {
+            problem = "the file cannot be read";
+            break;
+        }
+        // Written while it was read: what was read may be two halves.
+        const std::optional<Stamp> after = stamp_of(path, problem);
+        if (!after) break;
+        if (!(*after == *before)) {
+            if (attempt < 2) continue;
+        }
+        if (!(entry.read && *text == entry.text && !entry.settled)) {
+            entry.result = parse(*text, name);
+        }
+        entry.read = true;
+        entry.stamp = *after;
+        entry.settled = settled && *after == *before;
+        entry.text = entry.settled ? std::string() : std::move(*text);
+        return;
+    }
+    entry.read = false;
+    entry.settled = false;
+    entry.text.clear();
+    entry.result = {nullptr, name + ": " + problem};
+}
+
+std::vector<Vec3> edited_at(const Sidecar& sidecar, const Slice& slice, const AppliedEdits& edits) {
+    const Polytope& polytope = sidecar.polytope;
+    if (edits.sidecar && edits.host.empty()) {
+        return edited_colours(polytope, sidecar.edits, slice);
+    }
+    return edited_colours(polytope,
+                          with_colours(polytope, sidecar.edits, edits.sidecar, edits.host), slice);
+}
+
+std::shared_ptr<Entry> entry_of(const std::string& key) {
+    Cache& all = cache();
+    const std::lock_guard<std::mutex> lock(all.mutex);
+    std::shared_ptr<Entry>& entry = all.entries[key];
+    if (!entry) entry = std::make_shared<Entry>();
+    const std::shared_ptr<Entry> wanted = entry;
+    wanted->last_use = ++all.uses;
+    while (all.entries.size() > kMaxSidecars) {
+        auto oldest = all.entries.begin();
+        for (auto it = all.entries.begin(); it != all.entries.end(); ++it) {
+            if (it->second->last_use < oldest->second->last_use) oldest = it;
+        }
+        all.entries.erase(oldest);
+    }
+    return wanted;
+}
+
+}  // namespace
+
+LoadedSidecar::LoadedSidecar(Sidecar sidecar, std::string revision)
+    : sidecar_(std::move(sidecar)), revision_(std::move(revision)) {}
+
+bool operator<(const AppliedEdits& a, const AppliedEdits& b) {
+    if (a.sidecar != b.sidecar) return a.sidecar < b.sidecar;
+    return std::lexicographical_compare(a.host.begin(), a.host.end(), b.host.begin(), b.host.end(),
+                                        [](const HandleColour& x, const HandleColour& y) {
+                                            return x.handle != y.handle ? x.handle < y.handle
+                                                                        : x.rgb < y.rgb;
+                                        });
+}
+
+std::shared_ptr<const Recolourer> LoadedSidecar::recolourer_at(double frame,
+                                                               const AppliedEdits& edits) {
+    return prepared({frame, Purpose::kEdit, 0, edits});
+}
+
+std::shared_ptr<const Recolourer> LoadedSidecar::weight_at(double frame, int handle) {
+    return prepared({frame, Purpose::kWeight, handle, {}});
+}
+
+std::shared_ptr<const Recolourer> LoadedSidecar::surface_at(double frame) {
+    return prepared({frame, Purpose::kSurface, 0, {}});
+}
+
+std::pair<std::vector<Vec3>, std::vector<Vec3>> LoadedSidecar::palette_at(
+    double frame, const AppliedEdits& edits) const {
+    Slice slice = slice_at(sidecar_.polytope, frame);
+    return {slice.rgb, edited_at(sidecar_, slice, edits)};
+}
+
+LoadedSidecar::Key LoadedSidecar::clamped(const Key& wanted) const {
+    Key key = wanted;
+    double& frame = std::get<double>(key);
+    // All of the time before the clip is its first frame, all after it the last.
+    const Polytope& polytope = sidecar_.polytope;
+    if (frame < polytope.first_frame()) frame = polytope.first_frame();
+    if (frame > polytope.last_frame()) frame = polytope.last_frame();
+    return key;
+}
+
+std::shared_ptr<LoadedSidecar::Prepared> LoadedSidecar::entry(const Key& key) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const auto [at, is_new] = frames_.try_emplace(key);
+    if (is_new) {
+        at->second = std::make_shared<Prepared>();
+    } else {
+        recent_.remove(&at->first);
+    }
+    recent_.push_front(&at->first);
+    const std::shared_ptr<Prepared> found = at->second;
+    while (recent_.size() > most_frames()) {
+        const Key* oldest = recent_.back();
+        recent_.pop_back();
+        frames_.erase(frames_.find(*oldest));
+    }
+    return found;
+}
+
+std::shared_ptr<const Recolourer> LoadedSidecar::prepared(const Key& wanted) {
+    const Key key = clamped(wanted);
+    const std::shared_ptr<Prepared> prepared = entry(key);
+    // Only threads that want this very frame wait for it.
+    const std::lock_guard<std::mutex> lock(prepared->building);
+    if (!prepared->recolourer) prepared->recolourer = prepare(key);
+    return prepared->recolourer;
+}
+
+std::size_t LoadedSidecar::most_lattices() {
+    static const std::size_t most =
+        std::max<std::size_t>(12, std::thread::hardware_concurrency() + 4);
+    return most;  // asked for every tile, and the processors are the system's to count
+}
+
+std::shared_ptr<const Lattice> LoadedSidecar::lattice_at(double frame, const AppliedEdits& edits) {
+    const Key key = clamped({frame, Purpose::kEdit, 0, edits});
+    const std::shared_ptr<Prepared> prepared = entry(key);
+    std::shared_ptr<const Lattice> lattice;
+    {
+        const std::lock_guard<std::mutex> lock(prepared->building);
+        if (!prepared->recolourer) prepared->recolourer = prepare(key);
+        if (!prepared->lattice) {
+            prepared->lattice = std::make_shared<const Lattice>(prepared->recolourer);
+        }
+        lattice = prepared->lattice;
+    }
+    std::shared_ptr<Prepared> oldest;
+    {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        with_lattice_.remove(prepared);
+        with_lattice_.push_front(prepared);
+        if (with_lattice_.size() > most_lattices()) {
+            oldest = with_lattice_.back();
+            with_lattice_.pop_back();
+        }
+    }
+    if (oldest) {
+        const std::lock_guard<std::mutex> lock(oldest->building);
+        oldest->lattice = nullptr;
+    }
+    return lattice;
+}
+
+std::shared_ptr<const Lattice> LoadedSidecar::ready_lattice_at(double frame,
+                                                               const AppliedEdits& edits) {
+    const Key key = clamped({frame, Purpose::kEdit, 0, edits});
+    std::shared_ptr<Prepared> prepared;
+    {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        const auto at = frames_.find(key);
+        if (at == frames_.end()) return nullptr;
+        prepared = at->second;
+    }
+    const std::lock_guard<std::mutex> lock(prepared->building);
+    return prepared->lattice;
+}
+
+std::shared_ptr<const Recolourer> LoadedSidecar::prepare(const Key& key) const {
+    const auto& [frame, purpose, handle, edits] = key;
+    Slice slice = slice_at(sidecar_.polytope, frame);
+    std::vector<Vec3> edited;
+    switch (purpose) {
+        case Purpose::kEdit:
+            edited = edited_at(sidecar_, slice, edits);
+            break;
+        case Purpose::kWeight:
+            edited = weight_reader(slice, Lineage(sidecar_.polytope, sidecar_.edits, handle));
+            break;
+        case Purpose::kSurface:
+            edited = surface_reader(slice);
+            break;
+    }
+    return std::make_shared<const Recolourer>(std::move(slice.rgb), edited, std::move(slice.faces));
+}
+
+SidecarResult load_sidecar(const std::string& path) {
+    try {
+        const fs::path given = fs::u8path(path);
+        std::error_code error;
+        fs::path canonical = fs::weakly_canonical(given, error);
+        if (error) canonical = given;
+        const std::shared_ptr<Entry> entry = entry_of(canonical.u8string());
+        const std::lock_guard<std::mutex> lock(entry->mutex);
+        refresh(*entry, canonical, path);
+        return entry->result;
+    } catch (const std::bad_alloc&) {
+        throw;
+    } catch (const std::exception& error) {
+        return {nullptr, path + ": " + error.what()};
+    }
+}
+
+SidecarResult load_sidecar_text(const std::string& text, const std::string& name) {
+    Cache& all = cache();
+    {
+        const std::lock_guard<std::mutex> lock(all.mutex);
+        for (const auto& [known, result] : all.texts) {
+            if (known == text) return result;
+        }
+    }
+    const SidecarResult result = parse(text, name);
+    const std::lock_guard<std::mutex> lock(all.mutex);
+    for (const auto& [known, other] : all.texts) {
+        if (known == text) return other;  // another thread was quicker: share what it prepares
+    }
+    all.texts.emplace_front(text, result);
+    if (all.texts.size() > kMaxTexts) all.texts.pop_back();
+    return result;
+}
+
+std::optional<std::string> sidecar_text(const std::string& path) {
+    std::string problem;
+    const fs::path file = fs::u8path(path);
+    const std::optional<Stamp> stamp = stamp_of(file, problem);
+    return stamp ? text_of(file, stamp->bytes) : std::nullopt;
+}
+
+void purge_sidecars() {
+    Cache& all = cache();
+    std::map<std::string, std::shared_ptr<Entry>> dropped;
+    std::list<std::pair<std::string, SidecarResult>> texts;
+    const std::lock_guard<std::mutex> lock(all.mutex);
+    dropped.swap(all.entries);
+    texts.swap(all.texts);
+}
+
+}  // namespace palette4d::node

@@ -1,0 +1,57 @@
+#include "speed_mode.hpp"
+
+#include <cstdint>
+#include <locale>
+#include <sstream>
+
+namespace palette4d::node {
+namespace {
+
+/// A lattice costs what the picture's different colours cost: from so many pixels on, less than
+/// computing each exactly, whatever the edit (`bench_lattice.py --size`).
+constexpr std::int64_t kLatticePays = 1920 * 1080;
+
+}  // namespace
+
+void define_mode_param(ParamDefiner& define) {
+    define.choice({kParamMode, "Mode",
+                   "Exact: every colour is worked out by itself. Lattice: colours are interpolated "
+                   "where that is within 0.002 of exact, which is several times as fast in large "
+                   "pictures. Auto: the lattice where the picture is 1920x1080 or larger, needs "
+                   "no conversion, and the host says that it renders for somebody who watches, or "
+                   "a draft; exact for all else, such as a final render."},
+                  {"Auto", "Exact", "Lattice"});
+}
+
+Mode mode_at(const Params& params, OfxTime time) {
+    const int mode = params.int_at(kParamMode, time).value_or(0);
+    return mode == 1 ? Mode::kExact : mode == 2 ? Mode::kLattice : Mode::kAuto;
+}
+
+Interpolation interpolation_of(Mode mode, const Properties& render_arguments,
+                               const OfxRectI& picture) {
+    if (mode == Mode::kLattice) return Interpolation::kAlways;
+    if (mode == Mode::kExact) return Interpolation::kNever;
+    const std::int64_t width = static_cast<std::int64_t>(picture.x2) - picture.x1;
+    const std::int64_t height = static_cast<std::int64_t>(picture.y2) - picture.y1;
+    // Either may be as large as 2^32.
+    if (width <= 0 || height <= (kLatticePays - 1) / width) return Interpolation::kNever;
+    const auto says = [&](const char* name) {
+        return render_arguments.get_int(name).value_or(0) != 0;
+    };
+    return says(kOfxImageEffectPropInteractiveRenderStatus) ||
+                   says(kOfxImageEffectPropRenderQualityDraft)
+               ? Interpolation::kWithoutConversion
+               : Interpolation::kNever;
+}
+
+std::string words_of(const Lattice& lattice) {
+    std::ostringstream text;
+    text.imbue(std::locale::classic());
+    text.precision(2);
+    text << "lattice, largest error measured " << lattice.largest_error() << " (at most "
+         << Lattice::kTolerance << " is wanted)";
+    return text.str();
+}
+
+}  // namespace palette4d::node

@@ -1,0 +1,70 @@
+#include "threads.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cstdint>
+#include <exception>
+#include <mutex>
+
+namespace palette4d::node {
+namespace {
+
+// Small enough to notice an abort soon and to share evenly, large enough to be worth the asking.
+constexpr int kBandRows = 16;
+
+struct Work {
+    int first, last;
+    std::int64_t bands;
+    const std::function<void(int, int)>& band;
+    const std::function<bool()>& stop;
+    std::atomic<std::int64_t> next{0};
+    std::atomic<bool> stopped{false};
+    std::mutex mutex{};
+    std::exception_ptr error{};
+
+    void run() {
+        while (!stopped.load()) {
+            const std::int64_t index = next.fetch_add(1);
+            if (index >= bands) return;
+            try {
+                if (stop()) {
+                    stopped = true;
+                    return;
+                }
+                const std::int64_t y1 = first + index * kBandRows;
+                const std::int64_t y2 = std::min<std::int64_t>(last, y1 + kBandRows);
+                band(static_cast<int>(y1), static_cast<int>(y2));
+            } catch (...) {
+                // The host's threads are no place for an exception.
+                const std::lock_guard<std::mutex> lock(mutex);
+                if (!error) error = std::current_exception();
+                stopped = true;
+            }
+        }
+    }
+};
+
+void run_band(unsigned int, unsigned int, void* work) { static_cast<Work*>(work)->run(); }
+
+}  // namespace
+
+void for_each_band(const Suites& suites, int first, int last,
+                   const std::function<void(int, int)>& band, const std::function<bool()>& stop) {
+    const std::int64_t rows = static_cast<std::int64_t>(last) - first;
+    if (rows <= 0) return;
+    Work work{first, last, (rows + kBandRows - 1) / kBandRows, band, stop};
+    const OfxMultiThreadSuiteV1* host = suites.thread;
+    unsigned int processors = 1;
+    if (host && host->multiThread && host->multiThreadNumCPUs &&
+        host->multiThreadNumCPUs(&processors) != kOfxStatOK) {
+        processors = 1;
+    }
+    const auto wanted =
+        static_cast<unsigned int>(std::min<std::int64_t>(work.bands, std::min(processors, 1024u)));
+    if (wanted > 1) host->multiThread(&run_band, wanted, &work);
+    // Whatever a host that refused or started fewer threads left undone; nothing, as a rule.
+    work.run();
+    if (work.error) std::rethrow_exception(work.error);
+}
+
+}  // namespace palette4d::node

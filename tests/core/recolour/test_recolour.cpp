@@ -1,0 +1,266 @@
+#include "recolour/recolour.hpp"
+
+#include <cstring>
+#include <limits>
+#include <stdexcept>
+
+#include "check.hpp"
+#include "images.hpp"
+#include "shapes.hpp"
+
+using namespace palette4d;
+using namespace images;
+using namespace shapes;
+
+namespace {
+
+Image noise(int width, int height, int channels, std::uint64_t seed) {
+    Image image(width, height, channels);
+    Random random(seed);
+    for (float& x : image.data) x = static_cast<float>(random.uniform(-0.3, 1.4));
+    const float odd[] = {kNan, kInf, -kInf, -0.0f, 0.0f, 1e-42f, 3e38f};
+    for (int i = 0; i < 7 && i * 5 < static_cast<int>(image.data.size()); ++i) {
+        image.data[static_cast<std::size_t>(i) * 5] = odd[i];
+    }
+    return image;
+}
+
+std::vector<Vec3> moved_cube() {
+    std::vector<Vec3> edited = cube().rgb;
+    edited[7] = {1.2, 0.7, 0.9};
+    edited[1] = {0.8, 0.1, -0.1};
+    return edited;
+}
+
+Recolourer cube_recolourer() { return {cube().rgb, moved_cube(), cube().faces}; }
+
+}  // namespace
+
+TEST(without_an_edit_every_bit_passes) {
+    const Recolourer same(cube().rgb, cube().rgb, cube().faces);
+    CHECK(!same.moves());
+    for (const int channels : {3, 4}) {
+        const Image image = noise(17, 5, channels, 1);
+        Image result(17, 5, channels);
+        same.apply(image.in(), result.out(), {1.0, channels == 4, 2});
+        CHECK(same_bits(result.data, image.data));
+        CHECK(cube_recolourer().moves());
+        Image off(17, 5, channels);
+        cube_recolourer().apply(image.in(), off.out(), {0.0, false, 1});
+        CHECK(same_bits(off.data, image.data));
+    }
+}
+
+TEST(a_colour_moves_by_the_weighted_displacements) {
+    const Recolourer recolourer = cube_recolourer();
+    // On a vertex it becomes the edited vertex; half the strength goes half the way.
+    const Vec3 full = recolourer.displaced({1, 1, 1}, 1),
+               half = recolourer.displaced({1, 1, 1}, 0.5);
+    const Vec3 expected{1.2, 0.7, 0.9}, halfway{1.1, 0.85, 0.95};
+    for (std::size_t c = 0; c < 3; ++c) {
+        CHECK_NEAR(full[c], expected[c], 1e-14);
+        CHECK_NEAR(half[c], halfway[c], 1e-14);
+    }
+    // Outside it moves as its closest point does, and keeps its distance.
+    const Vec3 beyond = recolourer.displaced({1.5, 2, 1.25}, 1);
+    CHECK_NEAR(beyond[0], 1.7, 1e-14);
+    CHECK_NEAR(beyond[1], 1.7, 1e-14);
+    CHECK_NEAR(beyond[2], 1.15, 1e-14);
+    // A strength above 1 or below 0 goes on along the line.
+    CHECK_NEAR(recolourer.displaced({1, 1, 1}, 2)[0], 1.4, 1e-14);
+    CHECK_NEAR(recolourer.displaced({1, 1, 1}, -1)[0], 0.8, 1e-14);
+}
+
+TEST(an_affine_edit_moves_every_inner_colour_by_it) {
+    // Weights reproduce the point, hence any affine map of the palette is the map of its inside.
+    Random random(2);
+    for (int round = 0; round < 50; ++round) {
+        const Mesh mesh = random_convex(random, 5 + random.below(8));
+        std::array<Vec3, 3> matrix;
+        for (Vec3& row : matrix) row = random.colour(-1, 1);
+        const Vec3 shift = random.colour(-1, 1);
+        const auto map = [&](const Vec3& p) {
+            Vec3 q = shift;
+            for (std::size_t i = 0; i < 3; ++i) {
+                for (std::size_t j = 0; j < 3; ++j) q[i] += matrix[i][j] * p[j];
+            }
+            return q;
+        };
+        std::vector<Vec3> edited;
+        Vec3 centre{};
+        for (const Vec3& v : mesh.rgb) {
+            edited.push_back(map(v));
+            for (std::size_t c = 0; c < 3; ++c)
+                centre[c] += v[c] / static_cast<double>(mesh.rgb.size());
+        }
+        const Recolourer recolourer(mesh.rgb, edited, mesh.faces);
+        for (const Vec3& v : mesh.rgb) {
+            const double t = random.uniform(0.1, 0.9);
+            const Vec3 p{centre[0] + t * (v[0] - centre[0]), centre[1] + t * (v[1] - centre[1]),
+                         centre[2] + t * (v[2] - centre[2])};
+            const Vec3 found = recolourer.displaced(p, 1), expected = map(p);
+            for (std::size_t c = 0; c < 3; ++c) CHECK_NEAR(found[c], expected[c], 1e-11);
+        }
+    }
+}
+
+TEST(the_image_loop_is_the_one_colour_function) {
+    const Recolourer recolourer = cube_recolourer();
+    const Image image = noise(31, 9, 3, 3);
+    Image result(31, 9, 3);
+    recolourer.apply(image.in(), result.out(), {0.7, false, 1, Precision::kDouble});
+    int changed = 0;
+    for (std::size_t i = 0; i < image.data.size(); i += 3) {
+        const Vec3 p{image.data[i], image.data[i + 1], image.data[i + 2]};
+        const Vec3 q = recolourer.displaced(p, 0.7);
+        for (std::size_t c = 0; c < 3; ++c) {
+            const float expected = static_cast<float>(q[c]);
+            CHECK(std::memcmp(&result.data[i + c], &expected, 4) == 0 || std::isnan(p[c]));
+        }
+        changed += std::memcmp(&result.data[i], &image.data[i], 12) != 0;
+    }
+    CHECK(changed > 150);
+}
+
+TEST(a_colour_with_a_nan_or_infinity_passes) {
+    const Recolourer recolourer = cube_recolourer();
+    Image image(4, 1, 3);
+    image.data = {kNan, 0.5f, 0.5f, 0.5f, kInf, 0.5f, 0.5f, 0.5f, -kInf, 0.5f, 0.5f, 0.5f};
+    const std::uint32_t payload = 0x7fc12345;
+    std::memcpy(&image.data[0], &payload, 4);
+    Image result(4, 1, 3);
+    recolourer.apply(image.in(), result.out(), {});
+    CHECK(std::memcmp(result.data.data(), image.data.data(), 9 * sizeof(float)) == 0);
+    CHECK(result.data[9] != image.data[9]);
+    const Vec3 same = recolourer.displaced({1, std::numeric_limits<double>::infinity(), 2}, 1);
+    CHECK_EQUAL(same[0], 1.0);
+    CHECK_EQUAL(same[2], 2.0);
+}
+
+TEST(what_does_not_move_keeps_its_bits) {
+    // Only the red of one vertex moves: green and blue never change, nor does red where it has no
+    // weight, and a negative zero stays one.
+    std::vector<Vec3> edited = tetrahedron().rgb;
+    edited[1][0] = 0.5;
+    const Recolourer recolourer(tetrahedron().rgb, edited, tetrahedron().faces);
+    Image image(3, 1, 3);
+    image.data = {-0.0f, -0.0f, -0.0f, -0.0f, 0.25f, 0.5f, 0.5f, -0.0f, 1e-42f};
+    Image result(3, 1, 3);
+    recolourer.apply(image.in(), result.out(), {});
+    CHECK(std::memcmp(result.data.data(), image.data.data(), 6 * sizeof(float)) == 0);
+    CHECK(std::memcmp(&result.data[7], &image.data[7], 2 * sizeof(float)) == 0);
+    CHECK_NEAR(result.data[6], 0.25, 1e-7);
+}
+
+TEST(alpha_is_copied_and_premultiplied_colours_are_divided) {
+    const Recolourer recolourer = cube_recolourer();
+    Image straight(5, 1, 4), multiplied(5, 1, 4);
+    const float alphas[] = {1.0f, 0.5f, 0.25f, 2.0f, -0.5f};
+    Random random(4);
+    for (std::size_t i = 0; i < 5; ++i) {
+        for (std::size_t c = 0; c < 3; ++c) {
+            straight.data[4 * i + c] = static_cast<float>(random.uniform(0.1, 0.9));
+            multiplied.data[4 * i + c] = straight.data[4 * i + c] * alphas[i];
+        }
+        straight.data[4 * i + 3] = multiplied.data[4 * i + 3] = alphas[i];
+    }
+    Image a(5, 1, 4), b(5, 1, 4);
+    recolourer.apply(straight.in(), a.out(), {1, false, 1});
+    recolourer.apply(multiplied.in(), b.out(), {1, true, 1});
+    for (std::size_t i = 0; i < 5; ++i) {
+        CHECK_EQUAL(a.data[4 * i + 3], alphas[i]);
+        CHECK_EQUAL(b.data[4 * i + 3], alphas[i]);
+        for (std::size_t c = 0; c < 3; ++c) {
+            CHECK_NEAR(b.data[4 * i + c], a.data[4 * i + c] * alphas[i], 3e-7);
+            CHECK(a.data[4 * i + c] != straight.data[4 * i + c]);
+        }
+    }
+    // No alpha, no colour to speak of: unchanged. Not premultiplied: alpha does not matter.
+    Image odd(5, 1, 4);
+    odd.data = {.5f, .5f,  .5f, 0.f, .5f, .5f,  .5f, -0.f, .5f, .5f,
+                .5f, kNan, .5f, .5f, .5f, kInf, .5f, .5f,  .5f, 1e-45f};
+    Image c(5, 1, 4), d(5, 1, 4);
+    recolourer.apply(odd.in(), c.out(), {1, true, 1});
+    CHECK(std::memcmp(c.data.data(), odd.data.data(), 16 * sizeof(float)) == 0);
+    for (const float& x : c.data) CHECK(std::isfinite(x) || &x == &c.data[11] || &x == &c.data[15]);
+    recolourer.apply(odd.in(), d.out(), {1, false, 1});
+    for (std::size_t i = 0; i < 5; ++i) {
+        CHECK(d.data[4 * i] != .5f);
+        CHECK(std::memcmp(&d.data[4 * i + 3], &odd.data[4 * i + 3], 4) == 0);
+    }
+}
+
+TEST(rows_may_be_padded_upside_down_or_the_same_memory) {
+    const Recolourer recolourer = cube_recolourer();
+    for (const int channels : {3, 4}) {
+        const Image image = noise(13, 7, channels, 5);
+        Image expected(13, 7, channels);
+        recolourer.apply(image.in(), expected.out(), {1, false, 1});
+
+        const std::size_t row = static_cast<std::size_t>(13 * channels), padded = row + 3;
+        std::vector<float> in(padded * 7, 7.0f), out(padded * 7, 9.0f);
+        for (std::size_t y = 0; y < 7; ++y) {
+            std::copy_n(&image.data[y * row], row, &in[(6 - y) * padded]);
+        }
+        const auto stride = -static_cast<std::ptrdiff_t>(padded * sizeof(float));
+        recolourer.apply({&in[6 * padded], 13, 7, channels, stride},
+                         {&out[6 * padded], 13, 7, channels, stride}, {1, false, 3});
+        for (std::size_t y = 0; y < 7; ++y) {
+            const float* found = &out[(6 - y) * padded];
+            CHECK(std::memcmp(found, &expected.data[y * row], row * sizeof(float)) == 0);
+            for (std::size_t x = row; x < padded; ++x) CHECK_EQUAL(found[x], 9.0f);
+        }
+        Image place = image;
+        recolourer.apply(place.in(), place.out(), {1, false, 2});
+        CHECK(same_bits(place.data, expected.data));
+    }
+}
+
+TEST(the_number_of_threads_does_not_show) {
+    const Recolourer recolourer = cube_recolourer();
+    const Image image = noise(64, 37, 4, 6);
+    Image expected(64, 37, 4);
+    recolourer.apply(image.in(), expected.out(), {0.8, true, 1});
+    for (const int threads : {0, 2, 3, 8, 100}) {
+        Image result(64, 37, 4);
+        recolourer.apply(image.in(), result.out(), {0.8, true, threads});
+        CHECK(same_bits(result.data, expected.data));
+    }
+}
+
+TEST(one_two_and_flat_colours) {
+    // One colour: everything moves alike. Two: by the place along their line.
+    const Recolourer one({{0.5, 0.5, 0.5}}, {{0.6, 0.5, 0.4}}, {});
+    const Vec3 far = one.displaced({3, -2, 0.5}, 1);
+    CHECK_NEAR(far[0], 3.1, 1e-14);
+    CHECK_NEAR(far[1], -2, 0);
+    CHECK_NEAR(far[2], 0.4, 1e-14);
+    const Recolourer two({{0, 0, 0}, {1, 1, 1}}, {{0, 0, 0}, {1, 0, 0}}, {});
+    const Vec3 grey = two.displaced({0.5, 0.5, 0.5}, 1);
+    CHECK_NEAR(grey[0], 0.5, 1e-15);
+    CHECK_NEAR(grey[1], 0, 1e-15);
+    const Recolourer flat(flat_square().rgb, {{0, 0, 0.6}, {1, 0, 0.6}, {1, 1, 0.6}, {0, 1, 0.6}},
+                          flat_square().faces);
+    CHECK_NEAR(flat.displaced({0.3, 0.4, 0.5}, 1)[2], 0.6, 1e-14);
+    CHECK_NEAR(flat.displaced({0.3, 0.4, 0.9}, 1)[2], 1.0, 1e-14);
+}
+
+TEST(mismatched_input_is_refused) {
+    const Recolourer recolourer = cube_recolourer();
+    Image a(4, 4, 3), b(4, 5, 3), c(4, 4, 4), d(4, 4, 2);
+    CHECK_THROWS(std::invalid_argument, recolourer.apply(a.in(), b.out(), {}));
+    CHECK_THROWS(std::invalid_argument, recolourer.apply(a.in(), c.out(), {}));
+    CHECK_THROWS(std::invalid_argument, recolourer.apply(d.in(), d.out(), {}));
+    CHECK_THROWS(std::invalid_argument, recolourer.apply({nullptr, 4, 4, 3, 48}, a.out(), {}));
+    CHECK_THROWS(std::invalid_argument,
+                 recolourer.apply({a.data.data(), 4, 4, 3, 44}, a.out(), {}));
+    CHECK_THROWS(std::invalid_argument, recolourer.apply(a.in(), a.out(), {1, false, -1}));
+    CHECK_THROWS(std::invalid_argument,
+                 recolourer.apply(a.in(), a.out(), {std::nan(""), false, 1}));
+    recolourer.apply({nullptr, 0, 4, 3, 0}, {nullptr, 0, 4, 3, 0}, {});
+    CHECK_THROWS(std::invalid_argument, Recolourer({{0, 0, 0}}, {}, {}));
+    CHECK_THROWS(std::invalid_argument, Recolourer({{0, 0, 0}}, {{kNan, 0, 0}}, {}));
+    CHECK_THROWS(std::invalid_argument, Recolourer(cube().rgb, cube().rgb, {{0, 1, 9}}));
+}
+
+int main() { return check::run_all(); }
