@@ -11,7 +11,7 @@ import uuid
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,27 +38,14 @@ from palette4d.colour.conversion_steps import Step
 from palette4d.colour.difference import VISIBLE, Viewing, viewing_of
 from palette4d.common.errors import Palette4dError
 from palette4d.common.files import refuse_existing, replacing
+from palette4d.grade import sidecar as sidecars
+from palette4d.grade.document import Document
 from palette4d.media.source_clip import frame_colours
 
 F32 = NDArray[np.float32]
 
 #: The namespace of the files' ids (RFC 9562, version 5), drawn once for this project.
 NAMESPACE = uuid.UUID("09823ba4-0bc8-43a9-995d-cb9a6abeb5b3")
-
-
-class Document(Protocol):
-    """A palette with its edits, in memory: `palette4d.Document`."""
-
-    path: Path | None
-
-    @property
-    def core(self) -> _core.Sidecar:
-        """The core's view."""
-        ...
-
-    def fields(self) -> Mapping[str, Any]:
-        """Return the members of the sidecar."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -277,12 +264,7 @@ def bake(
     output = Path(path)
     format_ = format_of(output, format)
     check_target(output, force)
-    if isinstance(source, str | os.PathLike):
-        file: Path | None = Path(source)
-        sidecar = _core.read_sidecar(os.fspath(source))
-        data = Path(source).read_bytes()
-    else:
-        sidecar, file, data = source.core, source.path, _bytes_of(source)
+    sidecar, data, file = _opened(source)
     check_settings(settings, format_, sidecar, frame)
     found_space = space_of(data, sidecar, space, ocio_config)
     image, image_frame = _picture(file, sidecar, frame, clip)
@@ -346,14 +328,19 @@ def bake(
 # ------------------------------------------------------------------------------ before any sampling
 
 
-def _bytes_of(document: Document) -> bytes:
-    """Return a document's sidecar: the file where it holds the same, else the members as JSON."""
-    fields = document.fields()
-    if document.path is not None and document.path.is_file():
-        data = document.path.read_bytes()
+def _opened(
+    source: str | os.PathLike[str] | Document,
+) -> tuple[_core.Sidecar, bytes, Path | None]:
+    """Return the core's view of a sidecar, its bytes, and its file."""
+    if not isinstance(source, Document):
+        data = sidecars.read_bytes(source)
+        return _core.parse_sidecar(data, os.fspath(source)), data, Path(source)
+    fields = source.fields()
+    if source.path is not None and source.path.is_file():
+        data = source.path.read_bytes()
         if json.loads(data) == fields:
-            return data
-    return json.dumps(fields).encode()
+            return source.core, data, source.path
+    return source.core, sidecars.encoded(fields), source.path
 
 
 def check_target(path: Path, force: bool) -> None:

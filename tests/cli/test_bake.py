@@ -73,9 +73,7 @@ class TestPiping:
             assert b"standard output: " in piped.err
             assert b"dense grid" in piped.err
 
-    def test_json_is_on_standard_error(
-        self, capfdbinary: pytest.CaptureFixture[bytes]
-    ) -> None:
+    def test_json_is_on_standard_error(self, capfdbinary: pytest.CaptureFixture[bytes]) -> None:
         assert run("--size", 5, "-o", "-", "--format", "spi3d", "--json") == 0
         piped = capfdbinary.readouterr()
         assert piped.out.startswith(b"SPILUT 1.0")

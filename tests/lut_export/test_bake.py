@@ -19,6 +19,7 @@ from palette4d.lut_export.bake_error import load, stated
 
 from palette4d import Palette4dError, SidecarError, _core
 from palette4d.cli.main import main
+from palette4d.grade.document import Document
 
 F32 = NDArray[np.float32]
 
@@ -250,31 +251,21 @@ def test_the_same_bake_gives_the_same_bytes_and_id(warm_sidecar: Path, tmp_path:
     assert len(ids) == 3
 
 
-class InMemory:
-    """A document as `palette4d.load` returns it."""
-
-    def __init__(self, fields: dict[str, Any], path: Path | None) -> None:
-        self.path, self._fields = path, fields
-        self.core = _core.parse_sidecar(json.dumps(fields))
-
-    def fields(self) -> dict[str, Any]:
-        return self._fields
-
-
 def test_a_document_is_baked_like_its_file(warm_sidecar: Path, tmp_path: Path) -> None:
-    fields = json.loads(warm_sidecar.read_text("utf-8"))
+    document = Document.load(warm_sidecar)
     outs = [tmp_path / f"{k}.cube" for k in range(3)]
     bake(warm_sidecar, 4.0, outs[0], size=5)
-    bake(InMemory(fields, warm_sidecar), 4.0, outs[1], size=5)
+    bake(document, 4.0, outs[1], size=5)
     assert outs[0].read_bytes() == outs[1].read_bytes()
     # An edit that is not saved yet is baked, and the file's hash is not claimed.
-    fields["edits"]["vertices"][7]["rgb"] = [0.5, 0.8, 1.0]
-    unsaved = bake(InMemory(fields, warm_sidecar), 0.0, outs[2], size=5)
+    document.set("v8", rgb=(0.5, 0.8, 1.0))
+    unsaved = bake(document, 0.0, outs[2], size=5)
     assert unsaved.sidecar_sha256 != hashlib.sha256(warm_sidecar.read_bytes()).hexdigest()
     white = np.ones((1, 1, 3), dtype=np.float32)
     got = read_back(outs[2], white, ocio.INTERP_LINEAR)
     np.testing.assert_allclose(got[0, 0], [0.5, 0.8, 1.0], atol=1e-5)
-    assert bake(InMemory(fields, None), 0.0, tmp_path / "no.cube", size=5).sidecar is None
+    never_saved = Document(document.fields())
+    assert bake(never_saved, 0.0, tmp_path / "no.cube", size=5).sidecar is None
 
 
 def test_smallest_size(warm_sidecar: Path, tmp_path: Path) -> None:
