@@ -94,9 +94,9 @@ def before_after(clip: Path, graded: Path, out: Path) -> None:
 
 
 def fade(sidecar: Path) -> str:
-    """Say over which frames the sidecar's one colour stop acts: between its edge's two vertices."""
+    """Say over which frames the newest colour stop acts: between its edge's two vertices."""
     document = json.loads(sidecar.read_text(encoding="utf-8"))
-    (stop,) = document["edits"]["stops"]
+    stop = document["edits"]["stops"][-1]
     (edge,) = (e for e in document["polytope"]["edges"] if e["id"] == stop["edge"])
     when = {v["id"]: v["frame"] for v in document["polytope"]["vertices"]}
     return (

@@ -24,7 +24,7 @@ from palette4d.lut_export.spaces import space_of, transforms
 from palette4d import Palette4dError, _core
 from palette4d.colour import ocio_config
 from palette4d.grade import sidecar as sidecars
-from palette4d.grade.rendering import RenderOptions, recoloured
+from palette4d.grade.document import Document
 from palette4d.jobs.workers import Workers
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
@@ -79,7 +79,7 @@ def through(source: str, target: str, colours: F32) -> F32:
 
 
 def rendered(path: Path, colours: F32) -> F32:
-    return recoloured(_core.read_sidecar(path), FRAME, colours, False, RenderOptions())
+    return Document.load(path).recolour(colours, FRAME)
 
 
 @pytest.mark.parametrize("extension", [".clf", ".ctf"])

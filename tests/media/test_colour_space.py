@@ -18,6 +18,7 @@ from palette4d.colour.conversion import TOLERANCE, Comparison, conversion
 from palette4d.colour.conversion_steps import ConversionError
 from palette4d.common.errors import Palette4dError
 from palette4d.grade import sidecar as sidecars
+from palette4d.grade.document import Document
 from palette4d.media.clip import open_clip
 from palette4d.media.colour_space import SpaceOptions, Spaces, spaces_of
 
@@ -316,13 +317,10 @@ def test_without_options_and_without_ocio_nothing_changes(
 def test_unedited_pixels_keep_their_bits_and_edited_ones_come_back(
     linear_clip: str, tmp_path: Path
 ) -> None:
-    from palette4d.grade.rendering import RenderOptions, recoloured
-
     path = tmp_path / "cg.p4d.json"
     document = analyse(linear_clip, path, "--input-space", "ACEScg")
     image = scene(2)
-    read = _core.read_sidecar(path)
-    assert np.array_equal(recoloured(read, 2, image, False, RenderOptions()), image)
+    assert np.array_equal(Document.load(path).recolour(image, 2), image)
 
     # Brighter by half a stop everywhere: in ACEScct all colours move by the same step.
     half = 0.5 / 17.52
@@ -330,46 +328,33 @@ def test_unedited_pixels_keep_their_bits_and_edited_ones_come_back(
         {"vertex": vertex["id"], "rgb": [value + half for value in vertex["rgb"]]}
         for vertex in document["polytope"]["vertices"]
     ]
-    read = sidecars.validate(document)
-    brighter = recoloured(read, 2, image, False, RenderOptions())
+    brighter = Document(document).recolour(image, 2)
     # ACEScct is straight below 0.0078125, above it a step is a factor.
     bright = (image > 0.02).all(axis=-1)
     np.testing.assert_allclose(brighter[bright] / image[bright], np.sqrt(2), rtol=2e-3)
-    back = recoloured(
-        sidecars.validate(
-            {
-                **document,
-                "edits": {
-                    "stops": [],
-                    "vertices": [
-                        {"vertex": v["id"], "rgb": [x - half for x in v["rgb"]]}
-                        for v in document["polytope"]["vertices"]
-                    ],
-                },
-            }
-        ),
-        2, brighter, False, RenderOptions(),
-    )  # fmt: skip
+    document["edits"]["vertices"] = [
+        {"vertex": vertex["id"], "rgb": [value - half for value in vertex["rgb"]]}
+        for vertex in document["polytope"]["vertices"]
+    ]
+    back = Document(document).recolour(brighter, 2)
     np.testing.assert_allclose(back, image, rtol=2e-3, atol=1e-5)
 
 
 def test_the_neutral_stays_monotone_and_finite(linear_clip: str, tmp_path: Path) -> None:
-    from palette4d.grade.rendering import RenderOptions, recoloured
-
     path = tmp_path / "cg.p4d.json"
     document = analyse(linear_clip, path, "--input-space", "ACEScg")
     for vertex in document["polytope"]["vertices"]:
         document["edits"]["vertices"].append(
             {"vertex": vertex["id"], "rgb": [value + 0.05 for value in vertex["rgb"]]}
         )
-    read = sidecars.validate(document)
+    grade = Document(document)
     ramp = np.concatenate([-np.geomspace(100, 1e-6, 400), [0], np.geomspace(1e-6, 6e4, 2000)])
     image = np.repeat(ramp.astype(np.float32)[None, :, None], 3, axis=2)
-    result = recoloured(read, 2.5, image, False, RenderOptions())
+    result = grade.recolour(image, 2.5)
     assert np.isfinite(result).all()
     assert (np.diff(result[0], axis=0) > -1e-6 * np.abs(result[0, 1:])).all()
     odd = np.array([[[np.nan, 1, 1], [np.inf, 0, 0], [3e38, -3e38, 0]]], dtype=np.float32)
-    passed = recoloured(read, 2.5, odd, False, RenderOptions())
+    passed = grade.recolour(odd, 2.5)
     assert np.array_equal(passed[0, :2], odd[0, :2], equal_nan=True)
     assert np.isfinite(passed[0, 2]).all()
 
@@ -431,8 +416,6 @@ def test_other_encodings_in_a_common_palette_space(
     tmp_path: Path, space: str, extension: str, samples: str
 ) -> None:
     """Camera logs and displays, palettes in ACEScct: as OpenColorIO there, our edit, and back."""
-    from palette4d.grade.rendering import RenderOptions, recoloured
-
     config = ocio_config.load_config(STUDIO, "test")
     for frame in (1, 2):
         light = np.clip(scene(frame), 0, 1 if extension == "png" else None)
@@ -449,7 +432,7 @@ def test_other_encodings_in_a_common_palette_space(
     ]
     read = sidecars.validate(document)
     image = open_clip(clip).read(1)
-    found = recoloured(read, 1, image, False, RenderOptions())
+    found = Document(document).recolour(image, 1)
     cut = _core.slice_at(read.polytope, 1)
     recolourer = _core.Recolourer(
         cut.rgb, _core.edited_colours(read.polytope, read.edits, cut), cut.faces
@@ -490,8 +473,6 @@ def test_colours_beyond_an_encoding_s_end_are_told_and_come_back(
     tmp_path: Path, capsys: Any
 ) -> None:
     """Canon's log ends at code 1, where OpenColorIO clamps: our curves go on."""
-    from palette4d.grade.rendering import RenderOptions, recoloured
-
     codes = np.random.default_rng(6).uniform(0.1, 1.2, (24, 32, 3)).astype(np.float32)
     write_image(tmp_path / "c.0001.exr", codes, "float")
     output = tmp_path / "c.p4d.json"
@@ -507,7 +488,7 @@ def test_colours_beyond_an_encoding_s_end_are_told_and_come_back(
         {"vertex": vertex["id"], "rgb": [value + 0.01 for value in vertex["rgb"]]}
         for vertex in document["polytope"]["vertices"]
     ]
-    moved = recoloured(sidecars.validate(document), 1, codes, False, RenderOptions())
+    moved = Document(document).recolour(codes, 1)
     assert np.isfinite(moved).all()
     assert 0 < np.median(np.abs(moved - codes)) < 0.05
 

@@ -17,7 +17,7 @@ from typing import Any
 from palette4d import _core
 from palette4d.analysis import pipeline
 from palette4d.analysis.options import AnalysisOptions
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Palette4dError, in_words
 from palette4d.common.files import make_folder
 from palette4d.common.text import counted
 from palette4d.grade import sidecar
@@ -292,7 +292,7 @@ class _Run:
             self.analysed.append(name)
             self.remarks[name] = outcome.remarks
         except (Palette4dError, OSError) as error:
-            self.entries[name] = Entry(entry.shot, FAILED, error=str(error))
+            self.entries[name] = Entry(entry.shot, FAILED, error=in_words(error))
         self.save()
 
     def save(self) -> None:
