@@ -254,9 +254,8 @@ class Show:
         clip = document["clip"]
         found = (int(clip["frames"]["first"]), int(clip["frames"]["last"]))
         expected = {(shot.first, shot.last)}
-        if before and before.frames:
-            if dataclasses.replace(before.shot, place=shot.place) == shot:
-                expected.add(before.frames)
+        if before and before.frames and dataclasses.replace(before.shot, place=shot.place) == shot:
+            expected.add(before.frames)
         same = (
             (self.same_options if before else not self.options.spaces.asked)
             and found in expected
