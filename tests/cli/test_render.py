@@ -340,7 +340,7 @@ def test_a_movie_holds_the_recoloured_frames(tmp_path, name, codec):
     assert [path.name for path in (tmp_path / "out").iterdir()] == [name]
     clip = open_clip(str(tmp_path / "out" / name))
     assert (clip.rate, clip.frames, clip.width, clip.height) == (25, list(range(6)), 64, 48)
-    for frame, pixels in open_clip(str(source)).iter_frames():
+    for frame, pixels in open_clip(str(source)):
         expected = np.clip(by_core(frame, pixels), 0, 1)
         assert np.abs(expected - pixels).max() > 0.05
         np.testing.assert_allclose(centres(clip.read(frame)), centres(expected), atol=0.025)

@@ -1,6 +1,6 @@
 """What several verbs read from the command line alike: frames, times, numbers, colours.
 
-A value that is wrong whatever the files hold is refused here, as an argparse type: exit status 2.
+Values that no file can make right are refused here, as wrong usage: exit status 2.
 """
 
 import argparse
@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 
 from palette4d.common.errors import Palette4dError
 
-#: Longer than any clip; stops numbers that are dates or ids from being taken for frames.
+#: Longer than any clip: dates and ids are not taken for frames.
 MAX_FRAMES = 1_000_000
 
 # argparse takes "-3", "-5--4" and "-0.1,0.2,0.3" for options unless told that they are values.
@@ -24,8 +24,9 @@ _FRAMES_ARE = "expected A, A-B or A-BxN with A <= B, or several with commas, suc
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that says what is wrong in two lines, and where the help is: of a verb with dozens
-    of options argparse would print the whole usage before it. Verbs and their actions inherit it.
+    """A parser whose errors are two lines: argparse would print the whole usage of a verb first.
+
+    Verbs and their actions inherit it.
     """
 
     def error(self, message: str) -> NoReturn:
@@ -39,7 +40,7 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(
         self, args: Iterable[str] | None = None, namespace: Any = None
     ) -> tuple[Any, list[str]]:
-        """As argparse, but what a verb does not know is the verb's error, not the command's."""
+        """Parse as argparse does, but report unknown words as the verb's error."""
         found, unknown = super().parse_known_args(args, namespace)
         if unknown:
             self.error(f"unrecognized arguments: {' '.join(unknown)}")

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
 from palette4d.common.files import link_target
+from palette4d.common.text import counted
 from palette4d.grade import edits, sidecar
 from palette4d.grade.edits import Change, Colour, Edit, Setting, Settings, as_colour
 from palette4d.grade.palette import FAR, Near, Palette, palette_at
@@ -85,6 +86,15 @@ class Document:
         self._saved = self._settings
         self._done: list[Edit] = []
         self._undone: list[Edit] = []
+
+    def __repr__(self) -> str:
+        """Return the clip, its frames and how much is edited, on one line."""
+        first, last, _ = self.frames
+        return (
+            f"<Document {self._fields['clip']['name']!r}: frames {first} to {last}, "
+            f"{counted(len(self._vertices), 'vertex', 'vertices')}, "
+            f"{counted(len(self._settings), 'edit')}>"
+        )
 
     # ------------------------------------------------------------------------------ what it holds
 

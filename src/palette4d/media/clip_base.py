@@ -161,7 +161,7 @@ class Clip(abc.ABC):
         if not good:
             raise self.none_readable()
 
-    def iter_frames(self) -> Iterator[tuple[int, F32]]:
+    def __iter__(self) -> Iterator[tuple[int, F32]]:
         """(frame number, (h, w, 3 or 4) float32 pixels), in order, one frame at a time."""
         for image in self.iter_images():
             yield image.frame, image.pixels
