@@ -59,7 +59,7 @@ def state(folder: Path) -> dict[str, tuple[bytes, int]]:
 
 def recolour(path: Path) -> None:
     """Edit a sidecar as a user does."""
-    words = ["edit", str(path), "set", "--near", "0.5,0.5,0.5", "--frame"]
+    words = ["edit", str(path), "set", "--anyway", "--near", "0.5,0.5,0.5", "--frame"]
     first = json.loads(path.read_text("utf-8"))["clip"]["frames"]["first"]
     assert main.main([*words, str(first), "--rgb", "0.1", "0.9", "0.2"]) == 0
 

@@ -182,7 +182,16 @@ class TestSeries:
     def test_stops_of_unedited_shots_are_their_first_frame(
         self, show: Path, capsys: pytest.CaptureFixture[str]
     ) -> None:
-        words = ["edit", "shots/two.p4d.json", "set", "--near", "0.5,0.5,0.5", "--frame", "6"]
+        words = [
+            "edit",
+            "shots/two.p4d.json",
+            "set",
+            "--anyway",
+            "--near",
+            "0.5,0.5,0.5",
+            "--frame",
+            "6",
+        ]
         assert main.main([*words, "--rgb", "0.2", "0.9", "0.1"]) == 0
         verb = ["export", str(show), "--stops", "--size", "3", "--jobs", "1", "--quiet", "--json"]
         capsys.readouterr()
@@ -195,7 +204,15 @@ class TestSeries:
         self, show: Path, capsys: pytest.CaptureFixture[str]
     ) -> None:
         for name in ("one", "two"):
-            words = ["edit", f"shots/{name}.p4d.json", "set", "--near", "0.5,0.5,0.5", "--frame"]
+            words = [
+                "edit",
+                f"shots/{name}.p4d.json",
+                "set",
+                "--anyway",
+                "--near",
+                "0.5,0.5,0.5",
+                "--frame",
+            ]
             assert main.main([*words, "4", "--rgb", "0.2", "0.9", "0.1"]) == 0
         assert export(show, "-o", "luts", "--format", "cc", "--max-error", "0") == 1
         err = capsys.readouterr().err
@@ -228,7 +245,16 @@ class TestSeries:
 
 
 def test_a_config_has_a_look_a_shot(show: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["edit", "shots/two.p4d.json", "set", "--near", "0.5,0.5,0.5", "--frame", "4"]
+    words = [
+        "edit",
+        "shots/two.p4d.json",
+        "set",
+        "--anyway",
+        "--near",
+        "0.5,0.5,0.5",
+        "--frame",
+        "4",
+    ]
     assert main.main([*words, "--rgb", "0.2", "0.9", "0.1"]) == 0
     verb = ["config", str(show), "-o", "show", "--every", "4", "--size", "5", "--jobs", "1"]
     assert main.main([*verb, "--quiet", "--process-space", "sRGB - Texture"]) == 0
