@@ -64,7 +64,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--only", metavar="A,B", type=_names, default=(), help="only the shots of these names"
     )
     group.add_argument(
-        "--anew", action="store_true", help="analyse again also the shots that are there already"
+        "--force", action="store_true", help="analyse also the shots that are there already"
     )
     add_worker_options(group, "shots")
 
@@ -82,7 +82,7 @@ def is_show(args: argparse.Namespace) -> bool:
     for_edits = {"--media": args.media is not None, "--handles": args.handles is not None}
     for_shows = {
         "--only": bool(args.only),
-        "--anew": args.anew,
+        "--force": args.force,
         "--jobs": args.jobs != 0,
         "--cluster": args.cluster is not None,
     }
@@ -125,7 +125,7 @@ def run(args: argparse.Namespace, options: AnalysisOptions) -> int:
         skip_bad_frames=args.skip_bad_frames,
         allow_cuts=args.allow_cuts,
         on_edits=args.on_edits,
-        anew=args.anew,
+        force=args.force,
         only=args.only,
         workers=Workers(args.jobs, args.cluster),
     )
@@ -133,11 +133,9 @@ def run(args: argparse.Namespace, options: AnalysisOptions) -> int:
         hidden,
         lambda progress: batch.analyse(source, shots, args.output, show_options, progress),
     )
+    notes += [f"{name}: {note}" for name, found in done.notes.items() for note in found]
     for note in notes:
         print(f"palette4d: note: {note}", file=sys.stderr)
-    for name, remarks in done.remarks.items():
-        for remark in remarks:
-            print(f"palette4d: note: {name}: {remark}", file=sys.stderr)
     if args.json:
         print(done.path.read_text(encoding="utf-8"), end="")
     elif not args.quiet:

@@ -342,12 +342,11 @@ def _bits(picture: av.VideoFrame) -> int:
 
 def _bin_picture(picture: av.VideoFrame, row_step: int, binner: _core.ColourBinner) -> bool:
     """Bin every `row_step`-th row of a picture; returns whether none of them shows (`Fill`)."""
-    rows = np.arange(row_step // 2, picture.height, row_step)
     if _is_luma_chroma(picture) and not _has_alpha(picture):
         bits, matrix = _bits(picture), _matrix(picture)
         red_weight, blue_weight = LUMA_WEIGHTS[matrix]
         binner.add_luma_chroma(
-            *_thinned(picture, rows),
+            *_thinned(picture, row_step),
             red_weight=red_weight,
             blue_weight=blue_weight,
             bits=bits,
@@ -355,7 +354,7 @@ def _bin_picture(picture: av.VideoFrame, row_step: int, binner: _core.ColourBinn
         )
         return False
     packed = _packed(picture)
-    pixels = (picture_pixels(picture) if packed is None else packed)[rows]
+    pixels = (picture_pixels(picture) if packed is None else packed)[row_step // 2 :: row_step]
     binner.add(pixels)
     if not all_hidden(binner):
         return False
@@ -365,15 +364,16 @@ def _bin_picture(picture: av.VideoFrame, row_step: int, binner: _core.ColourBinn
     return True
 
 
-def _thinned(picture: av.VideoFrame, rows: NDArray[np.int_]) -> list[NDArray[Any]]:
-    """Some rows of Y', Cb and Cr, each as wide as the picture.
+def _thinned(picture: av.VideoFrame, step: int) -> list[NDArray[Any]]:
+    """Every `step`-th row of Y', Cb and Cr, each as wide as the picture.
 
     Of a large picture chroma is taken from the nearest sample, as filtering would cost more than
     decoding.
     """
     samples = np.uint8 if _bits(picture) == 8 else np.uint16
-    if len(rows) == picture.height or len(picture.planes) != 3:
-        picture = _full_chroma(picture)
+    if step == 1 or len(picture.planes) != 3:
+        return [_plane(plane, samples)[step // 2 :: step] for plane in _full_chroma(picture).planes]
+    rows = np.arange(step // 2, picture.height, step)
     planes = []
     for plane in picture.planes:
         lines = _plane(plane, samples)[rows * plane.height // picture.height]

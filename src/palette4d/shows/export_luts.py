@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import counted
+from palette4d.jobs.workers import Workers
 from palette4d.lut_export import series
 from palette4d.shows import manifest as manifests
 from palette4d.shows import timeline_references
@@ -19,7 +20,7 @@ from palette4d.shows import timeline_references
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from palette4d.lut_export.series import Series, SeriesOptions
+    from palette4d.lut_export.series import Request, Series
 
 
 def sidecars(paths: list[Path]) -> tuple[list[Path], list[str]]:
@@ -45,7 +46,7 @@ def _left_out(path: Path, names: list[str]) -> list[str]:
 
 def export(
     args: argparse.Namespace,
-    options: SeriesOptions,
+    request: Request,
     choose: Callable[[_core.Sidecar], tuple[int, ...]],
     with_bar: Callable[[Callable[[Callable[[int, int], None]], list[Series]]], list[Series]],
 ) -> list[Series]:
@@ -73,9 +74,11 @@ def export(
     requests = []
     for file, name in zip(files, names, strict=True):
         frames = choose(_core.read_sidecar(str(file)))
-        one = replace(options, frames=frames, name=name)
-        requests.append(series.Request(file, args.output / name, one))
-    done = with_bar(lambda progress: series.export_all(requests, options.workers, progress))
+        folder = args.output / name
+        one = replace(request, sidecar=file, folder=folder, frames=frames, name=name)
+        requests.append(one)
+    workers = Workers(args.jobs, args.cluster)
+    done = with_bar(lambda progress: series.export(requests, workers, progress))
     if source is not None:
         exported = dict(zip(names, done, strict=True))
         count = timeline_references.write(

@@ -20,7 +20,7 @@ from palette4d.common.text import counted, file_safe
 from palette4d.media.clip import Clip, open_clip
 from palette4d.media.clip_base import describe
 from palette4d.media.timecode import start_timecode
-from palette4d.shows import edit_time, find_media
+from palette4d.shows import find_media, media_range
 from palette4d.shows.shots import Place, Shot
 from palette4d.shows.timeline_files import Document, library
 
@@ -127,7 +127,7 @@ class _Reader:
             self.passed_over("generated picture", "generated pictures")
             return
         try:
-            shown = edit_time.shown(clip)
+            shown = media_range.shown(clip)
         except Palette4dError as error:
             self.add(clip, path, track, "", str(error))
             return
@@ -232,7 +232,7 @@ class _Reader:
         start *= rate / Fraction(used.start_time.rate).limit_denominator(1001)
         length = Fraction(used.duration.value).limit_denominator(10**6)
         length *= rate / Fraction(used.duration.rate).limit_denominator(1001)
-        rounding = Fraction(edit_time.ROUNDING).limit_denominator(1000)
+        rounding = Fraction(media_range.ROUNDING).limit_denominator(1000)
         first = math.floor(start + rounding)
         last = max(first, math.ceil(start + length - rounding) - 1)
         offset = self.offset(reference, opened, first, last, rate)

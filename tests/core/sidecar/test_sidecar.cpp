@@ -267,5 +267,3 @@ TEST(random_damage_never_does_more_than_throw) {
         }
     }
 }
-
-int main() { return check::run_all(); }
