@@ -13,6 +13,11 @@ CXX ?= g++
 # Passed on to pytest: make test-py PYTEST_ARGS="-k slice -x"
 PYTEST_ARGS ?=
 
+# How many tests run at a time.
+JOBS ?= $(shell nproc 2>/dev/null || echo 2)
+# The slow tests too: make test-py SLOW=1
+SLOW ?=
+
 # How long libFuzzer may look: make test-fuzz FUZZ_SECONDS=3600
 FUZZ_SECONDS ?= 60
 
@@ -26,6 +31,7 @@ VENV := .venv
 TOOLS := build/tools
 TEST_VENV := build/test-venv
 WHEELS := build/wheels
+TEST_WHEELS := build/test-wheels
 PIP := -m pip --quiet --disable-pip-version-check
 
 # Folders are listed too, so that a removed file counts as a change.
@@ -33,13 +39,14 @@ SOURCES := pyproject.toml README.md LICENSE $(shell find src ofx_plugin analysis
 	! -name '__pycache__*' ! -name '*.pyc')
 CXX_FILES = $(shell find ofx_plugin tests -name '*.cpp' -o -name '*.hpp' -o -name '*.h' -o -name '*.inl')
 
-.PHONY: help demo test install dev wheel lint style types build-cpp build-sanitize build-threads \
+.PHONY: help demo test test-all install dev wheel lint style types build-cpp build-sanitize build-threads \
 	build-fuzz test-cpp test-sanitize test-threads test-threads-short test-fuzz test-py format clean \
 	compiler fuzz-compiler
 
 help: ## this list
 	@echo "make demo            from nothing to results in demo_output/"
-	@echo "make test            everything: lint, C++ tests (plain and sanitized), the wheel, host tests"
+	@echo "make test            lint, C++ tests (plain and sanitized), the wheel, host tests; no slow tests"
+	@echo "make test-all        the same with the slow tests, ThreadSanitizer and libFuzzer, before a release"
 	@echo
 	@echo "make install         .venv with palette4d in it (.venv/bin/palette4d)"
 	@echo "make dev             .venv with an editable palette4d and every tool"
@@ -115,10 +122,21 @@ $(TOOLS)/.installed: pyproject.toml tools/requirements.py
 	$(TOOLS)/bin/python $(PIP) install -r $(TOOLS)/requirements.txt
 	@touch $@
 
+# The wheel that is tested, and with it the C++ tests, from one build: what pytest, the strict host and
+# ctest run is the same machine code. Warnings are errors here, not in a user's build.
+build/test-wheel.stamp: $(SOURCES) $(shell find tests/core tests/host tests/fuzz -name '*.[chi]*' -o -name CMakeLists.txt) \
+		| $(TOOLS)/.installed compiler
+	@echo "== C++: core, bindings, OpenFX bundle and their tests (takes 2 to 4 minutes)"
+	@rm -rf $(TEST_WHEELS)
+	@PATH="$(CURDIR)/$(TOOLS)/bin:$$PATH" $(TOOLS)/bin/python $(PIP) wheel . --no-deps --no-build-isolation \
+		--wheel-dir $(TEST_WHEELS) -C build-dir=build/cmake/test -C cmake.define.PALETTE4D_BUILD_TESTS=ON \
+		-C cmake.define.PALETTE4D_WERROR=ON -C cmake.define.OPENFX_ROOT="$(abspath $(OPENFX_ROOT))"
+	@touch $@
+
 # A fresh environment for every new wheel: nothing but the wheel, its dependencies and the tests'.
-$(TEST_VENV)/.installed: build/wheel.stamp
+$(TEST_VENV)/.installed: build/test-wheel.stamp
 	$(call new-venv,$(TEST_VENV))
-	@wheel=$$(echo $(WHEELS)/*.whl) && set -x && \
+	@wheel=$$(echo $(TEST_WHEELS)/*.whl) && set -x && \
 		$(TEST_VENV)/bin/python $(PIP) install "$$wheel[test]"
 	@touch $@
 
@@ -129,8 +147,15 @@ demo: $(VENV)/.installed ## from nothing to results in demo_output/
 
 # ---------------------------------------------------------------------------- tests
 
-test: lint test-cpp test-sanitize test-py ## everything
+test: lint test-cpp test-sanitize test-py ## what a change must pass: all but the slow tests
 	@echo "== all of make test passed"
+
+# Before a release: the slow tests too, ThreadSanitizer over all tests of the node, ten minutes of
+# libFuzzer, and a wheel built as pip builds it for users.
+test-all: ## everything, before a release
+	$(MAKE) SLOW=1 test test-threads wheel
+	$(MAKE) FUZZ_SECONDS=600 test-fuzz
+	@echo "== all of make test-all passed"
 
 wheel: build/wheel.stamp ## the wheel
 	@ls $(WHEELS)/*.whl
@@ -142,6 +167,7 @@ style: $(TOOLS)/.installed
 	$(TOOLS)/bin/ruff check .
 	$(TOOLS)/bin/ruff format --check .
 	@$(TOOLS)/bin/clang-format --dry-run --Werror $(CXX_FILES)
+	$(TOOLS)/bin/python tools/check_core_rooms.py
 
 # mypy sees palette4d as its users do: the installed wheel, never the source tree.
 types: $(TOOLS)/.installed $(TEST_VENV)/.installed
@@ -157,24 +183,24 @@ define preset
 	@PATH="$(CURDIR)/$(TOOLS)/bin:$$PATH" && export PATH && cd ofx_plugin && $(2) --preset $(1)
 endef
 
-build-cpp build-sanitize build-threads: compiler
+build-cpp: build/test-wheel.stamp
+build-sanitize build-threads: compiler
 build-fuzz: fuzz-compiler
-build-cpp build-sanitize build-threads build-fuzz: build-%: $(TOOLS)/.installed
-	@echo "== C++ (preset $(PRESET_$*))"
-	$(call preset,$(PRESET_$*),cmake -DPython_EXECUTABLE="$(CURDIR)/$(TOOLS)/bin/python" \
+build-sanitize build-threads build-fuzz: build-%: $(TOOLS)/.installed
+	@echo "== C++ (preset $*)"
+	$(call preset,$*,cmake -DPython_EXECUTABLE="$(CURDIR)/$(TOOLS)/bin/python" \
 		-DOPENFX_ROOT="$(abspath $(OPENFX_ROOT))")
-	$(call preset,$(PRESET_$*),cmake --build)
-PRESET_cpp := test
-PRESET_sanitize := sanitize
-PRESET_threads := threads
-PRESET_threads-short := threads-short
-PRESET_fuzz := fuzz
+	$(call preset,$*,cmake --build)
 
 test-threads-short: build-threads
 test-cpp test-sanitize test-threads: test-%: build-%
 test-cpp test-sanitize test-threads test-threads-short: test-%:
-	@echo "== C++ tests (preset $(PRESET_$*))"
-	$(call preset,$(PRESET_$*),ctest)
+	@echo "== C++ tests (preset $(CTEST_PRESET_$*))"
+	$(call preset,$(CTEST_PRESET_$*),ctest --parallel $(JOBS) $(if $(SLOW),,--label-exclude slow))
+CTEST_PRESET_cpp := test
+CTEST_PRESET_sanitize := sanitize
+CTEST_PRESET_threads := threads
+CTEST_PRESET_threads-short := threads-short
 
 # What it finds new goes on from run to run in build/fuzz/; a crash leaves its input there.
 test-fuzz: build-fuzz
@@ -185,13 +211,13 @@ test-fuzz: build-fuzz
 		build/fuzz/found tests/fuzz/corpus tests/golden/sidecars
 
 # From a folder of its own, so that no file of the tree can stand in for the installed package.
-# build-cpp: the strict host, which the tests of the packaged node drive.
-test-py: $(TEST_VENV)/.installed build-cpp
+test-py: $(TEST_VENV)/.installed
 	@echo "== pytest on the installed wheel"
 	@rm -rf build/test-run && mkdir -p build/test-run
-	@wheel=$$(echo "$(CURDIR)"/$(WHEELS)/*.whl) && cd build/test-run && \
+	@wheel=$$(echo "$(CURDIR)"/$(TEST_WHEELS)/*.whl) && cd build/test-run && \
 		PALETTE4D_WHEEL="$$wheel" "$(CURDIR)/$(TEST_VENV)/bin/python" -P -m pytest \
-		-c "$(CURDIR)/pyproject.toml" --rootdir "$(CURDIR)" "$(CURDIR)/tests" $(PYTEST_ARGS)
+		-c "$(CURDIR)/pyproject.toml" --rootdir "$(CURDIR)" "$(CURDIR)/tests" -n $(JOBS) --durations 10 \
+		$(if $(SLOW),,-m "not slow") $(PYTEST_ARGS)
 
 format: $(TOOLS)/.installed ## rewrite the sources as ruff and clang-format want them
 	$(TOOLS)/bin/ruff check --fix .

@@ -74,8 +74,7 @@ def read(spec: str) -> Frames:
     clip = open_clip(spec)
     by = max(1, clip.width // LARGEST)
     return [
-        np.rint(np.clip(image[::by, ::by, :3], 0, 1) * 255).astype(np.uint8)
-        for _, image in clip.iter_frames()
+        np.rint(np.clip(image[::by, ::by, :3], 0, 1) * 255).astype(np.uint8) for _, image in clip
     ]
 
 

@@ -190,25 +190,17 @@ def draw_timelines(sidecars: Sequence[tuple[str, Path]], output: Path, width: in
     import matplotlib.style
     from matplotlib.figure import Figure
 
-    from palette4d.plotting import layout, style, timeline
-    from palette4d.plotting.panel import Frame, Palette
+    from palette4d.plotting import style, timeline
+    from palette4d.plotting.rows import Palette, arrange
 
     room, margin, points = 30.0, 14.0, 800.0
     read = [(title, _core.read_sidecar(str(path))) for title, path in sidecars]
-    palettes = [Palette.of(sidecar) for _, sidecar in read]
-    layouts = [layout.arrange(p.frames, p.rgb, p.edges) for p in palettes]
-    panels = [
-        Frame(
-            left=margin,
-            right=points - margin,
-            top=0.0,
-            first=p.first,
-            last=p.last,
-            rows=rows.row_count,
-            row_height=min(33.0, 500.0 / rows.row_count),
-        )
-        for p, rows in zip(palettes, layouts, strict=True)
-    ]
+    panels = []
+    for _, sidecar in read:
+        palette = Palette.of(sidecar)
+        rows = arrange(palette.frames, palette.rgb, palette.edges)
+        tall = min(33.0, 500.0 / rows.count)
+        panels.append(timeline.Panel(palette, rows, margin, points - margin, tall))
     height = sum(room + panel.height for panel in panels) + margin
     with matplotlib.style.context("default"), matplotlib.rc_context(style.RC):
         figure = Figure(figsize=(points / 72, height / 72), facecolor=style.PAGE)
@@ -218,13 +210,11 @@ def draw_timelines(sidecars: Sequence[tuple[str, Path]], output: Path, width: in
         axes.set_axis_off()
         axes.set_autoscale_on(False)
         top = height
-        for (title, sidecar), palette, rows, panel in zip(
-            read, palettes, layouts, panels, strict=True
-        ):
+        for (title, sidecar), panel in zip(read, panels, strict=True):
             axes.text(margin, top - 18, title, fontsize=10, color=style.BRIGHT, va="center")
             panel.top = top - room
             top = panel.bottom
-            timeline.draw(axes, palette, rows, panel, str(sidecar.clip["encoding"]))
+            timeline.draw(axes, panel, str(sidecar.clip["encoding"]))
         figure.savefig(output, dpi=width / (points / 72), facecolor=style.PAGE)
     say(f"wrote {output}")
 

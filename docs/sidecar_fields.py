@@ -1,11 +1,12 @@
-"""Write the field tables of docs/sidecar.md and docs/shots.md from the JSON Schemas.
+"""Write the lists of fields of docs/sidecar.md and docs/files.md from the JSON Schemas.
 
-python docs/sidecar_fields.py            writes the tables into the pages
+python docs/sidecar_fields.py            writes the lists into the pages
 python docs/sidecar_fields.py --check    exits 1 when a page is not up to date
 """
 
 import json
 import sys
+import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,8 @@ ROOT = Path(__file__).resolve().parent.parent
 SCHEMAS = ROOT / "src" / "palette4d"
 PAGE = ROOT / "docs" / "sidecar.md"
 PAGES = {
-    PAGE: SCHEMAS / "sidecar_v2.schema.json",
-    ROOT / "docs" / "shots.md": SCHEMAS / "shots_v1.schema.json",
+    PAGE: SCHEMAS / "sidecar_v1.schema.json",
+    ROOT / "docs" / "files.md": SCHEMAS / "shots_v1.schema.json",
 }
 BEGIN = "<!-- begin: written by python docs/sidecar_fields.py -->"
 END = "<!-- end: written by python docs/sidecar_fields.py -->"
@@ -22,12 +23,12 @@ END = "<!-- end: written by python docs/sidecar_fields.py -->"
 Node = dict[str, Any]
 
 
-def table(schema: Node) -> str:
-    """Return the Markdown table of every member that the schema names."""
-    rows = ["| member | type | range | meaning |", "|---|---|---|---|"]
-    rows += [
-        f"| `{path}` | {kind} | {span} | {text} |" for path, kind, span, text in fields(schema)
-    ]
+def listed(schema: Node) -> str:
+    """Return the Markdown list of every member that the schema names, 100 columns wide."""
+    rows = []
+    for path, kind, span, text in fields(schema):
+        row = f"- `{path}`: {kind}{f', {span}' if span else ''}. {text}"
+        rows.append(textwrap.fill(row, 100, subsequent_indent="  ", break_on_hyphens=False))
     return "\n".join(rows)
 
 
@@ -97,10 +98,10 @@ def _range(schema: Node, node: Node) -> str:
 
 
 def written(page: str, schema: Node) -> str:
-    """Return the page with its table made anew."""
+    """Return the page with its list rewritten."""
     head, rest = page.split(BEGIN)
     _, tail = rest.split(END)
-    return f"{head}{BEGIN}\n{table(schema)}\n{END}{tail}"
+    return f"{head}{BEGIN}\n{listed(schema)}\n{END}{tail}"
 
 
 def main() -> int:

@@ -116,7 +116,8 @@ def pytest_configure(config: pytest.Config) -> None:
     # the tests of what Ctrl-C leaves behind would have nothing to see.
     if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-    if host_tests_required():
+    # Under pytest-xdist only the process that hands out the tests hears of all of them.
+    if host_tests_required() and not hasattr(config, "workerinput"):
         config.pluginmanager.register(HostWatch(), "palette4d-host-watch")
 
 

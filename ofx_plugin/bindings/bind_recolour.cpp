@@ -8,7 +8,6 @@
 
 #include "arrays.hpp"
 #include "binders.hpp"
-#include "lattice/converted_recolour.hpp"
 #include "lattice/lattice.hpp"
 #include "recolour/recolour.hpp"
 
@@ -89,8 +88,8 @@ InstructionSet instructions_from(const std::string& name) {
 }
 
 /// By a Recolourer or a Lattice.
-template <class Self>
-py::array apply(const Self& self, const py::array& image, double strength, bool premultiplied,
+template <class Map>
+py::array apply(const Map& self, const py::array& image, double strength, bool premultiplied,
                 int threads, const py::object& out, const std::string& precision,
                 const std::string& instructions, const ColourConversion* conversion) {
     require_image(image, "image");
@@ -115,11 +114,15 @@ py::array apply(const Self& self, const py::array& image, double strength, bool 
     }
     const auto in_view = view_of<ConstImageView>(image, static_cast<const float*>(image.data()));
     const auto out_view = view_of<ImageView>(result, static_cast<float*>(result.mutable_data()));
-    const RecolourOptions options{strength, premultiplied, threads, precision_from(precision),
-                                  instructions_from(instructions)};
+    const RecolourOptions options{strength,
+                                  premultiplied,
+                                  threads,
+                                  precision_from(precision),
+                                  instructions_from(instructions),
+                                  conversion};
     {
         const py::gil_scoped_release unlocked;
-        apply_converted(self, conversion, in_view, out_view, options);
+        self.apply(in_view, out_view, options);
     }
     return result;
 }
@@ -137,8 +140,9 @@ void bind_recolour(py::module_& module) {
                                                          faces_from(faces));
                  }),
              py::arg("original"), py::arg("edited"), py::arg("faces"))
-        .def_property_readonly("identity", &Recolourer::identity,
-                               "No colour is edited: apply() copies bit for bit.")
+        .def_property_readonly(
+            "identity", [](const Recolourer& self) { return !self.moves(); },
+            "No colour moves: apply() copies bit for bit.")
         .def("apply", &apply<Recolourer>, py::arg("image"), py::kw_only(),
              py::arg("strength") = 1.0, py::arg("premultiplied") = false, py::arg("threads") = 1,
              py::arg("out") = py::none(), py::arg("precision") = "double",

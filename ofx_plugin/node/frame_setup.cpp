@@ -19,77 +19,78 @@ namespace palette4d::node {
 namespace {
 
 /// One more thing for the user to know.
-void add_note(Look& look, const std::string& note) {
-    if (!look.note.empty() && !note.empty()) look.note += "; ";
-    look.note += note;
+void add_note(FrameSetup& setup, const std::string& note) {
+    if (!setup.note.empty() && !note.empty()) setup.note += "; ";
+    setup.note += note;
 }
 
 /// Prepares what the output asks for. Throws what slicing throws.
-void prepare(Look& look, const Params& params, LoadedSidecar& loaded, double frame, OfxTime time,
-             Interpolation interpolation) {
-    Drawing& drawing = look.drawing;
+void prepare(FrameSetup& setup, const Params& params, LoadedSidecar& loaded, double frame,
+             OfxTime time, Interpolation interpolation) {
+    Drawing& drawing = setup.drawing;
     const OutputSettings& settings = drawing.settings;
     const Sidecar& sidecar = loaded.sidecar();
-    look.passes = false;
+    setup.passes = false;
     if (sidecar.conversion && !settings.in_palette_space) {
         // Shares its ownership: a sidecar may be read anew while this is drawn.
         drawing.conversion = {sidecar.conversion, &sidecar.conversion->steps};
     }
     if (settings.output == Output::kOutside) {
-        drawing.recolourer = loaded.surface_at(frame);
+        drawing.reader = loaded.surface_at(frame);
         return;
     }
     if (settings.output == Output::kWeight) {
         const int handle = handle_at(params, sidecar, settings.weight_of, time);
         if (handle < 0) {
-            look.passes = true;
-            look.problem = "Weight of a handle: the sidecar has no handle " +
-                           std::to_string(settings.weight_of) + ", expected one of its " +
-                           std::to_string(handles_of(sidecar.polytope, sidecar.edits).size()) +
-                           "; choose another number as Handle";
+            setup.passes = true;
+            setup.problem = "Weight of a handle: the sidecar has no handle " +
+                            std::to_string(settings.weight_of) + ", expected one of its " +
+                            std::to_string(handles_of(sidecar.polytope, sidecar.edits).size()) +
+                            "; choose another number as Handle";
             return;
         }
-        drawing.recolourer = loaded.weight_at(frame, handle);
+        drawing.reader = loaded.weight_at(frame, handle);
         return;
     }
     EditsAt edits = edits_at(params, sidecar, time);
-    add_note(look, edits.note);
-    drawing.recolourer = loaded.recolourer_at(frame, edits.edits);
-    if (drawing.recolourer->identity() || settings.strength == 0) drawing.recolourer = nullptr;
-    if (drawing.recolourer &&
-        (interpolation == Interpolation::kAlways ||
-         (interpolation == Interpolation::kWithoutConversion && !drawing.conversion))) {
-        try {
-            drawing.lattice = loaded.lattice_at(frame, edits.edits);
-        } catch (const std::bad_alloc&) {
-            add_note(look, "there is no memory for a lattice: computed exactly");
+    add_note(setup, edits.note);
+    const std::shared_ptr<const Recolourer> exact = loaded.recolourer_at(frame, edits.edits);
+    if (exact->moves() && settings.strength != 0) {
+        drawing.edit = exact;
+        if (interpolation == Interpolation::kAlways ||
+            (interpolation == Interpolation::kWithoutConversion && !drawing.conversion)) {
+            try {
+                drawing.edit = loaded.lattice_at(frame, edits.edits);
+            } catch (const std::bad_alloc&) {
+                add_note(setup, "there is no memory for a lattice: computed exactly");
+            }
         }
     }
     if (settings.output == Output::kPalette) {
         std::tie(drawing.original, drawing.edited) = loaded.palette_at(frame, edits.edits);
     } else {
-        look.passes = !drawing.recolourer;
+        setup.passes = !drawing.edit;
     }
 }
 
 }  // namespace
 
-Look look_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time,
-             Interpolation interpolation) {
-    Look look;
+FrameSetup frame_setup_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time,
+                          Interpolation interpolation) {
+    FrameSetup setup;
     const Params params(suites, effect);
     const Chosen chosen = chosen_sidecar(params, time);
-    if (!chosen.any) return look;
+    if (!chosen.any) return setup;
     const SidecarResult& result = chosen.result;
     const std::string& path = chosen.path;
     if (!result.loaded) {
-        look.problem = result.problem;
-        return look;
+        setup.problem = result.problem;
+        return setup;
     }
-    look.note = chosen.broken;
-    look.drawing.settings = output_settings_at(params, time);
-    OutputSettings& settings = look.drawing.settings;
-    if (settings.passes()) return look;
+    setup.note = chosen.broken;
+    setup.drawing.settings = output_settings_at(params, time);
+    OutputSettings& settings = setup.drawing.settings;
+    if (settings.passes()) return setup;
     const Sidecar& sidecar = result.loaded->sidecar();
     if (settings.keep > 0 && settings.own_lightness) {
         settings.lightness = luminance_weights(encoding_of(sidecar, settings.in_palette_space));
@@ -97,21 +98,21 @@ Look look_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time,
     const FrameAt at =
         frame_at(sidecar.clip, time_settings_at(params, time), host_clip(suites, effect), time);
     if (!std::isfinite(at.frame)) {
-        look.problem = path +
-                       ": the host's time and the node's parameters of time give no frame; "
-                       "expected numbers";
-        return look;
+        setup.problem = path +
+                        ": the host's time and the node's parameters of time give no frame; "
+                        "expected numbers";
+        return setup;
     }
-    if (at.passes) return look;
+    if (at.passes) return setup;
     try {
-        prepare(look, params, *result.loaded, at.frame, time, interpolation);
+        prepare(setup, params, *result.loaded, at.frame, time, interpolation);
     } catch (const std::bad_alloc&) {
         throw;
     } catch (const std::exception& error) {
-        look.passes = true;
-        look.problem = path + ": " + words_of(time, at) + ": " + error.what();
+        setup.passes = true;
+        setup.problem = path + ": " + words_of(time, at) + ": " + error.what();
     }
-    return look;
+    return setup;
 }
 
 }  // namespace palette4d::node

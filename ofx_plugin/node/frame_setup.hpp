@@ -9,10 +9,10 @@
 
 namespace palette4d::node {
 
-/// Whether a look has a lattice.
+/// Whether a setup has a lattice.
 enum class Interpolation { kNever, kWithoutConversion, kAlways };
 
-struct Look {
+struct FrameSetup {
     /// The picture passes through unchanged.
     bool passes = true;
     Drawing drawing;
@@ -22,9 +22,9 @@ struct Look {
     std::string note;
 };
 
-/// The look of an instance at a time. Reads parameters in the way allowed while rendering. Problems
-/// are in the result; throws std::bad_alloc only.
-Look look_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time,
-             Interpolation interpolation = Interpolation::kNever);
+/// The setup of an instance at a time. Reads parameters in the way allowed while rendering.
+/// Problems are in the result; throws std::bad_alloc only.
+FrameSetup frame_setup_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time,
+                          Interpolation interpolation = Interpolation::kNever);
 
 }  // namespace palette4d::node

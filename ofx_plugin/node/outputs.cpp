@@ -8,8 +8,8 @@
 namespace palette4d::node {
 namespace {
 
-// Floats of one chunk of rows: source and result stay in the second-level cache together.
-constexpr std::size_t kChunkFloats = 16384;
+// Floats of one chunk of rows, source and result together: they stay in the second-level cache.
+constexpr std::size_t kChunkFloats = 32768;
 /// Colours so near to the palette's surface count as inside: what the surface is known to.
 constexpr double kAtSurface = 1e-3;
 /// From here on floats have too few digits left for a weight beside the colour.
@@ -86,11 +86,12 @@ std::vector<float> straight_colours(const Rows& rows, const ColourConversion* co
     std::vector<float> straight(rows.pixels * 3);
     for (std::size_t i = 0; i < rows.pixels; ++i) {
         const float* from = rows.source + i * rows.channels;
-        const float alpha = rows.premultiplied ? from[3] : 1.0f;
-        for (std::size_t c = 0; c < 3; ++c) {
-            straight[i * 3 + c] = alpha != 0 ? from[c] / alpha : std::nanf("");
-        }
+        const Vec3 seen = straight_colour(from, rows.premultiplied);
         float* colour = &straight[i * 3];
+        for (std::size_t c = 0; c < 3; ++c) {
+            const bool transparent = rows.premultiplied && from[3] == 0;
+            colour[c] = transparent ? std::nanf("") : static_cast<float>(seen[c]);
+        }
         if (!conversion || !finite(colour)) continue;
         const Vec3 converted = conversion->to_palette({colour[0], colour[1], colour[2]});
         for (std::size_t c = 0; c < 3; ++c) colour[c] = static_cast<float>(converted[c]);
@@ -114,7 +115,7 @@ double matte_of(const float* colour, const float* read, const Drawing& drawing) 
     if (settings.output == Output::kOutside && infinite(colour)) return 1;
     if (!finite(colour) || !finite(read)) return 0;
     if (settings.output == Output::kWeight) {
-        return std::clamp(weight_of(colour, read, *drawing.recolourer), 0.0, 1.0);
+        return std::clamp(weight_of(colour, read, *drawing.reader), 0.0, 1.0);
     }
     double square = 0;
     for (std::size_t c = 0; c < 3; ++c) {
@@ -129,8 +130,8 @@ void draw_matte(const Rows& rows, const Drawing& drawing) {
     std::vector<float> read(straight.size());
     const auto width = static_cast<int>(rows.pixels);
     const auto stride = static_cast<std::ptrdiff_t>(straight.size() * sizeof(float));
-    drawing.recolourer->apply({straight.data(), width, 1, 3, stride},
-                              {read.data(), width, 1, 3, stride}, {});
+    drawing.reader->apply({straight.data(), width, 1, 3, stride},
+                          {read.data(), width, 1, 3, stride}, {});
     const bool in_alpha = drawing.settings.in_alpha && rows.channels == 4;
     for (std::size_t i = 0; i < rows.pixels; ++i) {
         const float* from = rows.source + i * rows.channels;
@@ -175,18 +176,17 @@ void draw_rows(const Rows& rows, const Drawing& drawing) {
         RecolourOptions options;
         options.strength = settings.strength;
         options.premultiplied = rows.premultiplied;
+        options.threads = 1;  // the host's threads share the rows already
         const auto width = static_cast<int>(rows.pixels);
         const auto channels = static_cast<int>(rows.channels);
         const auto stride =
             static_cast<std::ptrdiff_t>(rows.pixels * rows.channels * sizeof(float));
         const ConstImageView from{rows.source, width, 1, channels, stride};
         const ImageView to{rows.result, width, 1, channels, stride};
-        const ColourConversion* const conversion = drawing.conversion.get();
-        if (drawing.lattice) {
-            apply_converted(*drawing.lattice, conversion, from, to, options);
-        } else if (drawing.recolourer) {
-            apply_converted(*drawing.recolourer, conversion, from, to, options);
-        } else {
+        options.conversion = drawing.conversion.get();
+        if (drawing.edit) {
+            drawing.edit->apply(from, to, options);
+        } else if (rows.result != rows.source) {
             std::copy_n(rows.source, rows.pixels * rows.channels, rows.result);
         }
         if (settings.keep > 0) keep_lightness(rows, settings);
@@ -288,38 +288,45 @@ void prefer_alpha(const Suites& suites, OfxImageEffectHandle effect, const Prope
 
 void draw(const Image& in, const Image& out, const OfxRectI& area, const Drawing& drawing) {
     const OutputSettings& settings = drawing.settings;
-    if (settings.output == Output::kRecoloured && settings.keep == 0 && settings.mix == 1) {
-        const ColourConversion* const conversion = drawing.conversion.get();
-        if (drawing.lattice) {
-            recolour(in, out, area, *drawing.lattice, conversion, settings.strength);
-        } else {
-            recolour(in, out, area, *drawing.recolourer, conversion, settings.strength);
-        }
-        return;
-    }
     const OfxRectI covered = intersect(area, in.bounds);
     clear_around(out, area, covered);
     if (is_empty(covered)) return;
+    const bool edit_alone =
+        settings.output == Output::kRecoloured && settings.keep == 0 && settings.mix == 1;
+    if (edit_alone && in.depth == Depth::kFloat) {
+        RecolourOptions options;
+        options.strength = settings.strength;
+        options.premultiplied = in.premultiplied;
+        options.conversion = drawing.conversion.get();
+        const int width = covered.x2 - covered.x1, height = covered.y2 - covered.y1;
+        drawing.edit->apply({reinterpret_cast<const float*>(in.at(covered.x1, covered.y1)), width,
+                             height, in.channels, in.row_bytes},
+                            {reinterpret_cast<float*>(out.at(covered.x1, covered.y1)), width,
+                             height, out.channels, out.row_bytes},
+                            options);
+        return;
+    }
     const auto channels = static_cast<std::size_t>(in.channels);
     const std::size_t row = static_cast<std::size_t>(covered.x2 - covered.x1) * channels;
-    const int rows_at_once = static_cast<int>(std::max<std::size_t>(1, kChunkFloats / row));
+    const std::size_t most = kChunkFloats / (edit_alone ? 1 : 2);
+    const int rows_at_once = static_cast<int>(std::max<std::size_t>(1, most / row));
     std::vector<float> source, result;
     for (int y = covered.y1; y < covered.y2; y += rows_at_once) {
         const OfxRectI rows = {covered.x1, y, covered.x2, std::min(y + rows_at_once, covered.y2)};
         const std::size_t count = row * static_cast<std::size_t>(rows.y2 - rows.y1);
         source.resize(count);
-        result.resize(count);
+        if (!edit_alone) result.resize(count);
+        float* const drawn = edit_alone ? source.data() : result.data();
         read_floats(in, rows, source.data());
         if (in.opaque && settings.is_matte() && settings.in_alpha) {
             for (std::size_t i = channels - 1; i < count; i += channels) source[i] = 1;
         }
-        draw_rows({source.data(), result.data(), count / channels, channels, in.premultiplied},
-                  drawing);
+        draw_rows({source.data(), drawn, count / channels, channels, in.premultiplied}, drawing);
         for (int r = rows.y1; settings.output == Output::kPalette && r < rows.y2; ++r) {
-            draw_strip(result.data() + row * static_cast<std::size_t>(r - rows.y1), rows.x1,
-                       rows.x2, r, channels, drawing);
+            draw_strip(drawn + row * static_cast<std::size_t>(r - rows.y1), rows.x1, rows.x2, r,
+                       channels, drawing);
         }
-        write_floats(result.data(), out, rows);
+        write_floats(drawn, out, rows);
     }
 }
 

@@ -6,8 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "lattice/converted_recolour.hpp"
-#include "lattice/lattice.hpp"
+#include "convert/colour_conversion.hpp"
 #include "param_define.hpp"
 #include "params.hpp"
 #include "pixels.hpp"
@@ -56,11 +55,10 @@ const std::string& encoding_of(const Sidecar& sidecar, bool in_palette_space);
 /// What is drawn, all of it read only: threads share it.
 struct Drawing {
     OutputSettings settings;
-    /// Of the edit, of the weight (weight_reader()) or of the surface (surface_reader()), as the
-    /// output asks; null where the picture keeps its colours.
-    std::shared_ptr<const Recolourer> recolourer;
-    /// Of that, where it is the edit's and interpolating will do.
-    std::shared_ptr<const Lattice> lattice;
+    /// The edit, exact or interpolated; null where the picture keeps its colours.
+    std::shared_ptr<const ColourMap> edit;
+    /// For mattes: weight_reader() or surface_reader().
+    std::shared_ptr<const Recolourer> reader;
     /// From the picture's numbers to the palette's; null where they are the same.
     std::shared_ptr<const ColourConversion> conversion;
     /// For Output::kPalette: the slice's colours before and after the edit, and the whole picture,

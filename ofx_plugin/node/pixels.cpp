@@ -4,13 +4,9 @@
 #include <cstdint>
 #include <cstring>
 #include <string>
-#include <vector>
 
 namespace palette4d::node {
 namespace {
-
-// Floats of one round trip byte -> float -> byte: stays in the second-level cache.
-constexpr std::size_t kChunkFloats = 32768;
 
 int bytes_of_depth(const std::string& depth) {
     if (depth == kOfxBitDepthByte) return 1;
@@ -40,50 +36,6 @@ std::uint8_t to_byte(float value) {
     if (!(value > 0.0f)) return 0;
     if (value >= 1.0f) return 255;
     return static_cast<std::uint8_t>((value * 255.0f + kNoFraction) - kNoFraction);
-}
-
-/// `recolourer` is a Recolourer or a Lattice.
-template <class Self>
-void recolour_bytes(const Image& in, const Image& out, const OfxRectI& area, const Self& recolourer,
-                    const ColourConversion* conversion, const RecolourOptions& options) {
-    const int width = area.x2 - area.x1;
-    const std::size_t row = static_cast<std::size_t>(width) * static_cast<std::size_t>(in.channels);
-    const int rows_at_once = static_cast<int>(std::max<std::size_t>(1, kChunkFloats / row));
-    const auto stride = static_cast<std::ptrdiff_t>(row * sizeof(float));
-    std::vector<float> floats;
-    for (int y = area.y1; y < area.y2; y += rows_at_once) {
-        const int rows = std::min(rows_at_once, area.y2 - y);
-        const OfxRectI chunk = {area.x1, y, area.x2, y + rows};
-        floats.resize(row * static_cast<std::size_t>(rows));
-        read_floats(in, chunk, floats.data());
-        apply_converted(recolourer, conversion, {floats.data(), width, rows, in.channels, stride},
-                        {floats.data(), width, rows, in.channels, stride}, options);
-        write_floats(floats.data(), out, chunk);
-    }
-}
-
-template <class Self>
-void recolour_by(const Image& in, const Image& out, const OfxRectI& area, const Self& recolourer,
-                 const ColourConversion* conversion, double strength) {
-    const OfxRectI covered = intersect(area, in.bounds);
-    clear_around(out, area, covered);
-    if (is_empty(covered)) return;
-    RecolourOptions options;
-    options.strength = strength;
-    options.premultiplied = in.premultiplied;
-    options.threads = 1;  // the rows are shared among the host's threads already
-    if (in.depth == Depth::kByte) {
-        recolour_bytes(in, out, covered, recolourer, conversion, options);
-        return;
-    }
-    const int width = covered.x2 - covered.x1;
-    const int height = covered.y2 - covered.y1;
-    apply_converted(recolourer, conversion,
-                    {reinterpret_cast<const float*>(in.at(covered.x1, covered.y1)), width, height,
-                     in.channels, in.row_bytes},
-                    {reinterpret_cast<float*>(out.at(covered.x1, covered.y1)), width, height,
-                     out.channels, out.row_bytes},
-                    options);
 }
 
 }  // namespace
@@ -184,16 +136,6 @@ void copy(const Image& in, const Image& out, const OfxRectI& area) {
     for (int y = covered.y1; y < covered.y2; ++y) {
         std::memmove(out.at(covered.x1, y), in.at(covered.x1, y), bytes);
     }
-}
-
-void recolour(const Image& in, const Image& out, const OfxRectI& area, const Recolourer& recolourer,
-              const ColourConversion* conversion, double strength) {
-    recolour_by(in, out, area, recolourer, conversion, strength);
-}
-
-void recolour(const Image& in, const Image& out, const OfxRectI& area, const Lattice& lattice,
-              const ColourConversion* conversion, double strength) {
-    recolour_by(in, out, area, lattice, conversion, strength);
 }
 
 }  // namespace palette4d::node

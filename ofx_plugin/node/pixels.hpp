@@ -1,4 +1,4 @@
-// The pixels of OFX images: where they lie, and what is done to rows of them.
+// The pixels of OFX images: where they lie, and how they are read, written and copied.
 // Rows count upwards from bounds.y1; row_bytes is signed and may hold padding.
 #pragma once
 
@@ -6,9 +6,6 @@
 #include <optional>
 
 #include "host.hpp"
-#include "lattice/converted_recolour.hpp"
-#include "lattice/lattice.hpp"
-#include "recolour/recolour.hpp"
 
 namespace palette4d::node {
 
@@ -53,13 +50,5 @@ void clear_around(const Image& out, const OfxRectI& area, const OfxRectI& covere
 void clear(const Image& out, const OfxRectI& area);
 /// Copies what `in` covers of `area`; the rest becomes transparent black.
 void copy(const Image& in, const Image& out, const OfxRectI& area);
-/// Recolours what `in` covers of `area`; the rest becomes transparent black. Bytes are recoloured
-/// as byte / 255 and come back rounded and clamped.
-/// `conversion`: from the picture's numbers to the palette's; null where they are the same.
-void recolour(const Image& in, const Image& out, const OfxRectI& area, const Recolourer& recolourer,
-              const ColourConversion* conversion, double strength);
-/// The same by a lattice.
-void recolour(const Image& in, const Image& out, const OfxRectI& area, const Lattice& lattice,
-              const ColourConversion* conversion, double strength);
 
 }  // namespace palette4d::node

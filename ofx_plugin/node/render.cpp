@@ -52,11 +52,11 @@ private:
 
 /// Draws the window; on an exception the source is copied instead, and the exception goes on.
 OfxStatus draw_window(const Suites& suites, OfxImageEffectHandle effect, const Image& in,
-                      const Image& out, const OfxRectI& window, const Look& look) {
+                      const Image& out, const OfxRectI& window, const FrameSetup& setup) {
     try {
         for_each_band(
             suites, window.y1, window.y2,
-            [&](int y1, int y2) { draw(in, out, {window.x1, y1, window.x2, y2}, look.drawing); },
+            [&](int y1, int y2) { draw(in, out, {window.x1, y1, window.x2, y2}, setup.drawing); },
             [&] { return suites.effect->abort && suites.effect->abort(effect) != 0; });
     } catch (...) {
         copy(in, out, window);
@@ -71,9 +71,9 @@ OfxStatus is_identity(const Suites& suites, OfxImageEffectHandle effect, const P
                       const Properties& out_args) {
     const std::optional<double> time = in_args.get_double(kOfxPropTime);
     if (!time) return kOfxStatReplyDefault;
-    const Look look = look_at(suites, effect, *time);
+    const FrameSetup setup = frame_setup_at(suites, effect, *time);
     // With a problem there is something to render: the message.
-    if (!look.passes || !look.problem.empty() || !look.note.empty()) return kOfxStatReplyDefault;
+    if (!setup.passes || !setup.problem.empty() || !setup.note.empty()) return kOfxStatReplyDefault;
     report(suites, effect, "");
     if (!out_args.set_string(kOfxPropName, kOfxImageEffectSimpleSourceClipName)) {
         return kOfxStatReplyDefault;
@@ -100,31 +100,32 @@ OfxStatus render(const Suites& suites, OfxImageEffectHandle effect, const Proper
     }
     const Image& in = *source.pixels();
 
-    Look look;
+    FrameSetup setup;
     try {
         const Mode mode = mode_at(Params(suites, effect), *time);
-        look = look_at(suites, effect, *time, interpolation_of(mode, in_args, out.definition));
+        setup =
+            frame_setup_at(suites, effect, *time, interpolation_of(mode, in_args, out.definition));
     } catch (...) {
         copy(in, out, window);
         throw;
     }
-    report(suites, effect, look.problem.empty() ? look.note : look.problem);
+    report(suites, effect, setup.problem.empty() ? setup.note : setup.problem);
     // Depths and layouts that the node did not ask for pass through too.
-    if (look.passes || in.depth == Depth::kOther || in.channels < 3) {
+    if (setup.passes || in.depth == Depth::kOther || in.channels < 3) {
         copy(in, out, window);
         return kOfxStatOK;
     }
-    look.drawing.picture = out.definition;
+    setup.drawing.picture = out.definition;
     // A host that takes the node into a LUT asks for colours alone, whatever lies where.
     if (in_args.get_string(kOfxImageEffectPropNoSpatialAwareness) == "true" &&
-        look.drawing.settings.output == Output::kPalette) {
-        look.drawing.settings.output = Output::kRecoloured;
-        if (!look.drawing.recolourer) {
+        setup.drawing.settings.output == Output::kPalette) {
+        setup.drawing.settings.output = Output::kRecoloured;
+        if (!setup.drawing.edit) {
             copy(in, out, window);
             return kOfxStatOK;
         }
     }
-    return draw_window(suites, effect, in, out, window, look);
+    return draw_window(suites, effect, in, out, window, setup);
 }
 
 }  // namespace palette4d::node

@@ -159,7 +159,7 @@ def test_letterbox_bars_are_a_black_in_every_frame(analysed):
 
 def test_grain_does_not_blow_up_the_palette(analysed):
     found = analysed("grain")
-    pixels = [image.reshape(-1, 3) for _, image in found.clip.iter_frames()]
+    pixels = [image.reshape(-1, 3) for _, image in found.clip]
     outermost = float(np.mean([ConvexHull(p).volume for p in pixels]))
     assert found.volume() < 0.92 * outermost
     assert found.volume() < 2.5 * analysed("clean").volume()
@@ -198,7 +198,7 @@ def test_straight_and_premultiplied_files_give_one_palette(analysed):
 
 def test_monochrome_is_a_line_from_dark_to_light(analysed):
     found = analysed("monochrome")
-    for frame, image in found.clip.iter_frames():
+    for frame, image in found.clip:
         palette = found.palette(frame)
         assert palette.shape == (2, 3)
         np.testing.assert_allclose(palette - palette[:, :1], 0, atol=1e-6)

@@ -145,7 +145,7 @@ def highlights_over_seasons(seasons, numbers, lit, lights):
     """Pieces of SEASONS at half size; squares of (rgb, side) are lit in some frames."""
     clip = open_clip(str(seasons), frames=numbers)
     pictures = []
-    for number, image in clip.iter_frames():
+    for number, image in clip:
         picture = np.array(image[::2, ::2, :3])
         for place, (rgb, side) in enumerate(lights if number in lit else ()):
             picture[60 : 60 + side, 100 + 60 * place : 100 + 60 * place + side] = rgb

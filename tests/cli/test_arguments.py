@@ -85,7 +85,7 @@ def test_values_that_no_file_makes_right_are_wrong_usage(capsys, monkeypatch, tm
         (("analyze",), "palette4d analyze", "CLIP, -o/--output"),
         (("analyze", "c", "-o", "a", "--verts", "3"), "palette4d analyze", "--verts"),
         (("render", EDITED), "palette4d render", "CLIP"),
-        (("edit", EDITED, "set", "v1", "--rgb", "1", "--no"), "palette4d edit SIDECAR set", "--no"),
+        (("edit", EDITED, "reset", "v1", "--no"), "palette4d edit SIDECAR reset", "--no"),
     ],
 )
 def test_wrong_usage_is_two_lines(capsys, words, verb, wrong):

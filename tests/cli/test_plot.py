@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from numpy.typing import NDArray
 
 from palette4d import _core
 from palette4d.cli.main import main
-from palette4d.plotting import discs, figure, layout, style
-from palette4d.plotting.panel import Frame, Palette
+from palette4d.plotting import page, style
+from palette4d.plotting.rows import Palette, arrange
 
 GOLDEN = Path(__file__).resolve().parent.parent / "golden" / "sidecars"
 ALL_GOLDEN = sorted(GOLDEN.glob("v*_*.p4d.json"))
@@ -138,7 +139,8 @@ def test_pdf_and_reproducible_pictures(tmp_path: Path) -> None:
     for extension in ("pdf", "svg", "png"):
         outs = [tmp_path / f"{k}.{extension}" for k in range(2)]
         for out in outs:
-            assert main(["plot", sidecar, "-o", str(out), "--width", "600"]) == 0
+            words = ["-o", str(out), "--width", "400", "--frames", "3"]
+            assert main(["plot", sidecar, *words]) == 0
         assert outs[0].read_bytes() == outs[1].read_bytes()
     assert (tmp_path / "0.pdf").read_bytes().startswith(b"%PDF")
 
@@ -218,54 +220,33 @@ def test_a_note_says_that_the_clip_is_not_there(
 def test_default_frames(
     first: float, last: float, edited: list[float], expected: list[float]
 ) -> None:
-    chosen = figure.default_frames(first, last, edited)
+    chosen = page.default_frames(first, last, edited)
     assert chosen == expected
     for time in edited:  # every edit is near to a frame that is shown, as far as five can reach
         assert min(abs(time - v) for v in chosen) <= max(0.5, (last - first) / 8)
 
 
-@pytest.mark.parametrize("count", [2, 3, 30, 120])
-@pytest.mark.parametrize("distance", [0.0, 1.0, 7.0])
-def test_close_discs_make_way(count: int, distance: float) -> None:
-    home = np.concatenate([200 + distance * np.arange(count), [30.0, 950.0]])
-    home = np.clip(home, 30.0, 950.0)
-    row = np.zeros(len(home))
-    wanted = np.full(len(home), 16.5)
-    x, radius = discs._place(wanted, home, row, 10.0, 990.0)
-    order = np.argsort(home, kind="stable")
-    gaps = np.diff(x[order])
-    room = radius[order][:-1] + radius[order][1:]
-    assert (gaps >= room + 2 * discs.COLLAR - 1e-6).all() or (count >= 120 and (gaps > 0).all())
-    assert radius.min() >= 1.6
-    assert (x - radius >= 10.0).all()
-    assert (x + radius <= 990.0).all()
+def drawn(document: dict[str, Any]) -> tuple[Any, Any]:
+    """The page's axes and renderer; an SVG's ids name the rims of the discs."""
+    sidecar = _core.parse_sidecar(json.dumps(document))
+    canvas = FigureCanvasAgg(page.build(sidecar, []))
+    return canvas.figure.axes[0], canvas.get_renderer()
 
 
-def test_labels_keep_off_forks_and_the_axis() -> None:
-    panel = Frame(left=0, right=400, top=300, first=0, last=10, rows=4, row_height=50)
-    up, down = panel.y(1) + np.array([10, 40]), panel.y(1) - np.array([40, 10])
-    above = [190.0, up[0], 210.0, up[1]]
-    below = [190.0, down[0], 210.0, down[1]]
-
-    def label(crossing: list[list[float]], row: int = 1) -> float:
-        axes = Figure().add_axes((0, 0, 1, 1))
-        marks = [(200.0, float(panel.y(row)), 16.0, "v12", False)]
-        discs._draw_labels(axes, marks, np.array(crossing).reshape(-1, 4), panel)
-        (text,) = axes.texts
-        return float(text.get_position()[1] - panel.y(row))
-
-    assert label([]) > 16
-    assert label([above]) < -16
-    assert label([above, below]) > 0  # across a fork, where there is no other room
-    assert panel.y(3) - 16 - panel.floor < 12  # no room between the last row and the axis
-    assert label([[0.0, panel.y(3), 400.0, panel.y(3) + 50]], row=3) > 0
-
-
-def test_discs_with_room_stay_where_they_belong() -> None:
-    home, row = np.array([100.0, 160.0, 161.0]), np.array([50.0, 50.0, 90.0])
-    x, radius = discs._place(np.full(3, 16.5), home, row, 10.0, 990.0)
-    np.testing.assert_allclose(x, home)
-    np.testing.assert_allclose(radius, 16.5)
+@pytest.mark.parametrize("blocks", [2, 12])
+def test_close_discs_make_way_and_ids_do_not_overlap(blocks: int) -> None:
+    axes, renderer = drawn(tetrahedron_through(blocks))
+    rims = [line for line in axes.lines if str(line.get_gid()).startswith("vertex-")]
+    assert len(rims) == 8 * blocks
+    for y in {line.get_ydata()[0] for line in rims}:
+        row = sorted((r.get_xdata()[0], r.get_markersize() / 2) for r in rims if y in r.get_ydata())
+        for (x, radius), (after, other) in itertools.pairwise(row):
+            assert after - x >= radius + other
+        assert min(radius for _, radius in row) >= 1.6
+    ids = [t for t in axes.texts if t.get_text().startswith("v")]
+    assert len(ids) >= 8
+    boxes = [text.get_window_extent(renderer).padded(-1) for text in ids]
+    assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
 
 
 @pytest.mark.parametrize(
@@ -310,8 +291,10 @@ def test_bands_show_the_cores_colours(frame: float) -> None:
     for index, edge in enumerate(cut.edges):
         if edge >= 0:
             when = np.array([frame])
-            np.testing.assert_allclose(palette.before(edge, when)[0], cut.rgb[index], atol=1e-12)
-            np.testing.assert_allclose(palette.after(edge, when)[0], edited[index], atol=1e-12)
+            plain = palette.colours(edge, when, edited=False)[0]
+            np.testing.assert_allclose(plain, cut.rgb[index], atol=1e-12)
+            after = palette.colours(edge, when, edited=True)[0]
+            np.testing.assert_allclose(after, edited[index], atol=1e-12)
         else:
             np.testing.assert_allclose(palette.edited[cut.ends[index, 0]], edited[index])
 
@@ -319,17 +302,17 @@ def test_bands_show_the_cores_colours(frame: float) -> None:
 @pytest.mark.parametrize("name", ["v1_split", "v1_merge"])
 def test_a_fork_is_a_chain_of_its_own(name: str) -> None:
     palette = Palette.of(_core.read_sidecar(str(GOLDEN / f"{name}.p4d.json")))
-    rows = layout.arrange(palette.frames, palette.rgb, palette.edges)
+    rows = arrange(palette.frames, palette.rgb, palette.edges)
     # Four colours on one side, five on the other: one fork.
     assert len(rows.chains) == 5
-    assert rows.row_count == 5
+    assert rows.count == 5
     placed = [v for chain in rows.chains for v in chain.vertices]
     assert sorted(placed) == list(range(len(palette.ids)))
     assert sorted(e for chain in rows.chains for e in chain.edges) == list(
         range(len(palette.edges))
     )
     forks = [
-        abs(int(rows.rows[rows.vertex_chain[v]]) - int(rows.rows[rows.edge_chain[e]]))
+        abs(int(rows.row[rows.vertex_chain[v]]) - int(rows.row[rows.edge_chain[e]]))
         for e, ends in enumerate(palette.edges)
         for v in ends
         if rows.vertex_chain[v] != rows.edge_chain[e]
@@ -341,6 +324,6 @@ def test_chains_that_never_meet_share_a_row() -> None:
     # a: 0..100; b: 0..20 joins a at 20; c leaves a at 60.
     frames = np.array([0.0, 0.0, 20.0, 60.0, 100.0, 100.0])
     rgb = np.array([[0.5] * 3, [0.6] * 3, [0.5] * 3, [0.5] * 3, [0.5] * 3, [0.6] * 3])
-    rows = layout.arrange(frames, rgb, [(0, 2), (1, 2), (2, 3), (3, 4), (3, 5)])
+    rows = arrange(frames, rgb, [(0, 2), (1, 2), (2, 3), (3, 4), (3, 5)])
     assert len(rows.chains) == 3
-    assert rows.row_count == 2
+    assert rows.count == 2

@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 from host.melt import MeltUnavailableError, bring_melt
 
-from palette4d.cli import install_plugin
+from palette4d.hosts.bundle import find_bundle
 
 
 @pytest.fixture(scope="session")
 def bundle() -> Path:
     """The OpenFX bundle inside the installed package."""
-    return install_plugin.find_bundle()
+    return find_bundle()
 
 
 @pytest.fixture(scope="session")

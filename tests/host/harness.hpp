@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "lattice/converted_recolour.hpp"
+#include "model/slice.hpp"
 #include "recolour/recolour.hpp"
 #include "sidecar/sidecar.hpp"
 #include "strict_host.hpp"

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from palette4d.cli import install_plugin
+from palette4d.hosts.bundle import find_bundle
 
 pytestmark = pytest.mark.skipif(
     not sys.platform.startswith("linux"), reason="reads ELF files, which Linux has"
@@ -78,7 +78,7 @@ def read_elf(path: Path) -> Elf:
 
 @pytest.fixture(scope="module")
 def bundle() -> Path:
-    return install_plugin.find_bundle()
+    return find_bundle()
 
 
 @pytest.fixture(scope="module")

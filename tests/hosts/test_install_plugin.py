@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import argparse
 import os
+import shutil
 from pathlib import Path
 
 import pytest
 
 from palette4d.cli import install_plugin
 from palette4d.common.errors import Palette4dError
-
-BUNDLE = install_plugin.BUNDLE
+from palette4d.hosts.bundle import BUNDLE, default_destination, find_bundle, install_bundle
 
 
 def make_bundle(root: Path, content: bytes = b"code") -> Path:
@@ -38,7 +38,7 @@ def bundle(tmp_path: Path) -> Path:
 
 def test_copies_the_whole_bundle_and_leaves_nothing_else(bundle: Path, tmp_path: Path) -> None:
     destination = tmp_path / "new" / "OFX"
-    target = install_plugin.install(bundle, destination)
+    target = install_bundle(bundle, destination)
     assert target == destination / BUNDLE
     assert not target.is_symlink()
     assert files(target) == files(bundle)
@@ -50,7 +50,7 @@ def test_replaces_an_earlier_version(bundle: Path, tmp_path: Path) -> None:
     destination = tmp_path / "OFX"
     old = make_bundle(destination, b"old code")
     (old / "Contents" / "left-over").write_text("of an older version")
-    target = install_plugin.install(bundle, destination)
+    target = install_bundle(bundle, destination)
     assert files(target) == files(bundle)
     assert [path.name for path in destination.iterdir()] == [BUNDLE]
 
@@ -58,11 +58,11 @@ def test_replaces_an_earlier_version(bundle: Path, tmp_path: Path) -> None:
 def test_links(bundle: Path, tmp_path: Path) -> None:
     destination = tmp_path / "OFX"
     for _ in range(2):
-        target = install_plugin.install(bundle, destination, link=True)
+        target = install_bundle(bundle, destination, link=True)
         assert target.is_symlink()
         assert target.resolve() == bundle.resolve()
     # A copy replaces the link, not what it leads to.
-    target = install_plugin.install(bundle, destination)
+    target = install_bundle(bundle, destination)
     assert not target.is_symlink()
     assert files(target) == files(bundle)
 
@@ -71,7 +71,7 @@ def test_a_link_that_leads_nowhere_is_replaced(bundle: Path, tmp_path: Path) -> 
     destination = tmp_path / "OFX"
     destination.mkdir()
     (destination / BUNDLE).symlink_to(tmp_path / "gone")
-    assert files(install_plugin.install(bundle, destination)) == files(bundle)
+    assert files(install_bundle(bundle, destination)) == files(bundle)
 
 
 @pytest.mark.parametrize("kind", ["file", "folder"])
@@ -85,10 +85,10 @@ def test_refuses_to_replace_something_else(bundle: Path, tmp_path: Path, kind: s
         other.mkdir(parents=True)
         (other / "precious").write_text("precious")
     with pytest.raises(Palette4dError, match="--force"):
-        install_plugin.install(bundle, destination)
+        install_bundle(bundle, destination)
     assert other.exists()
     assert [path.name for path in destination.iterdir()] == [BUNDLE]
-    install_plugin.install(bundle, destination, force=True)
+    install_bundle(bundle, destination, force=True)
     assert files(other) == files(bundle)
 
 
@@ -103,11 +103,11 @@ def test_says_what_to_do_without_the_right_to_write(
         def refuse(*_: object, **__: object) -> None:
             raise PermissionError(13, "Permission denied", str(destination))
 
-        monkeypatch.setattr(install_plugin.shutil, "copytree", refuse)
+        monkeypatch.setattr(shutil, "copytree", refuse)
     else:
         destination.chmod(0o555)
     with pytest.raises(Palette4dError, match=r"sudo.*--dest.*OFX_PLUGIN_PATH"):
-        install_plugin.install(bundle, destination)
+        install_bundle(bundle, destination)
     destination.chmod(0o755)
     assert files(old) == {"Contents/Linux-x86-64/Palette4D.ofx": b"old code"}
     assert [path.name for path in destination.iterdir()] == [BUNDLE]
@@ -127,14 +127,14 @@ def test_a_failed_rename_puts_the_old_bundle_back(
 
     monkeypatch.setattr(Path, "rename", fail_on_the_fresh_one)
     with pytest.raises(Palette4dError, match="No space left"):
-        install_plugin.install(bundle, destination)
+        install_bundle(bundle, destination)
     assert files(destination / BUNDLE) == {"Contents/Linux-x86-64/Palette4D.ofx": b"old code"}
 
 
 def test_default_destinations() -> None:
-    assert install_plugin.default_destination("linux") == Path("/usr/OFX/Plugins")
-    assert install_plugin.default_destination("darwin") == Path("/Library/OFX/Plugins")
-    windows = install_plugin.default_destination("win32")
+    assert default_destination("linux") == Path("/usr/OFX/Plugins")
+    assert default_destination("darwin") == Path("/Library/OFX/Plugins")
+    windows = default_destination("win32")
     assert windows.as_posix() == "C:/Program Files/Common Files/OFX/Plugins"
 
 
@@ -147,7 +147,7 @@ def test_the_verb_installs_the_packaged_node(
     assert args.run(args) == 0
     out = capsys.readouterr().out
     assert f"OFX_PLUGIN_PATH={tmp_path / 'OFX'}" in out
-    packaged = install_plugin.find_bundle()
+    packaged = find_bundle()
     assert files(tmp_path / "OFX" / BUNDLE) == files(packaged)
     binaries = list((tmp_path / "OFX" / BUNDLE).glob("Contents/*/Palette4D.ofx"))
     assert len(binaries) == 1

@@ -73,6 +73,7 @@ def busy(client: Client, made: Farm, name: str) -> bool:
     return address is not None and bool(client.processing().get(address))
 
 
+@pytest.mark.slow
 def test_a_worker_that_dies_costs_its_shot_another_try(
     edit: Path, here: dict[str, bytes], tmp_path: Path
 ) -> None:
@@ -90,6 +91,7 @@ def test_a_worker_that_dies_costs_its_shot_another_try(
     assert files(out) == here
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_dies_is_told(edit: Path, tmp_path: Path) -> None:
     out = tmp_path / "shots"
     with farm(tmp_path / "farm", workers=1) as made:
@@ -130,6 +132,7 @@ def nothing_left(process: subprocess.Popen[str]) -> None:
     wait_for(gone, "the workers to end")
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_the_local_workers(edit: Path, tmp_path: Path) -> None:
     out = tmp_path / "shots"
     process = start("analyze", edit, "-o", out, "--quiet", "--cluster", "local:2")

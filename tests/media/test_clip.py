@@ -20,7 +20,7 @@ from palette4d.media.clip_sequence import frame_number
 
 def reds(clip) -> dict[int, int]:
     """Frame number -> the number painted into the frame."""
-    return {frame: round(float(p[0, 0, 0]) * 65535) for frame, p in clip.iter_frames()}
+    return {frame: round(float(p[0, 0, 0]) * 65535) for frame, p in clip}
 
 
 @pytest.mark.parametrize(
@@ -205,11 +205,11 @@ def test_cut_file_is_named_or_skipped(tmp_path, extension, keep):
     whole = path.read_bytes()
     path.write_bytes(whole[: int(len(whole) * keep)])
     with pytest.raises(FrameError, match=r"c\.002\..*frame 2 cannot be read"):
-        list(open_clip(str(tmp_path)).iter_frames())
+        list(open_clip(str(tmp_path)))
     clip = open_clip(str(tmp_path), skip_bad_frames=True)
-    assert [frame for frame, _ in clip.iter_frames()] == [1, 3]
+    assert [frame for frame, _ in clip] == [1, 3]
     assert clip.skipped == [2]
-    assert [frame for frame, _ in clip.iter_frames()] == [1, 3]
+    assert [frame for frame, _ in clip] == [1, 3]
     assert clip.skipped == [2]
     with pytest.raises(FrameError):
         clip.read(2)
@@ -235,12 +235,12 @@ def test_nothing_readable_says_so(tmp_path):
 def test_other_size_and_channels_mid_clip(tmp_path):
     for frame, shape in enumerate([(6, 8, 3), (6, 8, 3), (6, 9, 3), (6, 8, 4), (6, 8, 1)]):
         write_image(tmp_path / f"c.{frame}.png", np.full(shape, 128, np.uint8))
-    with pytest.raises(FrameError, match="frame 2 is 9x6 pixels, expected 8x6"):
-        list(open_clip(str(tmp_path)).iter_frames())
+    with pytest.raises(FrameError, match="frame 2 has 9x6 pixels, expected 8x6"):
+        list(open_clip(str(tmp_path)))
     with pytest.raises(FrameError, match="frame 3 has straight alpha, expected no alpha"):
         open_clip(str(tmp_path)).read(3)
     clip = open_clip(str(tmp_path), skip_bad_frames=True)
-    assert [frame for frame, _ in clip.iter_frames()] == [0, 1, 4]  # grey is as good as RGB
+    assert [frame for frame, _ in clip] == [0, 1, 4]  # grey is as good as RGB
     assert clip.skipped == [2, 3]
 
 

@@ -106,9 +106,9 @@ def test_another_file_is_refused(text: str | bytes, words: str, tmp_path: Path) 
 
 
 def test_the_page_shows_the_schema(tool: ModuleType) -> None:
-    page = (ROOT / "docs" / "shots.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "files.md").read_text(encoding="utf-8")
     assert tool.written(page, SCHEMA) == page, (
-        "docs/shots.md is not up to date; run: python docs/sidecar_fields.py"
+        "docs/files.md is not up to date; run: python docs/sidecar_fields.py"
     )
     rows = tool.fields(SCHEMA)
     assert all(kind and text for _, kind, _, text in rows)

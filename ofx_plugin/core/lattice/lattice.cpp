@@ -1,14 +1,13 @@
 #include "lattice/lattice.hpp"
 
 #include <algorithm>
-#include <mutex>
 #include <stdexcept>
 #include <thread>
 #include <utility>
 #include <vector>
 
 #include "lattice/lattice_store.hpp"
-#include "recolour/image_rows.hpp"
+#include "recolour/exact_worker.hpp"
 #include "simd/kernel_choice.hpp"
 
 namespace palette4d {
@@ -16,7 +15,7 @@ namespace palette4d {
 /// Blocks of pixels with some in cells that nobody has made yet wait until there are a few of them,
 /// for the cells to be made many at a time and yet before too many others wait for the same; pixels
 /// in parts that are not good enough go on to the exact worker.
-class Lattice::Worker {
+class Lattice::Worker final : public RowWorker {
 public:
     Worker(const Recolourer& recolourer, Store& store, const RecolourOptions& options, int channels)
         : store_(store),
@@ -24,12 +23,12 @@ public:
           strength_(static_cast<float>(options.strength)),
           premultiplied_(options.premultiplied),
           channels_(channels),
-          exact_(recolourer, options),
+          exact_(exact_worker(recolourer, options, channels)),
           builder_(store, options.instructions) {
         waiting_.reserve(kMostLeft + kWaiting);
     }
 
-    void row(const float* in, float* out, int width) {
+    void row(const float* in, float* out, int width) override {
         for (int x = 0; x < width; x += kSize) {
             const int count = std::min(kSize, width - x);
             const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(x) * channels_;
@@ -47,16 +46,17 @@ public:
         }
     }
 
-    /// All of it is written when this returns.
-    void finish() {
+    void finish() override {
         do_waiting(0);
+        left_ = 0;
         check_samples();
-        exact_.finish();
+        exact_->finish();
     }
 
-    LatticeCounts counts() const {
-        const RecolourCounts exact = exact_.counts();
-        return {interpolated_, exact.single + exact.twofold + exact.one};
+    RecolourCounts counts() const override {
+        RecolourCounts all = exact_->counts();
+        all.interpolated = interpolated_;
+        return all;
     }
 
 private:
@@ -101,7 +101,7 @@ private:
         if ((others & kLatticeKind) == 0) return true;
         for (int i = 0; i < count; ++i) {
             if (b.state[i] == Store::kExact) {
-                exact_.pixel(from + i * channels_, to + i * channels_, channels_);
+                exact_->pixel(from + i * channels_, to + i * channels_);
                 --interpolated_;
             }
         }
@@ -179,7 +179,7 @@ private:
     const float strength_;
     const bool premultiplied_;
     const int channels_;
-    ExactWorker exact_;
+    std::unique_ptr<ExactWorker> exact_;
     Store::Builder builder_;
     LatticeBlock block_{};
     std::vector<Waiting> waiting_;
@@ -200,28 +200,11 @@ double Lattice::largest_error() const { return store_ ? store_->largest_error() 
 
 Lattice::Size Lattice::size() const { return store_ ? store_->size() : Size{}; }
 
-LatticeCounts Lattice::apply(const ConstImageView& in, const ImageView& out,
-                             const RecolourOptions& given) const {
-    RecolourOptions options = given;
-    options.premultiplied = options.premultiplied && in.channels == 4;
-    check_recolouring(in, out, options);
-    if (!store_ || options.precision == Precision::kDouble || options.strength <= 0 ||
-        options.strength > 1 || in.width == 0 || in.height == 0) {
-        const RecolourCounts counts = recolourer_->apply(in, out, options);
-        return {0, counts.single + counts.twofold + counts.one};
+std::unique_ptr<RowWorker> Lattice::worker(const RecolourOptions& options, int channels) const {
+    if (options.precision == Precision::kDouble || options.strength <= 0 || options.strength > 1) {
+        return recolourer_->worker(options, channels);
     }
-    LatticeCounts counts;
-    std::mutex guard;
-    share_rows(in.height, options.threads, [&](const NextRow& next) {
-        const auto worker = std::make_unique<Worker>(*recolourer_, *store_, options, in.channels);
-        for (int y = next(); y >= 0; y = next()) {
-            worker->row(row_of(in, y), row_of(out, y), in.width);
-        }
-        worker->finish();
-        const std::lock_guard<std::mutex> lock(guard);
-        counts += worker->counts();
-    });
-    return counts;
+    return std::make_unique<Worker>(*recolourer_, *store_, options, channels);
 }
 
 }  // namespace palette4d

@@ -8,18 +8,6 @@
 
 namespace palette4d {
 
-/// How many colours of an apply() went which way; what is copied counts as neither.
-struct LatticeCounts {
-    long long interpolated = 0;
-    long long exact = 0;  ///< by the Recolourer
-
-    LatticeCounts& operator+=(const LatticeCounts& other) {
-        interpolated += other.interpolated;
-        exact += other.exact;
-        return *this;
-    }
-};
-
 /// One frame's displacements at the nodes of a lattice, interpolated tetrahedrally between them.
 ///
 /// The lattice spans the unit cube and the palette's bounding box, and a sixteenth of that more on
@@ -36,7 +24,7 @@ struct LatticeCounts {
 /// displacement is an affine function of them, region by region. Nodes are then the inside's mean
 /// value coordinates, beyond the surface as well, so that a cell that the surface crosses is
 /// interpolated below it, as smoothly as if it were not there.
-class Lattice {
+class Lattice final : public ColourMap {
 public:
     /// Of (interpolated - exact) / max(|exact|, 0.1), channel by channel. Where cells are looked at
     /// less is asked for, since an error is larger in between.
@@ -44,17 +32,17 @@ public:
 
     /// Throws std::invalid_argument for null.
     explicit Lattice(std::shared_ptr<const Recolourer> recolourer);
-    ~Lattice();
+    ~Lattice() override;
     Lattice(const Lattice&) = delete;
     Lattice& operator=(const Lattice&) = delete;
 
     const Recolourer& recolourer() const { return *recolourer_; }
 
-    /// As Recolourer::apply(), and with its bits for colours outside of the lattice or in parts
-    /// that are not good enough, for precision double, and for all at a strength beyond 0 to 1. A
-    /// pixel's result depends on that pixel and the options only. Throws what that throws.
-    LatticeCounts apply(const ConstImageView& in, const ImageView& out,
-                        const RecolourOptions& options) const;
+    bool moves() const override { return recolourer_->moves(); }
+    /// Colours outside of the lattice or in parts that are not good enough have the Recolourer's
+    /// bits, as have all for precision double and at a strength beyond 0 to 1. kTolerance holds in
+    /// the palette's code values.
+    std::unique_ptr<RowWorker> worker(const RecolourOptions& options, int channels) const override;
 
     /// The largest error, measured as kTolerance says and at strength 1, that was seen so far: of
     /// the points looked at in the cells in use and of about every thousandth pixel, evaluated

@@ -42,12 +42,10 @@ bool goes_on(const LatticePlane& plane, const float* columns, int part, const Fo
 
 }  // namespace
 
-Lattice::Store::Builder::Builder(Store& store, InstructionSet instructions)
-    : store_(store), exact_(store.recolourer_, [&] {
-          RecolourOptions options;
-          options.instructions = instructions;
-          return options;
-      }()) {
+Lattice::Store::Builder::Builder(Store& store, InstructionSet instructions) : store_(store) {
+    RecolourOptions options;
+    options.instructions = instructions;
+    exact_ = store.recolourer_.worker(options, 3);
     if (store.regions_) {
         mean_value_ = std::make_unique<MeanValueWorker>(store.recolourer_, instructions);
     }
@@ -433,9 +431,9 @@ const float* Lattice::Store::Builder::displacements(const float* colours, std::s
     constexpr std::size_t kMostInRow = 1 << 20;
     for (std::size_t at = 0; at < count; at += kMostInRow) {
         const std::size_t row = std::min(kMostInRow, count - at);
-        exact_.row(colours + 3 * at, &moved_[3 * at], static_cast<int>(row), 3);
+        exact_->row(colours + 3 * at, &moved_[3 * at], static_cast<int>(row));
     }
-    exact_.finish();
+    exact_->finish();
     for (std::size_t i = 0; i < 3 * count; ++i) moved_[i] -= colours[i];
     store_.colours_ += static_cast<long long>(count);
     return moved_.data();

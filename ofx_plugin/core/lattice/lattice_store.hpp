@@ -14,7 +14,6 @@
 #include "lattice/lattice_kernels.hpp"
 #include "lattice/mean_value_worker.hpp"
 #include "lattice/palette_regions.hpp"
-#include "recolour/exact_worker.hpp"
 
 namespace palette4d {
 
@@ -168,7 +167,7 @@ private:
     const float* node_displacements(const float* colours, std::size_t count);
 
     Store& store_;
-    ExactWorker exact_;
+    std::unique_ptr<RowWorker> exact_;
     std::unique_ptr<MeanValueWorker> mean_value_;  ///< where there are regions
     std::vector<Group> groups_;
     std::vector<int> taken_;

@@ -11,51 +11,52 @@
 
 namespace palette4d {
 
-/// Pixels are gathered in blocks, sorted into those inside the palette and those outside, and their
-/// displacement computed by a kernel each; those that a kernel cannot promise go on to the next,
-/// more precise stage: float, double, one by one. A pixel's way depends on its colour alone.
-class ExactWorker::Pipeline {
+namespace {
+
+/// Pixels are gathered in blocks and sorted into those inside the palette and those outside; a
+/// kernel for each computes their displacement. Pixels that a kernel cannot guarantee go to the
+/// next, more precise stage: float, double, one by one. A pixel's stage depends on its colour
+/// alone.
+class Pipeline final : public ExactWorker {
 public:
-    Pipeline(const Recolourer& recolourer, const RecolourOptions& options)
+    Pipeline(const Recolourer& recolourer, const RecolourOptions& options, int channels)
         : divide_(options.premultiplied),
-          one_by_one_(recolourer, options),
+          channels_(channels),
+          one_by_one_(recolourer, options, channels),
           twofold_(recolourer.plan().twofold,
                    kernels_of<BlockKernels>(options.instructions).twofold, options, one_by_one_),
           single_(recolourer.plan().single, kernels_of<BlockKernels>(options.instructions).single,
                   options, twofold_) {}
 
-    /// All of it is written when finish() returns.
-    void row(const float* in, float* out, int width, int channels) {
+    void row(const float* from, float* to, int width) override {
         constexpr int kSize = Block<float>::kSize;
         for (int x = 0; x < width; x += kSize) {
             const int count = std::min(kSize, width - x);
-            const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(x) * channels;
-            if (channels == 3) {
-                single_.run<3>(in + at, out + at, count);
+            const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(x) * channels_;
+            if (channels_ == 3) {
+                single_.run<3>(from + at, to + at, count);
             } else {
-                single_.run<4>(in + at, out + at, count);
+                single_.run<4>(from + at, to + at, count);
             }
         }
     }
 
-    void pixel(const float* from, float* to, int channels) {
-        if (channels == 4) to[3] = from[3];
-        // NaN where one is not finite: 0 times infinity is no number.
-        if (0 * from[0] + 0 * from[1] + 0 * from[2] == 0 &&
-            (!divide_ || (from[3] != 0 && std::isfinite(from[3])))) {
+    void pixel(const float* from, float* to) override {
+        if (channels_ == 4) to[3] = from[3];
+        if (recolourable(from, divide_)) {
             single_.recolour(from, to);
         } else {
             for (int c = 0; c < 3; ++c) to[c] = from[c];
         }
     }
 
-    void finish() {
+    void finish() override {
         single_.finish();
         twofold_.finish();
     }
 
-    RecolourCounts counts() const {
-        return {single_.count(), twofold_.count(), one_by_one_.count()};
+    RecolourCounts counts() const override {
+        return {0, single_.count(), twofold_.count(), one_by_one_.counts().one};
     }
 
 private:
@@ -95,17 +96,12 @@ private:
             for (int i = 0; i < count; ++i) {
                 const float* pixel = in + i * Channels;
                 for (int c = 0; c < 3; ++c) batch.block.high[c][i] = pixel[c];
-                // NaN where one is not finite: 0 times infinity is no number.
-                const float sum = 0 * pixel[0] + 0 * pixel[1] + 0 * pixel[2];
-                good[i] = sum == 0;
+                good[i] = recolourable(pixel, Channels == 4 && divide_);
                 all_good &= good[i];
             }
             if (Channels == 4 && divide_) {
                 for (int i = 0; i < count; ++i) {
-                    const float alpha = in[i * 4 + 3];
-                    good[i] = good[i] && alpha != 0 && std::isfinite(alpha);
-                    all_good &= good[i];
-                    if (good[i]) batch.divide(i, alpha);
+                    if (good[i]) batch.divide(i, in[i * 4 + 3]);
                 }
             }
             if (usable_) {
@@ -135,7 +131,7 @@ private:
             }
         }
 
-        /// One pixel, finite and with an alpha that can be divided by; `to` may be `from`.
+        /// One pixel that is recolourable(); `to` may be `from`.
         void recolour(const float* from, float* to) {
             if (!usable_) {
                 next_.recolour(from, to);
@@ -258,21 +254,17 @@ private:
     };
 
     const bool divide_;
+    const int channels_;
     OneByOne one_by_one_;
     Stage<double, OneByOne> twofold_;
     Stage<float, Stage<double, OneByOne>> single_;
 };
 
-ExactWorker::ExactWorker(const Recolourer& recolourer, const RecolourOptions& options)
-    : pipeline_(std::make_unique<Pipeline>(recolourer, options)) {}
-ExactWorker::~ExactWorker() = default;
-void ExactWorker::row(const float* from, float* to, int width, int channels) {
-    pipeline_->row(from, to, width, channels);
+}  // namespace
+
+std::unique_ptr<ExactWorker> exact_worker(const Recolourer& recolourer,
+                                          const RecolourOptions& options, int channels) {
+    return std::make_unique<Pipeline>(recolourer, options, channels);
 }
-void ExactWorker::pixel(const float* from, float* to, int channels) {
-    pipeline_->pixel(from, to, channels);
-}
-void ExactWorker::finish() { pipeline_->finish(); }
-RecolourCounts ExactWorker::counts() const { return pipeline_->counts(); }
 
 }  // namespace palette4d

@@ -1,4 +1,4 @@
-// One thread's work in Precision::kSingle: of Recolourer::apply(), and pixel by pixel of others.
+// One thread's work in Precision::kSingle.
 #pragma once
 
 #include <memory>
@@ -7,24 +7,14 @@
 
 namespace palette4d {
 
-class ExactWorker {
+/// Also takes single pixels; their bits are those of row().
+class ExactWorker : public RowWorker {
 public:
-    /// `recolourer` must outlive this and move some colour; its apply() says what `options` may be.
-    ExactWorker(const Recolourer& recolourer, const RecolourOptions& options);
-    ~ExactWorker();
-    ExactWorker(const ExactWorker&) = delete;
-    ExactWorker& operator=(const ExactWorker&) = delete;
-
-    /// Pixels that lie next to each other, and one; `from` and `to` stay where they are until
-    /// finish() has returned, when all is written. The bits are those of apply().
-    void row(const float* from, float* to, int width, int channels);
-    void pixel(const float* from, float* to, int channels);
-    void finish();
-    RecolourCounts counts() const;
-
-private:
-    class Pipeline;
-    std::unique_ptr<Pipeline> pipeline_;
+    virtual void pixel(const float* from, float* to) = 0;
 };
+
+/// `recolourer` must outlive the worker and move some colour.
+std::unique_ptr<ExactWorker> exact_worker(const Recolourer& recolourer,
+                                          const RecolourOptions& options, int channels);
 
 }  // namespace palette4d

@@ -1,6 +1,5 @@
 #include "recolour/one_by_one.hpp"
 
-#include <cmath>
 #include <cstdint>
 #include <cstring>
 
@@ -22,21 +21,20 @@ std::size_t slot(const Vec3& p) {
 
 }  // namespace
 
-OneByOne::OneByOne(const Recolourer& recolourer, const RecolourOptions& options)
+OneByOne::OneByOne(const Recolourer& recolourer, const RecolourOptions& options, int channels)
     : recolourer_(recolourer),
       strength_(options.strength),
       divide_(options.premultiplied),
+      channels_(channels),
       weights_(recolourer.original().size()) {}
 
-void OneByOne::row(const float* in, float* out, int width, int channels) {
-    for (int x = 0; x < width; ++x, in += channels, out += channels) {
-        const bool finite_colour =
-            std::isfinite(in[0]) && std::isfinite(in[1]) && std::isfinite(in[2]);
-        if (channels == 4) out[3] = in[3];
-        if (finite_colour && (!divide_ || (in[3] != 0 && std::isfinite(in[3])))) {
-            recolour(in, out);
+void OneByOne::row(const float* from, float* to, int width) {
+    for (int x = 0; x < width; ++x, from += channels_, to += channels_) {
+        if (channels_ == 4) to[3] = from[3];
+        if (recolourable(from, divide_)) {
+            recolour(from, to);
         } else {
-            for (int c = 0; c < 3; ++c) out[c] = in[c];
+            for (int c = 0; c < 3; ++c) to[c] = from[c];
         }
     }
 }
@@ -44,14 +42,12 @@ void OneByOne::row(const float* in, float* out, int width, int channels) {
 void OneByOne::recolour(const float* from, float* to) {
     ++count_;
     const double alpha = divide_ ? from[3] : 1.0;
-    const Vec3 seen{from[0], from[1], from[2]};
-    const Vec3& moved =
-        displacement(divide_ ? Vec3{seen[0] / alpha, seen[1] / alpha, seen[2] / alpha} : seen);
+    const Vec3& moved = displacement(straight_colour(from, divide_));
     for (std::size_t c = 0; c < 3; ++c) {
         // Multiplying the displaced colour by alpha again is the same as this, less rounding.
         const double step = alpha * (strength_ * moved[c]);
         // Channels that do not move keep their bits, a negative zero included.
-        to[c] = step != 0 ? static_cast<float>(seen[c] + step) : from[c];
+        to[c] = step != 0 ? static_cast<float>(from[c] + step) : from[c];
     }
 }
 

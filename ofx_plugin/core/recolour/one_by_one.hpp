@@ -8,18 +8,18 @@
 
 namespace palette4d {
 
-/// Colours repeat, in flat areas next to each other and in 8-bit pictures all over: a worker
-/// remembers some that it has met. The displacement depends on the colour alone, so that what is
-/// remembered never shows in the result.
-class OneByOne {
+/// Colours repeat, in flat areas and in 8-bit images: a worker remembers some displacements. They
+/// depend on the colour alone, so the result does not change.
+class OneByOne final : public RowWorker {
 public:
     /// `recolourer` must outlive this and move some colour.
-    OneByOne(const Recolourer& recolourer, const RecolourOptions& options);
+    OneByOne(const Recolourer& recolourer, const RecolourOptions& options, int channels);
 
-    void row(const float* in, float* out, int width, int channels);
-    /// `from` is finite, with an alpha that can be divided by where colours are premultiplied.
+    void row(const float* from, float* to, int width) override;
+    void finish() override {}
+    RecolourCounts counts() const override { return {0, 0, 0, count_}; }
+    /// One pixel that is recolourable().
     void recolour(const float* from, float* to);
-    long long count() const { return count_; }
 
 private:
     struct Entry {
@@ -32,6 +32,7 @@ private:
     const Recolourer& recolourer_;
     const double strength_;
     const bool divide_;
+    const int channels_;
     std::vector<double> weights_;
     PaletteBody::Workspace workspace_;
     std::vector<Entry> memory_;

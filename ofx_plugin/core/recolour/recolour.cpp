@@ -1,14 +1,11 @@
 #include "recolour/recolour.hpp"
 
-#include <cstring>
-#include <mutex>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
 #include "model/vec3.hpp"
 #include "recolour/exact_worker.hpp"
-#include "recolour/image_rows.hpp"
 #include "recolour/one_by_one.hpp"
 #include "recolour/recolour_plan.hpp"
 
@@ -29,7 +26,6 @@ Recolourer::Recolourer(std::vector<Vec3> original, const std::vector<Vec3>& edit
                                         " is not finite");
         }
         displacement_.push_back(edited[i] - colours[i]);
-        if (std::memcmp(&edited[i], &colours[i], sizeof(Vec3)) != 0) identity_ = false;
         if (displacement_[i] != Vec3{0, 0, 0}) displaced_.push_back(static_cast<int>(i));
     }
     if (!displaced_.empty()) plan_ = std::make_unique<RecolourPlan>(body_, displacement_);
@@ -46,7 +42,7 @@ Vec3 Recolourer::displacement_at(const Vec3& p, std::vector<double>& weights,
 }
 
 Vec3 Recolourer::displaced(const Vec3& p, double strength) const {
-    if (identity_ || strength == 0 || !finite(p)) return p;
+    if (!moves() || strength == 0 || !finite(p)) return p;
     std::vector<double> weights(body_.rgb().size());
     PaletteBody::Workspace workspace;
     const Vec3 moved = displacement_at(p, weights, workspace);
@@ -58,41 +54,11 @@ Vec3 Recolourer::displaced(const Vec3& p, double strength) const {
     return result;
 }
 
-RecolourCounts Recolourer::apply(const ConstImageView& in, const ImageView& out,
-                                 const RecolourOptions& given) const {
-    RecolourOptions options = given;
-    options.premultiplied = options.premultiplied && in.channels == 4;
-    check_recolouring(in, out, options);
-    if (in.width == 0 || in.height == 0) return {};
-
-    if (identity_ || displaced_.empty() || options.strength == 0) {
-        copy_rows(in, out);
-        return {};
+std::unique_ptr<RowWorker> Recolourer::worker(const RecolourOptions& options, int channels) const {
+    if (options.precision == Precision::kDouble) {
+        return std::make_unique<OneByOne>(*this, options, channels);
     }
-
-    RecolourCounts counts;
-    std::mutex guard;
-    share_rows(in.height, options.threads, [&](const NextRow& next) {
-        const auto rows = [&](auto& recolour) {
-            for (int y = next(); y >= 0; y = next()) {
-                recolour.row(row_of(in, y), row_of(out, y), in.width, in.channels);
-            }
-        };
-        RecolourCounts mine;
-        if (options.precision == Precision::kDouble) {
-            OneByOne one_by_one(*this, options);
-            rows(one_by_one);
-            mine.one = one_by_one.count();
-        } else {
-            ExactWorker worker(*this, options);
-            rows(worker);
-            worker.finish();
-            mine = worker.counts();
-        }
-        const std::lock_guard<std::mutex> lock(guard);
-        counts += mine;
-    });
-    return counts;
+    return exact_worker(*this, options, channels);
 }
 
 }  // namespace palette4d

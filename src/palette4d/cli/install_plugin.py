@@ -1,26 +1,13 @@
-"""The verb `install-plugin`: puts the OpenFX bundle where hosts look for it.
-
-The bundle lies inside the package (`palette4d/_ofx`). It is copied beside its destination first and
-then renamed into place, so that a host never scans half a bundle. For Kdenlive and Shotcut the
-verb also writes the files that let them show the node's parameters (`palette4d.hosts`).
-"""
+"""The verb `install-plugin`: the OpenFX node, and what Kdenlive and Shotcut need to show it."""
 
 from __future__ import annotations
 
 import argparse
-import contextlib
-import os
-import shutil
-import sys
-import tempfile
-from importlib import resources
 from pathlib import Path
-from typing import Literal
 
 from palette4d.common.errors import Palette4dError
+from palette4d.hosts.bundle import default_destination, find_bundle, install_bundle
 from palette4d.hosts.editors import data_folder, install_kdenlive, install_shotcut
-
-BUNDLE = "Palette4D.ofx.bundle"
 
 _EPILOG = """\
 examples:
@@ -29,133 +16,13 @@ examples:
   palette4d install-plugin --dest ~/OFX --link    follows this installation when it is upgraded
   palette4d install-plugin --dest ~/OFX --kdenlive --shotcut
                                                   the node, and files for these two programs
-  palette4d install-plugin --kdenlive             that file alone, in ~/.local/share (or where
-                                                  XDG_DATA_HOME says); not with sudo
+  palette4d install-plugin --kdenlive             that file alone, in ~/.local/share (or in
+                                                  $XDG_DATA_HOME); not with sudo
 
 Without its file Kdenlive has no way to choose a sidecar, and its choices do nothing. Without its
-filter Shotcut has to be started with --experimental, and the sidecar's path has to be typed; with
-it or without, Settings > Allow External Plugins must be on.
+filter Shotcut has to be started with --experimental, and the sidecar's path has to be typed. In
+both cases Shotcut needs Settings > Allow External Plugins.
 """
-
-_KDENLIVE_NOTE = """\
-Restart Kdenlive; the effect is 'Palette4D', in the group Misc."""
-
-_SHOTCUT_NOTE = """\
-Restart Shotcut with Settings > Allow External Plugins on; the filter is 'Palette4D'."""
-
-
-def default_destination(platform: str = sys.platform) -> Path:
-    """The folder in which the OpenFX standard lets hosts look on a platform (`sys.platform`)."""
-    if platform == "win32":
-        return Path("C:/Program Files/Common Files/OFX/Plugins")
-    if platform == "darwin":
-        return Path("/Library/OFX/Plugins")
-    return Path("/usr/OFX/Plugins")
-
-
-def find_bundle() -> Path:
-    """Return the bundle inside the installed package.
-
-    Raises
-    ------
-    Palette4dError
-        When this installation holds no bundle, or not as files.
-    """
-    for root in _bundle_roots():
-        bundle = root / BUNDLE
-        if any(bundle.glob("Contents/*/*.ofx")):
-            return bundle
-    raise Palette4dError(
-        f"found no {BUNDLE} in the installed package palette4d, expected it in palette4d/_ofx; "
-        "install palette4d again from a wheel built with PALETTE4D_BUILD_PLUGIN=ON (the default)"
-    )
-
-
-def _bundle_roots() -> list[Path]:
-    """Folders `palette4d/_ofx`: one, or two in an editable installation."""
-    resource = resources.files("palette4d") / "_ofx"
-    if isinstance(resource, Path):
-        return [resource]
-    # An editable installation spreads the package over the source tree and site-packages; such a
-    # resource is a MultiplexedPath, which yields the files' real paths only.
-    found = []
-    with contextlib.suppress(OSError, AttributeError):
-        found = [entry for entry in resource.iterdir() if isinstance(entry, Path)]
-    return [entry.parent for entry in found]
-
-
-def install(bundle: Path, destination: Path, *, link: bool = False, force: bool = False) -> Path:
-    """Copy or link the bundle into a plugin folder.
-
-    Parameters
-    ----------
-    bundle : Path
-        The bundle to install.
-    destination : Path
-        The folder of plugins; made when it is missing.
-    link : bool
-        Make a symbolic link instead of a copy.
-    force : bool
-        Replace something at the destination that is not an earlier Palette4D bundle.
-
-    Returns
-    -------
-    Path
-        The installed bundle.
-
-    Raises
-    ------
-    Palette4dError
-        When the destination is occupied, may not be written to or is no folder.
-    """
-    bundle = bundle.resolve()
-    target = destination / BUNDLE
-    try:
-        destination.mkdir(parents=True, exist_ok=True)
-        if target.exists() and target.resolve() == bundle and link:
-            return target
-        if os.path.lexists(target) and not force and not _is_ours(target):
-            raise Palette4dError(
-                f"{target}: found something that is not an OpenFX bundle of Palette4D, "
-                "expected nothing or an earlier version; pass --force to replace it"
-            )
-        # Beside the target, so that the rename stays on one file system.
-        with tempfile.TemporaryDirectory(prefix=".palette4d-", dir=destination) as temporary:
-            fresh = Path(temporary) / BUNDLE
-            if link:
-                fresh.symlink_to(bundle, target_is_directory=True)
-            else:
-                shutil.copytree(bundle, fresh)
-            _replace(fresh, target, Path(temporary) / "old")
-    except PermissionError as error:
-        raise Palette4dError(
-            f"{destination}: may not be written to ({error.strerror}); run the command as an "
-            "administrator (sudo), or give a folder of your own with --dest and name it in the "
-            "environment variable OFX_PLUGIN_PATH"
-        ) from error
-    except OSError as error:
-        raise Palette4dError(f"{target}: cannot be installed: {error}") from error
-    return target
-
-
-def _is_ours(target: Path) -> bool:
-    """Tell a Palette4D bundle, or a link that leads nowhere any more, from anything else."""
-    if target.is_symlink() and not target.exists():
-        return True
-    return target.is_dir() and any(target.glob("Contents/*/Palette4D.ofx"))
-
-
-def _replace(fresh: Path, target: Path, aside: Path) -> None:
-    """Rename `fresh` to `target`; what was there is put aside, and back when the rename fails."""
-    occupied = os.path.lexists(target)
-    if occupied:
-        target.rename(aside)
-    try:
-        fresh.rename(target)
-    except OSError:
-        if occupied:
-            aside.rename(target)
-        raise
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -199,19 +66,28 @@ def run(args: argparse.Namespace) -> int:
         _install_node(args)
     elif args.link:
         raise Palette4dError("--link is for the node; add --dest DIR, or leave it out")
-    if args.kdenlive:
-        folder = _program_folder(args.kdenlive, "kdenlive")
-        _tell(install_kdenlive(folder, force=args.force), _KDENLIVE_NOTE)
-    if args.shotcut:
-        folder = _program_folder(args.shotcut, "shotcut")
-        _tell(install_shotcut(folder, force=args.force), _SHOTCUT_NOTE)
+    for program, install, where in (
+        ("kdenlive", install_kdenlive, "; the effect is 'Palette4D', in the group Misc"),
+        (
+            "shotcut",
+            install_shotcut,
+            " with Settings > Allow External Plugins on; the filter is 'Palette4D'",
+        ),
+    ):
+        given: Path | bool | None = getattr(args, program)
+        if not given:
+            continue
+        folder = given.expanduser().absolute() if isinstance(given, Path) else data_folder(program)
+        for path in install(folder, force=args.force):
+            print(f"installed {path}")
+        print(f"Restart {program.capitalize()}{where}.")
     return 0
 
 
 def _install_node(args: argparse.Namespace) -> None:
     standard = default_destination()
     destination = args.dest.expanduser().absolute() if args.dest else standard
-    target = install(find_bundle(), destination, link=args.link, force=args.force)
+    target = install_bundle(find_bundle(), destination, link=args.link, force=args.force)
     print(f"installed {target}")
     if destination != standard:
         print(f"Tell your host where it is: export OFX_PLUGIN_PATH={destination}")
@@ -219,14 +95,3 @@ def _install_node(args: argparse.Namespace) -> None:
         "Restart the host (DaVinci Resolve, Nuke, Natron, Fusion, Kdenlive, …), add the node\n"
         "'Palette4D' (group Color) and choose a sidecar made by 'palette4d analyze'."
     )
-
-
-def _program_folder(given: Path | Literal[True], program: str) -> Path:
-    """The folder that was named, or the program's own where none was."""
-    return data_folder(program) if given is True else given.expanduser().absolute()
-
-
-def _tell(written: list[Path], note: str) -> None:
-    for path in written:
-        print(f"installed {path}")
-    print(note)

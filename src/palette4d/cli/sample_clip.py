@@ -1,24 +1,15 @@
-"""The verb `sample-clip`: write the built-in procedural time-lapse (see `sample_scene`)."""
+"""The verb `sample-clip`: write the built-in procedural time-lapse (`palette4d.demo`)."""
 
 from __future__ import annotations
 
 import argparse
 import re
-from fractions import Fraction
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 from palette4d.common.arguments import whole
-from palette4d.common.errors import Palette4dError
 from palette4d.common.text import counted
-
-if TYPE_CHECKING:
-    from palette4d.media.frame_writer import FramePattern
-
 
 FRAMES = 48
 SIZE = (320, 180)
-RATE = Fraction(24)
 _LARGEST = 4096
 
 DESCRIPTION = f"""\
@@ -86,60 +77,18 @@ def parse_size(text: str) -> tuple[int, int]:
 
 def run(args: argparse.Namespace) -> int:
     """Write the clip; returns the exit status."""
-    from palette4d.media.frame_writer import FramePattern, make_folder
+    from palette4d.cli.progress import frames_bar
+    from palette4d.demo.scene import write_clip
 
-    pattern = FramePattern.parse(args.output)
-    if pattern.width is None and args.frames > 1:
-        raise Palette4dError(
-            f"output {args.output}: {args.frames} frames would go into one file; expected a "
-            "pattern such as sample/sample.####.png"
+    with frames_bar("sample clip", hidden=args.quiet, total=args.frames) as progress:
+        written = write_clip(
+            args.output,
+            args.frames,
+            args.size,
+            first=args.first,
+            half=args.half,
+            force=args.force,
+            progress=progress,
         )
-    if args.half and pattern.extension != "exr":
-        raise Palette4dError(f"output {args.output}: --half needs an .exr output")
-    numbers = range(args.first, args.first + args.frames)
-    existing = next((pattern.path(n) for n in numbers if pattern.path(n).exists()), None)
-    if existing is not None and not args.force:
-        raise Palette4dError(
-            f"output {existing}: it exists already; choose another place, or replace with --force"
-        )
-    make_folder(pattern.folder)
-    written = write_sample_clip(
-        pattern, args.frames, args.size, first=args.first, half=args.half, quiet=args.quiet
-    )
     print(f"wrote {counted(len(written), 'frame')}, {written[0]} to {written[-1].name}")
     return 0
-
-
-def write_sample_clip(
-    pattern: FramePattern,
-    frames: int = FRAMES,
-    size: tuple[int, int] = SIZE,
-    *,
-    first: int = 1,
-    half: bool = False,
-    quiet: bool = True,
-) -> list[Path]:
-    """Draw and write the clip; returns its files. The folder must exist."""
-    import OpenImageIO as oiio
-
-    from palette4d.cli.progress import frames_bar
-    from palette4d.demo.scene import Scene
-    from palette4d.media.frame_writer import write_frame
-
-    samples = "uint16" if pattern.extension != "exr" else "half" if half else "float"
-    rate = oiio.TypeDesc("rational")
-    metadata = [
-        ("oiio:ColorSpace", oiio.TypeDesc("string"), "srgb_rec709_scene"),
-        ("FramesPerSecond", rate, (RATE.numerator, RATE.denominator)),
-    ]
-    scene = Scene(*size)
-    files = []
-    with frames_bar("sample clip", hidden=quiet, total=frames) as bar:
-        for index in range(frames):
-            path = pattern.path(first + index)
-            # A single frame shows the middle of the story.
-            time = index / (frames - 1) if frames > 1 else 0.5
-            write_frame(path, scene.picture(time), samples, metadata=metadata)
-            files.append(path)
-            bar.update()
-    return files

@@ -166,6 +166,12 @@ def same_encodings(encoding: str) -> list[str]:
     return [encoding]
 
 
+def space_of_encoding(config: Any, encoding: str) -> Any | None:
+    """Return the config's space of colours for an encoding, under any of its names; None: none."""
+    spaces = (config.getColorSpace(name) for name in same_encodings(encoding))
+    return next((found for found in spaces if found is not None and not found.isData()), None)
+
+
 def near(name: str, known: list[str], most: int = 3) -> list[str]:
     """Return the known names nearest to one, the first few of them all when none is near.
 

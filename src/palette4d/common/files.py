@@ -1,8 +1,10 @@
-"""Writing a file so that nobody ever sees half of it: a temporary name, then a rename."""
+"""The one atomic writer: readers see the old file or the new one, never a part of one."""
 
+import contextlib
 import os
-import tempfile
-from collections.abc import Generator
+import secrets
+import stat
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -29,7 +31,7 @@ def refuse_existing(path: Path, force: bool) -> None:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder and those above it.
+    """Make a folder and its parents.
 
     Raises
     ------
@@ -44,12 +46,30 @@ def make_folder(folder: Path) -> None:
         ) from error
 
 
-@contextmanager
-def replacing(path: Path, *, force: bool = False) -> Generator[Path]:
-    """Yield a temporary name beside `path`, with its suffix; rename it when the body succeeds.
+def link_target(path: str | os.PathLike[str]) -> Path:
+    """Return the file that a link leads to, else the path itself: a link stays a link."""
+    return Path(os.path.realpath(path)) if Path(path).is_symlink() else Path(path)
 
-    Whatever ends the body otherwise (an error, Ctrl-C) removes the temporary file and leaves
-    `path` as it was.
+
+@contextmanager
+def replacing(
+    path: Path, *, force: bool = False, check: Callable[[], None] | None = None
+) -> Generator[Path]:
+    """Yield a temporary file beside `path`; rename it to `path` when the body succeeds.
+
+    The temporary file is new (O_EXCL), has an unpredictable name and the suffix of `path`, so that
+    libraries which take a path can write it. File and folder are synced. A file that is replaced
+    keeps its permissions. Whatever ends the body otherwise (an error, Ctrl-C) removes the temporary
+    file and leaves `path` as it was.
+
+    Parameters
+    ----------
+    path : Path
+        The file to write; a symbolic link is followed.
+    force : bool
+        Replace a file that exists.
+    check : callable, optional
+        Called last, immediately before the rename; what it raises leaves `path` as it was.
 
     Raises
     ------
@@ -57,22 +77,24 @@ def replacing(path: Path, *, force: bool = False) -> Generator[Path]:
         As `refuse_existing`; `WriteError` where the folder cannot be written to, or the disk is
         full.
     """
+    path = link_target(path)
     refuse_existing(path, force)
+    # At most 250 bytes: 40 characters of the name are enough to recognise it by.
+    temporary = path.with_name(f".{path.stem[:40]}.{secrets.token_hex(8)}.tmp{path.suffix}")
     try:
-        handle, name = tempfile.mkstemp(
-            prefix=f".{path.stem}.", suffix=f".part{path.suffix}", dir=path.parent
-        )
+        # 0o666 less the umask, as for any new file.
+        os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
     except OSError as error:
         raise _closed(path, f": {error.strerror}") from error
-    os.close(handle)
-    temporary = Path(name)
     try:
         yield temporary
         with temporary.open("rb+") as written:
             os.fsync(written.fileno())
-        # mkstemp makes private files; a result has the permissions that any new file would have.
-        temporary.chmod(0o666 & ~_umask())
+        with contextlib.suppress(FileNotFoundError):
+            temporary.chmod(stat.S_IMODE(path.stat().st_mode))
         refuse_existing(path, force)
+        if check is not None:
+            check()
         temporary.replace(path)
     except OSError as error:
         raise WriteError(
@@ -80,16 +102,22 @@ def replacing(path: Path, *, force: bool = False) -> Generator[Path]:
             "make some or choose another folder"
         ) from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+    _sync_folder(path.parent)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Make the rename itself durable, where folders can be opened and synced."""
+    with contextlib.suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
 
 
 def _closed(path: Path, why: str = "") -> WriteError:
     return WriteError(
         f"{path}: cannot write in {path.parent}{why}; choose another folder or mend its permissions"
     )
-
-
-def _umask() -> int:
-    mask = os.umask(0o022)
-    os.umask(mask)
-    return mask

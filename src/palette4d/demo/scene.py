@@ -12,11 +12,16 @@ every machine of one kind. What happens to the colours, by time u in 0..1:
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from palette4d.common.files import make_folder
+from palette4d.media.frame_writer import FramePattern, check_targets, sample_type, write_frame
 
 F32 = NDArray[np.float32]
 Real = NDArray[np.floating[Any]]
@@ -408,3 +413,60 @@ class Scene:
         below = self._y - self._bank
         shade = 0.10 + 0.75 * self._turf + 0.2 * _step(0.06, 0.0, below)
         _over(picture, self._lit(keyed(_GRASS, u) * 0.85, shade, u), _step(-edge, edge, below))
+
+
+def write_clip(
+    output: str,
+    frames: int,
+    size: tuple[int, int],
+    *,
+    first: int = 1,
+    half: bool = False,
+    force: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Path]:
+    """Draw the scene from day to night and write it, 24 frames a second.
+
+    Parameters
+    ----------
+    output : str
+        `OUT.####.png`, `.tif` (16 bits) or `.exr` (32-bit float, or `half`).
+    frames : int
+        How many; a single frame shows the middle of the story.
+    size : (int, int)
+        Width and height in pixels.
+    first : int
+        Number of the first frame.
+    force : bool
+        Replace files that exist.
+    progress : callable, optional
+        Called with (frames written, frames in all).
+
+    Returns
+    -------
+    list of Path
+        The files.
+
+    Raises
+    ------
+    Palette4dError
+        The output cannot be written.
+    """
+    import OpenImageIO as oiio
+
+    pattern = FramePattern.parse(output)
+    samples = sample_type(pattern.extension, "uint16", half=half)
+    files = pattern.paths(range(first, first + frames))
+    check_targets(files, force=force)
+    make_folder(pattern.folder)
+    metadata = [
+        ("oiio:ColorSpace", oiio.TypeDesc("string"), "srgb_rec709_scene"),
+        ("FramesPerSecond", oiio.TypeDesc("rational"), (24, 1)),
+    ]
+    scene = Scene(*size)
+    for index, path in enumerate(files):
+        time = index / (frames - 1) if frames > 1 else 0.5
+        write_frame(path, scene.picture(time), samples, metadata=metadata)
+        if progress is not None:
+            progress(index + 1, frames)
+    return files

@@ -4,7 +4,7 @@ import os
 import sys
 from pathlib import Path
 
-from palette4d import __version__
+from palette4d._core import __version__
 from palette4d.common.errors import Palette4dError
 from palette4d.common.files import make_folder, replacing
 from palette4d.hosts import MARK, kdenlive, shotcut

@@ -1,14 +1,12 @@
 """Where many pieces of work are done: in processes here, or on a farm."""
 
-import argparse
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from palette4d.common.arguments import checked, whole
 from palette4d.jobs import dask_farm, pool
 from palette4d.jobs.pool import Failed, Key, Result, Task
 
-__all__ = ["Failed", "Workers", "add_options"]
+__all__ = ["Failed", "Workers"]
 
 
 @dataclass(frozen=True)
@@ -39,21 +37,3 @@ class Workers:
             dask_farm.run(self.cluster, work, tasks, take)
         else:
             pool.run(work, tasks, take, self.jobs, patient=patient)
-
-
-def add_options(parser: argparse.ArgumentParser | argparse._ArgumentGroup, what: str) -> None:
-    """Add --jobs and --cluster to a verb that works on many of `what`."""
-    parser.add_argument(
-        "--jobs",
-        metavar="N",
-        type=whole(0, 1024),
-        default=0,
-        help=f"{what} worked on at a time; 0: one per processor (default)",
-    )
-    parser.add_argument(
-        "--cluster",
-        metavar="ADDRESS",
-        type=checked(str, dask_farm.check_address),
-        help=f"work on the {what} on a Dask farm instead: its scheduler's address "
-        "(tcp://farm:8786), or local:N for N workers on this machine",
-    )

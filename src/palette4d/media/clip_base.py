@@ -35,8 +35,11 @@ DEFAULT_RATE = Fraction(24)
 COUNTED_PIXELS = 4_000_000
 """Of larger frames the analysis counts every n-th row, so that about as many pixels are left."""
 
-STRIP_BYTES = 32 << 20
-"""Most bytes of the strips in which frames are read for counting."""
+LEAVE_OUT = (
+    "Bring a good copy, choose a range with --frames, or leave such frames out with "
+    "--skip-bad-frames."
+)
+"""The remedy for a bad frame."""
 
 
 class ClipError(Palette4dError):
@@ -158,7 +161,7 @@ class Clip(abc.ABC):
         if not good:
             raise self.none_readable()
 
-    def iter_frames(self) -> Iterator[tuple[int, F32]]:
+    def __iter__(self) -> Iterator[tuple[int, F32]]:
         """(frame number, (h, w, 3 or 4) float32 pixels), in order, one frame at a time."""
         for image in self.iter_images():
             yield image.frame, image.pixels

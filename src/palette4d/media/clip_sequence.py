@@ -39,7 +39,7 @@ _VERSION = re.compile(r"(^|.*[._ -])[vV]\Z", re.DOTALL)
 
 
 @dataclass(frozen=True)
-class Sequence:
+class ImageSequence:
     """Numbered files in one folder: `prefix` + zero-padded number + `suffix`."""
 
     folder: Path
@@ -117,7 +117,7 @@ def _file_names(folder: Path) -> list[str]:
         ) from error
 
 
-def sequences_in(folder: Path) -> list[Sequence]:
+def sequences_in(folder: Path) -> list[ImageSequence]:
     """All image sequences of a folder, single numbered images included, by name."""
     groups: dict[tuple[str, str], list[tuple[str, str]]] = {}
     for name in _file_names(folder):
@@ -136,7 +136,7 @@ def sequences_in(folder: Path) -> list[Sequence]:
 
 def _by_width(
     folder: Path, prefix: str, suffix: str, members: list[tuple[str, str]]
-) -> Iterator[Sequence]:
+) -> Iterator[ImageSequence]:
     """Split names that differ only in their number into sequences of one padding each."""
     rest = members
     while rest:
@@ -150,11 +150,11 @@ def _by_width(
         width = max(padded) if padded else (lengths[0] if same else 1)
         fits = [(number, name) for number, name in rest if _digits_fit(number, width)]
         files = {int(number): folder / name for number, name in fits}
-        yield Sequence(folder, prefix, suffix, width, files)
+        yield ImageSequence(folder, prefix, suffix, width, files)
         rest = [member for member in rest if member not in fits]
 
 
-def in_folder(folder: Path) -> Sequence | Path:
+def in_folder(folder: Path) -> ImageSequence | Path:
     """The one image sequence of a folder, or its one image when that has no number."""
     found = sequences_in(folder)
     names = _file_names(folder)
@@ -200,7 +200,7 @@ def in_folder(folder: Path) -> Sequence | Path:
     )
 
 
-def of_pattern(spec: str) -> tuple[Sequence, str | None]:
+def of_pattern(spec: str) -> tuple[ImageSequence, str | None]:
     """(sequence, embedded range or None) of `name.####.exr`, `%04d`, `@@@`, `1-10x2#`."""
     from fileseq.constants import PAD_STYLE_HASH1
     from fileseq.exceptions import FileSeqException
@@ -237,7 +237,7 @@ def of_pattern(spec: str) -> tuple[Sequence, str | None]:
         sequence = max(found, key=lambda one: len(one.files))
     else:
         files = {int(n): folder / name for n, name in matches if _digits_fit(n, width)}
-        sequence = Sequence(folder, prefix, suffix, width, files)
+        sequence = ImageSequence(folder, prefix, suffix, width, files)
     if not sequence.files:
         raise ClipError(f"{spec}: no file matches the pattern; {_near(spec, folder)}")
     return sequence, embedded
@@ -253,12 +253,12 @@ def _near(spec: str, folder: Path) -> str:
     return "found there: " + ", ".join(patterns[name] for name in ranked[:5])
 
 
-def of_file(path: Path) -> tuple[Sequence, int]:
+def of_file(path: Path) -> tuple[ImageSequence, int]:
     """A single image as a one-frame sequence, with its frame number (0 when it has none)."""
     numbered = frame_number(path.stem)
     if numbered is None:
-        return Sequence(path.parent, path.stem, path.suffix, 0, {0: path}), 0
+        return ImageSequence(path.parent, path.stem, path.suffix, 0, {0: path}), 0
     prefix, number = numbered
     frame = int(number)
     width = len(number.lstrip("-"))
-    return Sequence(path.parent, prefix, path.suffix, width, {frame: path}), frame
+    return ImageSequence(path.parent, prefix, path.suffix, width, {frame: path}), frame

@@ -237,7 +237,6 @@ def record(document: dict[str, Any], clip: Clip, spaces: Spaces | None) -> list[
             f"{ways}: found a difference of {seen.error:.2g} from OpenColorIO on the clip's "
             f"colours, expected at most {TOLERANCE:g}; choose another --palette-space"
         )
-    document["version"] = 2
     document["clip"]["conversion"] = {
         "input_space": spaces.input_space,
         "config": spaces.config_name,

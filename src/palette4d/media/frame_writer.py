@@ -6,9 +6,8 @@ premultiplied in EXR, straight in PNG, and in TIFF whichever the frame has (and 
 
 from __future__ import annotations
 
-import contextlib
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Palette4dError, WriteError
+from palette4d.common.files import replacing
 
 FORMATS = ("exr", "png", "tif", "tiff")
 # What each format can hold of the metadata that `palette4d.media.clip_images.CARRIED` names.
@@ -86,6 +86,51 @@ class FramePattern:
         """File of a frame; the sign of a negative number counts as a digit, as in C's printf."""
         number = "" if self.width is None else f"{frame:0{self.width}d}"
         return self.folder / f"{self.prefix}{number}{self.suffix}"
+
+    def paths(self, frames: Sequence[int]) -> list[Path]:
+        """Files of several frames; OutputError when they would all go into one."""
+        if self.width is None and len(frames) > 1:
+            raise OutputError(
+                f"output {self.path(0)}: {len(frames)} frames would go into one file; expected a "
+                f"pattern such as {self.prefix}.####{self.suffix}, or one frame (--frames)"
+            )
+        return [self.path(frame) for frame in frames]
+
+
+def check_targets(
+    targets: Sequence[Path], inputs: Iterable[Path] = (), force: bool = False
+) -> None:
+    """Refuse outputs before the first is written.
+
+    Raises
+    ------
+    OutputError
+        One is a folder or one of the `inputs`, or exists and `force` is false.
+    """
+    existing = [target for target in targets if os.path.lexists(target)]
+    own = {_identity(path) for path in inputs} if existing else set()
+    for target in existing:
+        if _identity(target) in own:
+            raise OutputError(
+                f"output {target}: it is a file of the clip itself; choose another folder or name"
+            )
+        if target.is_dir():
+            raise OutputError(f"output {target}: it is a folder; choose another name")
+    if existing and not force:
+        more = f" ({len(existing)} of {len(targets)} files do)" if len(existing) > 1 else ""
+        raise OutputError(
+            f"output {existing[0]}: it exists already{more}; choose another place, or replace "
+            "with --force"
+        )
+
+
+def _identity(path: Path) -> tuple[int, int] | str:
+    """Device and inode of a file, links followed; its name where there is none."""
+    try:
+        status = path.stat()
+    except OSError:
+        return str(path.absolute())
+    return status.st_dev, status.st_ino
 
 
 def sample_type(extension: str, depth: str, *, half: bool = False, bits: int | None = None) -> str:
@@ -183,7 +228,7 @@ def write_frame(
 
     Raises
     ------
-    OutputError
+    WriteError
         When the folder cannot be written to or the disk is full; nothing half written remains.
     """
     import OpenImageIO as oiio
@@ -205,11 +250,10 @@ def write_frame(
         spec.alpha_channel = 3
         spec.attribute("oiio:UnassociatedAlpha", 0 if premultiplied else 1)
 
-    temporary = path.with_name(f".{path.stem[:100]}.{os.getpid()}.tmp{path.suffix}")
-    target = oiio.ImageOutput.create(str(temporary))
-    if target is None:
-        raise OutputError(f"{path}: {oiio.geterror()}; expected .exr, .png or .tif")
-    try:
+    with replacing(path, force=True) as temporary:
+        target = oiio.ImageOutput.create(str(temporary))
+        if target is None:
+            raise OutputError(f"{path}: {oiio.geterror()}; expected .exr, .png or .tif")
         if not target.open(str(temporary), spec):
             raise _cannot_write(path, target.geterror())
         written = target.write_image(stored)
@@ -217,13 +261,6 @@ def write_frame(
         closed = target.close()
         if problem or not written or not closed or not _is_whole(temporary):
             raise _cannot_write(path, problem or target.geterror())
-        temporary.replace(path)
-    except OSError as error:
-        raise _cannot_write(path, error.strerror or str(error)) from error
-    finally:
-        # Where the folder cannot be written, not even this can be asked.
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
 
 
 def _is_whole(path: Path) -> bool:
@@ -242,19 +279,9 @@ def _is_whole(path: Path) -> bool:
     return row is not None and not problem
 
 
-def _cannot_write(path: Path, reason: str) -> OutputError:
+def _cannot_write(path: Path, reason: str) -> WriteError:
     said = reason.strip().splitlines()[0] if reason.strip() else "the file was cut short"
-    return OutputError(
+    return WriteError(
         f"{path}: the frame cannot be written ({said}); expected a folder that may be written to "
         "on a disk with free space. Check both, or choose another place."
     )
-
-
-def make_folder(folder: Path) -> None:
-    """Create an output folder and the ones above it; OutputError when that is not possible."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(
-            f"{folder}: the folder cannot be created ({error.strerror}); choose another place"
-        ) from error

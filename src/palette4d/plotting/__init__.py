@@ -1,6 +1,77 @@
 """The picture of a palette: its timeline, frames and polyhedra (figures 1 and 8 of the paper).
 
-`layout` decides which row a palette vertex stands in, `panel` where rows and times are; `timeline`,
-`discs` and `polyhedron` draw, `figure` joins them to one page, `style` holds colours and sizes.
-matplotlib is imported here and nowhere else in the package; no global state of it is touched.
+`rows` has the palette as arrays and its layout in rows and chains, free of any drawing library.
+`timeline` and `polyhedron` draw, `page` joins them, `style` holds colours and text. matplotlib is
+imported inside functions only, and its global state stays untouched.
 """
+
+from pathlib import Path
+
+
+def plot(
+    sidecar_path: Path,
+    output: Path,
+    *,
+    frames: list[float] | None = None,
+    clip: str | None = None,
+    width: int = 2400,
+    force: bool = False,
+) -> list[float]:
+    """Write a picture of a sidecar to a .png, .svg or .pdf file.
+
+    Parameters
+    ----------
+    sidecar_path, output : Path
+        The sidecar and the picture.
+    frames : list of float, optional
+        Times to show; by default four or five over the clip, edited ones among them.
+    clip : str, optional
+        The clip; by default where the sidecar says.
+    width : int
+        Pixels, for .png.
+    force : bool
+        Replace an existing picture.
+
+    Returns
+    -------
+    list of float
+        The frames whose pixels could not be read: the picture shows only the palette there.
+
+    Raises
+    ------
+    Palette4dError
+        The sidecar, a frame, the clip or the output cannot be used; nothing was written.
+    """
+    import matplotlib.style
+
+    from palette4d import _core
+    from palette4d.common.errors import Palette4dError
+    from palette4d.common.files import refuse_existing, replacing
+    from palette4d.media.source_clip import frame_colours
+    from palette4d.plotting import page, style
+    from palette4d.plotting.rows import Palette
+
+    refuse_existing(output, force)
+    sidecar = _core.read_sidecar(str(sidecar_path))
+    first, last = sidecar.polytope.first_frame, sidecar.polytope.last_frame
+    if frames is None:
+        frames = page.default_frames(first, last, Palette.of(sidecar).edited_times)
+    columns = []
+    for frame in sorted(set(frames)):
+        if not first <= frame <= last:
+            raise Palette4dError(
+                f"frame {frame:g} is outside the clip {sidecar.clip['name']!r}; expected times "
+                f"from {first:g} to {last:g}"
+            )
+        image, _ = frame_colours(sidecar_path, sidecar.clip, frame, clip)
+        if image is not None and sidecar.conversion is not None:
+            image = sidecar.conversion.steps.to_palette(image).astype("float32")
+        columns.append(page.column(sidecar, frame, image))
+    with (
+        matplotlib.style.context("default"),
+        matplotlib.rc_context(style.RC),
+        replacing(output, force=force) as temporary,
+    ):
+        figure = page.build(sidecar, columns)
+        page.save(figure, temporary, output.suffix.lower()[1:], width)
+    return [column.frame for column in columns if not column.pictures]

@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from palette4d import _core
-
 F64 = NDArray[np.float64]
 
 PAGE = "#202020"
@@ -35,48 +33,32 @@ RC: dict[Any, Any] = {
     "svg.hashsalt": "palette4d",  # the same picture gives the same file
     "pdf.fonttype": 42,
     "path.simplify": False,
-    "text.hinting": "no_hinting",  # as wide at every resolution as it was measured
+    "text.parse_math": False,
+    "text.hinting": "no_hinting",  # the same width at every resolution
 }
 
-_LINEAR = ("linear", "lin_", "acescg", "aces2065", "scene")
+#: Text that is centred at its point, small and faint.
+CENTRED: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8, "color": FAINT}
 
 
 def shown(rgb: NDArray[np.floating], encoding: str) -> F64:
     """Return colours as a screen shows them: (…, 3) in the clip's encoding -> (…, 3) in 0..1.
 
-    Display encodings are shown as they are; scene-linear ones get the sRGB curve, and logs that
-    OpenColorIO knows are brought to sRGB. All are clamped.
+    Scene-linear and log encodings that OpenColorIO knows are converted to sRGB; all others are
+    display encodings, and stay. All are clamped.
     """
     values = np.nan_to_num(np.asarray(rgb, dtype=np.float64), nan=0.0)
-    if (display := _from_log(encoding)) is not None:
-        return np.clip(display.to_palette(values), 0.0, 1.0)
-    values = np.clip(values, 0.0, 1.0)
-    if any(word in encoding.lower() for word in _LINEAR):
-        low = values <= 0.0031308
-        values = np.where(
-            low, 12.92 * values, 1.055 * np.maximum(values, 1e-9) ** (1 / 2.4) - 0.055
-        )
+    if (to_srgb := _to_srgb(encoding)) is not None:
+        values = to_srgb(values).astype(np.float64)
     return np.clip(values, 0.0, 1.0)
 
 
 @cache
-def _from_log(encoding: str) -> _core.ColourConversion | None:
-    """Return the way from a log encoding to sRGB; None for other encodings."""
-    from palette4d.colour.conversion import conversion
-    from palette4d.colour.conversion_steps import ConversionError
-    from palette4d.colour.ocio_config import BUILT_IN, load_config, same_encodings
+def _to_srgb(encoding: str) -> Any:
+    from palette4d.colour.difference import viewing_of
 
-    if any(word in encoding.lower() for word in (*_LINEAR, "srgb")):
-        return None
-    config = load_config(BUILT_IN, "")
-    for name in same_encodings(encoding):
-        space = config.getColorSpace(name)
-        if space is not None and space.getEncoding() == "log":
-            try:
-                return conversion(config, str(space.getName()), "sRGB - Texture").chain
-            except ConversionError:
-                return None
-    return None
+    viewing = viewing_of(encoding)
+    return viewing.to_srgb if viewing.encoding in ("log", "scene-linear") else None
 
 
 @cache
@@ -98,16 +80,3 @@ def printable(text: str, longest: int = 60) -> str:
 def number(value: float) -> str:
     """Return a frame number without needless decimals, with a real minus sign."""
     return f"{value:.6g}".replace("-", "−")
-
-
-def ticks(first: float, last: float, most: int) -> list[int]:
-    """Return whole frame numbers for an axis, at most about `most`, at round distances."""
-    span = max(last - first, 1e-9)
-    step = 1
-    for power in range(12):
-        for digit in (1, 2, 5):
-            step = digit * 10**power
-            if span / step <= most:
-                start = int(np.ceil(first / step))
-                return [k * step for k in range(start, int(np.floor(last / step)) + 1)]
-    return [int(np.ceil(first))]

@@ -1,6 +1,6 @@
 """A show's manifest, ``NAME.shots.json``: its shots, their sidecars, and what failed.
 
-`docs/shots.md` explains the format, `shots_v1.schema.json` is its JSON Schema. It is replaced whole
+`docs/files.md` explains the format, `shots_v1.schema.json` is its JSON Schema. It is replaced whole
 whenever a shot is done, so that a run that ends early leaves what it reached.
 """
 
@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from palette4d import _core
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Palette4dError, in_words
 from palette4d.common.files import replacing
 from palette4d.shows.shots import Place, Shot
 
@@ -144,7 +144,9 @@ def read(path: Path) -> Manifest:
         document = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
         raise Palette4dError(f"{path}: there is no such manifest; check the path") from error
-    except (ValueError, OSError) as error:
+    except OSError as error:
+        raise Palette4dError(in_words(error)) from error
+    except ValueError as error:
         raise Palette4dError(f"{path}: the manifest cannot be read: {error}{_MEND}") from error
     schema = document.get("schema") if isinstance(document, dict) else None
     if schema != SCHEMA:

@@ -1,7 +1,7 @@
 """What was exported for the shots of an edit, noted in the edit: metadata of a timeline's clips.
 
 Only the member `palette4d` of `metadata` is written, of each clip that has a sidecar and of the
-timeline; all else stays as it is in the file. The notes are in docs/shots.md.
+timeline; all else stays as it is in the file. The notes are in docs/files.md.
 """
 
 from __future__ import annotations

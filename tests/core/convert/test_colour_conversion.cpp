@@ -1,4 +1,4 @@
-#include "lattice/converted_recolour.hpp"
+#include "convert/colour_conversion.hpp"
 
 #include <cmath>
 #include <cstring>
@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "check.hpp"
+#include "lattice/lattice.hpp"
 #include "shapes.hpp"
 
 using namespace palette4d;
@@ -122,11 +123,18 @@ TEST(whatever_an_edit_asks_for_stays_a_number) {
     }
 }
 
+/// apply() between kChain and the way back.
+RecolourCounts converted(const ColourMap& map, const ConstImageView& in, const ImageView& out,
+                         RecolourOptions options) {
+    options.conversion = &kChain;
+    return map.apply(in, out, options);
+}
+
 TEST(without_an_edit_every_bit_passes) {
     Image image{4, 3, {50, -0.3f, 1e-42f, -0.0f, kNan, 1, kInf, 0, 0, 0.18f, 0.2f, 65504}};
     const Image before = image;
     const Recolourer same(cube().rgb, cube().rgb, cube().faces);
-    apply_converted(same, &kChain, image.in(), image.out(), {});
+    converted(same, image.in(), image.out(), {});
     CHECK(std::memcmp(image.data.data(), before.data.data(), 48) == 0);
 }
 
@@ -136,7 +144,7 @@ TEST(it_is_the_recolouring_between_two_conversions) {
     const Recolourer recolourer = moved_cube();
     RecolourOptions options;
     options.precision = Precision::kDouble;
-    apply_converted(recolourer, &kChain, image.in(), image.out(), options);
+    converted(recolourer, image.in(), image.out(), options);
     for (std::size_t i = 0; i < 4; ++i) {
         const Vec3 p{before.data[3 * i], before.data[3 * i + 1], before.data[3 * i + 2]};
         const Vec3 expected =
@@ -153,15 +161,15 @@ TEST(alpha_is_divided_by_and_odd_pixels_pass) {
     RecolourOptions options;
     options.premultiplied = true;
     Image straight{1, 4, {0.4f, 0.3f, 0.2f, 1}}, half{1, 4, {0.2f, 0.15f, 0.1f, 0.5f}};
-    apply_converted(recolourer, &kChain, straight.in(), straight.out(), options);
-    apply_converted(recolourer, &kChain, half.in(), half.out(), options);
+    converted(recolourer, straight.in(), straight.out(), options);
+    converted(recolourer, half.in(), half.out(), options);
     CHECK(straight.data[0] != 0.4f);
     for (std::size_t c = 0; c < 3; ++c) CHECK_NEAR(half.data[c], straight.data[c] / 2, 1e-7);
     CHECK_EQUAL(half.data[3], 0.5f);
 
     Image odd{4, 4, {0.1f, 0.2f, 0.3f, 0, kNan, 0, 0, 1, 0, kInf, 0, 1, 0.1f, 0.2f, 0.3f, kInf}};
     const Image before = odd;
-    apply_converted(recolourer, &kChain, odd.in(), odd.out(), options);
+    converted(recolourer, odd.in(), odd.out(), options);
     CHECK(std::memcmp(odd.data.data(), before.data.data(), 64) == 0);
 }
 
@@ -171,12 +179,12 @@ TEST(threads_and_pieces_do_not_show) {
     for (float& x : one.data) x = static_cast<float>(random.uniform(-0.1, 3));
     Image many = one;
     const Recolourer recolourer = moved_cube();
-    apply_converted(recolourer, &kChain, one.in(), one.out(), {});
+    converted(recolourer, one.in(), one.out(), {});
     RecolourOptions options;
     options.threads = 3;
     const std::ptrdiff_t row = 100 * 3 * static_cast<std::ptrdiff_t>(sizeof(float));
-    apply_converted(recolourer, &kChain, {many.data.data(), 100, 400, 3, row},
-                    {many.data.data(), 100, 400, 3, row}, options);
+    converted(recolourer, {many.data.data(), 100, 400, 3, row},
+              {many.data.data(), 100, 400, 3, row}, options);
     CHECK(std::memcmp(one.data.data(), many.data.data(), one.data.size() * sizeof(float)) == 0);
 }
 
@@ -193,10 +201,10 @@ TEST(a_lattice_recolours_between_two_conversions_too) {
     edited[1] = {0.1, 0.2, 0.6};
     const auto recolourer = std::make_shared<Recolourer>(cube().rgb, edited, cube().faces);
     const Lattice lattice(recolourer);
-    apply_converted(*recolourer, &kChain, image.in(), exact.out(), {});
-    const LatticeCounts counts = apply_converted(lattice, &kChain, image.in(), found.out(), {});
-    CHECK_EQUAL(counts.interpolated + counts.exact, 40000LL);
-    CHECK(counts.interpolated > 2 * counts.exact);
+    converted(*recolourer, image.in(), exact.out(), {});
+    const RecolourCounts counts = converted(lattice, image.in(), found.out(), {});
+    CHECK_EQUAL(counts.interpolated + counts.exact(), 40000LL);
+    CHECK(counts.interpolated > 2 * counts.exact());
     CHECK(found.data != exact.data);
     const auto palette = [](const Image& of, std::size_t i) {
         return kChain.to_palette({of.data[i], of.data[i + 1], of.data[i + 2]});
@@ -212,14 +220,9 @@ TEST(a_lattice_recolours_between_two_conversions_too) {
     RecolourOptions options;
     options.threads = 3;
     const std::ptrdiff_t row = 100 * 3 * static_cast<std::ptrdiff_t>(sizeof(float));
-    apply_converted(lattice, &kChain, {many.data.data(), 100, 400, 3, row},
-                    {many.data.data(), 100, 400, 3, row}, options);
+    converted(lattice, {many.data.data(), 100, 400, 3, row}, {many.data.data(), 100, 400, 3, row},
+              options);
     CHECK(std::memcmp(many.data.data(), found.data.data(), many.data.size() * sizeof(float)) == 0);
-    // Without a conversion it is the lattice itself.
-    Image plain = image, straight = image;
-    lattice.apply(image.in(), plain.out(), {});
-    apply_converted(lattice, nullptr, image.in(), straight.out(), {});
-    CHECK(std::memcmp(plain.data.data(), straight.data.data(), plain.data.size() * 4) == 0);
 }
 
 TEST(what_a_lattice_does_not_move_keeps_its_bits_between_conversions) {
@@ -239,7 +242,7 @@ TEST(what_a_lattice_does_not_move_keeps_its_bits_between_conversions) {
     const auto recolourer = std::make_shared<Recolourer>(cube().rgb, edited, cube().faces);
     const Lattice lattice(recolourer);
     Image image{3000, 4, colours};
-    apply_converted(lattice, &kChain, image.in(), image.out(), {});
+    converted(lattice, image.in(), image.out(), {});
     int moved = 0;
     for (std::size_t i = 0; i < 3000; ++i) {
         const bool same = std::memcmp(&image.data[4 * i], &colours[4 * i], 16) == 0;
@@ -252,11 +255,11 @@ TEST(what_a_lattice_does_not_move_keeps_its_bits_between_conversions) {
     const Image before = odd;
     RecolourOptions options;
     options.premultiplied = true;
-    apply_converted(lattice, &kChain, odd.in(), odd.out(), options);
+    converted(lattice, odd.in(), odd.out(), options);
     CHECK(std::memcmp(odd.data.data(), before.data.data(), 64) == 0);
     Image one{1, 4, {0.4f, 0.3f, 0.2f, 1}}, half{1, 4, {0.2f, 0.15f, 0.1f, 0.5f}};
-    apply_converted(lattice, &kChain, one.in(), one.out(), options);
-    apply_converted(lattice, &kChain, half.in(), half.out(), options);
+    converted(lattice, one.in(), one.out(), options);
+    converted(lattice, half.in(), half.out(), options);
     CHECK(one.data[2] != 0.2f);
     for (std::size_t c = 0; c < 3; ++c) CHECK_NEAR(half.data[c], one.data[c] / 2, 1e-7);
 }
@@ -283,5 +286,3 @@ TEST(what_has_no_way_back_is_refused) {
     curve.curves = {{{1}, {1}}};
     CHECK_EQUAL(problem_of(curve).member(), "/curves/0/x");
 }
-
-int main() { return check::run_all(); }

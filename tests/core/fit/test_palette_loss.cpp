@@ -295,5 +295,3 @@ TEST(no_palette_has_no_losses) {
     CHECK_EQUAL(loss.D, 0.0);
     CHECK(gradient.empty());
 }
-
-int main() { return check::run_all(); }

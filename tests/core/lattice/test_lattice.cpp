@@ -92,10 +92,10 @@ TEST(pictures_are_within_the_tolerance_of_the_exact_ones) {
                 const Image image = picture(301, 83, channels, ++seed);
                 Image expected(301, 83, channels), found(301, 83, channels);
                 recolourer->apply(image.in(), expected.out(), {strength});
-                const LatticeCounts counts = lattice.apply(image.in(), found.out(), {strength});
-                CHECK_EQUAL(counts.interpolated + counts.exact, 301LL * 83);
+                const RecolourCounts counts = lattice.apply(image.in(), found.out(), {strength});
+                CHECK_EQUAL(counts.interpolated + counts.exact(), 301LL * 83);
                 interpolated += counts.interpolated;
-                exact += counts.exact;
+                exact += counts.exact();
                 CHECK(difference(found, expected) <= Lattice::kTolerance);
             }
         }
@@ -319,7 +319,7 @@ TEST(what_lies_outside_or_is_no_number_has_the_exact_bits) {
         // Premultiplied by what keeps colours outside, and by nothing at all.
         Image expected(96, 20, 4), found(96, 20, 4);
         recolourer->apply(image.in(), expected.out(), {1.0, premultiplied});
-        const LatticeCounts counts = lattice.apply(image.in(), found.out(), {1.0, premultiplied});
+        const RecolourCounts counts = lattice.apply(image.in(), found.out(), {1.0, premultiplied});
         CHECK_EQUAL(counts.interpolated, 0LL);
         CHECK(same_bits(found.data, expected.data));
         Image place = image;
@@ -338,7 +338,7 @@ TEST(a_palette_beyond_the_unit_cube_widens_the_lattice) {
     const Image image = picture(200, 60, 3, 15, -1, 3);
     Image expected(200, 60, 3), found(200, 60, 3);
     recolourer->apply(image.in(), expected.out(), {});
-    const LatticeCounts counts = lattice.apply(image.in(), found.out(), {});
+    const RecolourCounts counts = lattice.apply(image.in(), found.out(), {});
     CHECK(counts.interpolated > 0);
     CHECK(difference(found, expected) <= Lattice::kTolerance);
 }
@@ -428,7 +428,5 @@ TEST(what_is_wrong_is_said) {
     CHECK_THROWS(std::invalid_argument,
                  lattice.apply(image.in(), image.out(), {static_cast<double>(kNan)}));
     Image empty(0, 0, 3);
-    CHECK_EQUAL(lattice.apply(empty.in(), empty.out(), {}).exact, 0LL);
+    CHECK_EQUAL(lattice.apply(empty.in(), empty.out(), {}).exact(), 0LL);
 }
-
-int main() { return check::run_all(); }

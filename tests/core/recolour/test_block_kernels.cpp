@@ -345,5 +345,3 @@ TEST(a_pixel_does_not_see_its_surroundings) {
         CHECK(same_bits(shifted, whole));
     }
 }
-
-int main() { return check::run_all(); }

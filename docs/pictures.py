@@ -1,0 +1,184 @@
+"""Draw the pictures of the README and of docs/grading.md from the results of `make demo`.
+
+    .venv/bin/python docs/pictures.py demo_output
+
+docs/images/demo.jpg is the demo's own plot without its polyhedra. docs/images/timeline.jpg shows
+one colour of the same palette through time, with the parts that an edit is made of named.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenImageIO as oiio
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import Ellipse
+from numpy.typing import NDArray
+from PIL import Image
+
+IMAGES = Path(__file__).resolve().parent / "images"
+PAGE, PANEL, TEXT, DIM = "#202020", "#2a2a2a", "#eeeeee", "#9a9a9a"
+GOLD, ROSE = (0.86, 0.58, 0.07), (0.9, 0.42, 0.62)
+SHOWN = (4, 12, 20, 28, 36, 44)
+"""The frames of timeline.jpg: each picture stands above its frame on the time axis."""
+HELD = 19
+"""The frame of the stop that holds the colour."""
+
+Image8 = NDArray[np.uint8]
+
+
+def palette4d(*words: object) -> None:
+    """Run one command of the installed palette4d."""
+    command = Path(sys.executable).with_name("palette4d")
+    subprocess.run([command, *map(str, words)], check=True, stdout=subprocess.DEVNULL)
+
+
+def save(image: Image8, name: str) -> None:
+    """Write (h, w, 3); a PNG of the same size is five times as large."""
+    Image.fromarray(image).save(IMAGES / name, quality=90, subsampling=0, optimize=True)
+
+
+def crop_demo(plot: Path) -> None:
+    """Keep the frames and the timeline of the demo's plot."""
+    image = np.asarray(Image.open(plot).convert("RGB"))
+    panel = np.array([int(PANEL[i : i + 2], 16) for i in (1, 3, 5)])
+    inside = np.abs(image[:, image.shape[1] // 30].astype(int) - panel).max(axis=1) < 4
+    end, margin = int(np.flatnonzero(inside)[-1]) + 4, image.shape[1] // 60
+    image = np.concatenate(
+        [image[:end], np.broadcast_to(image[:1, :1], (margin, *image.shape[1:]))]
+    )
+    size = (1400, round(1400 * len(image) / image.shape[1]))
+    small = Image.fromarray(image).resize(size, Image.Resampling.LANCZOS)
+    save(np.asarray(small), "demo.jpg")
+
+
+def pixels(path: Path) -> NDArray[np.float32]:
+    """Return one frame, (h, w, 3), 0 to 1."""
+    image = oiio.ImageBuf(str(path)).get_pixels(oiio.FLOAT)
+    return np.clip(np.asarray(image, dtype=np.float32)[..., :3], 0, 1)
+
+
+class Track:
+    """The palette colour that turns to gold, as the sidecar has it."""
+
+    def __init__(self, document: dict[str, Any]) -> None:
+        self.vertices = {v["id"]: v for v in document["polytope"]["vertices"]}
+        self.gold = min(
+            (v for v in self.vertices.values() if 20 < v["frame"] < 40),
+            key=lambda v: float(np.linalg.norm(np.subtract(v["rgb"], GOLD))),
+        )["id"]
+        blocks = document["polytope"]["blocks"]
+        (self.ids,) = (t for b in blocks for t in b["tracks"] if self.gold in t)
+        before = self.ids[self.ids.index(self.gold) - 1]
+        edges = document["polytope"]["edges"]
+        (self.edge,) = (e["id"] for e in edges if (e["from"], e["to"]) == (before, self.gold))
+
+    def colours(self, frames: NDArray[np.float64], edited: bool) -> NDArray[np.float64]:
+        """Return (n, 3): the colour at each frame, before or after the edit."""
+        knots = [(self.vertices[i]["frame"], self.vertices[i]["rgb"]) for i in self.ids]
+        if edited:
+            stop = self.colours(np.array([float(HELD)]), False)[0]
+            gold = self.vertices[self.gold]
+            knots = [(t, ROSE if t == gold["frame"] else c) for t, c in knots]
+            knots = sorted([*knots, (HELD, stop)], key=lambda knot: knot[0])
+        times, values = zip(*knots, strict=True)
+        return np.stack([np.interp(frames, times, channel) for channel in np.transpose(values)], 1)
+
+
+def draw_timeline(demo: Path, folder: Path) -> None:
+    """Edit a copy of the demo's sidecar, render it and draw timeline.jpg."""
+    sidecar = folder / "sample.p4d.json"
+    sidecar.write_bytes((demo / "sample.p4d.json").read_bytes())
+    palette4d("edit", sidecar, "reset")
+    track = Track(json.loads(sidecar.read_text(encoding="utf-8")))
+    held = track.colours(np.array([float(HELD)]), False)[0]
+    palette4d("edit", sidecar, "set", track.gold, "--rgb", *ROSE)
+    palette4d("edit", sidecar, "set", track.edge, "--frame", HELD, "--rgb", *held)
+    clip, graded = demo / "clip" / "sample.####.png", folder / "graded.####.png"
+    frames = ",".join(map(str, SHOWN))
+    palette4d("render", sidecar, clip, "-o", graded, "--frames", frames, "--quiet")
+
+    figure = Figure(figsize=(14, 7.4), dpi=100, facecolor=PAGE)
+    axes = figure.add_axes((0.04, 0.0, 0.95, 1.0))
+    axes.set_xlim(-0.6, 49.4)
+    axes.set_ylim(0, 27)
+    axes.set_axis_off()
+
+    for frame in SHOWN:
+        for path, top in ((demo / "clip" / f"sample.{frame:04d}.png", 26.6),
+                          (folder / f"graded.{frame:04d}.png", 22.1)):  # fmt: skip
+            span = (frame - 3.9, frame + 3.9, top - 4.28, top)
+            axes.imshow(pixels(path), extent=span, aspect="auto", zorder=2)
+        axes.text(frame, 16.8, f"frame {frame}", color=DIM, ha="center", fontsize=10)
+        axes.plot([frame, frame], [16.4, 14.5], color="#4a4a4a", lw=1, zorder=1)
+    for text, y in (("before", 24.4), ("after", 20.0)):
+        axes.text(-0.3, y, text, color=DIM, rotation=90, ha="right", va="center", fontsize=11)
+
+    low, high = track.vertices[track.ids[0]]["frame"], track.vertices[track.ids[-1]]["frame"]
+    when = np.linspace(low, high, 800)
+    own, new = track.colours(when, False), track.colours(when, True)
+    axes.imshow(own[None], extent=(low, high, 11.7, 12.6), aspect="auto", zorder=2)
+    axes.imshow(new[None], extent=(low, high, 10.8, 11.7), aspect="auto", zorder=2)
+    ratio = (27 / 7.4) / (50 / (14 * 0.95))
+    for name in track.ids:
+        vertex = track.vertices[name]
+        colour = ROSE if name == track.gold else vertex["rgb"]
+        _disc(axes, vertex["frame"], 11.7, 1.15, ratio, vertex["rgb"], colour)
+        axes.text(vertex["frame"], 13.3, name, color=TEXT, ha="center", fontsize=11)
+    _disc(axes, HELD, 11.7, 0.75, ratio, held, held, ring=True)
+
+    amount = np.linalg.norm(new - own, axis=1)
+    amount = amount / amount.max()
+    axes.fill_between(when, 2.2, 2.2 + 3.2 * amount, color="#d8729e", alpha=0.55, lw=0, zorder=2)
+    axes.plot(when, 2.2 + 3.2 * amount, color="#f2a5c4", lw=2, zorder=3)
+    axes.text(low, 2.6, "how far the edit moves\nthis colour", color=DIM, fontsize=10, va="bottom")
+
+    gold, end = track.vertices[track.gold]["frame"], high
+    note: dict[str, Any] = {"color": TEXT, "fontsize": 12, "ha": "center", "va": "top"}
+    line: dict[str, Any] = {"arrowstyle": "-", "color": TEXT, "lw": 1.2}
+    for x, place, text in (
+        (gold, 29.6, f"vertex {track.gold}\nthe edit sets it: gold becomes rose"),
+        (HELD, 16.0, f"stop at frame {HELD}\nholds the colour as it was"),
+        (end, 45.2, f"vertex {track.ids[-1]}, not edited\nthe edit has faded"),
+    ):
+        axes.annotate(text, (x, 10.4), (place, 8.6), arrowprops=line, **note)
+    for left, right, text in ((HELD, gold, "ramp in"), (gold, end, "ramp out")):
+        axes.annotate("", (left, 1.6), (right, 1.6), arrowprops={"arrowstyle": "<->", "color": DIM})
+        axes.text((left + right) / 2, 1.25, text, color=TEXT, ha="center", va="top", fontsize=12)
+
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    save(np.asarray(canvas.buffer_rgba())[..., :3].copy(), "timeline.jpg")
+
+
+def _disc(axes: Any, x: float, y: float, size: float, ratio: float, top: Any, bottom: Any,
+          ring: bool = False) -> None:  # fmt: skip
+    """A disc: its upper half the colour before, its lower half the colour after."""
+    wide, tall = size * 2, size * 2 * ratio
+    if ring:
+        axes.add_patch(Ellipse((x, y), wide * 1.35, tall * 1.35, color=TEXT, zorder=4))
+        axes.add_patch(Ellipse((x, y), wide * 1.18, tall * 1.18, color=PAGE, zorder=4))
+    axes.add_patch(Ellipse((x, y), wide * 1.08, tall * 1.08, color=TEXT, zorder=4))
+    for colour, start in ((top, 0), (bottom, 180)):
+        angles = np.radians(np.linspace(start, start + 180, 90))
+        points = np.stack([x + wide / 2 * np.cos(angles), y + tall / 2 * np.sin(angles)])
+        axes.fill(*points, color=np.clip(colour, 0, 1), zorder=5)
+
+
+def main() -> None:
+    """Draw both pictures from the folder of a demo."""
+    demo = Path(sys.argv[1])
+    crop_demo(demo / "palette_edited.png")
+    with tempfile.TemporaryDirectory() as folder:
+        draw_timeline(demo, Path(folder))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,239 @@
+#include "recolour/colour_map.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstring>
+#include <exception>
+#include <functional>
+#include <limits>
+#include <mutex>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+#include <thread>
+#include <vector>
+
+#include "model/vec3.hpp"
+
+namespace palette4d {
+namespace {
+
+/// Rows that a thread takes at once. Adjacent rows share colours: threads that each worked on one
+/// of them would wait for each other while the cells of a Lattice are made.
+constexpr int kMostRowsAtOnce = 16;
+
+template <class View>
+void check_view(const View& view, const char* name) {
+    const std::string what = std::string("recolour: the ") + name + " image ";
+    if (view.channels != 3 && view.channels != 4) {
+        throw std::invalid_argument(what + "has " + std::to_string(view.channels) +
+                                    " channels; expected 3 or 4");
+    }
+    if (view.width < 0 || view.height < 0) {
+        throw std::invalid_argument(what + "is " + std::to_string(view.width) + " by " +
+                                    std::to_string(view.height) + "; expected no negative size");
+    }
+    if (view.width == 0 || view.height == 0) return;
+    if (view.data == nullptr) throw std::invalid_argument(what + "has no data");
+    const auto row = static_cast<std::ptrdiff_t>(sizeof(float)) * view.width * view.channels;
+    if (view.height > 1 && std::abs(view.row_bytes) < row) {
+        throw std::invalid_argument(what + "has rows " + std::to_string(view.row_bytes) +
+                                    " bytes apart; expected at least " + std::to_string(row));
+    }
+}
+
+void check_recolouring(const ConstImageView& in, const ImageView& out,
+                       const RecolourOptions& options) {
+    check_view(in, "input");
+    check_view(out, "output");
+    if (in.width != out.width || in.height != out.height || in.channels != out.channels) {
+        const auto size = [](const auto& view) {
+            return std::to_string(view.width) + " by " + std::to_string(view.height) + " with " +
+                   std::to_string(view.channels) + " channels";
+        };
+        throw std::invalid_argument("recolour: the output image is " + size(out) +
+                                    "; expected that of the input image, " + size(in));
+    }
+    if (!std::isfinite(options.strength)) {
+        throw std::invalid_argument("recolour: the strength is not finite");
+    }
+    if (options.threads < 0) {
+        throw std::invalid_argument("recolour: " + std::to_string(options.threads) +
+                                    " threads; expected 0 (one per processor) or more");
+    }
+    resolved(options.instructions);
+}
+
+const float* row_of(const ConstImageView& view, int y) {
+    return reinterpret_cast<const float*>(reinterpret_cast<const char*>(view.data) +
+                                          view.row_bytes * y);
+}
+float* row_of(const ImageView& view, int y) {
+    return reinterpret_cast<float*>(reinterpret_cast<char*>(view.data) + view.row_bytes * y);
+}
+
+void copy_rows(const ConstImageView& in, const ImageView& out) {
+    const std::size_t bytes =
+        sizeof(float) * static_cast<std::size_t>(in.width) * static_cast<std::size_t>(in.channels);
+    for (int y = 0; y < in.height; ++y) {
+        if (row_of(in, y) != row_of(out, y)) std::memmove(row_of(out, y), row_of(in, y), bytes);
+    }
+}
+
+/// Hands out the numbers 0 to count - 1, each once; -1 when there are none left.
+using NextRow = std::function<int()>;
+
+/// Calls `work` in up to `threads` threads (0: one per processor), this one among them. After an
+/// exception no more rows are handed out; the first one is thrown when all threads have returned.
+void share_rows(int count, int threads, const std::function<void(const NextRow&)>& work) {
+    if (threads == 0) threads = static_cast<int>(std::thread::hardware_concurrency());
+    threads = std::clamp(threads, 1, std::max(count, 1));
+    // Several rows in a piece, as long as there is work for all to the end.
+    const int band = std::clamp(count / threads / 8, 1, kMostRowsAtOnce);
+    std::atomic<int> next{0};
+    std::exception_ptr problem;
+    std::mutex guard;
+    const auto guarded = [&] {
+        int row = 0, end = 0;
+        const NextRow next_row = [&] {
+            if (row == end) {
+                row = next.fetch_add(band);
+                end = row + band;
+            }
+            return row < count ? row++ : -1;
+        };
+        try {
+            work(next_row);
+        } catch (...) {
+            const std::lock_guard<std::mutex> lock(guard);
+            if (!problem) problem = std::current_exception();
+            next = count;
+        }
+    };
+    std::vector<std::thread> helpers;
+    helpers.reserve(static_cast<std::size_t>(threads - 1));
+    try {
+        for (int i = 1; i < threads; ++i) helpers.emplace_back(guarded);
+    } catch (const std::system_error&) {
+        // No more threads to be had: those that run share the rows.
+    }
+    guarded();
+    for (std::thread& helper : helpers) helper.join();
+    if (problem) std::rethrow_exception(problem);
+}
+
+/// Rows in other code values than the palette's: pixels are gathered, converted and recoloured as a
+/// row of their own.
+class ConvertedRows : public RowWorker {
+public:
+    ConvertedRows(const ColourMap& map, const RecolourOptions& options, int channels)
+        : conversion_(*options.conversion),
+          premultiplied_(options.premultiplied),
+          channels_(channels) {
+        RecolourOptions straight = options;
+        straight.premultiplied = false;
+        worker_ = map.worker(straight, 3);
+        pixels_.reserve(kPiece);
+        before_.reserve(3 * kPiece);
+    }
+
+    void row(const float* from, float* to, int width) override {
+        for (int x = 0; x < width; ++x, from += channels_, to += channels_) {
+            const bool good = recolourable(from, premultiplied_);
+            const double alpha = premultiplied_ ? from[3] : 1.0;
+            const Vec3 seen = straight_colour(from, premultiplied_);
+            if (to != from) std::copy_n(from, channels_, to);
+            if (!good) continue;
+            const Vec3 exact = conversion_.to_palette(seen);
+            float rounded[3];
+            for (std::size_t c = 0; c < 3; ++c) rounded[c] = static_cast<float>(exact[c]);
+            if (!std::isfinite(rounded[0] + rounded[1] + rounded[2])) continue;
+            pixels_.push_back({exact, alpha, to});
+            before_.insert(before_.end(), rounded, rounded + 3);
+            if (pixels_.size() == kPiece) finish();
+        }
+    }
+
+    void finish() override {
+        if (pixels_.empty()) return;
+        after_.resize(before_.size());
+        worker_->row(before_.data(), after_.data(), static_cast<int>(pixels_.size()));
+        worker_->finish();
+        for (std::size_t i = 0; i < pixels_.size(); ++i) {
+            Vec3 at = pixels_[i].exact;
+            bool moved = false;
+            for (std::size_t c = 0; c < 3; ++c) {
+                // The edit's step is added to the unrounded value: nothing jumps where an edit
+                // begins.
+                const double step = static_cast<double>(after_[3 * i + c]) - before_[3 * i + c];
+                at[c] += step;
+                moved |= step != 0;
+            }
+            if (moved) write(conversion_.to_clip(at), pixels_[i]);
+        }
+        pixels_.clear();
+        before_.clear();
+    }
+
+    RecolourCounts counts() const override { return worker_->counts(); }
+
+private:
+    struct Pixel {
+        Vec3 exact;
+        double alpha;
+        float* out;
+    };
+    /// Pixels that are converted before they are recoloured together.
+    static constexpr std::size_t kPiece = 16384;
+    static constexpr double kLargest = std::numeric_limits<float>::max();
+
+    static void write(const Vec3& colour, const Pixel& pixel) {
+        if (!finite(colour)) return;
+        for (std::size_t c = 0; c < 3; ++c) {
+            const double value = std::clamp(pixel.alpha * colour[c], -kLargest, kLargest);
+            pixel.out[c] = static_cast<float>(value);
+        }
+    }
+
+    const ColourConversion& conversion_;
+    const bool premultiplied_;
+    const int channels_;
+    std::unique_ptr<RowWorker> worker_;
+    std::vector<Pixel> pixels_;
+    std::vector<float> before_, after_;
+};
+
+}  // namespace
+
+Vec3 straight_colour(const float* pixel, bool premultiplied) {
+    const double alpha = premultiplied ? pixel[3] : 1.0;
+    return {pixel[0] / alpha, pixel[1] / alpha, pixel[2] / alpha};
+}
+
+RecolourCounts ColourMap::apply(const ConstImageView& in, const ImageView& out,
+                                const RecolourOptions& given) const {
+    RecolourOptions options = given;
+    options.premultiplied = options.premultiplied && in.channels == 4;
+    check_recolouring(in, out, options);
+    if (in.width == 0 || in.height == 0) return {};
+    if (!moves() || options.strength == 0) {
+        copy_rows(in, out);
+        return {};
+    }
+    const bool converts = options.conversion && !options.conversion->identity();
+    RecolourCounts counts;
+    std::mutex guard;
+    share_rows(in.height, options.threads, [&](const NextRow& next) {
+        const std::unique_ptr<RowWorker> rows =
+            converts ? std::make_unique<ConvertedRows>(*this, options, in.channels)
+                     : worker(options, in.channels);
+        for (int y = next(); y >= 0; y = next()) rows->row(row_of(in, y), row_of(out, y), in.width);
+        rows->finish();
+        const std::lock_guard<std::mutex> lock(guard);
+        counts += rows->counts();
+    });
+    return counts;
+}
+
+}  // namespace palette4d

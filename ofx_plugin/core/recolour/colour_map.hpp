@@ -1,0 +1,107 @@
+// The one road from an image to its recoloured copy: rows are shared among threads, colours are
+// divided by alpha, converted to the palette's space, displaced, and taken back.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+
+#include "convert/colour_conversion.hpp"
+#include "simd/instruction_set.hpp"
+
+namespace palette4d {
+
+/// A float32 image that the caller owns: `row_bytes` may be negative or padded, `channels` is 3 or
+/// 4, interleaved (the fourth is alpha and is copied).
+struct ConstImageView {
+    const float* data;
+    int width, height, channels;
+    std::ptrdiff_t row_bytes;
+};
+struct ImageView {
+    float* data;
+    int width, height, channels;
+    std::ptrdiff_t row_bytes;
+};
+
+/// How exactly a colour's displacement is computed.
+enum class Precision {
+    /// Many colours at a time, in float where an estimate of the error, made along with each
+    /// result, allows that, else in double. Channels of straight colours are within
+    /// kSingleTolerance of kDouble (times the largest difference between two vertices'
+    /// displacements times strength, where that is above 1), and within half a unit in the last
+    /// place of the result.
+    kSingle,
+    /// One colour after another by PaletteBody, in double throughout: the reference for kSingle.
+    kDouble,
+};
+inline constexpr double kSingleTolerance = 1e-4;
+
+struct RecolourOptions {
+    double strength = 1.0;       ///< 0 returns the input, 1 the edit; linear, not clamped
+    bool premultiplied = false;  ///< RGBA only: colours are divided by alpha first; alpha 0 passes
+    int threads = 1;             ///< 0: one per processor
+    Precision precision = Precision::kSingle;
+    InstructionSet instructions = InstructionSet::kBest;  ///< of kSingle; the result is the same
+    /// From the image's code values to the palette's; null where they are the same. Colours that
+    /// the edit does not move keep their bits; the others are converted in double precision.
+    const ColourConversion* conversion = nullptr;
+};
+
+/// How many colours of an apply() were computed in each way; copied colours are not counted.
+struct RecolourCounts {
+    long long interpolated = 0;  ///< by a Lattice
+    long long single = 0;        ///< many at a time in float
+    long long twofold = 0;       ///< many at a time in double
+    long long one = 0;           ///< by PaletteBody
+
+    long long exact() const { return single + twofold + one; }
+    RecolourCounts& operator+=(const RecolourCounts& other) {
+        interpolated += other.interpolated;
+        single += other.single;
+        twofold += other.twofold;
+        one += other.one;
+        return *this;
+    }
+};
+
+/// One thread's recolouring of rows of pixels in the palette's code values.
+class RowWorker {
+public:
+    virtual ~RowWorker() = default;
+    /// Adjacent pixels. `from` and `to` must stay valid until finish() returns; all is written
+    /// then.
+    virtual void row(const float* from, float* to, int width) = 0;
+    virtual void finish() = 0;
+    virtual RecolourCounts counts() const = 0;
+};
+
+/// A map of colours to colours; many threads may use one object.
+class ColourMap {
+public:
+    virtual ~ColourMap() = default;
+    /// Some colour moves; else apply() copies.
+    virtual bool moves() const = 0;
+    /// For pixels of so many channels. Ignores options.threads and options.conversion;
+    /// options.premultiplied is only ever set for four channels. The map must outlive the worker.
+    virtual std::unique_ptr<RowWorker> worker(const RecolourOptions& options,
+                                              int channels) const = 0;
+
+    /// `in` and `out` have the same size and channels; they may be the same memory. A pixel's
+    /// result depends on that pixel and the options only: not on the number of threads, the image
+    /// around it, where it lies, or the processor. Colours with a NaN or an infinity pass, as do
+    /// premultiplied ones whose alpha is 0 or not finite. Throws std::invalid_argument on
+    /// mismatched views and for instructions that this processor does not have.
+    RecolourCounts apply(const ConstImageView& in, const ImageView& out,
+                         const RecolourOptions& options) const;
+};
+
+/// A pixel that can be recoloured: finite colours, and alpha that they can be divided by.
+inline bool recolourable(const float* pixel, bool premultiplied) {
+    // NaN where a channel is not finite: 0 times infinity is NaN.
+    return 0 * pixel[0] + 0 * pixel[1] + 0 * pixel[2] == 0 &&
+           (!premultiplied || (pixel[3] != 0 && 0 * pixel[3] == 0));
+}
+/// The pixel's colour, divided by alpha where it is premultiplied.
+Vec3 straight_colour(const float* pixel, bool premultiplied);
+
+}  // namespace palette4d

@@ -1,0 +1,123 @@
+"""The OpenFX bundle: where it lies in the package, where hosts look for it, and the way there.
+
+It is copied beside its destination first and then renamed into place, so that a host never scans
+half a bundle.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+from palette4d import _core
+from palette4d.common.errors import Palette4dError
+
+BUNDLE = "Palette4D.ofx.bundle"
+
+
+def default_destination(platform: str = sys.platform) -> Path:
+    """The folder in which the OpenFX standard lets hosts look on a platform (`sys.platform`)."""
+    if platform == "win32":
+        return Path("C:/Program Files/Common Files/OFX/Plugins")
+    if platform == "darwin":
+        return Path("/Library/OFX/Plugins")
+    return Path("/usr/OFX/Plugins")
+
+
+def find_bundle() -> Path:
+    """Return the bundle inside the installed package.
+
+    Raises
+    ------
+    Palette4dError
+        When this installation holds no bundle.
+    """
+    # Beside the compiled module: in an editable installation that is not the sources' folder.
+    bundle = Path(_core.__file__).parent / "_ofx" / BUNDLE
+    if any(bundle.glob("Contents/*/*.ofx")):
+        return bundle
+    raise Palette4dError(
+        f"found no {BUNDLE} in the installed package palette4d, expected it in {bundle.parent}; "
+        "install palette4d again from a wheel built with PALETTE4D_BUILD_PLUGIN=ON (the default)"
+    )
+
+
+def install_bundle(
+    bundle: Path, destination: Path, *, link: bool = False, force: bool = False
+) -> Path:
+    """Copy or link the bundle into a plugin folder.
+
+    Parameters
+    ----------
+    bundle : Path
+        The bundle to install.
+    destination : Path
+        The folder of plugins; made when it is missing.
+    link : bool
+        Make a symbolic link instead of a copy.
+    force : bool
+        Replace something at the destination that is not an earlier Palette4D bundle.
+
+    Returns
+    -------
+    Path
+        The installed bundle.
+
+    Raises
+    ------
+    Palette4dError
+        When the destination is occupied, may not be written to or is no folder.
+    """
+    bundle = bundle.resolve()
+    target = destination / BUNDLE
+    try:
+        destination.mkdir(parents=True, exist_ok=True)
+        if target.exists() and target.resolve() == bundle and link:
+            return target
+        if os.path.lexists(target) and not force and not _is_ours(target):
+            raise Palette4dError(
+                f"{target}: found something that is not an OpenFX bundle of Palette4D, "
+                "expected nothing or an earlier version; pass --force to replace it"
+            )
+        # Beside the target, so that the rename stays on one file system.
+        with tempfile.TemporaryDirectory(prefix=".palette4d-", dir=destination) as temporary:
+            fresh = Path(temporary) / BUNDLE
+            if link:
+                fresh.symlink_to(bundle, target_is_directory=True)
+            else:
+                shutil.copytree(bundle, fresh)
+            _replace(fresh, target, Path(temporary) / "old")
+    except PermissionError as error:
+        raise Palette4dError(
+            f"{destination}: may not be written to; run the command as an administrator (sudo), or "
+            "give a folder of your own with --dest and name it in the environment variable "
+            "OFX_PLUGIN_PATH"
+        ) from error
+    except OSError as error:
+        raise Palette4dError(
+            f"{target}: cannot be installed ({error.strerror}); choose another folder with --dest"
+        ) from error
+    return target
+
+
+def _is_ours(target: Path) -> bool:
+    """Tell a Palette4D bundle, or a link that leads nowhere any more, from anything else."""
+    if target.is_symlink() and not target.exists():
+        return True
+    return target.is_dir() and any(target.glob("Contents/*/Palette4D.ofx"))
+
+
+def _replace(fresh: Path, target: Path, aside: Path) -> None:
+    """Rename `fresh` to `target`; what was there is put aside, and back when the rename fails."""
+    occupied = os.path.lexists(target)
+    if occupied:
+        target.rename(aside)
+    try:
+        fresh.rename(target)
+    except OSError:
+        if occupied:
+            aside.rename(target)
+        raise

@@ -1,0 +1,257 @@
+"""The page: heading, frames before and after, the timeline, the polyhedra, and a legend."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palette4d import _core
+from palette4d.common.text import counted
+from palette4d.plotting import polyhedron, style, timeline
+from palette4d.plotting.rows import Palette, arrange
+
+F64 = NDArray[np.float64]
+F32 = NDArray[np.float32]
+
+#: The page's width in points; --width scales a PNG, a page keeps its proportions.
+WIDTH = 1200.0
+MARGIN = 28.0
+GUTTER = 14.0
+HEADER = 76.0
+#: Room for the lines between the timeline and the frames above and below it.
+LEADER = 30.0
+#: Room between the pictures before and after.
+GAP = 4.0
+
+
+@dataclass(frozen=True)
+class Column:
+    """What the page shows of one frame.
+
+    Attributes
+    ----------
+    frame : float
+        The time of the palette.
+    shape : polyhedron.Shape
+        The sliced palette; with the clip, also pixels.
+    pictures : tuple of (h, w, 3) float32
+        The clip's frame, reduced in size, and its recolouring where the sidecar has edits. Empty
+        without the clip.
+    """
+
+    frame: float
+    shape: polyhedron.Shape
+    pictures: tuple[F32, ...] = ()
+
+
+def default_frames(
+    first: float, last: float, edited: Sequence[float] = (), count: int = 4, most: int = 5
+) -> list[float]:
+    """Choose what to show: whole frame numbers spread over the clip, edited ones among them.
+
+    Parameters
+    ----------
+    first, last : float
+        The clip's first and last frame.
+    edited : sequence of float
+        Times of edited vertices and stops.
+    count, most : int
+        How many frames to show, and how many when edits ask for more. They are a tenth of the clip
+        apart at least, unless the clip has fewer frames.
+    """
+    if last <= first:
+        return [first]
+    gap = max(1.0, (last - first) / 10)
+    wanted = sorted({float(min(max(round(t), first), last)) for t in edited})
+    # The clip's ends, or an edited frame near to an end.
+    chosen = [
+        min((t for t in wanted if t - first < gap), default=first),
+        max((t for t in wanted if last - t < gap), default=last),
+    ]
+    spread = np.linspace(first, last, count) if not wanted else np.arange(first, last)
+
+    def room(time: float) -> float:
+        return min(abs(time - other) for other in chosen)
+
+    for candidates, limit in ((wanted, most), ([float(round(t)) for t in spread], count)):
+        while candidates and len(chosen) < limit:
+            best = max(candidates, key=room)
+            if room(best) < gap:
+                break
+            chosen.append(best)
+    return sorted(chosen)
+
+
+def column(
+    sidecar: _core.Sidecar, frame: float, image: F32 | None, *, width: int = 640, pixels: int = 4000
+) -> Column:
+    """Slice the palette at a time and recolour the clip's frame there.
+
+    Parameters
+    ----------
+    sidecar : Sidecar
+        Palette and edits.
+    frame : float
+        The time.
+    image : (h, w, 3) float32 or None
+        Straight colours of the clip's frame, in the palette's colour space.
+    width : int
+        Pictures are at least this wide, or as wide as the clip, and less than twice as wide.
+    pixels : int
+        At most about this many pixels, evenly picked, are shown with the polyhedron.
+    """
+    palette = _core.slice_at(sidecar.polytope, frame)
+    edited = _core.edited_colours(sidecar.polytope, sidecar.edits, palette)
+    rgb, faces = np.asarray(palette.rgb), np.asarray(palette.faces)
+    if image is None:
+        return Column(frame, polyhedron.Shape(rgb, np.asarray(edited), faces))
+    flat = image.reshape(-1, 3)
+    # A golden-ratio sequence picks evenly without following rows or columns.
+    picked = np.arange(min(pixels, len(flat))) * 0.6180339887498949 % 1 * len(flat)
+    cloud = flat[picked.astype(np.int64)].astype(np.float64)
+    shape = polyhedron.Shape(rgb, np.asarray(edited), faces, cloud[np.isfinite(cloud).all(axis=1)])
+    step = max(1, image.shape[1] // width)
+    small = np.ascontiguousarray(image[::step, ::step], dtype=np.float32)
+    if not (sidecar.edits.vertex_rgb or sidecar.edits.stops):
+        return Column(frame, shape, (small,))
+    recolourer = _core.Recolourer(palette.rgb, edited, palette.faces)
+    return Column(frame, shape, (small, recolourer.apply(small, threads=0)))
+
+
+def build(sidecar: _core.Sidecar, columns: Sequence[Column]) -> Any:
+    """Lay out and draw the page; return a matplotlib Figure of `WIDTH` points."""
+    from matplotlib.figure import Figure
+
+    palette = Palette.of(sidecar)
+    encoding = str(sidecar.clip["encoding"])
+    rows = arrange(palette.frames, palette.rgb, palette.edges)
+    row_height = float(np.clip(1100.0 / max(rows.count, 1), 16.0, 50.0))
+    panel = timeline.Panel(palette, rows, MARGIN, WIDTH - MARGIN, row_height)
+
+    wide = (WIDTH - 2 * MARGIN + GUTTER) / max(len(columns), 1) - GUTTER
+    shapes = [picture.shape for c in columns for picture in c.pictures]
+    aspect = max((shape[0] / shape[1] for shape in shapes), default=0.0)
+    picture_width = min(wide, 420.0, 260.0 / aspect if aspect else wide)
+    picture_height = picture_width * aspect
+    names = ["before", "after"] if any(len(c.pictures) > 1 for c in columns) else ["clip"]
+    pictures = len(names) * (picture_height + GAP) - 2 + LEADER if shapes else 0.0
+    cube = min(wide * 0.96, 300.0)
+    height = HEADER + pictures + panel.height + MARGIN
+    height += LEADER + 38 + cube if columns else 0.0
+    top = height - HEADER
+    panel.top = top - pictures
+
+    figure = Figure(figsize=(WIDTH / 72, height / 72), facecolor=style.PAGE)
+    axes = figure.add_axes((0, 0, 1, 1))
+    axes.set(xlim=(0, WIDTH), ylim=(0, height), autoscale_on=False)
+    axes.set_axis_off()
+    _draw_heading(axes, sidecar, palette, height)
+    timeline.draw(axes, panel, encoding)
+    if shapes:
+        for k, name in enumerate(names):
+            y = top - (k + 0.5) * picture_height - GAP * k
+            axes.text(MARGIN / 2 + 2, y, name, rotation=90, **style.CENTRED)
+    extent = polyhedron.extent_of([c.shape for c in columns])
+    for k, shown in enumerate(columns):
+        centre = MARGIN + wide / 2 + k * (wide + GUTTER)
+        _draw_leaders(axes, panel, shown.frame, centre, above=bool(shapes))
+        for row, picture in enumerate(shown.pictures):
+            upper = top - row * (picture_height + GAP)
+            lower = upper - picture_width * picture.shape[0] / picture.shape[1]
+            ends = (centre - picture_width / 2, centre + picture_width / 2, lower, upper)
+            axes.imshow(style.shown(picture, encoding), extent=ends, aspect="auto", zorder=4)
+        middle = panel.bottom - LEADER - 30 - cube / 2
+        view = polyhedron.View.fit(extent, (centre, middle), cube)
+        polyhedron.draw(axes, shown.shape, view, encoding)
+    return figure
+
+
+def _draw_heading(axes: Any, sidecar: _core.Sidecar, palette: Palette, height: float) -> None:
+    """Write the title, the facts below it, and the legend at its right."""
+    from matplotlib.legend_handler import HandlerTuple
+
+    clip = sidecar.clip
+    numerator, denominator = clip["rate"]
+    ends = dict.fromkeys((style.number(palette.first), style.number(palette.last)))
+    facts = [
+        f"frame{'s' if len(ends) > 1 else ''} {'–'.join(ends)}",
+        f"{style.number(numerator / denominator)} fps",
+        f"{clip['width']}×{clip['height']}",
+        str(clip["encoding"]),
+        counted(len(palette.ids), "palette vertex", "palette vertices"),
+        counted(sum(not s["transition"] for s in palette.sections), "block"),
+        counted(int(palette.changed.sum()), "edited vertex", "edited vertices"),
+        counted(len(palette.stops), "stop"),
+    ]
+    line = style.printable("   ·   ".join(fact for fact in facts if fact), 200)
+    title = {"fontsize": 17, "fontweight": "bold", "color": style.BRIGHT, "va": "center"}
+    axes.text(MARGIN, height - 30, style.printable(clip["name"], 48), **title)
+    axes.text(MARGIN, height - 52, line, fontsize=8.5, color=style.FAINT, va="center")
+    grey, light = np.full(3, 0.42), np.full(3, 0.78)
+    entries = (
+        ("plain", 7.5, light, "palette vertex"),
+        ("edited", 7.5, grey, "edited: before above, after below"),
+        ("stop", 6.0, grey, "stop: a colour added between vertices"),
+    )
+    # Discs off the page: the legend copies them.
+    handles = [
+        timeline.disc(axes, np.nan, np.nan, radius, np.stack([before, light]), kind, 5)
+        for kind, radius, before, _ in entries
+    ]
+    legend = axes.legend(
+        handles,
+        [text for *_, text in entries],
+        handler_map={tuple: HandlerTuple(ndivide=1)},
+        loc="center right",
+        bbox_to_anchor=(WIDTH - MARGIN, height - 30),
+        bbox_transform=axes.transData,
+        ncols=3,
+        fontsize=8.5,
+        labelcolor=style.TEXT,
+        frameon=False,
+        borderpad=0,
+        borderaxespad=0,
+        handlelength=2,
+        columnspacing=2.6,
+    )
+    legend.set_zorder(5)
+
+
+def _draw_leaders(
+    axes: Any, panel: timeline.Panel, frame: float, centre: float, *, above: bool
+) -> None:
+    """Mark a frame on the timeline and lead from its pictures to it and on to its polyhedron."""
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path as Line
+
+    x = float(panel.x(frame))
+    dotted = {"linewidth": 0.7, "linestyle": (0, (1, 3)), "zorder": 2}
+    axes.plot([x, x], [panel.floor, panel.top], color=style.GUIDE, **dotted)
+    ends = [(panel.bottom, panel.bottom - LEADER + 2)]
+    ends += [(panel.top, panel.top + LEADER - 2)] if above else []
+    for near, far in ends:
+        middle = (near + far) / 2
+        curve = [(x, near), (x, middle), (centre, middle), (centre, far)]
+        line = Line(curve, [Line.MOVETO, *[Line.CURVE4] * 3])
+        how = {"fill": False, "edgecolor": style.GUIDE, "linewidth": 0.9, "zorder": 2}
+        axes.add_patch(PathPatch(line, **how))
+        axes.plot([x], [near], marker="o", markersize=3.4, color=style.FAINT, zorder=3)
+    caption = {**style.CENTRED, "fontsize": 9, "color": style.TEXT, "zorder": 4}
+    caption["bbox"] = {"facecolor": style.PAGE, "linewidth": 0, "pad": 1.5}
+    axes.text(centre, panel.bottom - LEADER - 9, f"frame {style.number(frame)}", **caption)
+
+
+def save(figure: Any, path: Path, kind: str, width: int) -> None:
+    """Write the figure as "png" (`width` pixels wide), "svg" or "pdf", without dates in it."""
+    # A fraction of a pixel more, so that rounding does not lose the last column.
+    dpi = (width + 0.01) / (WIDTH / 72)
+    creator = f"palette4d {_core.__version__}"
+    metadata: dict[str, dict[str, Any]] = {
+        "png": {"Software": creator},
+        "svg": {"Date": None, "Creator": creator},
+        "pdf": {"CreationDate": None, "Creator": creator},
+    }
+    figure.savefig(path, format=kind, dpi=dpi, metadata=metadata[kind], facecolor=style.PAGE)

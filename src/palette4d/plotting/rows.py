@@ -1,0 +1,325 @@
+"""The timeline's content and its layout, free of any drawing library: vertices, times, rows.
+
+`Palette` holds a sidecar's palette and edits as arrays. `arrange` finds the rows: a chain follows
+one palette colour through its vertices. At a split or a merge one edge carries the chain on; every
+other edge begins or ends a chain of its own, which forks from or joins the chain of that vertex.
+Chains that never meet in time share a row. Rows are ordered so that forks are short and cross
+little, and otherwise from light to dark.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palette4d import _core
+
+F64 = NDArray[np.float64]
+Row = list[int]
+Cost = Callable[[F64], float]
+
+#: Rec. 709 luma, to order rows from light to dark.
+LUMA = np.array([0.2126, 0.7152, 0.0722])
+#: The cost of a fork per row that it spans and per chain that it crosses. One place off the luma
+#: order costs ORDER_COST over the number of chains.
+SPAN_COST, CROSSING_COST, ORDER_COST = 1.0, 2.5, 0.35
+#: One row less is worth this cost. Above MANY_ROWS rows only neighbours are joined.
+ROW_SAVING, MANY_ROWS = 1.5, 24
+#: Largest number of moves tried: bounds the search on palettes of hundreds of vertices.
+MAX_TRIALS = 20_000
+
+
+@dataclass(frozen=True)
+class Palette:
+    """A palette and its edits as arrays.
+
+    Attributes
+    ----------
+    ids, edge_ids : list of str
+        Of the vertices and edges.
+    frames, rgb, edited : (n,), (n, 3), (n, 3) float64
+        Times of the vertices, and their colours before and after the edit.
+    changed : (n,) bool array
+        The vertex has an edited colour.
+    edges : list of (int, int)
+        Vertex indices, the earlier end first.
+    stops : list of (str, int, float, (3,) float64)
+        Id, edge index, frame and edited colour, by edge and frame.
+    sections : list of dict
+        Blocks and transitions: ``first``, ``last``, ``transition``.
+    first, last : float
+        The first and last frame.
+    """
+
+    ids: list[str]
+    frames: F64
+    rgb: F64
+    edited: F64
+    changed: NDArray[np.bool_]
+    edges: list[tuple[int, int]]
+    edge_ids: list[str]
+    stops: list[tuple[str, int, float, F64]]
+    sections: list[dict[str, Any]]
+    first: float
+    last: float
+
+    @classmethod
+    def of(cls, sidecar: _core.Sidecar) -> "Palette":
+        """Read the arrays from a sidecar."""
+        polytope, edits = sidecar.polytope, sidecar.edits
+        vertices = np.asarray(polytope.vertices, dtype=np.float64).reshape(-1, 4)
+        ids, edge_ids = list(polytope.vertex_ids), list(polytope.edge_ids)
+        edited, new_colours = vertices[:, :3].copy(), edits.vertex_rgb
+        changed = np.array([name in new_colours for name in ids], dtype=bool)
+        for index in np.flatnonzero(changed):
+            edited[index] = new_colours[ids[index]]
+        stops = [
+            (s["id"], edge_ids.index(s["edge"]), float(s["frame"]), np.array(s["rgb"], np.float64))
+            for s in edits.stops
+        ]
+        return cls(
+            ids=ids,
+            frames=vertices[:, 3].copy(),
+            rgb=vertices[:, :3].copy(),
+            edited=edited,
+            changed=changed,
+            edges=[(int(a), int(b)) for a, b in np.asarray(polytope.edges).reshape(-1, 2)],
+            edge_ids=edge_ids,
+            stops=sorted(stops, key=lambda stop: stop[1:3]),
+            sections=list(polytope.sections),
+            first=float(polytope.first_frame),
+            last=float(polytope.last_frame),
+        )
+
+    def colours(self, edge: int, frames: F64, *, edited: bool) -> F64:
+        """Return the colours on an edge at (k,) times, (k, 3); edited: linear between stops."""
+        start, end = self.edges[edge]
+        stops = [stop for stop in self.stops if stop[1] == edge] if edited else []
+        knots = [self.frames[start], *(stop[2] for stop in stops), self.frames[end]]
+        rgb = self.edited if edited else self.rgb
+        values = np.stack([rgb[start], *(stop[3] for stop in stops), rgb[end]])
+        return np.stack([np.interp(frames, knots, values[:, c]) for c in range(3)], axis=-1)
+
+    def touched(self, edge: int) -> bool:
+        """Whether anything on this edge is edited."""
+        return bool(self.changed[list(self.edges[edge])].any()) or any(
+            stop[1] == edge for stop in self.stops
+        )
+
+    @property
+    def edited_times(self) -> list[float]:
+        """The frames of edited vertices and of stops."""
+        return [float(t) for t in self.frames[self.changed]] + [stop[2] for stop in self.stops]
+
+
+@dataclass(frozen=True)
+class Chain:
+    """A palette colour through time.
+
+    Attributes
+    ----------
+    vertices : tuple of int
+        Vertices in this chain's row, in order of time.
+    edges : tuple of int
+        Its edges, in order of time; the outer ones may end on another chain's vertex.
+    first, last : float
+        The frames it spans, forks included.
+    """
+
+    vertices: tuple[int, ...]
+    edges: tuple[int, ...]
+    first: float
+    last: float
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Chains and their rows.
+
+    Attributes
+    ----------
+    chains : tuple of Chain
+        Every vertex and every edge belongs to exactly one.
+    row : (c,) int array
+        The row of each chain, 0 at the top.
+    vertex_chain, edge_chain : (n,), (m,) int arrays
+        The chain of each vertex and edge.
+    """
+
+    chains: tuple[Chain, ...]
+    row: NDArray[np.int64]
+    vertex_chain: NDArray[np.int64]
+    edge_chain: NDArray[np.int64]
+
+    @property
+    def count(self) -> int:
+        """The number of rows."""
+        return int(self.row.max()) + 1 if self.row.size else 0
+
+
+def _continuations(
+    frames: F64, rgb: F64, edges: Sequence[tuple[int, int]]
+) -> tuple[dict[int, int], list[int]]:
+    """Return which edge carries on into which, and the edge of each vertex (-1: none)."""
+
+    def change(edge: int) -> tuple[float, float, int]:
+        start, end = edges[edge]
+        # The colour that changes least carries on; of equals the longer edge.
+        length = float(frames[end] - frames[start])
+        return float(np.linalg.norm(rgb[end] - rgb[start])), -length, edge
+
+    follows: dict[int, int] = {}
+    home = []
+    for vertex in range(len(frames)):
+        arriving = [edge for edge, ends in enumerate(edges) if ends[1] == vertex]
+        leaving = [edge for edge, ends in enumerate(edges) if ends[0] == vertex]
+        home.append(min(arriving or leaving, key=change, default=-1))
+        if arriving and leaving:
+            follows[home[vertex]] = min(leaving, key=change)
+    return follows, home
+
+
+def find_chains(
+    frames: F64, rgb: F64, edges: Sequence[tuple[int, int]]
+) -> tuple[tuple[Chain, ...], NDArray[np.int64], NDArray[np.int64]]:
+    """Cut the edges into chains; return them with the chain of each vertex and of each edge."""
+    follows, home = _continuations(frames, rgb, edges)
+    edge_chain = np.full(len(edges), -1, dtype=np.int64)
+    members: list[list[int]] = []
+    carried_on = set(follows.values())
+    for first in range(len(edges)):
+        if first in carried_on:
+            continue
+        edge: int | None = first
+        chain: list[int] = []
+        while edge is not None:
+            edge_chain[edge] = len(members)
+            chain.append(edge)
+            edge = follows.get(edge)
+        members.append(chain)
+
+    vertex_chain = np.full(len(frames), -1, dtype=np.int64)
+    for vertex, edge_at in enumerate(home):
+        if edge_at >= 0:
+            vertex_chain[vertex] = edge_chain[edge_at]
+        else:  # no edge at all: a colour of one frame
+            vertex_chain[vertex] = len(members)
+            members.append([])
+
+    chains = []
+    for index, chain in enumerate(members):
+        standing = np.flatnonzero(vertex_chain == index)
+        standing = standing[np.argsort(frames[standing], kind="stable")]
+        times = [float(frames[v]) for v in standing]
+        times += [float(frames[v]) for e in chain for v in edges[e]]
+        chains.append(Chain(tuple(int(v) for v in standing), tuple(chain), min(times), max(times)))
+    return tuple(chains), vertex_chain, edge_chain
+
+
+def _fork_cost(
+    chains: Sequence[Chain],
+    frames: F64,
+    edges: Sequence[tuple[int, int]],
+    vertex_chain: NDArray[np.int64],
+    target: F64,
+) -> Cost:
+    """Return the function from (c,) places of the chains to the cost of that arrangement."""
+    forks = []
+    for index, chain in enumerate(chains):
+        # The outer ends of a chain may be on another chain's vertex.
+        ends = [edges[e][0] for e in chain.edges[:1]] + [edges[e][1] for e in chain.edges[-1:]]
+        forks += [(index, vertex_chain[v], frames[v]) for v in ends if vertex_chain[v] != index]
+    child, parent = (np.array([fork[k] for fork in forks], dtype=np.int64) for k in (0, 1))
+    times = np.array([fork[2] for fork in forks], dtype=np.float64)[:, None]
+    first, last = (np.array([getattr(c, end) for c in chains]) for end in ("first", "last"))
+    alive = (first[None] <= times) & (last[None] >= times)
+
+    def cost(place: F64) -> float:
+        low = np.minimum(place[child], place[parent])[:, None]
+        high = np.maximum(place[child], place[parent])[:, None]
+        crossed = (place[None] > low) & (place[None] < high) & alive
+        off_order = float(np.abs(place - target).sum()) / max(1, place.size)
+        total = ORDER_COST * off_order + SPAN_COST * float((high - low).sum())
+        return total + CROSSING_COST * float(np.count_nonzero(crossed))
+
+    return cost
+
+
+def _places(rows: Sequence[Sequence[int]]) -> NDArray[np.int64]:
+    """Return the row of each chain."""
+    result = np.zeros(sum(map(len, rows)), dtype=np.int64)
+    for row, members in enumerate(rows):
+        result[list(members)] = row
+    return result
+
+
+def _order(cost: Cost, order: list[int]) -> list[int]:
+    """Improve an order of chains by moving one at a time while the cost falls."""
+    best, trials, improved = cost(np.argsort(order).astype(np.float64)), 0, True
+    while improved and trials < MAX_TRIALS:
+        improved = False
+        for chain in list(order):
+            rest = [other for other in order if other != chain]
+            for there in range(len(order)):
+                candidate = [*rest[:there], chain, *rest[there:]]
+                found = cost(np.argsort(candidate).astype(np.float64))
+                if found < best - 1e-9:
+                    best, order, improved = found, candidate, True
+            trials += len(order)
+            if trials >= MAX_TRIALS:
+                break
+    return order
+
+
+def _share_rows(chains: Sequence[Chain], order: Sequence[int], cost: Cost, gap: float) -> list[Row]:
+    """Put chains that never meet in time (with a gap) into one row, where the cost allows it."""
+
+    def apart(some: Row, others: Row) -> bool:
+        return all(
+            chains[a].last + gap < chains[b].first or chains[b].last + gap < chains[a].first
+            for a in some
+            for b in others
+        )
+
+    rows = [[chain] for chain in order]
+    while True:
+        limit = cost(_places(rows).astype(np.float64)) + ROW_SAVING
+        best: tuple[float, list[Row]] | None = None
+        for a in range(len(rows)):
+            # Among many rows only neighbours are tried: the search stays short.
+            reach = len(rows) if len(rows) <= MANY_ROWS else min(a + 2, len(rows))
+            for b in range(a + 1, reach):
+                for kept, gone in ((a, b), (b, a)) if apart(rows[a], rows[b]) else ():
+                    candidate = [rows[a] + rows[b] if k == kept else r for k, r in enumerate(rows)]
+                    del candidate[gone]
+                    found = cost(_places(candidate).astype(np.float64))
+                    if found <= limit and (best is None or found < best[0]):
+                        best = found, candidate
+        if best is None:
+            return rows
+        rows = best[1]
+
+
+def arrange(frames: F64, rgb: F64, edges: Sequence[tuple[int, int]]) -> Rows:
+    """Find the rows of a palette's timeline.
+
+    Parameters
+    ----------
+    frames, rgb : (n,), (n, 3) float64
+        The vertices' frame numbers and colours.
+    edges : sequence of (int, int)
+        Vertex indices, the earlier end first.
+    """
+    chains, vertex_chain, edge_chain = find_chains(frames, rgb, edges)
+    luma = np.empty(len(chains))
+    for index, chain in enumerate(chains):
+        members = set(chain.vertices) | {v for e in chain.edges for v in edges[e]}
+        luma[index] = float((rgb[sorted(members)] @ LUMA).mean())
+    light_first = np.argsort(-luma, kind="stable")
+    target = np.argsort(light_first).astype(np.float64)
+    cost = _fork_cost(chains, frames, edges, vertex_chain, target)
+    gap = 0.04 * float(np.ptp(frames)) if frames.size else 0.0
+    rows = _share_rows(chains, _order(cost, light_first.tolist()), cost, gap)
+    return Rows(chains, _places(rows), vertex_chain, edge_chain)

@@ -1,0 +1,179 @@
+"""The atomic writer: whatever happens, a reader finds the old file or the new one."""
+
+import errno
+import os
+import stat
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from palette4d.common.errors import Palette4dError, WriteError
+from palette4d.common.files import replacing
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(entry.name for entry in folder.iterdir())
+
+
+def replace(path: Path, then: Callable[[], object], *, force: bool = True) -> None:
+    """Write a new content, with something that happens just after it."""
+    with replacing(path, force=force) as temporary:
+        temporary.write_bytes(b"new")
+        then()
+
+
+def failing(problem: BaseException) -> Callable[..., None]:
+    def fail(*_: object) -> None:
+        raise problem
+
+    return fail
+
+
+@pytest.fixture
+def old(tmp_path: Path) -> Path:
+    path = tmp_path / "grade.cube"
+    path.write_bytes(b"old")
+    return path
+
+
+def test_the_old_file_stays_until_the_new_one_is_complete(old: Path) -> None:
+    with replacing(old, force=True) as temporary:
+        assert temporary.parent == old.parent
+        assert temporary.suffix == ".cube"
+        assert temporary.read_bytes() == b""
+        temporary.write_bytes(b"new")
+        assert old.read_bytes() == b"old"
+    assert old.read_bytes() == b"new"
+    assert names(old.parent) == [old.name]
+
+
+def test_two_writers_at_once_have_a_file_each(old: Path) -> None:
+    with replacing(old, force=True) as a, replacing(old, force=True) as b:
+        assert a != b
+        a.write_bytes(b"a")
+        b.write_bytes(b"b")
+    assert old.read_bytes() == b"a"
+    assert names(old.parent) == [old.name]
+
+
+@pytest.mark.parametrize(
+    "problem", [KeyboardInterrupt(), OSError(errno.ENOSPC, "full"), ValueError()]
+)
+def test_errors_leave_the_old_file_and_nothing_else(old: Path, problem: BaseException) -> None:
+    expected = WriteError if isinstance(problem, OSError) else type(problem)
+    with pytest.raises(expected):
+        replace(old, failing(problem))
+    assert old.read_bytes() == b"old"
+    assert names(old.parent) == [old.name]
+
+
+@pytest.mark.parametrize(("owner", "name"), [(os, "fsync"), (Path, "replace")])
+@pytest.mark.parametrize("problem", [KeyboardInterrupt(), OSError(errno.ENOSPC, "full")])
+def test_failures_of_the_disk_leave_the_old_file(
+    old: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    owner: object,
+    name: str,
+    problem: BaseException,
+) -> None:
+    with pytest.raises((WriteError, KeyboardInterrupt)):
+        replace(old, lambda: monkeypatch.setattr(owner, name, failing(problem)))
+    monkeypatch.undo()
+    assert old.read_bytes() == b"old"
+    assert names(old.parent) == [old.name]
+
+
+def test_file_and_folder_are_synced(old: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In this order: the content, the rename, the folder that holds the new name."""
+    events: list[str] = []
+    real, rename = os.fsync, Path.replace
+
+    def fsync(handle: int) -> None:
+        events.append("folder" if stat.S_ISDIR(os.fstat(handle).st_mode) else "file")
+        real(handle)
+
+    def renamed(self: Path, target: Path) -> Path:
+        events.append("rename")
+        return rename(self, target)
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    monkeypatch.setattr(Path, "replace", renamed)
+    with replacing(old, force=True) as temporary:
+        temporary.write_bytes(b"new")
+    assert events == ["file", "rename", "folder"]
+
+
+@pytest.mark.parametrize("mode", [0o640, 0o600, 0o444])
+def test_permissions_are_kept(old: Path, mode: int) -> None:
+    old.chmod(mode)
+    with replacing(old, force=True) as temporary:
+        temporary.write_bytes(b"new")
+    assert stat.S_IMODE(old.stat().st_mode) == mode
+
+
+def test_a_new_file_has_the_usual_permissions(tmp_path: Path) -> None:
+    (tmp_path / "reference").touch()
+    with replacing(tmp_path / "new.txt") as temporary:
+        temporary.write_text("new")
+    assert (tmp_path / "new.txt").stat().st_mode == (tmp_path / "reference").stat().st_mode
+
+
+def test_a_library_may_replace_the_temporary_file(old: Path) -> None:
+    old.chmod(0o640)
+    with replacing(old, force=True) as temporary:
+        temporary.unlink()
+        temporary.write_bytes(b"new")
+    assert old.read_bytes() == b"new"
+    assert stat.S_IMODE(old.stat().st_mode) == 0o640
+
+
+def test_a_link_stays_a_link(old: Path) -> None:
+    folder = old.parent / "links"
+    folder.mkdir()
+    link = folder / "link.cube"
+    link.symlink_to(old)
+    with replacing(link, force=True) as temporary:
+        temporary.write_bytes(b"new")
+    assert link.is_symlink()
+    assert old.read_bytes() == b"new"
+    assert names(folder) == ["link.cube"]
+
+
+def test_a_file_that_exists_is_replaced_only_on_request(old: Path) -> None:
+    with pytest.raises(Palette4dError), replacing(old):
+        raise AssertionError("the body must not run")
+    new = old.with_name("new.cube")
+    with pytest.raises(Palette4dError):
+        replace(new, lambda: new.write_bytes(b"of another program"), force=False)
+    assert new.read_bytes() == b"of another program"
+    assert names(old.parent) == [old.name, new.name]
+
+
+def test_the_last_check_can_still_refuse(old: Path) -> None:
+    check = failing(Palette4dError("changed"))
+    with (
+        pytest.raises(Palette4dError),
+        replacing(old, force=True, check=check) as temporary,
+    ):
+        temporary.write_bytes(b"new")
+    assert old.read_bytes() == b"old"
+    assert names(old.parent) == [old.name]
+
+
+@pytest.mark.parametrize("name", ["x" * 250, "\N{GRINNING FACE}" * 60 + ".cube"])
+def test_the_longest_names(tmp_path: Path, name: str) -> None:
+    with replacing(tmp_path / name) as temporary:
+        temporary.write_bytes(b"new")
+    assert names(tmp_path) == [name]
+
+
+def test_targets_that_cannot_be_written(tmp_path: Path) -> None:
+    for target in (tmp_path, tmp_path / "missing" / "new.cube"):
+        with pytest.raises(Palette4dError), replacing(target):
+            raise AssertionError("the body must not run")
+    if os.geteuid() != 0:  # root may write everywhere
+        locked = tmp_path / "locked"
+        locked.mkdir(mode=0o500)
+        with pytest.raises(WriteError), replacing(locked / "new.cube"):
+            raise AssertionError("the body must not run")
