@@ -1,24 +1,22 @@
-"""Sudden cuts, found from the frames' colours alone: a palette must not span one (section 7.1).
+"""Detection of sudden cuts from the colours of frames: a palette must not span one (section 7.1).
 
-Input: the frames' statistics. Output: the frame numbers with which new shots begin; and the flashes
-inside of a shot, which are found by the same limits.
+Input: the histograms of frames (`colour_histogram`). Output: the numbers of the frames with which
+new shots begin.
 
-The measure is the share of pixels whose colour has no counterpart in the other frame: one minus the
-intersection of two histograms (`colour_histogram`), in which a small shift of all colours
-(exposure, fading, grain) is a small difference.
+Two frames differ by the share of pixels whose colour has no counterpart in the other frame, one
+minus the intersection of their histograms. A small shift of all colours (exposure, fading, grain)
+is a small difference. The difference of a frame from the one before is a cut when
 
-The difference of a frame from the one before is a cut when
-
-- at least `LEAST_DIFFERENCE` of the pixels have changed: a title or a banner changes less,
-- it is `LEAST_RATIO` times what goes on around it, the second largest of the `AROUND` differences
-  before or of those after (twice that with fewer than `SURE` on a side, beside the clip's ends): a
-  pan, a fade, a time lapse or flicker change all the time,
+- it is at least `LEAST_DIFFERENCE`: a title or a banner changes less,
+- it is `LEAST_RATIO` times the differences around it, the second largest of the `AROUND` before or
+  after (twice that with fewer than `SURE` on a side, near the ends of the clip): a pan, a fade, a
+  time lapse or flicker change all the time,
 - and no frames around it agree over a gap of one or two frames, as they do around a flash.
 
-Dissolves are changes in time that a palette can follow, and are not looked for. A cut between
-pictures of the same colours is not seen, and does no harm. Two frames alone show no cut: nothing
-says how fast the clip changes. A change of light in one frame that stays, such as a lamp switched
-on, is a cut to a palette too. `docs/clips.md` has the figures on which the limits stand.
+A dissolve is a change in time that a palette follows: it is no cut. A cut between pictures of equal
+colours is not detected, and does no harm. Two frames alone show no cut, since the speed of the clip
+is unknown. A lasting change of light, such as a lamp switched on, is a cut to a palette too.
+docs/clips.md has the figures behind the limits.
 """
 
 from __future__ import annotations
@@ -29,7 +27,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d.analysis.statistics import FrameStatistics
+from palette4d.analysis.frame_statistics import FrameStatistics
 
 from palette4d.common.text import counted
 
@@ -37,52 +35,29 @@ F64 = NDArray[np.float64]
 
 LEAST_DIFFERENCE = 0.15
 LEAST_RATIO = 3.0
-# Differences below this are noise: a still picture must not make any change look large.
+# Differences below this are noise: beside a still picture any change would look large.
 NOISE = 0.01
 # Around a flash the frames agree again: they differ by at most this share of the jump.
 AGREEMENT = 0.5
 LONGEST_FLASH = 2
 AROUND = 5
-# So many differences on both sides say enough.
 SURE = 3
-
 MOST_SHOWN = 8
 
 
 def find_cuts(statistics: Sequence[FrameStatistics]) -> list[int]:
-    """Return the numbers of the frames that begin a new shot, rising; none for a single shot.
-
-    Costs next to nothing: what they are found by was counted when the frames were read.
-    """
+    """Return the numbers of the frames that begin a new shot, rising; none for a single shot."""
     return find_cuts_of((frame.frame, frame.histogram) for frame in statistics)
 
 
 def find_cuts_of(histograms: Iterable[tuple[int, F64]]) -> list[int]:
-    """Return the same for frame numbers with their histograms, of which few are held at a time."""
+    """Return the same for (frame number, histogram) pairs; few of them are held at a time."""
     numbers, gaps = _gaps(histograms)
     return [numbers[i] for i in range(1, len(numbers)) if _is_cut(gaps, i)]
 
 
-def find_flashes(statistics: Sequence[FrameStatistics]) -> list[range]:
-    """Return the flashes, rising: runs of one or two frames (indices) that differ from the frames
-    around as a cut would, which agree with each other."""
-    _, gaps = _gaps((frame.frame, frame.histogram) for frame in statistics)
-    jumps, out = gaps[1], list[range]()
-    lengths = range(1, LONGEST_FLASH + 1)
-    for first, length in itertools.product(range(1, len(statistics)), lengths):
-        end = first + length
-        if end >= len(statistics) or (out and first <= out[-1].stop):
-            continue
-        jump = min(jumps[first - 1], jumps[end - 1])
-        sudden = _is_sudden(jump, jumps, first - 1, end)
-        if sudden and gaps[length + 1][first - 1] <= AGREEMENT * jump:
-            out.append(range(first, end))
-    return out
-
-
 def _gaps(histograms: Iterable[tuple[int, F64]]) -> tuple[list[int], dict[int, list[float]]]:
-    """Return the frames' numbers, and their differences: `gaps[d][i]` is that of frame i + d from
-    frame i, for d up to what spans a flash."""
+    """Return the numbers of the frames, and `gaps[d][i]`, how frame i + d differs from frame i."""
     numbers = []
     gaps: dict[int, list[float]] = {d: [] for d in range(1, LONGEST_FLASH + 2)}
     recent: deque[F64] = deque(maxlen=LONGEST_FLASH + 1)
@@ -95,10 +70,11 @@ def _gaps(histograms: Iterable[tuple[int, F64]]) -> tuple[list[int], dict[int, l
 
 
 def _is_cut(gaps: dict[int, list[float]], at: int) -> bool:
-    """Whether a shot begins with frame `at`, an index from 1."""
+    """Return whether a shot begins with frame `at`, an index from 1."""
     jumps = gaps[1]
     jump = jumps[at - 1]
-    if not _is_sudden(jump, jumps, at - 1, at):
+    around = max(_activity(jumps, at - 1, at), NOISE)
+    if jump < LEAST_DIFFERENCE or jump < LEAST_RATIO * around:
         return False
     for length in range(1, LONGEST_FLASH + 1):
         # The flash lies between `start` and `start + length + 1`; the jump is one of its edges.
@@ -108,15 +84,8 @@ def _is_cut(gaps: dict[int, list[float]], at: int) -> bool:
     return True
 
 
-def _is_sudden(jump: float, jumps: list[float], start: int, end: int) -> bool:
-    """Whether a jump is large beside what goes on around `jumps[start:end]`."""
-    return jump >= LEAST_DIFFERENCE and (
-        jump >= LEAST_RATIO * max(_activity(jumps, start, end), NOISE)
-    )
-
-
 def _activity(jumps: list[float], start: int, end: int) -> float:
-    """Return how much the frames change around some jumps; infinite where there are no others."""
+    """Return how much the frames change around some jumps; infinite if there are no others."""
     before, after = jumps[max(0, start - AROUND) : start], jumps[end : end + AROUND]
     if not before and not after:
         return np.inf
@@ -125,30 +94,33 @@ def _activity(jumps: list[float], start: int, end: int) -> float:
 
 
 def _usual(jumps: list[float]) -> float:
-    """Return the second largest of several jumps: the largest may be another cut, and repeated
-    frames (pulldown, animation on twos) leave only two of five that say how fast the clip moves."""
+    """Return the second largest of several jumps.
+
+    The largest may be another cut, and repeated frames (pulldown, animation on twos) leave two of
+    five jumps that tell the speed of the clip.
+    """
     ordered = sorted(jumps)
     return ordered[-2] if len(ordered) > 2 else ordered[-1]
 
 
 def difference(one: F64, other: F64) -> float:
-    """Return the share of pixels, 0 to 1, that one histogram has and the other has not."""
+    """Return the share of pixels, 0 to 1, without a counterpart in the other histogram."""
     return float(1 - np.minimum(one, other).sum())
 
 
 def refusal(frames: Sequence[int], cuts: Sequence[int]) -> str:
-    """Say that the clip of evenly spaced `frames` has `cuts`, and what to analyse apart."""
+    """Say that the clip of evenly spaced `frames` has `cuts`, and which frames to analyse."""
     shots = [f"--frames {shot}" for shot in _shots(frames, cuts)]
     return (
         f"found {counted(len(cuts), 'sudden cut')}: a new shot begins at {_places(cuts)}; expected "
-        "one shot, since a palette is followed through time and must not span a cut. Analyse each "
-        f"shot apart ({_some(shots)}; --detect-shots does all), or give --allow-cuts to analyse "
-        f"all as one.{_flash(frames, cuts)}"
+        "one shot, since a palette must not span a cut. Analyse each shot by itself "
+        f"({_some(shots)}; --detect-shots does all of them), or give --allow-cuts to analyse all "
+        f"frames as one shot.{_flash(frames, cuts)}"
     )
 
 
 def _flash(frames: Sequence[int], cuts: Sequence[int]) -> str:
-    """Say what to do if what looks like a shot at the clip's end is a flash."""
+    """Say what to do if the shot at the end of the clip is a flash."""
     step = frames[1] - frames[0]
     bounds = [frames[0], *cuts, frames[-1] + step]
     lasting = [
@@ -158,18 +130,18 @@ def _flash(frames: Sequence[int], cuts: Sequence[int]) -> str:
     ]
     if len(lasting) != 1:
         return ""
-    return f" If it is a flash at the clip's end, leave that out: --frames {lasting[0]}."
+    return f" If it is a flash at the end of the clip, leave it out: --frames {lasting[0]}."
 
 
 def refusal_inside(cuts: Sequence[int]) -> str:
-    """Say that there are `cuts` inside of what an edit shows as one clip."""
+    """Say that there are `cuts` inside one clip of an edit."""
     return (
-        f"found {counted(len(cuts), 'sudden cut')} inside of what the edit shows: a new shot "
-        f"begins at {_places(cuts)}; expected one shot. Blade the edit there, or give --allow-cuts"
+        f"found {counted(len(cuts), 'sudden cut')} inside one clip of the edit: a new shot begins "
+        f"at {_places(cuts)}; expected one shot. Blade the edit there, or give --allow-cuts"
     )
 
 
-def remark(cuts: Sequence[int]) -> str:
+def note(cuts: Sequence[int]) -> str:
     """Say that the palette spans `cuts` that the user allowed."""
     what = counted(len(cuts), "sudden cut", "sudden cuts")
     return f"the palette spans {what}, at {_places(cuts)}: expect a loose fit beside them"

@@ -43,10 +43,10 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d.analysis.losses import NO_FACES, colour_scale
-from palette4d.analysis.options import AnalysisOptions
+from palette4d.analysis.convex_hulls import THIN
+from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
+from palette4d.analysis.losses import NO_FACES
 from palette4d.analysis.polytope import Section, SkewPolytope
-from palette4d.analysis.statistics import FrameStatistics
 from scipy.spatial import ConvexHull, QhullError
 
 from palette4d import _core
@@ -64,8 +64,6 @@ LEAST_VERTICES = 8
 ROUND = 0.8
 # How far beyond the gamut a new vertex may lie, in units of the gamut, before it is clipped.
 OVERSHOOT = 0.3
-# Colours within half an 8-bit step of a plane, a line or a point fill nothing.
-THIN = 0.5 / 255
 EXACTLY_FLAT = 1e-9
 # Hulls whose facets qhull could not tell apart are told apart by moving colours this little.
 JITTERS = (0.0, 1e-9, 1e-7, 1e-5)
@@ -84,9 +82,7 @@ class _IllFormedError(Palette4dError):
 
 def rgbt_polytope(
     frames: Sequence[FrameStatistics],
-    low: F64,
-    high: F64,
-    options: AnalysisOptions,
+    gamut: Gamut,
     vertices: int = VERTICES,
     progress: Callable[[int, int], None] | None = None,
 ) -> SkewPolytope:
@@ -95,8 +91,7 @@ def rgbt_polytope(
     Parameters
     ----------
     frames : at least one frame, in order of time.
-    low, high : (3,) the gamut box; vertices are clipped to it.
-    options : accepted as by the other stages; the hull has no weights.
+    gamut : vertices are clipped to it.
     vertices : the most 4D vertices wanted, at least `LEAST_VERTICES`. Clipping may leave fewer.
     progress : called as progress(done, total) while vertices are removed.
 
@@ -105,31 +100,29 @@ def rgbt_polytope(
     Palette4dError
         When fewer than `LEAST_VERTICES` vertices are asked for, or rounding leaves no usable hull.
     """
-    del options
     if vertices < LEAST_VERTICES:
         raise Palette4dError(
             f"vertices of the RGBT hull: found {vertices}, expected at least {LEAST_VERTICES}: "
             "four at either end of the clip enclose a volume"
         )
     numbers = np.array([frame.frame for frame in frames], float)
-    points = all_extremes(frames, low, high)
+    points = all_extremes(frames, gamut)
     if len(frames) > 1:
-        points = simplified(points, numbers[0], numbers[-1], low, high, vertices, progress)
+        points = simplified(points, numbers[0], numbers[-1], gamut, vertices, progress)
         points[:, 3] = _nearest(numbers, points[:, 3])
-        points[:, :3] = np.clip(points[:, :3], low, high)
-        return convex_polytope(points, numbers, colour_scale(low, high))
-    colours = _simplified_colours(points[:, :3], low, high, vertices)
-    return _still(np.clip(colours, low, high), numbers[0], colour_scale(low, high))
+        points[:, :3] = gamut.clip(points[:, :3])
+        return convex_polytope(points, numbers, gamut.scale)
+    colours = _simplified_colours(points[:, :3], gamut, vertices)
+    return _still(gamut.clip(colours), numbers[0], gamut.scale)
 
 
-def all_extremes(frames: Sequence[FrameStatistics], low: F64, high: F64) -> F64:
+def all_extremes(frames: Sequence[FrameStatistics], gamut: Gamut) -> F64:
     """Return the (n, 4) corners of every frame's hull: r, g, b, frame."""
-    scale = colour_scale(low, high)
     return np.vstack(
         [
             np.column_stack([rgb, np.full(len(rgb), float(frame.frame))])
             for frame in frames
-            for rgb in (_extremes(frame.colours.rgb, scale),)
+            for rgb in (_extremes(frame.colours.rgb, gamut.scale),)
         ]
     )
 
@@ -138,8 +131,7 @@ def simplified(
     points: F64,
     first: float,
     last: float,
-    low: F64,
-    high: F64,
+    gamut: Gamut,
     vertices: int,
     progress: Callable[[int, int], None] | None = None,
 ) -> F64:
@@ -149,11 +141,11 @@ def simplified(
     More are left only where the hull of the points cannot be simplified so far. Points that fill
     nothing (see `THIN`) come back moved into the flat space around them.
     """
-    flat = _Flat.around(_normalised(points, first, last, low, high), THIN)
+    flat = _Flat.around(_normalised(points, first, last, gamut), THIN)
     hull = _hull(flat.coordinates)
-    scale = colour_scale(low, high)
+    low, scale = gamut.low, gamut.scale
     if hull.points.shape[1] > 1:
-        limits = flat.limits((high - low) / scale)
+        limits = flat.limits((gamut.high - low) / scale)
         hull = _simplify(hull, vertices, limits, progress)
         hull = _simplify(hull, vertices, limits[:2])  # time alone, where that was not enough
     unit = flat.back(hull.points)
@@ -177,7 +169,7 @@ def convex_polytope(points: F64, frames: F64, scale: float = 1.0) -> SkewPolytop
         When rounding leaves no usable hull.
     """
     points = np.unique(points[:, [3, 0, 1, 2]], axis=0)[:, [1, 2, 3, 0]]  # in order of time
-    unit = _normalised(points, frames[0], frames[-1], np.zeros(3), np.full(3, scale))
+    unit = _normalised(points, frames[0], frames[-1], Gamut(np.zeros(3), np.full(3, scale)))
     flat = _Flat.around(unit, THIN)
     if len(flat.axes) < 3:
         points = np.column_stack([scale * flat.back(flat.coordinates)[:, :3], points[:, 3]])
@@ -265,11 +257,10 @@ def _simplify(
     return hull
 
 
-def _normalised(points: F64, first: float, last: float, low: F64, high: F64) -> F64:
+def _normalised(points: F64, first: float, last: float, gamut: Gamut) -> F64:
     """Colours with the gamut as one unit, and times with the clip as one."""
-    return np.column_stack(
-        [(points[:, :3] - low) / colour_scale(low, high), (points[:, 3] - first) / (last - first)]
-    )
+    colours = (points[:, :3] - gamut.low) / gamut.scale
+    return np.column_stack([colours, (points[:, 3] - first) / (last - first)])
 
 
 @dataclasses.dataclass(frozen=True)
@@ -337,17 +328,17 @@ def _extremes(rgb: F64, scale: float) -> F64:
         return rgb
 
 
-def _simplified_colours(rgb: F64, low: F64, high: F64, vertices: int) -> F64:
+def _simplified_colours(rgb: F64, gamut: Gamut, vertices: int) -> F64:
     """Return at most `vertices` colours around the (n, 3) colours of a single frame."""
-    scale = colour_scale(low, high)
+    scale = gamut.scale
     axes = _axes(rgb, THIN * scale)
     centre: F64 = rgb.mean(axis=0)
     if len(axes) == 0:
         return centre[None]
     hull = _hull((rgb - centre) @ axes.T)
     if len(axes) > 1:
-        floor = low - OVERSHOOT * scale - centre
-        ceiling = high + OVERSHOOT * scale - centre
+        floor = gamut.low - OVERSHOOT * scale - centre
+        ceiling = gamut.high + OVERSHOOT * scale - centre
         limits = np.vstack([np.column_stack([axes.T, floor]), np.column_stack([-axes.T, -ceiling])])
         hull = _simplify(hull, vertices, limits)
         hull = _simplify(hull, vertices, limits[:0])

@@ -23,7 +23,16 @@ from edits import clip, external, movie, picture, save, sequence, timeline
 from palette4d.cli import main
 
 #: Small palettes of few colours: a shot takes a fraction of a second.
-QUICK = ("--palette-size", "4", "--colours", "512", "--coarse-colours", "128", "--blocks", "1")
+QUICK = (
+    "--set",
+    "palette_size=4",
+    "--set",
+    "colours=512",
+    "--set",
+    "coarse_colours=128",
+    "--set",
+    "blocks=1",
+)
 
 
 def analyze(source: Path | str, out: Path, *words: str) -> int:

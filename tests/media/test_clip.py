@@ -136,7 +136,7 @@ def test_ranges_in_the_pattern_and_outside(tmp_path):
     assert list(reds(some)) == some.frames == [1001, 1002, 1004]
     assert some.step == 0
     with pytest.raises(Palette4dError, match=r"1001, 1002, 1004 are not evenly spaced.*1-10x3"):
-        pipeline.analyze_clip(some, AnalysisOptions())
+        pipeline.analyze(some, AnalysisOptions())
     with pytest.raises(ClipError, match="frame 5 was asked for"):
         open_clip(str(folder)).read(5)
 

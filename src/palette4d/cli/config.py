@@ -60,7 +60,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Write the config; print what is in it."""
-    from palette4d.lut_export.bake import BakeSettings
+    from palette4d.lut_export.bake_job import BakeSettings
     from palette4d.lut_export.config import write_config
     from palette4d.lut_export.formats import format_named
     from palette4d.shows import export_luts

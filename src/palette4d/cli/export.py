@@ -99,7 +99,7 @@ def run(args: argparse.Namespace) -> int:
     """Export; print what was written."""
     from palette4d import _core
     from palette4d.lut_export import series
-    from palette4d.lut_export.bake import BakeSettings
+    from palette4d.lut_export.bake_job import BakeSettings
     from palette4d.lut_export.formats import format_named
     from palette4d.shows.manifest import is_manifest
 

@@ -9,7 +9,7 @@ import dataclasses
 import itertools
 from collections.abc import Callable, Iterable, Iterator
 
-from palette4d.analysis import cuts, statistics
+from palette4d.analysis import colour_statistics, cuts
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import file_safe
@@ -147,7 +147,9 @@ def cuts_of(clip: Clip, progress: Callable[[int, int], None] | None = None) -> l
     def histograms() -> Iterator[tuple[int, cuts.F64, bool]]:
         for done, image in enumerate(clip.iter_images(), start=1):
             tell(done, len(clip.frames))
-            found = statistics.gather(image.frame, clip.straight_colours(image.pixels), options)
+            found = colour_statistics.gather(
+                image.frame, clip.straight_colours(image.pixels), options
+            )
             if found is not None:
                 yield image.frame, found.histogram, hidden(image.pixels)
 
