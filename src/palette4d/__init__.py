@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from palette4d._core import __version__
     from palette4d.grade.document import Document
-    from palette4d.lut_export.bake import BakeResult
+    from palette4d.lut_export.bake import bake
     from palette4d.media.clip import Clip, open_clip
 
 __all__ = [
@@ -40,6 +40,7 @@ __all__ = [
 _HOMES = {
     "Document": "palette4d.grade.document",
     "__version__": "palette4d._core",
+    "bake": "palette4d.lut_export.bake",
     "open_clip": "palette4d.media.clip",
 }
 
@@ -137,51 +138,3 @@ def analyze(
     )
     notes = colour_space.record(fields, opened, spaces)
     return Document(fields, (*notes, *found.remarks))
-
-
-def bake(
-    source: "str | os.PathLike[str] | Document",
-    frame: float,
-    path: str | os.PathLike[str],
-    *,
-    size: int = 33,
-    force: bool = False,
-    **options: Any,
-) -> "BakeResult":
-    """Write the edit at one time as a 3D LUT or an ASC CDL, and measure the file's error.
-
-    Parameters
-    ----------
-    source : path or Document
-        A sidecar, or a document.
-    frame : float
-        The time, a frame number of the clip; fractions are allowed.
-    path : path
-        The file to write; its extension chooses the format.
-    size : int
-        Samples a side, 2..129.
-    force : bool
-        Replace an existing file.
-    **options
-        As `palette4d bake` has them.
-
-    Raises
-    ------
-    Palette4dError
-        An argument cannot be used; nothing was written.
-    """
-    import tempfile
-    from pathlib import Path
-
-    from palette4d.grade import sidecar
-    from palette4d.grade.document import Document
-    from palette4d.lut_export.bake import BakeOptions
-    from palette4d.lut_export.bake import bake as bake_file
-
-    settings = BakeOptions(frame, size, **options)
-    if not isinstance(source, Document):
-        return bake_file(Path(source), Path(path), settings, force=force)
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "document.p4d.json"
-        sidecar.save(source.fields(), file)
-        return bake_file(file, Path(path), settings, force=force)
