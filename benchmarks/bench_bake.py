@@ -19,11 +19,10 @@ from pathlib import Path
 
 import numpy as np
 import PyOpenColorIO as ocio
-from palette4d.lut_export import lattice
-from palette4d.lut_export.bake import BakeOptions, bake
-from palette4d.lut_export.error import Figures, measure
+from palette4d.lut_export import lut3d
+from palette4d.lut_export.bake import bake
+from palette4d.lut_export.bake_error import Figures, load, measure
 from palette4d.lut_export.frame_edit import frame_edit
-from palette4d.lut_export.reading import load
 from palette4d.lut_export.shaper import UNSHAPED
 from palette4d.lut_export.writers import Description, by_baker, by_transforms
 
@@ -73,7 +72,7 @@ def main() -> None:
     image, number = frame_colours(args.sidecar, sidecar.clip, args.frame, args.clip)
     edit = frame_edit(sidecar, args.frame)
     viewing = viewing_of(sidecar.clip["encoding"])
-    colours = lattice.dense_grid(UNSHAPED) if image is None else np.asarray(image[..., :3])
+    colours = lut3d.dense_grid(UNSHAPED) if image is None else np.asarray(image[..., :3])
     where = "a dense grid" if image is None else f"the clip's colours at frame {number}"
 
     def error(path: Path) -> Figures:
@@ -85,7 +84,7 @@ def main() -> None:
         big, ours, theirs = (Path(folder) / name for name in ("big.clf", "ours.cube", "peer.cube"))
 
         def make_big() -> None:
-            big.write_text(CLF(lattice.build(edit, 129), NOTHING), encoding="utf-8")
+            big.write_text(CLF(lut3d.sample(edit, 129), NOTHING), encoding="utf-8")
 
         print(
             f"wall seconds and errors, medians of {args.runs} runs; errors on {where}, tetrahedral"
@@ -99,16 +98,17 @@ def main() -> None:
         for size in map(int, args.sizes.split(",")):
 
             def table(size: int = size) -> None:
-                text = CUBE(lattice.build(edit, size), NOTHING)
+                text = CUBE(lut3d.sample(edit, size), NOTHING)
                 ours.write_text(text, encoding="utf-8")
 
             def whole(size: int = size) -> None:
                 bake(
                     args.sidecar,
+                    args.frame,
                     Path(folder) / "whole.cube",
-                    BakeOptions(args.frame, size, shaper="none"),
-                    image=image,
-                    image_frame=number,
+                    size=size,
+                    shaper="none",
+                    clip=image,
                     force=True,
                 )
 

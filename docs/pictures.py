@@ -100,7 +100,7 @@ def draw_timeline(demo: Path, folder: Path) -> None:
     track = Track(json.loads(sidecar.read_text(encoding="utf-8")))
     held = track.colours(np.array([float(HELD)]), False)[0]
     palette4d("edit", sidecar, "set", track.gold, "--rgb", *ROSE)
-    palette4d("edit", sidecar, "stop", track.edge, "--frame", HELD, "--rgb", *held)
+    palette4d("edit", sidecar, "set", track.edge, "--frame", HELD, "--rgb", *held)
     clip, graded = demo / "clip" / "sample.####.png", folder / "graded.####.png"
     frames = ",".join(map(str, SHOWN))
     palette4d("render", sidecar, clip, "-o", graded, "--frames", frames, "--quiet")

@@ -1,9 +1,8 @@
-"""An ASC CDL that comes as near as a CDL can to the edit at one time, for hosts without LUTs.
+"""The ASC CDL nearest to the edit at one time, for hosts without LUTs.
 
 A CDL is ten numbers: slope, offset and power for each channel, and a saturation (ASC CDL 1.2). They
-are found by least squares of the relative error (`error`), on the clip's colours at that time or,
-without them, on the dense grid; what a CDL cannot do is left over, and is stated like the error of
-a table.
+are fitted by least squares of the relative error (`bake_error`), on the clip's colours at that time
+or, without them, on the dense grid. The remaining error is stated like that of a 3D LUT.
 """
 
 from dataclasses import dataclass
@@ -11,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d.lut_export.error import FLOOR
+from palette4d.lut_export.bake_error import FLOOR
 from palette4d.lut_export.frame_edit import FrameEdit
 from palette4d.lut_export.writers import Description, one_line
 
@@ -21,7 +20,7 @@ F64 = NDArray[np.float64]
 #: Luma of ASC CDL 1.2, that of Rec.709.
 LUMA = np.array([0.2126, 0.7152, 0.0722])
 
-#: Colours that are fitted to, evenly spread over those that are given.
+#: At most about this many colours, evenly spread over those that are given, are fitted.
 FITTED = 10_000
 
 #: Digits after the point of the ten numbers.
@@ -60,33 +59,15 @@ def _apply(numbers: F64, colours: F64) -> F64:
     return np.asarray(luma + numbers[9] * (powered - luma))
 
 
-def _slopes(numbers: F64, colours: F64) -> F64:
-    """Return the (n, 3, 10) derivatives of `_apply` by the ten numbers."""
-    linear = colours * numbers[0:3] + numbers[3:6]
-    power = numbers[6:9]
-    above = linear > 0
-    # The slope of a power below 1 is infinite at 0.
-    base = np.where(above, np.maximum(linear, 1e-6), 1.0)
-    by_linear = np.where(above, power * base ** (power - 1), 1.0)
-    by_power = np.where(above, base**power * np.log(base), 0.0)
-    powered = np.where(above, base**power, linear)
-    mix = numbers[9] * np.eye(3) + (1 - numbers[9]) * LUMA
-    result = np.empty((len(colours), 3, 10))
-    for first, part in ((0, by_linear * colours), (3, by_linear), (6, by_power)):
-        result[:, :, first : first + 3] = mix * part[:, None, :]
-    result[:, :, 9] = powered - (powered @ LUMA)[:, None]
-    return result
-
-
 def fit(edit: FrameEdit, colours: F32) -> Cdl:
     """Return the CDL nearest to an edit on some colours.
 
     Parameters
     ----------
     edit : FrameEdit
-        What to come near to.
+        What to fit.
     colours : (h, w, 3) float32
-        Where; colours that are not finite are left out.
+        On what; colours that are not finite are left out.
     """
     if edit.identity:
         return Cdl()
@@ -103,14 +84,11 @@ def fit(edit: FrameEdit, colours: F32) -> Cdl:
     def residual(numbers: F64) -> F64:
         return ((_apply(numbers, points) - wanted) / scale).ravel()
 
-    def slopes(numbers: F64) -> F64:
-        return (_slopes(numbers, points) / scale[:, :, None]).reshape(-1, 10)
-
     start = np.array([1.0] * 3 + [0.0] * 3 + [1.0] * 3 + [1.0])
     # Slope, power and saturation are not negative by the standard; powers near 0 make steps.
     low = np.array([0.0] * 3 + [-10.0] * 3 + [0.1] * 3 + [0.0])
     high = np.array([100.0] * 3 + [10.0] * 3 + [10.0] * 3 + [10.0])
-    found = least_squares(residual, start, jac=slopes, bounds=(low, high), max_nfev=200)
+    found = least_squares(residual, start, bounds=(low, high), max_nfev=200)
     rounded = [round(float(value), DIGITS) + 0.0 for value in found.x]
     return Cdl(_triple(rounded[0:3]), _triple(rounded[3:6]), _triple(rounded[6:9]), rounded[9])
 

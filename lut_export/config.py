@@ -4,9 +4,9 @@ DIR/config.ocio            the config: a copy of a base config, with looks and v
 DIR/luts/SHOT/SHOT.F.clf   the edit of a shot at each of its frames F, and SHOT.default.clf
 
 There is one look a shot, in the shot's own encoding as process space. Its file transform names the
-file by the context variable FRAME, so that a host that sets it shows the look of the frame it is
-at. The look `palette4d` names the shot by the context variable SHOT, too, and for every view of the
-base there is one more that applies it.
+file by the context variable FRAME: a host that sets it shows the look of that frame. The look
+`palette4d` names the shot by the context variable SHOT, too, and each view of the base has one more
+view that applies it.
 """
 
 import copy
@@ -17,15 +17,17 @@ from pathlib import Path
 from typing import Any
 
 from palette4d.lut_export import series
+from palette4d.lut_export.bake_error import stated
+from palette4d.lut_export.bake_job import BakeSettings
+from palette4d.lut_export.between import LARGEST_DELTA_E, BetweenError, between_error, nearest
 from palette4d.lut_export.config_base import (
     ANY_SHOT,
-    TABLES,
+    LUTS,
     load_base,
-    process_space,
     refuse_looks,
     relocate,
+    space_of_sidecar,
 )
-from palette4d.lut_export.error import stated
 from palette4d.lut_export.formats import LutFormat, format_named
 from palette4d.lut_export.spaces import PALETTE
 
@@ -34,37 +36,10 @@ from palette4d.colour.ocio_config import BUILT_IN, failures
 from palette4d.common.errors import Palette4dError
 from palette4d.common.files import make_folder, refuse_existing, replacing
 from palette4d.common.text import checked_name, counted, file_safe
+from palette4d.jobs.workers import Workers
 
-#: What FRAME is when a host does not set it, and the name of the file for that.
+#: The value of FRAME when a host does not set it, and the name of the file for that.
 NO_FRAME = "default"
-
-
-@dataclass(frozen=True)
-class ConfigOptions:
-    """What to write.
-
-    Attributes
-    ----------
-    series : SeriesOptions
-        For every shot; its frames, name and padding are not looked at.
-    choose : callable
-        sidecar -> the frames to bake; the frames between take the nearest of them.
-    base : str or None
-        A config's file, an .ocioz archive or an ``ocio://`` name; None: `BUILT_IN`.
-    names : tuple of str or None
-        The shots' names, in the order of the sidecars; None: the clips'.
-    process_space : str or None
-        For all shots; None: by each sidecar's encoding.
-    force : bool
-        Replace a config that is there, and looks of the same names.
-    """
-
-    series: series.SeriesOptions
-    choose: Callable[[_core.Sidecar], tuple[int, ...]]
-    base: str | None = None
-    names: tuple[str, ...] | None = None
-    process_space: str | None = None
-    force: bool = False
 
 
 @dataclass(frozen=True)
@@ -81,6 +56,8 @@ class Shot:
         The clip's frames, for each of which there is a file.
     baked : Series
         The files that were baked; the others are links to the nearest of them.
+    between : BetweenError or None
+        The error at the frames between; None where every frame was baked.
     """
 
     name: str
@@ -89,10 +66,11 @@ class Shot:
     first: int
     last: int
     baked: series.Series
+    between: BetweenError | None
 
     @property
     def error(self) -> float:
-        """The largest relative error of the tables, of numbers in the process space."""
+        """The largest relative error of the files, in the process space."""
         return float(max(entry["error"] for entry in self.baked.document["frames"]))
 
 
@@ -110,7 +88,16 @@ class WrittenConfig:
 def write_config(
     sidecars: list[Path],
     folder: Path,
-    options: ConfigOptions,
+    settings: BakeSettings | None = None,
+    *,
+    choose: Callable[[_core.Sidecar], tuple[int, ...]] = lambda sidecar: series.every(sidecar, 1),
+    base: str | None = None,
+    names: tuple[str, ...] | None = None,
+    process_space: str | None = None,
+    clip: str | None = None,
+    workers: Workers | None = None,
+    force: bool = False,
+    anyway: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> WrittenConfig:
     """Write a config with a look for each sidecar.
@@ -120,9 +107,26 @@ def write_config(
     sidecars : list of Path
         The shots.
     folder : Path
-        Where the config and its tables go.
-    options : ConfigOptions
-        How.
+        Where the config and its LUTs go.
+    settings : BakeSettings, optional
+        For every frame; the format is CLF by default, and the colour space always the palette's:
+        OpenColorIO itself converts to a look's process space.
+    choose : callable
+        sidecar -> the frames to bake; the other frames show the nearest of them.
+    base : str, optional
+        A config's file, an .ocioz archive or an ``ocio://`` name; by default `BUILT_IN`.
+    names : tuple of str, optional
+        The shots' names, in the order of the sidecars; by default the clips'.
+    process_space : str, optional
+        For all shots; by default by each sidecar's encoding.
+    clip : str, optional
+        The clip, for shapers and errors; by default where each sidecar says.
+    workers : Workers, optional
+        Who bakes.
+    force : bool
+        Replace a config that is there, and looks of the same names.
+    anyway : bool
+        Write the config even where the error between the baked frames is above `LARGEST_DELTA_E`.
     progress : callable, optional
         Called with (frames done, frames in all), the first time before any is baked.
 
@@ -130,59 +134,58 @@ def write_config(
     ------
     Palette4dError
         Two shots of one name, a base that cannot be used or lacks a process space, a config that is
-        there already: nothing was written then. Or a frame could not be baked, or OpenColorIO
-        refuses the result: then there are tables, whole ones, but no config.
+        there already, too large an error between the frames: nothing was written then. Or a frame
+        could not be baked, or OpenColorIO refuses the result: then there are whole LUTs, but no
+        config.
     """
     import PyOpenColorIO as ocio
 
     path = folder / "config.ocio"
     if folder.is_dir():
-        refuse_existing(path, options.force)
+        refuse_existing(path, force)
+    settings = replace(settings or BakeSettings(), space=PALETTE)
+    settings = replace(settings, format=settings.format or "clf")
+    format_ = format_named(settings.format or "clf")
     read = [_core.read_sidecar(str(name)) for name in sidecars]
-    names = _shot_names(sidecars, read, options.names)
-    base = options.base or BUILT_IN
+    shot_names = _shot_names(sidecars, read, names)
+    base = base or BUILT_IN
     config, archive = load_base(base)
-    spaces = [process_space(config, base, s, options.process_space) for s in read]
-    if not options.force:
-        refuse_looks(config, base, [ANY_SHOT, *names])
-    frames = [options.choose(sidecar) for sidecar in read]
+    spaces = [space_of_sidecar(config, base, s, process_space) for s in read]
+    if not force:
+        refuse_looks(config, base, [ANY_SHOT, *shot_names])
+    frames = [choose(sidecar) for sidecar in read]
+    between = [
+        between_error(file, sidecar, baked, settings.strength, clip)
+        for file, sidecar, baked in zip(sidecars, read, frames, strict=True)
+    ]
+    if not anyway:
+        _refuse_far(shot_names, between)
 
     make_folder(folder)
-    format_ = format_named(options.series.bake.format or "clf")
-    # OpenColorIO itself converts to a look's process space.
-    in_palette = replace(options.series.bake, space=PALETTE)
     requests = []
-    for file, name, chosen in zip(sidecars, names, frames, strict=True):
-        _remove_links(folder / TABLES / name)
-        one = replace(
-            options.series,
-            bake=in_palette,
-            frames=chosen,
-            name=name,
-            padding=0,
-            force=options.force,
-        )
-        requests.append(series.Request(file, folder / TABLES / name, one))
-    baked = series.export_all(requests, options.series.workers, progress)
-    _refuse_failed(names, baked)
+    for file, name, chosen in zip(sidecars, shot_names, frames, strict=True):
+        luts = folder / LUTS / name
+        _remove_links(luts)
+        requests.append(series.Request(file, luts, chosen, settings, name, 0, clip, force))
+    baked = series.export(requests, workers, progress)
+    _refuse_failed(shot_names, baked)
     shots = []
-    for request, sidecar, name, space, made in zip(
-        requests, read, names, spaces, baked, strict=True
-    ):
+    for k, sidecar in enumerate(read):
         every = series.every(sidecar, 1)
-        _link(request.folder, name, format_, request.options.frames, every)
-        shots.append(Shot(name, str(request.sidecar), space, every[0], every[-1], made))
+        _link(requests[k].folder, shot_names[k], format_, frames[k], every)
+        ends = (every[0], every[-1])
+        shots.append(Shot(shot_names[k], str(sidecars[k]), spaces[k], *ends, baked[k], between[k]))
 
     notes = relocate(config, base, archive, folder)
     views = _add_looks(config, shots, format_, notes)
-    with replacing(path, force=options.force) as temporary:
+    with replacing(path, force=force) as temporary:
         temporary.write_text(config.serialize(), encoding="utf-8", newline="\n")
         try:
             _validate(ocio.Config.CreateFromFile(str(temporary)), shots, views)
         except failures() as error:
             raise Palette4dError(
-                f"{path}: OpenColorIO refuses the config: {error}; nothing was written but the "
-                f"tables. Mend {base}, or choose another with --base"
+                f"{path}: OpenColorIO refuses the config: {error}; only the LUTs were written. "
+                f"Mend {base}, or choose another with --base"
             ) from error
     return WrittenConfig(path, base, shots, views, notes)
 
@@ -212,8 +215,8 @@ def _shot_names(
             )
         if name.lower() == ANY_SHOT:
             raise Palette4dError(
-                f"{sidecars[i]}: found the shot name {name!r}, which is that of the look for all "
-                "shots; give another with --names"
+                f"{sidecars[i]}: found the shot name {name!r}, the name of the look for all shots; "
+                "give another with --names"
             )
     return names
 
@@ -231,40 +234,51 @@ def _refuse_failed(names: list[str], baked: list[series.Series]) -> None:
         )
 
 
-def _remove_links(tables: Path) -> None:
-    """Remove what an earlier config linked; what it baked stays."""
-    if tables.is_dir():
-        for entry in tables.iterdir():
+def _refuse_far(names: list[str], between: list[BetweenError | None]) -> None:
+    far = [
+        f"shot {name}, frame {found.frame}: deltaE 2000 of {stated(found.delta_e)} from the look "
+        f"of frame {found.look}"
+        for name, found in zip(names, between, strict=True)
+        if found is not None and found.delta_e > LARGEST_DELTA_E
+    ]
+    if far:
+        raise Palette4dError(
+            f"the edit changes too much between the frames with a look: found {'; '.join(far)}; "
+            f"expected at most {LARGEST_DELTA_E:g}. Choose more frames (a smaller --every), or "
+            "write the config with --anyway; nothing was written"
+        )
+
+
+def _remove_links(luts: Path) -> None:
+    """Remove the links of an earlier config; its LUTs stay."""
+    if luts.is_dir():
+        for entry in luts.iterdir():
             if entry.is_symlink():
                 entry.unlink()
 
 
 def _link(
-    tables: Path,
+    luts: Path,
     name: str,
     format_: LutFormat,
     baked: tuple[int, ...],
     every: tuple[int, ...],
 ) -> None:
-    """Give every frame a file: the one that was baked nearest to it, the earlier of two."""
+    """Give every frame a file: its own, or a link to that of the nearest baked frame."""
 
     def file(frame: object) -> str:
         return f"{name}.{frame}{format_.extension}"
 
-    there = set(baked)
     middle = min(baked, key=lambda f: (abs(2 * f - every[0] - every[-1]), f))
-    links = {file(NO_FRAME): file(middle)}
-    for frame in every:
-        if frame not in there:
-            links[file(frame)] = file(min(baked, key=lambda f: (abs(f - frame), f)))
-    for link, target in links.items():
-        place = tables / link
+    links = {file(f): file(nearest(baked, f)) for f in every if nearest(baked, f) != f}
+    for link, target in {file(NO_FRAME): file(middle), **links}.items():
+        place = luts / link
         place.unlink(missing_ok=True)
         try:
             place.symlink_to(target)
         except OSError:
             # A file system without links.
-            shutil.copyfile(tables / target, place)
+            shutil.copyfile(luts / target, place)
 
 
 # --------------------------------------------------------------------------------- looks and views
@@ -300,8 +314,8 @@ def _add_looks(
     spaces = list(dict.fromkeys(shot.process_space for shot in shots))
     if len(spaces) > 1:
         notes.append(
-            f"the shots are in {len(spaces)} encodings ({', '.join(spaces)}): there is a look for "
-            f"each shot, but no view and no look {ANY_SHOT} for all of them"
+            f"the shots have {len(spaces)} encodings ({', '.join(spaces)}): each shot has a look, "
+            f"but there is no view and no look {ANY_SHOT} for all of them"
         )
         return []
     text = "palette4d, by the variables SHOT and FRAME"
@@ -310,7 +324,7 @@ def _add_looks(
 
 
 def _add_views(config: Any) -> list[tuple[str, str]]:
-    """For every view of colours, not of data, add one with the look of the shot and the frame."""
+    """For every view of colours (not of data) add one with the look of the shot and the frame."""
     added = []
     some_active = config.getNumActiveViews() > 0
     for display in [str(name) for name in config.getDisplays()]:
@@ -335,7 +349,7 @@ def _add_views(config: Any) -> list[tuple[str, str]]:
 
 
 def _validate(config: Any, shots: list[Shot], views: list[tuple[str, str]]) -> None:
-    """Let OpenColorIO validate a config and make what a viewer makes, at each shot's ends."""
+    """Validate a config by OpenColorIO, and make a viewer's processors at each shot's ends."""
     import PyOpenColorIO as ocio
 
     config.validate()

@@ -12,12 +12,12 @@ from palette4d.colour.ocio_config import (
     failures,
     load_config,
     near_spaces,
-    same_encodings,
+    space_of_encoding,
 )
 from palette4d.common.errors import Palette4dError
 
-#: The folder of the tables, beside the config.
-TABLES = "luts"
+#: The folder of the LUTs, beside the config.
+LUTS = "luts"
 
 #: The look whose shot and frame are both variables.
 ANY_SHOT = "palette4d"
@@ -28,16 +28,16 @@ def load_base(base: str) -> tuple[Any, bool]:
     return load_config(base, "--base"), base.lower().endswith(".ocioz")
 
 
-def process_space(config: Any, base: str, sidecar: _core.Sidecar, wanted: str | None) -> str:
-    """Return the name of the config's colour space for a sidecar's numbers.
+def space_of_sidecar(config: Any, base: str, sidecar: _core.Sidecar, wanted: str | None) -> str:
+    """Return the name of the config's colour space for a sidecar's code values.
 
-    Looked up by name, alias or role, under every name that the encoding has; then, where the config
-    has the roles for it, among its colour spaces by what they do.
+    Looked up by name, alias or role, under every name of the encoding; then by OpenColorIO among
+    the colour spaces that convert alike, where the config has the roles for that.
 
     Raises
     ------
     Palette4dError
-        There is none, with the near names; or the encoding is not known.
+        There is none; or the encoding is not known.
     """
     import PyOpenColorIO as ocio
 
@@ -49,24 +49,18 @@ def process_space(config: Any, base: str, sidecar: _core.Sidecar, wanted: str | 
             f"the sidecar of {sidecar.clip['name']!r} does not say in which encoding its colours "
             "are; name a colour space of the config with --process-space"
         )
-    names = same_encodings(encoding)
-    for name in names:
-        space = config.getColorSpace(name)
-        if space is not None and not space.isData():
-            return str(space.getName())
+    if (named := space_of_encoding(config, encoding)) is not None:
+        return str(named.getName())
     lacking = ""
     built_in = ocio.Config.CreateFromBuiltinConfig(BUILT_IN)
-    for name in names:
-        if built_in.getColorSpace(name) is None:
-            continue
+    if (known := space_of_encoding(built_in, encoding)) is not None:
         try:
-            return str(ocio.Config.IdentifyBuiltinColorSpace(config, built_in, name))
+            return str(ocio.Config.IdentifyBuiltinColorSpace(config, built_in, known.getName()))
         except failures():
             roles = ("aces_interchange", "scene_linear")
             missing = [role for role in roles if not config.hasRole(role)]
             if missing:
-                lacking = f"; it lacks the role {missing[0]}, by which one could be found"
-            break
+                lacking = f"; it lacks the role {missing[0]}, which could identify one"
     raise Palette4dError(
         f"{base}: found no colour space for {encoding!r}{lacking}; name one with --process-space, "
         f"such as {near_spaces(config, encoding)}"
@@ -92,7 +86,7 @@ def refuse_looks(config: Any, base: str, names: list[str]) -> None:
 
 
 def relocate(config: Any, base: str, archive: bool, folder: Path) -> list[str]:
-    """Let the base's own files be found from the new place; return notes on that."""
+    """Make the base's own files found from the new place; return notes on that."""
     import PyOpenColorIO as ocio
 
     notes: list[str] = []
@@ -105,20 +99,20 @@ def relocate(config: Any, base: str, archive: bool, folder: Path) -> list[str]:
             there = Path(base).absolute().parent
             root = "" if there == folder.absolute() else str(there)
         config.clearSearchPaths()
-        # First: only a base of palette4d's own can have files of the same names.
-        config.addSearchPath(TABLES)
+        # First: only a base that palette4d wrote can have files of the same names.
+        config.addSearchPath(LUTS)
         for path in own or [""]:
             absolute = Path(path).is_absolute() or path.startswith(("$", "%"))
             found = path if absolute or not root else str(Path(root) / path)
-            if found != TABLES:
+            if found != LUTS:
                 config.addSearchPath(found or ".")
         if root and not archive:
             notes.append(f"the base's own files are still read from {root}")
-        # A list of variables in the config keeps all others of the environment out.
+        # Once a config lists variables, OpenColorIO ignores all others of the environment.
         if not list(config.getEnvironmentVarNames()):
             notes += _declare_variables(config)
     else:
-        config.addSearchPath(TABLES)
+        config.addSearchPath(LUTS)
     config.setWorkingDir(str(folder.absolute()))
     return notes
 

@@ -2,16 +2,16 @@
 
 Two extensions have two formats each, and the first in `FORMATS` is the default:
 
-- .cube: both dialects are alike as long as no shaper is needed, so every program reads the default,
-  Resolve's; with a shaper only Resolve's dialect can hold it.
-- .3dl: Flame's is the plain table that most programs read; Lustre's has a header of its own.
+- .cube: without a shaper both dialects hold the same lines: every program reads the default,
+  Resolve's. Only Resolve's dialect can hold a shaper.
+- .3dl: Flame's is the plain file that most programs read; Lustre's has a header of its own.
 """
 
 import difflib
 from dataclasses import dataclass
 from pathlib import Path
 
-from palette4d.lut_export.lattice import LARGEST, SMALLEST
+from palette4d.lut_export.lut3d import LARGEST, SMALLEST
 from palette4d.lut_export.writers import Writer, by_baker, by_transforms
 
 from palette4d.common.errors import Palette4dError
@@ -28,7 +28,7 @@ class LutFormat:
     Attributes
     ----------
     name : str
-        For ``--format`` and ``--json``; a table's is OpenColorIO's own where that is short.
+        For ``--format`` and ``--json``; a 3D LUT's is OpenColorIO's own where that is short.
     title : str
         For people.
     extension : str
@@ -36,15 +36,15 @@ class LutFormat:
     readings : tuple of str
         How hosts may read it, names of `reading.READINGS`; the error is stated for each.
     rounding : str
-        The precision of the file's numbers.
+        The precision of the file's code values.
     write : callable or None
-        (lattice, description) -> the file's text; None for a CDL, which holds no table.
+        (3D LUT, description) -> the file's text; None for a CDL.
     shaper : bool
         Whether it can hold a shaper.
     described : bool
         Whether it can say what it is: comments or metadata.
     discrete : bool
-        Whether it holds a list of transforms, and with it a conversion beside the table.
+        Whether it holds a list of transforms: also a conversion before and after the 3D LUT.
     smallest : int
         Samples a side.
     powers : bool
@@ -65,11 +65,11 @@ class LutFormat:
 
     @property
     def is_cdl(self) -> bool:
-        """Whether it holds a colour decision list instead of a table."""
+        """Whether it holds a colour decision list instead of a 3D LUT."""
         return self.write is None
 
     def check_size(self, size: int) -> None:
-        """Refuse a lattice that the format cannot hold.
+        """Refuse a 3D LUT that the format cannot hold.
 
         Raises
         ------
@@ -157,8 +157,8 @@ def format_named(name: str) -> LutFormat:
             return known
     if wanted == "spi1d":
         raise Palette4dError(
-            "found the format spi1d, which holds a curve a channel; an edit mixes the channels: "
-            "expected a format with a 3D table, such as spi3d"
+            "found the format spi1d, which holds 1D LUTs; an edit mixes the channels: expected a "
+            "format with a 3D LUT, such as spi3d"
         )
     near = difflib.get_close_matches(wanted, format_names(), n=3, cutoff=0.5)
     expected = " or ".join(near) if near else ", ".join(format_names())
@@ -166,7 +166,7 @@ def format_named(name: str) -> LutFormat:
 
 
 def format_of(path: Path, name: str | None = None) -> LutFormat:
-    """Return the format of a file: the one named, else the one its extension stands for.
+    """Return the format of a file: the one named, else that of its extension.
 
     Raises
     ------
@@ -197,7 +197,7 @@ def shaper_warning(name: str) -> str | None:
         return None
     return (
         "only Resolve and OpenColorIO know the shaper of a .cube; ffmpeg, melt and what is built "
-        "on them take it for the table: give those a .csp"
+        "on them read it as a part of the 3D LUT: give those a .csp"
     )
 
 

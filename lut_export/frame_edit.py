@@ -1,7 +1,6 @@
 """The edit of a sidecar at one time, as a function of colours.
 
-The one place of the bakes that asks the core: whatever samples, fits or measures an edit gets a
-`FrameEdit`.
+Only this module of the bakes calls the core; sampling, fitting and measuring take a `FrameEdit`.
 """
 
 from dataclasses import dataclass
@@ -52,9 +51,9 @@ class FrameEdit:
     strength : float
         0 leaves colours alone, 1 is the edit.
     recolourer : Recolourer
-        The node's own code for the same.
+        The node's own code for the edit.
     conversion : ColourConversion or None
-        From the colours' numbers to the palette's; None where they are the same.
+        From the colours' space to the palette's; None where they are the same.
     """
 
     palette: F64
@@ -70,7 +69,7 @@ class FrameEdit:
         return self.recolourer.identity or self.strength == 0
 
     def apply(self, colours: F32, threads: int = 0) -> F32:
-        """Return what the node makes of (h, w, 3) float32 colours; 0 threads: one a processor."""
+        """Return the node's result for (h, w, 3) float32 colours; 0 threads: one a processor."""
         return self.recolourer.apply(
             colours, strength=self.strength, threads=threads, conversion=self.conversion
         )
@@ -106,7 +105,7 @@ def frame_edit(
     strength : float
         0..1, as in the node.
     conversion : ColourConversion, optional
-        From the numbers that the edit is to be a function of to the palette's.
+        From the space of the edit's colours to the palette's.
 
     Raises
     ------

@@ -1,10 +1,10 @@
 """A dated series: the edit at many frames, a file each, and an index of them.
 
-The index says from which state of the sidecar and with which options each file was made and what
-its hash is. So a series can be interrupted and resumed: what is there and matches is left alone,
-and nothing that does not match is replaced unasked.
+The index records, for each file, the sidecar's state, the settings and the file's hash. So a series
+can be interrupted and resumed: a file that matches is kept, and a file that does not is replaced
+only with ``force``.
 
-Frames are baked in other processes or on other machines; what they make comes back to this one,
+Frames are baked in other processes or on other machines. Their files come back to this process,
 which alone writes in the folder.
 """
 
@@ -13,12 +13,12 @@ import math
 import tempfile
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from palette4d.lut_export.bake import bake
-from palette4d.lut_export.bake_options import BakeOptions, check_options, check_target
+from palette4d.lut_export.bake import bake, check_settings, check_target
+from palette4d.lut_export.bake_job import BakeSettings
 from palette4d.lut_export.formats import format_named
 from palette4d.lut_export.frame_edit import frame_text
 from palette4d.lut_export.series_index import (
@@ -36,40 +36,40 @@ from palette4d.common.errors import Palette4dError, WriteError
 from palette4d.common.files import make_folder, replacing
 from palette4d.common.text import checked_name, file_safe
 from palette4d.jobs.workers import Failed, Workers
-from palette4d.media.source_clip import frame_colours
 
 #: Seconds between two writings of the index while frames are baked.
 INDEX_EVERY = 2.0
 
 
 @dataclass(frozen=True)
-class SeriesOptions:
-    """What to export.
+class Request:
+    """A series to export.
 
     Attributes
     ----------
+    sidecar, folder : Path
+        From where, to where.
     frames : tuple of int
         Rising frame numbers.
-    bake : BakeOptions
-        For every frame; its own frame is not looked at. ``format`` must be set.
+    settings : BakeSettings
+        For every frame. ``format`` must be set.
     name : str or None
         The files' common name; None: the clip's.
     padding : int
         Digits of the frame numbers in the names.
     clip : str or None
         The clip, for shapers and errors; None: where the sidecar says.
-    workers : Workers
-        Who bakes.
     force : bool
         Replace files that differ.
     """
 
+    sidecar: Path
+    folder: Path
     frames: tuple[int, ...]
-    bake: BakeOptions
+    settings: BakeSettings
     name: str | None = None
     padding: int = 4
     clip: str | None = None
-    workers: Workers = field(default_factory=Workers)
     force: bool = False
 
 
@@ -84,7 +84,7 @@ class Series:
     document : dict
         Its content.
     baked, kept : list of int
-        Frames whose files were written, and those that were there already.
+        Frames whose files were written, and those whose files were there already.
     failed : dict of int to str
         What kept the others from being written.
     """
@@ -101,26 +101,10 @@ class FrameTask:
     """One file to bake; can be sent to another process or machine."""
 
     sidecar: Path
+    frame: int
     file: str
-    options: BakeOptions
+    settings: BakeSettings
     clip: str | None
-
-
-@dataclass(frozen=True)
-class Baked:
-    """One file that was baked: its entry of the index and its content."""
-
-    entry: Entry
-    data: bytes
-
-
-@dataclass(frozen=True)
-class Request:
-    """A series to export: from which sidecar, to which folder, how."""
-
-    sidecar: Path
-    folder: Path
-    options: SeriesOptions
 
 
 def every(sidecar: _core.Sidecar, step: int) -> tuple[int, ...]:
@@ -144,14 +128,9 @@ def stops(sidecar: _core.Sidecar) -> tuple[int, ...]:
     index = {name: i for i, name in enumerate(polytope.vertex_ids)}
     edges = dict(zip(polytope.edge_ids, polytope.edges.tolist(), strict=True))
     edited = {index[name] for name in edits.vertex_rgb}
-    around = set(edited)
-    for first, last in edges.values():
-        if first in edited or last in edited:
-            around |= {first, last}
-    times = []
-    for stop in edits.stops:
-        times.append(float(stop["frame"]))
-        around |= set(edges[stop["edge"]])
+    around = edited | {end for ends in edges.values() if edited & set(ends) for end in ends}
+    around |= {end for stop in edits.stops for end in edges[stop["edge"]]}
+    times = [float(stop["frame"]) for stop in edits.stops]
     times += [float(polytope.vertices[i, 3]) for i in around]
     if not times:
         raise Palette4dError(
@@ -187,7 +166,7 @@ def _limits(sidecar: _core.Sidecar) -> tuple[int, int]:
 
 
 def file_name(name: str, frame: int, padding: int, extension: str) -> str:
-    """Return a file's name; the sign of a negative number counts as a digit, as in C's printf.
+    """Return a file's name; the sign of a negative frame counts as a digit, as in C's printf.
 
     >>> file_name("shot010", 1001, 4, ".cube"), file_name("a", 7, 0, ".clf")
     ('shot010.1001.cube', 'a.7.clf')
@@ -196,35 +175,25 @@ def file_name(name: str, frame: int, padding: int, extension: str) -> str:
 
 
 def export(
-    sidecar: Path,
-    folder: Path,
-    options: SeriesOptions,
-    progress: Callable[[int, int], None] | None = None,
-) -> Series:
-    """Bake frames into a folder; see `export_all`."""
-    return export_all([Request(sidecar, folder, options)], options.workers, progress)[0]
-
-
-def export_all(
     requests: Sequence[Request],
-    workers: Workers,
+    workers: Workers | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Series]:
-    """Bake the frames of several series together.
+    """Bake the frames of one or several series together.
 
     Parameters
     ----------
     requests : sequence of Request
-        What to bake; folders are made when they are missing. Their own `workers` are not looked at.
-    workers : Workers
-        Who bakes; a sidecar is read where they are.
+        What to bake; missing folders are made.
+    workers : Workers, optional
+        Who bakes; they read the sidecars. By default a process for each processor.
     progress : callable, optional
         Called with (frames done, frames in all), the first time before any is baked.
 
     Returns
     -------
     list of Series
-        One for each request, also when frames failed: what could be baked was.
+        One for each request, also when some frames failed.
 
     Raises
     ------
@@ -237,19 +206,21 @@ def export_all(
     exports = [_Export(request) for request in requests]
     for one in exports:
         make_folder(one.request.folder)
-    tell = progress or (lambda done, total: None)
-    total = sum(len(one.request.options.frames) for one in exports)
+    total = sum(len(one.request.frames) for one in exports)
 
-    def take(key: tuple[int, int], outcome: Baked | Failed) -> None:
-        which, frame = key
-        exports[which].take(frame, outcome)
-        tell(sum(one.done for one in exports), total)
+    def tell() -> None:
+        if progress is not None:
+            progress(sum(one.done for one in exports), total)
 
-    tell(sum(one.done for one in exports), total)
+    def take(key: tuple[int, int], outcome: tuple[Entry, bytes] | Failed) -> None:
+        exports[key[0]].take(key[1], outcome)
+        tell()
+
+    tell()
     tasks = {(i, f): task for i, one in enumerate(exports) for f, task in one.tasks.items()}
     try:
         try:
-            workers.run(bake_frame, tasks, take)
+            (workers or Workers()).run(bake_frame, tasks, take)
         finally:
             for one in exports:
                 one.finish()
@@ -261,37 +232,34 @@ def export_all(
 
 
 class _Export:
-    """A series on its way: what is to do, and what came of it."""
+    """A series in progress: what is to be done, and what was done."""
 
     def __init__(self, request: Request) -> None:
         """Refuse what can be refused before the first frame is baked."""
-        self.request, options = request, request.options
+        self.request, settings = request, request.settings
         sidecar = _core.read_sidecar(str(request.sidecar))
-        assert options.bake.format is not None
-        format_ = format_named(options.bake.format)
-        frames = check_frames(sidecar, options.frames)
+        assert settings.format is not None
+        format_ = format_named(settings.format)
+        frames = check_frames(sidecar, request.frames)
         for frame in frames[:1]:
-            check_options(replace(options.bake, frame=float(frame)), format_, sidecar)
-        name = checked_name(options.name) if options.name else file_safe(sidecar.clip["name"])
+            check_settings(settings, format_, sidecar, frame)
+        name = checked_name(request.name) if request.name else file_safe(sidecar.clip["name"])
         self.index = request.folder / f"{name}.series.json"
-        self.header = header_of(sidecar, request.sidecar, options.bake)
-        known = read_index(self.index, self.header, options.force)
-        names = {f: file_name(name, f, options.padding, format_.extension) for f in frames}
+        self.header = header_of(sidecar, request.sidecar, settings)
+        known = read_index(self.index, self.header, request.force)
+        names = {f: file_name(name, f, request.padding, format_.extension) for f in frames}
         self.kept = [f for f in frames if _matches(request.folder / names[f], known.get(f))]
         todo = [f for f in frames if f not in set(self.kept)]
-        _refuse_changed(request.folder, names, todo, known, options.force)
-        # Absolute: other processes may run elsewhere.
-        clip = None if options.clip is None else str(Path.cwd() / options.clip)
-        baked = replace(options.bake, ocio_config=from_anywhere(options.bake.ocio_config))
-        self.tasks = {
-            f: FrameTask(
-                sidecar=request.sidecar.absolute(),
-                file=names[f],
-                options=replace(baked, frame=float(f)),
-                clip=clip,
-            )
-            for f in todo
-        }
+        for frame in todo:
+            target = request.folder / names[frame]
+            if target.exists():
+                # A file without an entry may match: an export that was killed may have left it.
+                check_target(target, request.force or frame not in known)
+        # Absolute: other processes may have another working folder.
+        clip = None if request.clip is None else str(Path.cwd() / request.clip)
+        settings = replace(settings, ocio_config=from_anywhere(settings.ocio_config))
+        path = request.sidecar.absolute()
+        self.tasks = {f: FrameTask(path, f, names[f], settings, clip) for f in todo}
         self.entries = {f: entry for f, entry in known.items() if f not in self.tasks}
         self.baked: list[int] = []
         self.failed: dict[int, str] = {}
@@ -299,23 +267,23 @@ class _Export:
 
     @property
     def done(self) -> int:
-        """How many frames are there, or failed."""
+        """The number of frames that are there, or failed."""
         return len(self.kept) + len(self.baked) + len(self.failed)
 
-    def take(self, frame: int, outcome: Baked | Failed) -> None:
+    def take(self, frame: int, outcome: tuple[Entry, bytes] | Failed) -> None:
         """Write a file that was baked; note what failed."""
         if isinstance(outcome, Failed):
             self.failed[frame] = outcome.text
             return
-        target = self.request.folder / self.tasks[frame].file
+        entry, data = outcome
         try:
-            _put(target, outcome.data, self.request.options.force)
+            _put(self.request.folder / self.tasks[frame].file, data, self.request.force)
         except WriteError:
-            raise  # so would all others
+            raise  # all others would fail, too
         except Palette4dError as error:
             self.failed[frame] = str(error)
             return
-        self.entries[frame] = outcome.entry
+        self.entries[frame] = entry
         self.baked.append(frame)
         if time.monotonic() - self.written > INDEX_EVERY:
             write_index(self.index, self.header, self.entries)
@@ -328,34 +296,28 @@ class _Export:
 
     def series(self) -> Series:
         """Return what was exported."""
-        return Series(
-            index=self.index,
-            document=document_of(self.header, self.entries),
-            baked=sorted(self.baked),
-            kept=self.kept,
-            failed=dict(sorted(self.failed.items())),
-        )
+        document = document_of(self.header, self.entries)
+        failed = dict(sorted(self.failed.items()))
+        return Series(self.index, document, sorted(self.baked), self.kept, failed)
 
 
-def bake_frame(task: FrameTask, threads: int) -> Baked:
-    """Bake one file of a series, aside.
+def bake_frame(task: FrameTask, threads: int) -> tuple[Entry, bytes]:
+    """Bake one file of a series in a temporary folder; return its entry and its content.
 
     Raises
     ------
     Palette4dError
         It cannot be baked.
     """
-    sidecar = _core.read_sidecar(str(task.sidecar))
-    image, number = frame_colours(task.sidecar, sidecar.clip, task.options.frame, task.clip)
     with tempfile.TemporaryDirectory(prefix="palette4d-") as scratch:
         path = Path(scratch) / task.file
-        options = replace(task.options, threads=threads)
-        result = bake(task.sidecar, path, options, image=image, image_frame=number)
-        return Baked(entry_of(path, result), path.read_bytes())
+        settings = asdict(task.settings)
+        result = bake(task.sidecar, task.frame, path, clip=task.clip, threads=threads, **settings)
+        return entry_of(path, result), path.read_bytes()
 
 
 def _put(target: Path, data: bytes, force: bool) -> None:
-    """Write a file, whole; one that is there already is left alone when it has the same bytes."""
+    """Write a file atomically; one with the same bytes is kept."""
     if target.is_file() and target.read_bytes() == data:
         return
     if target.exists() and not force:
@@ -371,19 +333,8 @@ def _matches(path: Path, entry: Entry | None) -> bool:
     return hashlib.sha256(path.read_bytes()).hexdigest() == str(entry["sha256"])
 
 
-def _refuse_changed(
-    folder: Path, names: dict[int, str], todo: list[int], known: dict[int, Entry], force: bool
-) -> None:
-    """Refuse before the first frame what can be known to fail."""
-    for frame in todo:
-        target = folder / names[frame]
-        if target.exists():
-            # Without an entry it may be the very file, left by an export that was killed.
-            check_target(target, force or frame not in known)
-
-
 def failures_text(failed: dict[int, str]) -> str:
-    """Return what went wrong, a line each, most of them once when they are alike."""
+    """Return what went wrong, a line for each message with the frames that it concerns."""
     by_text: dict[str, list[int]] = {}
     for frame, text in failed.items():
         by_text.setdefault(text, []).append(frame)

@@ -1,4 +1,4 @@
-"""The index of a dated series, ``NAME.series.json`` (docs/exports.md)."""
+"""The index of a dated series, ``NAME.series.json`` (docs/files.md)."""
 
 import hashlib
 import json
@@ -6,7 +6,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from palette4d.lut_export.bake import BakeOptions, BakeResult
+from palette4d.lut_export.bake import BakeResult
+from palette4d.lut_export.bake_job import BakeSettings
 
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
@@ -17,7 +18,7 @@ SCHEMA, VERSION = "palette4d.series", 1
 
 Entry = dict[str, Any]
 
-#: What differs when these parts of an index do.
+#: What differs when these members of an index differ.
 _CHANGED = {
     "schema": "another program",
     "version": "another version of the index",
@@ -26,13 +27,10 @@ _CHANGED = {
 }
 
 
-def header_of(sidecar: _core.Sidecar, path: Path, options: BakeOptions) -> dict[str, Any]:
-    """Return what an index says of all its files: the sidecar's state and the options."""
+def header_of(sidecar: _core.Sidecar, path: Path, settings: BakeSettings) -> dict[str, Any]:
+    """Return what an index says of all its files: the sidecar's state and the settings."""
     clip = sidecar.clip
-    settings = asdict(options)
-    for own in ("frame", "threads"):
-        del settings[own]
-    settings["domain"] = None if options.domain is None else list(options.domain)
+    options = {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(settings).items()}
     return {
         "schema": SCHEMA,
         "version": VERSION,
@@ -48,7 +46,7 @@ def header_of(sidecar: _core.Sidecar, path: Path, options: BakeOptions) -> dict[
             "rate": list(clip["rate"]),
             "encoding": clip["encoding"],
         },
-        "options": settings,
+        "options": options,
     }
 
 
@@ -76,7 +74,7 @@ def document_of(header: dict[str, Any], entries: dict[int, Entry]) -> dict[str, 
 
 
 def write_index(path: Path, header: dict[str, Any], entries: dict[int, Entry]) -> None:
-    """Replace an index, whole; a line an entry."""
+    """Replace an index atomically; a line an entry."""
     lines = [json.dumps(entry) for entry in document_of(header, entries)["frames"]]
     head = json.dumps(header, indent=2).removesuffix("\n}")
     text = head + ',\n  "frames": [\n    ' + ",\n    ".join(lines) + "\n  ]\n}\n"

@@ -1,13 +1,13 @@
-"""The shaper: from a clip's numbers to the 0..1 over which a lattice is laid.
+"""The 1D shaper before a 3D LUT: from a clip's code values to the LUT's 0..1.
 
-A lattice covers 0..1 and clamps what lies outside. Where a clip goes further, a curve in front of
-it brings low..high to 0..1:
+A 3D LUT covers 0..1 and clamps everything outside. For a larger domain low..high a shaper comes
+before it:
 
-- "none": the numbers as they are, 0..1;
+- "none": the code values themselves, 0..1;
 - "linear": u = (x - low) / (high - low);
 - "log": u = (f(x) - f(low)) / (f(high) - f(low)) with f(x) = log2(x / OFFSET + 1) for x >= 0 and
-  its tangent below. In scene-linear light that spends the nodes about evenly over the stops, runs
-  straight through black, and is a camera style Log of CLF, so that no table approximates it.
+  its tangent below. In scene-linear light the nodes are then about even in stops. The curve is
+  straight through black, and a camera style Log of CLF, so that no 1D LUT approximates it.
 
 Colours outside low..high are clamped.
 """
@@ -24,7 +24,7 @@ from palette4d.common.errors import Palette4dError
 F64 = NDArray[np.float64]
 
 Kind = Literal["none", "linear", "log"]
-#: What may be asked for: a kind, or that the colours decide.
+#: A kind, or "auto": the colours decide.
 Choice = Literal["auto", "none", "linear", "log"]
 
 #: Where the log curve turns from even steps to even ratios: 0.85 stops below middle grey.
@@ -33,7 +33,7 @@ OFFSET = 0.1
 #: Up to this width of the domain a linear shaper is chosen: log encodings that leave 0..1 a little.
 LINEAR_WIDTH = 2.0
 
-#: As the sidecar's colours.
+#: The limit of a sidecar's colours.
 LARGEST = 1e6
 
 
@@ -46,7 +46,7 @@ class Shaper:
     high: float = 1.0
 
     def __post_init__(self) -> None:
-        """Refuse domains that are none.
+        """Refuse an impossible domain.
 
         Raises
         ------
@@ -56,7 +56,7 @@ class Shaper:
         """
         if not (-LARGEST <= self.low < self.high <= LARGEST):
             raise Palette4dError(
-                f"found the domain {self.low:g} to {self.high:g}, expected two numbers within "
+                f"found the domain {self.low:g} to {self.high:g}, expected two code values within "
                 f"±{LARGEST:g}, the smaller one first"
             )
         if self.kind == "none" and (self.low, self.high) != (0.0, 1.0):
@@ -66,7 +66,7 @@ class Shaper:
             )
 
     def forward(self, x: ArrayLike) -> F64:
-        """Return u, unclamped, of numbers x of any shape."""
+        """Return u, unclamped, of code values x of any shape."""
         values = np.asarray(x, dtype=np.float64)
         if self.kind == "log":
             return np.asarray((_log(values) - _log(self.low)) / self._span)
@@ -108,9 +108,9 @@ class Shaper:
         ]
 
     def samples(self) -> int:
-        """Return how many samples a 1D table of the curve needs: 1,024 to 65,536.
+        """Return how many samples a 1D LUT of the curve needs: 1,024 to 65,536.
 
-        So many that linear interpolation misses u by at most 1e-5 where that is possible.
+        Linear interpolation is then within 1e-5 of u, where that is possible.
         """
         if self.kind != "log":
             return 1024
@@ -124,7 +124,7 @@ class Shaper:
         return f"{self.kind}, input {self.low:g} to {self.high:g}"
 
 
-#: Numbers within 0..1, as they are.
+#: Code values within 0..1, as they are.
 UNSHAPED = Shaper()
 
 
@@ -148,7 +148,7 @@ def choose(kind: str, low: float, high: float) -> Shaper:
         "auto" is none where low..high lies within 0..1, linear where it is little more
         (`LINEAR_WIDTH`) and log otherwise; "none" ignores low and high.
     low, high : float
-        The smallest and largest number to cover. 0..1 is always covered, and the limits are
+        The smallest and largest code value to cover. 0..1 is always covered, and the limits are
         rounded outwards to two digits.
     """
     low, high = min(0.0, -_outwards(-low)), max(1.0, _outwards(high))

@@ -1,14 +1,13 @@
 """In which colour space a baked file takes and returns colours.
 
-A sidecar's palette is in one colour space, its clip in another or in the same, and a file may be
-asked for in a third. Formats that hold a list of transforms (CLF, CTF) get the table in the
-palette's numbers, and the conversion before it and after it as transforms of their own; all others
-hold one table from numbers of the space to numbers of the space.
+A sidecar's palette has one colour space, its clip another or the same, and a file may take and
+return a third. In formats that hold a list of transforms (CLF, CTF) the 3D LUT takes and returns
+the palette's code values, with the conversion before and after it as transforms of their own. In
+all others one 3D LUT contains the conversion.
 """
 
 import json
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,12 @@ from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.colour.conversion import conversion
 from palette4d.colour.conversion_steps import Step
-from palette4d.colour.ocio_config import chosen_config, colour_space, load_config, same_encodings
+from palette4d.colour.ocio_config import (
+    chosen_config,
+    colour_space,
+    load_config,
+    space_of_encoding,
+)
 from palette4d.common.errors import Palette4dError
 
 F32 = NDArray[np.float32]
@@ -35,11 +39,11 @@ class BakeSpace:
     name : str
         For its metadata.
     steps : tuple of dict
-        From there to the palette's numbers; empty where they are the same.
+        The conversion to the palette's colour space; empty where they are the same.
     chain : ColourConversion or None
-        The same, to be applied; None for no steps.
+        What applies the steps; None for no steps.
     clip : ColourConversion or None
-        From the clip's numbers to the palette's.
+        From the clip's colour space to the palette's; None where they are the same.
     """
 
     name: str
@@ -48,40 +52,40 @@ class BakeSpace:
     clip: _core.ColourConversion | None = None
 
     def of_clip(self, colours: F32) -> F32:
-        """(h, w, 3) float32 colours of the clip as they are in this space."""
+        """Return (h, w, 3) float32 colours of the clip in this space."""
         if self.chain is self.clip:
             return colours
         palette = colours if self.clip is None else self.clip.to_palette(colours)
         return self.of_palette(palette).astype(np.float32)
 
     def of_palette(self, colours: NDArray[Any]) -> NDArray[Any]:
-        """(..., 3) colours in the palette's numbers as they are in this space."""
+        """Return (..., 3) colours of the palette's space in this space."""
         return colours if self.chain is None else self.chain.to_clip(colours)
 
     def to_palette(self, colours: F32) -> F32:
-        """(..., 3) colours in this space as they are in the palette's numbers."""
+        """Return (..., 3) colours of this space in the palette's space."""
         return colours if self.chain is None else self.chain.to_palette(colours).astype(np.float32)
 
 
 def space_of(
-    sidecar_path: Path, sidecar: _core.Sidecar, wanted: str, config_name: str | None
+    data: bytes, sidecar: _core.Sidecar, wanted: str, config_name: str | None
 ) -> BakeSpace:
     """Return the space of a name.
 
     Parameters
     ----------
-    sidecar_path, sidecar : Path, Sidecar
-        The file, and what is in it.
+    data, sidecar : bytes, Sidecar
+        A sidecar's JSON text, and the core's view of it.
     wanted : str
-        "input" (the clip's numbers), "palette", or a colour space of the config.
+        "input" (the clip's code values), "palette", or a colour space of the config.
     config_name : str or None
         None: the config that the sidecar names, else ``$OCIO``, else the built-in one.
 
     Raises
     ------
     Palette4dError
-        The config cannot be used or lacks one of the spaces; the way between them is no chain of
-        matrices and curves.
+        The config cannot be used or lacks one of the spaces, or the conversion between them is
+        more than matrices and curves.
     """
     encoding = str(sidecar.clip["encoding"])
     own = sidecar.conversion
@@ -90,37 +94,28 @@ def space_of(
         return BakeSpace(encoding, clip=clip)
     if wanted == INPUT:
         assert own is not None
-        document = json.loads(sidecar_path.read_bytes())
-        steps = document["clip"]["conversion"]["steps"]
+        steps = json.loads(data)["clip"]["conversion"]["steps"]
         return BakeSpace(own.input_space, tuple(steps), clip, clip)
     if config_name is None and own is not None:
         config, config_name = load_config(own.config, "--ocio-config"), own.config
     else:
         config, config_name = chosen_config(config_name)
     name = str(colour_space(config, config_name, wanted, "--space").getName())
-    palette = _named(config, config_name, encoding)
-    if name == palette:
-        return BakeSpace(name, clip=clip)
-    made = conversion(config, name, palette)
+    palette = space_of_encoding(config, encoding)
+    if palette is None:
+        raise Palette4dError(
+            f"the sidecar's palette is in {encoding!r}, which {config_name} does not know, so that "
+            "it cannot be converted; analyse with --input-space, or name the config that knows it "
+            "with --ocio-config"
+        )
+    made = conversion(config, name, str(palette.getName()))
     if not made.steps:
         return BakeSpace(name, clip=clip)
     return BakeSpace(name, tuple(made.steps), made.chain, clip)
 
 
-def _named(config: Any, config_name: str, encoding: str) -> str:
-    for name in same_encodings(encoding):
-        space = config.getColorSpace(name)
-        if space is not None and not space.isData():
-            return str(space.getName())
-    raise Palette4dError(
-        f"the sidecar's palette is in {encoding!r}, which {config_name} does not know, so that "
-        "there is no way to another space; analyse with --input-space, or name the config that "
-        "knows it with --ocio-config"
-    )
-
-
 def transforms(steps: tuple[Step, ...]) -> tuple[list[Any], list[Any]]:
-    """Return OpenColorIO's transforms of the steps, and those of the way back."""
+    """Return OpenColorIO's transforms of the steps, and of their inverse."""
     there = [_transform(step, back=False) for step in steps]
     return there, [_transform(step, back=True) for step in reversed(steps)]
 
@@ -157,11 +152,11 @@ def _transform(step: Step, back: bool) -> Any:
         return ocio.ExponentWithLinearTransform(
             [*step["gamma"], 1.0], [*step["offset"], 0.0], style, direction
         )
-    return _table(step, back)
+    return _half_lut(step, back)
 
 
-def _table(step: Step, back: bool) -> Any:
-    """Return a table over all half floats: the spacing of floats suits every curve."""
+def _half_lut(step: Step, back: bool) -> Any:
+    """Return a 1D LUT over all half floats: their spacing suits every curve."""
     import PyOpenColorIO as ocio
 
     chain = _core.ColourConversion(json.dumps([step]))
@@ -169,7 +164,7 @@ def _table(step: Step, back: bool) -> Any:
     largest = float(np.finfo(np.float16).max)
     ramp = np.repeat(np.nan_to_num(at, nan=0, posinf=largest, neginf=-largest)[:, None], 3, axis=1)
     values = chain.to_clip(ramp) if back else chain.to_palette(ramp)
-    table = ocio.Lut1DTransform(length=65536, inputHalfDomain=True)
-    table.setFileOutputBitDepth(ocio.BIT_DEPTH_F32)
-    table.setData(np.clip(values, -3e38, 3e38).astype(np.float32).ravel())
-    return table
+    lut = ocio.Lut1DTransform(length=65536, inputHalfDomain=True)
+    lut.setFileOutputBitDepth(ocio.BIT_DEPTH_F32)
+    lut.setData(np.clip(values, -3e38, 3e38).astype(np.float32).ravel())
+    return lut

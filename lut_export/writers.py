@@ -1,8 +1,8 @@
 """The text of LUT files, written by OpenColorIO, so that others get what its own tools write.
 
 CLF and CTF are written as a list of transforms; the other formats by OpenColorIO's baker, which
-samples a conversion between two colour spaces. Here that conversion is the shaper and the lattice,
-sampled at the lattice's own nodes, where interpolation returns the node's value.
+samples a conversion between two colour spaces. Here that conversion is the shaper and the 3D LUT,
+sampled at the LUT's own nodes, where interpolation returns the node's value.
 """
 
 from collections.abc import Callable
@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from palette4d.lut_export.lattice import Lattice
+from palette4d.lut_export.lut3d import Lut3D
 from palette4d.lut_export.spaces import transforms
 
 from palette4d.common.errors import Palette4dError
@@ -23,7 +23,7 @@ class Description:
     Attributes
     ----------
     identifier : str
-        A URN that is the same for the same table.
+        A URN that is the same for the same content.
     name : str
         One line: what it is.
     lines : tuple of str
@@ -42,7 +42,7 @@ class Description:
     info: dict[str, Any] = field(default_factory=dict)
 
 
-Writer = Callable[[Lattice, Description], str]
+Writer = Callable[[Lut3D, Description], str]
 
 
 def one_line(text: str) -> str:
@@ -62,41 +62,40 @@ def lut3d(values: Any) -> Any:
     return transform
 
 
-def nodes(lattice: Lattice) -> list[Any]:
-    """Return OpenColorIO's transforms of a lattice, discrete.
+def nodes(lut: Lut3D) -> list[Any]:
+    """Return OpenColorIO's transforms of a 3D LUT, from its conversion to the inverse of that."""
+    before, after = transforms(lut.steps)
+    return [*before, *_shaped(lut), *after]
 
-    They are: conversion, shaper, table, inverse shaper, inverse conversion.
 
-    With a log shaper the table holds shaped colours, so that what the edit leaves alone is left
-    alone between nodes, too, however steep the curve.
+def _shaped(lut: Lut3D) -> list[Any]:
+    """Return the shaper, the 3D LUT and, with a log shaper, the inverse shaper.
+
+    With a log shaper the LUT holds shaped colours: an unedited colour stays the same between nodes,
+    too, however steep the curve.
     """
-    before, after = transforms(lattice.steps)
-    return [*before, *_table(lattice), *after]
-
-
-def _table(lattice: Lattice) -> list[Any]:
     import PyOpenColorIO as ocio
 
-    shaper = lattice.shaper
+    shaper = lut.shaper
     if shaper.kind == "log":
         (before,), (after,) = shaper.transforms(), shaper.transforms()
         after.setDirection(ocio.TRANSFORM_DIR_INVERSE)
-        return [before, lut3d(shaper.forward(lattice.values)), after]
+        return [before, lut3d(shaper.forward(lut.values)), after]
     if shaper.kind == "linear":
         domain = ocio.RangeTransform(
             minInValue=shaper.low, maxInValue=shaper.high, minOutValue=0.0, maxOutValue=1.0
         )
-        return [domain, lut3d(lattice.values)]
-    return [lut3d(lattice.values)]
+        return [domain, lut3d(lut.values)]
+    return [lut3d(lut.values)]
 
 
 def by_transforms(format_name: str) -> Writer:
     """Return a writer of one of OpenColorIO's transform formats, CLF or CTF."""
 
-    def write(lattice: Lattice, description: Description) -> str:
+    def write(lut: Lut3D, description: Description) -> str:
         import PyOpenColorIO as ocio
 
-        group = ocio.GroupTransform(nodes(lattice))
+        group = ocio.GroupTransform(nodes(lut))
         metadata = group.getFormatMetadata()
         metadata.setID(description.identifier)
         metadata.setName(one_line(description.name))
@@ -133,32 +132,32 @@ def _add_info(element: Any, info: dict[str, Any]) -> None:
 def by_baker(format_name: str) -> Writer:
     """Return a writer of one of the formats of OpenColorIO's baker."""
 
-    def write(lattice: Lattice, description: Description) -> str:
+    def write(lut: Lut3D, description: Description) -> str:
         import PyOpenColorIO as ocio
 
         config = ocio.Config.CreateRaw()
-        # Not "raw": a data space takes part in no conversion and the table would be the identity.
+        # Not "raw": OpenColorIO does not convert data, and the 3D LUT would be the identity.
         config.addColorSpace(ocio.ColorSpace(name="before"))
         after = ocio.ColorSpace(name="after")
-        steps = [*lattice.shaper.transforms(), lut3d(lattice.values)]
+        steps = [*lut.shaper.transforms(), lut3d(lut.values)]
         after.setTransform(ocio.GroupTransform(steps), ocio.COLORSPACE_DIR_FROM_REFERENCE)
         config.addColorSpace(after)
 
         baker = ocio.Baker()
-        if lattice.shaper.kind != "none":
+        if lut.shaper.kind != "none":
             shaped = ocio.ColorSpace(name="shaped")
             shaped.setTransform(
-                ocio.GroupTransform(lattice.shaper.transforms()),
+                ocio.GroupTransform(lut.shaper.transforms()),
                 ocio.COLORSPACE_DIR_FROM_REFERENCE,
             )
             config.addColorSpace(shaped)
             baker.setShaperSpace("shaped")
-            baker.setShaperSize(lattice.shaper.samples())
+            baker.setShaperSize(lut.shaper.samples())
         baker.setConfig(config)
         baker.setFormat(format_name)
         baker.setInputSpace("before")
         baker.setTargetSpace("after")
-        baker.setCubeSize(lattice.size)
+        baker.setCubeSize(lut.size)
         metadata = baker.getFormatMetadata()
         spaces = f"input {description.input_space}, output {description.output_space}"
         for line in (description.name, *description.lines, spaces, f"id {description.identifier}"):

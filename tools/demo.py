@@ -22,6 +22,8 @@ from numpy.typing import NDArray
 
 FRAMES = (1, 11, 22, 30, 38, 48)
 """Shown in before_after.png: a summer day, its end, autumn, late autumn, dusk and night."""
+GOLD = 28
+"""The frame at which the gold is edited: a vertex of the palette lies there."""
 AUTUMN = 30
 """The frame whose edit is baked: late autumn."""
 
@@ -94,9 +96,9 @@ def before_after(clip: Path, graded: Path, out: Path) -> None:
 
 
 def fade(sidecar: Path) -> str:
-    """Say over which frames the sidecar's one colour stop acts: between its edge's two vertices."""
+    """Say over which frames the newest colour stop acts: between its edge's two vertices."""
     document = json.loads(sidecar.read_text(encoding="utf-8"))
-    (stop,) = document["edits"]["stops"]
+    stop = document["edits"]["stops"][-1]
     (edge,) = (e for e in document["polytope"]["edges"] if e["id"] == stop["edge"])
     when = {v["id"]: v["frame"] for v in document["polytope"]["vertices"]}
     return (
@@ -126,14 +128,14 @@ def demo(out: Path) -> None:
     run("The palette as a picture", "plot", str(sidecar), "--clip", frames, "-o", str(palette))
     # fmt: off
     run("Edit: the gold of late autumn, in leaves and meadow, becomes rose",
-        "edit", str(sidecar), "set", "--near", "0.86,0.58,0.07", "--frame", str(AUTUMN),
+        "edit", str(sidecar), "set", "--near", "0.86,0.58,0.07", "--frame", str(GOLD),
         "--rgb", "0.9", "0.42", "0.62")
     run("Edit: a colour stop turns the day's blue, in the sky and the haze, to lavender",
-        "edit", str(sidecar), "stop", "--near", "0.2,0.47,0.85", "--frame", "11",
+        "edit", str(sidecar), "set", "--near", "0.2,0.47,0.85", "--frame", "11",
         "--rgb", "0.52", "0.45", "0.85")
     say(f"   {fade(sidecar)}")
     run("Edit: until the same frame the green that turns to gold stays as it was",
-        "edit", str(sidecar), "stop", "--near", "0.49,0.67,0.14", "--frame", "11",
+        "edit", str(sidecar), "set", "--near", "0.49,0.67,0.14", "--frame", "11",
         "--rgb", "0.49", "0.67", "0.14")
     # fmt: on
     run("The palette with its edits", "plot", str(sidecar), "--clip", frames, "-o", str(edited))
@@ -166,7 +168,7 @@ def demo(out: Path) -> None:
 == What to try next
 
   another colour
-      {command} edit {sidecar} set --near 0.9,0.11,0.05 --frame 29 --rgb 0.1 0.4 0.9
+      {command} edit {sidecar} set --near 0.9,0.11,0.05 --frame 30 --rgb 0.1 0.4 0.9
       {command} render {sidecar} '{frames}' -o '{graded}/sample.####.exr' --force
   undo every edit
       {command} edit {sidecar} reset

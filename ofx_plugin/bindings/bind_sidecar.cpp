@@ -105,8 +105,6 @@ void bind_sidecar(py::module_& module) {
         .def_property_readonly("stops", &stops_of);
 
     py::class_<BoundSidecar>(module, "Sidecar", "A validated sidecar file.")
-        .def_property_readonly("version",
-                               [](const BoundSidecar& self) { return self.sidecar.version; })
         .def_property_readonly("clip", &clip_of)
         .def_property_readonly(
             "polytope", [](const BoundSidecar& self) { return &self.sidecar.polytope; },

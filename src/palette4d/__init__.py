@@ -1,42 +1,147 @@
-"""palette4d: time-varying palettes for colour grading.
+"""palette4d: time-varying palettes for colour grading (Du et al., SIGGRAPH 2021).
 
-A clip is analysed once (`palette4d.analysis`); the result, a 4D skew polytope, lives with its edits
-in a sidecar file, which the OpenFX node, `palette4d render` and the bakes read through one core.
+>>> import palette4d as p4d
+>>> doc = p4d.load("shot.p4d.json")                           # doctest: +SKIP
+>>> doc.set_near((0.9, 0.5, 0.2), frame=30, rgb=(0.7, 0.2, 0.9))  # doctest: +SKIP
+>>> doc.save()                                                # doctest: +SKIP
+
+What `__all__` names is public, and documented in docs/python.md; everything else may change.
+Importing this module is quick: each name loads what it needs when it is first used.
 """
 
-from palette4d._core import (
-    SIDECAR_VERSION,
-    Edits,
-    Polytope,
-    Recolourer,
-    Sidecar,
-    Slice,
-    __version__,
-    edited_colours,
-    mean_value_coordinates,
-    palette_weights,
-    parse_sidecar,
-    polytope_weights,
-    read_sidecar,
-    slice_at,
-)
+import importlib
+import os
+from collections.abc import Callable
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
 from palette4d.common.errors import Palette4dError, SidecarError
 
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from palette4d._core import __version__
+    from palette4d.grade.document import Document
+    from palette4d.lut_export.bake import bake
+    from palette4d.media.clip import Clip, open_clip
+
 __all__ = [
-    "SIDECAR_VERSION",
-    "Edits",
+    "Document",
     "Palette4dError",
-    "Polytope",
-    "Recolourer",
-    "Sidecar",
     "SidecarError",
-    "Slice",
     "__version__",
-    "edited_colours",
-    "mean_value_coordinates",
-    "palette_weights",
-    "parse_sidecar",
-    "polytope_weights",
-    "read_sidecar",
-    "slice_at",
+    "analyze",
+    "bake",
+    "load",
+    "open_clip",
 ]
+
+_HOMES = {
+    "Document": "palette4d.grade.document",
+    "__version__": "palette4d._core",
+    "bake": "palette4d.lut_export.bake",
+    "open_clip": "palette4d.media.clip",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'palette4d' has no attribute {name!r}")
+    value = globals()[name] = getattr(importlib.import_module(_HOMES[name]), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__
+
+
+def load(path: str | os.PathLike[str]) -> "Document":
+    """Load a sidecar (*.p4d.json): a clip's palette and its edits.
+
+    Raises
+    ------
+    SidecarError
+        There is no such file, or it is unusable.
+    """
+    from palette4d.grade.document import Document
+
+    return Document.load(path)
+
+
+def analyze(
+    clip: "str | os.PathLike[str] | Clip | NDArray[np.floating[Any]]",
+    *,
+    frames: str | None = None,
+    rate: Fraction | None = None,
+    skip_bad_frames: bool = False,
+    allow_cuts: bool = False,
+    input_space: str | None = None,
+    palette_space: str | None = None,
+    ocio_config: str | None = None,
+    method: str = "skew",
+    progress: Callable[[str, int, int], object] | None = None,
+    **settings: float,
+) -> "Document":
+    """Find the time-varying palette of a clip.
+
+    Parameters
+    ----------
+    clip : str, path, clip or array
+        What `open_clip` opens, or what it has opened, or an array (frames, height, width, 3) of
+        float code values, 0..1 as a rule. The frame numbers of an array are its indices. The next
+        three parameters are for files.
+    frames : str, optional
+        Only these frames of a file or folder, evenly spaced: "1001-1100x2".
+    rate : Fraction, optional
+        Frames a second; by default what the files say, or 24.
+    skip_bad_frames : bool
+        Pass over missing and unreadable frames instead of stopping at the first.
+    allow_cuts : bool
+        Analyse a clip with sudden cuts as one shot instead of refusing it.
+    input_space, palette_space, ocio_config : str, optional
+        Colour spaces of the clip and of its palette, and the OpenColorIO config that names them
+        (docs/colour_spaces.md). Without them, and without ``$OCIO``, the palette has the clip's
+        code values.
+    progress : callable, optional
+        Called as ``progress(stage, done, total)``; `print` will do.
+    method : {"skew", "paper", "static", "rgbt"}
+        The default is the one to use; the others are for comparison.
+    **settings
+        Numbers that `palette4d analyze --help-all` lists, such as ``vertices=16``; "lambda" is
+        ``lambda_``.
+
+    Returns
+    -------
+    Document
+        Not yet saved; its ``notes`` say what the analysis noticed.
+
+    Raises
+    ------
+    Palette4dError
+        The clip cannot be read, its frames are not evenly spaced, it has sudden cuts, or a setting
+        is unknown or out of range.
+    """
+    from palette4d.analysis import pipeline
+    from palette4d.analysis.options import AnalysisOptions, check_methods, parse_setting
+    from palette4d.grade.document import Document
+    from palette4d.media.array_clip import ArrayClip
+    from palette4d.media.clip import Clip, open_clip
+    from palette4d.media.colour_space import SpaceOptions
+
+    given = dict(parse_setting(f"{name.rstrip('_')}={value}") for name, value in settings.items())
+    check_methods(method, given)
+    if isinstance(clip, str | os.PathLike):
+        opened: Clip = open_clip(
+            os.fspath(clip), frames=frames, rate=rate, skip_bad_frames=skip_bad_frames
+        )
+    else:
+        opened = clip if isinstance(clip, Clip) else ArrayClip(clip, first=0)
+    found = pipeline.analyze(
+        opened,
+        AnalysisOptions(method=method, **given),
+        progress,
+        spaces=SpaceOptions(input_space, palette_space, ocio_config),
+        allow_cuts=allow_cuts,
+    )
+    return Document(found.document, found.notes)

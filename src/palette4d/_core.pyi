@@ -75,8 +75,6 @@ class Sidecar:
     """A validated sidecar file."""
 
     @property
-    def version(self) -> int: ...
-    @property
     def clip(self) -> dict[str, Any]:
         """name, source, first, last, step, rate (num, den), width, height, encoding."""
     @property

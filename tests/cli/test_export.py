@@ -22,7 +22,7 @@ EDITED, SPLIT = GOLDEN / "v1_edited.p4d.json", GOLDEN / "v1_split.p4d.json"
 @pytest.fixture(autouse=True)
 def small_grid(monkeypatch: pytest.MonkeyPatch) -> None:
     """Measure errors on 23^3 colours instead of 67^3 in this process."""
-    monkeypatch.setattr("palette4d.lut_export.lattice.DENSE", 23)
+    monkeypatch.setattr("palette4d.lut_export.lut3d.DENSE", 23)
 
 
 def export(*words: object) -> int:
@@ -142,11 +142,16 @@ class TestConfig:
     ) -> None:
         show = tmp_path / "show"
         words = (EDITED, "-o", show, "--every", "10", "--process-space", "srgb_tx")
+        # The edit changes too much between these frames.
+        assert config(*words, "--names", "shot010") == 1
+        assert "--anyway" in capsys.readouterr().err
+        assert not show.exists()
+        words = (*words, "--anyway", "--size", "9")
         assert config(*words, "--names", "shot010") == 0
         printed = capsys.readouterr()
         assert printed.out.startswith(f"{show}/config.ocio: 1 look, added to ocio://")
-        assert "shot010  frames 0 to 20, 3 tables, process space sRGB - Texture, " in printed.out
-        assert "largest |a-b|/max(|b|,0.1) in it 0." in printed.out
+        assert "shot010  frames 0 to 20, 3 LUTs, " in printed.out
+        assert "between the LUTs: deltaE 2000 of up to " in printed.out
         assert f"OCIO={show}/config.ocio SHOT=shot010 FRAME=0" in printed.out
         assert config(*words, "--names", "shot010") == 1
         assert "--force" in capsys.readouterr().err
@@ -156,6 +161,7 @@ class TestConfig:
         assert report["shots"][0]["process_space"] == "sRGB - Texture"
         assert report["shots"][0]["error_space"] == "sRGB - Texture"
         assert 0 < report["shots"][0]["error"] < 1
+        assert report["shots"][0]["between"]["delta_e"] > 2
         assert len(report["views"]) > 5
 
     def test_two_shots_of_one_name(

@@ -18,6 +18,7 @@ from palette4d import _core
 from palette4d.cli import render
 from palette4d.common.errors import Palette4dError, WriteError
 from palette4d.grade import rendering
+from palette4d.grade.document import Document
 from palette4d.media.clip import open_clip
 from palette4d.media.frame_writer import FramePattern, sample_type, write_frame
 
@@ -339,7 +340,7 @@ def test_a_movie_holds_the_recoloured_frames(tmp_path, name, codec):
     assert [path.name for path in (tmp_path / "out").iterdir()] == [name]
     clip = open_clip(str(tmp_path / "out" / name))
     assert (clip.rate, clip.frames, clip.width, clip.height) == (25, list(range(6)), 64, 48)
-    for frame, pixels in open_clip(str(source)).iter_frames():
+    for frame, pixels in open_clip(str(source)):
         expected = np.clip(by_core(frame, pixels), 0, 1)
         assert np.abs(expected - pixels).max() > 0.05
         np.testing.assert_allclose(centres(clip.read(frame)), centres(expected), atol=0.025)
@@ -413,9 +414,9 @@ def test_the_source_beside_the_edit(tmp_path):
 
 
 def rendered(output: Path, source: Path, progress: Callable[[int, int], None], force: bool) -> None:
-    sidecar, clip = _core.read_sidecar(str(PLAIN)), open_clip(str(source))
+    document, clip = Document.load(PLAIN), open_clip(str(source))
     options = rendering.RenderOptions()
-    rendering.render(sidecar, clip, str(output), options, force=force, progress=progress)
+    rendering.render(document, clip, str(output), options, force=force, progress=progress)
 
 
 @pytest.mark.parametrize("name", ["o.mp4", "o.mov"])

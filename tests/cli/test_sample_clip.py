@@ -44,7 +44,7 @@ def test_frames_are_written(tmp_path, name, depth, options):
     assert (clip.width, clip.height, clip.depth, clip.encoding) == (64, 36, depth, "sRGB")
     assert clip.rate == Fraction(24)
     tolerance = {"uint16": 1e-5, "float": 0, "half": 5e-4}[depth]
-    for frame, pixels in clip.iter_frames():
+    for frame, pixels in clip:
         drawn = Scene(64, 36).picture((frame - 1) / 2)
         np.testing.assert_allclose(pixels, drawn, atol=tolerance)
     with pytest.raises(Palette4dError, match="exists already"):

@@ -14,7 +14,7 @@ from palette4d import SidecarError, _core
 ROOT = Path(__file__).resolve().parents[2]
 FILES = sorted((ROOT / "tests" / "golden" / "sidecars").glob("v*_*.p4d.json"))
 SCHEMA: dict[str, Any] = json.loads(
-    (ROOT / "src/palette4d/sidecar_v2.schema.json").read_text(encoding="utf-8")
+    (ROOT / "src/palette4d/sidecar_v1.schema.json").read_text(encoding="utf-8")
 )
 
 
@@ -39,7 +39,7 @@ def test_the_table_notices_a_change(tool: ModuleType) -> None:
 
 
 def test_the_package_carries_the_schema() -> None:
-    installed = importlib.resources.files("palette4d") / "sidecar_v2.schema.json"
+    installed = importlib.resources.files("palette4d") / "sidecar_v1.schema.json"
     assert json.loads(installed.read_text(encoding="utf-8")) == SCHEMA
 
 

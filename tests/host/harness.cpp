@@ -1,5 +1,6 @@
 #include "harness.hpp"
 
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -271,7 +272,8 @@ std::vector<unsigned char> stored(const strict::Layout& layout, const std::vecto
 
 }  // namespace test
 
-/// palette4d_host_tests BUNDLE FOLDER [NAME …]: runs the tests whose names contain one of NAME.
+/// palette4d_host_tests BUNDLE FOLDER [NAME …] [-NAME …]: runs the tests whose names contain one of
+/// NAME (all without one), and none of -NAME.
 int main(int argc, char** argv) {
     if (argc < 3) {
         std::cerr << "usage: " << argv[0] << " BUNDLE FOLDER [NAME ...]\n";
@@ -280,15 +282,21 @@ int main(int argc, char** argv) {
     test::g_bundle = argv[1];
     int failed_cases = 0, run = 0;
     for (const test::Case& test_case : test::cases()) {
-        bool wanted = argc == 3;
-        for (int i = 3; i < argc; ++i) wanted |= std::strstr(test_case.name, argv[i]) != nullptr;
-        if (!wanted) continue;
+        bool any = false, wanted = false, unwanted = false;
+        for (int i = 3; i < argc; ++i) {
+            const bool minus = argv[i][0] == '-';
+            const bool holds = std::strstr(test_case.name, argv[i] + minus) != nullptr;
+            any |= !minus;
+            (minus ? unwanted : wanted) |= holds;
+        }
+        if (unwanted || (any && !wanted)) continue;
         ++run;
         // Whole: what the node is given and what it says are compared as texts.
         test::g_folder =
             std::filesystem::absolute(std::filesystem::u8path(argv[2])) / test_case.name;
         std::filesystem::remove_all(test::g_folder);
         std::filesystem::create_directories(test::g_folder);
+        const auto began = std::chrono::steady_clock::now();
         const int before = test::g_failures;
         strict::Host::get().configure({});
         strict::Host::get().take_faults();
@@ -302,7 +310,9 @@ int main(int argc, char** argv) {
         }
         const bool ok = test::g_failures == before;
         failed_cases += !ok;
-        std::cout << (ok ? "ok    " : "FAILED ") << test_case.name << std::endl;
+        const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - began;
+        std::cout << (ok ? "ok    " : "FAILED ") << test_case.name << "  ("
+                  << std::round(10 * taken.count()) / 10 << " s)" << std::endl;
     }
     std::cout << run - failed_cases << " of " << run << " passed" << std::endl;
     return failed_cases || !run ? 1 : 0;

@@ -54,7 +54,8 @@ def recolour(
     return np.clip(recolourer.apply(values, strength=strength, precision="single"), 0, 1)
 
 
-FIRST_FRAME, WHOLE_CLIP = 60.0, 300.0  # seconds
+# Seconds until the first frame, twice as long at each new try, and until the last.
+FIRST_FRAME, WHOLE_CLIP = 5.0, 300.0
 
 
 def run_until_it_writes(
@@ -66,12 +67,12 @@ def run_until_it_writes(
     """What melt said, and the KiB of memory that it took at most; asked again where it must be.
 
     On a busy machine melt 7.42, with or without an effect, now and then (2 of 100 runs) ends
-    without a word before its first frame, and more rarely (2 of 1000) waits for ever instead, its
-    rendering threads gone already. Whatever else happens once it has written something is not
-    forgiven: a render that stops midway fails the test.
+    without a word before its first frame, or waits for ever instead (1 of 100), its rendering
+    threads gone already. A render that stops midway, after its first frame, fails the test.
     """
-    for _ in range(5):
-        said, status, memory = _run_once(command, folder, environment, written)
+    for attempt in range(5):
+        patience = FIRST_FRAME * 2**attempt
+        said, status, memory = _run_once(command, folder, environment, written, patience)
         assert status in (0, None), f"melt ended with {status}: {said}"
         if written():
             assert status == 0, f"melt did not end within {WHOLE_CLIP:g} s: {said}"
@@ -84,6 +85,7 @@ def _run_once(
     folder: Path,
     environment: dict[str, str],
     written: Callable[[], object],
+    patience: float,
 ) -> tuple[str, int | None, int]:
     """What a program said, its exit status (None: it was killed) and its most KiB of memory."""
     with tempfile.TemporaryFile() as output:
@@ -103,7 +105,7 @@ def _run_once(
             if ended:
                 break
             elapsed = time.monotonic() - started
-            if not killed and elapsed > (WHOLE_CLIP if written() else FIRST_FRAME):
+            if not killed and elapsed > (WHOLE_CLIP if written() else patience):
                 program.kill()
                 killed = True
             time.sleep(0.02)

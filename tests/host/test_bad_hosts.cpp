@@ -181,14 +181,14 @@ TEST(every_property_refused_in_turn) {
 TEST(every_call_refused_in_turn) {
     const Pictures pictures;
     Plugin plugin(bundle());
-    // Most of describing is 32 handles alike: of its calls every 13th is refused, which meets every
-    // kind of call, and of all others every one.
+    // Most of describing is 32 equal handles: steps of a prime meet every kind of call. The test
+    // host.every_call refuses each one.
     CHECK(plugin.load() == kOfxStatOK);
     const long loaded = Host::get().calls();
     CHECK(plugin.describe(kOfxImageEffectContextFilter) != nullptr);
     const long described = Host::get().calls();
     long refused = 0, whole = 0;
-    for (long n = 0;; n += n >= loaded + 100 && n < described - 100 ? every(13) : 1) {
+    for (long n = 0;; n += n >= loaded + 100 && n < described - 100 ? every(29) : every(3)) {
         Config config;
         config.refused_call = n;
         config.processors =

@@ -29,7 +29,6 @@ std::string with_conversion(bool edited = true) {
     const auto put = [&](const std::string& from, const std::string& to) {
         text.replace(text.find(from), from.size(), to);
     };
-    put(R"("version": 1)", R"("version": 2)");
     put(R"("encoding": "linear")", kConversion);
     return text;
 }

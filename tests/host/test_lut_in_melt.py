@@ -12,7 +12,7 @@ import pytest
 from host.scene import Image, Scene
 from host.test_melt import box_sidecar
 from numpy.typing import NDArray
-from palette4d.lut_export.bake import BakeOptions, BakeResult, bake
+from palette4d.lut_export.bake import BakeResult, bake
 
 F64 = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ def graded(
     sidecar = scene.folder / "box.p4d.json"
     box_sidecar(sidecar, clip)
     out = scene.folder / "look.cube"
-    result = bake(sidecar, out, BakeOptions(101.0, 33), image=real_frame, image_frame=101)
+    result = bake(sidecar, 101.0, out, size=33, clip=real_frame)
     assert result.shaper.kind == "none"
     frames, said = scene.render(sidecar=sidecar)
     assert "persistent" not in said

@@ -192,7 +192,7 @@ def peak_memory(scene: Scene, bundle: Path, count: int, threads: int, *effect: s
     return memory
 
 
-@pytest.mark.parametrize("threads", [-1, -4])
+@pytest.mark.parametrize("threads", [pytest.param(-1, marks=pytest.mark.slow), -4])
 def test_a_thousand_frames_take_no_more_memory_than_an_effect_that_does_nothing(
     scene: Scene,
     sidecars: tuple[_core.Sidecar, _core.Sidecar],

@@ -75,22 +75,24 @@ def crimson_autumn(
     the orange that it ends in crimson; until frame 28 the leaves stay as they were."""
     sidecar = tmp_path_factory.mktemp("seasons") / "seasons.p4d.json"
     palette4d("analyze", seasons, "-o", sidecar, "--quiet")
+    summer = ("--near", "0.91,0.84,0.04", "--frame", 28)
+    palette4d("edit", sidecar, "set", *summer, "--rgb", 0.91, 0.84, 0.04)
     for leaves, frame, colour in (
         ("0.95,0.85,0", 35, (0.9, 0.35, 0.1)),
         ("1,0.6,0", 49, (0.8, 0.12, 0.15)),
     ):
         palette4d("edit", sidecar, "set", "--near", leaves, "--frame", frame, "--rgb", *colour)
-    summer = ("--near", "0.91,0.84,0.04", "--frame", 28)
-    palette4d("edit", sidecar, "stop", *summer, "--rgb", 0.91, 0.84, 0.04)
     return render_both_ways(melt, bundle, sidecar, seasons)
 
 
+@pytest.mark.slow
 def test_seasons_in_melt_is_what_the_command_renders(crimson_autumn: Rendered) -> None:
     assert "persistent" not in crimson_autumn.said
     assert len(crimson_autumn.frames) == 50
     crimson_autumn.scene.check_against(crimson_autumn.frames, crimson_autumn.expected)
 
 
+@pytest.mark.slow
 def test_an_edit_in_autumn_leaves_spring_alone(crimson_autumn: Rendered) -> None:
     for index in range(11):
         assert np.abs(crimson_autumn.change(index)).max() < 1 / 255, f"frame {index} changed"
@@ -98,6 +100,7 @@ def test_an_edit_in_autumn_leaves_spring_alone(crimson_autumn: Rendered) -> None
         assert np.abs(crimson_autumn.change(index)).mean() > 0.01, f"frame {index} did not change"
 
 
+@pytest.mark.slow
 def test_the_orange_leaves_turn_crimson(crimson_autumn: Rendered) -> None:
     red, green, blue = np.moveaxis(crimson_autumn.scene.clip[AUTUMN] / 65535, -1, 0)
     orange = (red > 0.5) & (green < 0.75 * red) & (blue < 0.4 * red)

@@ -26,8 +26,7 @@ from parity.cases import (
 )
 from parity.implementations import FAST, REFERENCE
 
-from palette4d import _core
-from palette4d.grade.rendering import RenderOptions, recoloured
+from palette4d.grade.document import Document
 
 Picture = NDArray[np.float32]  # (h, w, 3 or 4)
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
@@ -93,8 +92,8 @@ def test_at_beside_and_between_all_that_happens_the_node_is_the_core(node: Node,
 @pytest.mark.parametrize(("channels", "premultiplied"), SHAPES)
 def test_the_node_converts_as_render_does(node: Node, channels: int, premultiplied: bool) -> None:
     """Scene-linear light from below 0 to 50, a palette in ACEScct: every bit is the same."""
-    text = (GOLDEN / "v2_scene_linear.p4d.json").read_text(encoding="utf-8")
-    sidecar = _core.parse_sidecar(text, "golden")
+    text = (GOLDEN / "v1_scene_linear.p4d.json").read_text(encoding="utf-8")
+    document = Document(json.loads(text))
     random = np.random.default_rng(7)
     image = np.exp2(random.uniform(-9, 5.6, (20, 30, channels))).astype(np.float32)
     image[:3, :, :3] -= 0.1
@@ -102,7 +101,7 @@ def test_the_node_converts_as_render_does(node: Node, channels: int, premultipli
         image[..., 3] = random.uniform(0, 1, (20, 30)).astype(np.float32)
     for frame in (3.0, 6.25, 12.0):
         found = node.recolour(image, json.loads(text), frame, 0.8, premultiplied)
-        expected = recoloured(sidecar, frame, image, premultiplied, RenderOptions(0.8))
+        expected = document.recolour(image, frame, strength=0.8, premultiplied=premultiplied)
         assert same_bits(found, expected).all()
         assert np.isfinite(found).all()
     assert not same_bits(node.recolour(image, json.loads(text), 6.0), image).all()

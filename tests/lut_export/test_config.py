@@ -5,18 +5,19 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import PyOpenColorIO as ocio
 import pytest
 from numpy.typing import NDArray
 from palette4d.lut_export import series
-from palette4d.lut_export.bake import BakeOptions
-from palette4d.lut_export.config import ConfigOptions, WrittenConfig, write_config
+from palette4d.lut_export.bake_job import BakeSettings
+from palette4d.lut_export.config import WrittenConfig, write_config
 from palette4d.lut_export.frame_edit import frame_edit
-from palette4d.lut_export.series import SeriesOptions
 
 from palette4d import Palette4dError, _core
+from palette4d.colour.difference import delta_e_2000, viewing_of
 from palette4d.colour.ocio_config import BUILT_IN
 from palette4d.jobs.workers import Workers
 
@@ -48,14 +49,14 @@ def two_shots(write_sidecar: Callable[..., Path], tmp_path: Path) -> list[Path]:
     return paths
 
 
-def options(step: int = 1, size: int = 9, **changes: object) -> ConfigOptions:
-    return ConfigOptions(
-        series=SeriesOptions(
-            frames=(), bake=BakeOptions(0.0, size, format="clf"), workers=Workers(1)
-        ),
-        choose=lambda sidecar: series.every(sidecar, step),
-        **changes,  # type: ignore[arg-type]
-    )
+def options(step: int = 1, size: int = 9, **changes: object) -> dict[str, Any]:
+    return {
+        "settings": BakeSettings(size=size, format="clf"),
+        "choose": lambda sidecar: series.every(sidecar, step),
+        "workers": Workers(1),
+        "anyway": True,
+        **changes,
+    }
 
 
 def colours() -> F32:
@@ -86,7 +87,7 @@ def core(sidecar: Path, frame: float) -> NDArray[np.float64]:
 
 
 def test_a_viewer_shows_the_look_of_its_frame(two_shots: list[Path], tmp_path: Path) -> None:
-    done = write_config(two_shots, tmp_path / "show", options())
+    done = write_config(two_shots, tmp_path / "show", **options())
     assert [s.name for s in done.shots] == ["shot010", "shot020"]
     assert [s.process_space for s in done.shots] == ["sRGB - Texture"] * 2
     assert done.notes == []
@@ -106,8 +107,50 @@ def test_a_viewer_shows_the_look_of_its_frame(two_shots: list[Path], tmp_path: P
     assert np.abs(seen[-2] - seen[-4]).max() > 0.05  # the frames differ
 
 
+def test_frames_between_state_their_error(
+    shot: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    every = write_config([shot], tmp_path / "every", **options())
+    assert every.shots[0].between is None
+    done = write_config([shot], tmp_path / "show", **options(5, size=17))
+    between = done.shots[0].between
+    assert between is not None
+    assert not between.on_clip
+    # The palette moves evenly over the frames: two frames away from a look is the worst.
+    assert abs(between.frame - between.look) == 2
+    # The look that is shown there, against the edit.
+    got = shown(done.path, {"FRAME": str(between.frame)}, look("cube"))
+    seen, wanted = (viewing_of("sRGB").lab(c[0]) for c in (got, core(shot, between.frame)))
+    found = delta_e_2000(seen, wanted).max()
+    assert 0.3 * between.delta_e < found < 1.1 * between.delta_e
+
+    monkeypatch.setattr("palette4d.lut_export.config.LARGEST_DELTA_E", 0.9 * between.delta_e)
+    with pytest.raises(Palette4dError, match=rf"frame {between.frame}.*--every.*--anyway"):
+        write_config([shot], tmp_path / "no", **options(5, anyway=False))
+    assert not (tmp_path / "no").exists()
+    finer = write_config([shot], tmp_path / "finer", **options(2, anyway=False)).shots[0].between
+    assert finer is not None
+    assert finer.delta_e < 0.9 * between.delta_e
+
+
+def test_a_stop_between_two_looks_is_found(
+    write_sidecar: Callable[..., Path], tmp_path: Path
+) -> None:
+    """Both looks and the middle between them change nothing: only the stop's frame does."""
+    path = write_sidecar()
+    document = json.loads(path.read_text("utf-8"))
+    white = [1.0, 1.0, 1.0]
+    document["edits"]["stops"] = [
+        {"id": f"s{k}", "edge": "e8", "frame": frame, "rgb": rgb}
+        for k, (frame, rgb) in enumerate(((1, white), (2, [1.0, 0.6, 0.4]), (3, white)))
+    ]
+    path.write_text(json.dumps(document), "utf-8")
+    with pytest.raises(Palette4dError, match="frame 2: deltaE"):
+        write_config([path], tmp_path / "show", **options(10, anyway=False))
+
+
 def test_views_apply_the_look(shot: Path, tmp_path: Path) -> None:
-    done = write_config([shot], tmp_path / "show", options(5))
+    done = write_config([shot], tmp_path / "show", **options(5))
     assert ("sRGB - Display", "Un-tone-mapped + palette4d") in done.views
     config = ocio.Config.CreateFromFile(str(done.path))
     base = ocio.Config.CreateFromBuiltinConfig(BUILT_IN)
@@ -129,7 +172,7 @@ def test_views_apply_the_look(shot: Path, tmp_path: Path) -> None:
 def test_without_variables_the_middle_is_shown(
     shot: Path, tmp_path: Path, ocio_tool: Callable[..., str]
 ) -> None:
-    done = write_config([shot], tmp_path / "show", options())
+    done = write_config([shot], tmp_path / "show", **options())
     assert "ERROR" not in ocio_tool("ociocheck", "--iconfig", done.path)
     got = shown(done.path, {}, look("palette4d"))
     np.testing.assert_array_equal(got, shown(done.path, {"FRAME": "5"}, look("cube")))
@@ -140,7 +183,7 @@ def test_variables_of_the_environment(
     shot: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As a viewer does that is started with OCIO, SHOT and FRAME set."""
-    done = write_config([shot], tmp_path / "show", options(5))
+    done = write_config([shot], tmp_path / "show", **options(5))
     monkeypatch.setenv("OCIO", str(done.path))
     monkeypatch.setenv("SHOT", "cube")
     monkeypatch.setenv("FRAME", "10")
@@ -153,7 +196,7 @@ def test_variables_of_the_environment(
 
 
 def test_frames_between_take_the_nearest_table(shot: Path, tmp_path: Path) -> None:
-    done = write_config([shot], tmp_path / "show", options(4))
+    done = write_config([shot], tmp_path / "show", **options(4))
     tables = tmp_path / "show" / "luts" / "cube"
     baked = sorted(p.name for p in tables.glob("*.clf") if not p.is_symlink())
     assert baked == ["cube.0.clf", "cube.4.clf", "cube.8.clf"]
@@ -167,8 +210,8 @@ def test_frames_between_take_the_nearest_table(shot: Path, tmp_path: Path) -> No
 
 
 def test_more_tables_replace_links(shot: Path, tmp_path: Path) -> None:
-    write_config([shot], tmp_path / "show", options(4))
-    done = write_config([shot], tmp_path / "show", options(2, force=True))
+    write_config([shot], tmp_path / "show", **options(4))
+    done = write_config([shot], tmp_path / "show", **options(2, force=True))
     (written,) = done.shots
     assert (written.baked.kept, written.baked.baked) == ([0, 4, 8], [2, 6, 10])
     tables = tmp_path / "show" / "luts" / "cube"
@@ -201,7 +244,7 @@ class TestBase:
     def test_its_own_files_are_still_found(self, files: str, shot: Path, tmp_path: Path) -> None:
         base = self.own(tmp_path, files=files)
         before = base.read_bytes()
-        done = write_config([shot], tmp_path / "show", options(5, base=str(base)))
+        done = write_config([shot], tmp_path / "show", **options(5, base=str(base)))
         assert base.read_bytes() == before
         assert any("still read from" in note for note in done.notes)
         transform = ocio.DisplayViewTransform(
@@ -212,19 +255,19 @@ class TestBase:
 
     def test_one_of_palette4d(self, two_shots: list[Path], tmp_path: Path) -> None:
         """A second shot is added, and the first one changed, from another folder."""
-        first = write_config(two_shots[:1], tmp_path / "first", options(10))
+        first = write_config(two_shots[:1], tmp_path / "first", **options(10))
         with pytest.raises(Palette4dError, match=r"has a look 'palette4d' already.*--force"):
-            write_config(two_shots[1:], tmp_path / "show", options(10, base=str(first.path)))
+            write_config(two_shots[1:], tmp_path / "show", **options(10, base=str(first.path)))
         names = [_core.read_sidecar(str(path)).clip["name"] for path in two_shots]
         found = options(10, base=str(first.path), force=True)
-        done = write_config(two_shots[1:], tmp_path / "show", found)
+        done = write_config(two_shots[1:], tmp_path / "show", **found)
         for name, path in zip(names, two_shots, strict=True):
             got = shown(done.path, {"SHOT": name, "FRAME": "10"}, look("palette4d"))
             np.testing.assert_allclose(got, core(path, 10), atol=0.02)
         document = json.loads(two_shots[0].read_text("utf-8"))
         document["edits"]["vertices"] = [{"vertex": "v16", "rgb": [0.2, 0.9, 0.4]}]
         two_shots[0].write_text(json.dumps(document), "utf-8")
-        done = write_config(two_shots[:1], tmp_path / "again", found)
+        done = write_config(two_shots[:1], tmp_path / "again", **found)
         got = shown(done.path, {"SHOT": names[0], "FRAME": "10"}, look("palette4d"))
         np.testing.assert_allclose(got, core(two_shots[0], 10), atol=0.02)
 
@@ -234,14 +277,14 @@ class TestBase:
         with pytest.raises(
             Palette4dError, match=r"OpenColorIO refuses .*'half.spi1d' could not be"
         ):
-            write_config([shot], tmp_path / "show", options(5, base=str(base)))
+            write_config([shot], tmp_path / "show", **options(5, base=str(base)))
         assert not (tmp_path / "show" / "config.ocio").exists()
 
     def test_an_archive(self, shot: Path, tmp_path: Path) -> None:
         base = ocio.Config.CreateFromFile(str(self.own(tmp_path)))
         base.archive(str(tmp_path / "base.ocioz"))
         done = write_config(
-            [shot], tmp_path / "show", options(5, base=str(tmp_path / "base.ocioz"))
+            [shot], tmp_path / "show", **options(5, base=str(tmp_path / "base.ocioz"))
         )
         assert done.notes == []
         (tmp_path / "base.ocioz").unlink()
@@ -260,7 +303,7 @@ class TestBase:
         assert "environment" not in text
         base.write_text(text.replace("search_path: files", "search_path: $WHERE"), "utf-8")
         monkeypatch.setenv("WHERE", str(base.parent / "files"))
-        done = write_config([shot], tmp_path / "show", options(5, base=str(base)))
+        done = write_config([shot], tmp_path / "show", **options(5, base=str(base)))
         assert any("WHERE" in note for note in done.notes)
         monkeypatch.delenv("WHERE")
         got = shown(done.path, {}, ocio.ColorSpaceTransform(src="srgb_tx", dst="half"))
@@ -268,7 +311,7 @@ class TestBase:
 
     def test_a_declared_variable_is_kept(self, shot: Path, tmp_path: Path) -> None:
         base = self.own(tmp_path, environment=True)
-        done = write_config([shot], tmp_path / "show", options(5, base=str(base)))
+        done = write_config([shot], tmp_path / "show", **options(5, base=str(base)))
         assert done.notes[-1] == "the base's default of the variable SHOT is kept"
         got = shown(done.path, {"SHOT": "cube", "FRAME": "10"}, look("palette4d", "srgb_tx"))
         np.testing.assert_allclose(got, core(shot, 10), atol=0.02)
@@ -286,7 +329,7 @@ class TestBase:
         config.addColorSpace(space)
         base = tmp_path / "base.ocio"
         base.write_text(config.serialize(), "utf-8")
-        done = write_config([shot], tmp_path / "show", options(5, base=str(base)))
+        done = write_config([shot], tmp_path / "show", **options(5, base=str(base)))
         assert done.shots[0].process_space == "monitor stuff"
 
 
@@ -295,7 +338,7 @@ def test_shots_in_two_encodings(write_sidecar: Callable[..., Path], tmp_path: Pa
     for name, encoding in (("a", "sRGB"), ("b", "ACEScct")):
         path = write_sidecar(lambda c: (c[0], c[1] * 0.8, c[2]), name=name, encoding=encoding)
         paths.append(path.rename(tmp_path / f"{name}.p4d.json"))
-    done = write_config(paths, tmp_path / "show", options(10))
+    done = write_config(paths, tmp_path / "show", **options(10))
     assert [s.process_space for s in done.shots] == ["sRGB - Texture", "ACEScct"]
     assert done.views == []
     assert any("2 encodings" in note for note in done.notes)
@@ -306,11 +349,11 @@ def test_shots_in_two_encodings(write_sidecar: Callable[..., Path], tmp_path: Pa
 
 class TestRefusals:
     def refused(
-        self, sidecars: list[Path], tmp_path: Path, word: str, chosen: ConfigOptions | None = None
+        self, sidecars: list[Path], tmp_path: Path, word: str, chosen: dict[str, Any] | None = None
     ) -> None:
         before = sorted(tmp_path.rglob("*"))
         with pytest.raises(Palette4dError, match=word):
-            write_config(sidecars, tmp_path / "show", chosen or options())
+            write_config(sidecars, tmp_path / "show", **(chosen or options()))
         assert sorted(tmp_path.rglob("*")) == before
 
     def test_two_shots_of_one_name(self, two_shots: list[Path], tmp_path: Path) -> None:
@@ -325,7 +368,7 @@ class TestRefusals:
     def test_names_mend_it(self, two_shots: list[Path], tmp_path: Path) -> None:
         copies = [two_shots[0], tmp_path / "copy.p4d.json"]
         copies[1].write_bytes(two_shots[0].read_bytes())
-        done = write_config(copies, tmp_path / "show", options(10, names=("a", "b")))
+        done = write_config(copies, tmp_path / "show", **options(10, names=("a", "b")))
         assert [s.name for s in done.shots] == ["a", "b"]
 
     def test_no_such_base(self, shot: Path, tmp_path: Path) -> None:
@@ -348,7 +391,7 @@ class TestRefusals:
             found = options(base=str(base), process_space=near)
             self.refused([shot], tmp_path, f"--process-space '{near}': .*{expected}", found)
         chosen = options(10, base=str(base), process_space="film log")
-        assert write_config([shot], tmp_path / "s", chosen).shots[0].process_space == "film log"
+        assert write_config([shot], tmp_path / "s", **chosen).shots[0].process_space == "film log"
 
     def test_an_unknown_encoding(self, write_sidecar: Callable[..., Path], tmp_path: Path) -> None:
         self.refused([write_sidecar(encoding="")], tmp_path, "does not say in which encoding")
@@ -360,26 +403,22 @@ class TestRefusals:
         self.refused([shot], tmp_path, "--force")
 
     def test_a_look_that_is_there(self, shot: Path, tmp_path: Path) -> None:
-        first = write_config([shot], tmp_path / "first", options(10))
+        first = write_config([shot], tmp_path / "first", **options(10))
         self.refused([shot], tmp_path, "has a look", options(base=str(first.path)))
 
     def test_a_frame_that_fails_leaves_no_config(self, shot: Path, tmp_path: Path) -> None:
-        chosen = ConfigOptions(
-            series=SeriesOptions(
-                frames=(), bake=BakeOptions(0.0, 5, format="cc", max_error=1e-9), workers=Workers(1)
-            ),
-            choose=lambda sidecar: (0, 10),
-        )
+        settings = BakeSettings(size=5, format="cc", max_error=1e-9)
+        chosen = options(10, settings=settings)
         with pytest.raises(Palette4dError, match="shot cube, 1 frame:"):
-            write_config([shot], tmp_path / "show", chosen)
+            write_config([shot], tmp_path / "show", **chosen)
         assert not (tmp_path / "show" / "config.ocio").exists()
 
 
 def test_adding_to_itself(two_shots: list[Path], tmp_path: Path) -> None:
     """A show grows: the second shot joins the config that the first is in."""
-    first = write_config(two_shots[:1], tmp_path / "show", options(10))
+    first = write_config(two_shots[:1], tmp_path / "show", **options(10))
     second: WrittenConfig = write_config(
-        two_shots[1:], tmp_path / "show", options(10, base=str(first.path), force=True)
+        two_shots[1:], tmp_path / "show", **options(10, base=str(first.path), force=True)
     )
     for name, sidecar in zip(("shot010", "shot020"), two_shots, strict=True):
         got = shown(second.path, {"SHOT": name, "FRAME": "10"}, look("palette4d"))

@@ -12,7 +12,7 @@ import av
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from palette4d.lut_export.bake import BakeOptions, BakeResult, bake
+from palette4d.lut_export.bake import BakeResult, bake
 from palette4d.lut_export.frame_edit import frame_edit
 
 from palette4d import _core
@@ -49,8 +49,8 @@ def test_ffmpeg_keeps_the_stated_error(
     dialect: str, reading: str, warm_sidecar: Path, tmp_path: Path, real_frame: F32
 ) -> None:
     out = tmp_path / "warm.cube"
-    options = BakeOptions(4.0, 33, format=dialect)
-    result = bake(warm_sidecar, out, options, image=real_frame, image_frame=40)
+    options = {"frame": 4.0, "size": 33, "format": dialect}
+    result = bake(warm_sidecar, path=out, **options, clip=real_frame)
     check(result, out, warm_sidecar, real_frame, reading)
 
 
@@ -60,7 +60,7 @@ def test_ffmpeg_reads_the_shaper_of_a_csp(
 ) -> None:
     """Not that of a .cube, which is why `bake` warns."""
     out = tmp_path / "bright.csp"
-    result = bake(linear_sidecar, out, BakeOptions(4.0, 33), image=bright_picture, image_frame=4)
+    result = bake(linear_sidecar, 4.0, out, size=33, clip=bright_picture)
     assert result.shaper.kind == "log"
     check(result, out, linear_sidecar, bright_picture, reading)
 
@@ -83,7 +83,7 @@ def check(result: BakeResult, out: Path, sidecar: Path, image: F32, reading: str
 def test_ffmpeg_reads_the_axes_as_meant(warm_sidecar: Path, tmp_path: Path) -> None:
     colours = np.random.default_rng(8).random((40, 50, 3), dtype=np.float32)
     out = tmp_path / "warm.cube"
-    bake(warm_sidecar, out, BakeOptions(4.0, 65))
+    bake(warm_sidecar, 4.0, out, size=65)
     edit = frame_edit(_core.read_sidecar(str(warm_sidecar)), 4.0)
     want = edit.exact(colours.reshape(-1, 3)).reshape(colours.shape)
     assert np.abs(by_ffmpeg(out, colours, "tetrahedral") - want).max() < 2e-3

@@ -5,12 +5,13 @@ from __future__ import annotations
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import PyOpenColorIO as ocio
 import pytest
 from numpy.typing import NDArray
-from palette4d.lut_export.bake import BakeOptions, BakeResult, bake
+from palette4d.lut_export.bake import BakeResult, bake
 from palette4d.lut_export.formats import FORMATS, LutFormat, format_named, format_of
 from palette4d.lut_export.frame_edit import frame_edit
 
@@ -77,8 +78,8 @@ def test_each_format_keeps_its_stated_error_on_a_real_frame(
 ) -> None:
     image = np.ascontiguousarray(real_frame[::3, ::3])
     out = tmp_path / f"warm{known.extension}"
-    options = BakeOptions(4.0, 33, format=known.name)
-    result = bake(warm_sidecar, out, options, image=image, image_frame=40)
+    options = {"frame": 4.0, "size": 33, "format": known.name}
+    result = bake(warm_sidecar, path=out, **options, clip=image)
     assert (result.format, result.size) == (known.name, 33)
     assert result.shaper.kind == "none"
     check(result, out, warm_sidecar, image)
@@ -95,8 +96,8 @@ def test_a_shaper_reaches_beyond_one(
     known: LutFormat, linear_sidecar: Path, bright_picture: F32, tmp_path: Path
 ) -> None:
     out = tmp_path / f"bright{known.extension}"
-    options = BakeOptions(4.0, 33, format=known.name)
-    result = bake(linear_sidecar, out, options, image=bright_picture, image_frame=4)
+    options = {"frame": 4.0, "size": 33, "format": known.name}
+    result = bake(linear_sidecar, path=out, **options, clip=bright_picture)
     assert (result.shaper.kind, result.shaper.low, result.shaper.high) == ("log", -0.1, 50.0)
     assert result.clip is not None
     assert result.clip.outside_domain == 0
@@ -106,10 +107,12 @@ def test_a_shaper_reaches_beyond_one(
     assert mean < (0.003 if known.name in ("clf", "ctf") else 0.01)
     linear = bake(
         linear_sidecar,
+        4.0,
         out,
-        BakeOptions(4.0, 33, format=known.name, shaper="linear"),
-        image=bright_picture,
-        image_frame=4,
+        size=33,
+        format=known.name,
+        shaper="linear",
+        clip=bright_picture,
         force=True,
     )
     assert linear.clip is not None
@@ -122,8 +125,8 @@ def test_a_linear_shaper_for_a_little_more(
 ) -> None:
     image = np.random.default_rng(1).uniform(-0.05, 1.15, (30, 30, 3)).astype(np.float32)
     out = tmp_path / f"more{known.extension}"
-    options = BakeOptions(4.0, 33, format=known.name)
-    result = bake(warm_sidecar, out, options, image=image, image_frame=4)
+    options = {"frame": 4.0, "size": 33, "format": known.name}
+    result = bake(warm_sidecar, path=out, **options, clip=image)
     assert result.shaper.kind == "linear"
     assert result.shaper.low <= image.min()
     assert result.shaper.high >= image.max()
@@ -136,7 +139,7 @@ def test_without_a_shaper_beyond_one_is_clamped(
 ) -> None:
     """Formats that cannot hold one still write, and say how much they clamp."""
     out = tmp_path / "bright.spi3d"
-    result = bake(linear_sidecar, out, BakeOptions(4.0, 17), image=bright_picture, image_frame=4)
+    result = bake(linear_sidecar, 4.0, out, size=17, clip=bright_picture)
     assert result.shaper.kind == "none"
     assert result.clip is not None
     assert result.clip.outside_domain > 0.3
@@ -147,7 +150,7 @@ def test_clf_wraps_the_table_in_discrete_nodes(
     linear_sidecar: Path, bright_picture: F32, tmp_path: Path
 ) -> None:
     out = tmp_path / "bright.clf"
-    bake(linear_sidecar, out, BakeOptions(4.0, 5), image=bright_picture, image_frame=4)
+    bake(linear_sidecar, 4.0, out, size=5, clip=bright_picture)
     root = ElementTree.parse(out).getroot()
     nodes = [child.tag.rpartition("}")[2] for child in root]
     assert [n for n in nodes if n in ("Log", "LUT1D", "LUT3D", "Range")] == ["Log", "LUT3D", "Log"]
@@ -157,9 +160,7 @@ def test_an_unedited_log_table_is_the_identity(
     write_sidecar, bright_picture: F32, tmp_path: Path
 ) -> None:
     sidecar = write_sidecar(low=-0.1, high=50.0)
-    result = bake(
-        sidecar, tmp_path / "a.clf", BakeOptions(4.0, 17), image=bright_picture, image_frame=4
-    )
+    result = bake(sidecar, 4.0, tmp_path / "a.clf", size=17, clip=bright_picture)
     assert result.identity
     assert result.error < 2e-5
 
@@ -168,38 +169,50 @@ def test_both_cube_dialects_hold_the_same_table(warm_sidecar: Path, tmp_path: Pa
     texts = {}
     for name in ("resolve_cube", "iridas_cube"):
         out = tmp_path / f"{name}.cube"
-        assert bake(warm_sidecar, out, BakeOptions(0.0, 9, format=name)).format == name
+        assert bake(warm_sidecar, 0.0, out, size=9, format=name).format == name
         lines = out.read_text("utf-8").splitlines()
         texts[name] = [line for line in lines if line and not line.startswith("#")]
     assert texts["resolve_cube"] == texts["iridas_cube"]
-    assert bake(warm_sidecar, tmp_path / "x.cube", BakeOptions(0.0, 2)).format == "resolve_cube"
+    assert bake(warm_sidecar, 0.0, tmp_path / "x.cube", size=2).format == "resolve_cube"
 
 
 def test_a_given_domain(warm_sidecar: Path, tmp_path: Path) -> None:
-    options = BakeOptions(0.0, 9, domain=(-0.5, 4.0))
-    result = bake(warm_sidecar, tmp_path / "a.clf", options)
+    options = {"frame": 0.0, "size": 9, "domain": (-0.5, 4.0)}
+    result = bake(warm_sidecar, path=tmp_path / "a.clf", **options)
     assert (result.shaper.kind, result.shaper.low, result.shaper.high) == ("log", -0.5, 4.0)
 
 
 @pytest.mark.parametrize(
     ("name", "options", "word"),
     [
-        ("a.spi3d", BakeOptions(0.0, 9, shaper="log"), "cannot hold a shaper.*resolve_cube"),
-        ("a.cube", BakeOptions(0.0, 9, shaper="log", format="iridas_cube"), "cannot hold a shaper"),
-        ("a.itx", BakeOptions(0.0, 9, domain=(0, 2)), "--shaper log or linear"),
-        ("a.clf", BakeOptions(0.0, 9, shaper="none", domain=(0, 2)), "--shaper log or linear"),
-        ("a.3dl", BakeOptions(0.0, 16), "expected 5, 9, 17, 33, 65, 129"),
-        ("a.3dl", BakeOptions(0.0, 3), "expected 5, 9"),
-        ("a.cube", BakeOptions(0.0, 9, format="clf"), r"expected \.clf"),
-        ("a.cube", BakeOptions(0.0, 9, format="resolv_cube"), "expected resolve_cube"),
-        ("a.spi1d", BakeOptions(0.0, 9, format="spi1d"), "mixes the channels"),
+        (
+            "a.spi3d",
+            {"shaper": "log"},
+            "cannot hold a shaper.*resolve_cube",
+        ),
+        (
+            "a.cube",
+            {"shaper": "log", "format": "iridas_cube"},
+            "cannot hold a shaper",
+        ),
+        ("a.itx", {"domain": (0, 2)}, "--shaper log or linear"),
+        (
+            "a.clf",
+            {"shaper": "none", "domain": (0, 2)},
+            "--shaper log or linear",
+        ),
+        ("a.3dl", {"size": 16}, "expected 5, 9, 17, 33, 65, 129"),
+        ("a.3dl", {"size": 3}, "expected 5, 9"),
+        ("a.cube", {"format": "clf"}, r"expected \.clf"),
+        ("a.cube", {"format": "resolv_cube"}, "expected resolve_cube"),
+        ("a.spi1d", {"format": "spi1d"}, "mixes the channels"),
     ],
 )
 def test_refusals(
-    name: str, options: BakeOptions, word: str, warm_sidecar: Path, tmp_path: Path
+    name: str, options: dict[str, Any], word: str, warm_sidecar: Path, tmp_path: Path
 ) -> None:
     with pytest.raises(Palette4dError, match=word):
-        bake(warm_sidecar, tmp_path / name, options)
+        bake(warm_sidecar, 0.0, tmp_path / name, **options)
     assert [path.name for path in tmp_path.iterdir()] == ["cube.p4d.json"]
 
 
@@ -215,16 +228,16 @@ def test_format_names() -> None:
 class TestMaxError:
     def test_the_lattice_grows_until_it_holds(self, warm_sidecar: Path, tmp_path: Path) -> None:
         out = tmp_path / "a.clf"
-        small = bake(warm_sidecar, out, BakeOptions(0.0, 5))
+        small = bake(warm_sidecar, 0.0, out, size=5)
         limit = small.error / 8
-        result = bake(warm_sidecar, out, BakeOptions(0.0, 5, max_error=limit), force=True)
+        result = bake(warm_sidecar, 0.0, out, size=5, max_error=limit, force=True)
         assert result.error <= limit
         assert result.size in (9, 17, 33, 65)
-        before = bake(warm_sidecar, out, BakeOptions(0.0, (result.size - 1) // 2 + 1), force=True)
+        before = bake(warm_sidecar, 0.0, out, size=(result.size - 1) // 2 + 1, force=True)
         assert before.error > limit  # no larger than needed
 
     def test_what_holds_already_does_not_grow(self, warm_sidecar: Path, tmp_path: Path) -> None:
-        result = bake(warm_sidecar, tmp_path / "a.clf", BakeOptions(0.0, 6, max_error=1.0))
+        result = bake(warm_sidecar, 0.0, tmp_path / "a.clf", size=6, max_error=1.0)
         assert result.size == 6
 
     def test_it_fails_with_nothing_written(
@@ -237,11 +250,5 @@ class TestMaxError:
         monkeypatch.setattr("palette4d.lut_export.formats.LARGEST", 17)
         out = tmp_path / "a.spi3d"
         with pytest.raises(Palette4dError, match="are clamped: choose a format with a shaper"):
-            bake(
-                linear_sidecar,
-                out,
-                BakeOptions(4.0, 6, max_error=0.002),
-                image=bright_picture,
-                image_frame=4,
-            )
+            bake(linear_sidecar, 4.0, out, size=6, max_error=0.002, clip=bright_picture)
         assert [path.name for path in tmp_path.iterdir()] == ["cube.p4d.json"]

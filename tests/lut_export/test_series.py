@@ -18,9 +18,9 @@ import numpy as np
 import PyOpenColorIO as ocio
 import pytest
 from palette4d.lut_export import series
-from palette4d.lut_export.bake import BakeOptions
+from palette4d.lut_export.bake_job import BakeSettings
 from palette4d.lut_export.frame_edit import frame_edit
-from palette4d.lut_export.series import SeriesOptions, export
+from palette4d.lut_export.series import Request, Series
 
 from palette4d import Palette4dError, _core
 from palette4d.common.errors import WriteError
@@ -30,9 +30,14 @@ GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
 EDITED = GOLDEN / "v1_edited.p4d.json"
 
 
-def options(*frames: int, jobs: int = 1, **changes: object) -> SeriesOptions:
-    bake = BakeOptions(0.0, 5, format="resolve_cube")
-    return SeriesOptions(frames=frames, bake=replace(bake, **changes), workers=Workers(jobs))  # type: ignore[arg-type]
+def options(*frames: int, **changes: object) -> Request:
+    settings = BakeSettings(**{"size": 5, "format": "resolve_cube", **changes})  # type: ignore[arg-type]
+    return Request(Path(), Path(), frames, settings)
+
+
+def export(sidecar: Path, folder: Path, request: Request, jobs: int = 1) -> Series:
+    one = replace(request, sidecar=sidecar, folder=folder)
+    return series.export([one], Workers(jobs))[0]
 
 
 def state(folder: Path) -> dict[str, tuple[bytes, int]]:
@@ -85,7 +90,7 @@ def test_each_file_is_the_edit_of_its_frame(warm_sidecar: Path, tmp_path: Path) 
 @pytest.mark.usefixtures("full_grid")
 def test_processes_write_the_same_bytes(tmp_path: Path) -> None:
     for jobs in (1, 2):
-        export(EDITED, tmp_path / str(jobs), options(0, 3, 6, 9, jobs=jobs))
+        export(EDITED, tmp_path / str(jobs), options(0, 3, 6, 9), jobs)
     one, two = ({n: data for n, (data, _) in state(tmp_path / j).items()} for j in "12")
     assert one == two
 
@@ -198,7 +203,7 @@ if __name__ == "__main__":
             start_new_session=True,
         )
 
-    @pytest.mark.parametrize("jobs", ["1", "2"])
+    @pytest.mark.parametrize("jobs", [pytest.param("1", marks=pytest.mark.slow), "2"])
     def test_ctrl_c_leaves_whole_files_and_an_index(self, jobs: str, tmp_path: Path) -> None:
         folder = tmp_path / "l"
         process = self.start(tmp_path, "-o", str(folder), "--jobs", jobs, "--size", "33")
@@ -226,7 +231,7 @@ if __name__ == "__main__":
             data = (folder / entry["file"]).read_bytes()
             assert hashlib.sha256(data).hexdigest() == entry["sha256"]
 
-        again = self.start(tmp_path, "-o", str(folder), "--size", "33", "--jobs", "2", "--json")
+        again = self.start(tmp_path, "-o", str(folder), "--size", "33", "--jobs", "1", "--json")
         out, err = again.communicate(timeout=300)
         assert again.returncode == 0, err
         assert [entry["frame"] for entry in json.loads(out)["frames"]] == [0, 4, 8, 12, 16, 20]
@@ -242,17 +247,17 @@ def test_a_disk_that_fills_up_ends_it_at_once(tmp_path: Path) -> None:
         if done:
             resource.setrlimit(resource.RLIMIT_FSIZE, (3000, limits[1]))
 
-    wanted = options(0, 2, 4, 6, 8, 10, jobs=2)
+    wanted = replace(options(0, 2, 4, 6, 8, 10), sidecar=EDITED, folder=tmp_path / "l")
     try:
         with pytest.raises(WriteError, match=r"File too large; expected .* goes on from them"):
-            export(EDITED, tmp_path / "l", wanted, fill)
+            series.export([wanted], Workers(2), fill)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert max(told) == 1  # no other frame was tried
     (index,) = (tmp_path / "l").glob("*.json")
     entries = json.loads(index.read_text("utf-8"))["frames"]
     assert {e["file"] for e in entries} | {index.name} == set(state(tmp_path / "l"))
-    done = export(EDITED, tmp_path / "l", replace(wanted, workers=Workers(1)))
+    done = export(EDITED, tmp_path / "l", wanted)
     assert (len(done.kept), len(done.baked)) == (1, 5)
 
 

@@ -6,7 +6,6 @@ import json
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,22 +13,21 @@ import numpy as np
 import PyOpenColorIO as ocio
 import pytest
 from numpy.typing import NDArray
-from palette4d.lut_export.bake import BakeOptions, bake
-from palette4d.lut_export.config import ConfigOptions, write_config
-from palette4d.lut_export.error import stated
+from palette4d.lut_export.bake import bake
+from palette4d.lut_export.bake_error import stated
+from palette4d.lut_export.config import write_config
 from palette4d.lut_export.frame_edit import frame_edit
-from palette4d.lut_export.series import SeriesOptions
 from palette4d.lut_export.spaces import space_of, transforms
 
 from palette4d import Palette4dError, _core
 from palette4d.colour import ocio_config
 from palette4d.grade import sidecar as sidecars
-from palette4d.grade.rendering import RenderOptions, recoloured
+from palette4d.grade.document import Document
 from palette4d.jobs.workers import Workers
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
-SIDECAR = GOLDEN / "v2_scene_linear.p4d.json"  # lin_rec709, its palette in ACEScct
-EVERY_STEP = GOLDEN / "v2_every_step.p4d.json"
+SIDECAR = GOLDEN / "v1_scene_linear.p4d.json"  # lin_rec709, its palette in ACEScct
+EVERY_STEP = GOLDEN / "v1_every_step.p4d.json"
 PLAIN = GOLDEN / "v1_edited.p4d.json"
 FRAME = 6.0
 
@@ -79,7 +77,7 @@ def through(source: str, target: str, colours: F32) -> F32:
 
 
 def rendered(path: Path, colours: F32) -> F32:
-    return recoloured(_core.read_sidecar(path), FRAME, colours, False, RenderOptions())
+    return Document.load(path).recolour(colours, FRAME)
 
 
 @pytest.mark.parametrize("extension", [".clf", ".ctf"])
@@ -88,9 +86,9 @@ def test_a_list_of_transforms_has_the_conversion_beside_the_table(
 ) -> None:
     out = tmp_path / f"a{extension}"
     image = scene()
-    result = bake(gentle, out, BakeOptions(FRAME, size=65), image=image)
+    result = bake(gentle, FRAME, out, size=65, clip=image)
     assert result.encoding == "Linear Rec.709 (sRGB)"
-    assert "beside the table" in str(result.conversion)
+    assert "beside the 3D LUT" in str(result.conversion)
     kinds = [element.tag.rpartition("}")[2] for element in ET.parse(out).getroot()]
     assert kinds.count("LUT3D") == 1
     assert kinds.count("Log") == 2
@@ -109,7 +107,7 @@ def test_aces_look_transforms_take_and_return_ap0(
 ) -> None:
     out = tmp_path / "look.clf"
     image = scene()
-    result = bake(gentle, out, BakeOptions(FRAME, size=65, space="ACES2065-1"), image=image)
+    result = bake(gentle, FRAME, out, size=65, space="ACES2065-1", clip=image)
     assert result.encoding == "ACES2065-1"
     root = ET.parse(out).getroot()
     for name in ("InputDescriptor", "OutputDescriptor"):
@@ -128,9 +126,9 @@ def test_a_table_holds_the_conversion_where_the_format_has_no_room(
 ) -> None:
     out = tmp_path / "a.cube"
     image = scene()
-    result = bake(gentle, out, BakeOptions(FRAME, size=65), image=image)
+    result = bake(gentle, FRAME, out, size=65, clip=image)
     assert result.shaper.kind == "log"  # scene-linear light: beyond 1
-    assert "within the table" in str(result.conversion)
+    assert "within the 3D LUT" in str(result.conversion)
     found, wanted = applied(out, image), rendered(gentle, image)
     relative = np.abs(found - wanted) / np.maximum(np.abs(wanted), 0.1)
     assert result.clip is not None
@@ -139,7 +137,7 @@ def test_a_table_holds_the_conversion_where_the_format_has_no_room(
 
 def test_the_palette_s_own_numbers(gentle: Path, tmp_path: Path) -> None:
     out = tmp_path / "p.cube"
-    result = bake(gentle, out, BakeOptions(FRAME, space="palette"), image=scene())
+    result = bake(gentle, FRAME, out, space="palette", clip=scene())
     assert result.encoding == "ACEScct"
     assert result.conversion is None
     read = _core.read_sidecar(gentle)
@@ -154,10 +152,10 @@ def test_without_an_edit_every_space_gives_its_input_back(gentle: Path, tmp_path
     plain = tmp_path / "plain.p4d.json"
     sidecars.save(document, plain)
     for space in ("input", "palette", "ACES2065-1", "ARRI LogC4", "sRGB - Texture"):
-        name = str(space_of(plain, _core.read_sidecar(plain), space, None).name)
+        name = str(space_of(plain.read_bytes(), _core.read_sidecar(plain), space, None).name)
         colours = through("Linear Rec.709 (sRGB)", name, scene())
         out = tmp_path / f"{name.split()[0]}.clf"
-        result = bake(plain, out, BakeOptions(FRAME, size=9, space=space), image=scene())
+        result = bake(plain, FRAME, out, size=9, space=space, clip=scene())
         assert result.identity
         np.testing.assert_allclose(applied(out, colours), colours, rtol=2e-5, atol=2e-5)
 
@@ -186,10 +184,14 @@ def test_transforms_are_the_steps() -> None:
 
 
 def test_a_config_s_look_has_the_palette_s_space(gentle: Path, tmp_path: Path) -> None:
-    base = BakeOptions(0.0, size=33, format="clf")
-    series = SeriesOptions((), base, workers=Workers(1))
-    options = ConfigOptions(series, lambda sidecar: (6,), names=("shot",))
-    written = write_config([gentle], tmp_path / "show", options)
+    written = write_config(
+        [gentle],
+        tmp_path / "show",
+        choose=lambda sidecar: (6,),
+        names=("shot",),
+        workers=Workers(1),
+        anyway=True,
+    )
     assert written.shots[0].process_space == "ACEScct"
     config = ocio.Config.CreateFromFile(str(written.path))
     look = ocio.LookTransform(
@@ -224,12 +226,12 @@ def test_spaces_that_cannot_be_reached(
     out = tmp_path / "x.clf"
     frame = 0.0 if sidecar is EVERY_STEP else FRAME
     with pytest.raises(Palette4dError, match=words):
-        bake(sidecar, out, replace(BakeOptions(frame), **options))  # type: ignore[arg-type]
+        bake(sidecar, frame, out, **options)  # type: ignore[arg-type]
     assert not out.exists()
 
 
 def test_a_sidecar_without_a_conversion_is_baked_as_before(tmp_path: Path) -> None:
     first, second = tmp_path / "a.clf", tmp_path / "b.clf"
-    bake(PLAIN, first, BakeOptions(FRAME, size=5))
-    bake(PLAIN, second, BakeOptions(FRAME, size=5, space="palette"))
+    bake(PLAIN, FRAME, first, size=5)
+    bake(PLAIN, FRAME, second, size=5, space="palette")
     assert first.read_bytes() == second.read_bytes()

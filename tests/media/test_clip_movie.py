@@ -32,7 +32,7 @@ def test_lossless_eight_bit_is_exact(tmp_path):
     assert (clip.rate, clip.width, clip.height, clip.depth) == (25, WIDTH, HEIGHT, "uint8")
     assert clip.is_movie
     assert (clip.name, clip.source) == ("rém i", str(path))
-    for frame, pixels in clip.iter_frames():
+    for frame, pixels in clip:
         np.testing.assert_array_equal(pixels, frames[frame].astype(np.float32) / np.float32(255))
 
 
@@ -41,7 +41,7 @@ def test_lossless_sixteen_bit_is_exact(tmp_path):
     path = write_movie(tmp_path / "a.mkv", "ffv1", "gbrp16le", frames, "gbrp16le")
     clip = open_clip(str(path))
     assert clip.depth == "uint16"
-    for frame, pixels in clip.iter_frames():
+    for frame, pixels in clip:
         np.testing.assert_array_equal(pixels, frames[frame].astype(np.float32) / np.float32(65535))
 
 
@@ -127,14 +127,14 @@ def test_compressed_movie_with_reordered_frames(tmp_path):
     )
     clip = open_clip(str(path))
     assert (clip.frames, clip.rate) == (list(range(24)), Fraction(24000, 1001))
-    read = {frame: float(p.mean()) * 255 for frame, p in clip.iter_frames()}
+    read = {frame: float(p.mean()) * 255 for frame, p in clip}
     assert list(read) == clip.frames
     np.testing.assert_allclose(list(read.values()), levels, atol=3)
     for frame in (20, 3, 4, 23, 0):  # back and forth
         assert float(clip.read(frame).mean()) * 255 == pytest.approx(levels[frame], abs=3)
     part = open_clip(str(path), frames="5-20x5")
     assert part.frames == [5, 10, 15, 20]
-    assert [frame for frame, _ in part.iter_frames()] == [5, 10, 15, 20]
+    assert [frame for frame, _ in part] == [5, 10, 15, 20]
     with pytest.raises(ClipError, match="the movie has 0-23"):
         open_clip(str(path), frames="20-24")
     assert clip.notes == []
@@ -148,7 +148,7 @@ def test_variable_rate_is_noted(tmp_path):
     clip = open_clip(str(path))
     assert clip.frames == [0, 1, 2, 3, 4, 5]
     assert any("rate varies" in note for note in clip.notes)
-    assert len(list(clip.iter_frames())) == 6
+    assert len(list(clip)) == 6
 
 
 @pytest.mark.parametrize(("degrees", "turns"), [(90, 1), (-90, -1), (180, 2)])
@@ -176,12 +176,12 @@ def test_damaged_frame_is_named_or_skipped(tmp_path, name, codec, layout):
     options = {"g": "1", "bf": "0"} if codec == "libx264" else {}
     path = write_movie(tmp_path / name, codec, layout, noise(6), "rgb24", options=options)
     whole_clip = open_clip(str(path))
-    good = dict(whole_clip.iter_frames())
+    good = dict(whole_clip)
     damage(path, 3)
     with pytest.raises(FrameError, match="frame 3 cannot be decoded"):
-        list(open_clip(str(path)).iter_frames())
+        list(open_clip(str(path)))
     clip = open_clip(str(path), skip_bad_frames=True)
-    read = dict(clip.iter_frames())
+    read = dict(clip)
     assert list(read) == [0, 1, 2, 4, 5]
     assert clip.skipped == [3]
     for frame, pixels in read.items():  # no other frame has moved or changed
@@ -200,7 +200,7 @@ def test_movie_that_ends_early(tmp_path):
     whole = path.read_bytes()
     path.write_bytes(whole[: len(whole) // 2])
     with pytest.raises(ClipError, match=r"a\.mp4"):
-        list(open_clip(str(path)).iter_frames())
+        list(open_clip(str(path)))
 
 
 def test_what_is_no_movie(tmp_path):

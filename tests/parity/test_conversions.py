@@ -17,7 +17,7 @@ Document = dict[str, Any]
 
 
 def golden(name: str) -> Document:
-    document: Document = json.loads((GOLDEN / f"v2_{name}.p4d.json").read_text(encoding="utf-8"))
+    document: Document = json.loads((GOLDEN / f"v1_{name}.p4d.json").read_text(encoding="utf-8"))
     return document
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -14,17 +16,26 @@ from edits import clip, dissolve, external, gap, movie, save, timeline
 
 from palette4d.cli import main
 
-QUICK = ("--palette-size", "4", "--colours", "512", "--coarse-colours", "128", "--blocks", "1")
+QUICK = (
+    "--set",
+    "palette_size=4",
+    "--set",
+    "colours=512",
+    "--set",
+    "coarse_colours=128",
+    "--set",
+    "blocks=1",
+)
 #: What other programs keep in a timeline.
 THEIRS = {"colour": {"lut": "théirs.cube", "big": 2**60, "share": 0.1, "none": None}}
 
 
-@pytest.fixture
-def show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An edit of two shots in a folder, one of them nested, analysed; the manifest."""
-    monkeypatch.chdir(tmp_path)
-    movie(tmp_path / "media" / "one.mov", 12)
-    movie(tmp_path / "media" / "two.mov", 12)
+@pytest.fixture(scope="module")
+def analysed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An edit of two shots, one of them nested, and what its analysis leaves in the folder."""
+    folder = tmp_path_factory.mktemp("analysed") / "show"
+    movie(folder / "media" / "one.mov", 12)
+    movie(folder / "media" / "two.mov", 12)
     inner = otio.schema.Track(
         kind="Video", children=[clip("two", external("media/two.mov"), 1, 6, metadata=THEIRS)]
     )
@@ -36,8 +47,21 @@ def show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         clip("gone", external("media/gone.mov"), 0, 4),
     )
     made.metadata.update(THEIRS)
-    save(made, tmp_path / "edit.otio")
-    assert main.main(["analyze", "edit.otio", "-o", "shots", "--jobs", "1", "--quiet", *QUICK]) == 1
+    save(made, folder / "edit.otio")
+    with contextlib.chdir(folder):
+        assert analyze("edit.otio") == 1
+    return folder
+
+
+def analyze(edit: str) -> int:
+    return main.main(["analyze", edit, "-o", "shots", "--jobs", "1", "--quiet", *QUICK])
+
+
+@pytest.fixture
+def show(analysed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the analysed edit; the manifest."""
+    shutil.copytree(analysed, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
     return tmp_path / "shots" / "edit.shots.json"
 
 
@@ -104,7 +128,10 @@ class TestReferences:
             {"OTIO_SCHEMA": "Effect.1", "effect_name": "Sparkle", "amount": 3, "metadata": THEIRS}
         ]
         source.write_text(json.dumps(document), "utf-8")
-        assert main.main(["analyze", "edit.otio", "-o", "shots", "--quiet", *QUICK]) == 1
+        assert (
+            main.main(["analyze", "edit.otio", "-o", "shots", "--quiet", "--jobs", "1", *QUICK])
+            == 1
+        )
         assert export(show, "-o", "luts", "--otio", "graded.otio") == 0
         graded = json.loads(Path("graded.otio").read_text("utf-8"))
         assert without_ours(graded) == without_ours(document)
@@ -141,7 +168,18 @@ class TestReferences:
             "* FROM CLIP NAME: one\n002 ONE V C 00:00:00:02 00:00:00:08 01:00:00:00 01:00:00:06\n"
             "* FROM CLIP NAME: one\n"
         )
-        words = ["analyze", "reel.edl", "--media", "media", "-o", "reel", "--quiet", *QUICK]
+        words = [
+            "analyze",
+            "reel.edl",
+            "--media",
+            "media",
+            "-o",
+            "reel",
+            "--quiet",
+            "--jobs",
+            "1",
+            *QUICK,
+        ]
         assert main.main(words) == 0
         manifest = tmp_path / "reel" / "reel.shots.json"
         assert export(manifest, "-o", "luts", "--otio", "reel.otio") == 0
@@ -159,7 +197,17 @@ class TestReferences:
     def test_a_movie_has_no_timeline(
         self, show: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     ) -> None:
-        words = ["analyze", "media/one.mov", "--detect-shots", "-o", "cut", "--quiet", *QUICK]
+        words = [
+            "analyze",
+            "media/one.mov",
+            "--detect-shots",
+            "-o",
+            "cut",
+            "--quiet",
+            "--jobs",
+            "1",
+            *QUICK,
+        ]
         assert main.main(words) == 0
         assert export(Path("cut/one.shots.json"), "-o", "luts", "--otio", "a.otio") == 1
         assert "expects those of a timeline" in capsys.readouterr().err
@@ -182,7 +230,16 @@ class TestSeries:
     def test_stops_of_unedited_shots_are_their_first_frame(
         self, show: Path, capsys: pytest.CaptureFixture[str]
     ) -> None:
-        words = ["edit", "shots/two.p4d.json", "set", "--near", "0.5,0.5,0.5", "--frame", "6"]
+        words = [
+            "edit",
+            "shots/two.p4d.json",
+            "set",
+            "--near",
+            "0.5,0.5,0.5",
+            "--frame",
+            "6",
+            "--anyway",
+        ]
         assert main.main([*words, "--rgb", "0.2", "0.9", "0.1"]) == 0
         verb = ["export", str(show), "--stops", "--size", "3", "--jobs", "1", "--quiet", "--json"]
         capsys.readouterr()
@@ -195,7 +252,15 @@ class TestSeries:
         self, show: Path, capsys: pytest.CaptureFixture[str]
     ) -> None:
         for name in ("one", "two"):
-            words = ["edit", f"shots/{name}.p4d.json", "set", "--near", "0.5,0.5,0.5", "--frame"]
+            words = [
+                "edit",
+                f"shots/{name}.p4d.json",
+                "set",
+                "--near",
+                "0.5,0.5,0.5",
+                "--anyway",
+                "--frame",
+            ]
             assert main.main([*words, "4", "--rgb", "0.2", "0.9", "0.1"]) == 0
         assert export(show, "-o", "luts", "--format", "cc", "--max-error", "0") == 1
         err = capsys.readouterr().err
@@ -228,9 +293,19 @@ class TestSeries:
 
 
 def test_a_config_has_a_look_a_shot(show: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["edit", "shots/two.p4d.json", "set", "--near", "0.5,0.5,0.5", "--frame", "4"]
+    words = [
+        "edit",
+        "shots/two.p4d.json",
+        "set",
+        "--near",
+        "0.5,0.5,0.5",
+        "--anyway",
+        "--frame",
+        "4",
+    ]
     assert main.main([*words, "--rgb", "0.2", "0.9", "0.1"]) == 0
     verb = ["config", str(show), "-o", "show", "--every", "4", "--size", "5", "--jobs", "1"]
+    verb.append("--anyway")
     assert main.main([*verb, "--quiet", "--process-space", "sRGB - Texture"]) == 0
     assert "left out: gone" in capsys.readouterr().err
     config = ocio.Config.CreateFromFile("show/config.ocio")

@@ -234,6 +234,7 @@ public:
         fail(described(*value_), expected);
     }
 
+    bool has(const char* name) const { return value_->contains(name); }
     /// The required member `name`.
     Cursor member(const char* name) const {
         const auto found = value_->find(name);
@@ -256,11 +257,12 @@ public:
     void require_object() const {
         if (!value_->is_object()) wrong("an object");
     }
-    /// An object with exactly the members `names`.
-    void require_members(std::initializer_list<const char*> names) const {
+    /// An object with exactly the members `names`, and perhaps `optional`.
+    void require_members(std::initializer_list<const char*> names,
+                         const char* optional = nullptr) const {
         require_object();
         for (const auto& [name, unused] : value_->items()) {
-            bool known = false;
+            bool known = optional && name == optional;
             for (const char* candidate : names) known = known || name == candidate;
             if (!known) {
                 std::string list;
@@ -371,18 +373,17 @@ int known(const Index& index, const Cursor& where, const char* kind) {
     return found->second;
 }
 
-void read_head(const Cursor& root, Sidecar& sidecar) {
+void read_head(const Cursor& root) {
     root.require_object();
     const Cursor schema = root.member("schema");
     if (schema.text() != "palette4d.sidecar") schema.wrong("\"palette4d.sidecar\"");
     const Cursor version = root.member("version");
     const std::int64_t number = version.integer(1, kMaxFrame);
     if (number > kSidecarVersion) {
-        version.fail("version " + std::to_string(number) + ", written by a newer palette4d",
-                     "version " + std::to_string(kSidecarVersion) +
-                         " or earlier; update palette4d to read this file");
+        version.fail(
+            "version " + std::to_string(number) + ", written by a newer palette4d",
+            "version " + std::to_string(kSidecarVersion) + "; update palette4d to read this file");
     }
-    sidecar.version = static_cast<int>(number);
     root.require_members(
         {"schema", "version", "generator", "clip", "polytope", "quality", "edits", "extra"});
     root.member("generator").text();
@@ -499,13 +500,8 @@ std::shared_ptr<const ClipConversion> read_conversion(const Cursor& where,
     return result;
 }
 
-ClipInfo read_clip(const Cursor& clip, int version) {
-    if (version < 2) {
-        clip.require_members({"name", "source", "frames", "rate", "size", "encoding"});
-    } else {
-        clip.require_members(
-            {"name", "source", "frames", "rate", "size", "encoding", "conversion"});
-    }
+ClipInfo read_clip(const Cursor& clip) {
+    clip.require_members({"name", "source", "frames", "rate", "size", "encoding"}, "conversion");
     ClipInfo info;
     info.name = clip.member("name").text();
     info.source = clip.member("source").text();
@@ -701,10 +697,11 @@ Sidecar parse_sidecar(const std::string& text, const std::string& name) {
     const Json tree = json_tree(text, name);
     const Cursor root(tree, name);
     Sidecar sidecar;
-    read_head(root, sidecar);
-    sidecar.clip = read_clip(root.member("clip"), sidecar.version);
-    if (sidecar.version >= 2) {
-        sidecar.conversion = read_conversion(root.member("clip").member("conversion"), name);
+    read_head(root);
+    sidecar.clip = read_clip(root.member("clip"));
+    const Cursor clip = root.member("clip");
+    if (clip.has("conversion")) {
+        sidecar.conversion = read_conversion(clip.member("conversion"), name);
     }
     Index vertex_index;
     Index edge_index;

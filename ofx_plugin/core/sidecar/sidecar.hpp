@@ -21,7 +21,7 @@ struct ClipInfo {
     std::string encoding;  ///< of every colour of the palette
 };
 
-/// How the clip's numbers become those of the palette (version 2).
+/// From the code values of the clip to those of the palette.
 struct ClipConversion {
     std::string input_space;  ///< of the clip's files, the name that the config has for it
     std::string config;       ///< the OpenColorIO config that both names are of
@@ -30,7 +30,6 @@ struct ClipConversion {
 };
 
 struct Sidecar {
-    int version = 0;
     ClipInfo clip;
     Polytope polytope;
     Edits edits;
@@ -38,7 +37,7 @@ struct Sidecar {
     std::shared_ptr<const ClipConversion> conversion;
 };
 
-inline constexpr int kSidecarVersion = 2;
+inline constexpr int kSidecarVersion = 1;
 inline constexpr std::uint64_t kMaxSidecarBytes = 64u << 20;
 
 /// Reads and validates a file (UTF-8 path). Throws SidecarError; never trusts a count or an index.

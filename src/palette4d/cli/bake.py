@@ -7,45 +7,32 @@ import json
 import os
 import sys
 import tempfile
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from palette4d.cli.lut_options import add_space_options, add_table_options, bake_options
+from palette4d.cli.lut_options import add_lut_options, lut_settings, wide_help
 from palette4d.common.arguments import number
 from palette4d.common.errors import WriteError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from palette4d import _core
     from palette4d.lut_export.bake import BakeResult
-    from palette4d.lut_export.error import Figures, Measure
     from palette4d.lut_export.formats import LutFormat
 
 EPILOG = """\
-The extension chooses the format, --format between two of one extension:
-  .cube  resolve_cube (default), iridas_cube     .csp   cinespace
-  .clf   clf, Academy/ASC Common LUT Format      .3dl   flame (default), lustre
-  .ctf   ctf, Color Transform Format             .lut   houdini
-  .spi3d spi3d                                   .itx   iridas_itx
-  .cub   truelight                               .cc .ccc .cdl  an ASC CDL, fitted
-Both dialects of .cube are the same table; Resolve's can have a shaper as well. A CDL is ten numbers
-and only comes near to an edit; what is left over is its error.
-
-The error of the file is printed and, where the format has comments or metadata, stored in it: mean
-and largest |a-b|/max(|b|,0.1) per channel and deltaE 2000 between the file, read back and applied
-by OpenColorIO, and the exact recolouring, on the clip's colours at that frame (when the clip is
-given or found) and on a dense grid of 67 x 67 x 67 colours. Where a format does not say how to
-interpolate, linear and tetrahedral are stated, and the worse of them counts. Colours outside the
-domain are clamped.
+formats, by extension (--format chooses between two of one extension):
+  .cube resolve_cube, iridas_cube   .clf clf    .ctf ctf       .csp cinespace   .spi3d spi3d
+  .3dl flame, lustre                .lut houdini               .itx iridas_itx  .cub truelight
+  .cc .ccc .cdl  the nearest ASC CDL: ten numbers, which miss most of an edit
+The report states how far the file, read back by OpenColorIO, is from the exact edit: on the clip's
+colours at that frame, and on a dense grid. A deltaE 2000 of 1 is just visible.
 
 examples:
   palette4d bake seasons.p4d.json --frame 40 -o autumn.cube --size 65
   palette4d bake seasons.p4d.json --frame 40 -o autumn.clf --clip seasons/ --max-error 0.005
   palette4d bake seasons.p4d.json --frame 40 -o - --format spi3d > autumn.spi3d
-  palette4d bake seasons.p4d.json --frame 40 -o autumn.cc
-  palette4d bake cg.p4d.json --frame 1010 -o look.clf --space ACES2065-1     an ACES look transform
 """
 
 
@@ -54,91 +41,55 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "bake",
         help="write the edit at one time as a LUT file or a CDL",
-        description="Bake the edit at one time into a 3D LUT, written through OpenColorIO, "
-        "and state its error.",
+        description="Bake the edit at one time into a 3D LUT, and state its error.",
         epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        usage="%(prog)s SIDECAR --frame T -o OUT [options]",
+        formatter_class=wide_help,
     )
-    parser.add_argument("sidecar", metavar="SIDECAR", type=Path, help="the sidecar (.p4d.json)")
-    parser.add_argument(
-        "--frame",
-        metavar="T",
-        type=number(),
-        required=True,
-        help="the time, a frame number of the clip; fractions are allowed",
-    )
-    parser.add_argument(
-        "-o",
-        "--output",
-        metavar="OUT",
-        required=True,
-        help="the file, OUT.cube and so on; - for standard output, with --format",
-    )
-    add_table_options(parser, None)
-    add_space_options(parser)
-    parser.add_argument("--force", action="store_true", help="replace an existing file")
-    parser.add_argument(
-        "--json",
-        action="store_true",
-        help="print the result as JSON (on standard error with -o -)",
-    )
+    add = parser.add_argument
+    add("sidecar", metavar="SIDECAR", type=Path, help="the sidecar (.p4d.json)")
+    frame = "the time, a frame number of the clip; fractions are allowed"
+    add("--frame", metavar="T", type=number(), required=True, help=frame)
+    output = "the file; - for standard output, with --format"
+    add("-o", "--output", metavar="OUT", required=True, help=output)
+    add_lut_options(parser, None, space=True)
+    add("--force", action="store_true", help="replace an existing file")
+    add("--json", action="store_true", help="print the result as JSON")
     parser.set_defaults(run=run, usage_error=parser.error)
 
 
 def run(args: argparse.Namespace) -> int:
     """Bake; print what was written and its error."""
-    from palette4d import _core
     from palette4d.lut_export.bake import bake
-    from palette4d.lut_export.bake_options import check_options, check_target
     from palette4d.lut_export.formats import format_named, format_of
-    from palette4d.media.source_clip import frame_colours
 
     piped = args.output == "-"
     if piped and args.format is None:
         args.usage_error("-o - has no extension; expected --format FORMAT with it")
-
-    # What can be refused is refused before any frame is read.
     format_ = format_named(args.format) if piped else format_of(Path(args.output), args.format)
-    if not piped:
-        check_target(Path(args.output), args.force)
-    options = bake_options(args, format_.name, args.frame)
-    sidecar = _core.read_sidecar(str(args.sidecar))
-    check_options(options, format_, sidecar)
-
-    image, number_ = frame_colours(args.sidecar, sidecar.clip, args.frame, args.clip)
-    if image is None:
-        _note_no_clip(sidecar)
+    settings = {**lut_settings(args, format_.name), "clip": args.clip}
     if piped:
         with tempfile.TemporaryDirectory(prefix="palette4d-") as folder:
             path = Path(folder) / f"baked{format_.extension}"
-            result = bake(args.sidecar, path, options, image=image, image_frame=number_)
+            result = bake(args.sidecar, args.frame, path, **settings)
             _to_stdout(path.read_bytes(), format_)
         result = replace(result, output="-")
     else:
-        result = bake(
-            args.sidecar,
-            Path(args.output),
-            options,
-            image=image,
-            image_frame=number_,
-            force=args.force,
-        )
+        result = bake(args.sidecar, args.frame, args.output, force=args.force, **settings)
     out = sys.stderr if piped else sys.stdout
     if args.json:
-        print(json.dumps(result.as_json(), indent=2), file=out)
+        print(json.dumps(asdict(result), indent=2), file=out)
     else:
         print("\n".join(report(result)), file=out)
+    if result.clip is None:
+        print(
+            "palette4d: note: the clip's frame could not be read; the error is measured on the "
+            "dense grid only (name the clip with --clip)",
+            file=sys.stderr,
+        )
     for line in warnings(result, format_):
         print(f"palette4d: warning: {line}", file=sys.stderr)
     return 0
-
-
-def _note_no_clip(sidecar: _core.Sidecar) -> None:
-    print(
-        f"palette4d: note: the clip's frame could not be read from {sidecar.clip['source']!r}; "
-        "the error is stated on the dense grid only (name the clip with --clip)",
-        file=sys.stderr,
-    )
 
 
 def _to_stdout(data: bytes, format_: LutFormat) -> None:
@@ -160,55 +111,42 @@ def _to_stdout(data: bytes, format_: LutFormat) -> None:
 
 def report(result: BakeResult) -> Iterator[str]:
     """Yield the lines that say what was written and its error."""
-    from palette4d.lut_export.error import table
+    from palette4d.lut_export.bake_error import table
     from palette4d.lut_export.frame_edit import frame_text
 
     name = "standard output" if result.output == "-" else result.output
     size = "" if result.size is None else f", {result.size} samples a side"
     yield f"{name}: {result.title}{size}, frame {frame_text(result.frame)}"
     if result.identity:
-        yield "  nothing is edited at this time: it changes nothing"
+        yield "  nothing is edited at this time: the file changes nothing"
     if result.cdl is not None:
-        cdl = result.cdl
-        for label, values in (
-            ("slope", cdl.slope),
-            ("offset", cdl.offset),
-            ("power", cdl.power),
-            ("saturation", (cdl.saturation,)),
-        ):
+        parts = {**asdict(result.cdl), "saturation": (result.cdl.saturation,)}
+        for label, values in parts.items():
             yield f"  {label:<10} {' '.join(f'{value:g}' for value in values)}"
     elif result.shaper.kind != "none":
         yield f"  shaper {result.shaper.text()}"
     if result.conversion is not None:
         yield f"  takes and returns {result.encoding}; {result.conversion}"
-    rows: list[tuple[str, Figures]] = []
-    for where, found in (
-        (f"clip's colours at frame {result.clip_frame}", result.clip),
-        ("dense grid", result.grid),
-    ):
-        if found is not None:
-            rows += _rows(where, found)
+    rows = []
+    measures = ((f"clip's colours at frame {result.clip_frame}", result.clip),)
+    for where, found in (*measures, ("dense grid", result.grid)):
+        if found is not None and len(found.by_reading) == 1:
+            rows.append((where, found.worst))
+        elif found is not None:
+            rows += [(f"{where}, {name}", each) for name, each in found.by_reading.items()]
     yield from (f"  {line}" for line in table(rows))
-    yield f"  deltaE: {result.viewing}; numbers in the file: {result.rounding}"
-
-
-def _rows(where: str, found: Measure) -> list[tuple[str, Figures]]:
-    if len(found.by_reading) == 1:
-        return [(where, found.worst)]
-    return [(f"{where}, {name}", figures) for name, figures in found.by_reading.items()]
+    yield f"  deltaE: {result.viewing}; code values in the file: {result.rounding}"
 
 
 def warnings(result: BakeResult, format_: LutFormat) -> Iterator[str]:
     """Yield what a user should know beside the figures."""
-    from palette4d.lut_export.bake import PREVIEW_TIER
-    from palette4d.lut_export.error import stated
+    from palette4d.lut_export.bake import nearer
+    from palette4d.lut_export.bake_error import stated
     from palette4d.lut_export.formats import shaper_warning, with_shaper
-    from palette4d.lut_export.lattice import nearer
 
-    shaper = result.shaper
+    shaper, (low, high), clip = result.shaper, result.palette, result.clip
     if shaper.kind != "none" and (about := shaper_warning(format_.name)):
         yield about
-    (low, high), clip = result.palette, result.clip
     beyond = clip.outside_domain > 0 if clip else low < shaper.low or high > shaper.high
     if beyond and result.cdl is None:
         if shaper.kind != "none":
@@ -217,15 +155,13 @@ def warnings(result: BakeResult, format_: LutFormat) -> Iterator[str]:
             help_ = "--shaper auto covers them"
         else:
             help_ = f"{with_shaper()} can hold a shaper that covers them"
-        what = (
-            f"{clip.outside_domain:.3%} of the frame's colours lie"
-            if clip
-            else f"the palette reaches from {low:g} to {high:g},"
-        )
-        yield f"{what} outside {shaper.low:g} to {shaper.high:g}, where the table clamps; {help_}"
-    if not result.preview_tier:
-        where = "the dense grid" if result.clip is None else "the clip's colours"
+        what = f"the palette, from {low:g} to {high:g}, is partly"
+        if clip:
+            what = f"{clip.outside_domain:.3%} of the frame's colours are"
+        domain = f"{shaper.low:g} to {shaper.high:g}"
+        yield f"{what} outside {domain}, where the LUT clamps; {help_}"
+    if clip and result.visible:
         yield (
-            f"the largest error on {where}, {stated(result.error)}, misses the preview tier "
-            f"{PREVIEW_TIER:g}; {nearer(result.size)}"
+            f"the error can be seen: deltaE 2000 of up to {stated(clip.worst.delta_e_largest)} on "
+            f"the clip's colours; {nearer(result.size)}"
         )

@@ -5,30 +5,27 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from palette4d.cli.export import add_frame_choice, add_run_options, chosen_frames, with_bar
-from palette4d.cli.lut_options import add_table_options, bake_options
+from palette4d.cli.export import add_frame_choice, add_run_options, chosen_frames
+from palette4d.cli.lut_options import add_lut_options, lut_settings, wide_help
+from palette4d.cli.progress import frames_bar
 from palette4d.jobs.workers import Workers
 
 if TYPE_CHECKING:
     from palette4d.lut_export.config import WrittenConfig
 
 EPILOG = """\
-Writes DIR/config.ocio, and the tables beside it in DIR/luts. Each shot is a look, in the encoding
-of its sidecar; which of its tables applies is said by the context variable FRAME. The look
-palette4d takes the shot from the variable SHOT, too, and each view of the base has a twin that
-applies it. A frame number has no leading zeros; where FRAME is not set, the shot's middle frame is
-shown.
-
-Without --every, --stops or --frames each frame has a table of its own; with one of them the frames
-between are links to the nearest table.
+Writes DIR/config.ocio, and 3D LUTs in DIR/luts. The context variable FRAME (no leading zeros)
+chooses a shot's LUT. The look palette4d takes the shot from the variable SHOT, too; each view of
+the base has one more view with that look. Without FRAME a shot shows its middle frame. With
+--every, --stops or --frames the other frames use the nearest LUT, and the report states that error.
 
 examples:
   palette4d config shot010.p4d.json shot020.p4d.json -o show
-  palette4d config shot010.p4d.json -o show --base /configs/aces/config.ocio --every 5
-  palette4d config shots/edit.shots.json -o show --every 5
+  palette4d config shots/edit.shots.json -o show --base aces/config.ocio --every 5
   OCIO=show/config.ocio SHOT=shot010 FRAME=1001 VIEWER frame.1001.exr
 """
 
@@ -40,122 +37,107 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="write an OpenColorIO config with a look for each shot",
         description="Write an OpenColorIO config with one look a shot, which follows the frame.",
         epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        usage="%(prog)s SIDECAR... -o DIR [options]",
+        formatter_class=wide_help,
     )
-    parser.add_argument(
-        "sidecars",
-        metavar="SIDECAR",
-        type=Path,
-        nargs="+",
-        help="the sidecars, one a shot, or the manifest of a show (.shots.json)",
-    )
-    parser.add_argument(
-        "-o", "--output", metavar="DIR", type=Path, required=True, help="the folder to write"
-    )
-    parser.add_argument(
-        "--base",
-        metavar="CONFIG",
-        help="the config to add to a copy of: a file, .ocioz or ocio:// name (default: "
-        "OpenColorIO's built-in ACES studio config)",
-    )
-    parser.add_argument(
-        "--names",
-        metavar="A,B",
-        help="the shots' names, one for each sidecar (default: the clips')",
-    )
-    parser.add_argument(
-        "--process-space",
-        metavar="SPACE",
-        help="the config's colour space of the clips' numbers (default: by the sidecar's encoding)",
-    )
+    add = parser.add_argument
+    sidecars = "the sidecars, one a shot, or the manifest of a show (.shots.json)"
+    add("sidecars", metavar="SIDECAR", type=Path, nargs="+", help=sidecars)
+    add("-o", "--output", metavar="DIR", type=Path, required=True, help="the folder to write")
+    base = "the config to add to a copy of: a file, .ocioz or ocio:// name (default: ACES studio)"
+    add("--base", metavar="CONFIG", help=base)
+    add("--names", metavar="A,B", help="the shots' names, one a sidecar (default: the clips')")
+    space = "the config's colour space of the clips (default: by the sidecar's encoding)"
+    add("--process-space", metavar="SPACE", help=space)
     add_frame_choice(parser, required=False)
-    add_table_options(parser, "clf")
+    anyway = "allow a deltaE 2000 above 2 at the frames between"
+    add("--anyway", action="store_true", help=anyway)
+    add_lut_options(parser, "clf", space=False)
     add_run_options(parser)
-    parser.add_argument("--json", action="store_true", help="print what was written as JSON")
+    add("--json", action="store_true", help="print what was written as JSON")
     parser.set_defaults(run=run, usage_error=parser.error)
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the config; print what is in it."""
-    from palette4d.lut_export.config import ConfigOptions, write_config
+    from palette4d.lut_export.bake_job import BakeSettings
+    from palette4d.lut_export.config import write_config
     from palette4d.lut_export.formats import format_named
-    from palette4d.lut_export.series import SeriesOptions
     from palette4d.shows import export_luts
 
-    sidecars, remarks = export_luts.sidecars(args.sidecars)
+    sidecars, notes = export_luts.sidecars(args.sidecars)
     # A manifest is a show, also one of a single shot.
     show = len(sidecars) > 1 or sidecars != args.sidecars
     if args.clip is not None and len(sidecars) > 1:
         args.usage_error("--clip names one clip; with several sidecars each must name its own")
-    options = ConfigOptions(
-        series=SeriesOptions(
-            frames=(),
-            bake=bake_options(args, format_named(args.format).name),
+    settings = BakeSettings(**lut_settings(args, format_named(args.format).name))
+    with frames_bar("config", hidden=args.quiet) as progress:
+        done = write_config(
+            sidecars,
+            args.output,
+            settings,
+            choose=lambda sidecar: chosen_frames(args, sidecar, show=show),
+            base=args.base,
+            names=None if args.names is None else tuple(args.names.split(",")),
+            process_space=args.process_space,
             clip=args.clip,
             workers=Workers(args.jobs, args.cluster),
-        ),
-        choose=lambda sidecar: chosen_frames(args, sidecar, show=show),
-        base=args.base,
-        names=None if args.names is None else tuple(args.names.split(",")),
-        process_space=args.process_space,
-        force=args.force,
-    )
-    done = with_bar(
-        "config",
-        args.quiet,
-        lambda progress: write_config(sidecars, args.output, options, progress),
-    )
-    if args.json:
-        print(json.dumps(as_json(done), indent=2))
-    else:
-        print("\n".join(report(done)))
-    for note in [*remarks, *done.notes]:
+            force=args.force,
+            anyway=args.anyway,
+            progress=progress,
+        )
+    print(json.dumps(as_json(done), indent=2) if args.json else "\n".join(report(done)))
+    for note in [*notes, *done.notes]:
         print(f"palette4d: note: {note}", file=sys.stderr)
     return 0
 
 
 def as_json(done: WrittenConfig) -> dict[str, object]:
     """Return what was written as plain JSON values."""
+    shots = [
+        {
+            "look": shot.name,
+            "sidecar": shot.sidecar,
+            "process_space": shot.process_space,
+            "frames": [shot.first, shot.last],
+            "luts": len(shot.baked.baked) + len(shot.baked.kept),
+            "error": shot.error,
+            "error_space": shot.process_space,
+            "between": None if shot.between is None else asdict(shot.between),
+            "index": str(shot.baked.index),
+        }
+        for shot in done.shots
+    ]
+    views = [list(view) for view in done.views]
+    notes = done.notes
     return {
-        "config": str(done.path),
-        "base": done.base,
-        "shots": [
-            {
-                "look": shot.name,
-                "sidecar": shot.sidecar,
-                "process_space": shot.process_space,
-                "frames": [shot.first, shot.last],
-                "tables": len(shot.baked.baked) + len(shot.baked.kept),
-                "error": shot.error,
-                "error_space": shot.process_space,
-                "index": str(shot.baked.index),
-            }
-            for shot in done.shots
-        ],
-        "views": [list(view) for view in done.views],
-        "notes": done.notes,
-    }
+        "config": str(done.path), "base": done.base, "shots": shots, "views": views, "notes": notes
+    }  # fmt: skip
 
 
 def report(done: WrittenConfig) -> list[str]:
     """Return the lines that say what was written."""
     from palette4d.common.text import counted
-    from palette4d.lut_export.error import stated
+    from palette4d.lut_export.bake_error import stated
 
     lines = [f"{done.path}: {counted(len(done.shots), 'look')}, added to {done.base}"]
     width = max(len(shot.name) for shot in done.shots)
     for shot in done.shots:
-        tables = len(shot.baked.baked) + len(shot.baked.kept)
+        luts = len(shot.baked.baked) + len(shot.baked.kept)
         lines.append(
-            f"  {shot.name:<{width}}  frames {shot.first} to {shot.last}, "
-            f"{counted(tables, 'table')}, process space {shot.process_space}, largest "
-            f"|a-b|/max(|b|,0.1) in it {stated(shot.error)}"
+            f"  {shot.name:<{width}}  frames {shot.first} to {shot.last}, {counted(luts, 'LUT')}, "
+            f"largest |a-b|/max(|b|,0.1) in {shot.process_space} {stated(shot.error)}"
         )
+        if (between := shot.between) is not None:
+            where = "the clip's colours" if between.on_clip else "a grid"
+            lines.append(
+                f"  {'':<{width}}  between the LUTs: deltaE 2000 of up to "
+                f"{stated(between.delta_e)} on {where}, at frame {between.frame} with the LUT of "
+                f"frame {between.look}"
+            )
     if done.views:
-        lines.append(
-            f"  {counted(len(done.views), 'view')} more, such as {done.views[0][1]!r} of "
-            f"{done.views[0][0]!r}"
-        )
+        display, view = done.views[0]
+        lines.append(f"  {counted(len(done.views), 'view')} more, such as {view!r} of {display!r}")
     shot = done.shots[0]
     lines.append(
         f"next: OCIO={done.path} SHOT={shot.name} FRAME={shot.first} and a viewer, with the look "

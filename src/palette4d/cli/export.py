@@ -7,40 +7,31 @@ import json
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
-from palette4d.cli.lut_options import add_space_options, add_table_options, bake_options
+from palette4d.cli.lut_options import add_lut_options, lut_settings, wide_help
+from palette4d.cli.progress import frames_bar
 from palette4d.cli.worker_options import add_worker_options
 from palette4d.common.arguments import frame_range, parse_frames, whole
 from palette4d.common.errors import Palette4dError
+from palette4d.common.text import counted
 from palette4d.jobs.workers import Workers
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from palette4d import _core
-    from palette4d.lut_export.series import Series, SeriesOptions
-
-Done = TypeVar("Done")
+    from palette4d.lut_export.series import Request, Series
 
 EPILOG = """\
-Files are named NAME.FRAME.EXTENSION, and NAME.series.json beside them lists them: frame, file,
-hash, id, size, shaper and errors of each. Running the same command again bakes only what is missing
-or does not match its hash; Ctrl-C leaves whole files only.
-
-For a whole show give its manifest (NAME.shots.json, which `palette4d analyze` wrote): each shot's
-files go to a folder of its name. --otio writes a copy of the edit in which the metadata of each
-clip (its member "palette4d") names the shot's sidecar and files.
-
---stops are the frames at which the edit turns: the times of its colour stops and edited palette
-colours, and of the palette colours beside them, where it begins or has faded.
+Files are NAME.FRAME.EXTENSION; NAME.series.json lists them with hashes and errors. The same command
+again bakes only files that are missing or changed. Ctrl-C leaves whole files only.
+--stops are the times of the colour stops, of the edited palette colours and of their neighbours.
+With a manifest each shot's files go to a folder of its name; --otio writes a copy of the edit whose
+clips name the shot's sidecar and files in their metadata ("palette4d").
 
 examples:
   palette4d export shot010.p4d.json --every 1 -o luts
   palette4d export shot010.p4d.json --frames 1001-1100x10 -o luts --format clf --max-error 0.02
-  palette4d export shot010.p4d.json --stops -o luts --name shot010_warm --size 65
-  palette4d export shots/edit.shots.json --every 10 -o luts --otio edit_luts.otio
-  palette4d export shots/edit.shots.json --stops -o luts --cluster tcp://farm:8786
+  palette4d export shots/edit.shots.json --stops -o luts --otio edit_luts.otio
 """
 
 
@@ -51,49 +42,32 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="bake many frames: a dated series of LUT files",
         description="Bake the edit at many frames, a file each, in parallel, with an index.",
         epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        usage="%(prog)s SIDECAR (--every N | --stops | --frames RANGE) -o DIR [options]",
+        formatter_class=wide_help,
     )
-    parser.add_argument(
-        "sidecar",
-        metavar="SIDECAR",
-        type=Path,
-        help="the sidecar (.p4d.json), or the manifest of a show (.shots.json)",
-    )
+    add = parser.add_argument
+    sidecar = "the sidecar (.p4d.json), or the manifest of a show (.shots.json)"
+    add("sidecar", metavar="SIDECAR", type=Path, help=sidecar)
     add_frame_choice(parser, required=True)
-    parser.add_argument(
-        "-o", "--output", metavar="DIR", type=Path, required=True, help="the folder for the files"
-    )
-    parser.add_argument("--name", metavar="NAME", help="the files' name (default: the clip's)")
-    parser.add_argument(
-        "--padding",
-        metavar="N",
-        type=whole(0, 12),
-        default=4,
-        help="digits of the frame number in the names (default 4)",
-    )
-    add_table_options(parser, "resolve_cube")
-    add_space_options(parser)
+    add("-o", "--output", metavar="DIR", type=Path, required=True, help="the folder for the files")
+    add("--name", metavar="NAME", help="the files' name (default: the clip's)")
+    padding = "digits of the frame number in the names (default 4)"
+    add("--padding", metavar="N", type=whole(0, 12), default=4, help=padding)
+    add_lut_options(parser, "resolve_cube", space=True)
     add_run_options(parser)
-    parser.add_argument(
-        "--otio",
-        metavar="OUT.otio",
-        type=Path,
-        help="write the edit of a show with references to its files",
-    )
-    parser.add_argument("--json", action="store_true", help="print the index")
+    otio = "write the edit of a show with references to its files"
+    add("--otio", metavar="OUT.otio", type=Path, help=otio)
+    add("--json", action="store_true", help="print the index")
     parser.set_defaults(run=run, usage_error=parser.error)
 
 
 def add_frame_choice(parser: argparse.ArgumentParser, *, required: bool) -> None:
     """Add --every, --stops and --frames, of which one is chosen."""
-    chosen = parser.add_mutually_exclusive_group(required=required)
-    chosen.add_argument(
-        "--every", metavar="N", type=whole(1, 1_000_000), help="every N-th frame, from the first"
-    )
-    chosen.add_argument("--stops", action="store_true", help="the frames at which the edit turns")
-    chosen.add_argument(
-        "--frames", metavar="RANGE", type=frame_range, help="10, 1-20, 1001-1100x10, 0,12,30"
-    )
+    add = parser.add_mutually_exclusive_group(required=required).add_argument
+    every = "every N-th frame, from the first"
+    add("--every", metavar="N", type=whole(1, 1_000_000), help=every)
+    add("--stops", action="store_true", help="the frames at which the edit turns")
+    add("--frames", metavar="RANGE", type=frame_range, help="10, 1-20, 1001-1100x10, 0,12,30")
 
 
 def add_run_options(parser: argparse.ArgumentParser) -> None:
@@ -108,7 +82,7 @@ def chosen_frames(
 ) -> tuple[int, ...]:
     """Return the frames that --every, --stops or --frames name; all without any of them.
 
-    In a show, --stops is the first frame of a shot that is not edited.
+    In a show, --stops of a shot that is not edited is its first frame.
     """
     from palette4d.lut_export import series
 
@@ -125,29 +99,28 @@ def run(args: argparse.Namespace) -> int:
     """Export; print what was written."""
     from palette4d import _core
     from palette4d.lut_export import series
+    from palette4d.lut_export.bake_job import BakeSettings
     from palette4d.lut_export.formats import format_named
     from palette4d.shows.manifest import is_manifest
 
     show = is_manifest(args.sidecar)
     _check_show(args, show)
-    options = series.SeriesOptions(
+    request = series.Request(
+        sidecar=args.sidecar,
+        folder=args.output,
         frames=(),
-        bake=bake_options(args, format_named(args.format).name),
+        settings=BakeSettings(**lut_settings(args, format_named(args.format).name)),
         name=args.name,
         padding=args.padding,
         clip=args.clip,
-        workers=Workers(args.jobs, args.cluster),
         force=args.force,
     )
     if show:
-        return _run_show(args, options)
-    sidecar = _core.read_sidecar(str(args.sidecar))
-    chosen = replace(options, frames=chosen_frames(args, sidecar))
-    done = with_bar(
-        "export",
-        args.quiet,
-        lambda progress: series.export(args.sidecar, args.output, chosen, progress),
-    )
+        return _run_show(args, request)
+    request = replace(request, frames=chosen_frames(args, _core.read_sidecar(str(args.sidecar))))
+    workers = Workers(args.jobs, args.cluster)
+    with frames_bar("export", hidden=args.quiet) as progress:
+        (done,) = series.export([request], workers, progress)
     if args.json:
         print(json.dumps(done.document, indent=2))
     else:
@@ -173,18 +146,27 @@ def _check_show(args: argparse.Namespace, show: bool) -> None:
             args.usage_error(f"{option} does not go with the manifest of a show: {why}")
 
 
-def _run_show(args: argparse.Namespace, options: SeriesOptions) -> int:
+def _run_show(args: argparse.Namespace, request: Request) -> int:
     from palette4d.shows import export_luts
 
-    done = export_luts.export(
-        args,
-        options,
-        lambda sidecar: chosen_frames(args, sidecar, show=True),
-        lambda work: with_bar("export", args.quiet, work),
-    )
+    with frames_bar("export", hidden=args.quiet) as progress:
+        exported = export_luts.export(
+            args.sidecar,
+            args.output,
+            request,
+            lambda sidecar: chosen_frames(args, sidecar, show=True),
+            Workers(args.jobs, args.cluster),
+            progress,
+            otio=args.otio,
+        )
+    done = exported.series
+    for note in exported.notes:
+        print(f"palette4d: note: {note}", file=sys.stderr)
     if args.json:
         print(export_luts.as_json(done))
     else:
+        if args.otio is not None:
+            print(f"{args.otio}: references in {counted(exported.references, 'clip')}")
         for one in done:
             print("\n".join(report(one)))
     warn(done)
@@ -193,27 +175,9 @@ def _run_show(args: argparse.Namespace, options: SeriesOptions) -> int:
     return 0
 
 
-def with_bar(what: str, quiet: bool, work: Callable[[Callable[[int, int], None]], Done]) -> Done:
-    """Do `work` with a progress bar of frames."""
-    from palette4d.cli.progress import frames_bar
-
-    with frames_bar(what, hidden=quiet) as bar:
-
-        def progress(done: int, total: int) -> None:
-            if bar.total != total:
-                # What is there already costs no time: the bar starts behind it.
-                bar.total, bar.initial = total, done
-                bar.n = done
-                bar.refresh()
-            bar.update(done - bar.n)
-
-        return work(progress)
-
-
 def report(done: Series) -> list[str]:
     """Return the lines that say what was written."""
-    from palette4d.common.text import counted
-    from palette4d.lut_export.error import stated
+    from palette4d.lut_export.bake_error import stated
 
     listed = {entry["frame"]: entry for entry in done.document["frames"]}
     frames = [listed[frame] for frame in sorted([*done.baked, *done.kept])]
@@ -239,10 +203,10 @@ def report(done: Series) -> list[str]:
 
 def warn(done: list[Series]) -> None:
     """Say what a user should know beside the figures."""
-    from palette4d.common.text import counted
-    from palette4d.lut_export.bake import PREVIEW_TIER
+    from palette4d.colour.difference import VISIBLE
+    from palette4d.lut_export.bake import nearer
+    from palette4d.lut_export.bake_error import stated
     from palette4d.lut_export.formats import shaper_warning
-    from palette4d.lut_export.lattice import nearer
 
     entries = [entry for one in done for entry in one.document["frames"]]
     shaped = {
@@ -256,24 +220,23 @@ def warn(done: list[Series]) -> None:
             print(f"palette4d: warning: {about}", file=sys.stderr)
     if any(entry["clip"] is None for entry in entries):
         print(
-            "palette4d: note: not all of the clip's frames could be read; errors are stated on the "
-            "dense grid for the others (name the clip with --clip)",
+            "palette4d: note: not all of the clip's frames could be read; the errors of the others "
+            "are measured on the dense grid (name the clip with --clip)",
             file=sys.stderr,
         )
-    missed = [entry for entry in entries if entry["error"] > PREVIEW_TIER]
+    missed = [e for e in entries if e["clip"] and e["clip"]["delta_e_largest"] > VISIBLE]
     if missed:
-        sizes = [entry["size"] for entry in missed if entry["size"] is not None]
+        smallest = min((e["size"] for e in missed if e["size"] is not None), default=None)
+        worst = stated(max(e["clip"]["delta_e_largest"] for e in missed))
         print(
-            f"palette4d: warning: {counted(len(missed), 'file')} of {len(entries)} "
-            f"{'misses' if len(missed) == 1 else 'miss'} the preview tier {PREVIEW_TIER:g}; "
-            f"{nearer(min(sizes, default=None))}",
+            f"palette4d: warning: the error of {counted(len(missed), 'file')} of {len(entries)} "
+            f"can be seen: deltaE 2000 of up to {worst} on the clip's colours; {nearer(smallest)}",
             file=sys.stderr,
         )
 
 
 def failures(done: Series) -> Palette4dError:
     """Return the error that lists the frames that could not be baked."""
-    from palette4d.common.text import counted
     from palette4d.lut_export.series import failures_text
 
     return Palette4dError(

@@ -10,14 +10,16 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 
-from palette4d import __version__
+from palette4d._core import __version__
 from palette4d.common.arguments import Parser, accept_negative_values
-from palette4d.common.errors import Palette4dError, SidecarError
+from palette4d.common.errors import Palette4dError, SidecarError, in_words
 
 #: The modules of the verbs, in the order of a day's work (and of ``palette4d --help``).
 VERB_MODULES = (
     "palette4d.cli.sample_clip",
     "palette4d.cli.analyze",
+    "palette4d.cli.info",
+    "palette4d.cli.slice",
     "palette4d.cli.edit",
     "palette4d.cli.render",
     "palette4d.cli.bake",
@@ -71,14 +73,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         status = run(args)
         sys.stdout.flush()
-    except Palette4dError as error:
-        return _report(error)
     except BrokenPipeError:
         # The reader of our output went away (`palette4d info … | head`): not our error, but
         # Python would complain when it flushes stdout at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
-    except OSError as error:
+    except (Palette4dError, OSError) as error:
         return _report(error)
     except KeyboardInterrupt:
         print("palette4d: interrupted", file=sys.stderr)
@@ -87,7 +87,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _report(error: Exception) -> int:
-    text = str(error).encode("utf-8", "backslashreplace").decode("utf-8")
+    text = in_words(error).encode("utf-8", "backslashreplace").decode("utf-8")
     broken = isinstance(error, SidecarError) and (error.pointer or "JSON" in error.expected)
     if isinstance(error, SidecarError) and '"palette4d.shots"' in error.found:
         text += (

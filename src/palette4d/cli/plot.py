@@ -4,6 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from palette4d.cli.lut_options import wide_help
 from palette4d.common.arguments import times, whole
 
 EXTENSIONS = (".png", ".svg", ".pdf")
@@ -29,7 +30,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         help="draw the palette's timeline and polyhedra",
         description="Draw a palette and its edits: the timeline, and the polyhedra of some frames.",
         epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=wide_help,
     )
     add = parser.add_argument
     add("sidecar", metavar="SIDECAR", type=Path, help="the sidecar (.p4d.json)")

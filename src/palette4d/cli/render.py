@@ -95,31 +95,31 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Render; returns the exit status."""
-    from palette4d import _core
     from palette4d.cli.progress import frames_bar
     from palette4d.grade import rendering
+    from palette4d.grade.document import Document
     from palette4d.media.clip import open_clip
     from palette4d.media.clip_base import named
     from palette4d.media.movie_writer import is_movie
 
-    sidecar = _core.read_sidecar(args.sidecar)
+    document = Document.load(args.sidecar)
     clip = open_clip(args.clip, frames=args.frames, skip_bad_frames=args.skip_bad_frames)
     options = rendering.RenderOptions(
-        args.strength, args.threads, args.space == "palette", args.compare, args.half, args.bits
+        args.strength, args.threads, args.space, args.compare, args.half, args.bits
     )
-    for warning in rendering.mismatches(sidecar, clip, whole=args.frames is None):
+    for warning in rendering.mismatches(document, clip, whole=args.frames is None):
         print(f"palette4d: warning: {warning}", file=sys.stderr)
     movie = is_movie(Path(args.output))
     for note in (*clip.notes, *(rendering.movie_notes(clip, options) if movie else ())):
         print(f"palette4d: note: {note}", file=sys.stderr)
-    with frames_bar("render", hidden=args.quiet, total=len(clip.frames)) as bar:
+    with frames_bar("render", hidden=args.quiet, total=len(clip.frames)) as progress:
         written = rendering.render(
-            sidecar,
+            document,
             clip,
             args.output,
             options,
             force=args.force,
-            progress=lambda done, total: bar.update(done - bar.n),
+            progress=progress,
         )
     if movie or len(written) == 1:
         frames = f", {counted(len(clip.frames) - len(clip.skipped), 'frame')}" if movie else ""

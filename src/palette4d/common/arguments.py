@@ -1,29 +1,32 @@
-"""What several verbs read from the command line alike: frames, times, numbers, negative ones too.
+"""What several verbs read from the command line alike: frames, times, numbers, colours.
 
-A value that is wrong whatever the files hold is refused here, as an argparse type: exit status 2.
+Values that no file can make right are refused here, as wrong usage: exit status 2.
 """
 
 import argparse
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NoReturn
 
 from palette4d.common.errors import Palette4dError
 
-#: Longer than any clip; stops numbers that are dates or ids from being taken for frames.
+#: Longer than any clip: dates and ids are not taken for frames.
 MAX_FRAMES = 1_000_000
 
 # argparse takes "-3", "-5--4" and "-0.1,0.2,0.3" for options unless told that they are values.
 _NEGATIVE = re.compile(r"-(?:\.?[0-9][0-9.,eEx+-]*|inf|nan)$")
 _RANGE = re.compile(r"(-?[0-9]{1,12})(?:-(-?[0-9]{1,12})(?:x([0-9]{1,12}))?)?")
 
+_HEX = re.compile(r"#([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})")
+
 _FRAMES_ARE = "expected A, A-B or A-BxN with A <= B, or several with commas, such as 1001-1100x2"
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that says what is wrong in two lines, and where the help is: of a verb with dozens
-    of options argparse would print the whole usage before it. Verbs and their actions inherit it.
+    """A parser whose errors are two lines: argparse would print the whole usage of a verb first.
+
+    Verbs and their actions inherit it.
     """
 
     def error(self, message: str) -> NoReturn:
@@ -37,7 +40,7 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(
         self, args: Iterable[str] | None = None, namespace: Any = None
     ) -> tuple[Any, list[str]]:
-        """As argparse, but what a verb does not know is the verb's error, not the command's."""
+        """Parse as argparse does, but report unknown words as the verb's error."""
         found, unknown = super().parse_known_args(args, namespace)
         if unknown:
             self.error(f"unrecognized arguments: {' '.join(unknown)}")
@@ -145,6 +148,46 @@ def whole(low: float = -math.inf, high: float = math.inf) -> Callable[[str], int
         return value
 
     return parse
+
+
+class ColourAction(argparse.Action):
+    """Read three numbers: R G B, R,G,B or #rrggbb (nargs="+")."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        """Keep the colour; refuse words that are none, with 2."""
+        colour = parse_colour(values)
+        if colour is None:
+            raise argparse.ArgumentError(
+                self,
+                f"found {' '.join(values)!r}, expected three finite numbers (R G B or R,G,B) or "
+                "#rrggbb, with the id before the option",
+            )
+        setattr(namespace, self.dest, colour)
+
+
+def parse_colour(words: Sequence[str]) -> tuple[float, float, float] | None:
+    """Return the colour written as R G B, R,G,B or #rrggbb; None when it is none.
+
+    >>> parse_colour(["0.5", "-0.1", "1e0"])
+    (0.5, -0.1, 1.0)
+    >>> parse_colour(["#ff0033"])
+    (1.0, 0.0, 0.2)
+    """
+    if len(words) == 1 and (match := _HEX.fullmatch(words[0])):
+        r, g, b = (int(digits, 16) / 255 for digits in match.groups())
+        return (r, g, b)
+    parts = words[0].split(",") if len(words) == 1 else words
+    try:
+        r, g, b = (number()(part) for part in parts)
+    except (argparse.ArgumentTypeError, ValueError):
+        return None
+    return (r, g, b)
 
 
 def checked(parse: Callable[[str], Any], check: Callable[[Any], object]) -> Callable[[str], Any]:

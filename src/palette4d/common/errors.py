@@ -1,5 +1,8 @@
 """The errors of palette4d: each says what was found, what was expected and what to do."""
 
+import errno
+import os
+
 
 class Palette4dError(Exception):
     """Something in the input or the environment that the user can mend.
@@ -37,3 +40,33 @@ class SidecarError(Palette4dError):
         """Return "FILE: POINTER: found X, expected Y", without the parts that are empty."""
         parts = [part for part in (self.file, self.pointer) if part]
         return ": ".join([*parts, f"found {self.found}, expected {self.expected}"])
+
+
+_REMEDIES = {
+    errno.ENOENT: "found no such file or folder; check the path",
+    errno.EACCES: "found no permission for it; change its permissions, or choose another",
+    errno.EPERM: "found no permission for it; change its permissions, or choose another",
+    errno.EROFS: "found a read-only disk; choose another place",
+    errno.EISDIR: "found a folder, expected a file",
+    errno.ENOTDIR: "found a file, expected a folder",
+    errno.ENOSPC: "found no room on the disk; make some, or choose another place",
+    errno.ENAMETOOLONG: "found a name that is too long for the disk; choose a shorter one",
+    errno.EMFILE: "found too many open files; close some programs, or raise `ulimit -n`",
+}
+
+
+def in_words(error: Exception) -> str:
+    """Return an error as a sentence: the operating system's say the file and what to do.
+
+    >>> in_words(FileNotFoundError(errno.ENOENT, "No such file or directory", "a.exr"))
+    'a.exr: found no such file or folder; check the path'
+    """
+    if not isinstance(error, OSError) or error.strerror is None:
+        return str(error)
+    reason = error.strerror[:1].lower() + error.strerror[1:]
+    remedy = _REMEDIES.get(
+        error.errno or 0, f"it cannot be used ({reason}); check the file and its disk"
+    )
+    if isinstance(error.filename, str | bytes | os.PathLike):
+        return f"{os.fsdecode(error.filename)}: {remedy}"
+    return remedy

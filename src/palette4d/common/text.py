@@ -1,4 +1,4 @@
-"""Words of messages that depend on numbers, and words that names may hold."""
+"""Counts in messages, and names that are fit for files."""
 
 import re
 
@@ -6,7 +6,7 @@ from palette4d.common.errors import Palette4dError
 
 
 def counted(count: int, one: str, several: str | None = None) -> str:
-    """Return "1 frame", "2 frames"; `several` where an s does not make the plural.
+    """Return "1 frame", "2 frames"; `several` is the plural where it is not made by an s.
 
     >>> counted(1, "bad frame"), counted(0, "vertex", "vertices")
     ('1 bad frame', '0 vertices')
@@ -15,7 +15,7 @@ def counted(count: int, one: str, several: str | None = None) -> str:
 
 
 def file_safe(name: str) -> str:
-    """Return a name fit for files, looks and OpenColorIO's variables: letters, digits, . _ -.
+    """Return a name that is fit for files and for OpenColorIO: letters, digits, . _ -.
 
     >>> file_safe("shot 010/a+b"), file_safe("-x")
     ('shot_010_a_b', 'x')
@@ -24,12 +24,12 @@ def file_safe(name: str) -> str:
 
 
 def checked_name(name: str) -> str:
-    """Return a name that is fit for files as it is.
+    """Return the name, if it is fit for files.
 
     Raises
     ------
     Palette4dError
-        It is not, with one that is.
+        It is not; the error suggests one that is.
     """
     if file_safe(name) != name:
         raise Palette4dError(

@@ -1,313 +1,201 @@
-"""Edits as pure functions: each takes a sidecar document and returns a new one.
+"""Edits: what the user gave each handle, and steps between two such states that can be taken back.
 
-A document is what `palette4d.grade.sidecar.load` returns. A handle is what an edit holds on to:
-a palette vertex or a colour stop, both named by an id. Colours are in the clip's own encoding and
-may lie outside 0..1; frames are the clip's frame numbers. Every function raises `Palette4dError`
-when it is asked for something that does not exist, and leaves its argument as it was.
+A handle is a palette vertex or a colour stop; an id names it. The state is a mapping from ids to
+`Setting`: a vertex that is not in it keeps its own colour, a stop that is not in it does not exist.
+Input and output are plain values: this module knows neither files nor palettes.
 """
 
-import copy
-import difflib
-import math
-import re
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
 
-from palette4d import _core
 from palette4d.common.errors import Palette4dError
-from palette4d.grade.sidecar import Document, validate
 
 Colour = tuple[float, float, float]
 
-#: Colour components further from 0 are refused by the format (docs/sidecar.md).
+#: Code values further from 0 are refused by the format (docs/sidecar.md).
 LARGEST_COLOUR = 1e6
 
 
-@dataclass(frozen=True)
-class Handle:
-    """The handle nearest to a colour at a time.
-
-    Attributes
-    ----------
-    kind : {"vertex", "stop"}
-        What `id` names.
-    id : str
-        The vertex or stop to edit.
-    frame : float
-        When the handle is; differs from the time asked for unless `exact`.
-    edge : str or None
-        The edge on which the palette colour lies at the time asked for; None on a vertex.
-    exact : bool
-        Whether the handle lies at the time asked for.
-    rgb : tuple of float
-        The palette colour found there, unedited.
-    distance : float
-        From the colour asked for to `rgb`, Euclidean in RGB.
-    """
-
-    kind: Literal["vertex", "stop"]
-    id: str
-    frame: float
-    edge: str | None
-    exact: bool
-    rgb: Colour
-    distance: float
-
-
-def colour_of(document: Document, handle: str) -> Colour:
-    """Return the present (edited, else original) colour of a vertex or stop."""
-    stop = _find(document["edits"]["stops"], handle)
-    if stop is not None:
-        return _colour(stop["rgb"])
-    vertex = _vertex(document, handle)
-    edit = _find(document["edits"]["vertices"], handle, "vertex")
-    return _colour((edit or vertex)["rgb"])
-
-
-def set_colour(document: Document, handle: str, rgb: Iterable[float]) -> Document:
-    """Give a vertex or a stop a colour."""
-    colour = _checked(rgb)
-    document = copy.deepcopy(document)
-    stop = _find(document["edits"]["stops"], handle)
-    if stop is not None:
-        stop["rgb"] = list(colour)
-        return document
-    _vertex(document, handle)
-    edit = _find(document["edits"]["vertices"], handle, "vertex")
-    if edit is None:
-        document["edits"]["vertices"].append({"vertex": handle, "rgb": list(colour)})
-        # In the order of the polytope, so that the file does not depend on the order of editing.
-        order = {vertex["id"]: i for i, vertex in enumerate(document["polytope"]["vertices"])}
-        document["edits"]["vertices"].sort(key=lambda entry: order[entry["vertex"]])
-    else:
-        edit["rgb"] = list(colour)
-    return document
-
-
-def shift_colour(document: Document, handle: str, offset: Iterable[float]) -> Document:
-    """Add an offset to the present colour of a vertex or a stop."""
-    delta = _checked(offset)
-    now = colour_of(document, handle)
-    return set_colour(document, handle, [a + b for a, b in zip(now, delta, strict=True)])
-
-
-def set_stop(
-    document: Document, edge: str, frame: float, rgb: Iterable[float]
-) -> tuple[Document, str]:
-    """Return the document with a stop on `edge` at `frame`, and the stop's id.
-
-    A stop that is there already gets the colour; otherwise a new one is added.
-    """
-    colour = _checked(rgb)
-    _check_inside(document, edge, frame)
-    there = stop_at(document, edge, frame)
-    if there is not None:
-        return set_colour(document, there, colour), there
-    document = copy.deepcopy(document)
-    new = {"id": _new_stop_id(document), "edge": edge, "frame": frame, "rgb": list(colour)}
-    document["edits"]["stops"].append(new)
-    return document, str(new["id"])
-
-
-def move_stop(document: Document, stop: str, frame: float) -> Document:
-    """Move a stop in time, within its edge."""
-    entry = _find(document["edits"]["stops"], stop)
-    if entry is None:
-        if _find(document["polytope"]["vertices"], stop) is not None:
-            raise Palette4dError(
-                f"{stop} is a palette vertex, whose time the analysis found; only stops move in "
-                "time. Its colour moves with --by"
-            )
-        raise _unknown(stop, "stop", [s["id"] for s in document["edits"]["stops"]])
-    _check_inside(document, entry["edge"], frame)
-    there = stop_at(document, entry["edge"], frame)
-    if there not in (None, stop):
-        raise Palette4dError(
-            f"edge {entry['edge']} already has the stop {there} at frame {frame:g}; choose another "
-            "frame, or reset that stop first"
-        )
-    document = copy.deepcopy(document)
-    _require(_find(document["edits"]["stops"], stop))["frame"] = frame
-    return document
-
-
-def reset(document: Document, handle: str | None = None) -> Document:
-    """Undo the edit of a vertex, remove a stop, or (None) undo everything.
-
-    Resetting a vertex that is not edited changes nothing.
-    """
-    if handle is not None and _find(document["edits"]["stops"], handle) is None:
-        _vertex(document, handle)
-    document = copy.deepcopy(document)
-    edits = document["edits"]
-    edits["vertices"] = [e for e in edits["vertices"] if handle not in (None, e["vertex"])]
-    edits["stops"] = [s for s in edits["stops"] if handle not in (None, s["id"])]
-    return document
-
-
-def stop_at(document: Document, edge: str, frame: float) -> str | None:
-    """Return the id of the stop on `edge` at exactly `frame`, or None."""
-    for stop in document["edits"]["stops"]:
-        if stop["edge"] == edge and stop["frame"] == frame:
-            return str(stop["id"])
-    return None
-
-
-def nearest_handle(document: Document, rgb: Iterable[float], frame: float) -> Handle:
-    """Return the handle with which to change the palette colour nearest to `rgb` at `frame`.
-
-    The palette is sliced at `frame` (eq. 5) and the sliced colour nearest to `rgb`, as analysed and
-    not as edited, is taken. Where it lies on a vertex or a stop, that is the handle; else it is the
-    end or stop of its edge that is nearest in time.
-    """
-    colour = _checked(rgb)
-    check_frame(document, frame)
-    polytope = document["polytope"]
-    ids = {vertex["id"]: vertex for vertex in polytope["vertices"]}
-    sliced = _core.slice_at(validate(document).polytope, frame)
-    best, distance = 0, math.inf
-    for i, candidate in enumerate(sliced.rgb.tolist()):
-        d = math.dist(colour, candidate)
-        if d < distance:
-            best, distance = i, d
-    there = _colour(sliced.rgb[best].tolist())
-    edge_index = int(sliced.edges[best])
-    if edge_index < 0:
-        vertex = polytope["vertices"][int(sliced.ends[best, 0])]
-        return Handle("vertex", vertex["id"], vertex["frame"], None, True, there, distance)
-    edge = polytope["edges"][edge_index]
-    kinds: list[tuple[Literal["vertex", "stop"], str, float]] = [
-        ("vertex", edge["from"], ids[edge["from"]]["frame"]),
-        ("vertex", edge["to"], ids[edge["to"]]["frame"]),
-    ]
-    for stop in document["edits"]["stops"]:
-        if stop["edge"] == edge["id"]:
-            kinds.append(("stop", stop["id"], stop["frame"]))
-    kind, handle, when = min(kinds, key=lambda entry: (abs(entry[2] - frame), entry[2]))
-    return Handle(kind, handle, when, edge["id"], when == frame, there, distance)
-
-
-def nearest_edge(document: Document, rgb: Iterable[float], frame: float) -> tuple[str, Colour]:
-    """Return the edge on which the palette colour nearest to `rgb` lies, and that colour.
+def as_colour(values: Iterable[float], what: str = "colour") -> Colour:
+    """Return three finite code values.
 
     Raises
     ------
     Palette4dError
-        When the colour lies on a vertex at that time: vertices need no stop.
+        `values` are not three numbers of at most `LARGEST_COLOUR`.
     """
-    handle = nearest_handle(document, rgb, frame)
-    if handle.edge is None:
-        raise Palette4dError(
-            f"the nearest palette colour at frame {frame:g} is the vertex {handle.id} itself, "
-            f"where there is no edge to put a stop on; use `set {handle.id}`"
-        )
-    return handle.edge, handle.rgb
-
-
-def edited_at(document: Document, edge: str, frame: float) -> Colour:
-    """Return the edited colour on an edge at a frame from its start to its end, by the core."""
-    entry = _edge(document, edge)
-    for vertex in (entry["from"], entry["to"]):
-        if frame == _vertex(document, vertex)["frame"]:
-            return colour_of(document, vertex)
-    _check_inside(document, edge, frame)
-    read = validate(document)
-    cut = _core.slice_at(read.polytope, frame)
-    # Where tracks share the edge, each of them has the same colour there.
-    track = cut.edges.tolist().index(read.polytope.edge_ids.index(edge))
-    return _colour(_core.edited_colours(read.polytope, read.edits, cut)[track].tolist())
-
-
-def check_frame(document: Document, frame: float) -> None:
-    """Refuse a frame outside of the clip."""
-    frames = document["clip"]["frames"]
-    if not frames["first"] <= frame <= frames["last"]:
-        raise Palette4dError(
-            f"frame {frame:g} is outside of the clip; choose one from {frames['first']} to "
-            f"{frames['last']}"
-        )
-
-
-# ----------------------------------------------------------------------------------------- details
-
-
-def _find(entries: Sequence[dict[str, Any]], value: str, name: str = "id") -> dict[str, Any] | None:
-    return next((entry for entry in entries if entry[name] == value), None)
-
-
-def _require(entry: dict[str, Any] | None) -> dict[str, Any]:
-    if entry is None:
-        raise LookupError("an id that a validated document holds is missing")
-    return entry
-
-
-def _colour(values: Iterable[float]) -> Colour:
-    r, g, b = values
-    return (float(r), float(g), float(b))
-
-
-def _checked(values: Iterable[float]) -> Colour:
-    listed = [float(value) for value in values]
+    try:
+        listed = [float(value) for value in values]
+    except (TypeError, ValueError):
+        listed = []
     if len(listed) != 3 or not all(abs(value) <= LARGEST_COLOUR for value in listed):
         raise Palette4dError(
-            f"found the colour {listed}, expected 3 finite numbers of at most {LARGEST_COLOUR:g}"
+            f"found the {what} {values!r}, expected 3 finite numbers of at most {LARGEST_COLOUR:g}"
         )
-    return _colour(listed)
+    return (listed[0], listed[1], listed[2])
 
 
-def _vertex(document: Document, handle: str) -> dict[str, Any]:
-    vertices = document["polytope"]["vertices"]
-    found = _find(vertices, handle)
-    if found is not None:
-        return found
-    if _find(document["polytope"]["edges"], handle) is not None:
-        raise Palette4dError(
-            f"{handle} is an edge, which has no colour of its own; add a stop with "
-            f"`stop {handle} --frame T --rgb R G B`"
+@dataclass(frozen=True)
+class Setting:
+    """What the user gave a handle.
+
+    Attributes
+    ----------
+    rgb : tuple of float
+        The colour, in the palette's code values.
+    edge, frame : str and float, or None
+        Where a stop is; None for a vertex, which stays where the analysis found it.
+    """
+
+    rgb: Colour
+    edge: str | None = None
+    frame: float | None = None
+
+
+Settings = Mapping[str, Setting]
+
+
+@dataclass(frozen=True)
+class Change:
+    """One handle's setting before and after an edit; None: not edited, no such stop."""
+
+    id: str
+    before: Setting | None
+    after: Setting | None
+
+
+@dataclass(frozen=True)
+class Edit:
+    """One step of the user's work: the changes that belong together."""
+
+    changes: tuple[Change, ...]
+
+    def inverse(self) -> "Edit":
+        """Return the edit that takes this one back."""
+        return Edit(tuple(Change(c.id, c.after, c.before) for c in reversed(self.changes)))
+
+    def apply(self, settings: Settings) -> dict[str, Setting]:
+        """Return the settings after this edit.
+
+        Raises
+        ------
+        Palette4dError
+            A handle is not as this edit expects it: somebody else has changed it.
+        """
+        result = dict(settings)
+        for change in self.changes:
+            if result.get(change.id) != change.before:
+                raise Palette4dError(
+                    f"{change.id} was changed meanwhile, so that this edit no longer fits; give "
+                    f"{change.id} a colour again instead"
+                )
+            if change.after is None:
+                result.pop(change.id, None)
+            else:
+                result[change.id] = change.after
+        return result
+
+    def renamed(self, names: Mapping[str, str]) -> "Edit":
+        """Return the same edit of handles that have other ids now."""
+        return Edit(tuple(replace(c, id=names.get(c.id, c.id)) for c in self.changes))
+
+
+def difference(before: Settings, after: Settings) -> Edit:
+    """Return the edit that leads from one state to another."""
+    ids = [*before, *(id_ for id_ in after if id_ not in before)]
+    return Edit(
+        tuple(
+            Change(id_, before.get(id_), after.get(id_))
+            for id_ in ids
+            if before.get(id_) != after.get(id_)
         )
-    ids = [v["id"] for v in vertices] + [s["id"] for s in document["edits"]["stops"]]
-    raise _unknown(handle, "vertex or stop", ids)
-
-
-def _edge(document: Document, edge: str) -> dict[str, Any]:
-    found = _find(document["polytope"]["edges"], edge)
-    if found is None:
-        raise _unknown(edge, "edge", [e["id"] for e in document["polytope"]["edges"]])
-    return found
-
-
-def _unknown(handle: str, kind: str, ids: list[str]) -> Palette4dError:
-    near = difflib.get_close_matches(handle, ids, n=5, cutoff=0.5) or ids[:5]
-    if not near:
-        return Palette4dError(f"there is no {kind} {handle!r}; the file holds none")
-    return Palette4dError(
-        f"there is no {kind} {handle!r}; did you mean {' or '.join(near)}? "
-        "`palette4d info SIDECAR` lists all ids"
     )
 
 
-def _check_inside(document: Document, edge: str, frame: float) -> None:
-    entry = _edge(document, edge)
-    vertices = document["polytope"]["vertices"]
-    start = _require(_find(vertices, entry["from"]))
-    end = _require(_find(vertices, entry["to"]))
-    if frame in (start["frame"], end["frame"]):
-        vertex = start if frame == start["frame"] else end
-        raise Palette4dError(
-            f"at frame {frame:g} edge {edge} has its end {vertex['id']}, which needs no stop; use "
-            f"`set {vertex['id']} --rgb R G B`"
-        )
-    if not start["frame"] < frame < end["frame"]:
-        raise Palette4dError(
-            f"edge {edge} runs from {start['id']} at frame {start['frame']:g} to {end['id']} at "
-            f"frame {end['frame']:g}; found frame {frame:g}, expected one in between"
-        )
+def merged(
+    base: Settings, mine: Settings, theirs: Settings, taken: Collection[str]
+) -> tuple[dict[str, Setting], dict[str, str]]:
+    """Return the state that holds the changes of two writers, and the new ids of stops of mine.
+
+    Parameters
+    ----------
+    base, mine, theirs : mapping of str to Setting
+        What both started from, and what each has made of it.
+    taken : collection of str
+        Ids of the palette, which no stop may have.
+
+    Raises
+    ------
+    Palette4dError
+        Both have changed the same handle, or put a stop at the same place, in different ways.
+    """
+    renamed: dict[str, str] = {}
+    result = dict(theirs)
+    for change in difference(base, mine).changes:
+        id_, there = change.id, theirs.get(change.id)
+        if there == change.after:
+            continue
+        if there != change.before:
+            # Two new stops that happen to have one id are two stops.
+            if change.before is not None or there is None or _place(there) == _place(change.after):
+                raise _conflict(id_)
+            renamed[id_] = id_ = new_stop_id({*taken, *result, *mine})
+        if change.after is None:
+            result.pop(id_, None)
+        else:
+            result[id_] = change.after
+    places: dict[tuple[str, float], str] = {}
+    for id_, setting in result.items():
+        if (place := _place(setting)) and places.setdefault(place, id_) != id_:
+            raise _conflict(f"edge {place[0]} at frame {place[1]:g}")
+    return result, renamed
 
 
-def _new_stop_id(document: Document) -> str:
-    """Return s1, s2, …: one more than the largest in use, so that gaps are not filled again."""
-    polytope = document["polytope"]
-    taken = {e["id"] for e in polytope["vertices"] + polytope["edges"] + document["edits"]["stops"]}
-    numbers = [int(match[1]) for match in map(re.compile(r"s(\d{1,9})").fullmatch, taken) if match]
+def _place(setting: Setting | None) -> tuple[str, float] | None:
+    if setting is None or setting.edge is None or setting.frame is None:
+        return None
+    return setting.edge, setting.frame
+
+
+def _conflict(where: str) -> Palette4dError:
+    return Palette4dError(
+        f"another program has edited {where} as well since the file was loaded; nothing was "
+        "written. Load the file again and repeat this edit, or save under another name"
+    )
+
+
+def new_stop_id(taken: Collection[str]) -> str:
+    """Return s1, s2, …: one more than the largest in use, so that gaps are not filled again.
+
+    >>> new_stop_id({"s1", "s7", "v9"})
+    's8'
+    """
+    numbers = [int(id_[1:]) for id_ in taken if id_[0] == "s" and _is_number(id_[1:])]
     return f"s{max(numbers, default=0) + 1}"
+
+
+def _is_number(text: str) -> bool:
+    return text.isascii() and text.isdigit() and len(text) <= 9
+
+
+def from_fields(fields: Mapping[str, Any]) -> dict[str, Setting]:
+    """Return the state that a sidecar's member "edits" holds."""
+    settings = {entry["vertex"]: Setting(as_colour(entry["rgb"])) for entry in fields["vertices"]}
+    for stop in fields["stops"]:
+        settings[stop["id"]] = Setting(as_colour(stop["rgb"]), stop["edge"], stop["frame"])
+    return settings
+
+
+def to_fields(settings: Settings, vertex_ids: Iterable[str]) -> dict[str, Any]:
+    """Return a sidecar's member "edits": vertices in the palette's order, stops as they came."""
+    return {
+        "vertices": [
+            {"vertex": id_, "rgb": list(settings[id_].rgb)} for id_ in vertex_ids if id_ in settings
+        ],
+        "stops": [
+            {"id": id_, "edge": setting.edge, "frame": setting.frame, "rgb": list(setting.rgb)}
+            for id_, setting in settings.items()
+            if setting.edge is not None
+        ],
+    }

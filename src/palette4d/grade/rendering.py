@@ -12,8 +12,8 @@ from typing import Literal
 
 import numpy as np
 
-from palette4d import _core
 from palette4d.common.files import make_folder
+from palette4d.grade.document import Document
 from palette4d.media.clip_base import F32, Clip, Image, describe
 from palette4d.media.frame_writer import (
     FramePattern,
@@ -35,8 +35,8 @@ class RenderOptions:
         0 the original, 1 the edit.
     threads : int
         0: one per processor.
-    in_palette_space : bool
-        The clip's code values are in the palette's colour space already.
+    space : {"input", "palette"}
+        "palette": the clip's code values are in the palette's colour space already.
     compare : {"wipe", "side"} or None
         The source beside the edit: "wipe" shows the left half of the source and the right half of
         the edit, "side" both whole, the source on the left.
@@ -46,32 +46,10 @@ class RenderOptions:
 
     strength: float = 1.0
     threads: int = 0
-    in_palette_space: bool = False
+    space: Literal["input", "palette"] = "input"
     compare: Literal["wipe", "side"] | None = None
     half: bool = False
     bits: int | None = None
-
-
-def recoloured(
-    sidecar: _core.Sidecar, frame: float, pixels: F32, premultiplied: bool, options: RenderOptions
-) -> F32:
-    """(h, w, 3 or 4) float32 pixels recoloured with the palette at a frame, as the node does it.
-
-    Frames outside the sidecar's range take its first or last palette. Returns a new array.
-    """
-    palette = _core.slice_at(sidecar.polytope, frame)
-    edited = _core.edited_colours(sidecar.polytope, sidecar.edits, palette)
-    recolourer = _core.Recolourer(palette.rgb, edited, palette.faces)
-    return recolourer.apply(
-        np.ascontiguousarray(pixels),
-        strength=options.strength,
-        premultiplied=premultiplied and pixels.shape[2] == 4,
-        threads=options.threads,
-        precision="single",
-        conversion=None
-        if sidecar.conversion is None or options.in_palette_space
-        else sidecar.conversion.steps,
-    )
 
 
 def compared(source: F32, edited: F32, how: Literal["wipe", "side"]) -> F32:
@@ -82,11 +60,12 @@ def compared(source: F32, edited: F32, how: Literal["wipe", "side"]) -> F32:
     return np.concatenate([source[:, :middle], edited[:, middle:]], axis=1)
 
 
-def mismatches(sidecar: _core.Sidecar, clip: Clip, whole: bool) -> list[str]:
+def mismatches(document: Document, clip: Clip, whole: bool) -> list[str]:
     """Return what in a clip differs from the one that a sidecar was made from, and what happens.
 
     `whole`: the clip was opened with all its frames, not with a range of them.
     """
+    sidecar = document.core
     found = []
     size = f"{sidecar.clip['width']}x{sidecar.clip['height']}"
     if size != f"{clip.width}x{clip.height}":
@@ -130,7 +109,7 @@ def movie_notes(clip: Clip, options: RenderOptions) -> list[str]:
 
 
 def render(
-    sidecar: _core.Sidecar,
+    document: Document,
     clip: Clip,
     output: str,
     options: RenderOptions,
@@ -142,8 +121,8 @@ def render(
 
     Parameters
     ----------
-    sidecar : Sidecar
-        The polytope and its edits.
+    document : Document
+        The palette and its edits.
     clip : Clip
         The frames; one that `Clip.skipped` lists in the end is left out.
     output : str
@@ -173,7 +152,7 @@ def render(
             raise OutputError(f"output {output}: --half and --bits are for frames, not for movies")
         check_targets([Path(output)], inputs, force)
         make_folder(Path(output).parent)
-        opened = _movie(clip, sidecar, Path(output), options)
+        opened = _movie(clip, document, Path(output), options)
     else:
         pattern = FramePattern.parse(output)
         samples = sample_type(pattern.extension, clip.depth, half=options.half, bits=options.bits)
@@ -192,7 +171,14 @@ def render(
     # One frame is written while the next is read and recoloured.
     with opened as write, ThreadPoolExecutor(1) as writer:
         for image in clip.iter_images():
-            pixels = recoloured(sidecar, image.frame, image.pixels, clip.premultiplied, options)
+            pixels = document.recolour(
+                image.pixels,
+                image.frame,
+                strength=options.strength,
+                premultiplied=clip.premultiplied,
+                space=options.space,
+                threads=options.threads,
+            )
             if options.compare is not None:
                 pixels = compared(image.pixels, pixels, options.compare)
             finish()
@@ -223,12 +209,10 @@ def _frames(clip: Clip, pattern: FramePattern, samples: str) -> Generator[_Write
 
 
 @contextlib.contextmanager
-def _movie(
-    clip: Clip, sidecar: _core.Sidecar, path: Path, options: RenderOptions
-) -> Generator[_Write]:
+def _movie(clip: Clip, document: Document, path: Path, options: RenderOptions) -> Generator[_Write]:
     """Yield what appends a frame to a movie."""
     # Files of frames seldom say their rate: the sidecar knows what the user said.
-    rate = clip.rate if clip.is_movie else Fraction(*sidecar.clip["rate"])
+    rate = clip.rate if clip.is_movie else Fraction(*document.core.clip["rate"])
     width = clip.width * (2 if options.compare == "side" else 1)
     with movie_writer(path, (width, clip.height), rate, clip.encoding) as append:
 

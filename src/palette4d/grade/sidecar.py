@@ -1,38 +1,40 @@
-"""The sidecar's only writer. Input: a document (plain dicts and lists); output: a validated file.
+"""The sidecar's text and files: what is read from them, and the only writer.
 
-`docs/sidecar.md` explains the format. The core (`palette4d._core`) is the judge of every document:
-nothing is written that it would refuse, and what was written is read back through it before the
-file takes its final name. Readers therefore see the old file or the new one, never a part of one.
+Input and output are a sidecar's members as plain dicts and lists; `docs/sidecar.md` explains them.
+The core (`palette4d._core`) judges every text: nothing is written that it would refuse.
 """
 
 import contextlib
-import copy
 import errno
 import json
 import os
-import secrets
 import stat
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
 from palette4d import _core
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Palette4dError, SidecarError
+from palette4d.common.files import link_target, refuse_existing, replacing
+from palette4d.common.text import counted
 
 if sys.platform != "win32":
     import fcntl
 
-Document = dict[str, Any]
+Fields = dict[str, Any]
 OnEdits = Literal["refuse", "keep", "drop"]
 
 SCHEMA = "palette4d.sidecar"
 
 #: Seconds to wait for another palette4d that writes in the same folder.
 LOCK_SECONDS = 10.0
+
+#: The core refuses a longer text.
+_LARGEST_FILE = 64 << 20
 
 # Member order in the file; what is not named here keeps the document's order.
 _ORDER: dict[str, tuple[str, ...]] = {
@@ -95,15 +97,15 @@ def new_document(
     clip: Mapping[str, Any],
     polytope: Mapping[str, Any],
     quality: Mapping[str, Any] | None = None,
-) -> Document:
+) -> Fields:
     """Return a document without edits from the analysis' results.
 
     Parameters
     ----------
     clip : mapping
         ``name``, ``source``, ``frames`` (``first``, ``last``, ``step``, ``skipped``), ``rate``
-        (numerator, denominator), ``size`` (width, height in pixels), ``encoding``; with
-        ``conversion`` the document is of version 2, which older readers refuse.
+        (numerator, denominator), ``size`` (width, height in pixels), ``encoding``, and
+        ``conversion`` where the palette is in another space than the clip.
     polytope : mapping
         ``vertices``, ``edges``, ``blocks``, ``transitions`` as in `docs/sidecar.md`.
     quality : mapping, optional
@@ -116,9 +118,9 @@ def new_document(
         `save` does that.
     """
     quality = quality or {}
-    document: Document = {
+    document: Fields = {
         "schema": SCHEMA,
-        "version": 2 if "conversion" in clip else 1,
+        "version": _core.SIDECAR_VERSION,
         "generator": f"palette4d {_core.__version__}",
         "clip": clip,
         "polytope": polytope,
@@ -126,7 +128,7 @@ def new_document(
         "edits": {"vertices": [], "stops": []},
         "extra": {},
     }
-    plain: Document = _canonical(document, "")
+    plain: Fields = _canonical(document, "")
     return plain
 
 
@@ -146,18 +148,47 @@ def validate(document: Mapping[str, Any], name: str = "<document>") -> _core.Sid
     SidecarError
         Naming `name`, the JSON pointer, what was found and what was expected.
     """
-    return _core.parse_sidecar(dumps(document), name)
+    return _core.parse_sidecar(encoded(document), name)
 
 
-def load(path: str | os.PathLike[str]) -> Document:
-    """Read a sidecar that the core accepts.
+def encoded(document: Mapping[str, Any]) -> bytes:
+    """Return the bytes of `dumps`; a name that is not Unicode passes, for the core to refuse."""
+    return dumps(document).encode("utf-8", "surrogatepass")
+
+
+def read_bytes(path: str | os.PathLike[str]) -> bytes:
+    """Return what a file holds, not yet judged.
+
+    Raises
+    ------
+    SidecarError
+        There is no file, or it cannot be read.
+    """
+    try:
+        # Opening a pipe would wait for somebody to write into it.
+        if stat.S_ISREG(Path(path).stat().st_mode):
+            with Path(path).open("rb") as stream:
+                return stream.read(_LARGEST_FILE + 1)
+    except OSError as error:
+        reason = error.strerror
+    else:
+        reason = "it is not a regular file"
+    _core.read_sidecar(path)  # says what is there instead
+    raise SidecarError(os.fspath(path), "", f"an unreadable file ({reason})", "a sidecar file")
+
+
+def load(path: str | os.PathLike[str]) -> Fields:
+    """Read the members of a sidecar that the core accepts.
 
     Raises
     ------
     SidecarError
         When there is no such file or the core refuses it.
     """
-    return _load_bytes(_read_bytes(path), os.fspath(path))
+    data = read_bytes(path)
+    _core.parse_sidecar(data, os.fspath(path))
+    document: Fields = json.loads(data)
+    return document
 
 
 def has_edits(document: Mapping[str, Any]) -> bool:
@@ -174,17 +205,8 @@ def check_target(path: str | os.PathLike[str], *, on_edits: OnEdits = "refuse") 
         When `path` holds edits and `on_edits` is "refuse", holds something that is not a sidecar
         and `on_edits` is not "drop", or lies in a folder that cannot be written.
     """
-    target = _target(path)
-    if target.is_dir():
-        raise Palette4dError(f"{target}: found a folder, expected the name of a file to write")
-    if not target.parent.is_dir():
-        raise Palette4dError(
-            f"{target}: there is no folder {target.parent}; make it, or choose another output"
-        )
-    if not os.access(target.parent, os.W_OK):
-        raise Palette4dError(
-            f"{target}: the folder {target.parent} cannot be written; choose another output"
-        )
+    target = link_target(path)
+    refuse_existing(target, force=True)
     old = _existing(target, on_edits)
     if old is not None and has_edits(old) and on_edits == "refuse":
         raise _would_lose(target, old)
@@ -195,12 +217,11 @@ def save(
     path: str | os.PathLike[str],
     *,
     on_edits: OnEdits = "refuse",
-) -> Document:
+) -> Fields:
     """Write a sidecar and return the document as written.
 
-    The document is validated by the core, written to a temporary file in the same folder, synced,
-    read back through the core, compared, and renamed. Whatever fails, Ctrl-C included, leaves the
-    old file as it was and no temporary file.
+    The core validates the text before it replaces the file. Whatever fails, Ctrl-C included, leaves
+    the old file as it was and no temporary file.
 
     Parameters
     ----------
@@ -220,44 +241,47 @@ def save(
     SidecarError
         When the core refuses the document.
     """
-    target = _target(path)
-    canonical: Document = _canonical(document, "")
-    with _locked(target):
+    canonical: Fields = _canonical(document, "")
+    target = link_target(path)
+    with locked(target):
         old = _existing(target, on_edits)
         if old is not None and has_edits(old) and old["edits"] != canonical.get("edits"):
             if on_edits == "refuse":
                 raise _would_lose(target, old)
             if on_edits == "keep":
                 canonical = _with_edits_of(old, canonical, target)
-        _replace(target, canonical, replaces=None)
+        data = encoded(canonical)
+        _core.parse_sidecar(data, os.fspath(target))
+        write(target, data)
     return canonical
 
 
-def update_edits(
-    path: str | os.PathLike[str], function: Callable[[Document], Mapping[str, Any]]
-) -> Document:
-    """Load a sidecar, let `function` return it with other edits, write it, and return it.
+def write(target: Path, data: bytes, *, replaces: bytes | None = None) -> None:
+    """Replace a file by the bytes of a document that the core accepts.
 
-    Two programs that edit one file at once wait for each other (advisory lock on the folder); where
-    a file system has no locks, or the other program takes none, a change of the file in the
-    meantime is an error and its content is left alone.
+    Parameters
+    ----------
+    target : Path
+        The file; hold its lock (`locked`).
+    data : bytes
+        What to write.
+    replaces : bytes, optional
+        What the file must hold until the end: programs that do not know the lock may write, too.
 
     Raises
     ------
     Palette4dError
-        When the file changed meanwhile or cannot be written; whatever `function` raises.
-    SidecarError
-        When the file, or what `function` returned, is not a valid sidecar.
+        The file holds something else, or cannot be written.
     """
-    target = _target(path)
-    with _locked(target):
-        before = _read_bytes(target)
-        document = _load_bytes(before, os.fspath(path))
-        changed: Document = _canonical(function(copy.deepcopy(document)), "")
-        if {**changed, "edits": None} != {**_canonical(document, ""), "edits": None}:
-            raise ValueError("update_edits: the function changed more than the edits")
-        _replace(target, changed, replaces=before)
-    return changed
+
+    def unchanged() -> None:
+        if replaces is not None and _bytes_or_none(target) != replaces:
+            raise Palette4dError(
+                f"{target} was changed by another program meanwhile; nothing was written. Try again"
+            )
+
+    with replacing(target, force=True, check=unchanged) as temporary:
+        temporary.write_bytes(data)
 
 
 # ------------------------------------------------------------------------------------- documents
@@ -301,21 +325,10 @@ def _text(value: Any, where: str, depth: int) -> str:
     return f"{opening}\n{body}\n{'  ' * depth}{closing}"
 
 
-def _load_bytes(data: bytes, name: str) -> Document:
-    _core.parse_sidecar(data, name)
-    document: Document = json.loads(data)
-    return document
-
-
-def _read_bytes(path: str | os.PathLike[str]) -> bytes:
-    _core.read_sidecar(path)  # its errors are the better ones: missing, folder, pipe, too large
-    return Path(path).read_bytes()
-
-
 # ----------------------------------------------------------------------------------- edits at stake
 
 
-def _existing(target: Path, on_edits: OnEdits) -> Document | None:
+def _existing(target: Path, on_edits: OnEdits) -> Fields | None:
     """Return the document that a save would replace, None when there is nothing to lose."""
     if on_edits not in ("refuse", "keep", "drop"):
         raise ValueError(f"on_edits: found {on_edits!r}, expected 'refuse', 'keep' or 'drop'")
@@ -335,16 +348,12 @@ def _existing(target: Path, on_edits: OnEdits) -> Document | None:
         ) from error
 
 
-def _summary(document: Document) -> str:
-    vertices = len(document["edits"]["vertices"])
-    stops = len(document["edits"]["stops"])
-    return (
-        f"{vertices} edited {'vertex' if vertices == 1 else 'vertices'} and "
-        f"{stops} {'stop' if stops == 1 else 'stops'}"
-    )
+def _summary(document: Fields) -> str:
+    vertices = counted(len(document["edits"]["vertices"]), "edited vertex", "edited vertices")
+    return f"{vertices} and {counted(len(document['edits']['stops']), 'stop')}"
 
 
-def _would_lose(target: Path, old: Document) -> Palette4dError:
+def _would_lose(target: Path, old: Fields) -> Palette4dError:
     return Palette4dError(
         f"{target} holds edits ({_summary(old)}) that this would lose. "
         "Keep them with --keep-edits (works when the palette comes out unchanged), "
@@ -352,7 +361,7 @@ def _would_lose(target: Path, old: Document) -> Palette4dError:
     )
 
 
-def _with_edits_of(old: Document, new: Document, target: Path) -> Document:
+def _with_edits_of(old: Fields, new: Fields, target: Path) -> Fields:
     if has_edits(new):
         raise Palette4dError(
             f"{target} holds edits ({_summary(old)}) and so does what is to be written; they "
@@ -370,72 +379,6 @@ def _with_edits_of(old: Document, new: Document, target: Path) -> Document:
 # ------------------------------------------------------------------------------------------- files
 
 
-def _target(path: str | os.PathLike[str]) -> Path:
-    """Return the file itself: a link to it stays a link."""
-    return Path(os.path.realpath(path)) if Path(path).is_symlink() else Path(path)
-
-
-def _cannot_write(target: Path, error: OSError) -> Palette4dError:
-    return Palette4dError(
-        f"{target}: cannot be written ({error.strerror or error}); check that its folder exists, "
-        "may be written and has room, or choose another output"
-    )
-
-
-def _replace(target: Path, document: Document, *, replaces: bytes | None) -> None:
-    """Validate, write aside, read back, compare, rename. `replaces` is what must be there still."""
-    text = dumps(document)
-    # A lone surrogate (a file name that is not UTF-8) passes here for the core to name its place.
-    data = text.encode("utf-8", "surrogatepass")
-    _core.parse_sidecar(data, os.fspath(target))
-    temporary = target.with_name(f".{target.name}.{secrets.token_hex(6)}.tmp")
-    try:
-        # 0o666 less the umask, as for any new file; tempfile's 0o600 would shut out colleagues.
-        handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(data)
-            stream.flush()
-            os.fsync(stream.fileno())
-        with contextlib.suppress(OSError):
-            temporary.chmod(stat.S_IMODE(target.stat().st_mode))
-        _read_back(temporary, target, data, document)
-        if replaces is not None and _bytes_or_none(target) != replaces:
-            raise Palette4dError(
-                f"{target} was changed by another program meanwhile; nothing was written. Try again"
-            )
-        temporary.replace(target)
-    except OSError as error:
-        raise _cannot_write(target, error) from error
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
-    _sync_folder(target.parent)
-
-
-def _read_back(temporary: Path, target: Path, data: bytes, document: Document) -> None:
-    sidecar = _core.read_sidecar(temporary)
-    polytope = sidecar.polytope
-    vertices = document["polytope"]["vertices"]
-    index = {vertex["id"]: i for i, vertex in enumerate(vertices)}
-    agrees = (
-        temporary.read_bytes() == data
-        and polytope.vertices.tolist() == [[*v["rgb"], v["frame"]] for v in vertices]
-        and polytope.vertex_ids == [v["id"] for v in vertices]
-        and polytope.edge_ids == [e["id"] for e in document["polytope"]["edges"]]
-        and polytope.edges.tolist()
-        == [[index[e["from"]], index[e["to"]]] for e in document["polytope"]["edges"]]
-        and sidecar.edits.vertex_rgb
-        == {e["vertex"]: tuple(e["rgb"]) for e in document["edits"]["vertices"]}
-        and sidecar.edits.stops
-        == [{**stop, "rgb": tuple(stop["rgb"])} for stop in document["edits"]["stops"]]
-    )
-    if not agrees:
-        raise Palette4dError(
-            f"{target}: what was written reads back differently; nothing was replaced. Check the "
-            "disk, and report this if it is sound"
-        )
-
-
 def _bytes_or_none(path: Path) -> bytes | None:
     try:
         return path.read_bytes()
@@ -443,18 +386,8 @@ def _bytes_or_none(path: Path) -> bytes | None:
         return None
 
 
-def _sync_folder(folder: Path) -> None:
-    """Make the rename itself durable, where folders can be opened and synced."""
-    with contextlib.suppress(OSError):
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
-
-
 @contextlib.contextmanager
-def _locked(target: Path) -> Iterator[None]:
+def locked(target: Path) -> Iterator[None]:
     """Hold the folder's advisory lock, which leaves no file behind and ends with the process."""
     try:
         handle = os.open(target.parent, os.O_RDONLY)

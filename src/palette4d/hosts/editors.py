@@ -1,10 +1,10 @@
-"""Puts the files of `kdenlive` and `shotcut` into the folders in which those programs look."""
+"""Installs the files of `kdenlive` and `shotcut` where those programs look for them."""
 
 import os
 import sys
 from pathlib import Path
 
-from palette4d import __version__
+from palette4d._core import __version__
 from palette4d.common.errors import Palette4dError
 from palette4d.common.files import make_folder, replacing
 from palette4d.hosts import MARK, kdenlive, shotcut

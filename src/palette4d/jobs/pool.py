@@ -12,7 +12,7 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from typing import TypeVar
 
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Palette4dError, in_words
 
 Key = TypeVar("Key")
 Task = TypeVar("Task")
@@ -114,7 +114,7 @@ def outcome(call: Callable[..., Result], *arguments: object) -> Result | Failed:
     try:
         return call(*arguments)
     except (Palette4dError, OSError) as error:
-        return Failed(str(error))
+        return Failed(in_words(error))
     except BrokenProcessPool:
         return Failed(
             "its process was ended from outside (too little memory?); run the same command again, "

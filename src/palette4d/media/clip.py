@@ -59,7 +59,7 @@ def open_clip(
     path = Path(spec)
     if path.is_dir():
         found = clip_sequence.in_folder(path)
-        if isinstance(found, clip_sequence.Sequence):
+        if isinstance(found, clip_sequence.ImageSequence):
             return clip_images.open_images(found, frames, None, rate, skip_bad_frames)
         path = found
     extension = clip_sequence.extension(path)

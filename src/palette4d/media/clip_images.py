@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import collections.abc
 import functools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -18,7 +17,7 @@ from palette4d.common.arguments import MAX_FRAMES, parse_frames
 from palette4d.media.clip_base import (
     DEFAULT_RATE,
     F32,
-    STRIP_BYTES,
+    LEAVE_OUT,
     Clip,
     ClipError,
     Fill,
@@ -30,7 +29,7 @@ from palette4d.media.clip_base import (
     named,
     progression_step,
 )
-from palette4d.media.clip_sequence import Sequence
+from palette4d.media.clip_sequence import ImageSequence
 
 #: Metadata that a recoloured copy of the frame keeps.
 CARRIED = (
@@ -51,8 +50,6 @@ CARRIED = (
     "Make",
     "Model",
 )
-#: Rows that are decompressed together in one file format or another (256 in a DWAB EXR).
-_CHUNK = 256
 _RATE_NAMES = ("FramesPerSecond", "dpx:FrameRate", "dpx:TemporalFrameRate")
 _DEPTHS = {"uint": "uint32", "int": "int32"}
 # OpenImageIO's names for what people call sRGB and so on; other names pass as they are.
@@ -73,7 +70,7 @@ _ENCODINGS = {
 class ImageClip(Clip):
     """An image sequence, or a single image as a clip of one frame."""
 
-    sequence: Sequence = field(kw_only=True)
+    sequence: ImageSequence = field(kw_only=True)
 
     def file(self, frame: int) -> Path:
         """File that holds a frame, whether it exists or not."""
@@ -81,26 +78,45 @@ class ImageClip(Clip):
 
     def load(self, frame: int) -> Image:
         """Read one frame; FrameError when it is missing, unreadable, or of another size."""
-        header, pixels = read_image(self._path(frame), f"frame {frame}")
-        self._check(header, frame)
-        return Image(frame, pixels, header.metadata)
+        header, stored, orientation = self._read(frame)
+        pixels = _upright(_scaled(stored, header.bits), orientation)
+        return Image(frame, np.ascontiguousarray(pixels), header.metadata)
 
-    def fills(self, frames: collections.abc.Sequence[int]) -> Iterator[tuple[int, Fill]]:
-        """For each frame its number and what reads and bins it, in strips."""
+    def fills(self, frames: Sequence[int]) -> Iterator[tuple[int, Fill]]:
+        """For each frame its number and what reads and bins it."""
         for frame in frames:
             yield frame, functools.partial(self._fill, frame)
 
     def _fill(self, frame: int, binner: _core.ColourBinner) -> bool:
-        path, what = self._path(frame), f"frame {frame}"
-        source, spec = _open(path, what)
-        self._check(_header(path, spec, _channel_choice(spec)), frame)
-        _bin_image(source, path, what, binner, self.row_step, self.has_alpha)
+        header, stored, _ = self._read(frame)
+        rows = stored[self.row_step // 2 :: self.row_step]
+        if rows.dtype not in (np.uint8, np.uint16, np.float32):
+            rows = _scaled(rows, 0)
+        bits = header.bits or 16
+        binner.add(rows, bits=bits, premultiplied=self.premultiplied)
         if not self.has_alpha or not all_hidden(binner):
             return False
         # Nothing shows: see `straight_colours`.
         binner.clear()
-        _bin_image(_open(path, what)[0], path, what, binner, self.row_step, False)
+        binner.add(rows[..., :3], bits=bits)
         return True
+
+    def _read(self, frame: int) -> tuple[Header, NDArray[Any], int]:
+        """Header, (h, w, 3 or 4) samples as they are stored, and Exif's orientation."""
+        path, what = self._path(frame), f"frame {frame}"
+        source, spec = _open(path, what)
+        chosen = _channel_choice(spec)
+        header = _header(spec, chosen)
+        self._check(header, frame)
+        first, last = min(chosen), max(chosen) + 1
+        stored = source.read_image(source.current_subimage(), 0, first, last, spec.format)
+        problem = source.geterror()
+        source.close()
+        # JPEG returns grey pixels together with an error: both count.
+        if stored is None or problem:
+            raise _unreadable(path, what, problem)
+        samples = np.asarray(stored)[..., [channel - first for channel in chosen]]
+        return header, _in_display_window(samples, spec), spec.get_int_attribute("Orientation", 1)
 
     def _path(self, frame: int) -> Path:
         if frame not in self.sequence.files:
@@ -109,29 +125,30 @@ class ImageClip(Clip):
 
     def _check(self, header: Header, frame: int) -> None:
         """Refuse a frame unlike the first."""
-        path = self.sequence.path(frame)
-        if (header.width, header.height) != (self.width, self.height):
-            raise FrameError(
-                f"{path}: frame {frame} is {header.width}x{header.height} pixels, expected "
-                f"{self.width}x{self.height} as in the frames before. Mend the clip, take a range "
-                "with --frames, or leave such frames out with --skip-bad-frames."
-            )
-        if (header.has_alpha, header.premultiplied) != (self.has_alpha, self.premultiplied):
-            raise FrameError(
-                f"{path}: frame {frame} has {_channels(header)}, expected "
-                f"{_channels(self)} as in the frames before. Mend the clip, take a range "
-                "with --frames, or leave such frames out with --skip-bad-frames."
-            )
+        for found, expected in (
+            (_size_of(header), _size_of(self)),
+            (_alpha_of(header), _alpha_of(self)),
+        ):
+            if found != expected:
+                raise FrameError(
+                    f"{self.sequence.path(frame)}: frame {frame} has {found}, expected {expected} "
+                    f"as in the frames before. {LEAVE_OUT}"
+                )
 
 
 @dataclass(frozen=True)
 class Header:
-    """What an image file says about itself; width and height upright."""
+    """What an image file says about itself.
+
+    Width and height are upright. bits: of a sample where they are fewer than its memory type's,
+    else 0.
+    """
 
     width: int
     height: int
     has_alpha: bool
     premultiplied: bool
+    bits: int
     depth: str
     encoding: str
     rate: Fraction | None
@@ -139,7 +156,7 @@ class Header:
 
 
 def open_images(
-    sequence: Sequence,
+    sequence: ImageSequence,
     frames: str | None,
     embedded: str | None,
     rate: Fraction | None,
@@ -184,7 +201,7 @@ def open_images(
     )
 
 
-def _wanted_frames(sequence: Sequence, frames: str | None, embedded: str | None) -> list[int]:
+def _wanted_frames(sequence: ImageSequence, frames: str | None, embedded: str | None) -> list[int]:
     found = sequence.numbers
     if embedded is not None:
         inside = parse_frames(embedded)
@@ -217,23 +234,21 @@ def _wanted_frames(sequence: Sequence, frames: str | None, embedded: str | None)
     return wanted
 
 
-def _missing(sequence: Sequence, missing: list[int]) -> FrameError:
+def _missing(sequence: ImageSequence, missing: list[int]) -> FrameError:
     found = sequence.numbers
-    inside = [frame for frame in missing if found[0] < frame < found[-1]]
-    if not inside:
-        return FrameError(
-            f"{sequence.pattern}: the range asks for frame{'s' * (len(missing) > 1)} "
-            f"{describe(missing)}, the clip has {describe(found)}. Choose a range inside the clip, "
-            "or leave such frames out with --skip-bad-frames."
-        )
+    gap = any(found[0] < frame < found[-1] for frame in missing)
+    no_file = f" (no file {sequence.path(missing[0]).name})" if gap else ""
     return FrameError(
-        f"{sequence.pattern}: frame{'s' * (len(missing) > 1)} {describe(missing)} missing between "
-        f"{found[0]} and {found[-1]} (no file {sequence.path(missing[0]).name}). Bring the file "
-        "back, choose a range with --frames, or leave such frames out with --skip-bad-frames."
+        f"{sequence.pattern}: {named(missing)} missing{no_file}, the clip has {describe(found)}. "
+        f"{LEAVE_OUT}"
     )
 
 
-def _channels(what: Header | Clip) -> str:
+def _size_of(what: Header | Clip) -> str:
+    return f"{what.width}x{what.height} pixels"
+
+
+def _alpha_of(what: Header | Clip) -> str:
     if not what.has_alpha:
         return "no alpha"
     return "premultiplied alpha" if what.premultiplied else "straight alpha"
@@ -243,94 +258,13 @@ def read_header(path: Path, what: str) -> Header:
     """Open an image for its header alone; FrameError names `what` and the file."""
     source, spec = _open(path, what)
     source.close()
-    return _header(path, spec, _channel_choice(spec))
-
-
-def read_image(path: Path, what: str = "the image") -> tuple[Header, F32]:
-    """Header and (h, w, 3 or 4) float32 pixels; FrameError names `what` and the file."""
-    source, spec = _open(path, what)
-    chosen = _channel_choice(spec)
-    first, last = min(chosen), max(chosen) + 1
-    stored = source.read_image(source.current_subimage(), 0, first, last, spec.format)
-    problem = source.geterror()
-    source.close()
-    # JPEG returns grey pixels together with an error: both count.
-    if stored is None or problem:
-        raise _unreadable(path, what, problem)
-    pixels = _scaled(np.asarray(stored), _bits(spec))
-    pixels = pixels[..., [channel - first for channel in chosen]]
-    pixels = _in_display_window(pixels, spec)
-    pixels = _upright(pixels, spec.get_int_attribute("Orientation", 1))
-    return _header(path, spec, chosen), np.ascontiguousarray(pixels)
-
-
-def _bin_image(
-    source: Any, path: Path, what: str, binner: _core.ColourBinner, row_step: int, alpha: bool
-) -> None:
-    """Bin every `row_step`-th row of an image, of which memory holds a strip."""
-    spec = source.spec()
-    chosen = _channel_choice(spec)[: 4 if alpha else 3]
-    premultiplied = alpha and not spec.get_int_attribute("oiio:UnassociatedAlpha", 0)
-    left, right = max(spec.full_x - spec.x, 0), spec.full_x + spec.full_width - spec.x
-    below = spec.full_y + spec.full_height  # the first row under the display window
-    rows = 0
-    for top, stored in _strips(source, spec, path, what, min(chosen), max(chosen) + 1):
-        # Rows are counted from the middle of the first step of the display window.
-        first = max(top, spec.full_y)
-        first += (spec.full_y + row_step // 2 - first) % row_step
-        strip = stored[first - top : max(below - top, 0) : row_step, left : max(right, 0)]
-        if chosen != list(range(chosen[0], chosen[0] + stored.shape[2])):
-            strip = strip[..., [channel - min(chosen) for channel in chosen]]
-        if strip.dtype not in (np.uint8, np.uint16, np.float32):
-            strip = _scaled(strip, 0)
-        if strip.size:
-            binner.add(strip, bits=_bits(spec) or 16, premultiplied=premultiplied)
-            rows += strip.shape[0]
-    # The display window beyond the data is black.
-    height = len(range(row_step // 2, spec.full_height, row_step))
-    width = max(min(right, spec.width) - left, 0) if rows else 0
-    for count, length in ((rows, spec.full_width - width), (height - rows, spec.full_width)):
-        if count > 0 and length > 0:
-            black = np.zeros((1, length, len(chosen)), strip.dtype)
-            binner.add(
-                np.broadcast_to(black, (count, length, len(chosen))), premultiplied=premultiplied
-            )
-
-
-def _strips(
-    source: Any, spec: Any, path: Path, what: str, first: int, last: int
-) -> Iterator[tuple[int, NDArray[Any]]]:
-    """(y of its first row, (rows, w, c) samples) of strips of the channels `first` to `last`."""
-    part = source.current_subimage()
-    samples = "float" if str(spec.format) in ("half", "double") else spec.format
-    row = spec.width * (last - first) * spec.format.size()
-    rows = max(STRIP_BYTES // max(row, 1), 1)
-    if rows > _CHUNK:
-        rows -= rows % _CHUNK
-    if spec.tile_width:
-        rows = max(rows - rows % spec.tile_height, spec.tile_height)
-    bottom = spec.y + spec.height
-    for top in range(spec.y, bottom, rows):
-        end = min(top + rows, bottom)
-        if spec.tile_width:
-            right = spec.x + spec.width
-            strip = source.read_tiles(part, 0, spec.x, right, top, end, 0, 1, first, last, samples)
-        else:
-            strip = source.read_scanlines(part, 0, top, end, 0, first, last, samples)
-        problem = source.geterror()
-        # JPEG returns grey pixels together with an error: both count.
-        if strip is None or problem:
-            source.close()
-            raise _unreadable(path, what, problem)
-        yield top, np.asarray(strip)
-    source.close()
+    return _header(spec, _channel_choice(spec))
 
 
 def _unreadable(path: Path, what: str, problem: str) -> FrameError:
     reason = problem.strip().splitlines()[0] if problem.strip() else "no reason given"
     return FrameError(
-        f"{path}: {what} cannot be read ({reason}); expected a whole image file. Bring a good "
-        "copy, or leave such frames out with --skip-bad-frames."
+        f"{path}: {what} cannot be read ({reason}); expected a whole image file. {LEAVE_OUT}"
     )
 
 
@@ -402,21 +336,16 @@ def _scaled(stored: NDArray[Any], bits: int) -> F32:
     return stored.astype(np.float32) / np.float32(largest)
 
 
-def _in_display_window(pixels: F32, spec: Any) -> F32:
+def _in_display_window(samples: NDArray[Any], spec: Any) -> NDArray[Any]:
     """An EXR's data window laid into its display window: black outside, overscan cut off."""
-    if (spec.x, spec.y, spec.width, spec.height) == (
-        spec.full_x,
-        spec.full_y,
-        spec.full_width,
-        spec.full_height,
-    ):
-        return pixels
     left, top = spec.x - spec.full_x, spec.y - spec.full_y
-    framed = np.zeros((spec.full_height, spec.full_width, pixels.shape[2]), np.float32)
-    x0, y0 = max(left, 0), max(top, 0)
-    x1, y1 = min(left + spec.width, spec.full_width), min(top + spec.height, spec.full_height)
-    if x0 < x1 and y0 < y1:
-        framed[y0:y1, x0:x1] = pixels[y0 - top : y1 - top, x0 - left : x1 - left]
+    size = spec.full_height, spec.full_width
+    if (left, top) == (0, 0) and samples.shape[:2] == size:
+        return samples
+    framed = np.zeros((*size, samples.shape[2]), samples.dtype)
+    inside = samples[max(-top, 0) : max(size[0] - top, 0), max(-left, 0) : max(size[1] - left, 0)]
+    y, x = max(top, 0), max(left, 0)
+    framed[y : y + inside.shape[0], x : x + inside.shape[1]] = inside
     return framed
 
 
@@ -434,7 +363,7 @@ def _upright(pixels: F32, orientation: int) -> F32:
     return turned(pixels) if turned else pixels
 
 
-def _header(path: Path, spec: Any, chosen: list[int]) -> Header:
+def _header(spec: Any, chosen: list[int]) -> Header:
     width, height = spec.full_width, spec.full_height
     if 5 <= spec.get_int_attribute("Orientation", 1) <= 8:
         width, height = height, width
@@ -447,6 +376,7 @@ def _header(path: Path, spec: Any, chosen: list[int]) -> Header:
         height=height,
         has_alpha=has_alpha,
         premultiplied=has_alpha and not straight,
+        bits=bits,
         depth=f"uint{bits}" if bits else _DEPTHS.get(str(spec.format), str(spec.format)),
         encoding=_ENCODINGS.get(space.lower(), space) or _dpx_encoding(spec) or "unknown",
         rate=_rate(spec),

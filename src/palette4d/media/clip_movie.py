@@ -9,7 +9,7 @@ others do); FFV1 and VP9 conceal it, and FFmpeg passes no word of it on.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -25,7 +25,7 @@ from palette4d.common.arguments import parse_frames
 from palette4d.media.clip_base import (
     DEFAULT_RATE,
     F32,
-    STRIP_BYTES,
+    LEAVE_OUT,
     Clip,
     ClipError,
     Fill,
@@ -61,7 +61,8 @@ LUMA_WEIGHTS = {
     9: (0.2627, 0.0593),
     10: (0.2627, 0.0593),
 }
-_FULL_RANGE = 2
+_LIMITED_RANGE, _FULL_RANGE = 1, 2
+_GREYS = ("gray", "gray10le", "gray12le", "gray16le")
 _PLANAR_DEPTHS = (8, 9, 10, 12, 14, 16)
 #: How the names of Y'CbCr layouts start.
 _LUMA_CHROMA = ("yuv", "nv", "p0", "p2", "p4", "yuyv", "uyvy", "yvyu", "y2", "xv", "v")
@@ -104,8 +105,7 @@ class MovieClip(Clip):
             why = f" ({self._problem})" if self._problem else ""
             raise FrameError(
                 f"{self.path}: frame {frame} cannot be decoded{why}; expected {self.count} whole "
-                "frames. Bring a good copy, choose a range with --frames, or leave such frames "
-                "out with --skip-bad-frames."
+                f"frames. {LEAVE_OUT}"
             )
         shape = _shape(picture)
         if shape != (self.height, self.width, 4 if self.has_alpha else 3):
@@ -113,8 +113,7 @@ class MovieClip(Clip):
             raise FrameError(
                 f"{self.path}: frame {frame} is {width}x{height} pixels with {channels} channels, "
                 f"expected {self.width}x{self.height} with {4 if self.has_alpha else 3} as in the "
-                "frames before. Choose a range with --frames, or leave such frames out with "
-                "--skip-bad-frames."
+                f"frames before. {LEAVE_OUT}"
             )
         return picture
 
@@ -210,8 +209,7 @@ def open_movie(
     if wanted[-1] >= packets and not skip_bad_frames:
         raise FrameError(
             f"{path}: frame {packets} is missing: the file ends after {packets} of {count} frames. "
-            "Bring a whole copy, choose a range with --frames, or leave such frames out with "
-            "--skip-bad-frames."
+            f"{LEAVE_OUT}"
         )
     height, width, channels = _shape(first)
     notes = []
@@ -343,74 +341,45 @@ def _bits(picture: av.VideoFrame) -> int:
 
 
 def _bin_picture(picture: av.VideoFrame, row_step: int, binner: _core.ColourBinner) -> bool:
-    """Bin every `row_step`-th row of a picture, with the colours of `picture_pixels`; returns
-    whether none of them shows (`Fill`)."""
-    picture = _thinned(picture, row_step)
-    how = _luma_chroma(picture)
-    if how is not None and not how.alpha:
-        luma, blue, red = _planes_of(how.planar, how.samples)
-        red_weight, blue_weight = LUMA_WEIGHTS[how.matrix]
+    """Bin every `row_step`-th row of a picture; returns whether none of them shows (`Fill`)."""
+    if _is_luma_chroma(picture) and not _has_alpha(picture):
+        bits, matrix = _bits(picture), _matrix(picture)
+        red_weight, blue_weight = LUMA_WEIGHTS[matrix]
         binner.add_luma_chroma(
-            luma,
-            blue,
-            red,
+            *_thinned(picture, row_step),
             red_weight=red_weight,
             blue_weight=blue_weight,
-            bits=how.bits,
-            full_range=how.full_range,
+            bits=bits,
+            full_range=int(picture.color_range) == _FULL_RANGE,
         )
         return False
-    packed, convert = _packed(picture), _converter(picture)
-    strip = max(STRIP_BYTES // (16 * picture.width), 1)
-
-    def add(channels: int) -> None:
-        for top in range(0, picture.height, strip):
-            rows = slice(top, top + strip)
-            pixels = convert(rows) if packed is None else packed[rows]
-            binner.add(pixels[..., :channels])
-
-    add(4 if _has_alpha(picture) else 3)
+    packed = _packed(picture)
+    pixels = (picture_pixels(picture) if packed is None else packed)[row_step // 2 :: row_step]
+    binner.add(pixels)
     if not all_hidden(binner):
         return False
     # Nothing shows: see `Clip.straight_colours`.
     binner.clear()
-    add(3)
+    binner.add(pixels[..., :3])
     return True
 
 
-def _thinned(picture: av.VideoFrame, row_step: int) -> av.VideoFrame:
-    """Every `row_step`-th row, where the layout's planes allow it: chroma that is halved from row
-    to row (4:2:0) becomes that of 4:2:2, from the nearest row."""
-    if row_step == 1 or picture.format.has_palette:
-        return picture
-    rows = np.arange(row_step // 2, picture.height, row_step)
-    layout = picture.format.name.replace("420p", "422p")
-    thin = av.VideoFrame(picture.width, len(rows), layout)
-    widths = [plane.width for plane in picture.planes]
-    if any(plane.height != len(rows) for plane in thin.planes) or widths != [
-        plane.width for plane in thin.planes
-    ]:
-        return picture
-    thin.colorspace, thin.color_range = _matrix(picture), picture.color_range
-    for source, target in zip(picture.planes, thin.planes, strict=True):
-        lines = _plane(source, np.uint8, source.line_size, source.height)
-        fitted = np.zeros((len(rows), target.line_size), np.uint8)
-        length = min(source.line_size, target.line_size)
-        fitted[:, :length] = lines[rows * source.height // picture.height, :length]
-        target.update(fitted.tobytes())
-    return thin
+def _thinned(picture: av.VideoFrame, step: int) -> list[NDArray[Any]]:
+    """Every `step`-th row of Y', Cb and Cr, each as wide as the picture.
 
-
-@dataclass(frozen=True)
-class _LumaChroma:
-    """A Y'CbCr picture at full chroma resolution, and how it becomes R'G'B'."""
-
-    planar: av.VideoFrame
-    samples: type
-    bits: int
-    matrix: int
-    full_range: bool
-    alpha: bool
+    Of a large picture chroma is taken from the nearest sample, as filtering would cost more than
+    decoding.
+    """
+    samples = np.uint8 if _bits(picture) == 8 else np.uint16
+    if step == 1 or len(picture.planes) != 3:
+        return [_plane(plane, samples)[step // 2 :: step] for plane in _full_chroma(picture).planes]
+    rows = np.arange(step // 2, picture.height, step)
+    planes = []
+    for plane in picture.planes:
+        lines = _plane(plane, samples)[rows * plane.height // picture.height]
+        wide = np.repeat(lines, -(-picture.width // plane.width), axis=1)
+        planes.append(wide[:, : picture.width])
+    return planes
 
 
 def picture_pixels(picture: av.VideoFrame) -> F32:
@@ -418,9 +387,26 @@ def picture_pixels(picture: av.VideoFrame) -> F32:
 
     Y'CbCr is converted here in floating point with the stream's own matrix and range (Rec.709 above
     576 lines and Rec.601 below where it states none, limited range likewise); libswscale, which
-    rounds on the way, only brings chroma to full size. Float formats are not clamped.
+    rounds on the way, only brings chroma to full size.
     """
-    return _converter(picture)(slice(None))
+    packed = _packed(picture)
+    if packed is not None:
+        return packed.astype(np.float32) / np.float32(255)
+    bits = _bits(picture)
+    kind = np.uint8 if bits == 8 else np.uint16
+    if picture.format.name in _GREYS and int(picture.color_range) != _LIMITED_RANGE:
+        grey = _plane(picture.planes[0], kind).astype(np.float32) / np.float32((1 << bits) - 1)
+        return np.repeat(grey[..., None], 3, axis=2)
+    if picture.format.is_rgb and bits in _PLANAR_DEPTHS:
+        alpha = "a" if _has_alpha(picture) else ""
+        planar = _to(picture, f"gbr{alpha}p{bits}le")
+        green, blue, red, *rest = [_plane(plane, kind) for plane in planar.planes]
+        samples = np.stack([red, green, blue, *rest], axis=-1)
+        return samples.astype(np.float32) / np.float32((1 << bits) - 1)
+    if _is_luma_chroma(picture):
+        return _from_luma_chroma(picture)
+    wide = _to(picture, "rgba64le" if _has_alpha(picture) else "rgb48le").to_ndarray()
+    return wide.astype(np.float32) / np.float32(65535)
 
 
 def _packed(picture: av.VideoFrame) -> NDArray[np.uint8] | None:
@@ -430,31 +416,6 @@ def _packed(picture: av.VideoFrame) -> NDArray[np.uint8] | None:
         return None
     packed = _to(picture, "rgba" if _has_alpha(picture) else "rgb24").to_ndarray()
     return np.asarray(packed, np.uint8)
-
-
-def _converter(picture: av.VideoFrame) -> Callable[[slice], F32]:
-    """Return a function from rows to their pixels, see `picture_pixels`."""
-    layout = picture.format
-    bits = _bits(picture)
-    alpha = any(component.is_alpha for component in layout.components)
-    name = layout.name
-    if bits == 32 and name.startswith("gbr"):
-        planar = _to(picture, "gbrapf32le" if alpha else "gbrpf32le")
-        return lambda rows: _planes(planar, np.float32, "gbr", rows)
-    if name.startswith(("gray", "ya")) and bits in (8, 10, 12, 14, 16):
-        return _grey(picture, bits, alpha)
-    packed = _packed(picture)
-    if packed is not None:
-        return lambda rows: packed[rows].astype(np.float32) / np.float32(255)
-    if layout.is_rgb and bits in _PLANAR_DEPTHS and not (alpha and bits == 9):
-        planar = _to(picture, f"gbr{'a' if alpha else ''}p{bits}le")
-        largest = np.float32((1 << bits) - 1)
-        return lambda rows: _planes(planar, np.uint16, "gbr", rows) / largest
-    how = _luma_chroma(picture)
-    if how is not None:
-        return functools.partial(_from_luma_chroma, how)
-    wide = _to(picture, "rgba64le" if alpha else "rgb48le").to_ndarray()
-    return lambda rows: wide[rows].astype(np.float32) / np.float32(65535)
 
 
 def _to(picture: av.VideoFrame, layout: str) -> av.VideoFrame:
@@ -474,69 +435,29 @@ def _to(picture: av.VideoFrame, layout: str) -> av.VideoFrame:
     )
 
 
-def _plane(plane: Any, dtype: type, width: int, height: int) -> NDArray[Any]:
-    samples = np.frombuffer(plane, dtype=np.dtype(dtype).newbyteorder("<"))
-    row = plane.line_size // np.dtype(dtype).itemsize
-    return samples[: row * height].reshape(height, row)[:, :width]
+def _plane(plane: Any, samples: type) -> NDArray[Any]:
+    """(h, w) samples of a plane; its lines in memory may be longer."""
+    kind = np.dtype(samples).newbyteorder("<")
+    lines = np.frombuffer(plane, dtype=kind)[: plane.height * plane.line_size // kind.itemsize]
+    return lines.reshape(plane.height, -1)[:, : plane.width]
 
 
-def _planes_of(picture: av.VideoFrame, dtype: type) -> list[NDArray[Any]]:
-    return [_plane(plane, dtype, picture.width, picture.height) for plane in picture.planes]
-
-
-def _planes(picture: av.VideoFrame, dtype: type, order: str, rows: slice) -> F32:
-    """Rows as (h, w, c) float32; `order` names the first three planes, "gbr" comes out as RGB."""
-    planes = _planes_of(picture, dtype)
-    if order == "gbr":
-        planes[:3] = [planes[2], planes[0], planes[1]]
-    return np.stack([plane[rows].astype(np.float32) for plane in planes], axis=-1)
-
-
-def _grey(picture: av.VideoFrame, bits: int, alpha: bool) -> Callable[[slice], F32]:
-    """Grey, full range unless limited range is stated, as three equal channels."""
-    suffix = "" if bits == 8 else f"{bits}le"
-    samples: type = np.uint8 if bits == 8 else np.uint16
-    largest = np.float32((1 << bits) - 1)
-    planar = _to(picture, f"ya{bits}{suffix[-2:]}" if alpha else f"gray{suffix}")
-
-    def convert(rows: slice) -> F32:
-        if alpha:
-            packed = _plane(planar.planes[0], samples, planar.width * 2, planar.height)
-            pairs = packed.reshape(planar.height, planar.width, 2)
-            values = pairs[rows].astype(np.float32)
-        else:
-            values = _planes(planar, samples, "y", rows)
-        values /= largest
-        if int(picture.color_range) == 1:
-            unit = np.float32(1 << (bits - 8)) / largest
-            values[..., 0] = np.clip((values[..., 0] - 16 * unit) / (219 * unit), 0, 1)
-        return np.ascontiguousarray(values[..., [0, 0, 0, 1] if alpha else [0, 0, 0]])
-
-    return convert
-
-
-def _luma_chroma(picture: av.VideoFrame) -> _LumaChroma | None:
-    """Bring Y'CbCr of a known matrix to full chroma resolution; None for everything else."""
-    name, bits = picture.format.name, _bits(picture)
-    alpha = any(component.is_alpha for component in picture.format.components)
-    matrix = _matrix(picture)
-    if (
-        not name.startswith(_LUMA_CHROMA)
-        or picture.format.is_rgb
-        or matrix not in LUMA_WEIGHTS
-        or bits not in _PLANAR_DEPTHS
-        or (alpha and bits == 14)
-    ):
-        return None
-    depth = "" if bits == 8 else f"{bits}le"
-    return _LumaChroma(
-        planar=_to(picture, f"yuv{'a' if alpha else ''}444p{depth}"),
-        samples=np.uint8 if bits == 8 else np.uint16,
-        bits=bits,
-        matrix=matrix,
-        full_range=int(picture.color_range) == _FULL_RANGE,
-        alpha=alpha,
+def _is_luma_chroma(picture: av.VideoFrame) -> bool:
+    """Whether a picture is Y'CbCr of a known matrix and depth."""
+    return (
+        picture.format.name.startswith(_LUMA_CHROMA)
+        and not picture.format.is_rgb
+        and _matrix(picture) in LUMA_WEIGHTS
+        and _bits(picture) in _PLANAR_DEPTHS
+        and not (_has_alpha(picture) and _bits(picture) == 14)
     )
+
+
+def _full_chroma(picture: av.VideoFrame) -> av.VideoFrame:
+    """Y'CbCr(A) with as many chroma samples as luma samples, a plane each."""
+    bits = _bits(picture)
+    depth = "" if bits == 8 else f"{bits}le"
+    return _to(picture, f"yuv{'a' if _has_alpha(picture) else ''}444p{depth}")
 
 
 def _matrix(picture: av.VideoFrame) -> int:
@@ -545,18 +466,20 @@ def _matrix(picture: av.VideoFrame) -> int:
     return (1 if picture.height > 576 else 5) if stated == _UNSPECIFIED else stated
 
 
-def _from_luma_chroma(how: _LumaChroma, rows: slice) -> F32:
+def _from_luma_chroma(picture: av.VideoFrame) -> F32:
     """Y'CbCr -> R'G'B' in floating point (ITU-T H.273, section 8.3), clamped to 0..1."""
-    samples = _planes(how.planar, how.samples, "yuv", rows)
-    unit = float(1 << (how.bits - 8))
-    if how.full_range:
-        largest = float((1 << how.bits) - 1)
+    bits, unit = _bits(picture), float(1 << (_bits(picture) - 8))
+    kind = np.uint8 if bits == 8 else np.uint16
+    planes = [_plane(plane, kind) for plane in _full_chroma(picture).planes]
+    samples = np.stack([plane.astype(np.float32) for plane in planes], axis=-1)
+    largest = float((1 << bits) - 1)
+    if int(picture.color_range) == _FULL_RANGE:
         luma = samples[..., 0] / np.float32(largest)
         chroma = (samples[..., 1:3] - np.float32(128 * unit)) / np.float32(largest)
     else:
         luma = (samples[..., 0] - np.float32(16 * unit)) / np.float32(219 * unit)
         chroma = (samples[..., 1:3] - np.float32(128 * unit)) / np.float32(224 * unit)
-    red_weight, blue_weight = LUMA_WEIGHTS[how.matrix]
+    red_weight, blue_weight = LUMA_WEIGHTS[_matrix(picture)]
     green_weight = 1 - red_weight - blue_weight
     out = np.empty_like(samples)
     out[..., 0] = luma + np.float32(2 * (1 - red_weight)) * chroma[..., 1]
@@ -564,6 +487,6 @@ def _from_luma_chroma(how: _LumaChroma, rows: slice) -> F32:
     out[..., 1] = (
         luma - np.float32(red_weight) * out[..., 0] - np.float32(blue_weight) * out[..., 2]
     ) / np.float32(green_weight)
-    if how.alpha:
-        out[..., 3] = samples[..., 3] / np.float32((1 << how.bits) - 1)
+    if samples.shape[2] == 4:
+        out[..., 3] = samples[..., 3] / np.float32(largest)
     return np.clip(out, 0, 1, out=out)

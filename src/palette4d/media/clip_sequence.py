@@ -39,7 +39,7 @@ _VERSION = re.compile(r"(^|.*[._ -])[vV]\Z", re.DOTALL)
 
 
 @dataclass(frozen=True)
-class Sequence:
+class ImageSequence:
     """Numbered files in one folder: `prefix` + zero-padded number + `suffix`."""
 
     folder: Path
@@ -117,7 +117,7 @@ def _file_names(folder: Path) -> list[str]:
         ) from error
 
 
-def sequences_in(folder: Path) -> list[Sequence]:
+def sequences_in(folder: Path) -> list[ImageSequence]:
     """All image sequences of a folder, single numbered images included, by name."""
     groups: dict[tuple[str, str], list[tuple[str, str]]] = {}
     for name in _file_names(folder):
@@ -136,7 +136,7 @@ def sequences_in(folder: Path) -> list[Sequence]:
 
 def _by_width(
     folder: Path, prefix: str, suffix: str, members: list[tuple[str, str]]
-) -> Iterator[Sequence]:
+) -> Iterator[ImageSequence]:
     """Split names that differ only in their number into sequences of one padding each."""
     rest = members
     while rest:
@@ -150,57 +150,41 @@ def _by_width(
         width = max(padded) if padded else (lengths[0] if same else 1)
         fits = [(number, name) for number, name in rest if _digits_fit(number, width)]
         files = {int(number): folder / name for number, name in fits}
-        yield Sequence(folder, prefix, suffix, width, files)
+        yield ImageSequence(folder, prefix, suffix, width, files)
         rest = [member for member in rest if member not in fits]
 
 
-def in_folder(folder: Path) -> Sequence | Path:
+def in_folder(folder: Path) -> ImageSequence | Path:
     """The one image sequence of a folder, or its one image when that has no number."""
     found = sequences_in(folder)
     names = _file_names(folder)
     images = [name for name in names if extension(name) in IMAGE_EXTENSIONS]
-    if len(found) == 1:
-        # One numbered image among others (beach.png, sky2.png) is no sequence, but one of them.
-        if len(found[0].files) == 1 and len(images) > 1:
-            listed = "\n".join(f"  {folder / name}" for name in images[:12])
-            more = f"\n  … and {len(images) - 12} more" if len(images) > 12 else ""
-            raise ClipError(
-                f"{folder}: found {len(images)} images that are no sequence, expected one image "
-                f"sequence such as name.0001.exr, name.0002.exr, …:\n{listed}{more}\n"
-                "Give the image or the pattern that you mean."
-            )
-        return found[0]
-    if len(found) > 1:
-        listed = "\n".join(
-            f"  {folder / Path(one.pattern).name}  {describe(one.numbers)}" for one in found[:12]
-        )
-        more = f"\n  … and {len(found) - 12} more" if len(found) > 12 else ""
-        raise ClipError(
-            f"{folder}: found {len(found)} image sequences, expected one:\n{listed}{more}\n"
-            "Give the pattern of the one you mean."
-        )
-    if len(images) == 1:
-        return folder / images[0]
     movies = [name for name in names if extension(name) in MOVIE_EXTENSIONS]
-    if movies:
-        raise ClipError(
-            f"{folder}: found {counted(len(movies), 'movie file')} such as {movies[0]} and no "
-            "image sequence; give the movie file itself."
-        )
-    what = (
-        f"{len(images)} images without frame numbers"
-        if images
-        else (
-            f"{counted(len(names), 'file')}, none of them an image" if names else "an empty folder"
-        )
-    )
+    # One numbered image among others (beach.png, sky2.png) is no sequence, but one of them.
+    if len(found) == 1 and (len(found[0].files) > 1 or len(images) == 1):
+        return found[0]
+    if not found and len(images) == 1:
+        return folder / images[0]
+    if len(found) > 1:
+        what = f"{len(found)} image sequences"
+        listed = [f"{one.pattern}  {describe(one.numbers)}" for one in found]
+    elif images:
+        what = f"{len(images)} images that are no sequence"
+        listed = [str(folder / name) for name in images]
+    else:
+        what = counted(len(movies), "movie file") if movies else counted(len(names), "file")
+        what += " and no image" if names else ""
+        listed = [str(folder / name) for name in movies]
+    more = [f"… and {len(listed) - 12} more"] if len(listed) > 12 else []
+    lines = "".join(f"\n  {line}" for line in [*listed[:12], *more])
     raise ClipError(
         f"{folder}: found {what}, expected one image sequence such as name.0001.exr, "
-        "name.0002.exr, …"
+        f"name.0002.exr, …{':' * bool(listed)}{lines}"
+        + ("\nGive the pattern, image or movie that you mean." if listed else "")
     )
 
 
-def of_pattern(spec: str) -> tuple[Sequence, str | None]:
+def of_pattern(spec: str) -> tuple[ImageSequence, str | None]:
     """(sequence, embedded range or None) of `name.####.exr`, `%04d`, `@@@`, `1-10x2#`."""
     from fileseq.constants import PAD_STYLE_HASH1
     from fileseq.exceptions import FileSeqException
@@ -237,7 +221,7 @@ def of_pattern(spec: str) -> tuple[Sequence, str | None]:
         sequence = max(found, key=lambda one: len(one.files))
     else:
         files = {int(n): folder / name for n, name in matches if _digits_fit(n, width)}
-        sequence = Sequence(folder, prefix, suffix, width, files)
+        sequence = ImageSequence(folder, prefix, suffix, width, files)
     if not sequence.files:
         raise ClipError(f"{spec}: no file matches the pattern; {_near(spec, folder)}")
     return sequence, embedded
@@ -253,12 +237,12 @@ def _near(spec: str, folder: Path) -> str:
     return "found there: " + ", ".join(patterns[name] for name in ranked[:5])
 
 
-def of_file(path: Path) -> tuple[Sequence, int]:
+def of_file(path: Path) -> tuple[ImageSequence, int]:
     """A single image as a one-frame sequence, with its frame number (0 when it has none)."""
     numbered = frame_number(path.stem)
     if numbered is None:
-        return Sequence(path.parent, path.stem, path.suffix, 0, {0: path}), 0
+        return ImageSequence(path.parent, path.stem, path.suffix, 0, {0: path}), 0
     prefix, number = numbered
     frame = int(number)
     width = len(number.lstrip("-"))
-    return Sequence(path.parent, prefix, path.suffix, width, {frame: path}), frame
+    return ImageSequence(path.parent, prefix, path.suffix, width, {frame: path}), frame

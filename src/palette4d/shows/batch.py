@@ -1,15 +1,15 @@
-"""A show: many shots analysed, a sidecar each, several at a time, with a manifest beside them.
+"""A batch: many shots analysed, a sidecar each, with a manifest beside them.
 
-Shots are analysed in other processes or on other machines; what they find comes back to this one,
-which alone writes. What is there and was made from the same frames with the same options is left
-alone, so that the same command again does what is missing or failed.
+Shots are analysed in other processes or on other machines; this process alone writes files. A
+sidecar that was made from the same frames with the same options is kept, so that the same command
+again does only what is missing or failed.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -17,14 +17,12 @@ from typing import Any
 from palette4d import _core
 from palette4d.analysis import pipeline
 from palette4d.analysis.options import AnalysisOptions
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Palette4dError, in_words
 from palette4d.common.files import make_folder
 from palette4d.common.text import counted
 from palette4d.grade import sidecar
 from palette4d.jobs.workers import Failed, Workers
-from palette4d.media import colour_space
 from palette4d.media.clip import open_clip
-from palette4d.media.clip_base import describe
 from palette4d.media.colour_space import SpaceOptions
 from palette4d.shows import manifest as manifests
 from palette4d.shows.manifest import DONE, FAILED, TO_DO, Entry, Manifest
@@ -47,7 +45,7 @@ class ShowOptions:
         As for one clip.
     on_edits : {"refuse", "keep", "drop"}
         What to do with edits of sidecars that are analysed again.
-    anew : bool
+    force : bool
         Analyse also shots that are there already.
     only : tuple of str
         The names of the shots to analyse; empty: all.
@@ -61,7 +59,7 @@ class ShowOptions:
     skip_bad_frames: bool = False
     allow_cuts: bool = False
     on_edits: sidecar.OnEdits = "refuse"
-    anew: bool = False
+    force: bool = False
     only: tuple[str, ...] = ()
     workers: Workers = dataclasses.field(default_factory=Workers)
 
@@ -77,29 +75,6 @@ class Source:
 
 
 @dataclasses.dataclass(frozen=True)
-class Show:
-    """What was analysed.
-
-    Attributes
-    ----------
-    path : Path
-        The manifest.
-    manifest : Manifest
-        Its content.
-    analysed, kept : list of str
-        Names of the shots analysed now, and of those that were there already.
-    remarks : dict of str to tuple of str
-        Remarks of the analysis, by shot.
-    """
-
-    path: Path
-    manifest: Manifest
-    analysed: list[str]
-    kept: list[str]
-    remarks: dict[str, tuple[str, ...]]
-
-
-@dataclasses.dataclass(frozen=True)
 class ShotTask:
     """One shot to analyse; can be sent to another process or machine."""
 
@@ -110,10 +85,10 @@ class ShotTask:
 
 @dataclasses.dataclass(frozen=True)
 class Analysed:
-    """A shot's sidecar document, and remarks for the user."""
+    """A shot's sidecar document, and notes for the user."""
 
     document: dict[str, Any]
-    remarks: tuple[str, ...]
+    notes: tuple[str, ...]
 
 
 def analyse(
@@ -152,27 +127,41 @@ def analyse(
     KeyboardInterrupt
         Ctrl-C; the sidecars that are there are whole, and the manifest lists them.
     """
-    _check_only(shots, options.only)
+    if unknown := [name for name in options.only if name not in {shot.name for shot in shots}]:
+        some = ", ".join(sorted(shot.name for shot in shots)[:8]) + (", …" if shots[8:] else "")
+        raise Palette4dError(
+            f"--only: there is no shot {unknown[0]!r}; expected names such as {some}"
+        )
     make_folder(folder)
-    run = _Run(source, shots, folder, options)
-    run.save()  # early: what cannot be written is refused before hours of work
+    show = Show(source, shots, folder, options)
+    show.save()  # early: what cannot be written is refused before hours of work
     tell = progress or (lambda done, total, words: None)
 
     def take(name: str, outcome: Analysed | Failed) -> None:
-        run.take(name, outcome)
-        tell(*run.progress())
+        show.take(name, outcome)
+        tell(*show.progress())
 
-    tell(*run.progress())
+    tell(*show.progress())
     try:
         # A shot may take minutes: Ctrl-C does not wait for it.
-        options.workers.run(analyse_shot, run.tasks, take, patient=False)
+        options.workers.run(analyse_shot, show.tasks, take, patient=False)
     finally:
-        run.save()
-    return run.show()
+        show.save()
+    return show
 
 
-class _Run:
-    """A show on its way."""
+class Show:
+    """The shots of a source: which are there, which are to be analysed, and what became of them.
+
+    Attributes
+    ----------
+    path : Path
+        The manifest.
+    analysed, kept : list of str
+        Names of the shots analysed now, and of those that were there already.
+    notes : dict of str to tuple of str
+        Notes of the analysis, by shot.
+    """
 
     def __init__(
         self, source: Source, shots: list[Shot], folder: Path, options: ShowOptions
@@ -181,27 +170,32 @@ class _Run:
         self.path = manifests.path_of(folder, source.name)
         before = manifests.read(self.path) if self.path.exists() else None
         known = {} if before is None else {entry.shot.name: entry for entry in before.entries}
-        here = os.path.relpath(source.file, folder.absolute())
-        self.manifest = Manifest(
-            source=Path(here if not Path(source.file).is_absolute() else source.file).as_posix(),
+        spaces = dataclasses.asdict(options.spaces) if options.spaces.asked else {}
+        self._head = Manifest(
+            source=self.beside(source.file),
             source_sha256=source.sha256,
             rate=source.rate,
-            options=options.analysis.recorded() | _asked(options.spaces),
+            options=options.analysis.recorded() | spaces,
             entries=(),
         )
         self.same_edit = (
             before is not None
-            and self.manifest.is_timeline
+            and self._head.is_timeline
             and (before.source_sha256, before.rate) == (source.sha256, source.rate)
         )
-        self.same_options = before is not None and before.options == self.manifest.options
+        self.same_options = before is not None and before.options == self._head.options
         self.entries: dict[str, Entry] = {}
         self.tasks: dict[str, ShotTask] = {}
         self.kept: list[str] = []
         self.analysed: list[str] = []
-        self.remarks: dict[str, tuple[str, ...]] = {}
+        self.notes: dict[str, tuple[str, ...]] = {}
         for shot in shots:
             self.plan(shot, known.get(shot.name))
+
+    @property
+    def manifest(self) -> Manifest:
+        """The manifest as it stands."""
+        return dataclasses.replace(self._head, entries=tuple(self.entries.values()))
 
     def plan(self, shot: Shot, before: Entry | None) -> None:
         """Decide what to do with a shot."""
@@ -209,12 +203,13 @@ class _Run:
         entry = Entry(own)
         chosen = not self.options.only or shot.name in self.options.only
         if before is not None and not chosen and self.stays(before, own):
-            entry = before if self.same_edit else _placed(before, own)
+            place = dataclasses.replace(before.shot, used=own.used, place=own.place)
+            entry = before if self.same_edit else dataclasses.replace(before, shot=place)
             if entry.status == DONE:
                 self.kept.append(shot.name)
         elif shot.problem:
             entry = Entry(own, FAILED, error=shot.problem)
-        elif not self.options.anew and (frames := self.there(own, before)) is not None:
+        elif not self.options.force and (frames := self.there(own, before)) is not None:
             entry = Entry(own, DONE, frames)
             self.kept.append(shot.name)
         elif chosen:
@@ -226,13 +221,13 @@ class _Run:
         self.entries[shot.name] = entry
 
     def stays(self, before: Entry, shot: Shot) -> bool:
-        """Whether what is known of a shot that is not asked for still holds."""
+        """Whether the manifest's entry still holds for a shot that `--only` leaves out."""
         own = before.shot
         if before.status != DONE:
             # The cause of a failure may be mended, and a sidecar there although it is not noted.
             return self.same_edit and own.clip == shot.clip and self.there(shot, before) is None
         if self.same_edit:
-            return True  # with other handles, or with its media away, it is what it was
+            return True  # whatever its head and tail frames are now, and wherever its media is
         first, last = before.frames or (0, -1)
         shown = first <= shot.used[0] and shot.used[1] <= last
         return (own.clip, own.step) == (shot.clip, shot.step) and shown
@@ -241,12 +236,12 @@ class _Run:
         """Refuse a sidecar that may not be replaced."""
         target = self.folder / entry.sidecar
         sidecar.check_target(target, on_edits=self.options.on_edits)
-        if before is not None or self.options.anew or not target.exists():
+        if before is not None or self.options.force or not target.exists():
             return
         if sidecar.load(target)["clip"]["source"] != entry.shot.clip:
             raise Palette4dError(
                 f"{target}: a sidecar of another clip is there already; choose another folder, or "
-                "replace it with --anew"
+                "replace it with --force"
             )
 
     def there(self, shot: Shot, before: Entry | None) -> tuple[int, int] | None:
@@ -259,7 +254,7 @@ class _Run:
         clip = document["clip"]
         found = (int(clip["frames"]["first"]), int(clip["frames"]["last"]))
         expected = {(shot.first, shot.last)}
-        if before and before.frames and _media(before.shot) == _media(shot):
+        if before and before.frames and dataclasses.replace(before.shot, place=shot.place) == shot:
             expected.add(before.frames)
         same = (
             (self.same_options if before else not self.options.spaces.asked)
@@ -272,7 +267,7 @@ class _Run:
         return found if same else None
 
     def beside(self, clip: str) -> str:
-        """Return a relative clip as seen from the folder: both may then move together."""
+        """Return a relative path as seen from the folder: both may then move together."""
         if not clip or Path(clip).is_absolute():
             return clip
         return Path(os.path.relpath(clip, self.folder.absolute())).as_posix()
@@ -290,18 +285,14 @@ class _Run:
             frames = document["clip"]["frames"]
             self.entries[name] = Entry(entry.shot, DONE, (frames["first"], frames["last"]))
             self.analysed.append(name)
-            self.remarks[name] = outcome.remarks
+            self.notes[name] = outcome.notes
         except (Palette4dError, OSError) as error:
-            self.entries[name] = Entry(entry.shot, FAILED, error=str(error))
+            self.entries[name] = Entry(entry.shot, FAILED, error=in_words(error))
         self.save()
 
     def save(self) -> None:
         """Write the manifest."""
-        manifests.write(self.content(), self.path)
-
-    def content(self) -> Manifest:
-        """Return the manifest as it stands."""
-        return dataclasses.replace(self.manifest, entries=tuple(self.entries.values()))
+        manifests.write(self.manifest, self.path)
 
     def progress(self) -> tuple[int, int, str]:
         """Return frames done, frames in all, and words."""
@@ -310,10 +301,6 @@ class _Run:
         total = sum(counts[name] for name in [*self.kept, *self.tasks])
         ready = sum(entry.status == DONE for entry in self.entries.values())
         return total - left, total, f"{ready} of {counted(len(self.entries), 'shot')}"
-
-    def show(self) -> Show:
-        """Return what was analysed."""
-        return Show(self.path, self.content(), self.analysed, self.kept, self.remarks)
 
 
 def analyse_shot(task: ShotTask, threads: int) -> Analysed:
@@ -327,34 +314,27 @@ def analyse_shot(task: ShotTask, threads: int) -> Analysed:
     """
     options = task.options
     shot = task.shot
-    remarks: list[str] = []
+    notes: list[str] = []
     # A shot of a movie is what lies between its cuts: there is nothing to look for again.
     if shot.place is not None and not options.allow_cuts:
         shot = trimmed(shot, _open(task, shot))
         if shot != task.shot:
-            remarks.append(
-                f"the media cuts inside of the handles: frames {shot.frames} are analysed instead "
-                f"of {task.shot.frames}"
+            notes.append(
+                f"the media cuts inside of the head and tail frames: frames {shot.frames} are "
+                f"analysed instead of {task.shot.frames}"
             )
     clip = _open(task, shot)
-    spaces = colour_space.spaces_of(clip, options.spaces)
-    clip = colour_space.converted(clip, spaces)
     analysis_options = dataclasses.replace(options.analysis, threads=threads)
     try:
-        document, analysis = pipeline.analyze_clip(clip, analysis_options, allow_cuts=True)
+        analysis = pipeline.analyze(clip, analysis_options, spaces=options.spaces, allow_cuts=True)
     except (Palette4dError, OSError):
         raise
     except Exception as error:  # one shot must not end a night's work
         raise Palette4dError(
             f"the analysis ended with {type(error).__name__}: {error}; please report this"
         ) from error
-    document["clip"]["name"] = shot.name
-    remarks += colour_space.record(document, clip, spaces)
-    if clip.skipped:
-        remarks.append(
-            f"{counted(len(clip.skipped), 'bad frame')} skipped: {describe(clip.skipped)}"
-        )
-    return Analysed(document, (*remarks, *analysis.remarks))
+    analysis.document["clip"]["name"] = shot.name
+    return Analysed(analysis.document, (*notes, *analysis.notes))
 
 
 def _open(task: ShotTask, shot: Shot) -> Any:
@@ -364,28 +344,3 @@ def _open(task: ShotTask, shot: Shot) -> Any:
         rate=task.options.rate,
         skip_bad_frames=task.options.skip_bad_frames,
     )
-
-
-def _asked(spaces: SpaceOptions) -> dict[str, str | None]:
-    """Return what a manifest notes of the colour spaces that were asked for."""
-    return dataclasses.asdict(spaces) if spaces.asked else {}
-
-
-def _media(shot: Shot) -> tuple[object, ...]:
-    """Return what of a shot its palette depends on."""
-    return shot.clip, shot.first, shot.last, shot.used, shot.step
-
-
-def _placed(entry: Entry, shot: Shot) -> Entry:
-    """Return an entry with its shot's place in the edit as it is now."""
-    place = dataclasses.replace(entry.shot, used=shot.used, place=shot.place)
-    return dataclasses.replace(entry, shot=place)
-
-
-def _check_only(shots: list[Shot], only: Collection[str]) -> None:
-    names = {shot.name for shot in shots}
-    if unknown := [name for name in only if name not in names]:
-        some = ", ".join(sorted(names)[:8]) + (", …" if len(names) > 8 else "")
-        raise Palette4dError(
-            f"--only: there is no shot {unknown[0]!r}; expected names such as {some}"
-        )

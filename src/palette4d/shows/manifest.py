@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from palette4d import _core
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Palette4dError, in_words
 from palette4d.common.files import replacing
 from palette4d.shows.shots import Place, Shot
 
@@ -34,7 +34,7 @@ class Entry:
     status : str
         `DONE`, `FAILED` or `TO_DO`.
     frames : (int, int) or None
-        The first and last frame of the sidecar: the shot's, less of a handle where the media cuts.
+        The first and last frame of the sidecar: fewer head or tail frames where the media cuts.
     error : str
         Why it failed.
     """
@@ -144,7 +144,9 @@ def read(path: Path) -> Manifest:
         document = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
         raise Palette4dError(f"{path}: there is no such manifest; check the path") from error
-    except (ValueError, OSError) as error:
+    except OSError as error:
+        raise Palette4dError(in_words(error)) from error
+    except ValueError as error:
         raise Palette4dError(f"{path}: the manifest cannot be read: {error}{_MEND}") from error
     schema = document.get("schema") if isinstance(document, dict) else None
     if schema != SCHEMA:

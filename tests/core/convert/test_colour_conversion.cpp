@@ -286,5 +286,3 @@ TEST(what_has_no_way_back_is_refused) {
     curve.curves = {{{1}, {1}}};
     CHECK_EQUAL(problem_of(curve).member(), "/curves/0/x");
 }
-
-int main() { return check::run_all(); }

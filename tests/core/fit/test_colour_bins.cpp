@@ -365,5 +365,3 @@ TEST(a_binner_refuses_what_does_not_fit) {
     CHECK_THROWS(std::invalid_argument,
                  (binner.add_luma_chroma(planes, {0.3, 0.1, 8, true}), binner.take(0)));
 }
-
-int main() { return check::run_all(); }

@@ -153,5 +153,3 @@ TEST(colours_on_a_point_a_line_and_far_away) {
     CHECK(sample.chosen.size() <= 100 && sample.chosen.size() > 30);
     CHECK_EQUAL(sum(sample.counts), sum(line.counts));
 }
-
-int main() { return check::run_all(); }

@@ -208,5 +208,3 @@ TEST(a_tree_refuses_bad_arguments) {
     for (const double bad : {0.0, -1.0, kNan})
         CHECK_THROWS(std::invalid_argument, tree.nearest_mean({0, 0, 0}, bad));
 }
-
-int main() { return check::run_all(); }

@@ -214,5 +214,3 @@ TEST(problems_in_any_thread_reach_the_caller) {
         }
     }
 }
-
-int main() { return check::run_all(); }

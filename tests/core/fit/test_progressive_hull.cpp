@@ -130,5 +130,3 @@ TEST(bad_meshes_are_refused) {
             CHECK_THROWS(std::invalid_argument, progressive_hull(rgb, mesh.faces, 4));
         }
 }
-
-int main() { return check::run_all(); }

@@ -328,5 +328,3 @@ TEST(bad_hulls_are_refused) {
     refuses<3>();
     refuses<4>();
 }
-
-int main() { return check::run_all(); }

@@ -430,5 +430,3 @@ TEST(what_is_wrong_is_said) {
     Image empty(0, 0, 3);
     CHECK_EQUAL(lattice.apply(empty.in(), empty.out(), {}).exact(), 0LL);
 }
-
-int main() { return check::run_all(); }

@@ -155,5 +155,3 @@ TEST(there_are_none_where_they_would_not_hold) {
     CHECK(Subject(flat_square(), 3).regions() == nullptr);
     CHECK(Subject(tetrahedron(), 5).regions(1e9) == nullptr);
 }
-
-int main() { return check::run_all(); }

@@ -77,5 +77,3 @@ TEST(handles_that_do_not_exist_and_colours_that_are_none_are_refused) {
     CHECK_THROWS(std::invalid_argument, with_colours(polytope, edits, true, {{17, {0, 0, 0}}}));
     CHECK_THROWS(std::invalid_argument, with_colours(polytope, edits, true, {{0, {0, nan, 0}}}));
 }
-
-int main() { return check::run_all(); }

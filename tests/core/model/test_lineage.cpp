@@ -92,5 +92,3 @@ TEST(readers_read_weights_and_the_surface) {
         }
     }
 }
-
-int main() { return check::run_all(); }

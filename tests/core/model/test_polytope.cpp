@@ -228,5 +228,3 @@ TEST(the_palette_goes_on_across_boundaries) {
         for (const Face& f : std::vector<Face>{{2, 3, 5}, {3, 4, 5}, {4, 2, 5}}) faces.push_back(f);
     });
 }
-
-int main() { return check::run_all(); }

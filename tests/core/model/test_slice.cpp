@@ -189,5 +189,3 @@ TEST(edits_of_another_polytope_are_refused) {
     edits.vertex_rgb.resize(3);
     CHECK_THROWS(std::invalid_argument, edited_colours(polytope, edits, slice_at(polytope, 1)));
 }
-
-int main() { return check::run_all(); }

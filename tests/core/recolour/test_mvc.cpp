@@ -455,5 +455,3 @@ TEST(bad_palettes_are_refused) {
     CHECK_THROWS(std::invalid_argument, PaletteBody(cube().rgb, {{0, 1, 8}}));
     CHECK_THROWS(std::invalid_argument, PaletteBody(cube().rgb, {{0, -1, 2}}));
 }
-
-int main() { return check::run_all(); }

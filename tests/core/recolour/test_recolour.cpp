@@ -262,5 +262,3 @@ TEST(mismatched_input_is_refused) {
     CHECK_THROWS(std::invalid_argument, Recolourer({{0, 0, 0}}, {{kNan, 0, 0}}, {}));
     CHECK_THROWS(std::invalid_argument, Recolourer(cube().rgb, cube().rgb, {{0, 1, 9}}));
 }
-
-int main() { return check::run_all(); }

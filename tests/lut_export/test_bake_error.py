@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from palette4d.lut_export.error import Figures, measure, stated, table
+from palette4d.lut_export.bake_error import Figures, measure, stated, table
 from palette4d.lut_export.frame_edit import FrameEdit, frame_edit
 
 from palette4d import Palette4dError, _core
@@ -24,7 +24,7 @@ class Off:
     def __init__(self, edit: FrameEdit, by: tuple[float, float, float]) -> None:
         self.edit, self.by = edit, by
 
-    def apply(self, colours: F32) -> F32:
+    def __call__(self, colours: F32) -> F32:
         wrong = self.edit.exact(colours) + np.array(self.by) * colours
         return np.asarray(wrong, dtype=np.float32)
 
@@ -46,9 +46,9 @@ def test_against_plain_numpy(edit: FrameEdit) -> None:
     flat = colours.reshape(-1, 3)
     exact = edit.exact(flat)
     for name, reader in readers.items():
-        difference = np.abs(reader.apply(flat).astype(np.float64) - exact)
+        difference = np.abs(reader(flat).astype(np.float64) - exact)
         relative = difference / np.maximum(np.abs(exact), 0.1)
-        delta_e = delta_e_2000(SRGB.lab(exact), SRGB.lab(reader.apply(flat)))
+        delta_e = delta_e_2000(SRGB.lab(exact), SRGB.lab(reader(flat)))
         want = (
             difference.mean(), difference.max(), relative.mean(), relative.max(),
             delta_e.mean(), delta_e.max(),
@@ -105,7 +105,7 @@ def test_colours_outside_the_domain(edit: FrameEdit) -> None:
 def test_large_pictures_have_delta_e_on_part_of_their_colours(
     edit: FrameEdit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("palette4d.lut_export.error.DELTA_E_COLOURS", 1000)
+    monkeypatch.setattr("palette4d.lut_export.bake_error.DELTA_E_COLOURS", 1000)
     got = measure(picture(), {"a": Off(edit, (0.01, 0.0, 0.0))}, edit, SRGB)
     assert got is not None
     assert got.colours == 36_000

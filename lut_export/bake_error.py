@@ -1,13 +1,12 @@
-"""How far a file is from the exact edit, over a set of colours.
+"""The error of a file: how far it is from the exact edit, over a set of colours.
 
-a is what OpenColorIO makes of a colour with the file read back, b what the core makes of it in
-double precision. The error therefore contains everything: interpolation, the rounding of the file's
-numbers, and the clamping of colours outside the table's domain. Three measures are taken of each
-channel or colour, the mean and the largest of each:
+a is the colour that OpenColorIO computes with the file read back, b the core's in double precision.
+The error therefore contains interpolation, the rounding of the file's code values, and the clamping
+of colours outside the LUT's domain. There are three measures, the mean and the largest of each:
 
 - absolute: |a - b| per channel;
 - relative: |a - b| / max(|b|, 0.1) per channel, the measure of CLF's implementation guide;
-- deltaE: CIEDE2000 between the two colours (`colour_difference`).
+- deltaE: CIEDE2000 between the two colours (`palette4d.colour.difference`).
 """
 
 import os
@@ -15,13 +14,17 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from decimal import ROUND_CEILING, Decimal
-from typing import Any, Protocol
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from palette4d.lut_export.frame_edit import FrameEdit
 
 from palette4d.colour.difference import Viewing, delta_e_2000
+from palette4d.colour.ocio_config import failures
+from palette4d.colour.ocio_processor import ExactProcessor
+from palette4d.common.errors import Palette4dError
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -36,12 +39,47 @@ PIECE = 1 << 14
 DELTA_E_COLOURS = 1 << 20
 
 
-class Reader(Protocol):
-    """A file that was read back."""
+#: A file read back: (n, 3) float32 colours -> (n, 3) float32.
+Reader = Callable[[F32], F32]
 
-    def apply(self, colours: F32) -> F32:
-        """Return the (n, 3) float32 colours that replace (n, 3) float32 ones."""
-        ...
+#: How hosts may read a file: a name for people, then the setter of OpenColorIO's FileTransform.
+READINGS = {
+    "linear": ("setInterpolation", "INTERP_LINEAR"),
+    "tetrahedral": ("setInterpolation", "INTERP_TETRAHEDRAL"),
+    "clamped": ("setCDLStyle", "CDL_ASC"),
+    "not clamped": ("setCDLStyle", "CDL_NO_CLAMP"),
+}
+
+
+def load(path: Path, readings: Iterable[str]) -> dict[str, Reader]:
+    """Read a file back through OpenColorIO, as hosts with each of some `READINGS` do.
+
+    A LUT that names its own interpolation keeps that.
+
+    Raises
+    ------
+    Palette4dError
+        OpenColorIO cannot read the file.
+    """
+    import PyOpenColorIO as ocio
+
+    # OpenColorIO caches files by name: drop what was at this name before.
+    ocio.ClearAllCaches()
+    found: dict[str, Reader] = {}
+    for name in readings:
+        setter, value = READINGS[name]
+        transform = ocio.FileTransform(src=str(path.absolute()))
+        getattr(transform, setter)(getattr(ocio, value))
+        try:
+            # An empty context: the environment's would replace "$HOME" in a folder's name.
+            found[name] = ExactProcessor(
+                ocio.Config.CreateRaw().getProcessor(
+                    ocio.Context(), transform, ocio.TRANSFORM_DIR_FORWARD
+                )
+            )
+        except failures() as error:
+            raise Palette4dError(f"{path}: OpenColorIO cannot read it: {error}") from error
+    return found
 
 
 @dataclass(frozen=True)
@@ -69,9 +107,9 @@ class Measure:
     outside_domain : float
         Share of colours with a channel outside the file's domain, where it clamps.
     worst : Figures
-        The larger of `by_reading`, figure by figure: holds however a host reads the file.
+        The larger of `by_reading`, figure by figure: a bound for every host.
     by_reading : dict of str to Figures
-        For each way in which hosts read the file.
+        For each reading of the file.
     """
 
     colours: int
@@ -106,11 +144,11 @@ def measure(
     Parameters
     ----------
     colours : (h, w, 3 or more) float array
-        What to compare on. Colours with a NaN or an infinity are left out: no table holds them.
+        What to compare on. Colours with a NaN or an infinity are left out: no LUT holds them.
     readers : mapping
-        The file, as each way of reading it makes it.
+        The file, by its readings.
     edit : FrameEdit
-        What it should do.
+        The exact edit.
     viewing : Viewing
         For deltaE.
     domain : (low, high)
@@ -118,7 +156,7 @@ def measure(
     threads : int
         0: one a processor; the result does not depend on it.
     shaped : callable, optional
-        From colours to the numbers that the domain is one of.
+        From colours to the code values of the domain.
 
     Returns
     -------
@@ -174,18 +212,18 @@ def _compare(
     sums, maxima = np.zeros((len(readers), 3)), np.zeros((len(readers), 3))
     if not colours.size:
         return _Part(0, 0, 0, sums, maxima)
-    numbers = colours if shaped is None else shaped(colours)
-    outside = int(((numbers < domain[0]) | (numbers > domain[1])).any(axis=-1).sum())
+    values = colours if shaped is None else shaped(colours)
+    outside = int(((values < domain[0]) | (values > domain[1])).any(axis=-1).sum())
     exact = edit.exact(colours)
     scale = np.maximum(np.abs(exact), FLOOR)
     lab = viewing.lab(exact[::stride])
     for i, reader in enumerate(readers.values()):
-        got = reader.apply(colours).astype(np.float64)
+        got = reader(colours).astype(np.float64)
         absolute = np.abs(got - exact)
         relative = absolute / scale
         delta_e = delta_e_2000(lab, viewing.lab(got[::stride]))
-        for k, values in enumerate((absolute, relative, delta_e)):
-            sums[i, k], maxima[i, k] = values.sum(), values.max()
+        for k, found in enumerate((absolute, relative, delta_e)):
+            sums[i, k], maxima[i, k] = found.sum(), found.max()
     return _Part(len(colours), len(lab), outside, sums, maxima)
 
 
@@ -212,7 +250,7 @@ def figures_text(figures: Figures) -> str:
 
 
 def figures_info(figures: Figures) -> dict[str, str]:
-    """Return errors as they stand in the Info of a CLF."""
+    """Return errors as the Info of a CLF names them."""
     return {
         "RelativeMean": stated(figures.relative_mean),
         "RelativeLargest": stated(figures.relative_largest),
@@ -222,7 +260,7 @@ def figures_info(figures: Figures) -> dict[str, str]:
 
 
 def table(rows: Iterable[tuple[str, Figures]]) -> list[str]:
-    """Return the lines of a table of errors, a row for each (name, figures)."""
+    """Return the lines of a printed table of errors, a row for each (name, figures)."""
     listed = list(rows)
     width = max(len(name) for name, _ in listed)
     lines = [

@@ -1,4 +1,4 @@
-"""What an edit shows of a clip's media: its range, transitions, speed and enclosing stacks.
+"""The range of a clip's media that an edit shows: transitions, speed and enclosing stacks counted.
 
 Input: a clip of an OpenTimelineIO timeline. Output: ranges of time, in the edit and in the media.
 """
@@ -11,7 +11,7 @@ from typing import Any
 from palette4d.common.errors import Palette4dError
 from palette4d.shows.timeline_files import library
 
-#: Of a frame: times in double precision are no surer.
+#: Fraction of a frame within which two times are the same: OpenTimelineIO's are doubles.
 ROUNDING = 1e-3
 
 
@@ -20,9 +20,14 @@ def shown(clip: Any) -> tuple[Any, Any] | None:
 
     None when nothing of it is left. The first is in time of the timeline's stack, the second
     in the media's.
+
+    Raises
+    ------
+    Palette4dError
+        The clip or a compound that holds it plays at a speed that is not followed.
     """
     schema = library().schema
-    whole = _with_transitions(clip)
+    whole = clip.visible_range()  # with what the transitions beside it take of its media
     window, item = whole, clip
     while item.parent() is not None:
         parent = item.parent()
@@ -39,26 +44,8 @@ def shown(clip: Any) -> tuple[Any, Any] | None:
             if window is None:
                 return None
         item = parent
-    left = item.transformed_time_range(window, clip)
-    left = _common(left, whole)
-    if left is None or left.duration.value <= 0:
-        return None
-    return window.start_time, _with_speed(clip, left)
-
-
-def _with_transitions(clip: Any) -> Any:
-    """Return a clip's range with what the transitions beside it take of its media."""
-    shown = clip.trimmed_range()
-    parent = clip.parent()
-    if not isinstance(parent, library().schema.Track):
-        return shown
-    before, after = parent.neighbors_of(clip)
-    start, end = shown.start_time, shown.end_time_exclusive()
-    if isinstance(before, library().schema.Transition):
-        start -= before.in_offset
-    if isinstance(after, library().schema.Transition):
-        end += after.out_offset
-    return library().opentime.range_from_start_end_time(start, end)
+    left = _common(item.transformed_time_range(window, clip), whole)
+    return None if left is None else (window.start_time, _with_speed(clip, left))
 
 
 def _with_speed(clip: Any, shown: Any) -> Any:
@@ -77,9 +64,8 @@ def _with_speed(clip: Any, shown: Any) -> Any:
         return shown
     if speed < 0 or not math.isfinite(speed):
         raise Palette4dError(
-            f"the clip {clip.name!r} plays at {speed:g} times its speed, which is not "
-            "followed; expected 0 (a freeze frame) or more. Render it, or analyse its media "
-            "apart"
+            f"the clip {clip.name!r} plays at {speed:g} times its speed, which is not followed; "
+            "expected 0 (a freeze frame) or more. Render it, or analyse its media on its own"
         )
     # The in-point stays what it is; time counts from there, in whole frames.
     origin = clip.trimmed_range().start_time

@@ -1,0 +1,158 @@
+"""The verb `info`: what a sidecar holds."""
+
+import argparse
+import json
+from typing import Any
+
+from palette4d.cli.swatches import hex_of, row, swatch
+from palette4d.common.text import counted
+
+EPILOG = """\
+example:
+  palette4d info clip.p4d.json
+  palette4d info clip.p4d.json --json | python -m json.tool
+"""
+
+#: Figures of the analysis that get a column, in the order of the file.
+STAGE_FIGURES = ("vertices", "blocks", "R", "C", "L", "K", "L_prime", "outside", "max_distance")
+
+
+def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the verb to the command line."""
+    parser = subparsers.add_parser(
+        "info",
+        help="show what a sidecar holds",
+        description="Show what a sidecar holds: the clip, the palette with its ids and colours, "
+        "the edits and the losses of the analysis.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("sidecar", metavar="SIDECAR", help="the sidecar file (*.p4d.json)")
+    parser.add_argument("--json", action="store_true", help="print JSON instead of tables")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print what a sidecar holds."""
+    from palette4d.grade.document import Document
+
+    info = info_of(Document.load(args.sidecar).fields())
+    if args.json:
+        print(json.dumps(info, ensure_ascii=True, allow_nan=False))
+        return 0
+    _print_head(info)
+    _print_stages(info["stages"])
+    _print_palette(info)
+    return 0
+
+
+def info_of(fields: dict[str, Any]) -> dict[str, Any]:
+    """Return what ``palette4d info --json`` prints; docs/sidecar.md explains the words."""
+    clip, polytope = fields["clip"], fields["polytope"]
+    frames = clip["frames"]
+    edited = {entry["vertex"]: entry["rgb"] for entry in fields["edits"]["vertices"]}
+    stops = fields["edits"]["stops"]
+    stages = fields["quality"]["stages"]
+    return {
+        "name": clip["name"],
+        "source": clip["source"],
+        "frame_range": [frames["first"], frames["last"]],
+        "frame_step": frames["step"],
+        "skipped": frames["skipped"],
+        "rate": clip["rate"],
+        "size": clip["size"],
+        "encoding": clip["encoding"],
+        "input_space": clip.get("conversion", {}).get("input_space"),
+        "generator": fields["generator"],
+        "version": fields["version"],
+        "vertices": len(polytope["vertices"]),
+        "edges": len(polytope["edges"]),
+        "blocks": len(polytope["blocks"]),
+        "stops": len(stops),
+        "edited_vertices": len(edited),
+        "losses": stages[-1] if stages else {},
+        "stages": stages,
+        "palette": [
+            {**vertex, "hex": hex_of(vertex["rgb"]), "edited": edited.get(vertex["id"])}
+            for vertex in polytope["vertices"]
+        ],
+        "palette_edges": [
+            {**edge, "stops": [stop["id"] for stop in stops if stop["edge"] == edge["id"]]}
+            for edge in polytope["edges"]
+        ],
+        "palette_stops": stops,
+        "block_ranges": [[block["first"], block["last"]] for block in polytope["blocks"]],
+    }
+
+
+def _print_head(info: dict[str, Any]) -> None:
+    first, last = info["frame_range"]
+    numerator, denominator = info["rate"]
+    step = f", every {info['frame_step']}" if info["frame_step"] != 1 else ""
+    skipped = f", {len(info['skipped'])} skipped" if info["skipped"] else ""
+    print(f"clip      {info['name']}  ({info['source']})")
+    print(f"frames    {first} to {last}{step}{skipped}, {numerator / denominator:g} per second")
+    found_in = f", palette in {info['encoding']}" if info["input_space"] else ""
+    colours = info["input_space"] or info["encoding"]
+    print(f"picture   {info['size'][0]} x {info['size'][1]}, {colours}{found_in}")
+    print(
+        f"palette   {counted(info['vertices'], 'vertex', 'vertices')}, "
+        f"{counted(info['edges'], 'edge')}, {counted(info['blocks'], 'block')}: "
+        + ", ".join(f"{a:g}-{b:g}" for a, b in info["block_ranges"])
+    )
+    print(
+        f"edits     {counted(info['edited_vertices'], 'vertex', 'vertices')}, "
+        f"{counted(info['stops'], 'stop')}"
+    )
+    print(f"by        {info['generator']}")
+
+
+def _print_stages(stages: list[dict[str, Any]]) -> None:
+    """Print the figures that stages share as a table, and those of one stage alone below it."""
+    if not stages:
+        return
+    every = dict.fromkeys(name for stage in stages for name in stage if name != "stage")
+    names = [n for n in every if n in STAGE_FIGURES or sum(n in stage for stage in stages) > 1]
+    rows = [["stage", *names]]
+    for stage in stages:
+        cells = [stage.get(name, "") for name in names]
+        rows.append([str(stage["stage"]), *(_cell(cell) for cell in cells)])
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    print()
+    for line in rows:
+        cells = [line[0].ljust(widths[0])]
+        cells += [cell.rjust(width) for cell, width in zip(line[1:], widths[1:], strict=True)]
+        print("  ".join(cells).rstrip())
+    alone = {n: v for stage in stages for n, v in stage.items() if n not in (*names, "stage")}
+    if alone:
+        wide = max(map(len, alone))
+        print()
+        for name, value in alone.items():
+            print(f"{name.ljust(wide)}  {_cell(value)}")
+
+
+def _cell(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else "" if value is None else str(value)
+
+
+def _print_palette(info: dict[str, Any]) -> None:
+    wide = max([6, *(len(entry["id"]) for entry in info["palette"] + info["palette_edges"])])
+    patch = swatch(None)
+    print(
+        f"\n{'vertex':<{wide}} {'frame':>9}  {patch}{'colour':8} {'r':>8} {'g':>8} {'b':>8}  edited"
+    )
+    for vertex in sorted(info["palette"], key=lambda vertex: vertex["frame"]):
+        edited = "" if vertex["edited"] is None else f"  {row(vertex['edited'])}"
+        print(f"{vertex['id']:<{wide}} {vertex['frame']:>9.6g}  {row(vertex['rgb'])}{edited}")
+    frames = {vertex["id"]: vertex["frame"] for vertex in info["palette"]}
+    if info["palette_edges"]:
+        print(f"\n{'edge':<{wide}} {'from':<{wide}} {'to':<{wide}} {'frames':>17}  stops")
+    for edge in info["palette_edges"]:
+        span = f"{frames[edge['from']]:.6g}-{frames[edge['to']]:.6g}"
+        line = f"{edge['id']:<{wide}} {edge['from']:<{wide}} {edge['to']:<{wide}} {span:>17}"
+        print(f"{line}  {' '.join(edge['stops'])}".rstrip())
+    if info["palette_stops"]:
+        print(f"\n{'stop':<{wide}} {'edge':<{wide}} {'frame':>9}  {patch}colour")
+    for stop in info["palette_stops"]:
+        line = f"{stop['id']:<{wide}} {stop['edge']:<{wide}} {stop['frame']:>9.6g}  "
+        print(f"{line}{row(stop['rgb'])}")

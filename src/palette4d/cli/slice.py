@@ -1,0 +1,113 @@
+"""The verb `slice`: the palette at one frame, or at many."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from typing import TYPE_CHECKING, Any
+
+from palette4d.cli.swatches import row
+from palette4d.common.arguments import frame_range_or_all, number, parse_frames
+from palette4d.common.text import counted
+
+if TYPE_CHECKING:
+    from palette4d.grade.document import Document
+    from palette4d.grade.palette import Palette
+
+EPILOG = """\
+example:
+  palette4d slice clip.p4d.json --frame 23
+  palette4d slice clip.p4d.json --frame 23.5 --json
+  palette4d slice clip.p4d.json --frames all --json
+"""
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the verb to the command line."""
+    parser = subparsers.add_parser(
+        "slice",
+        help="print the palette at one frame, or at many",
+        description="Print the palette at one frame, or at many: each colour as analysed and as\n"
+        "edited, where it lies, and the triangles between the colours. A frame outside\n"
+        "the clip gives its first or last.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("sidecar", metavar="SIDECAR", help="the sidecar file (*.p4d.json)")
+    when = parser.add_mutually_exclusive_group(required=True)
+    when.add_argument(
+        "--frame", type=number(), metavar="T", help="the frame number; may lie between two frames"
+    )
+    when.add_argument(
+        "--frames",
+        metavar="RANGE",
+        type=frame_range_or_all,
+        help="many frames: all, 10, 1-20, 1001-1100x2, 1-9,15",
+    )
+    parser.add_argument("--json", action="store_true", help="print JSON (a list with --frames)")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the palette at one or more frames."""
+    from palette4d.grade.document import Document
+
+    document = Document.load(args.sidecar)
+    frames = [args.frame] if args.frames is None else _frames(args.frames, document)
+    palettes = [document.palette(frame) for frame in frames]
+    if args.frames is None and palettes[0].frame != args.frame:
+        print(
+            f"palette4d: frame {args.frame:g} is outside of the clip; this is frame "
+            f"{palettes[0].frame:g}",
+            file=sys.stderr,
+        )
+    if args.json:
+        values = [_as_json(palette) for palette in palettes]
+        print(json.dumps(values[0] if args.frames is None else values, allow_nan=False))
+        return 0
+    for palette in palettes:
+        _print(palette)
+    return 0
+
+
+def _frames(text: str, document: Document) -> list[int]:
+    first, last, step = document.frames
+    if text == "all":
+        return list(range(first, last + 1, step))
+    frames = parse_frames(text)
+    for end in (frames[0], frames[-1]):
+        document.check_frame(end)
+    return frames
+
+
+def _as_json(palette: Palette) -> dict[str, Any]:
+    """``tracks`` says where each colour lies: ``edge`` is None on a vertex, ``weight`` is that of
+    ``to`` (eq. 6)."""
+    return {
+        "frame": palette.frame,
+        "vertices": palette.rgb.tolist(),
+        "edited": palette.edited.tolist(),
+        "faces": palette.faces.tolist(),
+        "tracks": [
+            {"edge": None if id_ == a else id_, "from": a, "to": b, "weight": weight}
+            for id_, (a, b), weight in zip(
+                palette.ids, palette.ends, palette.weights.tolist(), strict=True
+            )
+        ],
+    }
+
+
+def _print(palette: Palette) -> None:
+    print(
+        f"frame {palette.frame:g}: {counted(len(palette.ids), 'colour')}, "
+        f"{counted(len(palette.faces), 'face')}"
+    )
+    for i, (id_, (a, b)) in enumerate(zip(palette.ids, palette.ends, strict=True)):
+        where = id_ if id_ == a else f"{id_} ({a} to {b} at {palette.weights[i]:.4g})"
+        line = f"{i:4}  {row(palette.rgb[i])}  {where:32}"
+        if (palette.edited[i] != palette.rgb[i]).any():
+            line += f" now {row(palette.edited[i])}"
+        print(line.rstrip())
+    if len(palette.faces):
+        print("      faces " + " ".join("-".join(map(str, face)) for face in palette.faces))

@@ -1,0 +1,666 @@
+"""The document: a palette and the user's edits, loaded from a sidecar, edited, applied and saved.
+
+Everything that changes a grade goes through `Document.apply`: it takes one `Edit`, and `undo` takes
+it back. The core is asked for every colour, so that a recolouring has the node's bits.
+"""
+
+import copy
+import difflib
+import json
+import math
+import os
+import re
+from collections.abc import Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palette4d import _core
+from palette4d.common.errors import Palette4dError
+from palette4d.common.files import link_target
+from palette4d.common.text import counted
+from palette4d.grade import edits, sidecar
+from palette4d.grade.edits import Change, Colour, Edit, Setting, Settings, as_colour
+from palette4d.grade.palette import FAR, Near, Palette, palette_at
+from palette4d.grade.sidecar import Fields, OnEdits
+
+F32 = NDArray[np.float32]
+
+#: Names of scene-linear colour spaces: "Linear", "lin_rec709", "ACEScg", "ACES2065-1", ...
+_LINEAR = re.compile(r"\blin(ear)?(\b|_)|scene.linear|acescg|aces2065", re.IGNORECASE)
+
+
+class Document:
+    """A clip's palette with its edits.
+
+    Get one with `palette4d.load` or `palette4d.analyze`. Colours are code values of the palette
+    (``encoding`` says which); 0..1 is the usual range, and any finite value is allowed. Frames are
+    the clip's frame numbers; fractions are times between frames. Every method that cannot do what
+    it is asked for raises `Palette4dError` and changes nothing.
+
+    Parameters
+    ----------
+    fields : mapping
+        The members of a sidecar (docs/sidecar.md).
+    notes : iterable of str
+        What the analysis has to say about the palette.
+
+    Attributes
+    ----------
+    path : Path or None
+        The sidecar; None until it is saved.
+    notes : tuple of str
+        As above.
+    """
+
+    def __init__(self, fields: Mapping[str, Any], notes: Iterable[str] = ()) -> None:
+        data = sidecar.encoded(fields)
+        self._start(data, _core.parse_sidecar(data, "<document>"))
+        self._disk: bytes | None = None
+        self.path: Path | None = None
+        self.notes = tuple(notes)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> "Document":
+        """Load a sidecar (*.p4d.json).
+
+        Raises
+        ------
+        SidecarError
+            There is no such file, or it is unusable.
+        """
+        document = cls.__new__(cls)
+        data = sidecar.read_bytes(path)
+        document._start(data, _core.parse_sidecar(data, os.fspath(path)))
+        document._disk, document.path, document.notes = data, Path(path), ()
+        return document
+
+    def _start(self, data: bytes, core: _core.Sidecar) -> None:
+        self._fields: Fields = json.loads(data)
+        self._core: _core.Sidecar | None = core  # of `_settings`; None: to be parsed when needed
+        self._settings = edits.from_fields(self._fields["edits"])
+        self._saved = self._settings
+        self._done: list[Edit] = []
+        self._undone: list[Edit] = []
+
+    def __repr__(self) -> str:
+        """Return the clip, its frames and how much is edited, on one line."""
+        first, last, _ = self.frames
+        return (
+            f"<Document {self._fields['clip']['name']!r}: frames {first} to {last}, "
+            f"{counted(len(self._vertices), 'vertex', 'vertices')}, "
+            f"{counted(len(self._settings), 'edit')}>"
+        )
+
+    # ------------------------------------------------------------------------------ what it holds
+
+    @property
+    def core(self) -> _core.Sidecar:
+        """The core's view of the document, for this package."""
+        if self._core is None:
+            data = sidecar.encoded(_with_edits(self._fields, self._settings))
+            self._core = _core.parse_sidecar(data, self._name)
+        return self._core
+
+    @property
+    def _name(self) -> str:
+        return "<document>" if self.path is None else str(self.path)
+
+    def fields(self) -> Fields:
+        """Return the members of the sidecar as it would be saved (docs/sidecar.md)."""
+        return copy.deepcopy(_with_edits(self._fields, self._settings))
+
+    @property
+    def frames(self) -> tuple[int, int, int]:
+        """First and last frame number of the clip, and the step between frames."""
+        found = self._fields["clip"]["frames"]
+        return found["first"], found["last"], found["step"]
+
+    @property
+    def encoding(self) -> str:
+        """The colour space of the palette's code values, or "unknown"."""
+        return str(self._fields["clip"]["encoding"])
+
+    @property
+    def scene_linear(self) -> bool:
+        """Whether the clip is scene-linear, or its palette reaches far above 1 all the same."""
+        clip = self._fields["clip"]
+        names = (clip["encoding"], clip.get("conversion", {}).get("input_space", ""))
+        brightest = max(max(vertex["rgb"]) for vertex in self._vertices)
+        return any(_LINEAR.search(name) for name in names) or brightest > 2
+
+    @property
+    def settings(self) -> Settings:
+        """What the user gave each edited vertex, and each stop, by id."""
+        return MappingProxyType(self._settings)
+
+    @property
+    def edited(self) -> bool:
+        """Whether any handle is edited."""
+        return bool(self._settings)
+
+    @property
+    def changed(self) -> bool:
+        """Whether `save` has something to write."""
+        return self._disk is None or self._settings != self._saved
+
+    @property
+    def history(self) -> tuple[Edit, ...]:
+        """The edits since the document was loaded, in order, without those taken back."""
+        return tuple(self._done)
+
+    @property
+    def _vertices(self) -> list[dict[str, Any]]:
+        found: list[dict[str, Any]] = self._fields["polytope"]["vertices"]
+        return found
+
+    @property
+    def _edges(self) -> list[dict[str, Any]]:
+        found: list[dict[str, Any]] = self._fields["polytope"]["edges"]
+        return found
+
+    def check_frame(self, frame: float) -> None:
+        """Refuse a time outside the clip."""
+        first, last, _ = self.frames
+        if not first <= _finite(frame) <= last:
+            raise Palette4dError(
+                f"frame {frame:g} is outside of the clip; choose one from {first} to {last}"
+            )
+
+    def check_code_values(self, rgb: Iterable[float]) -> None:
+        """Refuse a colour that looks like integers of 8 bits or more, such as 255 128 0.
+
+        Colours of scene-linear clips pass: theirs may be large.
+        """
+        values = as_colour(rgb)
+        largest = max(values)
+        whole = largest > 1 and all(value.is_integer() for value in values)
+        if self.scene_linear or not (whole or largest > 16):
+            return
+        bits = next(n for n in (8, 10, 12, 16, 32) if largest < 2**n)
+        shown = " ".join(f"{value:g}" for value in values)
+        scaled = " ".join(f"{value / (2**bits - 1):.4g}" for value in values)
+        raise Palette4dError(
+            f"found the colour {shown}, expected code values where 1 is display white; "
+            f"{shown} in {bits} bits is {scaled}. Give that, or add --float if {shown} is meant"
+        )
+
+    def palette(self, frame: float) -> Palette:
+        """Return the palette at a time: ids, colours as analysed and as edited, faces.
+
+        Frames outside the clip give its first or last.
+        """
+        return palette_at(self.core, _finite(frame))
+
+    def colour(self, id: str, *, frame: float | None = None) -> Colour:
+        """Return the edited colour of a vertex or stop, or of an edge at a frame."""
+        if id in self._settings:
+            return self._settings[id].rgb
+        if frame is None or _find(self._vertices, id) is not None:
+            return as_colour(self._vertex(id)["rgb"])
+        self.check_frame(frame)
+        self._check_inside(id, frame)
+        palette = self.palette(frame)
+        return as_colour(palette.edited[palette.ids.index(id)])
+
+    def named(self, id: str) -> str:
+        """Return a handle with its place, for people: "stop s1 (edge e3, frame 4.5)"."""
+        setting = self._settings.get(id)
+        if setting is not None and setting.edge is not None:
+            return f"stop {id} (edge {setting.edge}, frame {setting.frame:g})"
+        if (vertex := _find(self._vertices, id)) is not None:
+            return f"vertex {id} (frame {vertex['frame']:g})"
+        return id
+
+    def near(self, rgb: Iterable[float], *, frame: float) -> Near:
+        """Return the palette colour that is nearest to one seen at a frame.
+
+        The palette is compared as it is edited. The handle is the stop at that time, or the vertex
+        of the colour's edge within half a frame step of it.
+        """
+        wanted = as_colour(rgb)
+        self.check_frame(frame)
+        palette = self.palette(frame)
+        index, distance = palette.nearest(wanted)
+        id_ = palette.ids[index]
+        return Near(
+            frame=frame,
+            id=id_,
+            handle=self._handle_at(id_, palette.ends[index], frame),
+            rgb=as_colour(palette.edited[index]),
+            distance=distance,
+            shares=palette.shares(wanted),
+        )
+
+    def _handle_at(self, id_: str, ends: tuple[str, str], frame: float) -> str | None:
+        if id_ == ends[0]:
+            return id_
+        if (stop := self._stop_at(id_, frame)) is not None:
+            return stop
+        away = {end: abs(self._vertex(end)["frame"] - frame) for end in ends}
+        nearest = min(ends, key=lambda end: away[end])
+        return nearest if away[nearest] <= self.frames[2] / 2 else None
+
+    # ------------------------------------------------------------------------------------ editing
+
+    def set(self, id: str, *, rgb: Iterable[float]) -> None:
+        """Give a vertex or a stop a colour."""
+        new = as_colour(rgb)
+        before = self._settings.get(id)
+        if before is not None:
+            after = Setting(new, before.edge, before.frame)
+        else:
+            self._vertex(id)
+            after = Setting(new)
+        self.apply(Edit((Change(id, before, after),)))
+
+    def stop(self, edge: str, *, frame: float, rgb: Iterable[float]) -> str:
+        """Give an edge a colour at a time, by a colour stop; returns the stop's id.
+
+        A stop that is there already gets the colour.
+        """
+        new = as_colour(rgb)
+        self.check_frame(frame)
+        self._check_inside(edge, frame)
+        there = self._stop_at(edge, frame)
+        if there is not None:
+            self.set(there, rgb=new)
+            return there
+        id_ = edits.new_stop_id(self._taken() | self._settings.keys())
+        self.apply(Edit((Change(id_, None, Setting(new, edge, frame)),)))
+        return id_
+
+    def set_near(
+        self,
+        near: Iterable[float],
+        *,
+        frame: float,
+        rgb: Iterable[float],
+        anyway: bool = False,
+    ) -> Near:
+        """Give the palette colour nearest to one that is seen at a frame a new colour there.
+
+        It moves the vertex if there is one within half a frame step, else the stop at that time,
+        else it adds a stop.
+
+        Parameters
+        ----------
+        near : 3 floats
+            The colour as it is seen, edited.
+        frame : float
+            When it is seen; within the clip.
+        rgb : 3 floats
+            The new colour.
+        anyway : bool
+            Edit the palette colour even when it is further than 0.25 away.
+
+        Returns
+        -------
+        Near
+            What was found and how far away it is; its `handle` is the vertex or stop that has the
+            colour now.
+
+        Raises
+        ------
+        Palette4dError
+            The nearest palette colour is further than 0.25 away; the error names what `near` is
+            made of.
+        """
+        new, wanted = as_colour(rgb), as_colour(near)
+        found = self.near(wanted, frame=frame)
+        if found.distance > FAR and not anyway:
+            raise Palette4dError(_too_far(wanted, found))
+        if found.handle is not None:
+            self.set(found.handle, rgb=new)
+            return found
+        handle = self.stop(found.id, frame=frame, rgb=new)
+        return Near(frame, found.id, handle, found.rgb, found.distance, found.shares)
+
+    def shift(self, id: str, *, by: Iterable[float]) -> None:
+        """Add three offsets to the colour of a vertex or a stop."""
+        offset = as_colour(by, "offset")
+        self.set(id, rgb=[a + b for a, b in zip(self.colour(id), offset, strict=True)])
+
+    def move(self, stop: str, *, frame: float) -> None:
+        """Move a stop in time, within its edge."""
+        before = self._settings.get(stop)
+        if before is None or before.edge is None:
+            if _find(self._vertices, stop) is not None:
+                raise Palette4dError(
+                    f"{stop} is a palette vertex, whose time the analysis found; only stops move "
+                    "in time. Its colour moves with --by"
+                )
+            stops = [id_ for id_, setting in self._settings.items() if setting.edge is not None]
+            raise _unknown(stop, "stop", stops)
+        self.check_frame(frame)
+        self._check_inside(before.edge, frame)
+        there = self._stop_at(before.edge, frame)
+        if there not in (None, stop):
+            raise Palette4dError(
+                f"edge {before.edge} already has the stop {there} at frame {frame:g}; choose "
+                "another frame, or reset that stop first"
+            )
+        self.apply(Edit((Change(stop, before, Setting(before.rgb, before.edge, frame)),)))
+
+    def reset(self, id: str | None = None) -> None:
+        """Give a vertex its own colour back, remove a stop, or (None) reset everything."""
+        if id is not None and id not in self._settings:
+            self._vertex(id)
+            return
+        ids = list(self._settings) if id is None else [id]
+        if ids:
+            self.apply(Edit(tuple(Change(id_, self._settings[id_], None) for id_ in ids)))
+
+    def apply(self, edit: Edit) -> None:
+        """Apply an edit; `undo` takes it back."""
+        self._change(edit)
+        self._done.append(edit)
+        self._undone.clear()
+
+    def undo(self) -> Edit:
+        """Take the last edit back, and return it."""
+        if not self._done:
+            raise Palette4dError("there is nothing to undo: no edit since the document was loaded")
+        self._change(self._done[-1].inverse())
+        self._undone.append(self._done.pop())
+        return self._undone[-1]
+
+    def redo(self) -> Edit:
+        """Apply the edit that was taken back last, and return it."""
+        if not self._undone:
+            raise Palette4dError("there is nothing to redo: no edit was taken back")
+        self._change(self._undone[-1])
+        self._done.append(self._undone.pop())
+        return self._done[-1]
+
+    def _change(self, edit: Edit) -> None:
+        self._settings = edit.apply(self._settings)
+        self._core = None
+
+    # ----------------------------------------------------------------------------------- applying
+
+    def recolour(
+        self,
+        image: F32,
+        frame: float,
+        *,
+        strength: float = 1.0,
+        premultiplied: bool = False,
+        space: Literal["input", "palette"] = "input",
+        threads: int = 0,
+    ) -> F32:
+        """Recolour an image with the palette at a time: the same bits as the node.
+
+        Parameters
+        ----------
+        image : (h, w, 3 or 4) float32
+            Code values of the clip, 0..1 as a rule; alpha passes unchanged.
+        frame : float
+            The time; frames outside the clip take its first or last.
+        strength : float
+            0 is the original, 1 the edit.
+        premultiplied : bool
+            Colours are multiplied by alpha.
+        space : {"input", "palette"}
+            "palette": the image is in the palette's own colour space, not in the clip's.
+        threads : int
+            0: one a processor. The result does not depend on it.
+
+        Returns
+        -------
+        (h, w, 3 or 4) float32
+            A new array. Where nothing is edited it has the bits of `image`.
+        """
+        pixels = _checked_image(image)
+        palette = self.palette(frame)
+        conversion = self._conversion(space)
+        if not 0 <= strength <= 1:
+            raise Palette4dError(f"found the strength {strength}, expected 0 to 1")
+        recolourer = _core.Recolourer(palette.rgb, palette.edited, palette.faces)
+        return recolourer.apply(
+            pixels,
+            strength=strength,
+            premultiplied=premultiplied and pixels.shape[2] == 4,
+            threads=threads,
+            precision="single",
+            conversion=conversion,
+        )
+
+    def weights(
+        self, image: F32, frame: float, *, space: Literal["input", "palette"] = "input"
+    ) -> F32:
+        """Return how much of each palette colour a pixel is made of (mean value coordinates).
+
+        Parameters
+        ----------
+        image : (h, w, 3 or 4) float32
+            As in `recolour`; colours are not multiplied by alpha, and alpha is ignored.
+        frame, space
+            As in `recolour`.
+
+        Returns
+        -------
+        (h, w, n) float32
+            In the order of ``palette(frame).ids``. They sum to 1 and reproduce the pixel, or, for a
+            pixel outside the palette, the nearest point of it. NaN where a pixel is not finite.
+        """
+        colours = _checked_image(image)[..., :3]
+        palette = self.palette(frame)
+        conversion = self._conversion(space)
+        result = np.empty((*colours.shape[:2], len(palette.ids)), np.float32)
+
+        def row(y: int) -> None:
+            points: NDArray[Any] = colours[y]
+            if conversion is not None:
+                points = conversion.to_palette(points)
+            result[y], _ = _core.palette_weights(points, palette.rgb, palette.faces)
+
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            list(pool.map(row, range(len(colours))))
+        return result
+
+    def _conversion(self, space: str) -> _core.ColourConversion | None:
+        if space not in ("input", "palette"):
+            raise Palette4dError(f"found the space {space!r}, expected 'input' or 'palette'")
+        own = self.core.conversion
+        return None if own is None or space == "palette" else own.steps
+
+    # ------------------------------------------------------------------------------------- saving
+
+    def save(
+        self, path: str | os.PathLike[str] | None = None, *, on_edits: OnEdits = "refuse"
+    ) -> None:
+        """Write the sidecar: readers see the old file or the new one, never a part of one.
+
+        Another program may have edited the file since it was loaded. What both changed differently
+        is an error, and nothing is written; all other edits of both are kept, and the document
+        then holds them.
+
+        Parameters
+        ----------
+        path : path, optional
+            Another file than the one that was loaded.
+        on_edits : {"refuse", "keep", "drop"}
+            What to do with edits in another file, which this would lose; "keep" takes them over,
+            which needs the same palette.
+
+        Raises
+        ------
+        Palette4dError
+            Edits would be lost, or the file cannot be written.
+        """
+        if path is None and self.path is None:
+            raise Palette4dError(
+                "this palette has no file yet; expected a name: save('clip.p4d.json')"
+            )
+        target = Path(path if path is not None else self.path or "")
+        if self._disk is not None and self.path is not None and _same(target, self.path):
+            self._save_again(link_target(target), self._disk)
+            return
+        fields = self.fields()
+        if self.path is None:
+            fields["clip"]["source"] = _beside(fields["clip"]["source"], target)
+        self._fields = sidecar.save(fields, target, on_edits=on_edits)
+        self._written(edits.from_fields(self._fields["edits"]), sidecar.encoded(self._fields))
+        self.path = target
+
+    def _save_again(self, target: Path, loaded: bytes) -> None:
+        with sidecar.locked(target):
+            found = sidecar.read_bytes(target)
+            fields, settings = self._fields, self._settings
+            names: dict[str, str] = {}
+            if found != loaded:
+                fields, settings, names = self._merged(found)
+            elif settings == self._saved:
+                return
+            data = sidecar.encoded(_with_edits(fields, settings))
+            if found != loaded or self._core is None:
+                core = _core.parse_sidecar(data, str(target))
+            else:
+                core = self._core
+            sidecar.write(target, data, replaces=found)
+        self._fields = fields
+        self._done = [edit.renamed(names) for edit in self._done]
+        self._undone = [edit.renamed(names) for edit in self._undone]
+        self._written(settings, data)
+        self._core = core
+
+    def _merged(self, found: bytes) -> tuple[Fields, dict[str, Setting], dict[str, str]]:
+        _core.parse_sidecar(found, self._name)
+        fields: Fields = json.loads(found)
+        if fields["polytope"] != self._fields["polytope"]:
+            raise Palette4dError(
+                f"{self._name}: the clip was analysed again since this palette was loaded, and the "
+                "edits belong to the old palette; nothing was written. Load the file again, or "
+                "save under another name"
+            )
+        theirs = edits.from_fields(fields["edits"])
+        try:
+            settings, names = edits.merged(self._saved, self._settings, theirs, self._taken())
+        except Palette4dError as error:
+            raise Palette4dError(f"{self._name}: {error}") from None
+        return fields, settings, names
+
+    def _written(self, settings: dict[str, Setting], data: bytes) -> None:
+        if settings != self._settings:
+            self._core = None
+        self._settings = self._saved = settings
+        self._disk = data
+
+    # ------------------------------------------------------------------------------------ details
+
+    def _taken(self) -> frozenset[str]:
+        return frozenset(entry["id"] for entry in (*self._vertices, *self._edges))
+
+    def _vertex(self, id_: str) -> dict[str, Any]:
+        found = _find(self._vertices, id_)
+        if found is not None:
+            return found
+        if _find(self._edges, id_) is not None:
+            raise Palette4dError(
+                f"{id_} is an edge, whose colour changes in time; say at which frame it gets one, "
+                f"as in `set {id_} --frame T --rgb R G B`"
+            )
+        raise _unknown(id_, "vertex or stop", [v["id"] for v in self._vertices] + [*self._settings])
+
+    def _stop_at(self, edge: str, frame: float) -> str | None:
+        for id_, setting in self._settings.items():
+            if setting.edge == edge and setting.frame == frame:
+                return id_
+        return None
+
+    def _check_inside(self, edge: str, frame: float) -> None:
+        found = _find(self._edges, edge)
+        if found is None and (edge in self._settings or _find(self._vertices, edge)):
+            raise Palette4dError(
+                f"{self.named(edge)} has a time of its own; --frame goes with an edge, or with "
+                f"--near. Use `set {edge} --rgb R G B`"
+            )
+        if found is None:
+            raise _unknown(edge, "edge", [entry["id"] for entry in self._edges])
+        start, end = self._vertex(found["from"]), self._vertex(found["to"])
+        for vertex in (start, end):
+            if frame == vertex["frame"]:
+                raise Palette4dError(
+                    f"at frame {frame:g} edge {edge} has its end {vertex['id']}, which needs no "
+                    f"stop; use `set {vertex['id']} --rgb R G B`"
+                )
+        if not start["frame"] < frame < end["frame"]:
+            raise Palette4dError(
+                f"edge {edge} runs from {start['id']} at frame {start['frame']:g} to {end['id']} "
+                f"at frame {end['frame']:g}; found frame {frame:g}, expected one in between"
+            )
+
+
+def _with_edits(fields: Fields, settings: Settings) -> Fields:
+    ids = (vertex["id"] for vertex in fields["polytope"]["vertices"])
+    return {**fields, "edits": edits.to_fields(settings, ids)}
+
+
+def _finite(frame: float) -> float:
+    if not math.isfinite(frame):
+        raise Palette4dError(f"found the frame {frame}, expected a finite number")
+    return float(frame)
+
+
+def _find(entries: list[dict[str, Any]], id_: str) -> dict[str, Any] | None:
+    return next((entry for entry in entries if entry["id"] == id_), None)
+
+
+def _unknown(id_: str, kind: str, ids: list[str]) -> Palette4dError:
+    near = difflib.get_close_matches(id_, ids, n=5, cutoff=0.5) or ids[:5]
+    if not near:
+        return Palette4dError(f"there is no {kind} {id_!r}; the file holds none")
+    return Palette4dError(
+        f"there is no {kind} {id_!r}; did you mean {' or '.join(near)}? "
+        "`palette4d info SIDECAR` lists all ids"
+    )
+
+
+def _too_far(wanted: Colour, found: Near) -> str:
+    shown = ", ".join(f"{value:.4g}" for value in wanted)
+    there = ", ".join(f"{value:.4g}" for value in found.rgb)
+    made_of = ", ".join(f"{id_} {share:.0%}" for id_, share in found.shares[:5] if share >= 0.005)
+    return (
+        f"the palette colour nearest to ({shown}) at frame {found.frame:g} is ({there}) of "
+        f"{found.id}, {found.distance:.3g} away; expected one within {FAR:g}. A pixel of ({shown}) "
+        f"is made of {made_of}. Edit one of these, or edit {found.id} anyway (--anyway; "
+        "anyway=True)"
+    )
+
+
+def _checked_image(image: F32) -> F32:
+    array = np.asarray(image)
+    if array.dtype.kind != "f" or array.dtype.itemsize != 4:
+        if array.dtype.kind == "u":
+            largest = 2 ** (8 * array.dtype.itemsize) - 1
+            remedy = f"image.astype(numpy.float32) / {largest} makes code values of 0 to 1"
+        else:
+            remedy = "image.astype(numpy.float32) converts it"
+        raise Palette4dError(
+            f"found an image of {array.dtype}, expected float32 code values; {remedy}"
+        )
+    if array.ndim != 3 or array.shape[2] not in (3, 4):
+        raise Palette4dError(
+            f"found an image of the shape {array.shape}, expected (height, width, 3) or "
+            "(height, width, 4)"
+        )
+    return np.ascontiguousarray(array, dtype=np.float32)
+
+
+def _same(a: Path, b: Path) -> bool:
+    return os.path.realpath(a) == os.path.realpath(b)
+
+
+def _beside(source: str, output: Path) -> str:
+    """Return a relative source as seen from the sidecar's folder: both may then move together."""
+    if not source or Path(source).is_absolute():
+        return source
+    try:
+        return Path(os.path.relpath(source, output.absolute().parent)).as_posix()
+    except ValueError:  # on another drive
+        return str(Path(source).absolute())
