@@ -118,25 +118,19 @@ def analyze(
     from palette4d.analysis import pipeline
     from palette4d.analysis.options import AnalysisOptions
     from palette4d.grade.document import Document
-    from palette4d.media import colour_space
-    from palette4d.media.array_clip import ArrayClip
-    from palette4d.media.clip import Clip, open_clip
+    from palette4d.media.clip import open_clip
+    from palette4d.media.colour_space import SpaceOptions
 
     if isinstance(clip, str | os.PathLike):
-        opened: Clip = open_clip(
-            os.fspath(clip), frames=frames, rate=rate, skip_bad_frames=skip_bad_frames
-        )
-    else:
-        opened = clip if isinstance(clip, Clip) else ArrayClip(clip, first=0)
-    spaces = colour_space.spaces_of(
-        opened, colour_space.SpaceOptions(input_space, palette_space, ocio_config)
+        clip = open_clip(os.fspath(clip), frames=frames, rate=rate, skip_bad_frames=skip_bad_frames)
+    found = pipeline.analyze(
+        clip,
+        AnalysisOptions(**options),
+        progress,
+        spaces=SpaceOptions(input_space, palette_space, ocio_config),
+        allow_cuts=allow_cuts,
     )
-    opened = colour_space.converted(opened, spaces)
-    fields, found = pipeline.analyze_clip(
-        opened, AnalysisOptions(**options), progress, allow_cuts=allow_cuts
-    )
-    notes = colour_space.record(fields, opened, spaces)
-    return Document(fields, (*notes, *found.remarks))
+    return Document(found.document, found.notes)
 
 
 def bake(
