@@ -1,4 +1,4 @@
-"""The index of a dated series, ``NAME.series.json`` (docs/exports.md)."""
+"""The index of a dated series, ``NAME.series.json`` (docs/files.md)."""
 
 import hashlib
 import json

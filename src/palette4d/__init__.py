@@ -79,8 +79,9 @@ def analyze(
     input_space: str | None = None,
     palette_space: str | None = None,
     ocio_config: str | None = None,
+    method: str = "skew",
     progress: Callable[[str, int, int], object] | None = None,
-    **options: Any,
+    **settings: float,
 ) -> "Document":
     """Find the time-varying palette of a clip.
 
@@ -88,7 +89,8 @@ def analyze(
     ----------
     clip : str, path, clip or array
         What `open_clip` opens, or what it has opened, or an array (frames, height, width, 3) of
-        float code values, 0..1 as a rule. The frame numbers of an array are its indices.
+        float code values, 0..1 as a rule. The frame numbers of an array are its indices. The next
+        three parameters are for files.
     frames : str, optional
         Only these frames of a file or folder, evenly spaced: "1001-1100x2".
     rate : Fraction, optional
@@ -103,8 +105,11 @@ def analyze(
         code values.
     progress : callable, optional
         Called as ``progress(stage, done, total)``; `print` will do.
-    **options
-        Settings of the analysis, such as ``vertices=16`` (`palette4d analyze --help-all`).
+    method : {"skew", "paper", "static", "rgbt"}
+        The default is the one to use; the others are for comparison.
+    **settings
+        Numbers that `palette4d analyze --help-all` lists, such as ``vertices=16``; "lambda" is
+        ``lambda_``.
 
     Returns
     -------
@@ -114,27 +119,29 @@ def analyze(
     Raises
     ------
     Palette4dError
-        The clip cannot be read, its frames are not evenly spaced, or it has sudden cuts.
+        The clip cannot be read, its frames are not evenly spaced, it has sudden cuts, or a setting
+        is unknown or out of range.
     """
     from palette4d.analysis import pipeline
-    from palette4d.analysis.options import AnalysisOptions
+    from palette4d.analysis.options import AnalysisOptions, check_methods, parse_setting
     from palette4d.grade.document import Document
-    from palette4d.media import colour_space
     from palette4d.media.array_clip import ArrayClip
     from palette4d.media.clip import Clip, open_clip
+    from palette4d.media.colour_space import SpaceOptions
 
+    given = dict(parse_setting(f"{name.rstrip('_')}={value}") for name, value in settings.items())
+    check_methods(method, given)
     if isinstance(clip, str | os.PathLike):
         opened: Clip = open_clip(
             os.fspath(clip), frames=frames, rate=rate, skip_bad_frames=skip_bad_frames
         )
     else:
         opened = clip if isinstance(clip, Clip) else ArrayClip(clip, first=0)
-    spaces = colour_space.spaces_of(
-        opened, colour_space.SpaceOptions(input_space, palette_space, ocio_config)
+    found = pipeline.analyze(
+        opened,
+        AnalysisOptions(method=method, **given),
+        progress,
+        spaces=SpaceOptions(input_space, palette_space, ocio_config),
+        allow_cuts=allow_cuts,
     )
-    opened = colour_space.converted(opened, spaces)
-    fields, found = pipeline.analyze_clip(
-        opened, AnalysisOptions(**options), progress, allow_cuts=allow_cuts
-    )
-    notes = colour_space.record(fields, opened, spaces)
-    return Document(fields, (*notes, *found.remarks))
+    return Document(found.document, found.notes)
