@@ -1,10 +1,9 @@
-"""Stage 3, section 5.3: merging blocks of topologically consistent frames.
+"""Block merging, section 5.3: blocks of topologically consistent frames.
 
-Input: a palette for each frame and which neighbours are consistent. Output: few `Block`s, each
-with one topology. A merge makes one block adopt the other's topology: its frames' palettes become
-refinements of their neighbour's, frame after frame (eq. 9). Greedy, by the block configuration
-loss (eqs. 8 and 10): `merge_sequence` down to one block, `merge_blocks` until the loss exceeds eta1
-times its first value.
+Input: a palette for each frame, and which neighbours are consistent. Output: few `Block`s, each
+with one topology. In a merge one block adopts the topology of the other: the palettes of its frames
+become refinements of their neighbour's palette, frame after frame (eq. 9). Merging is greedy, by
+the block configuration loss (eqs. 8 and 10).
 """
 
 from __future__ import annotations
@@ -12,20 +11,17 @@ from __future__ import annotations
 import dataclasses
 import heapq
 import itertools
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
 from palette4d.analysis.losses import palette_loss, refine_palette
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Palette
-from palette4d.analysis.statistics import FrameStatistics
 
-F64 = NDArray[np.float64]
-
-# Of a frame's refinement: it starts where its neighbour's ended.
+# Evaluations of a frame's refinement: it starts where that of its neighbour ended.
 EVALUATIONS = 30
-# Of its loss: a frame that its neighbour's palette fits so nearly as well shows the same.
+# A frame whose loss differs by less than this share from its neighbour's keeps the palette.
 SAME = 1e-3
 
 
@@ -56,14 +52,14 @@ def _theta(n: int, m: int, frames: int, options: AnalysisOptions) -> float:
 
 
 def initial_blocks(
-    statistics: Sequence[FrameStatistics],
+    frames: Sequence[FrameStatistics],
     palettes: Sequence[Palette],
     links: Sequence[Sequence[tuple[int, int]] | None],
     options: AnalysisOptions,
 ) -> list[Block]:
     """Group frames into blocks; links[i] are the one-to-one edges from frame i to i + 1, or None.
 
-    Inside a block the colours are put in the order of its first frame.
+    All palettes of a block have the order of its first frame.
     """
     blocks: list[Block] = []
     run: list[Palette] = []
@@ -76,7 +72,7 @@ def initial_blocks(
             to = dict(pairs)
             order = np.array([to[int(v)] for v in order])
             run = [*run, Palette(palette.rgb[order], run[0].faces)]
-        loss = palette_loss(statistics[i].coarse, run[-1].rgb, options)
+        loss = palette_loss(frames[i].coarse, run[-1].rgb, options)
         if pairs is None:
             blocks.append(Block(i, (run[0],), (loss,)))
         else:
@@ -85,58 +81,48 @@ def initial_blocks(
 
 
 class Merge:
-    """Merging `adopt` into its neighbour `keep`, before or after it (eq. 9), a frame at a time.
+    """A merge in progress: `adopt` takes the topology of its neighbour `keep` (eq. 9).
 
     Attributes
     ----------
-    change : what it adds to the sum of theta_i L_i; while frames are missing, the least it can add.
+    change : the rise of the sum of theta_i L_i; a lower bound of it until all frames are done.
     """
 
     def __init__(
         self,
         keep: Block,
         adopt: Block,
-        statistics: Sequence[FrameStatistics],
-        low: F64,
-        high: F64,
+        frames: Sequence[FrameStatistics],
+        gamut: Gamut,
         options: AnalysisOptions,
     ) -> None:
         self.keep, self.adopt = keep, adopt
-        self.statistics, self.low, self.high, self.options = statistics, low, high, options
+        self.frames, self.gamut, self.options = frames, gamut, options
         self.forwards = keep.first < adopt.first
         self.palettes: list[Palette] = []
         self.losses: list[float] = []
-        frames = len(statistics)
-        self.before = keep.weighted_loss(frames, options) + adopt.weighted_loss(frames, options)
-        self.theta = _theta(
-            len(keep.palettes) + len(adopt.palettes), len(keep.palettes[0].rgb), frames, options
-        )
+        n = len(frames)
+        self.before = keep.weighted_loss(n, options) + adopt.weighted_loss(n, options)
+        both = len(keep.palettes) + len(adopt.palettes)
+        self.theta = _theta(both, len(keep.palettes[0].rgb), n, options)
         self.kept = sum(keep.losses)
         self.change = self.theta * self.kept - self.before
 
     @property
     def done(self) -> bool:
-        """Whether no frame is missing."""
+        """Whether all frames are done."""
         return len(self.palettes) == len(self.adopt.palettes)
 
     def advance(self) -> None:
         """Refine the palette of the next frame, away from `keep`."""
         first, count, at = self.adopt.first, len(self.adopt.palettes), len(self.palettes)
-        colours = self.statistics[first + (at if self.forwards else count - 1 - at)].coarse
+        colours = self.frames[first + (at if self.forwards else count - 1 - at)].coarse
         end = -1 if self.forwards else 0
         previous = self.palettes[-1] if at else self.keep.palettes[end]
         fitted = self.losses[-1] if at else self.keep.losses[end]
         loss = palette_loss(colours, previous.rgb, self.options)
         if abs(loss - fitted) > SAME * fitted:
-            rgb = refine_palette(
-                colours,
-                previous.rgb,
-                previous.faces,
-                self.low,
-                self.high,
-                self.options,
-                EVALUATIONS,
-            )
+            rgb = refine_palette(colours, previous, self.gamut, self.options, EVALUATIONS)
             previous = Palette(rgb, previous.faces)
             loss = palette_loss(colours, rgb, self.options)
         self.palettes.append(previous)
@@ -159,35 +145,27 @@ class Merge:
 
 def merge_sequence(
     blocks: Sequence[Block],
-    statistics: Sequence[FrameStatistics],
-    low: F64,
-    high: F64,
+    frames: Sequence[FrameStatistics],
+    gamut: Gamut,
     options: AnalysisOptions,
-    apart: Collection[int] = (),
 ) -> Iterator[tuple[float, list[Block]]]:
-    """Yield the configurations of greedy merging, from the given one down to one block, or to those
-    that begin with the frames (indices) of `apart`: they are never merged with the one before.
+    """Yield the configurations of greedy merging and their losses, from `blocks` to one block.
 
-    Each with its loss, the sum of theta_i L_i. A merge is followed only as far as it may still be
-    the best: what it adds can but grow with its frames, since losses are never negative.
+    The loss is the sum of theta_i L_i. A merge goes on only while it may be the best: its change
+    never falls from frame to frame, since losses are never negative.
     """
     current = list(blocks)
-    frames = len(statistics)
-    total = sum(b.weighted_loss(frames, options) for b in current)
+    total = sum(b.weighted_loss(len(frames), options) for b in current)
     yield total, list(current)
-    tried: dict[tuple[int, int, bool], Merge] = {}
+    tried: dict[tuple[int, int], Merge] = {}
     while len(current) > 1:
         queue = []
         for i, (a, b) in enumerate(itertools.pairwise(current)):
-            if b.first in apart:
-                continue
             for keep, adopt in ((a, b), (b, a)):
-                key = (id(keep), id(adopt), keep is a)
+                key = (id(keep), id(adopt))
                 if key not in tried:
-                    tried[key] = Merge(keep, adopt, statistics, low, high, options)
+                    tried[key] = Merge(keep, adopt, frames, gamut, options)
                 queue.append((tried[key].change, i, keep is b, tried[key]))
-        if not queue:
-            break
         heapq.heapify(queue)  # changes, then places: merges themselves are never compared
         while not queue[0][3].done:
             _, i, backwards, best = queue[0]
@@ -195,32 +173,8 @@ def merge_sequence(
             heapq.heapreplace(queue, (best.change, i, backwards, best))
         change, i, _, best = queue[0]
         gone = {id(current[i]), id(current[i + 1])}
-        # Keys are object ids: forget those of the blocks that end here before their ids are used
-        # again.
-        tried = {key: value for key, value in tried.items() if not gone & set(key[:2])}
+        # Object ids are used again: forget the merges of the blocks that end here.
+        tried = {key: value for key, value in tried.items() if not gone & set(key)}
         current[i : i + 2] = [best.finish()]
         total += change
         yield total, list(current)
-
-
-def merge_blocks(
-    blocks: Sequence[Block],
-    statistics: Sequence[FrameStatistics],
-    low: F64,
-    high: F64,
-    options: AnalysisOptions,
-    progress: Callable[[int, int], None] | None = None,
-) -> list[Block]:
-    """Merge greedily (section 5.3.3) until the loss exceeds eta1 times its first value, or one
-    block is left; return the blocks, in order."""
-    start = len(blocks)
-    threshold, last = 0.0, list(blocks)
-    for total, configuration in merge_sequence(blocks, statistics, low, high, options):
-        if len(configuration) == start:
-            threshold = options.eta1 * total
-        elif total > threshold:
-            break
-        last = configuration
-        if progress and start > 1:
-            progress(start - len(configuration), start - 1)
-    return last

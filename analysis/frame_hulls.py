@@ -1,76 +1,49 @@
-"""Stage 1, section 5.2.1: a polyhedral palette for each frame.
+"""Frame hulls, section 5.2.1: a polyhedral palette for each frame.
 
-Input: a frame's colours. Output: a `Palette`: at most `palette_size` colours and the triangles of
-their convex hull. The convex hull of the colours is simplified (Tan et al. 2016), clipped to the
-gamut, close colours are merged, and the vertices refined (Wang et al. 2019). Colours that fill no
-volume give palettes of one colour, of two (a line), or flat two-sided polygons.
+Input: the colours of a frame. Output: a `Palette` of at most `palette_size` colours and the
+triangles of their convex hull. The convex hull of the colours is simplified (Tan et al. 2016) and
+clipped to the gamut, close colours are merged, and the vertices refined (Wang et al. 2019). Colours
+without volume give palettes of one colour, of two (a line), or flat two-sided polygons.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d.analysis.losses import colour_scale, palette_loss, refine_palette
+from palette4d.analysis.convex_hulls import THIN, hull_mesh, two_sided
+from palette4d.analysis.frame_statistics import Gamut
+from palette4d.analysis.losses import NO_FACES, palette_loss, refine_palette
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Palette
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import ConvexHull
 
 from palette4d import _core
 
 F64 = NDArray[np.float64]
-I32 = NDArray[np.int32]
-
-# Colours within half an 8-bit step of a plane, a line or a point fill nothing.
-THIN = 0.5 / 255
 
 
-def frame_palette(
-    colours: _core.ColourTree, low: F64, high: F64, options: AnalysisOptions
-) -> Palette:
-    """Return the refined, simplified hull of a frame's colours, inside the gamut [low, high]."""
+def frame_palette(colours: _core.ColourTree, gamut: Gamut, options: AnalysisOptions) -> Palette:
+    """Return the refined, simplified hull of a frame's colours, inside the gamut."""
     flat = flat_palette(colours.rgb, options)
     if flat is not None:
         return flat
-    close = options.merge_distance * colour_scale(low, high)
+    close = options.merge_distance * gamut.scale
     mesh = hull_mesh(colours.rgb)
     simple = _core.progressive_hull(mesh.rgb, mesh.faces, options.palette_size)
     if len(simple) > options.palette_size:
-        # No edge of a sliver-thin hull may be contracted: its extreme points do instead.
+        # No edge of a sliver-thin hull can be contracted: take its extreme points instead.
         simple = extreme_points(mesh.rgb, options.palette_size)
-    palette = hull_mesh(merge_close(np.clip(simple, low, high), close))
-    best, best_loss = palette, palette_loss(colours, palette.rgb, options)
-    for _ in range(
-        2
-    ):  # refining may push a vertex inside; the second round starts from the new hull
-        moved = refine_palette(colours, best.rgb, best.faces, low, high, options)
+    best = hull_mesh(merge_close(gamut.clip(simple), close))
+    best_loss = palette_loss(colours, best.rgb, options)
+    # Refining may push a vertex inside: the second round starts from the new hull.
+    for _ in range(2):
+        moved = refine_palette(colours, best, gamut, options)
         palette = hull_mesh(merge_close(moved, close))
         loss = palette_loss(colours, palette.rgb, options)
         if loss >= best_loss and len(palette.rgb) >= len(best.rgb):
             break
         best, best_loss = palette, loss
     return best
-
-
-def hull_mesh(points: F64) -> Palette:
-    """Return the convex hull of (n, 3) points that fill a volume: its vertices and outward
-    triangles.
-
-    Raises
-    ------
-    scipy.spatial.QhullError
-        When the points fill no volume.
-    """
-    try:
-        hull = ConvexHull(points)
-    except QhullError:
-        hull = ConvexHull(points, qhull_options="QJ")
-    used = np.unique(hull.simplices)
-    faces = np.searchsorted(used, hull.simplices)
-    rgb = points[used]
-    a, b, c = rgb[faces[:, 0]], rgb[faces[:, 1]], rgb[faces[:, 2]]
-    inwards = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
-    faces[inwards] = faces[inwards][:, ::-1]
-    return Palette(rgb, faces.astype(np.int32))
 
 
 def extreme_points(points: F64, count: int) -> F64:
@@ -102,35 +75,30 @@ def merge_close(points: F64, distance: float) -> F64:
 
 
 def flat_palette(points: F64, options: AnalysisOptions) -> Palette | None:
-    """Return the palette of colours that fill no volume, or None when they do.
+    """Return the palette of colours without volume, or None when they have one.
 
-    One colour for a point, two for a line, a two-sided polygon of at most `palette_size` for a
-    plane.
+    One colour for a point, two for a line, a two-sided polygon of at most `palette_size` corners
+    for a plane.
     """
     centre = points.mean(axis=0)
     _, vectors = np.linalg.eigh((points - centre).T @ (points - centre))
     axes = vectors.T[::-1]  # principal axes, longest first
     along = (points - centre) @ axes.T
     extent = np.ptp(along, axis=0)
-    none: I32 = np.zeros((0, 3), np.int32)
     if extent[0] <= 2 * THIN:
-        return Palette(centre[None], none)
+        return Palette(centre[None], NO_FACES)
     if extent[1] <= 2 * THIN:
         ends = [int(np.argmin(along[:, 0])), int(np.argmax(along[:, 0]))]
-        return Palette(points[ends], none)
+        return Palette(points[ends], NO_FACES)
     if extent[2] > 2 * THIN:
         return None
     polygon: NDArray[np.int32] = ConvexHull(along[:, :2]).vertices  # anticlockwise
     while len(polygon) > max(3, options.palette_size):
         polygon = np.delete(polygon, _least_corner(along[polygon, :2]))
-    n = len(polygon)
-    front = [(0, i, i + 1) for i in range(1, n - 1)]
-    # The back is a fan from the next corner: the two sides must not share a diagonal.
-    back = [(1, (i + 2) % n, (i + 1) % n) for i in range(1, n - 1)]
-    return Palette(points[polygon], np.array(front + back, np.int32))
+    return Palette(points[polygon], two_sided(np.arange(len(polygon))))
 
 
 def _least_corner(corners: F64) -> int:
-    """Index of the polygon corner whose removal loses the least area."""
+    """Return the index of the polygon corner whose removal loses the least area."""
     before, after = np.roll(corners, 1, axis=0) - corners, np.roll(corners, -1, axis=0) - corners
     return int(np.argmin(np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])))

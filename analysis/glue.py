@@ -1,14 +1,14 @@
-"""Stage 2, section 5.2.2: gluing the palettes of two frames into a two-frame 4D skew polytope.
+"""Gluing, section 5.2.2: the palettes of two frames become a two-frame 4D skew polytope.
 
 Input: two palettes. Output: `Glue`: the inter-frame edges (pairs of colour indices) that obey the
 two inter-degree rules and the two topological rules at the least total colour distance, searched
 exhaustively (branch and bound) among the edges of the 4D convex hull of both palettes; and the
-triangle mesh that holds between the two frames, whose corners are those edges.
+triangle mesh between the two frames, whose corners are these edges.
 
-The search then goes on among all pairs of colours, and a shorter solution there wins: the paper
-restricts its search to the hull's edges, but colours that lie inside the hull of both frames then
-link to strangers. Where no solution exists at all (the two palettes' triangulations cannot be
-mapped onto each other), topological rule 2 is broken as little as possible.
+The search then goes on among all pairs of colours, and a shorter solution there wins. The paper
+searches the edges of the hull only, but colours inside the hull of both frames then link to
+unrelated ones. If the triangulations of the two palettes cannot be mapped onto each other, no
+solution exists; topological rule 2 is then broken as little as possible.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
 Bool = NDArray[np.bool_]
 
-# Search nodes before the best solution so far is taken; the searches of real clips end far below.
+# After so many nodes the best solution so far is taken; real clips need far fewer.
 MOST_NODES = 200_000
-# A broken rule costs more than any colour distance that it could save.
+# The cost of a broken rule, above any colour distance that it saves.
 BROKEN = 10.0
 
 
@@ -41,7 +41,7 @@ class Glue:
     links : (i, j) pairs, colour i of the first palette to colour j of the second, sorted.
     broken : how many intra-frame edges break topological rule 2 (0 wherever possible).
     consistent : all one-to-one and the same connectivity (section 5.3).
-    complete : whether the search saw every solution; else the links are the best that it met.
+    complete : whether the search saw every solution; otherwise the links are the best found.
     """
 
     links: tuple[tuple[int, int], ...]
@@ -76,11 +76,6 @@ def glue(first: Palette, second: Palette) -> Glue:
     return Glue(found[0], found[1], False, complete and looser.complete)
 
 
-def one_to_one(count: int) -> tuple[tuple[int, int], ...]:
-    """Return the inter-frame edges inside a block."""
-    return tuple((i, i) for i in range(count))
-
-
 def hull_pairs(first: F64, second: F64) -> Bool:
     """Return which (i, j) are edges of the RGBT convex hull of two palettes one frame apart."""
     n, m = len(first), len(second)
@@ -113,8 +108,8 @@ class _Search:
         self.distance = distance.tolist()
         self.near_first: list[list[bool]] = first.adjacency().tolist()
         self.near_second: list[list[bool]] = second.adjacency().tolist()
-        # Sets of the second palette's colours are bits of a number: each colour with those next to
-        # it, and of each colour of the first palette those that it links to.
+        # Sets of the second palette's colours are bits of a number. `around`: each colour with its
+        # neighbours; `linked`: the colours that each colour of the first palette links to.
         self.around = [
             1 << u | sum(1 << w for w in range(self.m) if self.near_second[u][w])
             for u in range(self.m)
@@ -125,7 +120,7 @@ class _Search:
         self.before = [
             [w for w in self.order[:at] if self.near_first[v][w]] for at, v in enumerate(self.order)
         ]
-        self.rest = [0.0] * (self.n + 1)  # the least that the colours still to come must cost
+        self.rest = [0.0] * (self.n + 1)  # the least cost of the colours that follow
         for at in range(self.n - 1, -1, -1):
             costs = [cost for cost, *_ in self.choices[self.order[at]]]
             self.rest[at] = self.rest[at + 1] + (min(costs) if costs else np.inf)
@@ -138,8 +133,8 @@ class _Search:
         self.complete = True
 
     def _choices(self, v: int, allowed: Bool) -> list[tuple[float, tuple[int, ...], int, int]]:
-        """Sets of one to three colours that v may link to (topological rule 1 within each set):
-        what each costs, its colours, these as bits, and as bits those and all around them."""
+        """Return the sets of one to three colours that v may link to (topological rule 1 within
+        each set): the cost, the colours, and as bits the colours and those with neighbours."""
         near = np.flatnonzero(allowed).tolist()
         out = []
         for size in (1, 2, 3):
@@ -162,8 +157,7 @@ class _Search:
             users = self.users[u]
             if not users:
                 continue
-            # Inter-degree rule 2: u becomes a merging vertex, so nothing that it links to may
-            # split.
+            # Inter-degree rule 2: u becomes a merging vertex; its partners must not split.
             if len(group) > 1 or any(len(self.chosen[w]) > 1 for w in users):
                 return False
             if not all(self.near_first[v][w] for w in users):  # topological rule 1
@@ -171,7 +165,7 @@ class _Search:
         return True
 
     def _broken_back(self) -> int:
-        """Topological rule 2 for the second palette's edges."""
+        """Count the edges of the second palette that break topological rule 2."""
         return sum(
             self.near_second[a][b]
             and not any(
@@ -265,7 +259,7 @@ def transition_faces(first: Palette, second: Palette, links: tuple[tuple[int, in
     """Return the (f, 3) triangles over the links: the topology between the two frames.
 
     Where colours only split it is the second palette's mesh, where they only merge the first's.
-    Where both happen the second's mesh is taken and each merging vertex is split into its strands,
+    Where both happen the second's mesh is taken and each merging vertex is split into its tracks,
     along the cut that reproduces most of the first palette's triangles (all of them when the rules
     hold).
     """
@@ -277,12 +271,12 @@ def transition_faces(first: Palette, second: Palette, links: tuple[tuple[int, in
     if len(set(early)) == len(links):
         place = {i: at for at, i in enumerate(early)}
         return _relabel(first.faces, place)
-    strands = {j: [at for at, (_, b) in enumerate(links) if b == j] for j in set(late)}
-    mesh = [tuple(strands[int(v)][0] for v in face) for face in second.faces]
+    tracks = {j: [at for at, (_, b) in enumerate(links) if b == j] for j in set(late)}
+    mesh = [tuple(tracks[int(v)][0] for v in face) for face in second.faces]
     wanted = {_triangle(*map(int, face)) for face in first.faces}
-    for j in sorted(strands):
-        for fresh in strands[j][1:]:
-            mesh = _split_vertex(mesh, strands[j][0], fresh, early, wanted)
+    for j in sorted(tracks):
+        for fresh in tracks[j][1:]:
+            mesh = _split_vertex(mesh, tracks[j][0], fresh, early, wanted)
     return np.array(mesh, np.int32).reshape(-1, 3)
 
 

@@ -1,5 +1,4 @@
-"""The paper's losses (eqs. 2 to 4, 8, 11 and 12) of palettes and polytopes, computed by the
-core."""
+"""The paper's losses (eqs. 2 to 4, 8, 11, 12), and minimising them inside a box."""
 
 from __future__ import annotations
 
@@ -12,29 +11,32 @@ from collections.abc import Callable
 import nlopt
 import numpy as np
 from numpy.typing import NDArray
+from palette4d.analysis.frame_statistics import Gamut
 from palette4d.analysis.options import AnalysisOptions
+from palette4d.analysis.polytope import Palette
 
 from palette4d import _core
 
 F64 = NDArray[np.float64]
-Objective = Callable[[F64], tuple[float, F64]]
+ValueAndGradient = Callable[[F64], tuple[float, F64]]
 I32 = NDArray[np.int32]
-# How NLopt says that it stopped early: no progress left in the floating-point numbers, or asked to.
+# The ways in which NLopt stops early: rounding leaves no progress, or `force_stop` was called.
 STOPPED = (
     nlopt.RoundoffLimited,
     nlopt.ForcedStop,
     nlopt.runtime_error,
     nlopt.invalid_argument,
 )
-# Farther outside than this a pixel is lost: no edit of the palette's colours takes hold of it. Of a
-# frame at least this share must be lost to matter: fewer are hot pixels or glints.
+# A pixel farther outside than this is lost: no edit of the palette reaches it. A smaller share of a
+# frame is taken for hot pixels or glints.
 LOST, LOST_SHARE = 0.25, 1e-4
 NO_FACES: I32 = np.zeros((0, 3), np.int32)
 
 
 @dataclasses.dataclass(frozen=True)
 class Losses:
-    """Means over the frames: R (eq. 2), C (eq. 3), L (eqs. 4, 8); K (eq. 11); L' (eq. 12)."""
+    """Means over the frames: R (eq. 2), C (eq. 3), L (eqs. 4, 8), the share of pixels outside;
+    K (eq. 11); L' (eq. 12); the distance of the farthest pixel."""
 
     R: float
     C: float
@@ -50,26 +52,20 @@ def thread_count(options: AnalysisOptions) -> int:
     return options.threads or os.cpu_count() or 1
 
 
-def colour_scale(low: F64, high: F64) -> float:
-    """Return the size of the gamut [low, high], 1 for the unit cube: distances in options scale
-    with it."""
-    return max(1.0, float(np.max(high - low)))
-
-
 def loss_weights(options: AnalysisOptions) -> _core.LossWeights:
-    """Return the weights of the paper's losses alone: what every reported figure is made with."""
+    """Return the weights of the paper's losses alone: all reported figures use them."""
     return _core.LossWeights(options.lambda_, options.k)
 
 
 def reach_weights(options: AnalysisOptions, scale: float) -> _core.LossWeights:
-    """Return the weights of the paper's losses and of what lies far outside."""
+    """Return the weights of the paper's losses and of distant pixels (`reach`)."""
     return _core.LossWeights(options.lambda_, options.k, reach=options.reach * scale)
 
 
 def shaped_weights(options: AnalysisOptions, scale: float, faces: bool = True) -> _core.LossWeights:
     """Return the weights of what is minimised: the paper's losses, convexity, separation and reach.
 
-    Losses are distances: `scale` (of `colour_scale`) sets volumes, its cube, against them.
+    Losses are distances and convexity is a volume: `scale` (of `Gamut`) relates the two.
     """
     return _core.LossWeights(
         options.lambda_,
@@ -129,62 +125,52 @@ def summarise(rows: F64, k: float, options: AnalysisOptions) -> Losses:
 
 def refine_palette(
     colours: _core.ColourTree,
-    rgb: F64,
-    faces: I32,
-    low: F64,
-    high: F64,
+    palette: Palette,
+    gamut: Gamut,
     options: AnalysisOptions,
     most_evaluations: int = 60,
 ) -> F64:
-    """Move a palette's (n, 3) colours to lower eq. 4, each in a box (Wang et al. 2019).
+    """Move the colours of a palette to lower eq. 4 (Wang et al. 2019); return them, (n, 3).
 
-    All vertices move together, by NLopt's L-BFGS with the core's gradient, inside `hull_box` around
-    where they are and inside the gamut [low, high]. Never returns a worse palette. `faces` keeps
-    the mesh convex when options.convexity asks for it, options.separation its colours apart.
+    All colours move together, inside boxes of half width `hull_box` and inside the gamut. The
+    options `convexity` and `separation` count too. The result is never worse than the palette.
     """
-    n = len(rgb)
-    scale = colour_scale(low, high)
-    weights = shaped_weights(options, scale, len(faces) > 0)
+    faces, n = palette.faces, len(palette.rgb)
+    weights = shaped_weights(options, gamut.scale, len(faces) > 0)
 
     def objective(x: F64) -> tuple[float, F64]:
         r, c, shape, _, _, gradient = _core.palette_loss(colours, x.reshape(n, 3), faces, weights)
         return options.lambda_ * r + c + shape, gradient.ravel()
 
-    start = np.clip(rgb, low, high)
-    best = minimise(
-        objective,
-        start.ravel(),
-        np.maximum(start - options.hull_box * scale, low).ravel(),
-        np.minimum(start + options.hull_box * scale, high).ravel(),
-        most_evaluations,
-    )
+    start = gamut.clip(palette.rgb)
+    lower, upper = gamut.around(start, options.hull_box * gamut.scale)
+    best = minimise(objective, start.ravel(), lower.ravel(), upper.ravel(), most_evaluations)
     return best.reshape(n, 3)
 
 
 def minimise(
-    objective: Objective,
+    objective: ValueAndGradient,
     x: F64,
     low: F64,
     high: F64,
     most_evaluations: int,
     tolerance: float = 1e-4,
 ) -> F64:
-    """Minimise a function with gradient inside a box (NLopt, L-BFGS); the best point ever seen.
+    """Minimise a function inside a box (NLopt, L-BFGS); return the best point of all evaluations.
 
     The losses have kinks (a pixel enters the palette, the nearest pixels change), where a line
-    search may fail: that ends the search, and the best point still counts.
+    search may fail. That ends the search, and the best point still counts.
     """
     best_value, best = objective(x)[0], x.copy()
-
     failures: list[BaseException] = []
     solver = nlopt.opt(nlopt.LD_LBFGS, len(x))
-    # The solver holds `call`: were it held by that in turn, it were a cycle through C++, which no
-    # collector sees, and all that the objective knows would stay in memory until the end.
+    # The solver holds `call`. A strong reference back would make a cycle through C++, which is
+    # never freed, with all that the objective holds.
     running = weakref.proxy(solver)
 
     def call(point: F64, gradient: F64) -> float:
         nonlocal best_value, best
-        if failures:  # a line search calls a few times more before it stops
+        if failures:  # a line search goes on for a few calls before it stops
             return float("inf")
         try:
             value, slope = objective(point)

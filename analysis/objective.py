@@ -1,7 +1,7 @@
-"""Eq. 12 as a function of a polytope's vertices, and moving all of them together to lower it.
+"""Eq. 12 as a function of the vertices of a polytope, and joint moves of vertices that lower it.
 
-What vertex refinement (5.5) and the removal that refines as it goes share: the boxes that vertices
-may move in, the frames that a vertex touches, and NLopt with the core's exact gradient.
+Vertex refinement (section 5.5), the structure search and the static hull share this: the boxes that
+vertices may move in, the frames that a vertex affects, and NLopt with the core's exact gradient.
 """
 
 from __future__ import annotations
@@ -10,68 +10,95 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
 from palette4d.analysis.losses import (
-    colour_scale,
+    Losses,
+    loss_weights,
     minimise,
     shaped_weights,
     smoothness,
+    summarise,
     thread_count,
 )
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import SkewPolytope
-from palette4d.analysis.statistics import FrameStatistics
 
 from palette4d import _core
 
 F64 = NDArray[np.float64]
 
-# Two vertices of a track stay this many frames apart: a steeper change is a cut, not a palette.
+# Two vertices of a track stay this many frames apart: a steeper change would be a cut.
 LEAST_GAP = 0.5
-# What a change to and from a colour that is there for a moment weighs in eq. 11.
+# Weight in eq. 11 of the change to and from a colour that is there for a short time only.
 BRIEF = 0.25
 
 
 def loss_of(
-    polytope: SkewPolytope, statistics: Sequence[FrameStatistics], coarse: bool = False
+    polytope: SkewPolytope, frames: Sequence[FrameStatistics], coarse: bool = False
 ) -> _core.PolytopeLoss:
-    """Prepare the polytope's structure for evaluation on all frames' fine or coarse colours."""
+    """Prepare a polytope's structure for evaluation on the fine or coarse colours of frames."""
     blocks = [
         (b.first, b.last, tracks, b.faces)
         for b, tracks in zip(polytope.blocks, polytope.extended_tracks(), strict=True)
     ]
-    frames = np.array([s.frame for s in statistics], float)
-    return _core.PolytopeLoss(
-        blocks, frames, [s.coarse if coarse else s.colours for s in statistics]
+    times = np.array([f.frame for f in frames], float)
+    return _core.PolytopeLoss(blocks, times, [f.coarse if coarse else f.colours for f in frames])
+
+
+def frame_losses(
+    polytope: SkewPolytope,
+    frames: Sequence[FrameStatistics],
+    which: Sequence[int],
+    weights: _core.LossWeights,
+    options: AnalysisOptions,
+    coarse: bool,
+) -> F64:
+    """Return (n, 5) R, C, shape, share outside and farthest pixel of the frames (indices)."""
+    rows: F64
+    rows, _ = loss_of(polytope, frames, coarse).evaluate(
+        polytope.vertices, list(which), weights, thread_count(options), False
     )
+    return rows
+
+
+def losses_of(
+    polytope: SkewPolytope, frames: Sequence[FrameStatistics], options: AnalysisOptions
+) -> Losses:
+    """Measure a polytope on all colours of all frames, by the paper's losses alone."""
+    everything = range(len(frames))
+    rows = frame_losses(polytope, frames, everything, loss_weights(options), options, coarse=False)
+    k, _ = smoothness(polytope.vertices, polytope.edges(), polytope.length())
+    return summarise(rows, k, options)
 
 
 def refine_jointly(
     polytope: SkewPolytope,
-    statistics: Sequence[FrameStatistics],
-    low: F64,
-    high: F64,
+    frames: Sequence[FrameStatistics],
+    gamut: Gamut,
     options: AnalysisOptions,
     most_evaluations: int,
     coarse: bool,
     brief: Collection[int] = (),
 ) -> tuple[SkewPolytope, float]:
-    """Move all vertices together in their boxes; return the polytope and what was minimised.
+    """Move all vertices together in their boxes; return the polytope and the value of `Objective`.
 
-    That is eq. 12, and what keeps slices convex and colours apart. It is never above that of the
-    polytope given, clipped to the gamut. `brief` as in `Objective`; these stay where they are in
-    time: else the mean, to which a moment hardly matters, would shorten it.
+    The value is never above that of the given polytope, clipped to the gamut. Vertices in `brief`
+    (see `Objective`) keep their times: the mean over all frames would shorten such a colour.
     """
-    scale = colour_scale(low, high)
-    evaluate = Objective(polytope, statistics, options, scale, coarse, brief)
+    evaluate = Objective(polytope, frames, options, gamut, coarse, brief)
     vertices = polytope.vertices.copy()
-    vertices[:, :3] = np.clip(vertices[:, :3], low, high)
-    everything = list(range(len(statistics)))
+    vertices[:, :3] = gamut.clip(vertices[:, :3])
     evaluate.fixed[list(brief)] = True
+    vertices = move_all(evaluate, vertices, most_evaluations)
+    return polytope.with_vertices(vertices), evaluate(vertices, evaluate.everything)[0]
+
+
+def move_all(evaluate: Objective, vertices: F64, most_evaluations: int) -> F64:
+    """Return the vertices after a joint move of all of them."""
     moving = np.arange(len(vertices))
     # Neighbours in time share the gap between them, so that both may move at once.
-    box = evaluate.box(vertices, moving, low, high, share=0.5)
-    vertices = move(evaluate, vertices, moving, everything, box, most_evaluations)
-    return polytope.with_vertices(vertices), evaluate(vertices, everything)[0]
+    box = evaluate.box(vertices, moving, share=0.5)
+    return move(evaluate, vertices, moving, evaluate.everything, box, most_evaluations)
 
 
 def move(
@@ -82,7 +109,7 @@ def move(
     box: tuple[F64, F64],
     most_evaluations: int,
 ) -> F64:
-    """Return the vertices with those of `moving` at their best place in the box."""
+    """Return the vertices with those in `moving` at their best place in the box."""
 
     def objective(x: F64) -> tuple[float, F64]:
         trial = vertices.copy()
@@ -94,7 +121,7 @@ def move(
     lower, upper = ((bound / evaluate.scale).ravel() for bound in box)
     best = minimise(objective, start, lower, upper, most_evaluations, tolerance=1e-5)
     out = vertices.copy()
-    # Scaling there and back rounds: a vertex at the edge of its box must not leave its block.
+    # Scaling back and forth rounds: a vertex at the edge of its box must not leave its block.
     out[moving] = np.clip(best.reshape(-1, 4) * evaluate.scale, *box)
     fixed = evaluate.fixed[moving]
     out[moving[fixed], 3] = vertices[moving[fixed], 3]
@@ -102,37 +129,35 @@ def move(
 
 
 class Objective:
-    """Eq. 12, and what keeps slices convex and colours apart, over a choice of frames.
+    """Eq. 12 over a choice of frames, plus the terms for convexity, separation and reach.
 
-    `brief` are vertices that are there for a moment: their colours may come and go quickly, so
-    that in eq. 11 the edges that end at them count `BRIEF` times only.
+    Vertices in `brief` belong to a colour that is there for a short time only. It may appear and
+    vanish quickly: in eq. 11 edges that end at these vertices have the weight `BRIEF`.
     """
 
     def __init__(
         self,
         polytope: SkewPolytope,
-        statistics: Sequence[FrameStatistics],
+        frames: Sequence[FrameStatistics],
         options: AnalysisOptions,
-        scale_of_colours: float,
+        gamut: Gamut,
         coarse: bool,
         brief: Collection[int] = (),
     ) -> None:
-        self.colour_box = options.refinement_box * scale_of_colours
-        self.weights = shaped_weights(options, scale_of_colours)
-        self.loss = loss_of(polytope, statistics, coarse)
-        self.options = options
+        self.gamut, self.options = gamut, options
+        self.weights = shaped_weights(options, gamut.scale)
+        self.loss = loss_of(polytope, frames, coarse)
         self.threads = thread_count(options)
-        self.count = len(statistics)
-        self.frames = np.array([s.frame for s in statistics], float)
+        self.everything = list(range(len(frames)))
+        self.times = np.array([frame.frame for frame in frames], float)
         self.edges = polytope.edges()
         self.quick = np.where(np.isin(self.edges, list(brief)).any(axis=1), BRIEF, 1.0)
         self.length = polytope.length()
         self.fixed = polytope.fixed_times()
-        # Times are divided by the clip's length, as in the paper, so that all four axes are alike.
+        # As in the paper, times are divided by the clip's length, so that all four axes are alike.
         self.scale = np.array([1.0, 1.0, 1.0, self.length])
-        n = len(polytope.vertices)
         self.before, self.after = polytope.neighbours()
-        self.block = np.zeros((n, 2))
+        self.block = np.zeros((len(polytope.vertices), 2))
         for b in polytope.blocks:
             inside = (polytope.vertices[:, 3] >= b.first) & (polytope.vertices[:, 3] <= b.last)
             self.block[inside] = b.first, b.last
@@ -142,34 +167,32 @@ class Objective:
         o = self.options
         rows, gradient = self.loss.evaluate(vertices, which, self.weights, self.threads, True)
         sums = rows.sum(axis=0)
-        value = (o.lambda_ * sums[0] + sums[1] + sums[2]) / self.count
-        gradient = gradient / self.count
-        if o.gamma and self.count > 1:
+        count = len(self.everything)
+        value = (o.lambda_ * sums[0] + sums[1] + sums[2]) / count
+        gradient = gradient / count
+        if o.gamma and count > 1:
             k, slope = smoothness(vertices, self.edges, self.length, self.quick)
             value += o.gamma * k
             gradient += o.gamma * slope
         return float(value), gradient
 
-    def touched(self, vertices: F64, moving: list[int]) -> list[int]:
-        """Frames whose slices depend on the vertices in `moving`, wherever their boxes let them
-        go."""
+    def touched(self, vertices: F64, moving: Sequence[int]) -> list[int]:
+        """Return the frames whose slices the vertices in `moving` affect, wherever they move."""
         near = [n for v in moving for n in (*self.before[v], *self.after[v], v)]
         times = vertices[near, 3]
-        inside = (self.frames >= times.min()) & (self.frames <= times.max())
+        inside = (self.times >= times.min()) & (self.times <= times.max())
         return [int(i) for i in np.flatnonzero(inside)]
 
     def box(
-        self,
-        vertices: F64,
-        moving: Sequence[int] | NDArray[np.int64],
-        low: F64,
-        high: F64,
-        share: float,
+        self, vertices: F64, moving: Sequence[int] | NDArray[np.int64], share: float
     ) -> tuple[F64, F64]:
-        """Return the lower and upper (n, 4) bounds of section 5.5."""
+        """Return the lower and upper (n, 4) bounds of section 5.5.
+
+        A vertex may move by `share` of the gap to its neighbours in time, inside its block.
+        """
         lower, upper = vertices[list(moving)].copy(), vertices[list(moving)].copy()
-        lower[:, :3] = np.maximum(lower[:, :3] - self.colour_box, low)
-        upper[:, :3] = np.minimum(upper[:, :3] + self.colour_box, high)
+        half_width = self.options.refinement_box * self.gamut.scale
+        lower[:, :3], upper[:, :3] = self.gamut.around(lower[:, :3], half_width)
         for row, v in enumerate(moving):
             if self.fixed[v]:
                 continue

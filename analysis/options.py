@@ -1,145 +1,176 @@
-"""The analysis' options, with the paper's defaults and names."""
+"""The options of an analysis: one table of names, defaults (the paper's where it has one), limits
+and the methods that each option affects."""
 
 from __future__ import annotations
 
 import dataclasses
+import difflib
 import math
+from typing import Any
 
 from palette4d.common.errors import Palette4dError
 
 METHODS = {
-    "skew": "a 4D skew polytope; its structure by what each handle is worth (the default)",
-    "paper": "the same by the paper's own rules, eta1 and eta2",
-    "static": "one palette for the whole clip, the static RGB hull of section 6.2",
-    "rgbt": "the simplified convex hull in RGB and time of section 6.2",
+    "skew": "handles that are worth their cost (default)",
+    "paper": "the paper's thresholds",
+    "static": "one palette for the whole clip",
+    "rgbt": "a convex hull in RGB and time",
 }
 
-#: Options that only some methods look at; all others count with every method. What the losses
-#: are made of (lambda, k, gamma) counts where figures are printed.
-METHODS_OF: dict[str, tuple[str, ...]] = {
-    "handle_cost": ("skew",),
-    "vertices": ("skew", "rgbt"),
-    "blocks": ("skew",),
-    "alpha": ("skew", "paper"),
-    "beta": ("skew", "paper"),
-    "eta1": ("paper",),
-    "eta2": ("paper",),
-    "gamma": ("skew", "paper", "rgbt"),
-    "removal_candidates": ("paper",),
-    "refinement_cycles": ("paper",),
-    "refinement_box": ("skew", "paper", "static"),
-    "palette_size": ("skew", "paper", "static"),
-    "merge_distance": ("skew", "paper", "static"),
-    "hull_box": ("skew", "paper", "static"),
-    "convexity": ("skew", "paper", "static"),
-    "separation": ("skew", "paper", "static"),
-    "reach": ("skew", "paper", "static"),
-}
+_SKEW, _PAPER = ("skew",), ("paper",)
+_POLYTOPES, _HULLS = ("skew", "paper"), ("skew", "paper", "static")
 
-#: The least and the largest value of each option that is a number.
-LIMITS: dict[str, tuple[float, float]] = {
-    "handle_cost": (0.0, 1e6),
-    "vertices": (0, 1e6),
-    "blocks": (1, 1e6),
-    "lambda_": (0.0, 1e6),
-    "k": (1, 1e9),
-    "alpha": (0.0, 1e6),
-    "beta": (0.0, 1e6),
-    "eta1": (1.0, 1e6),
-    "eta2": (1.0, 1e6),
-    "gamma": (0.0, 1e6),
-    "removal_candidates": (1, 1e6),
-    "refinement_box": (0.0, 10.0),
-    "refinement_cycles": (0, 1000),
-    "palette_size": (4, 24),
-    "merge_distance": (0.0, 1.0),
-    "hull_box": (0.0, 10.0),
-    "convexity": (0.0, 1e6),
-    "separation": (0.0, 1.0),
-    "reach": (0.0, 10.0),
-    "colours": (64, 1e8),
-    "coarse_colours": (64, 1e8),
-    "seed": (0, 2**63),
-    "threads": (0, 1024),
-}
+
+def _option(
+    default: float, low: float, high: float, text: str, methods: tuple[str, ...] = tuple(METHODS)
+) -> Any:
+    metadata = {"default": default, "low": low, "high": high, "text": text, "methods": methods}
+    return dataclasses.field(default=default, metadata=metadata)
 
 
 @dataclasses.dataclass(frozen=True)
 class AnalysisOptions:
-    """Options of `palette4d analyze`; defaults as in Du et al. 2021 unless said otherwise.
+    """Options of `palette4d analyze`. `OPTIONS` explains them; `lambda_` is called `lambda` there.
 
-    Some methods do not look at some of them: `METHODS_OF`.
-
-    Attributes
-    ----------
-    method : one of `METHODS`.
-    handle_cost : the rise of eq. 12 that a vertex must be worth to stay (ours).
-    vertices : most vertices of the palette, 0 for as many as are worth it.
-    blocks : most blocks of one topology.
-    lambda_ : weight of the reconstruction loss in eq. 4 (50).
-    k : pixels a palette colour is compared with in eq. 3 (50).
-    alpha, beta : weights of block size and palette size in eq. 10 (10, 1).
-    eta1 : block merging stops above eta1 times the first block loss (3.5, 5.3.3).
-    eta2 : vertex removal stops above eta2 times the loss after merging (3, 5.4.2).
-    gamma : weight of the smoothness term in eq. 12 (0.01).
-    removal_candidates : vertices tried for each removal (10, section 5.4.2).
-    refinement_box : half width of the colour box a vertex may move in (0.1, section 5.5).
-    refinement_cycles : rounds over all vertices (3, section 5.5).
-    palette_size : most colours of a frame's palette (8, as the authors' program).
-    merge_distance : palette colours closer than this become one (the authors' program: 0.1).
-    hull_box : half width of the box in the per-frame refinement (0.15, Wang et al. 2019).
-    convexity : weight of a term that keeps slices convex (ours; 0 is the paper).
-    separation : palette colours nearer than this repel each other (ours; 0 is the paper).
-    reach : pixels this far outside count twice, farther ones still more (ours; 0 is the paper).
-    colours : most colour bins kept of a frame; 8-bit frames with no more distinct colours are
-        exact.
-    coarse_colours : the same for hulls, merging and removal, where speed counts; of short clips
-        more (`statistics.SHORT`).
-    seed : seeds what is random (nothing at present: every step is deterministic).
-    threads : threads of the loss evaluation; the result does not depend on it. 0: one a processor.
+    Raises
+    ------
+    Palette4dError
+        When a value is outside its limits; the message names the option.
     """
 
     method: str = "skew"
-    handle_cost: float = 0.0025
-    vertices: int = 0
-    blocks: int = 3
-    lambda_: float = 50.0
-    k: float = 50.0
-    alpha: float = 10.0
-    beta: float = 1.0
-    eta1: float = 3.5
-    eta2: float = 3.0
-    gamma: float = 0.01
-    removal_candidates: int = 10
-    refinement_box: float = 0.1
-    refinement_cycles: int = 3
-    palette_size: int = 8
-    merge_distance: float = 0.1
-    hull_box: float = 0.15
-    convexity: float = 3.0
-    separation: float = 0.15
-    reach: float = 0.1
-    colours: int = 32768
-    coarse_colours: int = 2048
-    seed: int = 0
-    threads: int = 0
+    vertices: int = _option(0, 0, 1e6, "most handles; 0: all that are worth it", ("skew", "rgbt"))
+    handle_cost: float = _option(
+        0.0025, 0, 1e6, "least gain in L' that justifies a handle; fewer handles if higher", _SKEW
+    )
+    blocks: int = _option(3, 1, 1e6, "most stretches of time with a topology of their own", _SKEW)
+    palette_size: int = _option(8, 4, 24, "most colours of one frame's palette", _HULLS)
+    merge_distance: float = _option(
+        0.1, 0, 1, "colours of a frame's hull closer than this become one", _HULLS
+    )
+    separation: float = _option(
+        0.15, 0, 1, "palette colours closer than this repel each other; 0: the paper", _HULLS
+    )
+    convexity: float = _option(3.0, 0, 1e6, "weight of convex palettes; 0: the paper", _HULLS)
+    reach: float = _option(
+        0.1, 0, 10, "pixels this far outside count twice; 0: once, as in the paper", _HULLS
+    )
+    colours: int = _option(32768, 64, 1e8, "most colours kept of a frame, for the losses")
+    coarse_colours: int = _option(
+        2048, 64, 1e8, "the same for hulls, merging and removal; of short clips up to twice as many"
+    )
+    threads: int = _option(0, 0, 1024, "threads; 0: one a processor; never changes the result")
+    lambda_: float = _option(50.0, 0, 1e6, "weight of the reconstruction loss, eq. 4")
+    k: float = _option(50.0, 1, 1e9, "pixels that a palette colour is compared with, eq. 3")
+    gamma: float = _option(
+        0.01, 0, 1e6, "weight of smoothness in time, eq. 12", (*_POLYTOPES, "rgbt")
+    )
+    alpha: float = _option(10.0, 0, 1e6, "merging: weight of a block's length, eq. 10", _POLYTOPES)
+    beta: float = _option(1.0, 0, 1e6, "merging: weight of a palette's size, eq. 10", _POLYTOPES)
+    hull_box: float = _option(
+        0.15, 0, 10, "how far a colour may move when a frame's hull is refined", _HULLS
+    )
+    refinement_box: float = _option(
+        0.1, 0, 10, "how far a colour may move in vertex refinement, section 5.5", _HULLS
+    )
+    eta1: float = _option(
+        3.5, 1, 1e6, "merging stops above this multiple of the first loss, section 5.3.3", _PAPER
+    )
+    eta2: float = _option(
+        3.0, 1, 1e6, "removal stops above this multiple of the first loss, section 5.4.2", _PAPER
+    )
+    removal_candidates: int = _option(
+        10, 1, 1e6, "vertices tried for each removal, section 5.4.2", _PAPER
+    )
+    refinement_cycles: int = _option(3, 0, 1000, "rounds of vertex refinement, section 5.5", _PAPER)
 
     def __post_init__(self) -> None:
-        """Refuse values outside their range, naming the option."""
+        """Refuse values outside their limits."""
         if self.method not in METHODS:
             raise Palette4dError(
                 f"option method: found {self.method!r}, expected one of {', '.join(METHODS)}"
             )
-        for name, (low, high) in LIMITS.items():
-            value = getattr(self, name)
-            if not math.isfinite(value) or not low <= value <= high:
-                raise Palette4dError(
-                    f"option {name.rstrip('_').replace('_', '-')}: found {value}, "
-                    f"expected a number from {low:.10g} to {high:.10g}"
-                )
+        for name, option in OPTIONS.items():
+            option.check(name, getattr(self, option.field))
 
     def recorded(self) -> dict[str, float | int | str]:
-        """Return what goes into the sidecar: everything that can change the result."""
-        fields = dataclasses.asdict(self)
-        del fields["threads"]
-        return {name.rstrip("_"): value for name, value in fields.items()}
+        """Return what the sidecar records: everything that can change the result."""
+        values: dict[str, float | int | str] = {"method": self.method}
+        values |= {name: getattr(self, option.field) for name, option in OPTIONS.items()}
+        del values["threads"]
+        return values
+
+
+@dataclasses.dataclass(frozen=True)
+class Option:
+    """One row of the table: a number from `low` to `high` that affects some methods."""
+
+    field: str
+    default: float
+    low: float
+    high: float
+    text: str
+    methods: tuple[str, ...]
+
+    def check(self, name: str, value: float) -> None:
+        """Refuse a value outside the limits."""
+        if not math.isfinite(value) or not self.low <= value <= self.high:
+            raise Palette4dError(
+                f"option {name}: found {value}, expected a number from {self.low:.10g} to "
+                f"{self.high:.10g}"
+            )
+
+
+#: All options but the method, by the names that users write and sidecars record.
+OPTIONS = {
+    field.name.rstrip("_"): Option(field.name, **field.metadata)
+    for field in dataclasses.fields(AnalysisOptions)
+    if field.metadata
+}
+
+
+def parse_setting(text: str) -> tuple[str, float]:
+    """Return the field of `AnalysisOptions` and the value that `NAME=VALUE` sets.
+
+    Raises
+    ------
+    Palette4dError
+        For an unknown name, a text that is no such number, or a number outside the limits.
+
+    >>> parse_setting("lambda=20")
+    ('lambda_', 20.0)
+    """
+    name, equals, value = (part.strip() for part in text.partition("="))
+    if not equals:
+        raise Palette4dError(f"found {text!r}, expected NAME=VALUE, such as handle_cost=0.001")
+    if name not in OPTIONS:
+        near = difflib.get_close_matches(name, OPTIONS, n=3, cutoff=0.5) or list(OPTIONS)
+        raise Palette4dError(f"found no option {name!r}, expected for example {', '.join(near)}")
+    option = OPTIONS[name]
+    kind = type(option.default)
+    try:
+        number = kind(value)
+    except ValueError:
+        what = "a whole number" if kind is int else "a number"
+        raise Palette4dError(
+            f"option {name}: found {value!r}, expected {what} from {option.low:.10g} to "
+            f"{option.high:.10g}"
+        ) from None
+    option.check(name, number)
+    return option.field, number
+
+
+def check_methods(method: str, given: dict[str, Any]) -> None:
+    """Refuse fields that have no effect with a method.
+
+    Raises
+    ------
+    Palette4dError
+        The message names the first such option, and the methods that use it.
+    """
+    for name, option in OPTIONS.items():
+        if option.field in given and method not in option.methods:
+            raise Palette4dError(
+                f"{name} has no effect with --method {method}; expected "
+                f"{' or '.join(option.methods)}"
+            )

@@ -1,66 +1,169 @@
-"""From a clip to a sidecar document: frames are read, analysed by a method, and written down.
+"""From a clip to a sidecar document: this module alone knows the order of the stages.
 
-The order of section 5's stages stands in `methods`.
+clip -> colour_statistics -> frame_hulls -> glue -> block_merging -> vertex_removal
+-> structure_search -> stop_insertion -> vertex_refinement -> polytope -> sidecar document
+
+Three other methods serve as comparisons: `baselines`.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+import itertools
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, TypeVar
 
-from palette4d.analysis import cuts, methods, statistics
-from palette4d.analysis.methods import Analysis, Progress
+import numpy as np
+from numpy.typing import NDArray
+from palette4d.analysis import (
+    block_merging,
+    colour_statistics,
+    frame_hulls,
+    glue,
+    stop_insertion,
+    structure_search,
+    vertex_refinement,
+    vertex_removal,
+)
+from palette4d.analysis.baselines import paper_thresholds, rgbt_hull, static_hull
+from palette4d.analysis.block_merging import Block
+from palette4d.analysis.convex_hulls import CONCAVE, deepest_concavity
+from palette4d.analysis.dense_polytope import DensePolytope
+from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
+from palette4d.analysis.losses import Losses
+from palette4d.analysis.objective import losses_of
 from palette4d.analysis.options import AnalysisOptions
+from palette4d.analysis.polytope import SkewPolytope
 from palette4d.analysis.report import advice, quality
-from palette4d.analysis.statistics import FrameStatistics
+from palette4d.analysis.report.quality import Report
 
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import counted
 from palette4d.grade import sidecar
-from palette4d.media.clip_base import describe, even_step
+from palette4d.media import colour_space, cuts
+from palette4d.media.array_clip import ArrayClip
+from palette4d.media.clip_base import Clip, describe, even_step
+from palette4d.media.colour_space import SpaceOptions
 
-if TYPE_CHECKING:
-    from palette4d.media.clip import Clip
+#: The stages that tell their progress, in order.
+STAGES = (
+    "colour_statistics",
+    "static_hull",
+    "rgbt_hull",
+    "frame_hulls",
+    "glue",
+    "block_merging",
+    "vertex_removal",
+    "vertex_refinement",
+)
+# A palette has at least so many colours, however few vertices are asked for.
+LEAST_COLOURS = 4
+# The factor of `convexity` in a second search, where the first result is not convex.
+STIFFER = 10.0
+
+T = TypeVar("T")
+Progress = Callable[[str, int, int], None]
+"""Called as progress(stage, done, total)."""
 
 
-def analyze_clip(
-    clip: Clip,
-    options: AnalysisOptions,
+@dataclasses.dataclass(frozen=True)
+class StageResult:
+    """The vertices, blocks and losses after a stage."""
+
+    stage: str
+    vertices: int
+    blocks: int
+    losses: Losses
+
+    def row(self) -> dict[str, Any]:
+        """Return the row of the stage in the sidecar's "quality"."""
+        counts = {"stage": self.stage, "vertices": self.vertices, "blocks": self.blocks}
+        return counts | dataclasses.asdict(self.losses)
+
+
+@dataclasses.dataclass(frozen=True)
+class Found:
+    """What the stages found.
+
+    Attributes
+    ----------
+    polytope : the palette.
+    stages : what each stage reached.
+    notes : notes and warnings for the user.
+    bound : L' of the best convex static palette, which the result never exceeds; None for methods
+        without this bound.
+    """
+
+    polytope: SkewPolytope
+    stages: tuple[StageResult, ...]
+    notes: tuple[str, ...]
+    bound: float | None
+
+
+@dataclasses.dataclass(frozen=True)
+class Analysis(Found):
+    """The result of an analysis.
+
+    Attributes
+    ----------
+    document : the sidecar document, not yet written.
+    report : how good the finished palette is.
+    colours : one line about the colour spaces, None if none is used.
+    """
+
+    document: dict[str, Any]
+    report: Report
+    colours: str | None
+
+
+def analyze(
+    clip: Clip | NDArray[np.floating[Any]],
+    options: AnalysisOptions | None = None,
     progress: Progress | None = None,
     *,
+    spaces: SpaceOptions | None = None,
     allow_cuts: bool = False,
-) -> tuple[dict[str, Any], Analysis]:
-    """Analyse a clip and return its sidecar document (not yet written) and the analysis.
+) -> Analysis:
+    """Find the time-varying palette of a clip.
 
-    Frames are read one after the other; what is kept of them is bounded, whatever their resolution
-    and number.
+    Frames are read one after the other; memory does not grow with their resolution and number.
+
+    Parameters
+    ----------
+    clip : an opened clip, or an array (frames, height, width, 3) of code values 0 to 1.
+    options : the defaults if left out.
+    progress : called as progress(stage, done, total).
+    spaces : colour spaces of the clip and of its palette; by default only $OCIO counts.
+    allow_cuts : analyse a clip with sudden cuts as one shot.
 
     Raises
     ------
     Palette4dError
-        When a frame cannot be read, the frames are not evenly spaced (a sidecar has one step), no
-        frame has a pixel to go by, or the clip has sudden cuts and `allow_cuts` is not set.
+        When a frame cannot be read, the frames are not evenly spaced, no frame has a pixel that
+        counts, or the clip has sudden cuts and `allow_cuts` is not set.
     """
+    options = options or AnalysisOptions()
+    clip = clip if isinstance(clip, Clip) else ArrayClip(clip)
+    used = colour_space.spaces_of(clip, spaces or SpaceOptions())
+    clip = colour_space.converted(clip, used)
     step = even_step(clip.frames)
     if not step:
         raise Palette4dError(
-            f"the frames {describe(clip.frames)} are not evenly spaced, and a palette is analysed "
-            "from frames with one step between them; expected a range such as 1-10 or 1-10x3"
+            f"the frames {describe(clip.frames)} are not evenly spaced; expected one step between "
+            "all frames, such as 1-10 or 1-10x3"
         )
     tell = progress or (lambda stage, done, total: None)
-    gathered = statistics.gather_clip(
-        clip, options, lambda done, total: tell("statistics", done, total)
+    gathered = colour_statistics.gather_clip(
+        clip, options, lambda done, total: tell("colour_statistics", done, total)
     )
-    skipped = set(clip.skipped)
-    usable, remarks = _usable(clip.frames, gathered.frames)
-    remarks = [*gathered.remarks, *remarks]
-    if found := cuts.find_cuts(usable):
+    skipped = sorted(clip.skipped)
+    usable, missing = _usable(clip.frames, gathered.frames)
+    if starts := cuts.find_cuts((frame.frame, frame.histogram) for frame in usable):
         if not allow_cuts:
-            raise Palette4dError(f"{clip.source}: {cuts.refusal(clip.frames, found)}")
-        remarks.append(cuts.remark(found))
-    analysis = methods.analyze(usable, options, tell)
+            raise Palette4dError(f"{clip.source}: {cuts.refusal(clip.frames, starts)}")
+        missing.append(cuts.note(starts))
+    found = find_polytope(usable, options, tell)
     document = sidecar.new_document(
         {
             "name": clip.name,
@@ -69,15 +172,15 @@ def analyze_clip(
                 "first": clip.frames[0],
                 "last": clip.frames[-1],
                 "step": step,
-                "skipped": sorted(skipped),
+                "skipped": skipped,
             },
             "rate": [clip.rate.numerator, clip.rate.denominator],
             "size": [clip.width, clip.height],
             "encoding": clip.encoding,
         },
-        analysis.polytope.fields(),
+        found.polytope.fields(),
         {
-            "stages": [stage.row() for stage in analysis.stages],
+            "stages": [stage.row() for stage in found.stages],
             "options": options.recorded(),
             "versions": _versions(),
         },
@@ -88,11 +191,23 @@ def analyze_clip(
     warnings = advice.warnings(
         report,
         options,
-        {stage.stage: stage.losses.max_distance for stage in analysis.stages},
+        {stage.stage: stage.losses.max_distance for stage in found.stages},
         brightest=float(finished.vertices[:, :3].max()),
     )
-    remarks = [*remarks, *analysis.remarks, *warnings]
-    return document, dataclasses.replace(analysis, remarks=tuple(remarks), report=report)
+    notes = []
+    if skipped:
+        notes.append(f"{counted(len(skipped), 'bad frame')} skipped: {describe(skipped)}")
+    notes += colour_space.record(document, clip, used)
+    notes += [*gathered.notes, *missing, *found.notes, *warnings]
+    return Analysis(
+        found.polytope,
+        found.stages,
+        tuple(notes),
+        found.bound,
+        document=document,
+        report=report,
+        colours=colour_space.described(used),
+    )
 
 
 def _versions() -> dict[str, str]:
@@ -105,29 +220,228 @@ def _versions() -> dict[str, str]:
 def _usable(
     frames: Iterable[int], gathered: dict[int, FrameStatistics | None]
 ) -> tuple[list[FrameStatistics], list[str]]:
-    """Return statistics of the frames that have pixels; the clip's ends are always there.
+    """Return the statistics of the frames that have pixels, and notes about the others.
 
-    A first or last frame without a colour of its own stands in with its nearest neighbour's, so
-    that the palette covers the whole clip.
+    The palette covers the whole clip: a first or last frame without pixels takes the colours of its
+    nearest neighbour.
     """
     numbers = list(frames)
     have = {n: s for n, s in gathered.items() if s is not None}
     if not have:
         raise Palette4dError(
-            f"no frame of the clip has a pixel to go by: found {counted(len(numbers), 'frame')} "
+            f"no frame of the clip has a pixel that counts: found {counted(len(numbers), 'frame')} "
             "empty or not finite; expected at least one with colours"
         )
-    remarks = []
-    blank = sorted(n for n, s in gathered.items() if s is None)
-    if blank:
-        what = counted(
-            len(blank),
-            "frame has no usable pixel and was",
-            "frames have no usable pixel and were",
-        )
-        remarks.append(f"{what} passed over: {describe(blank)}")
+    notes = []
+    if blank := sorted(n for n, s in gathered.items() if s is None):
+        one, more = "frame has no usable pixel and was", "frames have no usable pixel and were"
+        notes.append(f"{counted(len(blank), one, more)} passed over: {describe(blank)}")
     for end, nearest in ((numbers[0], min(have)), (numbers[-1], max(have))):
         if end not in have:
             have[end] = dataclasses.replace(have[nearest], frame=end)
-            remarks.append(f"frame {end} takes the palette of frame {nearest}")
-    return [have[n] for n in sorted(have)], remarks
+            notes.append(f"frame {end} takes the palette of frame {nearest}")
+    return [have[n] for n in sorted(have)], notes
+
+
+def find_polytope(
+    frames: Sequence[FrameStatistics], options: AnalysisOptions, progress: Progress | None = None
+) -> Found:
+    """Run the stages after `colour_statistics` on at least one frame, in order of time."""
+    run = _Run(frames, options, progress)
+    methods = {"skew": _skew, "paper": _paper, "static": _static, "rgbt": _rgbt}
+    polytope = methods[options.method](run)
+    return Found(polytope, tuple(run.stages), tuple(run.notes), run.bound)
+
+
+class _Run:
+    """One analysis: the frames, what each stage reached, and notes for the user."""
+
+    def __init__(
+        self,
+        frames: Sequence[FrameStatistics],
+        options: AnalysisOptions,
+        progress: Progress | None,
+    ) -> None:
+        self.frames, self.options = frames, options
+        self.gamut = Gamut.of(frames)
+        self.report = progress or (lambda stage, done, total: None)
+        self.stages: list[StageResult] = []
+        self.notes: list[str] = []
+        self.bound: float | None = None
+
+    def counter(self, stage: str) -> Callable[[int, int], None]:
+        """Return the progress callback of one stage."""
+        return lambda done, total: self.report(stage, done, total)
+
+    def counted(self, stage: str, results: Iterable[T], total: int) -> Iterator[T]:
+        """Yield results, and tell the progress of their stage."""
+        for done, result in enumerate(results, start=1):
+            yield result
+            self.report(stage, done, total)
+
+    def losses(self, polytope: SkewPolytope) -> Losses:
+        """Measure a polytope on all colours of all frames."""
+        return losses_of(polytope, self.frames, self.options)
+
+    def result(self, stage: str, polytope: SkewPolytope, blocks: int | None = None) -> StageResult:
+        """Return what a stage reached."""
+        count = len(polytope.blocks) if blocks is None else blocks
+        return StageResult(stage, len(polytope.vertices), count, self.losses(polytope))
+
+    def record(self, stage: str, polytope: SkewPolytope) -> None:
+        """Record what a stage reached."""
+        self.stages.append(self.result(stage, polytope))
+
+
+def _skew(run: _Run) -> SkewPolytope:
+    """Sections 5.2 to 5.5, with a structure whose handles are worth their cost (the default)."""
+    options = run.options
+    if most := options.vertices:  # a colour has a vertex at both ends of the clip
+        size = min(options.palette_size, max(LEAST_COLOURS, most // 2))
+        run.options = options = dataclasses.replace(options, palette_size=size)
+    hulls = [_static(run), *static_hull.plain_hulls(run.frames, run.gamut, options)]
+    convex = [h for h in hulls if h is hulls[0] or not _is_concave(h, run)]
+    simple = min(convex, key=lambda hull: run.losses(hull).L_prime)
+    bound = run.bound = run.losses(simple).L_prime
+    found = _searched(run, options, simple, bound)
+    if options.convexity and _is_concave(found.polytope, run):
+        stiffer = dataclasses.replace(options, convexity=STIFFER * options.convexity)
+        again = _searched(run, stiffer, simple, bound)
+        if not _is_concave(again.polytope, run):
+            found = again
+            run.notes.append(
+                "the palette was not convex: it was searched again with --set "
+                f"convexity={stiffer.convexity:g}"
+            )
+    polytope = found.polytope
+    run.stages += found.stages
+    run.notes += found.notes if len(polytope.blocks) > 1 else ()
+    run.record("vertex_refinement", polytope)
+    run.report("vertex_refinement", 1, 1)
+    if 0 < options.vertices < len(polytope.vertices):
+        run.notes.append(
+            f"the palette has {len(polytope.vertices)} vertices, not {options.vertices}: it has at "
+            "least four colours, and each of them two vertices"
+        )
+    return polytope
+
+
+def _is_concave(polytope: SkewPolytope, run: _Run) -> bool:
+    return deepest_concavity(polytope, run.frames) > CONCAVE
+
+
+@dataclasses.dataclass(frozen=True)
+class _Searched:
+    polytope: SkewPolytope
+    stages: tuple[StageResult, ...]
+    notes: tuple[str, ...]
+
+
+def _searched(run: _Run, options: AnalysisOptions, simple: SkewPolytope, bound: float) -> _Searched:
+    """Go through the stages from frame hulls to refinement; L' of the result is at most `bound`,
+    that of the static hull `simple`."""
+    frames, gamut = run.frames, run.gamut
+    blocks, first = _consistent_blocks(run, options)
+    sequence = block_merging.merge_sequence(blocks, frames, gamut, options)
+    configurations = [merged for _, merged in run.counted("block_merging", sequence, len(blocks))]
+    starts, merged, notes = [], [], []
+    for configuration in reversed(configurations):  # fewer blocks are searched faster
+        if len(configuration) <= options.blocks:
+            dense, remarks = _glued(frames, configuration)
+            merged.append(dense.polytope())
+            notes.append(remarks)
+            losses = vertex_removal.thin_out(dense, frames, options)
+            starts.append(structure_search.Start(dense.polytope(), losses))
+    progress = run.counter("vertex_removal")
+    at, found = structure_search.search(starts, simple, frames, gamut, options, progress)
+    with_stops = stop_insertion.insert_stops(found, frames, gamut, options)
+    stages = (
+        first,
+        run.result("block_merging", simple if at is None else merged[at]),
+        run.result("vertex_removal", with_stops[-1].polytope),
+    )
+    for one in dict.fromkeys((with_stops[-1], with_stops[0])):
+        polytope = vertex_refinement.refine(one.polytope, frames, gamut, options, one.brief)
+        if run.losses(polytope).L_prime <= bound:
+            return _Searched(polytope, stages, () if at is None else notes[at])
+    polytope = vertex_refinement.relax(simple, frames, gamut, options, bound)
+    return _Searched(polytope, stages, ())
+
+
+def _consistent_blocks(run: _Run, options: AnalysisOptions) -> tuple[list[Block], StageResult]:
+    """Return blocks of topologically consistent frames (sections 5.2 and 5.3.1)."""
+    frames = run.frames
+    hulls = (frame_hulls.frame_palette(f.coarse, run.gamut, options) for f in frames)
+    palettes = list(run.counted("frame_hulls", hulls, len(frames)))
+    pairs = (glue.glue(a, b) for a, b in itertools.pairwise(palettes))
+    glued = list(run.counted("glue", pairs, len(frames) - 1))
+    links = [g.links if g.consistent else None for g in glued]
+    blocks = block_merging.initial_blocks(frames, palettes, links, options)
+    times = [f.frame for f in frames]
+    dense = DensePolytope(times, [[p] for p in palettes], [g.links for g in glued])
+    return blocks, run.result("frame_hulls", dense.polytope(), len(blocks))
+
+
+def _glued(
+    frames: Sequence[FrameStatistics], blocks: Sequence[Block]
+) -> tuple[DensePolytope, tuple[str, ...]]:
+    """Return the polytope of a configuration of blocks, and notes about the edges between them."""
+    ends = [(a.palettes[-1], b.palettes[0]) for a, b in itertools.pairwise(blocks)]
+    glued = [glue.glue(a, b) for a, b in ends]
+    dense = DensePolytope(
+        [f.frame for f in frames],
+        [b.palettes for b in blocks],
+        [g.links for g in glued],
+        [glue.transition_faces(a, b, g.links) for (a, b), g in zip(ends, glued, strict=True)],
+    )
+    notes = []
+    boundaries = counted(len(glued), "block boundary", "block boundaries")
+    if broken := sum(g.broken > 0 for g in glued):
+        notes.append(
+            f"at {broken} of {boundaries} no set of edges obeys topological rule 2; the mesh "
+            "between the two frames is the nearest one"
+        )
+    if partial := sum(not g.complete for g in glued):
+        notes.append(
+            f"at {partial} of {boundaries} the search for edges ended early; with a smaller --set "
+            "palette_size=N it sees every solution"
+        )
+    return dense, tuple(notes)
+
+
+def _paper(run: _Run) -> SkewPolytope:
+    """Sections 5.2 to 5.5 with the thresholds of the paper."""
+    frames, gamut, options = run.frames, run.gamut, run.options
+    blocks, first = _consistent_blocks(run, options)
+    run.stages.append(first)
+    blocks = paper_thresholds.merge_blocks(
+        blocks, frames, gamut, options, run.counter("block_merging")
+    )
+    dense, notes = _glued(frames, blocks)
+    run.notes += notes
+    run.record("block_merging", dense.polytope())
+    paper_thresholds.remove_vertices(dense, frames, options, run.counter("vertex_removal"))
+    polytope = dense.polytope()
+    run.record("vertex_removal", polytope)
+    polytope = paper_thresholds.refine_vertices(
+        polytope, frames, gamut, options, run.counter("vertex_refinement")
+    )
+    run.record("vertex_refinement", polytope)
+    return polytope
+
+
+def _static(run: _Run) -> SkewPolytope:
+    """One palette for the whole clip (section 6.2), the best of several starts."""
+    hulls = static_hull.static_hulls(run.frames, run.gamut, run.options)
+    found = list(run.counted("static_hull", hulls, static_hull.STARTS))
+    polytope = min(found, key=lambda hull: run.losses(hull).L_prime)
+    run.record("static_hull", polytope)
+    return polytope
+
+
+def _rgbt(run: _Run) -> SkewPolytope:
+    """The simplified convex hull in RGB and time (section 6.2)."""
+    most = run.options.vertices or rgbt_hull.VERTICES
+    polytope = rgbt_hull.rgbt_polytope(run.frames, run.gamut, most, run.counter("rgbt_hull"))
+    run.record("rgbt_hull", polytope)
+    return polytope

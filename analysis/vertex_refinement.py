@@ -1,65 +1,68 @@
-"""Stage 5, section 5.5: refining the vertices in RGB and time.
+"""Vertex refinement, section 5.5: the last joint move of all vertices in RGB and time.
 
-Input and output: a `SkewPolytope`; its structure stays. Each vertex in turn moves in the 4D box of
-section 5.5 to lower the refinement loss (eq. 12), by NLopt with the core's exact gradient, only
-the frames that it touches being evaluated again; after each cycle over the vertices all move
-together once. Vertices of the first and last frame and splitting and merging vertices keep their
-time; the others stay inside their block, between their neighbours in time. The loss never grows.
+Input and output: a `SkewPolytope`; its structure stays. All vertices move together in the 4D boxes
+of section 5.5 to lower the refinement loss (eq. 12), measured on all colours of all frames.
+Vertices of the first and last frame and splitting and merging vertices keep their time; the others
+stay inside their block, between their neighbours in time. The paper moves one vertex at a time:
+`baselines.paper_thresholds`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import dataclasses
+from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-from palette4d.analysis.losses import colour_scale
-from palette4d.analysis.objective import Objective, move
+from palette4d.analysis.convex_hulls import CONCAVE, deepest_concavity
+from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
+from palette4d.analysis.objective import losses_of, refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import SkewPolytope
-from palette4d.analysis.statistics import FrameStatistics
 
-F64 = NDArray[np.float64]
-
-LOCAL_EVALUATIONS = 40
-JOINT_EVALUATIONS = 150
+EVALUATIONS = 150
+# Distance to which look-alikes are pushed apart in a static hull that hardly moves.
+APART = 0.07
+# The factor of `convexity` for slices that are not convex.
+STIFFER = 10.0
 
 
 def refine(
     polytope: SkewPolytope,
-    statistics: Sequence[FrameStatistics],
-    low: F64,
-    high: F64,
+    frames: Sequence[FrameStatistics],
+    gamut: Gamut,
     options: AnalysisOptions,
-    progress: Callable[[int, int], None] | None = None,
+    brief: tuple[int, ...] = (),
 ) -> SkewPolytope:
-    """Return the polytope with its vertices refined."""
-    scale = colour_scale(low, high)
-    fine = Objective(polytope, statistics, options, scale, coarse=False)
-    coarse = Objective(polytope, statistics, options, scale, coarse=True)
-    start = polytope.vertices.copy()
-    start[:, :3] = np.clip(start[:, :3], low, high)
-    vertices = start
-    everything = list(range(len(statistics)))
-    steps = options.refinement_cycles * (len(vertices) + 1)
-    done = 0
-    for cycle in range(options.refinement_cycles):
-        # The way is found on coarse colours, three times as fast; the last cycle uses all.
-        evaluate = fine if cycle == options.refinement_cycles - 1 else coarse
-        for v in range(len(vertices)):
-            which = evaluate.touched(vertices, [v])
-            box = evaluate.box(vertices, [v], low, high, share=1.0)
-            vertices = move(evaluate, vertices, np.array([v]), which, box, LOCAL_EVALUATIONS)
-            done += 1
-            if progress:
-                progress(done, steps)
-        # Neighbours in time share the gap between them, so that both may move at once.
-        box = evaluate.box(vertices, range(len(vertices)), low, high, share=0.5)
-        moving = np.arange(len(vertices))
-        vertices = move(evaluate, vertices, moving, everything, box, JOINT_EVALUATIONS)
-        done += 1
-        if progress:
-            progress(done, steps)
-    if fine(vertices, everything)[0] > fine(start, everything)[0]:
-        vertices = start
-    return polytope.with_vertices(vertices)
+    """Return the refined polytope; if it is not convex, refined again with more `convexity`.
+
+    The second result is taken if its deepest concavity is less. `brief` as in `Objective`.
+    """
+    found, _ = refine_jointly(polytope, frames, gamut, options, EVALUATIONS, False, brief)
+    deepest = deepest_concavity(found, frames)
+    if not options.convexity or deepest <= CONCAVE:
+        return found
+    stiffer = dataclasses.replace(options, convexity=STIFFER * options.convexity)
+    again, _ = refine_jointly(found, frames, gamut, stiffer, EVALUATIONS, False, brief)
+    return again if deepest_concavity(again, frames) < deepest else found
+
+
+def relax(
+    static: SkewPolytope,
+    frames: Sequence[FrameStatistics],
+    gamut: Gamut,
+    options: AnalysisOptions,
+    bound: float,
+) -> SkewPolytope:
+    """Return a static hull whose colours may move in time, with L' of at most `bound`.
+
+    Where little moves the terms for shape cost more than the motion gains. So they count less and
+    less until L' is within the bound; else the static hull itself is the result.
+    """
+    looser = dataclasses.replace(options, separation=min(options.separation, APART), reach=0.0)
+    plain = dataclasses.replace(options, convexity=0.0, separation=0.0, reach=0.0)
+    for shape in (options, looser, plain):
+        found = refine(static, frames, gamut, shape)
+        if losses_of(found, frames, options).L_prime <= bound and (
+            deepest_concavity(found, frames) <= CONCAVE
+        ):
+            return found
+    return static

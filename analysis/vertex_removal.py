@@ -1,127 +1,87 @@
-"""Stage 4, section 5.4: removing vertices that the others predict.
+"""Vertex removal, section 5.4: vertices that their neighbours in time predict become ghosts.
 
-Input and output: `Strands`, whose vertices become ghosts. `remove_vertices` is the paper's rule:
-greedy by the overall loss (eq. 8, theta = 1), among the candidates closest to their ghosts, until
-it exceeds eta2 times its first value. `thin` takes many vertices at a time while it costs little:
-what comes before the removal that refines as it goes (`handle_removal`).
+Input and output: a `DensePolytope`, changed in place. Removal is greedy by the overall loss (eq. 8,
+theta = 1). `thin_out` removes the vertices that cost little, many at a time; `structure_search`
+then removes vertices one by one. The paper's own rule is in `baselines.paper_thresholds`.
 """
 
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from palette4d.analysis.dense_polytope import DensePolytope
+from palette4d.analysis.frame_statistics import FrameStatistics
 from palette4d.analysis.losses import palette_loss
 from palette4d.analysis.options import AnalysisOptions
-from palette4d.analysis.statistics import FrameStatistics
-from palette4d.analysis.strands import Strands
 
 F64 = NDArray[np.float64]
 
-# A loss per frame that nobody sees (1/200 of an 8-bit step off, at lambda 50); without it, rounding
-# would keep vertices of clips whose loss is zero.
+# An invisible loss a frame: 1/200 of an 8-bit step at lambda 50. Without it, rounding would keep
+# the vertices of clips whose loss is zero.
 NEGLIGIBLE = 1e-3
-# Where `thin` stops: well before the losses say which vertices matter.
+# `thin_out` stops at this multiple of the first loss, well before vertices matter.
 THINNED = 1.6
-# What counts as a straight path of a colour: so near to the line between two vertices.
+# A path of a colour within this distance of the line between two vertices is straight.
 STRAIGHT = 0.08
 
 
-class _Trials:
-    """Each frame's loss, and what it would be without a vertex, remembered while nothing moves."""
+class RemovalTrials:
+    """The loss of each frame, and its loss without a vertex, cached while nothing changes."""
 
     def __init__(
-        self, strands: Strands, statistics: Sequence[FrameStatistics], options: AnalysisOptions
+        self, dense: DensePolytope, frames: Sequence[FrameStatistics], options: AnalysisOptions
     ) -> None:
-        self.strands, self.statistics, self.options = strands, statistics, options
-        self.losses = np.array([self.loss(i, rgb) for i, rgb in enumerate(strands.position)])
-        self.version = [0] * len(self.losses)  # counts the changes of each frame's palette
-        self.tried: dict[int, tuple[tuple[int, ...], dict[int, float]]] = {}
+        self.dense, self.frames, self.options = dense, frames, options
+        self.losses = np.array([self._loss(i, rgb) for i, rgb in enumerate(dense.position)])
+        self._version = [0] * len(self.losses)  # counts the changes of each frame's palette
+        self._tried: dict[int, tuple[tuple[int, ...], dict[int, float]]] = {}
 
-    def loss(self, frame: int, rgb: F64) -> float:
-        return palette_loss(self.statistics[frame].coarse, rgb, self.options)
+    def _loss(self, frame: int, rgb: F64) -> float:
+        return palette_loss(self.frames[frame].coarse, rgb, self.options)
 
-    def without(self, vertex: int) -> dict[int, float]:
-        """Losses of the frames that removing `vertex` touches, by frame index."""
-        moved = self.strands.ghosts(vertex)
-        state = tuple(self.version[i] for i, _, _ in moved)
-        known = self.tried.get(vertex)
-        if known is not None and known[0] == state and len(known[1]) == len(moved):
+    def _without(self, vertex: int) -> dict[int, float]:
+        """Return the losses of the frames that the removal of `vertex` affects, by frame index."""
+        moved = self.dense.ghosts(vertex)
+        state = tuple(self._version[i] for i, _, _ in moved)
+        known = self._tried.get(vertex)
+        if known is not None and known[0] == state:
             return known[1]
         new = {}
         for i, s, rgb in moved:
-            palette = self.strands.position[i].copy()
+            palette = self.dense.position[i].copy()
             palette[s] = rgb
-            new[i] = self.loss(i, palette)
-        self.tried[vertex] = state, new
+            new[i] = self._loss(i, palette)
+        self._tried[vertex] = state, new
         return new
 
     def change(self, vertex: int) -> float:
-        """By how much removing `vertex` raises the sum of the losses."""
-        return sum(new - float(self.losses[i]) for i, new in self.without(vertex).items())
+        """Return by how much the removal of `vertex` raises the sum of the losses."""
+        return sum(new - float(self.losses[i]) for i, new in self._without(vertex).items())
 
     def remove(self, vertex: int) -> None:
-        for i, new in self.without(vertex).items():
+        """Remove `vertex`."""
+        for i, new in self._without(vertex).items():
             self.losses[i] = new
-            self.version[i] += 1
-        self.strands.remove(vertex)
+            self._version[i] += 1
+        self.dense.remove(vertex)
 
 
-def remove_vertices(
-    strands: Strands,
-    statistics: Sequence[FrameStatistics],
-    options: AnalysisOptions,
-    progress: Callable[[int, int], None] | None = None,
-) -> None:
-    """Remove vertices from `strands` (section 5.4.2), in place."""
-    trials = _Trials(strands, statistics, options)
-    total = float(trials.losses.sum())
-    threshold = options.eta2 * total + NEGLIGIBLE * len(trials.losses)
-    pool = [v for v in range(len(strands.at)) if strands.removable(v)]
-    start, removed = len(pool), 0
-    distance: dict[int, tuple[tuple[int, int], float]] = {}
+def thin_out(
+    dense: DensePolytope, frames: Sequence[FrameStatistics], options: AnalysisOptions
+) -> F64:
+    """Remove vertices until the loss is `THINNED` times its first value; return it for each frame.
 
-    def ghost_distance(vertex: int) -> float:
-        """Distance to the ghost's position, which has the same time."""
-        ends = strands.before[vertex][0], strands.after[vertex][0]
-        known = distance.get(vertex)
-        if known is None or known[0] != ends:
-            place = next(rgb for i, _, rgb in strands.ghosts(vertex) if i == strands.at[vertex][0])
-            gap = float(np.linalg.norm(place - strands.colour(vertex)))
-            distance[vertex] = known = ends, gap
-        return known[1]
-
-    while True:
-        pool = [v for v in pool if strands.removable(v)]
-        if not pool:
-            break
-        nearest = sorted(pool, key=lambda v: (ghost_distance(v), v))[: options.removal_candidates]
-        change, vertex = min((trials.change(v), v) for v in nearest)
-        if total + change > threshold:
-            break
-        trials.remove(vertex)
-        total = float(trials.losses.sum())
-        removed += 1
-        if progress:
-            progress(removed, start)
-
-
-def thin(
-    strands: Strands, statistics: Sequence[FrameStatistics], options: AnalysisOptions
-) -> NDArray[np.float64]:
-    """Remove vertices many at a time, in place, until the loss is THINNED times its first value.
-
-    First those whose colours lie where the others predict them. Then each round tries every vertex
-    and removes the cheapest, a quarter of them at most, no two of them neighbours in time. Returns
-    each frame's loss.
+    The first to go are vertices on straight paths. Then each round tries all vertices and removes
+    the cheapest, a quarter of them at most, no two of them neighbours in time.
     """
-    first = _Trials(strands, statistics, options).losses
+    first = RemovalTrials(dense, frames, options).losses
     threshold = THINNED * float(first.sum()) + NEGLIGIBLE * len(first)
-    _straighten(strands, STRAIGHT)
-    trials = _Trials(strands, statistics, options)
-    pool = [v for v in range(len(strands.at)) if strands.removable(v)]
+    _straighten(dense)
+    trials = RemovalTrials(dense, frames, options)
+    pool = [v for v in range(len(dense.at)) if dense.removable(v)]
     while pool:
         total = float(trials.losses.sum())
         room = max(1, len(pool) // 4)
@@ -129,44 +89,41 @@ def thin(
         for change, vertex in sorted((trials.change(v), v) for v in pool):
             if total + change > threshold or room == 0:
                 break
-            near = {vertex, *strands.before[vertex], *strands.after[vertex]}
-            if busy & near or not strands.removable(vertex):
+            near = {vertex, *dense.before[vertex], *dense.after[vertex]}
+            if busy & near or not dense.removable(vertex):
                 continue
             busy |= near
             room -= 1
-            # Two tracks of one frame may change in one round: what that costs together is seen
-            # here, as the second is tried again.
+            # A removal on another track of the same frame may have changed the cost.
             total = float(trials.losses.sum()) + trials.change(vertex)
             if total > threshold:
                 break
             trials.remove(vertex)
         if not busy:
             break
-        pool = [v for v in pool if strands.removable(v)]
+        pool = [v for v in pool if dense.removable(v)]
     return trials.losses
 
 
-def _straighten(strands: Strands, tolerance: float) -> None:
-    """Remove vertices, the straightest first, while every ghost stays within `tolerance` of the
-    colour that it stands for."""
-    original = [rgb.copy() for rgb in strands.position]
+def _straighten(dense: DensePolytope) -> None:
+    """Remove vertices, the straightest path first, while ghosts stay near their first colours."""
+    original = [rgb.copy() for rgb in dense.position]
 
     def bend(vertex: int) -> float:
         return max(
-            float(np.linalg.norm(rgb - original[i][s])) for i, s, rgb in strands.ghosts(vertex)
+            float(np.linalg.norm(rgb - original[i][s])) for i, s, rgb in dense.ghosts(vertex)
         )
 
-    pool = [v for v in range(len(strands.at)) if strands.removable(v)]
-    queue = [(bend(v), v) for v in pool]
+    queue = [(bend(v), v) for v in range(len(dense.at)) if dense.removable(v)]
     heapq.heapify(queue)
     while queue:
         known, vertex = heapq.heappop(queue)
-        if known > tolerance:
+        if known > STRAIGHT:
             break
-        if not strands.removable(vertex):
+        if not dense.removable(vertex):
             continue
-        now = bend(vertex)  # may have grown since it was queued
+        now = bend(vertex)  # it grows as neighbours go
         if now > known:
             heapq.heappush(queue, (now, vertex))
             continue
-        strands.remove(vertex)
+        dense.remove(vertex)

@@ -24,9 +24,10 @@ from pathlib import Path
 import numpy as np
 import scenedetect
 from numpy.typing import NDArray
-from palette4d.analysis import cuts, statistics
+from palette4d.analysis import colour_statistics
 from palette4d.analysis.options import AnalysisOptions
 
+from palette4d.media import cuts
 from palette4d.media.clip import open_clip
 from palette4d.shows.shots import BINS
 
@@ -40,10 +41,10 @@ def ours(frames: Frames) -> list[int]:
     """Return palette4d's cuts, as --detect-shots finds them."""
     options = AnalysisOptions(colours=BINS, coarse_colours=BINS)
     gathered = [
-        statistics.gather(i, frame.astype(np.float32) / 255, options)
+        colour_statistics.gather(i, frame.astype(np.float32) / 255, options)
         for i, frame in enumerate(frames)
     ]
-    return cuts.find_cuts([s for s in gathered if s is not None])
+    return cuts.find_cuts((s.frame, s.histogram) for s in gathered if s is not None)
 
 
 def theirs(make: Callable[[], scenedetect.SceneDetector]) -> Callable[[Frames], list[int]]:
@@ -73,8 +74,7 @@ def read(spec: str) -> Frames:
     clip = open_clip(spec)
     by = max(1, clip.width // LARGEST)
     return [
-        np.rint(np.clip(image[::by, ::by, :3], 0, 1) * 255).astype(np.uint8)
-        for _, image in clip
+        np.rint(np.clip(image[::by, ::by, :3], 0, 1) * 255).astype(np.uint8) for _, image in clip
     ]
 
 

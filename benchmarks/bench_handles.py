@@ -26,7 +26,8 @@ from typing import TYPE_CHECKING
 import evaluator
 import numpy as np
 from evaluator import PAPER_RULES, Figures, Runs, TimedPalette, say, table
-from palette4d.analysis import frame_hulls, statistics
+from palette4d.analysis import colour_statistics, frame_hulls
+from palette4d.analysis.frame_statistics import Gamut
 from palette4d.analysis.options import AnalysisOptions
 
 from palette4d.media.clip import open_clip
@@ -41,15 +42,15 @@ HANDLE_COST = AnalysisOptions().handle_cost
 # What the shape of a palette costs: one option at a time, then all of the shape terms off.
 TRADES: dict[str, tuple[str, ...]] = {
     DEFAULT: (),
-    "--separation 0": ("--separation", "0"),
-    "--convexity 0": ("--convexity", "0"),
-    "--reach 0": ("--reach", "0"),
-    "all three of these": ("--separation", "0", "--convexity", "0", "--reach", "0"),
-    "--merge-distance 0.15": ("--merge-distance", "0.15"),
-    "--merge-distance 0.05": ("--merge-distance", "0.05"),
-    "--handle-cost 0.001": ("--handle-cost", "0.001"),
-    "--handle-cost 0.005": ("--handle-cost", "0.005"),
-    "--blocks 1": ("--blocks", "1"),
+    "--set separation=0": ("--set", "separation=0"),
+    "--set convexity=0": ("--set", "convexity=0"),
+    "--set reach=0": ("--set", "reach=0"),
+    "all three of these": ("--set", "separation=0", "--set", "convexity=0", "--set", "reach=0"),
+    "--set merge_distance=0.15": ("--set", "merge_distance=0.15"),
+    "--set merge_distance=0.05": ("--set", "merge_distance=0.05"),
+    "--set handle_cost=0.001": ("--set", "handle_cost=0.001"),
+    "--set handle_cost=0.005": ("--set", "handle_cost=0.005"),
+    "--set blocks=1": ("--set", "blocks=1"),
 }
 STATIC = ("--method", "static")
 # The paper's rules alone, and with this program's hulls and shape terms.
@@ -86,12 +87,12 @@ def single_hulls(clip: str, frames: str | None) -> TimedPalette:
     """Return each frame's own refined hull, as the analysis begins with."""
     options = AnalysisOptions()
     gathered = [
-        statistics.gather(number, image, options)
+        colour_statistics.gather(number, image, options)
         for number, image in open_clip(clip, frames=frames).iter_colours()
     ]
     usable = [s for s in gathered if s is not None]
-    low, high = statistics.gamut_box(usable)
-    palettes = {s.frame: frame_hulls.frame_palette(s.coarse, low, high, options) for s in usable}
+    gamut = Gamut.of(usable)
+    palettes = {s.frame: frame_hulls.frame_palette(s.coarse, gamut, options) for s in usable}
     return TimedPalette.of_hulls({n: (p.rgb, p.faces) for n, p in palettes.items()})
 
 
@@ -106,7 +107,7 @@ def cells(x: Figures) -> list[str | None]:
         evaluator.outside_cell(x),
         f"{x.farthest:.3f}",
         f"{x.closest:.3f}",
-        evaluator.share(x.dent, 1),
+        evaluator.share(x.concavity, 1),
     ]
 
 
@@ -114,7 +115,7 @@ def header(outside: str) -> list[str]:
     """Return the heads of `cells`."""
     names = ["vertices", "blocks", "colours a frame", *evaluator.FIT_HEADER]
     price = f"L' + {HANDLE_COST} a vertex"
-    return [*names, price, outside, "farthest", "nearest colours", "deepest dent"]
+    return [*names, price, outside, "farthest", "nearest colours", "deepest concavity"]
 
 
 # Where a label may stand beside its point: offsets in points, and how the text is aligned there.

@@ -1,13 +1,13 @@
 """Is the default never worse than one static palette of the same clip?
 
 Analyses each clip, or piece of one, with the defaults and as static palettes: `--method static` as
-it is, and the plain hulls of `--palette-size` colours that the default holds itself to, without the
-terms that shape a palette. All of them are measured on every pixel.
+it is, and the plain hulls of `palette_size` colours that the default holds itself to, without the
+terms for shape. All of them are measured on every pixel.
 
     python benchmarks/bench_never_worse.py CLIP[:A-B[xN]] ... [--evaluator PROGRAM]
 
-Prints Markdown, and how dented the best static palette is: one that lacks more than a twentieth of
-its hull is never a result. Ends with 1 where the default is worse than any.
+Prints Markdown, with the concavity of the best static palette. One that lacks more than a twentieth
+of its hull is no result and does not count. Ends with 1 where the default is worse than another.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from pathlib import Path
 import evaluator
 from evaluator import Figures, Runs, say, table
 from palette4d.analysis.baselines import static_hull
+from palette4d.analysis.convex_hulls import CONCAVE
 from palette4d.analysis.options import AnalysisOptions
 
 from palette4d.common.arguments import frame_range
@@ -32,11 +33,11 @@ SAMPLED = 0.0005
 def plain_hulls() -> dict[str, tuple[str, ...]]:
     """Return the command's options for each plain hull."""
     defaults, out = AnalysisOptions(), {}
-    for options in static_hull.plain(defaults):
+    for options in static_hull.plain_options(defaults):
         given = []
         for name, value in options.recorded().items():
             if value != defaults.recorded()[name]:
-                given += [f"--{name.replace('_', '-')}", f"{value:g}"]
+                given += ["--set", f"{name}={value:g}"]
         out[" ".join(given)] = (*STATIC, *given)
     return out
 
@@ -73,13 +74,14 @@ def main() -> None:
         name = f"{Path(clip).stem} {frames or ''}".strip()
         figures = measured(clip, frames, args.evaluator)
         own = figures.pop("")
-        best = min(figures, key=lambda way: figures[way].L_prime)
+        convex = {way: x for way, x in figures.items() if x.concavity <= CONCAVE}
+        best = min(convex or figures, key=lambda way: figures[way].L_prime)
         bound = figures[best].L_prime
         worse |= own.L_prime > bound + SAMPLED
-        dent = evaluator.share(figures[best].dent)
-        rows.append([name, f"{bound:.4f}", dent, f"{own.L_prime:.4f}", own.vertices, best])
+        concavity = evaluator.share(figures[best].concavity)
+        rows.append([name, f"{bound:.4f}", concavity, f"{own.L_prime:.4f}", own.vertices, best])
         say(f"{name}: " + ", ".join(f"{way}: {x.L_prime:.4f}" for way, x in figures.items()))
-    heads = ["clip", "best static palette, L'", "its dent", "default, L'", "handles"]
+    heads = ["clip", "best static palette, L'", "its concavity", "default, L'", "handles"]
     heads.append("options of the static")
     print(table(heads, rows))
     sys.exit("stopped: the default is worse than a static palette" if worse else 0)

@@ -27,8 +27,8 @@ from palette4d.analysis.options import METHODS
 from palette4d import _core
 from palette4d.media.clip import open_clip
 
-MERGING_ALONE = ("--eta2", "1", "--refinement-cycles", "0")
-UNREFINED = ("--refinement-cycles", "0")
+MERGING_ALONE = ("--set", "eta2=1", "--set", "refinement_cycles=0")
+UNREFINED = ("--set", "refinement_cycles=0")
 
 ALPHAS, ETA1S = (5, 10, 15), (1.5, 3.5, 6.0)
 BETAS = (0, 1, 2, 5)
@@ -61,7 +61,7 @@ def row_of(report: dict[str, Any], stage: str) -> dict[str, Any]:
 
 def merged(runs: Runs, alpha: float, eta1: float, beta: float) -> dict[str, Any]:
     """Return the report of an analysis that hardly goes on after block merging."""
-    weights = ("--alpha", str(alpha), "--eta1", str(eta1), "--beta", str(beta))
+    weights = ("--set", f"alpha={alpha}", "--set", f"eta1={eta1}", "--set", f"beta={beta}")
     return runs(*PAPER_RULES, *MERGING_ALONE, *weights)
 
 
@@ -95,8 +95,8 @@ def figure_8_options() -> dict[str, tuple[str, ...]]:
     """Return the analyses of figures 8 and 9 by name."""
     out = {}
     for eta2 in ETA2S:
-        out[f"η₂ {eta2}, not refined"] = (*PAPER_RULES, "--eta2", str(eta2), *UNREFINED)
-        out[f"η₂ {eta2}"] = (*PAPER_RULES, "--eta2", str(eta2))
+        out[f"η₂ {eta2}, not refined"] = (*PAPER_RULES, "--set", f"eta2={eta2}", *UNREFINED)
+        out[f"η₂ {eta2}"] = (*PAPER_RULES, "--set", f"eta2={eta2}")
     return out
 
 
@@ -104,7 +104,7 @@ def comparison_options() -> dict[str, tuple[str, ...]]:
     """Return the methods of section 6.2 by name; those that this version has."""
     out: dict[str, tuple[str, ...]] = {
         "skew": (),
-        "paper": (*PAPER_RULES, "--eta2", "3.0"),
+        "paper": (*PAPER_RULES, "--set", "eta2=3.0"),
         "static": ("--method", "static"),
     }
     if "rgbt" in METHODS:
@@ -134,12 +134,12 @@ def figure_8(figures: dict[str, Figures], outside: str) -> str:
                     *evaluator.fit_cells(x),
                     evaluator.outside_cell(x),
                     f"{x.farthest:.3f}",
-                    evaluator.share(x.dent),
+                    evaluator.share(x.concavity),
                     FIGURE_8[eta2],
                 ]
             )
     header = ["η₂", "refinement", "vertices", *evaluator.FIT_HEADER, outside, "farthest"]
-    header += ["deepest dent", "vertices, PLAYGROUND, the paper"]
+    header += ["deepest concavity", "vertices, PLAYGROUND, the paper"]
     return "### Figures 8 and 9: η₂, and vertex refinement\n\n" + table(header, rows)
 
 
@@ -148,7 +148,7 @@ def comparison(
 ) -> str:
     """Section 6.2's comparison."""
     header = ["method", "vertices", "colours a frame", *evaluator.FIT_HEADER, outside]
-    header += ["farthest", "nearest colours", "deepest dent", "C against all frames"]
+    header += ["farthest", "nearest colours", "deepest concavity", "C against all frames"]
     if is_seasons:
         header.append("the paper's C")
     rows = []
@@ -156,7 +156,7 @@ def comparison(
         x = figures[name]
         row: list[Any] = [METHOD_NAMES[name], x.vertices, f"{x.colours:.1f}"]
         row += [*evaluator.fit_cells(x), evaluator.outside_cell(x), f"{x.farthest:.3f}"]
-        row += [f"{x.closest:.3f}", evaluator.share(x.dent), f"{pooled[name]:.4f}"]
+        row += [f"{x.closest:.3f}", evaluator.share(x.concavity), f"{pooled[name]:.4f}"]
         if is_seasons:
             row.append(COMPACTNESS.get(name))
         rows.append(row)

@@ -38,9 +38,9 @@ LARGEST = 2**20  # of colours that are counted as such numbers
 AGREE = 1e-6
 # The paper's rules and nothing of this program's: no shape terms, the authors' merge distance.
 PAPER_RULES = (
-    *("--method", "paper", "--convexity", "0", "--separation", "0"),
-    *("--reach", "0"),
-    *("--merge-distance", "0.1"),
+    *("--method", "paper", "--set", "convexity=0", "--set", "separation=0"),
+    *("--set", "reach=0"),
+    *("--set", "merge_distance=0.1"),
 )
 
 
@@ -59,7 +59,7 @@ class Cut:
         gaps[self.related] = np.inf
         return float(gaps.min())
 
-    def dent(self) -> float:
+    def concavity(self) -> float:
         """Return the share of its convex hull that the polyhedron lacks; nan without faces."""
         if len(self.rgb) < 4:
             return 0.0
@@ -67,7 +67,7 @@ class Cut:
             return float("nan")
         try:
             hull = ConvexHull(self.rgb).volume
-        except QhullError:  # flat: nothing to be dented
+        except QhullError:  # flat: nothing to be concave
             return 0.0
         a, b, c = (self.rgb[self.faces[:, i]] - self.rgb[0] for i in range(3))
         volume = float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum()) / 6
@@ -170,7 +170,7 @@ def _related(rgb: F64, frame: float, vertices: F64, edges: I32) -> NDArray[np.bo
 class Figures:
     """Means over the frames: R, C, L (eqs. 2 to 4), K (eq. 11), L' (eq. 12), share of pixels
     outside, of those farther than 1/255 (by the program alone), colours a frame; the farthest
-    pixel, the least distance of two colours at one time and the deepest dent of all frames."""
+    pixel, the least distance of two colours at one time and the deepest concavity of all frames."""
 
     vertices: int
     blocks: int
@@ -184,7 +184,7 @@ class Figures:
     outside_1_255: float | None
     farthest: float
     closest: float
-    dent: float
+    concavity: float
 
 
 def measure(
@@ -324,7 +324,7 @@ def _figures(palette: TimedPalette, rows: F64) -> Figures:
         outside_1_255=None,
         farthest=float(rows[:, 3].max()),
         closest=min(cut.closest() for cut in cuts),
-        dent=max(cut.dent() for cut in cuts),
+        concavity=max(cut.concavity() for cut in cuts),
     )
 
 

@@ -1,15 +1,14 @@
 """Bake an edit at one time into a file, and state the error of that file.
 
 `frame_edit` is the edit, `shaper` and `lut3d` sample it (or `cdl` fits it), `formats` and `writers`
-make a file of it, and `bake_error` reads that back and compares it with the edit.
+make a file of it, and `bake_error` reads that back and compares it with the edit. `bake_job` does
+that until the error is small enough.
 """
 
 import hashlib
 import json
 import os
-import uuid
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,24 +17,15 @@ from numpy.typing import NDArray
 from palette4d.lut_export import cdl as cdls
 from palette4d.lut_export import lut3d
 from palette4d.lut_export import shaper as shapers
-from palette4d.lut_export.bake_error import (
-    Measure,
-    Reader,
-    figures_info,
-    figures_text,
-    load,
-    measure,
-    stated,
-)
+from palette4d.lut_export.bake_error import Measure, load
+from palette4d.lut_export.bake_job import BakeSettings, Job, check_same, describe, grow, judged
 from palette4d.lut_export.formats import LutFormat, format_of, with_shaper
-from palette4d.lut_export.frame_edit import FrameEdit, frame_edit, frame_text
+from palette4d.lut_export.frame_edit import frame_edit
 from palette4d.lut_export.shaper import UNSHAPED, Choice, Kind, Shaper
-from palette4d.lut_export.spaces import INPUT, BakeSpace, space_of
-from palette4d.lut_export.writers import Description
+from palette4d.lut_export.spaces import INPUT, space_of
 
 from palette4d import _core
-from palette4d.colour.conversion_steps import Step
-from palette4d.colour.difference import VISIBLE, Viewing, viewing_of
+from palette4d.colour.difference import VISIBLE, viewing_of
 from palette4d.common.errors import Palette4dError
 from palette4d.common.files import refuse_existing, replacing
 from palette4d.grade import sidecar as sidecars
@@ -43,23 +33,6 @@ from palette4d.grade.document import Document
 from palette4d.media.source_clip import frame_colours
 
 F32 = NDArray[np.float32]
-
-#: The namespace of the files' ids (RFC 9562, version 5), drawn once for this project.
-NAMESPACE = uuid.UUID("09823ba4-0bc8-43a9-995d-cb9a6abeb5b3")
-
-
-@dataclass(frozen=True)
-class BakeSettings:
-    """What to bake at each frame; `bake` explains the members."""
-
-    size: int = 33
-    strength: float = 1.0
-    format: str | None = None
-    shaper: Choice = "auto"
-    domain: tuple[float, float] | None = None
-    max_error: float | None = None
-    space: str = INPUT
-    ocio_config: str | None = None
 
 
 @dataclass(frozen=True)
@@ -133,66 +106,6 @@ class BakeResult:
     def visible(self) -> bool:
         """Whether the error can be seen on the clip's own colours: deltaE 2000 above 1."""
         return self.clip is not None and self.clip.worst.delta_e_largest > VISIBLE
-
-
-@dataclass(frozen=True)
-class _Job:
-    """What stays the same while a LUT grows."""
-
-    sidecar: _core.Sidecar
-    sha256: str
-    frame: float
-    settings: BakeSettings
-    threads: int
-    format: LutFormat
-    space: BakeSpace
-    edit: FrameEdit
-    shaper: Shaper
-    viewing: Viewing
-    image: F32 | None
-    image_frame: int | None
-
-    @property
-    def steps(self) -> tuple[Step, ...]:
-        """The conversion beside the 3D LUT; empty where the LUT contains it."""
-        return self.space.steps if self.format.discrete else ()
-
-    @property
-    def conversion(self) -> str | None:
-        """The conversion and where it is; None without one."""
-        if not self.space.steps:
-            return None
-        where = "beside the 3D LUT, as transforms" if self.steps else "within the 3D LUT"
-        return f"{self.space.name} to {self.sidecar.clip['encoding']} and back {where}"
-
-    def dense(self) -> F32:
-        """Return the dense grid's colours in the file's space."""
-        grid = lut3d.dense_grid(self.shaper)
-        return self.space.of_palette(grid).astype(np.float32) if self.steps else grid
-
-    def measured(self, colours: F32, readers: Mapping[str, Reader]) -> Measure | None:
-        """Compare a file that was read back with the edit on some colours."""
-        domain = (self.shaper.low, self.shaper.high)
-        shaped = self.space.to_palette if self.steps else None
-        return measure(colours, readers, self.edit, self.viewing, domain, self.threads, shaped)
-
-    def content(self, size: int) -> lut3d.Lut3D | cdls.Cdl:
-        """Return what the file holds."""
-        if self.format.is_cdl:
-            return cdls.fit(self.edit, self.dense() if self.image is None else self.image)
-        # In a list of transforms the LUT takes and returns the palette's code values.
-        edit = replace(self.edit, conversion=None) if self.steps else self.edit
-        return lut3d.sample(edit, size, self.shaper, self.threads, self.steps)
-
-    def write(self, path: Path, content: lut3d.Lut3D | cdls.Cdl, about: Description) -> None:
-        """Write the file."""
-        if isinstance(content, cdls.Cdl):
-            shot = f"{self.sidecar.clip['name']}.{frame_text(self.frame)}"
-            text = cdls.write(content, self.format.name, shot, about)
-        else:
-            assert self.format.write is not None
-            text = self.format.write(content, about)
-        path.write_text(text, encoding="utf-8", newline="\n")
 
 
 def bake(
@@ -278,7 +191,7 @@ def bake(
     if not format_.is_cdl:
         seen = found_space.to_palette(image) if in_palette and image is not None else image
         chosen = _choose_shaper(settings, format_, palette, seen)
-    job = _Job(
+    job = Job(
         sidecar=sidecar,
         sha256=hashlib.sha256(data).hexdigest(),
         frame=float(frame),
@@ -293,12 +206,12 @@ def bake(
         image_frame=image_frame,
     )
     with replacing(output, force=force) as temporary:
-        content, readers, grid, on_clip = _grow(job, temporary)
-        about = _describe(job, content, (grid, on_clip))
+        content, readers, grid, on_clip = grow(job, temporary)
+        about = describe(job, content, (grid, on_clip))
         if format_.described:
             # Once more, now with its errors in it; the colours stay the same.
             job.write(temporary, content, about)
-            _check_same(load(temporary, format_.readings), readers, job, output)
+            check_same(load(temporary, format_.readings), readers, job, output)
     return BakeResult(
         output=str(output),
         format=format_.name,
@@ -321,11 +234,8 @@ def bake(
         grid=grid,
         clip=on_clip,
         clip_frame=image_frame if on_clip is not None else None,
-        error=_judged(grid, on_clip),
+        error=judged(grid, on_clip),
     )
-
-
-# ------------------------------------------------------------------------------ before any sampling
 
 
 def _opened(
@@ -422,120 +332,9 @@ def _choose_shaper(
     return shapers.choose(settings.shaper, max(low, -most), min(high, most))
 
 
-# ------------------------------------------------------------------------------ writing, measuring
-
-
-def _grow(
-    job: _Job, path: Path
-) -> tuple[lut3d.Lut3D | cdls.Cdl, dict[str, Reader], Measure, Measure | None]:
-    """Write files, larger and larger ones if need be, until the error is small enough."""
-    limit, size = job.settings.max_error, job.settings.size
-    while True:
-        content = job.content(size)
-        job.write(path, content, _describe(job, content, None))
-        readers = load(path, job.format.readings)
-        grid = job.measured(job.dense(), readers)
-        assert grid is not None  # the grid's colours are finite
-        clip = None if job.image is None else job.measured(job.image, readers)
-        if limit is None or _judged(grid, clip) <= limit:
-            return content, readers, grid, clip
-        larger = None if job.format.is_cdl else job.format.larger(size)
-        if larger is None:
-            raise Palette4dError(_too_far(job, size, grid, clip))
-        size = larger
-
-
-def _judged(grid: Measure, clip: Measure | None) -> float:
-    return (grid if clip is None else clip).worst.relative_largest
-
-
-def _too_far(job: _Job, size: int, grid: Measure, clip: Measure | None) -> str:
-    where = "the dense grid" if clip is None else f"the clip's colours at frame {job.image_frame}"
-    what = job.format.title if job.format.is_cdl else f"{job.format.title} with {size} a side"
-    text = (
-        f"the error stays above the limit: found |a-b|/max(|b|,0.1) of up to "
-        f"{stated(_judged(grid, clip))} on {where} with {what}, expected at most "
-        f"{job.settings.max_error:g}; nothing was written. "
-    )
-    if clip is not None and clip.outside_domain > 0:
-        return text + (
-            f"{clip.outside_domain:.3%} of the colours are clamped: choose a format with a shaper "
-            f"({with_shaper()}) or a wider --domain"
-        )
-    return text + "Allow a larger error, or use the node or `palette4d render`, which are exact"
-
-
-def _check_same(
-    written: Mapping[str, Reader], measured: Mapping[str, Reader], job: _Job, output: Path
-) -> None:
-    """Make sure that the final file holds what was measured."""
-    colours = job.dense()
-    for name, reader in written.items():
-        if not np.array_equal(reader(colours), measured[name](colours)):
-            raise Palette4dError(
-                f"{output}: read back, the file differs from what was measured; "
-                "nothing was written, please report this"
-            )
-
-
 def nearer(size: int | None) -> str:
     """Return what is nearer to an edit than a 3D LUT of a size; None: than a CDL."""
     if size is None:
         return "a 3D LUT (.clf, .cube) is nearer"
     exact = "the node and `palette4d render` are exact"
     return f"a larger --size is nearer; {exact}" if size < lut3d.LARGEST else exact
-
-
-def _describe(
-    job: _Job,
-    content: lut3d.Lut3D | cdls.Cdl,
-    errors: tuple[Measure, Measure | None] | None,
-) -> Description:
-    """Return what the file says about itself; the lines repeat the names and values of its Info."""
-    name, frame = job.sidecar.clip["name"], frame_text(job.frame)
-    encoding = job.space.name or "the clip's own encoding"
-    info: dict[str, Any] = {
-        "Clip": name,
-        "Frame": frame,
-        "Strength": repr(job.settings.strength),
-        "Encoding": encoding,
-        "SidecarSha256": job.sha256,
-        "Shaper": job.shaper.kind,
-        "Domain": f"{job.shaper.low:g} {job.shaper.high:g}",
-    }
-    if job.conversion is not None:
-        info["Conversion"] = job.conversion
-    if isinstance(content, lut3d.Lut3D):
-        what, held = f"3D LUT {content.size}", content.values.tobytes()
-    else:
-        what, held = "CDL", repr(content).encode()
-    lines = [
-        f"clip {name}, frame {frame}, strength {job.settings.strength:g}, {what}",
-        f"sidecar sha256 {job.sha256}",
-        f"shaper {job.shaper.text()}",
-    ]
-    if errors is not None:
-        info["Error"] = {}
-        measures = (
-            ("Grid", "dense grid", errors[0]),
-            ("Clip", f"clip's colours at frame {job.image_frame}", errors[1]),
-        )
-        for key, where, found in measures:
-            if found is not None:
-                info["Error"][key] = figures_info(found.worst)
-                lines.append(f"error on the {where}: {figures_text(found.worst)}")
-        info["Error"]["Colours"] = job.viewing.assumption
-        lines.append(f"errors hold for the readings {' and '.join(job.format.readings)}")
-        lines.append(f"deltaE: {job.viewing.assumption}")
-    made_from = f"{job.sha256} {job.frame!r} {job.settings.strength!r} {job.shaper!r}"
-    if job.space.steps:
-        made_from += f" {job.space.name} {json.dumps(job.steps)}"
-    digest = hashlib.sha256(f"{made_from} ".encode() + held).hexdigest()
-    return Description(
-        identifier=uuid.uuid5(NAMESPACE, digest).urn,
-        name=f"palette4d {name} frame {frame}",
-        lines=tuple(lines),
-        input_space=encoding,
-        output_space=encoding,
-        info={"AppRelease": f"palette4d {_core.__version__}", "Palette4D": info},
-    )

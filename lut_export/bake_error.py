@@ -109,7 +109,7 @@ class Measure:
     worst : Figures
         The larger of `by_reading`, figure by figure: a bound for every host.
     by_reading : dict of str to Figures
-        For each way in which hosts read the file.
+        For each reading of the file.
     """
 
     colours: int
@@ -260,7 +260,7 @@ def figures_info(figures: Figures) -> dict[str, str]:
 
 
 def table(rows: Iterable[tuple[str, Figures]]) -> list[str]:
-    """Return the lines of a table of errors, a row for each (name, figures)."""
+    """Return the lines of a printed table of errors, a row for each (name, figures)."""
     listed = list(rows)
     width = max(len(name) for name, _ in listed)
     lines = [

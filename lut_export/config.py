@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from palette4d.lut_export import series
-from palette4d.lut_export.bake import BakeSettings
 from palette4d.lut_export.bake_error import stated
+from palette4d.lut_export.bake_job import BakeSettings
 from palette4d.lut_export.between import LARGEST_DELTA_E, BetweenError, between_error, nearest
 from palette4d.lut_export.config_base import (
     ANY_SHOT,

@@ -166,7 +166,7 @@ def format_named(name: str) -> LutFormat:
 
 
 def format_of(path: Path, name: str | None = None) -> LutFormat:
-    """Return the format of a file: the one named, else the one its extension stands for.
+    """Return the format of a file: the one named, else that of its extension.
 
     Raises
     ------

@@ -17,7 +17,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from palette4d.lut_export.bake import BakeSettings, bake, check_settings, check_target
+from palette4d.lut_export.bake import bake, check_settings, check_target
+from palette4d.lut_export.bake_job import BakeSettings
 from palette4d.lut_export.formats import format_named
 from palette4d.lut_export.frame_edit import frame_text
 from palette4d.lut_export.series_index import (

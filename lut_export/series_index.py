@@ -1,4 +1,4 @@
-"""The index of a dated series, ``NAME.series.json`` (docs/exports.md)."""
+"""The index of a dated series, ``NAME.series.json`` (docs/files.md)."""
 
 import hashlib
 import json
@@ -6,7 +6,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from palette4d.lut_export.bake import BakeResult, BakeSettings
+from palette4d.lut_export.bake import BakeResult
+from palette4d.lut_export.bake_job import BakeSettings
 
 from palette4d import _core
 from palette4d.common.errors import Palette4dError

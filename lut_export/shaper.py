@@ -56,7 +56,7 @@ class Shaper:
         """
         if not (-LARGEST <= self.low < self.high <= LARGEST):
             raise Palette4dError(
-                f"found the domain {self.low:g} to {self.high:g}, expected two numbers within "
+                f"found the domain {self.low:g} to {self.high:g}, expected two code values within "
                 f"±{LARGEST:g}, the smaller one first"
             )
         if self.kind == "none" and (self.low, self.high) != (0.0, 1.0):

@@ -115,7 +115,7 @@ def space_of(
 
 
 def transforms(steps: tuple[Step, ...]) -> tuple[list[Any], list[Any]]:
-    """Return OpenColorIO's transforms of the steps, and those of the way back."""
+    """Return OpenColorIO's transforms of the steps, and of their inverse."""
     there = [_transform(step, back=False) for step in steps]
     return there, [_transform(step, back=True) for step in reversed(steps)]
 
@@ -152,10 +152,10 @@ def _transform(step: Step, back: bool) -> Any:
         return ocio.ExponentWithLinearTransform(
             [*step["gamma"], 1.0], [*step["offset"], 0.0], style, direction
         )
-    return _table(step, back)
+    return _half_lut(step, back)
 
 
-def _table(step: Step, back: bool) -> Any:
+def _half_lut(step: Step, back: bool) -> Any:
     """Return a 1D LUT over all half floats: their spacing suits every curve."""
     import PyOpenColorIO as ocio
 
@@ -164,7 +164,7 @@ def _table(step: Step, back: bool) -> Any:
     largest = float(np.finfo(np.float16).max)
     ramp = np.repeat(np.nan_to_num(at, nan=0, posinf=largest, neginf=-largest)[:, None], 3, axis=1)
     values = chain.to_clip(ramp) if back else chain.to_palette(ramp)
-    table = ocio.Lut1DTransform(length=65536, inputHalfDomain=True)
-    table.setFileOutputBitDepth(ocio.BIT_DEPTH_F32)
-    table.setData(np.clip(values, -3e38, 3e38).astype(np.float32).ravel())
-    return table
+    lut = ocio.Lut1DTransform(length=65536, inputHalfDomain=True)
+    lut.setFileOutputBitDepth(ocio.BIT_DEPTH_F32)
+    lut.setData(np.clip(values, -3e38, 3e38).astype(np.float32).ravel())
+    return lut

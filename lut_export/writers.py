@@ -136,7 +136,7 @@ def by_baker(format_name: str) -> Writer:
         import PyOpenColorIO as ocio
 
         config = ocio.Config.CreateRaw()
-        # Not "raw": a data space takes part in no conversion and the table would be the identity.
+        # Not "raw": OpenColorIO does not convert data, and the 3D LUT would be the identity.
         config.addColorSpace(ocio.ColorSpace(name="before"))
         after = ocio.ColorSpace(name="after")
         steps = [*lut.shaper.transforms(), lut3d(lut.values)]

@@ -2,43 +2,15 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
-
 import numpy as np
 from numpy.typing import NDArray
-from palette4d.analysis import statistics
+from palette4d.analysis import colour_statistics
 from palette4d.analysis.options import AnalysisOptions
 
 from palette4d import _core
 from palette4d.grade import sidecar
 
 F32 = NDArray[np.float32]
-
-
-class ArrayClip:
-    """A clip in memory: what the pipeline asks of a clip, over arrays."""
-
-    def __init__(self, frames: list[F32], first: int = 1001, step: int = 1) -> None:
-        self.images = frames
-        self.frames = [first + step * i for i in range(len(frames))]
-        self.name, self.source, self.encoding = "array", "array.####.exr", "unknown"
-        self.rate = Fraction(24)
-        self.height, self.width = frames[0].shape[:2]
-        self.skipped: list[int] = []
-        self.skip_bad_frames = False
-        self.premultiplied = False
-
-    def iter_colours(self):
-        yield from zip(self.frames, self.images, strict=True)
-
-    def fills(self, frames):
-        for number in frames:
-            image = self.images[self.frames.index(number)]
-            yield number, lambda binner, image=image: self._fill(binner, image)
-
-    def _fill(self, binner, image) -> bool:
-        binner.add(image)
-        return False
 
 
 def noise(seed: int, scale: float = 1.0, offset: float = 0.0, size: tuple[int, int] = (20, 30)):
@@ -65,7 +37,7 @@ def mixture(corners, seed: int, pixels: int = 600) -> F32:
 
 def stats(images: list[F32], options: AnalysisOptions | None = None, first: int = 0):
     options = options or AnalysisOptions()
-    out = [statistics.gather(first + i, image, options) for i, image in enumerate(images)]
+    out = [colour_statistics.gather(first + i, image, options) for i, image in enumerate(images)]
     assert all(s is not None for s in out)
     return out
 

@@ -39,14 +39,14 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d.analysis.losses import NO_FACES, colour_scale
-from palette4d.analysis.options import AnalysisOptions
+from palette4d.analysis.convex_hulls import THIN, hull_mesh, two_sided
+from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
+from palette4d.analysis.losses import NO_FACES
 from palette4d.analysis.polytope import Section, SkewPolytope
-from palette4d.analysis.statistics import FrameStatistics
 from scipy.spatial import ConvexHull, QhullError
 
 from palette4d import _core
@@ -64,8 +64,6 @@ LEAST_VERTICES = 8
 ROUND = 0.8
 # How far beyond the gamut a new vertex may lie, in units of the gamut, before it is clipped.
 OVERSHOOT = 0.3
-# Colours within half an 8-bit step of a plane, a line or a point fill nothing.
-THIN = 0.5 / 255
 EXACTLY_FLAT = 1e-9
 # Hulls whose facets qhull could not tell apart are told apart by moving colours this little.
 JITTERS = (0.0, 1e-9, 1e-7, 1e-5)
@@ -84,9 +82,7 @@ class _IllFormedError(Palette4dError):
 
 def rgbt_polytope(
     frames: Sequence[FrameStatistics],
-    low: F64,
-    high: F64,
-    options: AnalysisOptions,
+    gamut: Gamut,
     vertices: int = VERTICES,
     progress: Callable[[int, int], None] | None = None,
 ) -> SkewPolytope:
@@ -95,8 +91,7 @@ def rgbt_polytope(
     Parameters
     ----------
     frames : at least one frame, in order of time.
-    low, high : (3,) the gamut box; vertices are clipped to it.
-    options : accepted as by the other stages; the hull has no weights.
+    gamut : vertices are clipped to it.
     vertices : the most 4D vertices wanted, at least `LEAST_VERTICES`. Clipping may leave fewer.
     progress : called as progress(done, total) while vertices are removed.
 
@@ -105,31 +100,29 @@ def rgbt_polytope(
     Palette4dError
         When fewer than `LEAST_VERTICES` vertices are asked for, or rounding leaves no usable hull.
     """
-    del options
     if vertices < LEAST_VERTICES:
         raise Palette4dError(
             f"vertices of the RGBT hull: found {vertices}, expected at least {LEAST_VERTICES}: "
             "four at either end of the clip enclose a volume"
         )
     numbers = np.array([frame.frame for frame in frames], float)
-    points = all_extremes(frames, low, high)
+    points = all_extremes(frames, gamut)
     if len(frames) > 1:
-        points = simplified(points, numbers[0], numbers[-1], low, high, vertices, progress)
+        points = simplified(points, numbers[0], numbers[-1], gamut, vertices, progress)
         points[:, 3] = _nearest(numbers, points[:, 3])
-        points[:, :3] = np.clip(points[:, :3], low, high)
-        return convex_polytope(points, numbers, colour_scale(low, high))
-    colours = _simplified_colours(points[:, :3], low, high, vertices)
-    return _still(np.clip(colours, low, high), numbers[0], colour_scale(low, high))
+        points[:, :3] = gamut.clip(points[:, :3])
+        return convex_polytope(points, numbers, gamut.scale)
+    colours = _simplified_colours(points[:, :3], gamut, vertices)
+    return _still(gamut.clip(colours), numbers[0], gamut.scale)
 
 
-def all_extremes(frames: Sequence[FrameStatistics], low: F64, high: F64) -> F64:
+def all_extremes(frames: Sequence[FrameStatistics], gamut: Gamut) -> F64:
     """Return the (n, 4) corners of every frame's hull: r, g, b, frame."""
-    scale = colour_scale(low, high)
     return np.vstack(
         [
             np.column_stack([rgb, np.full(len(rgb), float(frame.frame))])
             for frame in frames
-            for rgb in (_extremes(frame.colours.rgb, scale),)
+            for rgb in (_extremes(frame.colours.rgb, gamut.scale),)
         ]
     )
 
@@ -138,8 +131,7 @@ def simplified(
     points: F64,
     first: float,
     last: float,
-    low: F64,
-    high: F64,
+    gamut: Gamut,
     vertices: int,
     progress: Callable[[int, int], None] | None = None,
 ) -> F64:
@@ -149,11 +141,11 @@ def simplified(
     More are left only where the hull of the points cannot be simplified so far. Points that fill
     nothing (see `THIN`) come back moved into the flat space around them.
     """
-    flat = _Flat.around(_normalised(points, first, last, low, high), THIN)
+    flat = _Flat.around(_normalised(points, first, last, gamut), THIN)
     hull = _hull(flat.coordinates)
-    scale = colour_scale(low, high)
+    low, scale = gamut.low, gamut.scale
     if hull.points.shape[1] > 1:
-        limits = flat.limits((high - low) / scale)
+        limits = flat.limits((gamut.high - low) / scale)
         hull = _simplify(hull, vertices, limits, progress)
         hull = _simplify(hull, vertices, limits[:2])  # time alone, where that was not enough
     unit = flat.back(hull.points)
@@ -177,7 +169,7 @@ def convex_polytope(points: F64, frames: F64, scale: float = 1.0) -> SkewPolytop
         When rounding leaves no usable hull.
     """
     points = np.unique(points[:, [3, 0, 1, 2]], axis=0)[:, [1, 2, 3, 0]]  # in order of time
-    unit = _normalised(points, frames[0], frames[-1], np.zeros(3), np.full(3, scale))
+    unit = _normalised(points, frames[0], frames[-1], Gamut(np.zeros(3), np.full(3, scale)))
     flat = _Flat.around(unit, THIN)
     if len(flat.axes) < 3:
         points = np.column_stack([scale * flat.back(flat.coordinates)[:, :3], points[:, 3]])
@@ -186,8 +178,9 @@ def convex_polytope(points: F64, frames: F64, scale: float = 1.0) -> SkewPolytop
     noise[:, -1] = 0
     for jitter in JITTERS:
         try:
-            hull = _hull(flat.coordinates + jitter * noise)
-            lattice = _Lattice(points[hull.used], hull)
+            moved = flat.coordinates + jitter * noise
+            hull = _hull(moved)
+            lattice = _Lattice(points[hull.used], hull, flat.back(moved)[hull.used])
             return _sections(lattice, frames)
         except _IllFormedError:
             continue
@@ -265,11 +258,10 @@ def _simplify(
     return hull
 
 
-def _normalised(points: F64, first: float, last: float, low: F64, high: F64) -> F64:
+def _normalised(points: F64, first: float, last: float, gamut: Gamut) -> F64:
     """Colours with the gamut as one unit, and times with the clip as one."""
-    return np.column_stack(
-        [(points[:, :3] - low) / colour_scale(low, high), (points[:, 3] - first) / (last - first)]
-    )
+    colours = (points[:, :3] - gamut.low) / gamut.scale
+    return np.column_stack([colours, (points[:, 3] - first) / (last - first)])
 
 
 @dataclasses.dataclass(frozen=True)
@@ -337,17 +329,17 @@ def _extremes(rgb: F64, scale: float) -> F64:
         return rgb
 
 
-def _simplified_colours(rgb: F64, low: F64, high: F64, vertices: int) -> F64:
+def _simplified_colours(rgb: F64, gamut: Gamut, vertices: int) -> F64:
     """Return at most `vertices` colours around the (n, 3) colours of a single frame."""
-    scale = colour_scale(low, high)
+    scale = gamut.scale
     axes = _axes(rgb, THIN * scale)
     centre: F64 = rgb.mean(axis=0)
     if len(axes) == 0:
         return centre[None]
     hull = _hull((rgb - centre) @ axes.T)
     if len(axes) > 1:
-        floor = low - OVERSHOOT * scale - centre
-        ceiling = high + OVERSHOOT * scale - centre
+        floor = gamut.low - OVERSHOOT * scale - centre
+        ceiling = gamut.high + OVERSHOOT * scale - centre
         limits = np.vstack([np.column_stack([axes.T, floor]), np.column_stack([-axes.T, -ceiling])])
         hull = _simplify(hull, vertices, limits)
         hull = _simplify(hull, vertices, limits[:0])
@@ -374,16 +366,17 @@ def _nearest(numbers: F64, times: F64) -> F64:
 
 
 class _Lattice:
-    """The vertices, edges and facets of a hull in d dimensions, the last of which is time."""
+    """The vertices, edges and facets of a hull in d dimensions, the last of which is time.
 
-    def __init__(self, vertices: F64, hull: _Hull) -> None:
-        self.vertices = vertices
+    `shape` are the vertices as the hull sees them, told apart and normalised.
+    """
+
+    def __init__(self, vertices: F64, hull: _Hull, shape: F64) -> None:
+        self.vertices, self.shape = vertices, shape
         self.dimensions = hull.points.shape[1]
         self.times, self.level = np.unique(vertices[:, 3], return_inverse=True)
-        self.facet_vertices: dict[int, set[int]] = {}
         around: dict[Cut, set[int]] = {}
         for simplex, facet in zip(hull.simplices.tolist(), hull.facets.tolist(), strict=True):
-            self.facet_vertices.setdefault(facet, set()).update(simplex)
             for v in simplex:
                 around.setdefault((v,), set()).add(facet)
             for u, w in itertools.combinations(sorted(simplex, key=self._place), 2):
@@ -415,123 +408,34 @@ class _Lattice:
         return [c for c in self.facets if len(c) == 2 and level[c[0]] <= i < level[c[1]]]
 
     def colours(self, cuts: Sequence[Cut], t: float) -> F64:
-        """Return the (n, 3) colours of a slice."""
-        u = self.vertices[[c[0] for c in cuts]]
-        w = self.vertices[[c[-1] for c in cuts]]
-        span = w[:, 3] - u[:, 3]
-        weight = (t - u[:, 3]) / np.where(span > 0, span, 1)
-        out: F64 = u[:, :3] + weight[:, None] * (w - u)[:, :3]
+        """Return the (n, 3) colours of the shape in the slice at t."""
+        early, late = ([cut[end] for cut in cuts] for end in (0, -1))
+        start, end = self.vertices[early, 3], self.vertices[late, 3]
+        weight = (t - start) / np.where(end > start, end - start, 1)
+        out: F64 = self.shape[early, :3] + weight[:, None] * (
+            self.shape[late, :3] - self.shape[early, :3]
+        )
         return out
 
     def surface(self, cuts: Sequence[Cut], t: float) -> I32:
-        """Return the (f, 3) outward triangles over the cuts of the slice at t; none for a line."""
-        inside: dict[int, set[int]] = {}
-        for n, cut in enumerate(cuts):
-            for facet in self.facets[cut]:
-                inside.setdefault(facet, set()).add(n)
-        if self.dimensions <= 2 or len(cuts) <= 2:
-            if len(cuts) > 2:
-                raise _IllFormedError
+        """Return the outward triangles over the cuts of the slice at t, which is convex; none for a
+        point or a line, two sides for a polygon."""
+        if len(cuts) <= 2:
             return NO_FACES
-        # A facet that lies in the slice bounds nothing of it.
-        for facet, members in self.facet_vertices.items():
-            if {cuts[n] for n in inside.get(facet, ())} == {(v,) for v in members}:
-                del inside[facet]
-        if self.dimensions == 3:
-            sides = {frozenset(members) for members in inside.values() if len(members) == 2}
-            return _two_sided(_cycle(sides, set(range(len(cuts)))))
-        cycles: dict[frozenset[int], list[int]] = {}
-        for members in inside.values():
-            if len(members) > 2 and frozenset(members) not in cycles:
-                shared = (members & other for other in inside.values())
-                sides = {frozenset(pair) for pair in shared if len(pair) == 2}
-                cycles[frozenset(members)] = _cycle(sides, members)
-        polygons = list(cycles.values())
-        if len(polygons) == 1 and len(polygons[0]) == len(cuts):
-            return _two_sided(polygons[0])
-        faces = np.array([f for p in _oriented(polygons) for f in _fan(p)], np.int32)
-        if not _is_sphere(faces, len(cuts)):
+        colours = self.colours(cuts, t)
+        axes = _axes(colours, EXACTLY_FLAT)
+        try:
+            if len(axes) == 2:
+                polygon = ConvexHull(colours @ axes.T).vertices
+                faces, corners = two_sided(polygon), len(polygon)
+            else:
+                mesh = hull_mesh(colours)
+                faces, corners = mesh.faces, len(mesh.rgb)
+        except QhullError:
+            raise _IllFormedError from None
+        if corners != len(cuts):  # all cuts of a convex polytope are corners
             raise _IllFormedError
-        corners = self.colours(cuts, t)[faces]
-        corners = corners - corners.mean(axis=(0, 1))
-        volume = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
-        return faces if volume >= 0 else np.ascontiguousarray(faces[:, ::-1])
-
-
-def _cycle(sides: Iterable[frozenset[int]], members: set[int]) -> list[int]:
-    """Return the members of a polygon in the order in which its sides join them."""
-    beside: dict[int, list[int]] = {member: [] for member in sorted(members)}
-    for side in sides:
-        for a, b in itertools.permutations(side):
-            beside[a].append(b)
-    if any(len(both) != 2 for both in beside.values()):
-        raise _IllFormedError
-    start = min(members)
-    order, at = [start], min(beside[start])
-    while at != start:
-        one, other = beside[at]
-        order.append(at)
-        at = other if one == order[-2] else one
-    if len(order) != len(members):
-        raise _IllFormedError
-    return order
-
-
-def _fan(polygon: Sequence[int]) -> Iterator[tuple[int, int, int]]:
-    for a, b in itertools.pairwise(polygon[1:]):
-        yield polygon[0], a, b
-
-
-def _two_sided(polygon: list[int]) -> I32:
-    """Return a flat polygon's front and back, whose fans share no diagonal."""
-    back = [polygon[1], polygon[0], *polygon[:1:-1]]
-    return np.array([*_fan(polygon), *_fan(back)], np.int32)
-
-
-def _oriented(polygons: list[list[int]]) -> list[list[int]]:
-    """Turn the polygons of a closed surface round until neighbours agree."""
-    at_side: dict[frozenset[int], list[int]] = {}
-    for n, polygon in enumerate(polygons):
-        for side in _sides(polygon):
-            at_side.setdefault(frozenset(side), []).append(n)
-    if not polygons or any(len(both) != 2 for both in at_side.values()):
-        raise _IllFormedError
-    out, pending = {0: polygons[0]}, [0]
-    while pending:
-        n = pending.pop()
-        for side in _sides(out[n]):
-            for m in at_side[frozenset(side)]:
-                if m not in out:
-                    same = side in set(_sides(polygons[m]))
-                    out[m] = polygons[m][::-1] if same else polygons[m]
-                    pending.append(m)
-    return [out[n] for n in sorted(out)]
-
-
-def _sides(polygon: Sequence[int]) -> list[tuple[int, int]]:
-    return list(zip(polygon, [*polygon[1:], polygon[0]], strict=True))
-
-
-def _is_sphere(faces: I32, corners: int) -> bool:
-    """Whether the triangles are one closed, oriented surface with one ring around each corner."""
-    after: list[dict[int, int]] = [{} for _ in range(corners)]
-    for a, b, c in faces.tolist():
-        for at, left, right in ((a, b, c), (b, c, a), (c, a, b)):
-            if left in after[at]:
-                return False
-            after[at][left] = right
-    for ring in after:
-        if not ring:
-            return False
-        start = at = next(iter(ring))
-        steps = 0
-        while steps == 0 or at != start:
-            if at not in ring:
-                return False
-            at, steps = ring[at], steps + 1
-        if steps != len(ring):
-            return False
-    return len(faces) == 2 * corners - 4
+        return faces
 
 
 # ------------------------------------------------------------------------------------- sections

@@ -1,8 +1,8 @@
 """One palette for the whole clip, as section 6.2 compares with: a static, refined RGB hull.
 
-Input: the palette of all frames' pixels taken together. Output: a `SkewPolytope` of one block whose
-colours do not change; each has a vertex at the first and one at the last frame, the two keyframes
-of section 6.2. It is refined against the loss of every frame (eq. 8).
+Input: the colours of all frames. Output: `SkewPolytope`s of one block whose colours do not change;
+each colour has a vertex at the first and one at the last frame, the two keyframes of section 6.2.
+They are refined by the loss of every frame (eq. 8).
 """
 
 from __future__ import annotations
@@ -12,21 +12,47 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d.analysis.frame_hulls import THIN, hull_mesh
+from palette4d.analysis.convex_hulls import THIN, hull_mesh
+from palette4d.analysis.frame_hulls import frame_palette
+from palette4d.analysis.frame_statistics import FrameStatistics, Gamut, pooled
 from palette4d.analysis.objective import refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Palette, Section, SkewPolytope
-from palette4d.analysis.statistics import FrameStatistics
 
 F64 = NDArray[np.float64]
 
 EVALUATIONS = 100
+# All frames together keep so many times as many coarse colours as one frame.
+POOLED = 2
+# Static hulls start from all of these colours, a half, a quarter.
+STARTS = 3
+# In clips of fewer frames little moves, and a static hull is hard to beat: all starts are tried.
+SHORT = 48
 
 
-def plain(options: AnalysisOptions) -> Iterator[AnalysisOptions]:
-    """Yield options of hulls of `palette_size` colours for the paper's loss, without our terms and
-    in wide boxes: one, one kept as convex as asked for, and one that starts farther from where
-    simplification left it. On each of the clips tried, one of the three is the best by far."""
+def static_hulls(
+    frames: Sequence[FrameStatistics], gamut: Gamut, options: AnalysisOptions, starts: int = STARTS
+) -> Iterator[SkewPolytope]:
+    """Yield refined static palettes from several starts."""
+    for start in range(starts):
+        most = POOLED * options.coarse_colours // 2**start
+        palette = frame_palette(pooled([f.coarse for f in frames], most), gamut, options)
+        yield static_polytope(palette, frames, gamut, options)
+
+
+def plain_hulls(
+    frames: Sequence[FrameStatistics], gamut: Gamut, options: AnalysisOptions
+) -> Iterator[SkewPolytope]:
+    """Yield static palettes of no more than `vertices`, refined for the paper's loss."""
+    for plain in plain_options(options):
+        for hull in static_hulls(frames, gamut, plain, STARTS if len(frames) < SHORT else 1):
+            if not options.vertices or len(hull.vertices) <= options.vertices:
+                yield hull
+
+
+def plain_options(options: AnalysisOptions) -> Iterator[AnalysisOptions]:
+    """Yield options without terms for shape, with wide boxes: one, one that keeps `convexity`, and
+    one that starts farther from the simplified hull. Each is the best by far on some clips."""
     for convexity, start in ((0.0, 1.0), (options.convexity, 1.0), (0.0, 2.0)):
         yield dataclasses.replace(
             options,
@@ -40,38 +66,34 @@ def plain(options: AnalysisOptions) -> Iterator[AnalysisOptions]:
 
 
 def static_polytope(
-    palette: Palette,
-    statistics: Sequence[FrameStatistics],
-    low: F64,
-    high: F64,
-    options: AnalysisOptions,
+    palette: Palette, frames: Sequence[FrameStatistics], gamut: Gamut, options: AnalysisOptions
 ) -> SkewPolytope:
     """Return the palette, refined, as a polytope that does not change with time."""
-    first, last = float(statistics[0].frame), float(statistics[-1].frame)
+    first, last = float(frames[0].frame), float(frames[-1].frame)
     count = len(palette.rgb)
-    # A track of one vertex is a colour that stays: what moves is the palette of all frames.
-    still = SkewPolytope(
-        np.column_stack([palette.rgb, np.full(count, first)]),
-        (Section(first, last, tuple((i,) for i in range(count)), palette.faces),),
-        (),
+
+    def polytope(vertices: F64, tracks: Sequence[tuple[int, ...]]) -> SkewPolytope:
+        return SkewPolytope(vertices, (Section(first, last, tuple(tracks), faces),), ())
+
+    faces = palette.faces
+    # A track of one vertex is a colour that stays.
+    still = polytope(
+        np.column_stack([palette.rgb, np.full(count, first)]), [(i,) for i in range(count)]
     )
-    still, _ = refine_jointly(still, statistics, low, high, options, EVALUATIONS, coarse=True)
-    faces = _unfolded(still.vertices[:, :3], palette.faces)
+    still, _ = refine_jointly(still, frames, gamut, options, EVALUATIONS, coarse=True)
+    faces = _unfolded(still.vertices[:, :3], faces)
     if first == last:
-        return dataclasses.replace(
-            still, blocks=(dataclasses.replace(still.blocks[0], faces=faces),)
-        )
+        return polytope(still.vertices, still.blocks[0].tracks)
     ends = still.vertices.copy()
     ends[:, 3] = last
-    tracks = tuple((i, count + i) for i in range(count))
-    return SkewPolytope(
-        np.vstack([still.vertices, ends]), (Section(first, last, tracks, faces),), ()
-    )
+    return polytope(np.vstack([still.vertices, ends]), [(i, count + i) for i in range(count)])
 
 
 def _unfolded(rgb: F64, faces: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return the faces of the colours' convex hull, if all of them are its corners: the losses see
-    that alone, and without `convexity` a mesh may fold while its colours move."""
+    """Return the faces of the convex hull of the colours, if all of them are its corners.
+
+    The losses see the convex hull only: without `convexity` the mesh may fold as its colours move.
+    """
     spread = np.linalg.svd(rgb - rgb.mean(axis=0), compute_uv=False)
     if len(rgb) < 4 or spread[2] < THIN:
         return faces

@@ -1,33 +1,36 @@
-"""What a report's figures mean for the user: warnings, each with what would help.
+"""What the figures of a report mean for the user: warnings, each with a remedy.
 
-Input: the `Report` of a finished palette, the options it was found with, and how far outside the
-farthest pixels lie at each stage. Output: sentences. What helps differs from method to method: an
-option that a method does not look at is never advised. docs/palettes.md says on which clips each
-was tried.
+Input: the `Report` of a finished palette, the options it was found with, and the farthest pixel at
+each stage. Output: sentences. A remedy names only options that affect the method in use.
+docs/palettes.md lists the warnings and the clips on which the remedies were tried.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
+from palette4d.analysis.convex_hulls import CONCAVE
 from palette4d.analysis.losses import LOST_SHARE
-from palette4d.analysis.options import METHODS_OF, AnalysisOptions
-from palette4d.analysis.report.quality import DENT, Report
+from palette4d.analysis.options import OPTIONS, AnalysisOptions
+from palette4d.analysis.report.quality import Report
 
 from palette4d.common.text import counted
 
-# What is worth a warning.
-BAD_FRAME = 4.0  # times the median frame's L ...
-BAD_L = 0.3  # ... and at least this, or the clip's mean
-LOOKALIKE = 0.06  # RGB distance of two handles
-UNUSED = 0.001  # largest mean weight of a handle in any frame
-FARTHER = 1.4  # times as far out as a simpler palette leaves them: lost pixels
-# What lets colours change at once: less held against a jump, handles cheaper, more blocks.
+# A frame fits badly above this multiple of the median frame's L, and above `BAD_L`.
+BAD_FRAME, BAD_L = 4.0, 0.3
+# Two handles at a smaller RGB distance look alike.
+LOOKALIKE = 0.06
+# A handle is unused whose mean weight is smaller in every frame.
+UNUSED = 0.001
+# Pixels count as lost if a simpler palette leaves them so much nearer.
+FARTHER = 1.4
+# Settings with which colours may change at once.
 AT_ONCE = {"gamma": 0.0003, "handle_cost": 0.001, "blocks": 9}
-# No display-referred picture and no log goes so far.
+# No display-referred picture and no log encoding has larger code values.
 BRIGHT = 2.0
 
 DEFAULT = "the default --method skew"
+PARTS = "analyse parts of the clip by themselves with --frames"
 
 
 def warnings(
@@ -37,27 +40,27 @@ def warnings(
     *,
     brightest: float,
 ) -> tuple[str, ...]:
-    """Return what does not fit, with what would help.
+    """Return what does not fit, and what helps.
 
     Parameters
     ----------
     report : of the finished palette.
-    options : what it was found with.
-    farthest : for each stage of the analysis, how far outside its farthest pixel lies.
-    brightest : its largest number. Where that is scene-linear light distances mean little: nothing
-        else is said then.
+    options : the options that it was found with.
+    farthest : the distance of the farthest pixel outside, by stage.
+    brightest : the largest code value of the palette. In scene-linear light distances mean little:
+        that is then the only warning.
     """
     if brightest > BRIGHT:
         return (
-            f"the clip's numbers go to {brightest:.3g}: if it is scene-linear light, neither these "
-            "figures nor other options are of use; say what it is with --input-space (ACEScg, for "
-            "example) and leave --palette-space out: the palette is then found in a log encoding",
+            f"the clip has code values up to {brightest:.3g}: if it is scene-linear, these figures "
+            "mean little; give its colour space with --input-space (such as ACEScg), and leave out "
+            "--palette-space: the palette is then found in a log encoding",
         )
     found = (
         _fit(report, options),
         _lost(report, options, farthest),
         _lookalikes(report, options),
-        _dent(report),
+        _concave(report),
         _unused(report, options),
     )
     return tuple(text for text in found if text)
@@ -76,37 +79,23 @@ def _fit(x: Report, options: AnalysisOptions) -> str:
         what = f"the palette fits the clip loosely (mean L {x.mean_loss:.2f})"
     else:
         return ""
-    at_once = " ".join(f"--{name.replace('_', '-')} {at:g}" for name, at in AT_ONCE.items())
     if options.method in ("static", "rgbt"):
         ways = f"{DEFAULT} follows the colours"
-        if bad:
-            ways += f", with {at_once} also those of a flash"
-        return f"{what}; {ways}"
-    if options.method == "paper":
-        ways = "lower --eta2 or --eta1 for more handles"
-        ways += ", lower --gamma for those of a flash" if bad else f", take {DEFAULT}"
+    elif options.method == "paper":
+        ways = "lower eta2 or eta1 with --set" + (", lower gamma for a flash" if bad else "")
     elif options.vertices:
-        ways = "raise --vertices"
-    elif options.handle_cost > AnalysisOptions().handle_cost:
-        ways = "lower --handle-cost for more handles"
+        ways = f"raise --vertices, or {PARTS}"
     elif bad:
-        if (
-            options.gamma <= AT_ONCE["gamma"]
-            and options.handle_cost <= AT_ONCE["handle_cost"]
-            and options.blocks >= AT_ONCE["blocks"]
-        ):
-            return f"{what}; analyse parts of the clip apart with --frames"
-        return (
-            f"{what}; analyse parts of the clip apart with --frames, or try {at_once}, with which "
-            "colours may change at once, as in a flash"
-        )
+        given = all(getattr(options, name) == value for name, value in AT_ONCE.items())
+        settings = " ".join(f"--set {name}={value}" for name, value in AT_ONCE.items())
+        ways = PARTS if given else f"{PARTS}, or, for a flash, try {settings}"
     else:
-        ways = "lower --handle-cost or raise --blocks for more handles"
-    return f"{what}; {ways}, or analyse parts of the clip apart with --frames"
+        ways = f"lower handle_cost or raise blocks with --set, or {PARTS}"
+    return f"{what}; {ways}"
 
 
 def _lost(x: Report, options: AnalysisOptions, farthest: Mapping[str, float]) -> str:
-    """Rare colours, such as lights, that simpler palettes hold better."""
+    """Rare colours, such as small highlights, that simpler palettes hold better."""
     frame = x.most_lost
     simpler = {
         "single frames' hulls leave": "frame_hulls",
@@ -121,19 +110,17 @@ def _lost(x: Report, options: AnalysisOptions, farthest: Mapping[str, float]) ->
         return ""
     where = " and ".join(f"{words} {distance:.2f}" for words, distance in nearer.items())
     ways = f"{DEFAULT} follows the colours"
-    if options.method in METHODS_OF["reach"]:
-        reach = f"lower --reach (to {options.reach / 2:.2g}, say)"
-        if options.reach == 0:  # without it no distance counts more than once
-            reach = f"raise --reach to {AnalysisOptions().reach:g}"
+    if options.method in OPTIONS["reach"].methods:
+        reach = options.reach / 2 or OPTIONS["reach"].default
         ways = (
-            f"raise --lambda (to {10 * options.lambda_:g}, say) or {reach}, so that rare colours "
-            f"count more, or lower --k where they are fewer than {options.k:g} pixels"
+            f"try --set lambda={10 * options.lambda_:g} or --set reach={reach:.2g}, so that rare "
+            f"colours count more, or a lower --set k=N if they have fewer than {options.k:g} pixels"
         )
-    static = ", or take --method static" if "one static palette leaves" in nearer else ""
+    static = ", or --method static" if "one static palette leaves" in nearer else ""
     return (
         f"in frame {frame.frame} colours of {frame.lost:.2%} of the picture lie up to "
-        f"{frame.farthest:.2f} outside the palette, where {where}: if they are lights rather than "
-        f"faulty pixels, {ways}{static}"
+        f"{frame.farthest:.2f} outside the palette, where {where}: if they are highlights rather "
+        f"than faulty pixels, {ways}{static}"
     )
 
 
@@ -141,23 +128,23 @@ def _lookalikes(x: Report, options: AnalysisOptions) -> str:
     if x.closest is None or x.closest[0] >= LOOKALIKE:
         return ""
     distance, frame, one, other = x.closest
-    ways = "ask for a smaller --palette-size, or raise --separation or --merge-distance"
+    ways = "with --set, lower palette_size, or raise separation or merge_distance"
     if options.method == "rgbt":
         ways = f"{DEFAULT} keeps them apart"
-    elif options.method == "skew":  # in a short clip the result may be a static palette
-        ways += ", or, where little moves, take --method static"
+    elif options.method == "skew":  # a short clip may have a static palette
+        ways += "; or, if little moves, take --method static"
     return (
         f"near frame {frame} the handles {one} and {other} are hard to tell apart "
         f"({distance:.2f} apart): {ways}"
     )
 
 
-def _dent(x: Report) -> str:
-    if x.dent[0] <= DENT:
+def _concave(x: Report) -> str:
+    if x.concavity[0] <= CONCAVE:
         return ""
     return (
-        f"at frame {x.dent[1]} the palette is dented (it lacks {x.dent[0]:.0%} of its convex hull)"
-        ": raise --convexity, or recoloured gradients may step there"
+        f"at frame {x.concavity[1]} the palette is not convex (it lacks {x.concavity[0]:.0%} of "
+        "its convex hull), and recoloured gradients may step there: raise --set convexity=X"
     )
 
 
@@ -166,12 +153,9 @@ def _unused(x: Report, options: AnalysisOptions) -> str:
     if use >= UNUSED:
         return ""
     ways = {
-        "skew": "raise --handle-cost, or ask for fewer --vertices",
-        "paper": "raise --eta2",
-        "static": "raise --merge-distance, or ask for a smaller --palette-size",
+        "skew": "raise --set handle_cost=X, or ask for fewer --vertices",
+        "paper": "raise --set eta2=X",
+        "static": "with --set, raise merge_distance or lower palette_size",
         "rgbt": "ask for fewer --vertices",
-    }
-    return (
-        f"the handle {handle} weighs less than {UNUSED:.1%} in every frame: "
-        + (ways[options.method])
-    )
+    }[options.method]
+    return f"the handle {handle} weighs less than {UNUSED:.1%} in every frame: {ways}"

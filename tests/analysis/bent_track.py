@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from palette4d.analysis.frame_hulls import hull_mesh
+from palette4d.analysis.convex_hulls import hull_mesh
 from palette4d.analysis.polytope import Section, SkewPolytope
 
 FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])

@@ -14,14 +14,15 @@ from typing import Any
 import any_clips
 import numpy as np
 import pytest
-from palette4d.analysis import cuts, pipeline, statistics
-from palette4d.analysis.methods import Analysis
+from palette4d.analysis import colour_statistics, pipeline
 from palette4d.analysis.options import AnalysisOptions
+from palette4d.analysis.pipeline import Analysis
 from scipy.spatial import ConvexHull
 
 from palette4d import _core
 from palette4d.cli import main
 from palette4d.grade import sidecar
+from palette4d.media import cuts
 from palette4d.media.clip import Clip, open_clip
 
 # kind: most of L, most handles, most distance of a pixel outside. Each is about one and a half
@@ -78,9 +79,9 @@ def analysed(tmp_path_factory):
     def analyse(kind: str) -> Found:
         folder = tmp_path_factory.mktemp(kind)
         clip = open_clip(getattr(any_clips, kind)(folder))
-        document, analysis = pipeline.analyze_clip(clip, AnalysisOptions())
-        polytope = _core.parse_sidecar(sidecar.dumps(document)).polytope
-        return Found(clip, document, analysis, polytope)
+        analysis = pipeline.analyze(clip)
+        polytope = _core.parse_sidecar(sidecar.dumps(analysis.document)).polytope
+        return Found(clip, analysis.document, analysis, polytope)
 
     return analyse
 
@@ -147,7 +148,7 @@ def test_a_title_has_a_white_while_it_stands(analysed):
 
     assert max(from_white(frame) for frame in (4, 5, 6, 7)) < 0.05
     assert min(from_white(frame) for frame in (1, 2, 9, 10)) > 0.3
-    assert "dented" not in " ".join(found.analysis.remarks)
+    assert "not convex" not in " ".join(found.analysis.notes)
 
 
 def test_letterbox_bars_are_a_black_in_every_frame(analysed):
@@ -221,7 +222,7 @@ def test_light_above_one_and_below_zero(analysed):
     assert palettes.max() > 30
     assert found.polytope.vertices[:, :3].max() <= 50.1
     # Beside a sun of 50 the picture's own colours weigh little, and the user is told so.
-    (text,) = found.analysis.remarks
+    (text,) = found.analysis.notes
     assert "--input-space" in text
 
 
@@ -272,10 +273,10 @@ def test_the_command_spans_a_cut_when_told_to(tmp_path, capsys):
 def test_no_other_kind_is_taken_for_a_cut(kind, analysed):
     found = analysed(kind)
     gathered = [
-        statistics.gather(number, image, AnalysisOptions())
+        colour_statistics.gather(number, image, AnalysisOptions())
         for number, image in found.clip.iter_colours()
     ]
-    assert cuts.find_cuts(gathered) == []
+    assert cuts.find_cuts((frame.frame, frame.histogram) for frame in gathered) == []
 
 
 @pytest.mark.parametrize("kind", ["interlaced", "hdr_exr", "monochrome"])

@@ -11,15 +11,15 @@ from palette4d.analysis.block_merging import (
     Block,
     Merge,
     initial_blocks,
-    merge_blocks,
     merge_sequence,
 )
-from palette4d.analysis.frame_hulls import hull_mesh
+from palette4d.analysis.convex_hulls import hull_mesh
+from palette4d.analysis.frame_statistics import Gamut
 from palette4d.analysis.losses import palette_loss
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Palette
 
-LOW, HIGH = np.zeros(3), np.ones(3)
+GAMUT = Gamut(np.zeros(3), np.ones(3))
 OPTIONS = AnalysisOptions()
 FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
 FIVE = np.vstack([FOUR, [[0.9, 0.9, 0.9]]])
@@ -54,11 +54,11 @@ def test_initial_blocks_follow_the_links(clip):
 def test_merging_goes_away_from_the_block_that_keeps_its_topology(clip):
     early = Block(0, (hull_mesh(FOUR),), (1.0,))
     late = Block(1, (hull_mesh(FIVE), hull_mesh(FIVE)), (1.0, 1.0))
-    forwards = Merge(early, late, clip, LOW, HIGH, OPTIONS).finish()
+    forwards = Merge(early, late, clip, GAMUT, OPTIONS).finish()
     assert (forwards.first, len(forwards.palettes)) == (0, 3)
     assert {len(p.rgb) for p in forwards.palettes} == {4}
     assert forwards.palettes[0] is early.palettes[0]
-    backwards = Merge(late, early, clip, LOW, HIGH, OPTIONS).finish()
+    backwards = Merge(late, early, clip, GAMUT, OPTIONS).finish()
     assert (backwards.first, len(backwards.palettes)) == (0, 3)
     assert {len(p.rgb) for p in backwards.palettes} == {5}
     assert backwards.palettes[1:] == late.palettes
@@ -69,34 +69,17 @@ def test_merging_goes_away_from_the_block_that_keeps_its_topology(clip):
         np.testing.assert_array_equal(palette.faces, early.palettes[0].faces)
 
 
-def test_merging_stops_at_eta1(clip):
-    palettes = [hull_mesh(FOUR)] * 3 + [hull_mesh(FIVE)] * 3
-    singles = initial_blocks(clip, palettes, [None] * 5, OPTIONS)
-    start = sum(b.weighted_loss(6, OPTIONS) for b in singles)
-    seen = []
-    for eta1 in (1.0, 2.0, 1e6):
-        options = AnalysisOptions(eta1=eta1)
-        blocks = merge_blocks(singles, clip, LOW, HIGH, options)
-        assert blocks[0].first == 0
-        assert sum(len(b.palettes) for b in blocks) == 6
-        total = sum(b.weighted_loss(6, options) for b in blocks)
-        assert total <= eta1 * start * (1 + 1e-12)
-        seen.append(len(blocks))
-    assert seen == sorted(seen, reverse=True)
-    assert seen[-1] == 1
-
-
 def test_the_greedy_choice_is_that_of_trying_every_merge(clip):
     """Merges are followed lazily, by a lower bound; the result is that of following all."""
     palettes = [hull_mesh(FOUR)] * 3 + [hull_mesh(FIVE)] * 3
     current = initial_blocks(clip, palettes, [None] * 5, OPTIONS)
-    for total, blocks in merge_sequence(current, clip, LOW, HIGH, OPTIONS):
+    for total, blocks in merge_sequence(current, clip, GAMUT, OPTIONS):
         assert total == pytest.approx(sum(b.weighted_loss(6, OPTIONS) for b in blocks))
         if len(blocks) < len(current):
             tried = []
             for i, (a, b) in enumerate(itertools.pairwise(current)):
                 for keep, adopt in ((a, b), (b, a)):
-                    merged = Merge(keep, adopt, clip, LOW, HIGH, OPTIONS).finish()
+                    merged = Merge(keep, adopt, clip, GAMUT, OPTIONS).finish()
                     tried.append([*current[:i], merged, *current[i + 2 :]])
             best = min(tried, key=lambda c: sum(b.weighted_loss(6, OPTIONS) for b in c))
             assert [b.first for b in best] == [b.first for b in blocks]
@@ -106,20 +89,10 @@ def test_the_greedy_choice_is_that_of_trying_every_merge(clip):
     assert len(current) == 1
 
 
-def test_what_is_kept_apart_is_never_merged(clip):
-    singles = initial_blocks(clip, [hull_mesh(FOUR)] * 6, [None] * 5, OPTIONS)
-    for apart in ([2, 3], [5], [1, 2, 3, 4, 5]):
-        *_, (total, last) = merge_sequence(singles, clip, LOW, HIGH, OPTIONS, apart)
-        assert [block.first for block in last] == [0, *apart]
-        assert total == pytest.approx(sum(b.weighted_loss(6, OPTIONS) for b in last))
-    *_, (_, free) = merge_sequence(singles, clip, LOW, HIGH, OPTIONS)
-    assert [block.first for block in free] == [0]
-
-
 def test_the_bound_of_an_unfinished_merge_never_falls(clip):
     early = Block(0, (hull_mesh(FOUR),), (1.0,))
     late = Block(1, (hull_mesh(FIVE),) * 4, (1.0,) * 4)
-    trial = Merge(early, late, clip, LOW, HIGH, OPTIONS)
+    trial = Merge(early, late, clip, GAMUT, OPTIONS)
     bounds = [trial.change]
     while not trial.done:
         trial.advance()

@@ -5,14 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from analysis_frames import constant, grey, mixture, noise, stats
-from palette4d.analysis.frame_hulls import frame_palette, hull_mesh, merge_close
+from palette4d.analysis.convex_hulls import hull_mesh
+from palette4d.analysis.frame_hulls import frame_palette, merge_close
+from palette4d.analysis.frame_statistics import Gamut
 from palette4d.analysis.losses import palette_loss
 from palette4d.analysis.options import AnalysisOptions
 from scipy.spatial import ConvexHull
 
 from palette4d import _core
 
-LOW, HIGH = np.zeros(3), np.ones(3)
+GAMUT = Gamut(np.zeros(3), np.ones(3))
 OPTIONS = AnalysisOptions()
 
 
@@ -55,7 +57,7 @@ def test_scale_does_not_matter_to_the_progressive_hull():
 def test_a_solid_frame_gets_a_small_closed_palette(seed):
     corners = [[0.1, 0.1, 0.1], [0.9, 0.2, 0.1], [0.2, 0.8, 0.2], [0.2, 0.3, 0.9], [0.9, 0.9, 0.8]]
     (frame,) = stats([mixture(corners, seed)])
-    palette = frame_palette(frame.coarse, LOW, HIGH, OPTIONS)
+    palette = frame_palette(frame.coarse, GAMUT, OPTIONS)
     assert 4 <= len(palette.rgb) <= 8
     closed, volume = is_closed_and_outward(palette)
     assert closed
@@ -66,10 +68,10 @@ def test_a_solid_frame_gets_a_small_closed_palette(seed):
 
 
 def test_one_colour_and_a_line_of_colours():
-    one = frame_palette(stats([constant([0.2, 0.4, 0.6])])[0].coarse, LOW, HIGH, OPTIONS)
+    one = frame_palette(stats([constant([0.2, 0.4, 0.6])])[0].coarse, GAMUT, OPTIONS)
     np.testing.assert_allclose(one.rgb, [[0.2, 0.4, 0.6]], atol=1e-6)
     assert len(one.faces) == 0
-    line = frame_palette(stats([grey(5)])[0].coarse, LOW, HIGH, OPTIONS)
+    line = frame_palette(stats([grey(5)])[0].coarse, GAMUT, OPTIONS)
     assert len(line.rgb) == 2
     assert len(line.faces) == 0
     assert np.ptp(line.rgb, axis=1).max() < 1e-6  # both ends are grey
@@ -79,7 +81,7 @@ def test_one_colour_and_a_line_of_colours():
 def test_flat_colours_get_a_two_sided_polygon():
     image = noise(6)
     image[..., 2] = 0.5
-    palette = frame_palette(stats([image])[0].coarse, LOW, HIGH, OPTIONS)
+    palette = frame_palette(stats([image])[0].coarse, GAMUT, OPTIONS)
     assert 3 <= len(palette.rgb) <= 8
     closed, volume = is_closed_and_outward(palette)
     assert closed
@@ -89,7 +91,7 @@ def test_flat_colours_get_a_two_sided_polygon():
 
 def test_colours_above_one_keep_their_place():
     (frame,) = stats([noise(7, scale=8, offset=-1)])
-    palette = frame_palette(frame.coarse, np.full(3, -1.0), np.full(3, 7.0), OPTIONS)
+    palette = frame_palette(frame.coarse, Gamut(np.full(3, -1.0), np.full(3, 7.0)), OPTIONS)
     assert len(palette.rgb) <= 8
     assert palette.rgb.max() > 6
     assert palette.rgb.min() < 0

@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
-from palette4d.analysis.frame_hulls import hull_mesh
+from palette4d.analysis.convex_hulls import hull_mesh
 from palette4d.analysis.glue import glue, transition_faces
 from palette4d.analysis.polytope import Palette
 

@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 from analysis_frames import mixture, stats
 from bent_track import FACES, FOUR, bent, colours_at
-from palette4d.analysis.frame_hulls import hull_mesh
+from palette4d.analysis.convex_hulls import hull_mesh
+from palette4d.analysis.frame_statistics import Gamut
 from palette4d.analysis.objective import Objective, loss_of, move, refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Section, SkewPolytope
 
 from palette4d import _core
 
-LOW, HIGH = np.zeros(3), np.ones(3)
+GAMUT = Gamut(np.zeros(3), np.ones(3))
 
 
 @pytest.fixture
@@ -54,7 +55,7 @@ def test_a_vertex_at_the_edge_of_its_box_stays_in_its_block():
         block = Section(0.0, float(last), polytope.blocks[0].tracks, FACES)
         polytope = SkewPolytope(vertices, (block,), ())
         frames = stats([mixture(colours_at(polytope, t), t, 300) for t in range(last + 1)])
-        evaluate = Objective(polytope, frames, AnalysisOptions(gamma=0.0), 1.0, coarse=True)
+        evaluate = Objective(polytope, frames, AnalysisOptions(gamma=0.0), GAMUT, coarse=True)
         for at in np.linspace(5.0, 7.0, 23):
             box = (vertices[[8]].copy(), vertices[[8]].copy())
             box[0][0, 3] = box[1][0, 3] = at  # nowhere to go but here
@@ -67,20 +68,20 @@ def test_joint_refinement_finds_the_bend_and_never_worsens(frames):
     start = bent(6.0)
     everything = list(range(11))
     for coarse in (True, False):
-        before, _ = Objective(start, frames, options, 1.0, coarse)(start.vertices, everything)
-        refined, after = refine_jointly(start, frames, LOW, HIGH, options, 100, coarse)
+        before, _ = Objective(start, frames, options, GAMUT, coarse)(start.vertices, everything)
+        refined, after = refine_jointly(start, frames, GAMUT, options, 100, coarse)
         assert after < 0.6 * before
         assert refined.vertices[8, 3] < 5.2  # the bend is at 4
         np.testing.assert_array_equal(refined.vertices[:8, 3], start.vertices[:8, 3])
-        value, _ = Objective(refined, frames, options, 1.0, coarse)(refined.vertices, everything)
+        value, _ = Objective(refined, frames, options, GAMUT, coarse)(refined.vertices, everything)
         assert value == after
-    same, _ = refine_jointly(start, frames, LOW, HIGH, options, 1, True)
+    same, _ = refine_jointly(start, frames, GAMUT, options, 1, True)
     np.testing.assert_array_equal(same.vertices, start.vertices)
 
 
 def test_what_is_there_for_a_moment_stays_where_it_is_in_time(frames):
     start = bent(5.3)  # the bend is at 4
-    found, _ = refine_jointly(start, frames, LOW, HIGH, AnalysisOptions(), 100, True, brief=(8,))
+    found, _ = refine_jointly(start, frames, GAMUT, AnalysisOptions(), 100, True, brief=(8,))
     assert found.vertices[8, 3] == 5.3
     assert np.abs(found.vertices[8, :3] - start.vertices[8, :3]).max() > 1e-3
 
@@ -99,7 +100,7 @@ def test_separation_keeps_colours_apart():
     gaps = []
     for separation in (0.0, 0.2):
         options = AnalysisOptions(separation=separation)
-        refined, _ = refine_jointly(polytope, frames, LOW, HIGH, options, 100, True)
+        refined, _ = refine_jointly(polytope, frames, GAMUT, options, 100, True)
         rgb = refined.vertices[:count, :3]
         pairs = itertools.combinations(range(count), 2)
         gaps.append(min(np.linalg.norm(rgb[i] - rgb[j]) for i, j in pairs))

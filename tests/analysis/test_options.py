@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 from analysis_frames import mixture, stats
-from palette4d.analysis import methods
-from palette4d.analysis.options import LIMITS, METHODS, METHODS_OF, AnalysisOptions
+from palette4d.analysis.options import (
+    METHODS,
+    OPTIONS,
+    AnalysisOptions,
+    check_methods,
+    parse_setting,
+)
+from palette4d.analysis.pipeline import find_polytope
 
 from palette4d.common.errors import Palette4dError
 
@@ -38,7 +42,7 @@ OTHERS = {
 
 
 def result(**options):
-    palette = methods.analyze(FRAMES, AnalysisOptions(**options))
+    palette = find_polytope(FRAMES, AnalysisOptions(**options))
     return palette.polytope.vertices.tolist(), [stage.row() for stage in palette.stages]
 
 
@@ -46,32 +50,56 @@ FRAMES = stats([mixture(CORNERS * (0.6 + 0.4 * np.sin(i)) + 0.02 * i, i, 300) fo
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_what_a_method_refuses_would_change_nothing(method):
-    ignored = {name: OTHERS[name] for name, of in METHODS_OF.items() if method not in of}
-    assert ignored
+def test_an_option_without_effect_is_refused_and_has_none(method):
+    ignored = {name: OTHERS[name] for name in OTHERS if method not in OPTIONS[name].methods}
+    for name, value in ignored.items():
+        with pytest.raises(Palette4dError, match=f"{name} has no effect"):
+            check_methods(method, {name: value})
+    check_methods(method, {name: OTHERS[name] for name in OTHERS.keys() - ignored.keys()})
     assert result(method=method, **ignored) == result(method=method)
 
 
 @pytest.mark.parametrize(
     ("method", "option"),
-    [(m, o) for o, of in METHODS_OF.items() for m in ("static", "rgbt") if m in of],
+    [(m, o) for o in OTHERS for m in ("static", "rgbt") if m in OPTIONS[o].methods],
 )
-def test_what_a_method_takes_counts(method, option):
+def test_an_option_of_a_method_has_an_effect(method, option):
     assert result(method=method, **{option: OTHERS[option]}) != result(method=method)
 
 
-def test_only_options_are_named():
-    names = {field.name for field in dataclasses.fields(AnalysisOptions)}
-    assert set(METHODS_OF) <= names
-    assert {method for of in METHODS_OF.values() for method in of} == set(METHODS)
-    assert set(LIMITS) == names - {"method"}
+@pytest.mark.parametrize("name", OPTIONS)
+def test_values_beyond_their_limits_are_refused(name):
+    option = OPTIONS[name]
+    for value in (option.low, option.high):
+        AnalysisOptions(**{option.field: value})
+    for value in (option.low - 0.5, 2 * option.high, float("nan")):
+        with pytest.raises(Palette4dError, match=f"option {name}: found"):
+            AnalysisOptions(**{option.field: value})
 
 
-@pytest.mark.parametrize("option", LIMITS)
-def test_values_beyond_their_limits_are_refused(option):
-    low, high = LIMITS[option]
-    for value in (low, high):
-        AnalysisOptions(**{option: value})
-    for value in (low - 0.5, 2 * high, float("nan")):
-        with pytest.raises(Palette4dError, match=f"{option.rstrip('_').replace('_', '-')}: found"):
-            AnalysisOptions(**{option: value})
+def test_an_unknown_method_is_refused():
+    with pytest.raises(Palette4dError, match="magic"):
+        AnalysisOptions(method="magic")
+
+
+def test_settings_are_read_by_the_names_that_sidecars_record():
+    recorded = AnalysisOptions(lambda_=7.0, blocks=2).recorded()
+    method = recorded.pop("method")
+    given = dict(parse_setting(f"{name}={value}") for name, value in recorded.items())
+    assert AnalysisOptions(method=method, **given) == AnalysisOptions(lambda_=7.0, blocks=2)
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("handel_cost=1", "handle_cost"),
+        ("handle-cost=1", "handle_cost"),
+        ("reach", "NAME=VALUE"),
+        ("blocks=2.5", "whole number"),
+        ("blocks=0", "from 1"),
+        ("gamma=nan", "from 0"),
+    ],
+)
+def test_a_setting_that_cannot_be_read_says_what_is_expected(text, named):
+    with pytest.raises(Palette4dError, match=named):
+        parse_setting(text)

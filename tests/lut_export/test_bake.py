@@ -328,22 +328,6 @@ def test_existing_output_needs_force(warm_sidecar: Path, tmp_path: Path) -> None
     assert "LUT_3D_SIZE 5" in out.read_text(encoding="utf-8")
 
 
-def test_a_failure_midway_leaves_the_old_file(
-    warm_sidecar: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    out = tmp_path / "there.cube"
-    out.write_text("mine", encoding="utf-8")
-
-    def interrupted(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("palette4d.lut_export.bake._check_same", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        bake(warm_sidecar, 0.0, out, size=5, force=True)
-    assert out.read_text(encoding="utf-8") == "mine"
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["cube.p4d.json", "there.cube"]
-
-
 @pytest.mark.parametrize("name", ["a.cube", "a.clf"])
 def test_folder_names_are_taken_as_they_are(name: str, warm_sidecar: Path, tmp_path: Path) -> None:
     """OpenColorIO would read $HOME and %x% as variables."""

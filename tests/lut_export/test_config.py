@@ -12,7 +12,7 @@ import PyOpenColorIO as ocio
 import pytest
 from numpy.typing import NDArray
 from palette4d.lut_export import series
-from palette4d.lut_export.bake import BakeSettings
+from palette4d.lut_export.bake_job import BakeSettings
 from palette4d.lut_export.config import WrittenConfig, write_config
 from palette4d.lut_export.frame_edit import frame_edit
 

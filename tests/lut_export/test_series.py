@@ -18,7 +18,7 @@ import numpy as np
 import PyOpenColorIO as ocio
 import pytest
 from palette4d.lut_export import series
-from palette4d.lut_export.bake import BakeSettings
+from palette4d.lut_export.bake_job import BakeSettings
 from palette4d.lut_export.frame_edit import frame_edit
 from palette4d.lut_export.series import Request, Series
 

@@ -16,7 +16,16 @@ from edits import clip, dissolve, external, gap, movie, save, timeline
 
 from palette4d.cli import main
 
-QUICK = ("--palette-size", "4", "--colours", "512", "--coarse-colours", "128", "--blocks", "1")
+QUICK = (
+    "--set",
+    "palette_size=4",
+    "--set",
+    "colours=512",
+    "--set",
+    "coarse_colours=128",
+    "--set",
+    "blocks=1",
+)
 #: What other programs keep in a timeline.
 THEIRS = {"colour": {"lut": "théirs.cube", "big": 2**60, "share": 0.1, "none": None}}
 

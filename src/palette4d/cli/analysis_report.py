@@ -11,32 +11,29 @@ from typing import TYPE_CHECKING, Any
 from palette4d.common.text import counted
 
 if TYPE_CHECKING:
-    from palette4d.analysis.methods import Analysis
+    from palette4d.analysis.pipeline import Analysis
     from palette4d.analysis.report.quality import Report
-    from palette4d.media.clip import Clip
 
 
 def figures(output: Path, analysis: Analysis, seconds: Mapping[str, float]) -> dict[str, Any]:
     """Return what `--json` prints; docs/palettes.md explains the names."""
-    assert analysis.report is not None  # analyze_clip always measures
     return {
         "sidecar": str(output),
         "stages": [stage.row() for stage in analysis.stages],
         "held_to_L_prime": analysis.bound,
         "palette": analysis.report.figures(),
         "frames": [dataclasses.asdict(fit) for fit in analysis.report.fits],
-        "notes": list(analysis.remarks),
+        "notes": list(analysis.notes),
         "seconds": dict(seconds),
         "cpu_seconds": round(time.process_time(), 3),
     }
 
 
-def lines(
-    clip: Clip, analysis: Analysis, seconds: Mapping[str, float], colours: str | None
-) -> list[str]:
-    """Return the report's lines; `colours` says which colour spaces were used, if any."""
-    assert analysis.report is not None  # analyze_clip always measures
-    out = [f"{clip.name}: {counted(len(clip.frames), 'frame')}, {clip.width}x{clip.height}"]
+def lines(analysis: Analysis, seconds: Mapping[str, float]) -> list[str]:
+    """Return the lines of the report."""
+    clip = analysis.document["clip"]
+    width, height = clip["size"]
+    out = [f"{clip['name']}: {counted(len(analysis.report.fits), 'frame')}, {width}x{height}"]
     out.append(
         f"{'stage':<18} {'vertices':>8} {'blocks':>6} {'R':>8} {'C':>8} {'L':>8} {'K':>8} "
         f"{'L_prime':>8} {'farthest':>8} {'seconds':>8}"
@@ -50,13 +47,13 @@ def lines(
         )
     rows = {"outside": outside(analysis.report), **_palette(analysis.report)}
     rows["seconds"] = ", ".join(f"{stage} {took:.2f}" for stage, took in seconds.items())
-    if colours:
-        rows["colours"] = colours
+    if analysis.colours:
+        rows["colours"] = analysis.colours
     return [*out, *(f"{name:<10} {text}" for name, text in rows.items())]
 
 
 def outside(report: Report) -> str:
-    """Say how many pixels the palette does not hold, and how far the farthest lies outside."""
+    """Say how many pixels are outside the palette, and how far the farthest is."""
     if not report.outside:
         return "no pixel is more than 1/255 outside"
     share = f"{report.outside:.1%}" if report.outside >= 0.001 else "less than 0.1%"
@@ -73,10 +70,11 @@ def _palette(x: Report) -> dict[str, str]:
     if x.closest:
         distance, frame, one, other = x.closest
         handles += f"; nearest {one} and {other}, {distance:.2f} apart at frame {frame}"
-    dented = f"deepest dent {x.dent[0]:.1%} of the convex hull, at frame {x.dent[1]}"
+    concavity, frame = x.concavity
+    concave = f"deepest concavity {concavity:.1%} of the convex hull, at frame {frame}"
     return {
         "fit": fit if x.worst.L >= 0.0005 else "every frame's L is below 0.001",
         "handles": handles,
         "use": f"least used {x.least_used[0]}, up to {x.least_used[1]:.1%} of the picture",
-        "shape": dented if x.dent[0] >= 0.0005 else "convex in every frame",
+        "shape": concave if concavity >= 0.0005 else "convex in every frame",
     }

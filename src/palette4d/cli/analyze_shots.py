@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from palette4d.cli.progress import frames_bar
 from palette4d.cli.worker_options import add_worker_options
 from palette4d.colour.ocio_config import from_anywhere
 from palette4d.common.arguments import whole
@@ -16,8 +17,6 @@ from palette4d.common.text import counted
 from palette4d.shows.timeline_files import is_timeline
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from palette4d.analysis.options import AnalysisOptions
     from palette4d.media.colour_space import SpaceOptions
     from palette4d.shows.batch import Show, Source
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
 
 DESCRIPTION = """\
 For many shots at once, CLIP is an edit (.otio, .otioz, .otiod, .edl) or, with --detect-shots, a
-movie or sequence that is split at its cuts; OUT is then a folder, for a sidecar a shot and a
+movie or sequence that is split at its cuts. OUT is then a folder for a sidecar a shot and a
 manifest, NAME.shots.json. The same command again does only what is missing or failed.
 """
 
@@ -57,14 +56,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         type=whole(0, 100_000),
         default=None,
-        help="frames more before and after what the edit shows, as far as the media goes and does "
-        "not cut (default 0)",
+        help="head and tail frames around what the edit shows, up to the end of the media or its "
+        "next cut (default 0)",
     )
     group.add_argument(
         "--only", metavar="A,B", type=_names, default=(), help="only the shots of these names"
     )
     group.add_argument(
-        "--force", action="store_true", help="analyse also the shots that are there already"
+        "--force", action="store_true", help="analyse the shots that are there already, too"
     )
     add_worker_options(group, "shots")
 
@@ -129,10 +128,8 @@ def run(args: argparse.Namespace, options: AnalysisOptions) -> int:
         only=args.only,
         workers=Workers(args.jobs, args.cluster),
     )
-    done = _with_bar(
-        hidden,
-        lambda progress: batch.analyse(source, shots, args.output, show_options, progress),
-    )
+    with frames_bar("shots", hidden=hidden) as progress:
+        done = batch.analyse(source, shots, args.output, show_options, progress)
     notes += [f"{name}: {note}" for name, found in done.notes.items() for note in found]
     for note in notes:
         print(f"palette4d: note: {note}", file=sys.stderr)
@@ -176,7 +173,6 @@ def _of_edit(args: argparse.Namespace) -> tuple[Source, list[Shot], list[str]]:
 
 
 def _of_movie(args: argparse.Namespace, hidden: bool) -> tuple[Source, list[Shot], list[str]]:
-    from palette4d.cli.progress import frames_bar
     from palette4d.common.text import file_safe
     from palette4d.media.clip import open_clip
     from palette4d.shows.batch import Source
@@ -185,26 +181,9 @@ def _of_movie(args: argparse.Namespace, hidden: bool) -> tuple[Source, list[Shot
     clip = open_clip(
         args.clip, frames=args.frames, rate=args.rate, skip_bad_frames=args.skip_bad_frames
     )
-    with frames_bar("cuts", hidden=hidden, total=len(clip.frames)) as bar:
-        shots = detect(clip, lambda done, total: bar.update(done - bar.n))
+    with frames_bar("cuts", hidden=hidden, total=len(clip.frames)) as progress:
+        shots = detect(clip, progress)
     return Source(file_safe(clip.name), clip.source, "", clip.rate), shots, list(clip.notes)
-
-
-def _with_bar(hidden: bool, work: Callable[[Callable[[int, int, str], None]], Show]) -> Show:
-    """Do `work` with a progress bar of frames."""
-    from palette4d.cli.progress import frames_bar
-
-    with frames_bar("shots", hidden=hidden) as bar:
-
-        def progress(done: int, total: int, words: str) -> None:
-            if bar.total != total:
-                # What is there already costs no time: the bar starts behind it.
-                bar.total, bar.initial, bar.n = total, done, done
-            bar.set_description(words, refresh=False)
-            bar.update(done - bar.n)
-            bar.refresh()
-
-        return work(progress)
 
 
 def report(done: Show) -> list[str]:

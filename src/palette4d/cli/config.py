@@ -9,8 +9,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from palette4d.cli.export import add_frame_choice, add_run_options, chosen_frames, with_bar
+from palette4d.cli.export import add_frame_choice, add_run_options, chosen_frames
 from palette4d.cli.lut_options import add_lut_options, lut_settings, wide_help
+from palette4d.cli.progress import frames_bar
 from palette4d.jobs.workers import Workers
 
 if TYPE_CHECKING:
@@ -59,7 +60,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Write the config; print what is in it."""
-    from palette4d.lut_export.bake import BakeSettings
+    from palette4d.lut_export.bake_job import BakeSettings
     from palette4d.lut_export.config import write_config
     from palette4d.lut_export.formats import format_named
     from palette4d.shows import export_luts
@@ -70,10 +71,8 @@ def run(args: argparse.Namespace) -> int:
     if args.clip is not None and len(sidecars) > 1:
         args.usage_error("--clip names one clip; with several sidecars each must name its own")
     settings = BakeSettings(**lut_settings(args, format_named(args.format).name))
-    done = with_bar(
-        "config",
-        args.quiet,
-        lambda progress: write_config(
+    with frames_bar("config", hidden=args.quiet) as progress:
+        done = write_config(
             sidecars,
             args.output,
             settings,
@@ -86,8 +85,7 @@ def run(args: argparse.Namespace) -> int:
             force=args.force,
             anyway=args.anyway,
             progress=progress,
-        ),
-    )
+        )
     print(json.dumps(as_json(done), indent=2) if args.json else "\n".join(report(done)))
     for note in [*notes, *done.notes]:
         print(f"palette4d: note: {note}", file=sys.stderr)

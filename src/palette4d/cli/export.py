@@ -7,21 +7,19 @@ import json
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 from palette4d.cli.lut_options import add_lut_options, lut_settings, wide_help
+from palette4d.cli.progress import frames_bar
 from palette4d.cli.worker_options import add_worker_options
 from palette4d.common.arguments import frame_range, parse_frames, whole
 from palette4d.common.errors import Palette4dError
+from palette4d.common.text import counted
 from palette4d.jobs.workers import Workers
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from palette4d import _core
     from palette4d.lut_export.series import Request, Series
-
-Done = TypeVar("Done")
 
 EPILOG = """\
 Files are NAME.FRAME.EXTENSION; NAME.series.json lists them with hashes and errors. The same command
@@ -101,7 +99,7 @@ def run(args: argparse.Namespace) -> int:
     """Export; print what was written."""
     from palette4d import _core
     from palette4d.lut_export import series
-    from palette4d.lut_export.bake import BakeSettings
+    from palette4d.lut_export.bake_job import BakeSettings
     from palette4d.lut_export.formats import format_named
     from palette4d.shows.manifest import is_manifest
 
@@ -121,9 +119,8 @@ def run(args: argparse.Namespace) -> int:
         return _run_show(args, request)
     request = replace(request, frames=chosen_frames(args, _core.read_sidecar(str(args.sidecar))))
     workers = Workers(args.jobs, args.cluster)
-    (done,) = with_bar(
-        "export", args.quiet, lambda progress: series.export([request], workers, progress)
-    )
+    with frames_bar("export", hidden=args.quiet) as progress:
+        (done,) = series.export([request], workers, progress)
     if args.json:
         print(json.dumps(done.document, indent=2))
     else:
@@ -152,15 +149,24 @@ def _check_show(args: argparse.Namespace, show: bool) -> None:
 def _run_show(args: argparse.Namespace, request: Request) -> int:
     from palette4d.shows import export_luts
 
-    done = export_luts.export(
-        args,
-        request,
-        lambda sidecar: chosen_frames(args, sidecar, show=True),
-        lambda work: with_bar("export", args.quiet, work),
-    )
+    with frames_bar("export", hidden=args.quiet) as progress:
+        exported = export_luts.export(
+            args.sidecar,
+            args.output,
+            request,
+            lambda sidecar: chosen_frames(args, sidecar, show=True),
+            Workers(args.jobs, args.cluster),
+            progress,
+            otio=args.otio,
+        )
+    done = exported.series
+    for note in exported.notes:
+        print(f"palette4d: note: {note}", file=sys.stderr)
     if args.json:
         print(export_luts.as_json(done))
     else:
+        if args.otio is not None:
+            print(f"{args.otio}: references in {counted(exported.references, 'clip')}")
         for one in done:
             print("\n".join(report(one)))
     warn(done)
@@ -169,26 +175,8 @@ def _run_show(args: argparse.Namespace, request: Request) -> int:
     return 0
 
 
-def with_bar(what: str, quiet: bool, work: Callable[[Callable[[int, int], None]], Done]) -> Done:
-    """Do `work` with a progress bar of frames."""
-    from palette4d.cli.progress import frames_bar
-
-    with frames_bar(what, hidden=quiet) as bar:
-
-        def progress(done: int, total: int) -> None:
-            if bar.total != total:
-                # Files that are there already cost no time: the bar starts after them.
-                bar.total, bar.initial = total, done
-                bar.n = done
-                bar.refresh()
-            bar.update(done - bar.n)
-
-        return work(progress)
-
-
 def report(done: Series) -> list[str]:
     """Return the lines that say what was written."""
-    from palette4d.common.text import counted
     from palette4d.lut_export.bake_error import stated
 
     listed = {entry["frame"]: entry for entry in done.document["frames"]}
@@ -216,7 +204,6 @@ def report(done: Series) -> list[str]:
 def warn(done: list[Series]) -> None:
     """Say what a user should know beside the figures."""
     from palette4d.colour.difference import VISIBLE
-    from palette4d.common.text import counted
     from palette4d.lut_export.bake import nearer
     from palette4d.lut_export.bake_error import stated
     from palette4d.lut_export.formats import shaper_warning
@@ -250,7 +237,6 @@ def warn(done: list[Series]) -> None:
 
 def failures(done: Series) -> Palette4dError:
     """Return the error that lists the frames that could not be baked."""
-    from palette4d.common.text import counted
     from palette4d.lut_export.series import failures_text
 
     return Palette4dError(

@@ -112,14 +112,14 @@ def run(args: argparse.Namespace) -> int:
     movie = is_movie(Path(args.output))
     for note in (*clip.notes, *(rendering.movie_notes(clip, options) if movie else ())):
         print(f"palette4d: note: {note}", file=sys.stderr)
-    with frames_bar("render", hidden=args.quiet, total=len(clip.frames)) as bar:
+    with frames_bar("render", hidden=args.quiet, total=len(clip.frames)) as progress:
         written = rendering.render(
             document,
             clip,
             args.output,
             options,
             force=args.force,
-            progress=lambda done, total: bar.update(done - bar.n),
+            progress=progress,
         )
     if movie or len(written) == 1:
         frames = f", {counted(len(clip.frames) - len(clip.skipped), 'frame')}" if movie else ""

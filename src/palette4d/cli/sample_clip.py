@@ -80,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
     from palette4d.cli.progress import frames_bar
     from palette4d.demo.scene import write_clip
 
-    with frames_bar("sample clip", hidden=args.quiet, total=args.frames) as bar:
+    with frames_bar("sample clip", hidden=args.quiet, total=args.frames) as progress:
         written = write_clip(
             args.output,
             args.frames,
@@ -88,7 +88,7 @@ def run(args: argparse.Namespace) -> int:
             first=args.first,
             half=args.half,
             force=args.force,
-            progress=lambda done, total: bar.update(done - bar.n),
+            progress=progress,
         )
     print(f"wrote {counted(len(written), 'frame')}, {written[0]} to {written[-1].name}")
     return 0

@@ -1,8 +1,8 @@
-"""Conversions between colour spaces without OpenColorIO, and how far they are from its own.
+"""Conversions between colour spaces without OpenColorIO, and their distance from OpenColorIO's.
 
 Input: an OpenColorIO config and the names of two of its colour spaces. Output: the chain of
-matrices and curves from one to the other and back (`conversion_steps`), checked against
-OpenColorIO: on probes of all kinds when it is made, on a clip's own colours by `Comparison`.
+matrices and curves from one to the other and back (`conversion_steps`). It is compared with
+OpenColorIO: on probes of all kinds here, on a clip's own colours by `Comparison`.
 """
 
 import json
@@ -21,30 +21,28 @@ from palette4d.colour.ocio_processor import ExactProcessor
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-#: The largest difference from OpenColorIO, relative to 1 or to the number, whichever is larger,
-#: beyond what OpenColorIO's single precision explains: two bits more or less of the colour that it
-#: was given, which a gamma makes large near 0.
+#: The largest difference from OpenColorIO, relative to 1 or to the code value, whichever is larger,
+#: beyond its single precision: two bits of its input, which a gamma enlarges near 0.
 TOLERANCE = 1e-5
 
-#: OpenColorIO brings a number back that was there and back again by this, or its encoding has
-#: ended before it.
+#: Where OpenColorIO's conversion and its inverse differ from the input by more than this, the
+#: encoding has ended.
 _COMES_BACK = 2e-6
 
 
 @dataclass(frozen=True)
 class Conversion:
-    """A chain, and how far it is from OpenColorIO.
+    """A chain, and its distance from OpenColorIO.
 
     Attributes
     ----------
     steps : list of dict
-        Of the sidecar.
+        As a sidecar holds them.
     chain : ColourConversion
-        What applies them.
+        Applies the steps.
     error : float
-        The largest |a - b| / max(|b|, 1) that was found between the chain and OpenColorIO, in
-        both directions, wherever OpenColorIO itself brings a colour back, beyond what its single
-        precision explains.
+        The largest |a - b| / max(|b|, 1) between the chain and OpenColorIO in both directions,
+        beyond its single precision, wherever OpenColorIO itself inverts its conversion.
     """
 
     steps: list[Step]
@@ -58,15 +56,15 @@ def conversion(config: Any, source: str, target: str) -> Conversion:
     Raises
     ------
     ConversionError
-        There is something else than matrices and curves between them, or the chain is further than
-        `TOLERANCE` from OpenColorIO, beyond what its single precision explains.
+        The conversion is more than matrices and curves, or the chain is further than `TOLERANCE`
+        from OpenColorIO.
     """
     try:
         forward = ExactProcessor(config.getProcessor(source, target))
         backward = ExactProcessor(config.getProcessor(target, source))
     except failures() as error:
         raise ConversionError(
-            f"OpenColorIO has no way from {source!r} to {target!r} and back: {error}; choose "
+            f"OpenColorIO cannot convert {source!r} to {target!r} and back: {error}; choose "
             "another --palette-space"
         ) from error
     steps: list[Step] = []
@@ -76,7 +74,7 @@ def conversion(config: Any, source: str, target: str) -> Conversion:
         except ConversionError as error:
             raise ConversionError(
                 f"from {source!r} to {target!r}: {error}; expected matrices and curves of one "
-                "channel only, which have a way back. Choose another --palette-space, or convert "
+                "channel only, which have an inverse. Choose another --palette-space, or convert "
                 "the clip first"
             ) from error
     steps = list(joined(steps))
@@ -96,7 +94,7 @@ def conversion(config: Any, source: str, target: str) -> Conversion:
 
 
 class Comparison:
-    """How far a chain is from OpenColorIO on a clip's own colours."""
+    """The distance of a chain from OpenColorIO on a clip's own colours."""
 
     def __init__(self, config: Any, source: str, target: str, chain: _core.ColourConversion):
         self._forward = ExactProcessor(config.getProcessor(source, target))
@@ -104,8 +102,8 @@ class Comparison:
         self._there = _Way(chain.to_palette, _is_scene_linear(config, source))
         self._back = _Way(chain.to_clip, _is_scene_linear(config, target))
         self.colours = 0  #: compared so far
-        self.beyond = 0  #: of them, where OpenColorIO brings no colour back
-        self.error = 0.0  #: the largest of the others, in both directions
+        self.beyond = 0  #: of them, beyond the encoding: OpenColorIO does not invert them
+        self.error = 0.0  #: the largest error of the others, in both directions
 
     def add(self, colours: F32) -> None:
         """Compare (n, 3) finite colours of the clip."""
@@ -113,7 +111,7 @@ class Comparison:
         back = self._backward(there)
         inside = _comes_back(back, colours)
         self.colours += len(colours)
-        # What OpenColorIO's rounding alone keeps from coming back is not beyond its encoding.
+        # Colours that only rounding keeps from the inverse are not beyond the encoding.
         lost, reached = colours[~inside], there[~inside]
         self.beyond += int((~_comes_back(back[~inside], lost, self._back.rounding(reached))).sum())
         if inside.any():
@@ -145,18 +143,18 @@ def _probes(scene_linear: bool) -> F32:
 
 
 class _Way:
-    """A chain in one direction, and how far OpenColorIO's single precision may be from it."""
+    """A chain in one direction, and the rounding of OpenColorIO's single precision."""
 
     def __init__(self, apply: Callable[[ArrayLike], F64], scene_linear: bool) -> None:
         self.apply = apply
-        # The constants of an encoding are about 1, so that its numbers near 0 are no finer.
+        # The constants of an encoding are about 1: its code values near 0 are no finer.
         self._least = 0.0 if scene_linear else 1.0
 
     def rounding(self, colours: F32) -> F64:
-        """(n, 3) -> (n, 3): how far two bits more or less in each channel move the result.
+        """Return how far two bits in each channel move the result, (n, 3) -> (n, 3).
 
-        They are the last bits of a colour's largest channel, as matrices mix the channels, and of
-        1 at least in an encoding.
+        They are the last bits of a colour's largest channel, because matrices mix the channels; in
+        an encoding of 1 at least.
         """
         exact = self.apply(colours)
         moved = np.zeros_like(exact)
@@ -186,7 +184,7 @@ def _difference(
 
 
 def _worst(way: _Way, colours: F32, expected: F32) -> float:
-    """Return the largest |a - b| / max(|b|, 1) beyond what single precision explains."""
+    """Return the largest |a - b| / max(|b|, 1) beyond single precision."""
     a, b = way.apply(colours), expected.astype(np.float64)
     off = np.maximum(np.abs(a - b) - way.rounding(colours), 0) / np.maximum(np.abs(b), 1)
     return float(off.max())

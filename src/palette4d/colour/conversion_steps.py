@@ -3,8 +3,8 @@
 Input: one of OpenColorIO's transforms, or a list of steps. Output: the steps that
 `palette4d._core.ColourConversion` applies, in either direction; docs/sidecar.md explains them.
 
-What OpenColorIO clamps, a chain continues: below black and above the largest number that an
-encoding holds its curves go on, so that every number has a way there and back.
+A chain does not clamp where OpenColorIO does: its curves go on below black and above the largest
+code value of an encoding, so that every code value has an inverse.
 """
 
 from collections.abc import Iterator
@@ -22,10 +22,10 @@ Step = dict[str, Any]
 #: Where a logarithm without a straight part of its own is continued straight: 2^-24.
 _DARKEST = 2.0**-24
 
-#: Samples of a curve are left out where the line through the others is so near.
+#: Samples of a curve are left out where the line through the others is within this.
 _STRAIGHT = 3e-7
 
-#: A curve's numbers beyond it are those of no picture.
+#: Curves end where their values are beyond this: no picture has them.
 _LARGEST = 1e9
 
 
@@ -39,7 +39,7 @@ def steps_of(transform: Any) -> list[Step]:
     Raises
     ------
     ConversionError
-        It is something else than matrices and curves of one channel, or has no way back.
+        It is more than matrices and curves of one channel, or has no inverse.
     """
     name = type(transform).__name__
     translate = {
@@ -87,7 +87,7 @@ def _range(transform: Any) -> list[Step]:
         return []  # clamps, and nothing else
     low, high, to_low, to_high = (getattr(transform, f"get{end}Value")() for end in ends)
     if not (high > low and to_high > to_low):
-        raise ConversionError(f"found a range from {low:g} to {high:g}, which has no way back")
+        raise ConversionError(f"found a range from {low:g} to {high:g}, which has no inverse")
     scale = (to_high - to_low) / (high - low)
     step = _matrix_step(np.eye(3) * scale, np.full(3, to_low - low * scale))
     if _direction(transform) == "inverse":
@@ -178,7 +178,7 @@ def _table(transform: Any) -> list[Step]:
     import PyOpenColorIO as ocio
 
     if transform.getHueAdjust() != ocio.HUE_NONE:
-        raise ConversionError("found a table that keeps hues, where channels depend on each other")
+        raise ConversionError("found a 1D LUT that keeps hues, where channels depend on each other")
     values = np.array(transform.getData(), dtype=np.float64).reshape(-1, 3)
     if transform.getInputHalfDomain():
         at = np.arange(len(values), dtype=np.uint16).view(np.float16).astype(np.float64)
@@ -225,10 +225,10 @@ def _rising(at: F64, values: F64) -> tuple[F64, F64]:
     y = values[good][first]
     falls = np.diff(y) < -1e-6 * np.maximum(np.abs(y[1:]), 1)
     if len(x) < 2 or falls.any():
-        raise ConversionError("found a curve that falls, which has no way back")
+        raise ConversionError("found a curve that falls, which has no inverse")
     rises = np.flatnonzero(np.diff(y) > 0)
     if not len(rises):
-        raise ConversionError("found a curve that is level, which has no way back")
+        raise ConversionError("found a curve that is level, which has no inverse")
     x, y = x[rises[0] :], y[rises[0] :]
     above = np.ones(len(y), dtype=bool)
     above[1:] = y[1:] > np.maximum.accumulate(y)[:-1]

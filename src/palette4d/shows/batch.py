@@ -22,9 +22,7 @@ from palette4d.common.files import make_folder
 from palette4d.common.text import counted
 from palette4d.grade import sidecar
 from palette4d.jobs.workers import Failed, Workers
-from palette4d.media import colour_space
 from palette4d.media.clip import open_clip
-from palette4d.media.clip_base import describe
 from palette4d.media.colour_space import SpaceOptions
 from palette4d.shows import manifest as manifests
 from palette4d.shows.manifest import DONE, FAILED, TO_DO, Entry, Manifest
@@ -256,9 +254,8 @@ class Show:
         clip = document["clip"]
         found = (int(clip["frames"]["first"]), int(clip["frames"]["last"]))
         expected = {(shot.first, shot.last)}
-        if before and before.frames:
-            if dataclasses.replace(before.shot, place=shot.place) == shot:
-                expected.add(before.frames)
+        if before and before.frames and dataclasses.replace(before.shot, place=shot.place) == shot:
+            expected.add(before.frames)
         same = (
             (self.same_options if before else not self.options.spaces.asked)
             and found in expected
@@ -323,26 +320,21 @@ def analyse_shot(task: ShotTask, threads: int) -> Analysed:
         shot = trimmed(shot, _open(task, shot))
         if shot != task.shot:
             notes.append(
-                f"the media cuts inside of the handles: frames {shot.frames} are analysed instead "
-                f"of {task.shot.frames}"
+                f"the media cuts inside of the head and tail frames: frames {shot.frames} are "
+                f"analysed instead of {task.shot.frames}"
             )
     clip = _open(task, shot)
-    spaces = colour_space.spaces_of(clip, options.spaces)
-    clip = colour_space.converted(clip, spaces)
     analysis_options = dataclasses.replace(options.analysis, threads=threads)
     try:
-        document, analysis = pipeline.analyze_clip(clip, analysis_options, allow_cuts=True)
+        analysis = pipeline.analyze(clip, analysis_options, spaces=options.spaces, allow_cuts=True)
     except (Palette4dError, OSError):
         raise
     except Exception as error:  # one shot must not end a night's work
         raise Palette4dError(
             f"the analysis ended with {type(error).__name__}: {error}; please report this"
         ) from error
-    document["clip"]["name"] = shot.name
-    notes += colour_space.record(document, clip, spaces)
-    if clip.skipped:
-        notes.append(f"{counted(len(clip.skipped), 'bad frame')} skipped: {describe(clip.skipped)}")
-    return Analysed(document, (*notes, *analysis.remarks))
+    analysis.document["clip"]["name"] = shot.name
+    return Analysed(analysis.document, (*notes, *analysis.notes))
 
 
 def _open(task: ShotTask, shot: Shot) -> Any:

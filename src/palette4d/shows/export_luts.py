@@ -2,91 +2,102 @@
 
 from __future__ import annotations
 
-import argparse
 import json
-import sys
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import counted
 from palette4d.jobs.workers import Workers
 from palette4d.lut_export import series
+from palette4d.lut_export.series import Request, Series
 from palette4d.shows import manifest as manifests
 from palette4d.shows import timeline_references
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
-    from palette4d.lut_export.series import Request, Series
+@dataclass(frozen=True)
+class Exported:
+    """A series a shot, in the manifest's order; notes; how many clips of the timeline name one."""
+
+    series: list[Series]
+    notes: list[str]
+    references: int
 
 
 def sidecars(paths: list[Path]) -> tuple[list[Path], list[str]]:
-    """Return sidecars, those of manifests among them, and remarks on shots that have none."""
+    """Return sidecars, those of manifests among them, and notes on shots that have none."""
     found: list[Path] = []
-    remarks = []
+    notes = []
     for path in paths:
         if not manifests.is_manifest(path):
             found.append(path)
             continue
         done, others = manifests.sidecars(path)
         found += done
-        remarks += _left_out(path, others)
-    return found, remarks
-
-
-def _left_out(path: Path, names: list[str]) -> list[str]:
-    if not names:
-        return []
-    some = ", ".join(names[:8]) + (", …" if len(names) > 8 else "")
-    return [f"{path}: {counted(len(names), 'shot')} not analysed and left out: {some}"]
+        if others:
+            some = ", ".join(others[:8]) + (", …" if len(others) > 8 else "")
+            notes.append(
+                f"{path}: {counted(len(others), 'shot')} not analysed and left out: {some}"
+            )
+    return found, notes
 
 
 def export(
-    args: argparse.Namespace,
+    path: Path,
+    output: Path,
     request: Request,
     choose: Callable[[_core.Sidecar], tuple[int, ...]],
-    with_bar: Callable[[Callable[[Callable[[int, int], None]], list[Series]]], list[Series]],
-) -> list[Series]:
-    """Export every shot of `args.sidecar`, a manifest; note it in a timeline where --otio asks.
+    workers: Workers,
+    progress: Callable[[int, int], None] | None = None,
+    *,
+    otio: Path | None = None,
+) -> Exported:
+    """Export every shot of a manifest; note it in a copy of the timeline.
 
-    Returns
-    -------
-    list of Series
-        One a shot, in the order of the manifest.
+    Parameters
+    ----------
+    path : Path
+        The manifest.
+    output : Path
+        The folder that gets a folder for each shot.
+    request : Request
+        How; sidecar, folder, frames and name are each shot's own.
+    choose : callable
+        Sidecar -> the frames to export.
+    workers : Workers
+        Who bakes.
+    progress : callable, optional
+        Called with (files done, files in all).
+    otio : Path, optional
+        The copy of the timeline; replaced where `request.force` says so.
 
     Raises
     ------
     Palette4dError
         Nothing can be exported; or, after what could be was, the timeline cannot be written.
     """
-    path: Path = args.sidecar
     manifest = manifests.read(path)
     source = None
-    if args.otio is not None:
-        source = timeline_references.check(manifest, path, args.otio, args.force)
-    files, others = manifests.sidecars(path)
-    for remark in _left_out(path, others):
-        print(f"palette4d: note: {remark}", file=sys.stderr)
+    if otio is not None:
+        source = timeline_references.check(manifest, path, otio, request.force)
+    files, notes = sidecars([path])
     names = [entry.shot.name for entry in manifest.entries if entry.status == manifests.DONE]
     requests = []
     for file, name in zip(files, names, strict=True):
         frames = choose(_core.read_sidecar(str(file)))
-        folder = args.output / name
-        one = replace(request, sidecar=file, folder=folder, frames=frames, name=name)
-        requests.append(one)
-    workers = Workers(args.jobs, args.cluster)
-    done = with_bar(lambda progress: series.export(requests, workers, progress))
-    if source is not None:
-        exported = dict(zip(names, done, strict=True))
-        count = timeline_references.write(
-            source, manifest, path, exported, args.otio, force=args.force
+        requests.append(
+            replace(request, sidecar=file, folder=output / name, frames=frames, name=name)
         )
-        if not args.json:
-            print(f"{args.otio}: references in {counted(count, 'clip')}")
-    return done
+    done = series.export(requests, workers, progress)
+    references = 0
+    if source is not None and otio is not None:
+        exported = dict(zip(names, done, strict=True))
+        references = timeline_references.write(
+            source, manifest, path, exported, otio, force=request.force
+        )
+    return Exported(done, notes, references)
 
 
 def as_json(done: list[Series]) -> str:

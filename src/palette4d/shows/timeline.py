@@ -1,10 +1,9 @@
 """The shots of an edit: a timeline of OpenTimelineIO, or an EDL, in; `Shot`s out.
 
-Each clip of each video track that is on is a shot, nested ones too, with the frames that the edit
-shows of it: its in-point and its length, what transitions on either side take more, what a change
-of speed takes more or less, and what an enclosing stack leaves of it. Gaps and generators are
-none. Times are turned into the frame numbers of the media's files, as `clip` counts them: those of
-an image sequence's names, and from 0 in a movie.
+Each clip of each enabled video track is a shot, nested clips too, with the media that the edit
+shows of it (`media_range`). Gaps and generators are no shots. Times become the frame numbers of the
+media's files, as `media.clip` counts them: the numbers in an image sequence's names, and from 0 in
+a movie.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ def shots_of(document: Document, folder: find_media.Folder | None = None, handle
     folder : find_media.Folder, optional
         Where to look for media first.
     handles : int
-        Frames more on either side, as far as the media goes.
+        Head and tail frames, as far as the media goes.
 
     Returns
     -------
@@ -126,49 +125,39 @@ class _Reader:
         if isinstance(reference, self.otio.schema.GeneratorReference):
             self.passed_over("generated picture", "generated pictures")
             return
+        place = Place(track, "", path)
         try:
             shown = media_range.shown(clip)
+            if shown is None:
+                self.passed_over("clip is cut away", "clips are cut away")
+                return
+            place = Place(track, self.record_of(shown[0]), path)
+            self.shots.append(self.shot(clip, place, shown[1]))
         except Palette4dError as error:
-            self.add(clip, path, track, "", str(error))
-            return
-        if shown is None:
-            self.passed_over("clip is cut away", "clips are cut away")
-            return
-        record, used = shown
-        place = Place(track, self.record_of(record), path)
-        try:
-            spec, opened = self.opened(clip)
-            first, last = self.frames(clip, used, opened)
-        except Palette4dError as error:
-            self.add(clip, path, track, place.record, str(error))
-            return
-        low, high = opened.frames[0], opened.frames[-1]
-        if not low <= first <= last <= high:
-            self.add(
-                clip,
-                path,
-                track,
-                place.record,
-                f"{spec}: the edit shows frames {first} to {last}, the media has "
-                f"{describe(opened.frames)}; bring the whole media, or the right take",
-            )
-            return
-        self.shots.append(
-            Shot(
-                name=file_safe(clip.name or Path(spec).stem),
-                clip=spec,
-                first=max(low, first - self.handles),
-                last=min(high, last + self.handles),
-                used=(first, last),
-                place=place,
-            )
-        )
+            name = file_safe(clip.name or "shot")
+            self.shots.append(Shot(name, "", 0, 0, (0, 0), place=place, problem=str(error)))
 
-    def add(self, clip: Any, path: tuple[int, ...], track: str, record: str, problem: str) -> None:
-        """Note a shot that cannot be analysed."""
-        place = Place(track, record, path)
-        name = file_safe(clip.name or "shot")
-        self.shots.append(Shot(name, "", 0, 0, (0, 0), place=place, problem=problem))
+    def shot(self, clip: Any, place: Place, used: Any) -> Shot:
+        """Return the shot of a clip, of whose media the edit shows a range of time."""
+        spec = self.found(clip)
+        if spec not in self.clips:
+            self.clips[spec] = open_clip(spec, skip_bad_frames=True)
+        media = self.clips[spec]
+        first, last = self.frames(clip, used, media)
+        low, high = media.frames[0], media.frames[-1]
+        if not low <= first <= last <= high:
+            raise Palette4dError(
+                f"{spec}: the edit shows frames {first} to {last}, the media has "
+                f"{describe(media.frames)}; bring the whole media, or the right take"
+            )
+        return Shot(
+            name=file_safe(clip.name or Path(spec).stem),
+            clip=spec,
+            first=max(low, first - self.handles),
+            last=min(high, last + self.handles),
+            used=(first, last),
+            place=place,
+        )
 
     def record_of(self, time: Any) -> str:
         """Return a time of the timeline as a timecode, or a number where there is none."""
@@ -182,15 +171,6 @@ class _Reader:
             return str(opentime.to_timecode(at, rate))
         except ValueError:  # a rate that timecodes do not have, or before 0
             return f"{at.value:g}"
-
-    # ----------------------------------------------------------------------------- media
-
-    def opened(self, clip: Any) -> tuple[str, Clip]:
-        """Return what `open_clip` takes for a clip's media, and the clip."""
-        spec = self.found(clip)
-        if spec not in self.clips:
-            self.clips[spec] = open_clip(spec, skip_bad_frames=True)
-        return spec, self.clips[spec]
 
     def found(self, clip: Any) -> str:
         """Find a clip's media: in the folder by name, else where the timeline says."""

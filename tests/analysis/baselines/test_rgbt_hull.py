@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from analysis_frames import constant, grey, mixture, noise, stats
 from palette4d.analysis.baselines import rgbt_hull
+from palette4d.analysis.colour_statistics import gather
+from palette4d.analysis.frame_statistics import Gamut
 from palette4d.analysis.objective import loss_of
 from palette4d.analysis.options import AnalysisOptions
-from palette4d.analysis.statistics import gamut_box, gather
 from scipy.spatial import ConvexHull
 
 from palette4d import _core
@@ -105,7 +106,7 @@ def frames_of(images, step=1):
 
 def analysed(images, vertices=20, step=1):
     frames = frames_of(images, step=step)
-    return frames, rgbt_hull.rgbt_polytope(frames, *gamut_box(frames), OPTIONS, vertices)
+    return frames, rgbt_hull.rgbt_polytope(frames, Gamut.of(frames), vertices)
 
 
 def document(polytope, step=1):
@@ -200,9 +201,9 @@ def test_slices_are_those_of_the_convex_hull(name, vertices):
 @pytest.mark.parametrize("vertices", [8, 12, 20, 40])
 def test_everything_is_enclosed_before_clipping(vertices):
     frames = frames_of([cloud(i) for i in range(7)])
-    low, high = gamut_box(frames)
-    corners = rgbt_hull.all_extremes(frames, low, high)
-    around = rgbt_hull.simplified(corners, 1001, 1007, low, high, vertices)
+    gamut = Gamut.of(frames)
+    corners = rgbt_hull.all_extremes(frames, gamut)
+    around = rgbt_hull.simplified(corners, 1001, 1007, gamut, vertices)
     assert 8 <= len(around) <= max(vertices, 8)
     assert around[:, 3].min() > 1001 - 1e-7
     assert around[:, 3].max() < 1007 + 1e-7
@@ -214,10 +215,8 @@ def test_everything_is_enclosed_before_clipping(vertices):
 
 def test_flat_colours_are_enclosed_within_their_plane():
     frames = frames_of([flat(i) for i in range(5)])
-    low, high = gamut_box(frames)
-    around = rgbt_hull.simplified(
-        rgbt_hull.all_extremes(frames, low, high), 1001, 1005, low, high, 10
-    )
+    gamut = Gamut.of(frames)
+    around = rgbt_hull.simplified(rgbt_hull.all_extremes(frames, gamut), 1001, 1005, gamut, 10)
     assert len(around) <= 10
     np.testing.assert_allclose(around[:, 2], 0.5, atol=1e-7)
     hull = ConvexHull(around[:, [0, 1, 3]])
@@ -229,10 +228,10 @@ def test_flat_colours_are_enclosed_within_their_plane():
 
 def test_fewer_vertices_enclose_more():
     frames = frames_of([cloud(i) for i in range(7)])
-    low, high = gamut_box(frames)
-    corners = rgbt_hull.all_extremes(frames, low, high)
+    gamut = Gamut.of(frames)
+    corners = rgbt_hull.all_extremes(frames, gamut)
     volumes = [
-        ConvexHull(rgbt_hull.simplified(corners, 1001, 1007, low, high, n)).volume
+        ConvexHull(rgbt_hull.simplified(corners, 1001, 1007, gamut, n)).volume
         for n in (1000, 40, 20, 12, 9)
     ]
     assert volumes == sorted(volumes)
@@ -293,9 +292,9 @@ def test_times_are_analysed_frames():
 
 def test_vertices_stay_in_the_gamut():
     frames, polytope = analysed([noise(i) for i in range(6)], 12)
-    low, high = gamut_box(frames)
-    assert (polytope.vertices[:, :3] >= low).all()
-    assert (polytope.vertices[:, :3] <= high).all()
+    gamut = Gamut.of(frames)
+    assert (polytope.vertices[:, :3] >= gamut.low).all()
+    assert (polytope.vertices[:, :3] <= gamut.high).all()
 
 
 @pytest.mark.parametrize("seed", [1023, 1056, 1183, 1239, 1330, 1447])
@@ -348,7 +347,7 @@ def test_progress_ends_at_its_total():
     calls: list[tuple[int, int]] = []
     frames = frames_of([mixture(CORNERS, i) for i in range(6)])
     rgbt_hull.rgbt_polytope(
-        frames, *gamut_box(frames), OPTIONS, 10, lambda done, total: calls.append((done, total))
+        frames, Gamut.of(frames), 10, lambda done, total: calls.append((done, total))
     )
     done = [d for d, _ in calls]
     assert len(calls) > 2
@@ -360,7 +359,7 @@ def test_progress_ends_at_its_total():
 def test_too_few_vertices_are_refused():
     frames = frames_of([noise(1), noise(2)])
     with pytest.raises(Palette4dError, match="found 7, expected at least 8"):
-        rgbt_hull.rgbt_polytope(frames, *gamut_box(frames), OPTIONS, 7)
+        rgbt_hull.rgbt_polytope(frames, Gamut.of(frames), 7)
 
 
 def test_seasons(seasons):
@@ -368,9 +367,9 @@ def test_seasons(seasons):
     frames = [
         gather(number, image, OPTIONS) for number, image in open_clip(str(seasons)).iter_colours()
     ]
-    low, high = gamut_box(frames)
+    gamut = Gamut.of(frames)
     start = time.process_time()
-    polytope = rgbt_hull.rgbt_polytope(frames, low, high, OPTIONS, 20)
+    polytope = rgbt_hull.rgbt_polytope(frames, gamut, 20)
     assert time.process_time() - start < 20
     assert 15 <= len(polytope.vertices) <= 20
     check_slices(polytope, np.linspace(0, 49, 99))

@@ -9,23 +9,23 @@ import numpy as np
 import pytest
 from analysis_frames import constant, mixture, stats
 from palette4d.analysis.baselines.static_hull import static_polytope
-from palette4d.analysis.frame_hulls import frame_palette, hull_mesh
+from palette4d.analysis.convex_hulls import deepest_concavity, hull_mesh
+from palette4d.analysis.frame_hulls import frame_palette
+from palette4d.analysis.frame_statistics import Gamut, pooled
 from palette4d.analysis.losses import palette_loss
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Palette
-from palette4d.analysis.report.quality import deepest_dent
-from palette4d.analysis.statistics import pooled
 
 CORNERS = np.array(list(itertools.product((0.1, 0.9), repeat=3)))
 FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
-LOW, HIGH = np.zeros(3), np.ones(3)
+GAMUT = Gamut(np.zeros(3), np.ones(3))
 OPTIONS = AnalysisOptions()
 
 
 def static(frames):
     colours = pooled([f.coarse for f in frames], OPTIONS.coarse_colours)
-    palette = frame_palette(colours, LOW, HIGH, OPTIONS)
-    return palette, static_polytope(palette, frames, LOW, HIGH, OPTIONS)
+    palette = frame_palette(colours, GAMUT, OPTIONS)
+    return palette, static_polytope(palette, frames, GAMUT, OPTIONS)
 
 
 def test_colours_do_not_move_and_the_loss_falls():
@@ -68,9 +68,9 @@ def test_a_mesh_that_has_folded_is_unfolded():
     other = mesh.rgb[[1, 0, *range(2, len(mesh.rgb))]]  # two colours have changed places
     plain = dataclasses.replace(OPTIONS, convexity=0.0, separation=0.0)
     folded = Palette(other, mesh.faces)
-    polytope = static_polytope(folded, frames, LOW, HIGH, plain)
-    assert deepest_dent(polytope, frames) < 1e-9
+    polytope = static_polytope(folded, frames, GAMUT, plain)
+    assert deepest_concavity(polytope, frames) < 1e-9
     # With a colour inside of the others it cannot be.
     inside = Palette(np.vstack([other, CORNERS.mean(axis=0)]), mesh.faces)
-    polytope = static_polytope(inside, frames, LOW, HIGH, plain)
+    polytope = static_polytope(inside, frames, GAMUT, plain)
     np.testing.assert_array_equal(polytope.blocks[0].faces, mesh.faces)

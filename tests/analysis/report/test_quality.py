@@ -6,13 +6,15 @@ import itertools
 
 import numpy as np
 import pytest
-from analysis_frames import ArrayClip, in_core, mixture, noise, stats
+from analysis_frames import in_core, mixture, noise, stats
 from palette4d.analysis import pipeline
-from palette4d.analysis.frame_hulls import hull_mesh
+from palette4d.analysis.convex_hulls import deepest_concavity, hull_mesh
 from palette4d.analysis.losses import NO_FACES, palette_loss
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Section, SkewPolytope
 from palette4d.analysis.report import quality
+
+from palette4d.media.array_clip import ArrayClip
 
 FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
 OPTIONS = AnalysisOptions()
@@ -52,8 +54,8 @@ def test_look_alikes_are_found_and_named(frames):
     assert found.closest[0] == pytest.approx(min(np.linalg.norm(a - b) for a, b in pairs))
 
 
-def test_strands_of_a_split_are_not_look_alikes(frames):
-    """Colour 3 splits at frame 2; its strands are one colour there, and far apart at the end."""
+def test_tracks_of_a_split_are_not_look_alikes(frames):
+    """Colour 3 splits at frame 2; its dense are one colour there, and far apart at the end."""
     mesh = hull_mesh(FOUR)
     five = hull_mesh(np.vstack([FOUR, [0.7, 0.7, 0.9]]))
     parent = [int(np.argmin(np.linalg.norm(mesh.rgb - c, axis=1))) for c in five.rgb]
@@ -74,20 +76,20 @@ def test_strands_of_a_split_are_not_look_alikes(frames):
     assert found.closest[0] > 0.5
 
 
-def test_dents_and_unused_handles_are_found(frames):
+def test_concavities_and_unused_handles_are_found(frames):
     cube = np.array(list(itertools.product([0.1, 0.9], repeat=3)))
     mesh = hull_mesh(np.vstack([cube, [0.5, 0.5, 0.95]]))
     apex = int(np.argmin(np.linalg.norm(mesh.rgb - [0.5, 0.5, 0.95], axis=1)))
-    dented = mesh.rgb.copy()
-    dented[apex, 2] = 0.5  # a pyramid is missing: 1/3 base times 0.4
-    polytope = resting(dented, mesh.faces)
+    concave = mesh.rgb.copy()
+    concave[apex, 2] = 0.5  # a pyramid is missing: 1/3 base times 0.4
+    polytope = resting(concave, mesh.faces)
     found = quality.report(in_core(polytope, frames), frames, OPTIONS)
-    assert found.dent[0] == pytest.approx((0.8 * 0.8 * 0.4 / 3) / 0.8**3, rel=1e-6)
-    assert quality.deepest_dent(polytope, frames) == pytest.approx(found.dent[0], rel=1e-6)
-    flat = resting(dented * [1, 1, 0.005], mesh.faces)  # as deep a dent, but who would see it
-    assert quality.deepest_dent(flat, frames) == 0
-    thin = resting(dented * [1, 1, 0.03], mesh.faces)
-    assert quality.deepest_dent(thin, frames) == pytest.approx(found.dent[0], rel=1e-6)
+    assert found.concavity[0] == pytest.approx((0.8 * 0.8 * 0.4 / 3) / 0.8**3, rel=1e-6)
+    assert deepest_concavity(polytope, frames) == pytest.approx(found.concavity[0], rel=1e-6)
+    flat = resting(concave * [1, 1, 0.005], mesh.faces)  # as deep a concavity, but who would see it
+    assert deepest_concavity(flat, frames) == 0
+    thin = resting(concave * [1, 1, 0.03], mesh.faces)
+    assert deepest_concavity(thin, frames) == pytest.approx(found.concavity[0], rel=1e-6)
 
     far = np.vstack([FOUR * 0.2, [0.9, 0.9, 0.9]])
     mesh = hull_mesh(far)
@@ -137,8 +139,8 @@ def test_pixels_are_outside_from_a_step_of_8_bits_on():
 
 def test_the_pipeline_reports_and_stores_the_figures():
     clip = ArrayClip([mixture(FOUR + 0.01 * i, i) for i in range(5)])
-    document, analysis = pipeline.analyze_clip(clip, AnalysisOptions())
-    last = document["quality"]["stages"][-1]
+    analysis = pipeline.analyze(clip)
+    last = analysis.document["quality"]["stages"][-1]
     for name, value in analysis.report.figures().items():
         assert last[name] == value
     assert last["L"] == pytest.approx(np.mean([fit.L for fit in analysis.report.fits]), abs=1e-6)

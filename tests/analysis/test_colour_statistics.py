@@ -7,17 +7,19 @@ import threading
 
 import numpy as np
 import pytest
-from analysis_frames import ArrayClip, mixture, noise
+from analysis_frames import mixture, noise
 from clip_files import grey_levels, write_image
-from palette4d.analysis import frame_hulls, pipeline, statistics
-from palette4d.analysis.colour_histogram import histogram
-from palette4d.analysis.cuts import difference
+from palette4d.analysis import colour_statistics, frame_hulls, pipeline
+from palette4d.analysis.colour_statistics import budget, chosen_frames, gather, gather_clip
+from palette4d.analysis.frame_statistics import Gamut, pooled
 from palette4d.analysis.losses import palette_loss
 from palette4d.analysis.options import AnalysisOptions
-from palette4d.analysis.statistics import budget, chosen_frames, gamut_box, gather, gather_clip
 
 from palette4d import _core
+from palette4d.media.array_clip import ArrayClip
 from palette4d.media.clip import FrameError, open_clip
+from palette4d.media.colour_histogram import histogram
+from palette4d.media.cuts import difference
 
 
 def same(a: _core.ColourTree, b: _core.ColourTree) -> bool:
@@ -58,11 +60,12 @@ def test_what_is_no_colour_does_not_count():
 def test_gamut_grows_only_for_colours_outside():
     inside = gather(0, noise(5), AnalysisOptions())
     outside = gather(1, noise(6, 3, -1), AnalysisOptions())
-    low, high = gamut_box([inside])
-    assert (low.tolist(), high.tolist()) == ([0, 0, 0], [1, 1, 1])
-    low, high = gamut_box([inside, outside])
-    assert low.max() < -0.9
-    assert high.min() > 1.9
+    gamut = Gamut.of([inside])
+    assert (gamut.low.tolist(), gamut.high.tolist(), gamut.scale) == ([0] * 3, [1] * 3, 1)
+    gamut = Gamut.of([inside, outside])
+    assert gamut.low.max() < -0.9
+    assert gamut.high.min() > 1.9
+    assert 2.9 < gamut.scale < 3
 
 
 def with_outliers(pixels: int, colour=(-10, 0.5, 0.5), seed: int = 5):
@@ -78,35 +81,36 @@ def test_only_enough_pixels_set_the_box(pixels, k, kept):
     images = [noise(4, size=(80, 100)), with_outliers(pixels), noise(6, size=(80, 100))]
     found = gather_clip(ArrayClip(images, first=10), AnalysisOptions(k=k))
     frames = list(found.frames.values())
-    low, high = gamut_box(frames)
-    np.testing.assert_allclose(low, [-10 if kept else 0, 0, 0])
-    np.testing.assert_array_equal(high, 1)
-    assert frames[1].low[0] == frames[1].colours.rgb.min() == frames[1].coarse.rgb.min() == low[0]
+    gamut = Gamut.of(frames)
+    np.testing.assert_allclose(gamut.low, [-10 if kept else 0, 0, 0])
+    np.testing.assert_array_equal(gamut.high, 1)
+    least = frames[1].colours.rgb.min()
+    assert frames[1].low[0] == least == frames[1].coarse.rgb.min() == gamut.low[0]
     assert frames[1].colours.total == frames[1].coarse.total == frames[1].pixels == 8000
     for image, frame in zip(images[::2], frames[::2], strict=True):
         assert same(frame.colours, gather(0, image, AnalysisOptions()).colours)
     if kept:
-        assert found.remarks == ()
+        assert found.notes == ()
     else:
-        (remark,) = found.remarks
-        assert remark.startswith(f"{pixels} pixel")
-        assert "by up to 10 (frame 11)" in remark
+        (note,) = found.notes
+        assert note.startswith(f"{pixels} pixel")
+        assert "by up to 10 (frame 11)" in note
 
 
 def test_a_hot_pixel_of_every_frame_is_an_outlier():
     images = [with_outliers(1, (0.5, 0.5, 40), seed) for seed in range(60)]
     found = gather_clip(ArrayClip(images, first=0), AnalysisOptions())
-    np.testing.assert_array_equal(gamut_box(list(found.frames.values()))[1], 1)
-    assert "60 pixels" in found.remarks[0]
-    assert "frames 0-59" in found.remarks[0]
+    np.testing.assert_array_equal(Gamut.of(list(found.frames.values())).high, 1)
+    assert "60 pixels" in found.notes[0]
+    assert "frames 0-59" in found.notes[0]
 
 
-def test_a_light_that_begins_small_is_no_outlier():
+def test_a_highlight_that_begins_small_is_no_outlier():
     images = [with_outliers(pixels, (3, 2, 1)) for pixels in (1, 90)]
     found = gather_clip(ArrayClip(images, first=0), AnalysisOptions())
     for frame in found.frames.values():
         np.testing.assert_allclose(frame.high, [3, 2, 1], rtol=1e-6)
-    assert found.remarks == ()
+    assert found.notes == ()
 
 
 def test_outliers_are_taken_at_the_border_of_what_others_reach():
@@ -115,7 +119,7 @@ def test_outliers_are_taken_at_the_border_of_what_others_reach():
     found = gather_clip(ArrayClip([image], first=0), AnalysisOptions())
     np.testing.assert_allclose(found.frames[0].high, [4, 2, 1], rtol=1e-6)
     assert found.frames[0].low[2] == pytest.approx(-0.05)  # near enough to stay
-    assert "by up to 56 " in found.remarks[0]
+    assert "by up to 56 " in found.notes[0]
 
 
 def test_an_outlier_hardly_changes_the_palette():
@@ -124,7 +128,7 @@ def test_an_outlier_hardly_changes_the_palette():
     for name, pixels in (("none", 0), ("one", 1), ("many", 60)):
         images = [mixture(corners + 0.01 * i, i, 9000) for i in range(4)]
         images[2].reshape(-1, 3)[-pixels or 9000 :] = (0.5, -10, 0.5)
-        _, done = pipeline.analyze_clip(ArrayClip(images), AnalysisOptions())
+        done = pipeline.analyze(ArrayClip(images), AnalysisOptions())
         palettes[name] = done.polytope.vertices, done.stages[-1].losses.L
     (clean, loss), (one, loss_of_one) = palettes["none"], palettes["one"]
     np.testing.assert_allclose(one[:, :3].min(axis=0), clean[:, :3].min(axis=0), atol=0.05)
@@ -137,12 +141,12 @@ def test_trees_are_pooled():
     options = AnalysisOptions()
     images = [noise(seed, size=(60, 60)) for seed in range(3)]
     trees = [gather(0, image, options).colours for image in images]
-    whole = statistics.pooled(trees, 10**6)
+    whole = pooled(trees, 10**6)
     assert whole.total == 3 * 3600
     np.testing.assert_allclose(
         whole.counts @ whole.rgb, np.sum(images, axis=(0, 1, 2), dtype=float), rtol=1e-6
     )
-    few = statistics.pooled(trees, 1000)
+    few = pooled(trees, 1000)
     assert 800 < len(few) <= 1000
     assert few.total == 3 * 3600
 
@@ -166,7 +170,7 @@ def test_threads_do_not_change_the_statistics(tmp_path, monkeypatch, rows):
     assert done == [(n, 12) for n in range(1, 13)] * 3
     for run in runs:
         assert list(run.frames) == list(range(12))
-        assert run.remarks == ()
+        assert run.notes == ()
         for number, found in run.frames.items():
             first = runs[0].frames[number]
             assert same(found.colours, first.colours)
@@ -211,7 +215,7 @@ def test_every_nth_frame_of_very_many():
     for count in (3001, 4444, 100_001):
         frames = range(5, 5 + 2 * count, 2)
         chosen = chosen_frames(frames)
-        assert len(chosen) <= statistics.MOST_FRAMES
+        assert len(chosen) <= colour_statistics.MOST_FRAMES
         assert (chosen[0], chosen[-1]) == (frames[0], frames[-1])
         gaps = set(np.diff(chosen[:-1]))
         assert len(gaps) == 1
@@ -219,11 +223,11 @@ def test_every_nth_frame_of_very_many():
 
 
 def test_leaving_frames_out_is_said(monkeypatch):
-    monkeypatch.setattr(statistics, "MOST_FRAMES", 4)
+    monkeypatch.setattr(colour_statistics, "MOST_FRAMES", 4)
     found = gather_clip(ArrayClip([noise(i) for i in range(9)], first=0), AnalysisOptions())
     assert list(found.frames) == [0, 3, 6, 8]
-    assert len(found.remarks) == 1
-    assert "9 frames: one in 3 and the last are analysed, 4 in all" in found.remarks[0]
+    assert len(found.notes) == 1
+    assert "9 frames: one in 3 and the last are analysed, 4 in all" in found.notes[0]
 
 
 def test_colours_kept_of_a_clip_are_bounded(monkeypatch):
@@ -231,14 +235,16 @@ def test_colours_kept_of_a_clip_are_bounded(monkeypatch):
     assert budget(50, options) == (16384, 4096)
     for frames in (400, 1600, 3000):
         colours, coarse = budget(frames, options)
-        assert colours >= statistics.FEWEST_COLOURS
-        assert coarse >= statistics.FEWEST_COARSE
-        fewest = frames * (statistics.FEWEST_COLOURS + statistics.FEWEST_COARSE)
-        assert frames * (colours + coarse) < max(1.2 * statistics.MOST_COLOURS, 1.001 * fewest)
+        assert colours >= colour_statistics.FEWEST_COLOURS
+        assert coarse >= colour_statistics.FEWEST_COARSE
+        fewest = frames * (colour_statistics.FEWEST_COLOURS + colour_statistics.FEWEST_COARSE)
+        assert frames * (colours + coarse) < max(
+            1.2 * colour_statistics.MOST_COLOURS, 1.001 * fewest
+        )
         assert frames * (colours + coarse) < 5_000_000
     assert budget(3000, AnalysisOptions(colours=100, coarse_colours=64)) == (100, 64)
-    monkeypatch.setattr(statistics, "MOST_COLOURS", 4000)
-    monkeypatch.setattr(statistics, "FEWEST_COLOURS", 64)
+    monkeypatch.setattr(colour_statistics, "MOST_COLOURS", 4000)
+    monkeypatch.setattr(colour_statistics, "FEWEST_COLOURS", 64)
     found = gather_clip(ArrayClip([noise(i, size=(90, 90)) for i in range(4)]), options)
     assert all(700 < len(one.colours) <= 800 for one in found.frames.values())
 
@@ -246,9 +252,9 @@ def test_colours_kept_of_a_clip_are_bounded(monkeypatch):
 def test_cuts_are_found_by_enough_colours_of_however_long_a_clip(monkeypatch):
     pictures = [noise(i, size=(90, 90)) for i in range(3)]
     whole = gather_clip(ArrayClip(pictures), AnalysisOptions()).frames
-    monkeypatch.setattr(statistics, "MOST_COLOURS", 600)
-    monkeypatch.setattr(statistics, "FEWEST_COLOURS", 128)
-    monkeypatch.setattr(statistics, "FEWEST_COARSE", 64)
+    monkeypatch.setattr(colour_statistics, "MOST_COLOURS", 600)
+    monkeypatch.setattr(colour_statistics, "FEWEST_COLOURS", 128)
+    monkeypatch.setattr(colour_statistics, "FEWEST_COARSE", 64)
     few = gather_clip(ArrayClip(pictures), AnalysisOptions()).frames
     for i, frame in few.items():
         assert len(frame.colours) <= 200
@@ -276,7 +282,7 @@ def palettes(seasons):
         binner = _core.ColourBinner()
         fill(binner)
         everything, coarse, *_ = binner.take(10**9, 4096)
-        palette = frame_hulls.frame_palette(coarse, np.zeros(3), np.ones(3), options)
+        palette = frame_hulls.frame_palette(coarse, Gamut(np.zeros(3), np.ones(3)), options)
         out.append((number, palette.rgb, everything))
     return clip, out
 

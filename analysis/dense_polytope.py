@@ -1,8 +1,8 @@
-"""The full skew polytope between block merging and vertex removal: strands of vertices, and ghosts.
+"""The skew polytope between block merging and vertex removal: a vertex for each colour and frame.
 
 Input: blocks with a palette a frame, and the inter-frame edges between blocks. A removed vertex
-becomes a ghost on the edge between its neighbours in time (section 5.4.1). Never removed: splitting
-and merging vertices, and those of the first and last frame.
+becomes a ghost on the edge between its neighbours in time (section 5.4.1). Splitting and merging
+vertices and those of the first and last frame are never removed.
 """
 
 from __future__ import annotations
@@ -11,31 +11,47 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from palette4d.analysis.losses import NO_FACES
 from palette4d.analysis.polytope import Palette, Section, SkewPolytope
 
 F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
 Links = tuple[tuple[int, int], ...]
-BlockPalettes = Sequence[Sequence[Palette]]
 
 
-class Strands:
-    """The full skew polytope as strands: every vertex, its neighbours in time, and the ghosts.
+class DensePolytope:
+    """All vertices, their neighbours in time, and the ghosts.
 
-    `node[i][s]` is the vertex of colour s in frame i. Ghosts stay in `chain`: for each edge (v,
-    w), the removed vertices between v and w, in order of time.
+    Parameters
+    ----------
+    frames : frame numbers.
+    blocks : for each block a palette a frame, all with the same faces.
+    links : inter-frame edges between each block and the next, pairs of colours.
+    faces_between : (f, 3) triangles over these edges; without them transitions have no faces.
+
+    Attributes
+    ----------
+    node : `node[i][s]` is the vertex of colour s in frame i.
+    position : (n, 3) colours of each frame, of ghosts too.
+    at : (frame index, colour) of each vertex.
+    chain : for each edge (v, w) the ghosts between v and w, in order of time.
     """
 
     def __init__(
-        self, frames: Sequence[int], blocks: BlockPalettes, links: Sequence[Links]
+        self,
+        frames: Sequence[int],
+        blocks: Sequence[Sequence[Palette]],
+        links: Sequence[Links] = (),
+        faces_between: Sequence[I32] = (),
     ) -> None:
         self.frames = [float(f) for f in frames]
         self.faces = [block[0].faces for block in blocks]
         self.links = list(links)
+        self.faces_between = list(faces_between)
         self.block_frames: list[range] = []
         self.node: list[list[int]] = []
         self.position: list[F64] = []
-        self.at: list[tuple[int, int]] = []  # (frame index, colour) of each vertex
+        self.at: list[tuple[int, int]] = []
         for block in blocks:
             begin = len(self.node)
             self.block_frames.append(range(begin, begin + len(block)))
@@ -62,13 +78,13 @@ class Strands:
         self.chain[u, v] = []
 
     def colour(self, vertex: int) -> F64:
-        """Return the (3,) colour of a vertex (of a ghost: where its edge passes)."""
+        """Return the (3,) colour of a vertex; a ghost has the colour of its edge at that time."""
         i, s = self.at[vertex]
         rgb: F64 = self.position[i][s]
         return rgb
 
     def removable(self, vertex: int) -> bool:
-        """Whether section 5.4.1 allows it, and no two strands would become the same edge."""
+        """Whether section 5.4.1 allows removal, and no two edges would become the same."""
         if not self.alive[vertex]:
             return False
         if len(self.before[vertex]) != 1 or len(self.after[vertex]) != 1:
@@ -100,14 +116,14 @@ class Strands:
             self.position[i][s] = rgb
 
     def polytope(self) -> SkewPolytope:
-        """Return what is left, with tracks through the living vertices."""
+        """Return the polytope of the vertices that are left."""
         keep = [v for v, alive in enumerate(self.alive) if alive]
         index = {v: n for n, v in enumerate(keep)}
         edge_of = {ghost: edge for edge, chain in self.chain.items() for ghost in chain}
         vertices = np.array([[*self.colour(v), self.frames[self.at[v][0]]] for v in keep])
 
         def through(nodes: Sequence[int]) -> tuple[int, ...]:
-            """Return the track that passes the given vertices and ghosts, as living vertices."""
+            """Return the track that passes the given vertices and ghosts."""
             out = [index[v] for v in nodes if self.alive[v]]
             if not self.alive[nodes[0]]:
                 out.insert(0, index[edge_of[nodes[0]][0]])
@@ -124,6 +140,6 @@ class Strands:
             if b + 1 < len(self.block_frames):
                 ends, begins = self.node[inside[-1]], self.node[inside[-1] + 1]
                 links = tuple(through([ends[i], begins[j]]) for i, j in self.links[b])
-                none: I32 = np.zeros((0, 3), np.int32)
-                transitions.append(Section(last, self.frames[inside[-1] + 1], links, none))
+                faces = self.faces_between[b] if self.faces_between else NO_FACES
+                transitions.append(Section(last, self.frames[inside[-1] + 1], links, faces))
         return SkewPolytope(vertices, tuple(blocks), tuple(transitions))

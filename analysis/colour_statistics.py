@@ -1,13 +1,13 @@
-"""Colour statistics of a frame: what the analysis keeps of its pixels.
+"""Colour statistics: what the analysis keeps of the pixels of each frame.
 
-Input: a clip, or an image. Output: for each frame weighted colours in k-d trees, of bounded size,
-so that memory grows neither with resolution nor, beyond `MOST_COLOURS`, with the number of frames.
-Pixels that are not finite or have an alpha below 1/255 do not count; where that leaves no pixel of
-any frame, alpha is not used.
+Input: a clip, or an image. Output: weighted colours of each frame in k-d trees of bounded size, so
+that memory grows neither with the resolution nor, beyond `MOST_COLOURS`, with the number of frames.
+Pixels that are not finite or have an alpha below 1/255 do not count; if that leaves no pixel in any
+frame, alpha is ignored.
 
-The losses of section 3 measured on a frame of 8-bit colours of which no more than the kept number
-differ are exact. Else the colours are a sample (`colour_sample.hpp`), dense where the colours of
-the frame end; its error is measured by the tests.
+The losses of section 3 are exact for 8-bit frames with no more distinct colours than are kept.
+Otherwise the colours are a sample, dense near the hull of the frame's colours; tests measure its
+error.
 """
 
 from __future__ import annotations
@@ -22,85 +22,49 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d.analysis import colour_histogram
+from palette4d.analysis.frame_statistics import FrameStatistics, pooled
 from palette4d.analysis.losses import LOST_SHARE, thread_count
 from palette4d.analysis.options import AnalysisOptions
 
 from palette4d import _core
 from palette4d.common.text import counted
-from palette4d.media.clip_base import Fill, FrameError, describe
+from palette4d.media import colour_histogram
+from palette4d.media.clip_base import Fill, FrameError, named
 
 if TYPE_CHECKING:
     from palette4d.media.clip import Clip
 
+# Pixels after which freed memory is returned: glibc keeps the gaps that frames of changing sizes
+# leave between the colours that stay.
 TRIM_EVERY = 50_000_000
-"""Pixels after which freed memory is given back: glibc keeps what frames of changing sizes leave
-between the colours that stay."""
-
+# Colours kept of all frames together, about 100 MB. Four times as many gave no better palettes.
 MOST_COLOURS = 2_000_000
-"""Colours kept of a clip, all frames together: about 100 MB. Four times as many gave palettes no
-better, for twice the time."""
-
+# Clips with fewer frames keep more coarse colours of each, at most so many times as many.
 SHORT, RICHER = 48, 2
-"""Of clips with fewer frames than these more coarse colours are kept of each, so that as many take
-part in the search, up to so many times."""
-
+# Of a longer clip every n-th frame is analysed: a palette is linear in time anyway.
 MOST_FRAMES = 3000
-"""Of a clip with more frames only every n-th is analysed: a palette is linear in time anyway."""
-
+# Colours and coarse colours kept of a frame, however many frames there are.
 FEWEST_COLOURS, FEWEST_COARSE = 1024, 512
-"""Colours kept of a frame, however many frames there are."""
-
+# Bytes for frames that are read at the same time, and the most frames.
 MEMORY, MOST_WORKERS = 400 << 20, 8
-"""Bytes for frames that are read at the same time, and how many that may be."""
-
+# Most bytes of a binner's table.
 TABLE = 64 << 20
-"""Most bytes of a binner's table."""
-
+# A colour outside 0..1 counts on so many pixels of a small frame, on this share of a tiny one.
 FEWEST_OUTSIDE, MOST_OUTSIDE_SHARE = 5, 0.01
-"""A colour outside 0..1 counts on so many pixels of a small frame, of a tiny one on this share."""
-
+# Outliers are farther outside than this share of the extent of the clip's other colours: less
+# hardly changes a hull, and keeps the end of a true highlight.
 OUTLYING = 0.1
-"""Outliers are those farther outside than this share of what the clip's other colours span: less
-than that hardly changes a hull, and the end of an honest highlight stays as it is."""
 
 Progress = Callable[[int, int], None]
 
 
 @dataclasses.dataclass(frozen=True)
-class FrameStatistics:
-    """One frame's colours.
-
-    Attributes
-    ----------
-    frame : the frame number.
-    colours : the colours the losses are measured on.
-    coarse : fewer of them, for the stages that only compare alternatives.
-    histogram : `colour_histogram.histogram` of the frame, to find cuts by.
-    low, high : (3,) float64 the colours' bounding box.
-    pixels, ignored : how many pixels count, and how many do not.
-    """
-
-    frame: int
-    colours: _core.ColourTree
-    coarse: _core.ColourTree
-    histogram: NDArray[np.float64]
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
-    pixels: int
-    ignored: int
-
-
-@dataclasses.dataclass(frozen=True)
 class ClipStatistics:
-    """The statistics of a clip's frames, by their number; None where no pixel counts.
-
-    remarks says what was left out to stay within bounds, whether alpha was, and which colours were
-    moved (`without_outliers`). Bad frames are listed by the clip.
-    """
+    """The statistics of frames by number, None where no pixel counts; and notes for the user about
+    frames that are left out, unused alpha and clipped outliers. The clip lists its bad frames."""
 
     frames: dict[int, FrameStatistics | None]
-    remarks: tuple[str, ...]
+    notes: tuple[str, ...]
 
 
 def gather(
@@ -115,10 +79,10 @@ def gather(
 def gather_clip(
     clip: Clip, options: AnalysisOptions, progress: Progress | None = None
 ) -> ClipStatistics:
-    """Read a clip's frames, one after the other, and keep their statistics.
+    """Read the frames of a clip, one after the other, and keep their statistics.
 
-    Frames are read and binned side by side in `options.threads` threads, as far as memory allows;
-    the result does not depend on it.
+    Frames are read and binned in `options.threads` threads, as far as memory allows; the result
+    does not depend on their number.
 
     Raises
     ------
@@ -127,7 +91,6 @@ def gather_clip(
     """
     chosen = chosen_frames(clip.frames)
     colours, coarse = budget(len(chosen), options)
-    report = progress or (lambda done, total: None)
     pixels = clip.width * clip.height
     found: dict[int, FrameStatistics | None] = {}
     hidden: set[int] = set()
@@ -140,11 +103,9 @@ def gather_clip(
         finally:
             binner.clear()
 
-    workers = min(
-        thread_count(options), MOST_WORKERS, max(1, MEMORY // (TABLE + 12 * pixels)), len(chosen)
-    )
-    # Its threads end here, whatever comes: an error's traceback would keep them until it is
-    # garbage, and the collector, wherever it happens to run, would wait for them.
+    most = min(MOST_WORKERS, MEMORY // (TABLE + 12 * pixels), len(chosen))
+    workers = max(1, min(thread_count(options), most))
+    # Closing ends the threads whatever happens: the traceback of an error would keep them alive.
     with contextlib.closing(_in_order(clip.fills(chosen), taken, workers)) as results:
         for done, (number, result) in enumerate(results, start=1):
             try:
@@ -155,18 +116,24 @@ def gather_clip(
                 clip.skip(number)
             if done % max(1, TRIM_EVERY // pixels) == 0:
                 _core.return_memory()
-            report(done, len(chosen))
+            if progress:
+                progress(done, len(chosen))
     if not found:
         raise clip.none_readable()
-    remarks = list(_remarks(clip.frames, chosen))
+    notes = []
+    if len(chosen) < len(clip.frames):
+        notes.append(
+            f"the clip has {counted(len(clip.frames), 'frame')}: one in "
+            f"{clip.frames.index(chosen[1])} and the last are analysed, {len(chosen)} in all; "
+            "colours change linearly between them"
+        )
     if any(found[number] is not None for number in found.keys() - hidden):
-        for number in hidden:  # alpha is used: there is nothing to be seen in these
-            found[number] = None
+        found |= dict.fromkeys(hidden)  # alpha is used: nothing of these frames shows
     elif hidden:
-        remarks.append(_unused_alpha(clip.premultiplied))
+        notes.append(_unused_alpha(clip.premultiplied))
     usable = {number: one for number, one in found.items() if one is not None}
     kept, outliers = without_outliers(usable, options, colours, coarse)
-    return ClipStatistics({**found, **kept}, (*remarks, *outliers))
+    return ClipStatistics({**found, **kept}, (*notes, *outliers))
 
 
 def chosen_frames(frames: Sequence[int]) -> list[int]:
@@ -188,26 +155,15 @@ def budget(frames: int, options: AnalysisOptions) -> tuple[int, int]:
     )
 
 
-def pooled(trees: Sequence[_core.ColourTree], most: int) -> _core.ColourTree:
-    """Return the colours of several trees as one, at most `most` of them."""
-    binner = _core.ColourBinner()
-    for tree in trees:
-        binner.add_colours(tree.rgb, tree.counts)
-    taken = binner.take(most, most)
-    assert taken is not None  # a tree has at least one colour
-    return taken[0]
-
-
 def without_outliers(
     frames: Mapping[int, FrameStatistics], options: AnalysisOptions, colours: int, coarse: int
 ) -> tuple[dict[int, FrameStatistics], tuple[str, ...]]:
-    """Return frames whose outliers are taken at the border of the other colours, and a remark.
+    """Return frames whose outliers are clipped to the border of the other colours, and a note.
 
-    The border is, for each channel and side, what enough pixels of some frame reach, never inside
-    0..1. Enough are `LOST_SHARE` of a frame, and `options.k`, which hold a handle, at most. They
-    are counted in each frame, since a hot pixel is in all of a clip's; but the border is the
-    clip's, so that a light may begin small. Frames without outliers are returned as they are;
-    others with at most `colours` and `coarse` colours.
+    The border of each channel and side is what enough pixels of some frame reach, never inside
+    0..1. Enough are `LOST_SHARE` of a frame, at most `options.k`, which hold a handle. Pixels are
+    counted in each frame, since a hot pixel is in all frames; but the border is the clip's, so that
+    a highlight may begin small. Frames without outliers are returned as they are.
     """
     if not frames:
         return {}, ()
@@ -234,12 +190,19 @@ def without_outliers(
         assert taken is not None  # there were colours
         fine, few, lowest, highest = taken
         kept[number] = dataclasses.replace(one, colours=fine, coarse=few, low=lowest, high=highest)
-    return dict(frames) | kept, _outliers(list(kept), max(1, round(pixels)), farthest)
+    if not kept:
+        return dict(frames), ()
+    note = (
+        f"{counted(max(1, round(pixels)), 'pixel lies', 'pixels lie')} far outside 0..1 and the "
+        f"clip's other colours, by up to {farthest:.3g} ({named(list(kept))}): for the palette "
+        "they are clipped to the other colours; --set k=1 keeps them"
+    )
+    return dict(frames) | kept, (note,)
 
 
 def _reached(frame: FrameStatistics, options: AnalysisOptions) -> NDArray[np.float64]:
-    """Return (2, 3) the least and the largest value of each channel that enough pixels reach, 0
-    and 1 where these are farther out."""
+    """Return (2, 3) the least and largest value of each channel that enough pixels reach, at most 0
+    and at least 1."""
     enough = min(
         options.k,
         max(FEWEST_OUTSIDE, LOST_SHARE * frame.pixels),
@@ -254,28 +217,17 @@ def _reached(frame: FrameStatistics, options: AnalysisOptions) -> NDArray[np.flo
             values = sign * frame.colours.rgb[:, channel]
             outside = np.flatnonzero(values > border)
             outside = outside[np.argsort(-values[outside], kind="stable")]
-            # Means of counts may fall short of a whole number by rounding.
+            # Rounded means of counts may fall short of a whole number.
             there = np.flatnonzero(np.cumsum(frame.colours.counts[outside]) >= enough - 1e-6)
             if len(there):
                 out[side, channel] = sign * values[outside[there[0]]]
     return out
 
 
-def _outliers(frames: Sequence[int], pixels: int, farthest: float) -> tuple[str, ...]:
-    if not frames:
-        return ()
-    what = counted(pixels, "pixel lies", "pixels lie")
-    where = f"{'frame' if len(frames) == 1 else 'frames'} {describe(frames)}"
-    return (
-        f"{what} far outside the clip's other colours and 0..1, by up to {farthest:.3g} "
-        f"({where}): for the palette taken at the others' border; --k 1 takes them as they are",
-    )
-
-
 def _taken(
     frame: int, binner: _core.ColourBinner, colours: int, coarse: int, pixels: int
 ) -> FrameStatistics | None:
-    """Take a frame's colours; where not all of its `pixels` were looked at, those stand for all."""
+    """Take the colours of a frame; those that were counted stand for all of its `pixels`."""
     looked_at = binner.pixels + binner.ignored
     scale = pixels / looked_at if looked_at else 1.0
     count, ignored = round(scale * binner.pixels), round(scale * binner.ignored)
@@ -295,7 +247,7 @@ def _in_order(
     taken: Callable[[int, Fill, _core.ColourBinner], FrameStatistics | None],
     workers: int,
 ) -> Generator[tuple[int, Callable[[], FrameStatistics | None]], None, None]:
-    """(number, what returns or raises its result) of each frame, in order."""
+    """Yield each frame's number and a function that returns or raises its result, in order."""
     if workers == 1:
         binner = _core.ColourBinner()
         for number, fill in fills:
@@ -316,7 +268,7 @@ def _in_order(
     try:
         for number, fill in fills:
             waiting.append((number, pool.submit(work, number, fill)))
-            if len(waiting) > workers:  # one is ready to be taken up
+            if len(waiting) > workers:
                 number, future = waiting.popleft()
                 yield number, future.result
         for number, future in waiting:
@@ -325,31 +277,12 @@ def _in_order(
         pool.shutdown(cancel_futures=True)
 
 
-def _remarks(frames: Sequence[int], chosen: Sequence[int]) -> Iterator[str]:
-    if len(chosen) < len(frames):
-        step = frames.index(chosen[1])
-        yield (
-            f"the clip has {counted(len(frames), 'frame')}: one in {step} and the last are "
-            f"analysed, {len(chosen)} in all; in between, colours are taken to change evenly"
-        )
-
-
 def _unused_alpha(premultiplied: bool) -> str:
-    """Say that no pixel of a clip shows, and what that means for recolouring it."""
-    text = "alpha is 0 in every pixel of the clip: it was taken for unused, and the clip for opaque"
+    """Say that no pixel of a clip shows, and what that means for its recolouring."""
+    text = "alpha is 0 in every pixel of the clip: it was ignored, and the clip taken for opaque"
     if premultiplied:
         text += (
-            "; but recolouring leaves premultiplied pixels with alpha 0 as they are: write the "
+            "; recolouring leaves premultiplied pixels with alpha 0 as they are, so write the "
             "frames without alpha, or with an alpha of 1, before they are graded"
         )
     return text
-
-
-def gamut_box(
-    statistics: list[FrameStatistics],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where palette colours may lie: the unit cube (section 3), grown to hold colours outside
-    it."""
-    low = np.minimum(0.0, np.min([s.low for s in statistics], axis=0))
-    high = np.maximum(1.0, np.max([s.high for s in statistics], axis=0))
-    return low, high

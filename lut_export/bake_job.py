@@ -1,0 +1,220 @@
+"""One bake: its content, written, read back and measured, in larger and larger files if need be."""
+
+import hashlib
+import json
+import uuid
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from palette4d.lut_export import cdl as cdls
+from palette4d.lut_export import lut3d
+from palette4d.lut_export.bake_error import (
+    Measure,
+    Reader,
+    figures_info,
+    figures_text,
+    load,
+    measure,
+    stated,
+)
+from palette4d.lut_export.formats import LutFormat, with_shaper
+from palette4d.lut_export.frame_edit import FrameEdit, frame_text
+from palette4d.lut_export.shaper import Choice, Shaper
+from palette4d.lut_export.spaces import INPUT, BakeSpace
+from palette4d.lut_export.writers import Description
+
+from palette4d import _core
+from palette4d.colour.conversion_steps import Step
+from palette4d.colour.difference import Viewing
+from palette4d.common.errors import Palette4dError
+
+F32 = NDArray[np.float32]
+Content = lut3d.Lut3D | cdls.Cdl
+
+#: The namespace of the files' ids (RFC 9562, version 5), drawn once for this project.
+NAMESPACE = uuid.UUID("09823ba4-0bc8-43a9-995d-cb9a6abeb5b3")
+
+
+@dataclass(frozen=True)
+class BakeSettings:
+    """What to bake at each frame; `bake` explains the members."""
+
+    size: int = 33
+    strength: float = 1.0
+    format: str | None = None
+    shaper: Choice = "auto"
+    domain: tuple[float, float] | None = None
+    max_error: float | None = None
+    space: str = INPUT
+    ocio_config: str | None = None
+
+
+@dataclass(frozen=True)
+class Job:
+    """What stays the same while a LUT grows."""
+
+    sidecar: _core.Sidecar
+    sha256: str
+    frame: float
+    settings: BakeSettings
+    threads: int
+    format: LutFormat
+    space: BakeSpace
+    edit: FrameEdit
+    shaper: Shaper
+    viewing: Viewing
+    image: F32 | None
+    image_frame: int | None
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """The conversion beside the 3D LUT; empty where the LUT contains it."""
+        return self.space.steps if self.format.discrete else ()
+
+    @property
+    def conversion(self) -> str | None:
+        """The conversion and where it is; None without one."""
+        if not self.space.steps:
+            return None
+        where = "beside the 3D LUT, as transforms" if self.steps else "within the 3D LUT"
+        return f"{self.space.name} to {self.sidecar.clip['encoding']} and back {where}"
+
+    def dense(self) -> F32:
+        """Return the dense grid's colours in the file's space."""
+        grid = lut3d.dense_grid(self.shaper)
+        return self.space.of_palette(grid).astype(np.float32) if self.steps else grid
+
+    def measured(self, colours: F32, readers: Mapping[str, Reader]) -> Measure | None:
+        """Compare a file that was read back with the edit on some colours."""
+        domain = (self.shaper.low, self.shaper.high)
+        shaped = self.space.to_palette if self.steps else None
+        return measure(colours, readers, self.edit, self.viewing, domain, self.threads, shaped)
+
+    def content(self, size: int) -> Content:
+        """Return what the file holds."""
+        if self.format.is_cdl:
+            return cdls.fit(self.edit, self.dense() if self.image is None else self.image)
+        # In a list of transforms the LUT takes and returns the palette's code values.
+        edit = replace(self.edit, conversion=None) if self.steps else self.edit
+        return lut3d.sample(edit, size, self.shaper, self.threads, self.steps)
+
+    def write(self, path: Path, content: Content, about: Description) -> None:
+        """Write the file."""
+        if isinstance(content, cdls.Cdl):
+            shot = f"{self.sidecar.clip['name']}.{frame_text(self.frame)}"
+            text = cdls.write(content, self.format.name, shot, about)
+        else:
+            assert self.format.write is not None
+            text = self.format.write(content, about)
+        path.write_text(text, encoding="utf-8", newline="\n")
+
+
+def grow(job: Job, path: Path) -> tuple[Content, dict[str, Reader], Measure, Measure | None]:
+    """Write files, larger and larger ones if need be, until the error is small enough."""
+    limit, size = job.settings.max_error, job.settings.size
+    while True:
+        content = job.content(size)
+        job.write(path, content, describe(job, content, None))
+        readers = load(path, job.format.readings)
+        grid = job.measured(job.dense(), readers)
+        assert grid is not None  # the grid's colours are finite
+        clip = None if job.image is None else job.measured(job.image, readers)
+        if limit is None or judged(grid, clip) <= limit:
+            return content, readers, grid, clip
+        larger = None if job.format.is_cdl else job.format.larger(size)
+        if larger is None:
+            raise Palette4dError(_too_far(job, size, grid, clip))
+        size = larger
+
+
+def judged(grid: Measure, clip: Measure | None) -> float:
+    """Return the error that `max_error` limits."""
+    return (grid if clip is None else clip).worst.relative_largest
+
+
+def _too_far(job: Job, size: int, grid: Measure, clip: Measure | None) -> str:
+    where = "the dense grid" if clip is None else f"the clip's colours at frame {job.image_frame}"
+    what = job.format.title if job.format.is_cdl else f"{job.format.title} with {size} a side"
+    text = (
+        f"the error stays above the limit: found |a-b|/max(|b|,0.1) of up to "
+        f"{stated(judged(grid, clip))} on {where} with {what}, expected at most "
+        f"{job.settings.max_error:g}; nothing was written. "
+    )
+    if clip is not None and clip.outside_domain > 0:
+        return text + (
+            f"{clip.outside_domain:.3%} of the colours are clamped: choose a format with a shaper "
+            f"({with_shaper()}) or a wider --domain"
+        )
+    return text + "Allow a larger error, or use the node or `palette4d render`, which are exact"
+
+
+def check_same(
+    written: Mapping[str, Reader], measured: Mapping[str, Reader], job: Job, output: Path
+) -> None:
+    """Make sure that the final file holds what was measured."""
+    colours = job.dense()
+    for name, reader in written.items():
+        if not np.array_equal(reader(colours), measured[name](colours)):
+            raise Palette4dError(
+                f"{output}: read back, the file differs from what was measured; "
+                "nothing was written, please report this"
+            )
+
+
+def describe(
+    job: Job,
+    content: Content,
+    errors: tuple[Measure, Measure | None] | None,
+) -> Description:
+    """Return what the file says about itself; the lines repeat the names and values of its Info."""
+    name, frame = job.sidecar.clip["name"], frame_text(job.frame)
+    encoding = job.space.name or "the clip's own encoding"
+    info: dict[str, Any] = {
+        "Clip": name,
+        "Frame": frame,
+        "Strength": repr(job.settings.strength),
+        "Encoding": encoding,
+        "SidecarSha256": job.sha256,
+        "Shaper": job.shaper.kind,
+        "Domain": f"{job.shaper.low:g} {job.shaper.high:g}",
+    }
+    if job.conversion is not None:
+        info["Conversion"] = job.conversion
+    if isinstance(content, lut3d.Lut3D):
+        what, held = f"3D LUT {content.size}", content.values.tobytes()
+    else:
+        what, held = "CDL", repr(content).encode()
+    lines = [
+        f"clip {name}, frame {frame}, strength {job.settings.strength:g}, {what}",
+        f"sidecar sha256 {job.sha256}",
+        f"shaper {job.shaper.text()}",
+    ]
+    if errors is not None:
+        info["Error"] = {}
+        measures = (
+            ("Grid", "dense grid", errors[0]),
+            ("Clip", f"clip's colours at frame {job.image_frame}", errors[1]),
+        )
+        for key, where, found in measures:
+            if found is not None:
+                info["Error"][key] = figures_info(found.worst)
+                lines.append(f"error on the {where}: {figures_text(found.worst)}")
+        info["Error"]["Colours"] = job.viewing.assumption
+        lines.append(f"errors hold for the readings {' and '.join(job.format.readings)}")
+        lines.append(f"deltaE: {job.viewing.assumption}")
+    made_from = f"{job.sha256} {job.frame!r} {job.settings.strength!r} {job.shaper!r}"
+    if job.space.steps:
+        made_from += f" {job.space.name} {json.dumps(job.steps)}"
+    digest = hashlib.sha256(f"{made_from} ".encode() + held).hexdigest()
+    return Description(
+        identifier=uuid.uuid5(NAMESPACE, digest).urn,
+        name=f"palette4d {name} frame {frame}",
+        lines=tuple(lines),
+        input_space=encoding,
+        output_space=encoding,
+        info={"AppRelease": f"palette4d {_core.__version__}", "Palette4D": info},
+    )

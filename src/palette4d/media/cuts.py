@@ -1,0 +1,164 @@
+"""Detection of sudden cuts from the colours of frames: a palette must not span one (section 7.1).
+
+Input: the histograms of frames (`colour_histogram`). Output: the numbers of the frames with which
+new shots begin.
+
+Two frames differ by the share of pixels whose colour has no counterpart in the other frame, one
+minus the intersection of their histograms. A small shift of all colours (exposure, fading, grain)
+is a small difference. The difference of a frame from the one before is a cut when
+
+- it is at least `LEAST_DIFFERENCE`: a title or a banner changes less,
+- it is `LEAST_RATIO` times the differences around it, the second largest of the `AROUND` before or
+  after (twice that with fewer than `SURE` on a side, near the ends of the clip): a pan, a fade, a
+  time lapse or flicker change all the time,
+- and no frames around it agree over a gap of one or two frames, as they do around a flash.
+
+A dissolve is a change in time that a palette follows: it is no cut. A cut between pictures of equal
+colours is not detected, and does no harm. Two frames alone show no cut, since the speed of the clip
+is unknown. A lasting change of light, such as a lamp switched on, is a cut to a palette too.
+docs/clips.md has the figures behind the limits.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections import deque
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palette4d.common.text import counted
+
+F64 = NDArray[np.float64]
+
+LEAST_DIFFERENCE = 0.15
+LEAST_RATIO = 3.0
+# Differences below this are noise: beside a still picture any change would look large.
+NOISE = 0.01
+# Around a flash the frames agree again: they differ by at most this share of the jump.
+AGREEMENT = 0.5
+LONGEST_FLASH = 2
+AROUND = 5
+SURE = 3
+MOST_SHOWN = 8
+
+
+def find_cuts(histograms: Iterable[tuple[int, F64]]) -> list[int]:
+    """Return the numbers of the frames that begin a new shot, rising; none for a single shot.
+
+    Takes (frame number, histogram) pairs in order of time, and holds few of them at a time.
+    """
+    numbers, gaps = _gaps(histograms)
+    return [numbers[i] for i in range(1, len(numbers)) if _is_cut(gaps, i)]
+
+
+def _gaps(histograms: Iterable[tuple[int, F64]]) -> tuple[list[int], dict[int, list[float]]]:
+    """Return the numbers of the frames, and `gaps[d][i]`, how frame i + d differs from frame i."""
+    numbers = []
+    gaps: dict[int, list[float]] = {d: [] for d in range(1, LONGEST_FLASH + 2)}
+    recent: deque[F64] = deque(maxlen=LONGEST_FLASH + 1)
+    for number, here in histograms:
+        for d, before in enumerate(reversed(recent), start=1):
+            gaps[d].append(difference(before, here))
+        recent.append(here)
+        numbers.append(number)
+    return numbers, gaps
+
+
+def _is_cut(gaps: dict[int, list[float]], at: int) -> bool:
+    """Return whether a shot begins with frame `at`, an index from 1."""
+    jumps = gaps[1]
+    jump = jumps[at - 1]
+    around = max(_activity(jumps, at - 1, at), NOISE)
+    if jump < LEAST_DIFFERENCE or jump < LEAST_RATIO * around:
+        return False
+    for length in range(1, LONGEST_FLASH + 1):
+        # The flash lies between `start` and `start + length + 1`; the jump is one of its edges.
+        for start in range(at - 1 - length, at):
+            if 0 <= start < len(gaps[length + 1]) and (gaps[length + 1][start] <= AGREEMENT * jump):
+                return False
+    return True
+
+
+def _activity(jumps: list[float], start: int, end: int) -> float:
+    """Return how much the frames change around some jumps; infinite if there are no others."""
+    before, after = jumps[max(0, start - AROUND) : start], jumps[end : end + AROUND]
+    if not before and not after:
+        return np.inf
+    activity = max(_usual(side) for side in (before, after) if side)
+    return activity if min(len(before), len(after)) >= SURE else 2 * activity
+
+
+def _usual(jumps: list[float]) -> float:
+    """Return the second largest of several jumps.
+
+    The largest may be another cut, and repeated frames (pulldown, animation on twos) leave two of
+    five jumps that tell the speed of the clip.
+    """
+    ordered = sorted(jumps)
+    return ordered[-2] if len(ordered) > 2 else ordered[-1]
+
+
+def difference(one: F64, other: F64) -> float:
+    """Return the share of pixels, 0 to 1, without a counterpart in the other histogram."""
+    return float(1 - np.minimum(one, other).sum())
+
+
+def refusal(frames: Sequence[int], cuts: Sequence[int]) -> str:
+    """Say that the clip of evenly spaced `frames` has `cuts`, and which frames to analyse."""
+    shots = [f"--frames {shot}" for shot in _shots(frames, cuts)]
+    return (
+        f"found {counted(len(cuts), 'sudden cut')}: a new shot begins at {_places(cuts)}; expected "
+        "one shot, since a palette must not span a cut. Analyse each shot by itself "
+        f"({_some(shots)}; --detect-shots does all of them), or give --allow-cuts to analyse all "
+        f"frames as one shot.{_flash(frames, cuts)}"
+    )
+
+
+def _flash(frames: Sequence[int], cuts: Sequence[int]) -> str:
+    """Say what to do if the shot at the end of the clip is a flash."""
+    step = frames[1] - frames[0]
+    bounds = [frames[0], *cuts, frames[-1] + step]
+    lasting = [
+        shot
+        for shot, (first, end) in zip(_shots(frames, cuts), itertools.pairwise(bounds), strict=True)
+        if end - first > LONGEST_FLASH * step
+    ]
+    if len(lasting) != 1:
+        return ""
+    return f" If it is a flash at the end of the clip, leave it out: --frames {lasting[0]}."
+
+
+def refusal_inside(cuts: Sequence[int]) -> str:
+    """Say that there are `cuts` inside one clip of an edit."""
+    return (
+        f"found {counted(len(cuts), 'sudden cut')} inside one clip of the edit: a new shot begins "
+        f"at {_places(cuts)}; expected one shot. Blade the edit there, or give --allow-cuts"
+    )
+
+
+def note(cuts: Sequence[int]) -> str:
+    """Say that the palette spans `cuts` that the user allowed."""
+    what = counted(len(cuts), "sudden cut", "sudden cuts")
+    return f"the palette spans {what}, at {_places(cuts)}: expect a loose fit beside them"
+
+
+def _places(cuts: Sequence[int]) -> str:
+    return f"frame{'s' * (len(cuts) != 1)} {_some([str(cut) for cut in cuts])}"
+
+
+def _some(texts: Sequence[str]) -> str:
+    return ", ".join(texts[:MOST_SHOWN]) + (", …" if len(texts) > MOST_SHOWN else "")
+
+
+def _shots(frames: Sequence[int], cuts: Sequence[int]) -> list[str]:
+    """Return the range of frames of each shot, as `--frames` reads it."""
+    step = frames[1] - frames[0]
+    bounds = [frames[0], *cuts, frames[-1] + step]
+    out = []
+    for first, end in itertools.pairwise(bounds):
+        last = end - step
+        by = f"x{step}" if step != 1 and first != last else ""
+        out.append(f"{first}-{last}{by}" if first != last else f"{first}")
+    return out
