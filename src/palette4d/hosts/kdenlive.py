@@ -1,8 +1,8 @@
 """Kdenlive's effect file: rows for the parameters that its own list leaves out or gets wrong.
 
-Of an OpenFX effect Kdenlive (26.08) makes a list by itself: without texts, and so without the
-sidecar, and with choices stored as numbers, which MLT does not take. An effect file that has the
-service's name as its id takes that list's place.
+Kdenlive (26.08) lists an OpenFX effect's parameters by itself, but without texts (so without the
+sidecar), and it stores choices as numbers, which MLT does not take. An effect file whose id is the
+service's name replaces that list.
 """
 
 from xml.etree import ElementTree
