@@ -1,6 +1,6 @@
-"""Shots: the stretches of media that get a palette each, named, with the frames that are analysed.
+"""Shots: ranges of media that get a palette each, with a name and the frames to analyse.
 
-Input: a clip with cuts, here, or an edit (`timeline`). Output: `Shot`s, which `show` analyses.
+Input: a clip with cuts, here, or an edit (`timeline`). Output: `Shot`s, which `batch` analyses.
 """
 
 from __future__ import annotations
@@ -9,10 +9,11 @@ import dataclasses
 import itertools
 from collections.abc import Callable, Iterable, Iterator
 
-from palette4d.analysis import colour_statistics, cuts
+from palette4d.analysis import colour_statistics
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import file_safe
+from palette4d.media import cuts
 from palette4d.media.clip_base import Clip, even_step, hidden
 
 #: Colour bins of a frame that the search for cuts looks at.
@@ -40,7 +41,7 @@ class Place:
 
 @dataclasses.dataclass(frozen=True)
 class Shot:
-    """A stretch of one clip that gets a palette.
+    """A range of one clip's frames that gets a palette.
 
     Attributes
     ----------
@@ -49,7 +50,7 @@ class Shot:
     clip : str
         What `open_clip` reads; "" where the media is missing.
     first, last : int
-        The frames that are analysed, handles included; the clip's own numbers.
+        The frames that are analysed, head and tail frames included; the clip's own numbers.
     used : (int, int)
         The first and the last frame that the edit shows.
     step : int
@@ -163,15 +164,15 @@ def cuts_of(clip: Clip, progress: Callable[[int, int], None] | None = None) -> l
                 return
             yield number, histogram
 
-    starts = cuts.find_cuts_of(before())
+    starts = cuts.find_cuts(before())
     if not shown:  # alpha is not used
         return starts
     rest = ((number, histogram) for number, histogram, is_hidden in frames if not is_hidden)
-    return cuts.find_cuts_of(itertools.chain(shown, rest))
+    return cuts.find_cuts(itertools.chain(shown, rest))
 
 
 def trimmed(shot: Shot, clip: Clip) -> Shot:
-    """Return a shot of an edit whose handles end at the media's cuts.
+    """Return a shot of an edit whose head and tail frames end at the media's cuts.
 
     Parameters
     ----------
