@@ -23,8 +23,8 @@ EDITED = GOLDEN / "v1_edited.p4d.json"
 
 @pytest.fixture(autouse=True)
 def small_grid(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Measure errors on 23^3 colours instead of 67^3 in this process."""
-    monkeypatch.setattr("palette4d.lut_export.lut3d.DENSE", 23)
+    """Measure errors on 13^3 colours instead of 67^3 in this process."""
+    monkeypatch.setattr("palette4d.lut_export.lut3d.DENSE", 13)
 
 
 def command(*words: object, **options: object) -> subprocess.CompletedProcess[bytes]:
@@ -124,7 +124,7 @@ class TestFiles:
             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000)),
         )  # fmt: skip
         assert done.returncode == 1, done.stderr
-        assert b"could not be written" in done.stderr
+        assert str(out).encode() in done.stderr
         assert b"Traceback" not in done.stderr
         assert out.read_text("utf-8") == "mine"
         assert [path.name for path in tmp_path.iterdir()] == ["a.clf"]

@@ -109,40 +109,26 @@ def test_a_scheduler_that_dies_is_told(edit: Path, tmp_path: Path) -> None:
     assert len(list(out.glob("*.p4d.json"))) == SHOTS
 
 
-def test_frames_on_local_workers_are_the_same_bytes(tmp_path: Path) -> None:
+def test_frames_on_a_farm_are_the_same_bytes(tmp_path: Path) -> None:
     words = ["export", str(EDITED), "--every", "7", "--size", "5", "--quiet"]
     assert main.main([*words, "-o", str(tmp_path / "here"), "--jobs", "1"]) == 0
-    done = start(*words, "-o", tmp_path / "farm", "--cluster", "local:2")
-    _, err = done.communicate(timeout=300)
-    assert done.returncode == 0, err
-    assert files(tmp_path / "farm") == files(tmp_path / "here")
-    nothing_left(done)
-
-
-def nothing_left(process: subprocess.Popen[str]) -> None:
-    """Make sure that no process of a session is left."""
-
-    def gone() -> bool:
-        try:
-            os.killpg(process.pid, 0)
-        except ProcessLookupError:
-            return True
-        return False
-
-    wait_for(gone, "the workers to end")
+    with farm(tmp_path / "farm", workers=1) as made:
+        there = ["-o", str(tmp_path / "there"), "--cluster", made.address]
+        assert main.main([*words, *there]) == 0
+    assert files(tmp_path / "there") == files(tmp_path / "here")
 
 
 @pytest.mark.slow
-def test_ctrl_c_ends_the_local_workers(edit: Path, tmp_path: Path) -> None:
+def test_ctrl_c_leaves_whole_files(edit: Path, tmp_path: Path) -> None:
     out = tmp_path / "shots"
-    process = start("analyze", edit, "-o", out, "--quiet", "--cluster", "local:2")
-    wait_for(lambda: list(out.glob("*.p4d.json")) or process.poll() is not None, "the first shot")
-    os.killpg(process.pid, signal.SIGINT)
-    _, err = process.communicate(timeout=120)
+    with farm(tmp_path / "farm", workers=2) as made:
+        process = start("analyze", edit, "-o", out, "--quiet", "--cluster", made.address)
+        wait_for(lambda: list(out.glob("*.p4d.json")), "the first shot")
+        os.killpg(process.pid, signal.SIGINT)
+        _, err = process.communicate(timeout=120)
     assert process.returncode == 130, err
     assert "palette4d: interrupted" in err
     assert "Traceback" not in err
-    nothing_left(process)
     assert not [path for path in out.iterdir() if path.name.startswith(".")]
 
 
@@ -228,16 +214,16 @@ class TestRefusals:
                 work()
 
     def test_without_dask_the_error_says_what_to_install(self, tmp_path: Path) -> None:
-        words = ["export", str(EDITED), "--every", "9", "-o", "out", "--cluster", "local:2"]
+        words = ["export", str(EDITED), "--every", "9", "-o", "out", "--cluster", "farm:8786"]
         done = run_without("distributed", tmp_path, *words)
         assert done.returncode == 1
         assert "pip install 'palette4d[farm]'" in done.stderr
 
-    @pytest.mark.parametrize("text", ["", "local", "local:0", "local:1000", "farm", "tcp://farm"])
+    @pytest.mark.parametrize("text", ["", "farm", "tcp://farm", "farm:", "a b:1"])
     def test_addresses(self, text: str) -> None:
-        with pytest.raises(Palette4dError, match="expected local:N"):
+        with pytest.raises(Palette4dError, match="scheduler's address"):
             farms.check_address(text)
 
     def test_good_addresses(self) -> None:
-        for text in ("local:1", "local:64", "tcp://farm:8786", "tls://10.0.0.1:8786", "farm:8786"):
+        for text in ("tcp://farm:8786", "tls://10.0.0.1:8786", "farm:8786"):
             assert farms.check_address(text) == text

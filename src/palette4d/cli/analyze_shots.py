@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 DESCRIPTION = """\
 For many shots at once, CLIP is an edit (.otio, .otioz, .otiod, .edl) or, with --detect-shots, a
-movie or sequence that is split at its cuts; OUT is then a folder, for a sidecar a shot and a
+movie or sequence that is split at its cuts. OUT is then a folder for a sidecar a shot and a
 manifest, NAME.shots.json. The same command again does only what is missing or failed.
 """
 
@@ -56,14 +56,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         type=whole(0, 100_000),
         default=None,
-        help="frames more before and after what the edit shows, as far as the media goes and does "
-        "not cut (default 0)",
+        help="head and tail frames around what the edit shows, up to the end of the media or its "
+        "next cut (default 0)",
     )
     group.add_argument(
         "--only", metavar="A,B", type=_names, default=(), help="only the shots of these names"
     )
     group.add_argument(
-        "--force", action="store_true", help="analyse also the shots that are there already"
+        "--force", action="store_true", help="analyse the shots that are there already, too"
     )
     add_worker_options(group, "shots")
 

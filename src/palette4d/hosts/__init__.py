@@ -1,7 +1,7 @@
-"""Files by which editing programs show the node's parameters, where they do not by themselves.
+"""Installing the node: the bundle, and the files that Kdenlive and Shotcut need to show it.
 
-`parameters` says what is shown, `kdenlive` and `shotcut` write it as those programs read it, and
-`install` puts the files into their folders. `palette4d install-plugin` is the way in.
+`bundle` installs the OpenFX bundle. `parameters` lists the node's parameters, `kdenlive` and
+`shotcut` write them as those programs read them, `editors` puts the files into their folders.
 """
 
 #: The node's name in MLT, the engine of both programs.
@@ -14,6 +14,6 @@ MARK = "Written by palette4d"
 def origin(version: str) -> str:
     """Return the line that names a file's writer and its version.
 
-    It has no two hyphens, which XML has nowhere in a remark.
+    It holds no two hyphens in a row, which an XML comment may not have.
     """
     return f"{MARK} {version}, with install-plugin, which replaces this file by a later version."

@@ -1,4 +1,4 @@
-"""Puts the files of `kdenlive` and `shotcut` into the folders in which those programs look."""
+"""Installs the files of `kdenlive` and `shotcut` where those programs look for them."""
 
 import os
 import sys

@@ -1,8 +1,8 @@
 """Kdenlive's effect file: rows for the parameters that its own list leaves out or gets wrong.
 
-Of an OpenFX effect Kdenlive (26.08) makes a list by itself: without texts, and so without the
-sidecar, and with choices stored as numbers, which MLT does not take. An effect file that has the
-service's name as its id takes that list's place.
+Kdenlive (26.08) lists an OpenFX effect's parameters by itself, but without texts (so without the
+sidecar), and it stores choices as numbers, which MLT does not take. An effect file whose id is the
+service's name replaces that list.
 """
 
 from xml.etree import ElementTree
@@ -64,8 +64,7 @@ def _row(parameter: Parameter) -> ElementTree.Element:
         case Switch():
             row.attrib |= {"type": "bool", "default": "0"}
         case Colour():
-            # As 0xRRGGBBAA, which MLT reads as Kdenlive means it: of '#000000FF', its own
-            # default, the one takes the last two digits for alpha and the other the first two.
-            row.attrib |= {"type": "color", "default": "0x000000ff"}
+            # MLT and Kdenlive read 0xRRGGBBAA alike; they disagree where '#' has eight digits.
+            row.attrib |= {"type": "color", "default": "0x808080ff"}
     ElementTree.SubElement(row, "name").text = parameter.label
     return row

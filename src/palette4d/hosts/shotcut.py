@@ -1,8 +1,8 @@
 """Shotcut's filter folder: the main parameters, with a button to choose the sidecar.
 
-Shotcut (26.9) makes a list of all parameters by itself, with `--experimental` alone and without
-such a button. Its filters are QML files, which are built here of what that version's own filters
-use. Numbers that have keyframes from elsewhere keep them until their slider is moved.
+Shotcut (26.9) lists all parameters by itself, but only with `--experimental` and without such a
+button. Its filters are QML files; these use the controls of that version's own filters. Numbers
+with keyframes from elsewhere keep them until their slider is moved.
 """
 
 from palette4d.hosts import SERVICE, origin

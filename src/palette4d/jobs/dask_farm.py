@@ -1,4 +1,4 @@
-"""Many pieces of work on a farm: the workers of a Dask scheduler, or some on this machine.
+"""Many pieces of work on a Dask farm: a scheduler, and workers on any machines.
 
 A worker that dies costs its pieces another try elsewhere, and nothing else: results come back to
 this process, which alone writes files. Scheduler and workers need the same palette4d, and the
@@ -18,7 +18,6 @@ import threading
 import time
 import uuid
 from collections.abc import Callable, Iterator, Mapping
-from multiprocessing import resource_tracker
 from typing import Any
 
 from palette4d import _core
@@ -31,35 +30,29 @@ from palette4d.jobs.pool import (
     Task,
     later_interrupts,
     outcome,
-    without_interrupts,
 )
-
-LOCAL = re.compile(r"local:([1-9][0-9]{0,2})")
 
 #: Seconds to wait for a scheduler to answer, and for the first worker to come.
 ANSWERS_WITHIN = 15
 WORKERS_WITHIN = 120
 
-#: Seconds until it is told that there is no worker, and between looks for one.
+#: Seconds until a note says that there is no worker, and between checks for one.
 TOLD_AFTER = 3
 ASKED_EVERY = 0.2
 
 
 def check_address(text: str) -> str:
-    """Return an address of --cluster: `local:N` or that of a scheduler.
+    """Return a scheduler's address as --cluster takes it.
 
     Raises
     ------
     Palette4dError
-        It is neither.
+        It is none.
     """
-    if LOCAL.fullmatch(text) or re.fullmatch(r"([a-z]+://)?[^/:\s]+:[0-9]+", text):
-        if text.startswith("local:") and not LOCAL.fullmatch(text):
-            raise Palette4dError(f"found {text!r}, expected local:N with N workers from 1 to 999")
+    if re.fullmatch(r"([a-z]+://)?[^/:\s]+:[0-9]+", text):
         return text
     raise Palette4dError(
-        f"found {text!r}, expected local:N for N workers on this machine, or a Dask scheduler's "
-        "address such as tcp://farm.example:8786"
+        f"found {text!r}, expected a Dask scheduler's address such as tcp://farm.example:8786"
     )
 
 
@@ -103,13 +96,13 @@ def run(
                 found = _outcome(future)
                 with later_interrupts():
                     take(keys[future.key], found)
-                future.release()  # what it brought may be large
+                future.release()  # results may be large
         finally:
             with contextlib.suppress(Exception):  # the scheduler may have gone
                 client.cancel(futures)
 
 
-# One piece at a time in a process: a worker's threads are used inside of a piece.
+# One piece at a time in a process: all threads of a worker serve that piece.
 _at_work = threading.Lock()
 
 
@@ -150,38 +143,27 @@ def _outcome(future: Any) -> Any:
 
 @contextlib.contextmanager
 def _connected(address: str) -> Iterator[Any]:
-    """Yield a client of the scheduler at an address, or of one of our own."""
+    """Yield a client of the scheduler at an address."""
     try:
         import distributed
     except ImportError as error:
         raise Palette4dError(
             "--cluster needs Dask, which is not installed; run: pip install 'palette4d[farm]'"
         ) from error
-    local = LOCAL.fullmatch(address)
-    if not local:
-        with _client(distributed, address, f"no Dask scheduler answers at {address}") as client:
-            yield client
-        return
-    # The workers inherit that Ctrl-C does not end them: this process does. What Python starts with
-    # the first process lets Ctrl-C through again, so that it is started before.
-    resource_tracker.ensure_running()
-    with without_interrupts():
-        cluster = distributed.LocalCluster(
-            n_workers=int(local[1]),
-            threads_per_worker=1,
-            processes=True,
-            host="127.0.0.1",
-            dashboard_address=None,
-            memory_limit=0,
-            silence_logs=logging.CRITICAL,
-        )
-    with cluster, _client(distributed, cluster, "the local workers cannot be reached") as client:
+    try:
+        client = distributed.Client(address, timeout=ANSWERS_WITHIN, set_as_default=False)
+    except (OSError, TimeoutError, ValueError) as error:
+        raise Palette4dError(
+            f"no Dask scheduler answers at {address} ({error}); start one with `dask scheduler`, "
+            "workers with `dask worker`, check the address, or use --jobs N"
+        ) from error
+    with _without_log(), client:
         yield client
 
 
 @contextlib.contextmanager
 def _without_log() -> Iterator[None]:
-    """Keep Dask's log from standard error: what matters is told with the piece it concerns."""
+    """Keep Dask's log from standard error: each failure is reported with its piece of work."""
     loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
     before = [logger.level for logger in loggers]
     for logger in loggers:
@@ -193,19 +175,6 @@ def _without_log() -> Iterator[None]:
             logger.setLevel(level)
 
 
-@contextlib.contextmanager
-def _client(distributed: Any, target: Any, otherwise: str) -> Iterator[Any]:
-    try:
-        client = distributed.Client(target, timeout=ANSWERS_WITHIN, set_as_default=False)
-    except (OSError, TimeoutError, ValueError) as error:
-        raise Palette4dError(
-            f"{otherwise} ({error}); start one with `dask scheduler` and workers with `dask "
-            "worker`, check the address, or use --cluster local:N"
-        ) from error
-    with _without_log(), client:
-        yield client
-
-
 def _check_workers(client: Any, address: str) -> None:
     """Wait for the first worker that answers, and refuse workers with another palette4d."""
     from tqdm import tqdm
@@ -214,7 +183,7 @@ def _check_workers(client: Any, address: str) -> None:
     told = False
     while (waited := time.monotonic() - started) < WORKERS_WITHIN:
         found = client.run(_version, on_error="return")
-        # One that died, or lost its connection, does not lack palette4d: Dask does without it.
+        # A worker that died or lost its connection does not lack palette4d; Dask drops it.
         there = {who: it for who, it in found.items() if not isinstance(it, OSError)}
         for worker, version in sorted(there.items()):
             _check_version(f"the worker {worker}", version)
@@ -235,7 +204,7 @@ def _check_workers(client: Any, address: str) -> None:
 
 
 def _check_scheduler(client: Any, address: str) -> None:
-    """Refuse a scheduler with another palette4d: it, too, must know what is sent."""
+    """Refuse a scheduler with another palette4d: it must import what is sent, too."""
     try:
         found: object = client.run_on_scheduler(_version)
     except Exception as error:  # whatever the scheduler's import raised

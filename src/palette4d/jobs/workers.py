@@ -18,7 +18,7 @@ class Workers:
     jobs : int
         Processes on this machine; 0: one a processor.
     cluster : str or None
-        A farm instead: `local:N` or a Dask scheduler's address.
+        A farm instead: its Dask scheduler's address.
     """
 
     jobs: int = 0

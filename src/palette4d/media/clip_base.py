@@ -1,7 +1,7 @@
 """What a clip is: frame numbers, a rate, a size, and pixels that are read one frame at a time.
 
 `clip.py` opens one, `clip_images.py` and `clip_movie.py` implement it. Memory holds one frame,
-however long the clip; the analysis, which only counts pixels, reads strips of one (`Clip.fills`).
+however long the clip. The analysis only counts pixels (`Clip.fills`).
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from palette4d.common.errors import Palette4dError
 F32 = NDArray[np.float32]
 
 Fill = Callable[[_core.ColourBinner], bool]
-"""Hands a frame's pixels over to a binner; FrameError when the frame is bad. Returns whether the
-frame is `hidden`: its colours were then handed over as if it had no alpha."""
+"""Adds a frame's pixels to a binner; FrameError when the frame is bad. Returns whether the frame is
+`hidden`: its colours were then added as if it had no alpha."""
 
 LEAST_ALPHA = np.float32(1 / 255)
 """Below it a pixel does not show in 8 bit."""
@@ -93,7 +93,7 @@ class Clip(abc.ABC):
     is_movie : bool
         The clip is a movie file: its frame numbers start at 0.
     notes : list of str
-        Remarks for the user, such as a variable frame rate.
+        Notes for the user, such as a variable frame rate.
     skipped : list of int
         Frames passed over so far, in rising order.
     """

@@ -159,44 +159,28 @@ def in_folder(folder: Path) -> ImageSequence | Path:
     found = sequences_in(folder)
     names = _file_names(folder)
     images = [name for name in names if extension(name) in IMAGE_EXTENSIONS]
-    if len(found) == 1:
-        # One numbered image among others (beach.png, sky2.png) is no sequence, but one of them.
-        if len(found[0].files) == 1 and len(images) > 1:
-            listed = "\n".join(f"  {folder / name}" for name in images[:12])
-            more = f"\n  … and {len(images) - 12} more" if len(images) > 12 else ""
-            raise ClipError(
-                f"{folder}: found {len(images)} images that are no sequence, expected one image "
-                f"sequence such as name.0001.exr, name.0002.exr, …:\n{listed}{more}\n"
-                "Give the image or the pattern that you mean."
-            )
-        return found[0]
-    if len(found) > 1:
-        listed = "\n".join(
-            f"  {folder / Path(one.pattern).name}  {describe(one.numbers)}" for one in found[:12]
-        )
-        more = f"\n  … and {len(found) - 12} more" if len(found) > 12 else ""
-        raise ClipError(
-            f"{folder}: found {len(found)} image sequences, expected one:\n{listed}{more}\n"
-            "Give the pattern of the one you mean."
-        )
-    if len(images) == 1:
-        return folder / images[0]
     movies = [name for name in names if extension(name) in MOVIE_EXTENSIONS]
-    if movies:
-        raise ClipError(
-            f"{folder}: found {counted(len(movies), 'movie file')} such as {movies[0]} and no "
-            "image sequence; give the movie file itself."
-        )
-    what = (
-        f"{len(images)} images without frame numbers"
-        if images
-        else (
-            f"{counted(len(names), 'file')}, none of them an image" if names else "an empty folder"
-        )
-    )
+    # One numbered image among others (beach.png, sky2.png) is no sequence, but one of them.
+    if len(found) == 1 and (len(found[0].files) > 1 or len(images) == 1):
+        return found[0]
+    if not found and len(images) == 1:
+        return folder / images[0]
+    if len(found) > 1:
+        what = f"{len(found)} image sequences"
+        listed = [f"{one.pattern}  {describe(one.numbers)}" for one in found]
+    elif images:
+        what = f"{len(images)} images that are no sequence"
+        listed = [str(folder / name) for name in images]
+    else:
+        what = counted(len(movies), "movie file") if movies else counted(len(names), "file")
+        what += " and no image" if names else ""
+        listed = [str(folder / name) for name in movies]
+    more = [f"… and {len(listed) - 12} more"] if len(listed) > 12 else []
+    lines = "".join(f"\n  {line}" for line in [*listed[:12], *more])
     raise ClipError(
         f"{folder}: found {what}, expected one image sequence such as name.0001.exr, "
-        "name.0002.exr, …"
+        f"name.0002.exr, …{':' * bool(listed)}{lines}"
+        + ("\nGive the pattern, image or movie that you mean." if listed else "")
     )
 
 

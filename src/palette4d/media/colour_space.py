@@ -1,9 +1,9 @@
-"""In which numbers a palette is found: colour spaces of a clip, through OpenColorIO.
+"""The colour space of a clip's palette, through OpenColorIO.
 
-Input: a clip, and what the user said about colour spaces. Output: the same clip in the palette's
-numbers, and what the sidecar records of the way there. The paper's palettes are hulls of
-display-referred colours, which this leaves as they are; scene-linear light goes to a log encoding
-first, where a stop of light has the same length everywhere.
+Input: a clip, and what the user said about colour spaces. Output: the same clip with code values in
+the palette's colour space, and the conversion that the sidecar records. The paper's palettes are
+hulls of display-referred colours, which stay as they are. Scene-linear code values are converted to
+a log encoding, where a photographic stop has the same length everywhere.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ F32 = NDArray[np.float32]
 #: Colours of each frame that the conversion is compared with OpenColorIO's on.
 COMPARED = 4096
 
-#: Samples that may be scene-linear light.
+#: Sample types that may be scene-linear.
 FLOATS = ("half", "float", "double")
 
-#: The log encoding for scene-linear light: these roles where they are logs, else this space.
+#: The log encoding of scene-linear clips: these roles where they are logs, else this space.
 LOG_ROLES = ("color_timing", "compositing_log")
 LOG_SPACE = "ACEScct"
 
@@ -68,13 +68,13 @@ def spaces_of(clip: Clip, options: SpaceOptions) -> Spaces | None:
 
     The input space is, in this order: what the user said; what a rule of the config says of the
     file's name; what the file says of itself; the config's default rule, for float files only. The
-    palette space is what the user said; for scene-linear light a log encoding; else the input
+    palette space is what the user said; for scene-linear clips a log encoding; else the input
     space: camera logs and display-referred encodings are fit for palettes as they are.
 
     Returns
     -------
     Spaces or None
-        None when nothing is said and nothing known: then the clip's numbers stay as they are.
+        None when nothing is said and nothing known: then the clip's code values stay as they are.
 
     Raises
     ------
@@ -140,10 +140,10 @@ def _is_the_role(config: Any, space: Any, role: str) -> bool:
 
 
 class ConvertedClip(Clip):
-    """A clip whose colours, for the analysis, are in its palette's numbers.
+    """A clip whose colours, for the analysis, are converted to the palette's colour space.
 
-    Images stay as they are stored; `comparison` says how far the conversion of the colours that
-    went by is from OpenColorIO's.
+    Images stay as they are stored. `comparison` says how far the converted colours are from
+    OpenColorIO's.
     """
 
     def __init__(self, clip: Clip, spaces: Spaces) -> None:
@@ -163,7 +163,7 @@ class ConvertedClip(Clip):
         return self._clip.file(frame)
 
     def load(self, frame: int) -> Image:
-        """As the clip itself: pixels in the clip's numbers."""
+        """As the clip itself: pixels in the clip's colour space."""
         return self._clip.load(frame)
 
     def iter_images(self) -> Iterator[Image]:
@@ -190,7 +190,7 @@ class ConvertedClip(Clip):
         return hidden(rows)
 
     def straight_colours(self, pixels: F32) -> F32:
-        """(h, w, 3) float32 straight colours in the palette's numbers."""
+        """(h, w, 3) float32 straight colours in the palette's colour space."""
         colours = self._clip.straight_colours(pixels)
         flat = colours.reshape(-1, 3)
         some = flat[:: max(1, len(flat) // COMPARED)]
@@ -208,7 +208,7 @@ _CLIP_FIELDS = tuple(field.name for field in dataclasses.fields(Clip))
 
 
 def converted(clip: Clip, spaces: Spaces | None) -> Clip:
-    """Return the clip as its palette is to see it."""
+    """Return the clip with its colours in the palette's colour space."""
     if spaces is None:
         return clip
     if spaces.conversion is None:
@@ -218,7 +218,7 @@ def converted(clip: Clip, spaces: Spaces | None) -> Clip:
 
 
 def record(document: dict[str, Any], clip: Clip, spaces: Spaces | None) -> list[str]:
-    """Write the conversion into a sidecar's document; returns remarks for the user.
+    """Write the conversion into a sidecar's document; returns notes for the user.
 
     Raises
     ------
@@ -243,13 +243,13 @@ def record(document: dict[str, Any], clip: Clip, spaces: Spaces | None) -> list[
         "error": float(f"{max(spaces.conversion.error, seen.error):.2e}"),
         "steps": spaces.conversion.steps,
     }
-    remarks = []
+    notes = []
     if seen.beyond:
-        remarks.append(
+        notes.append(
             f"{seen.beyond / seen.colours:.2%} of the clip's colours lie beyond what OpenColorIO "
             f"brings back {ways}; there the curves are continued"
         )
-    return remarks
+    return notes
 
 
 def described(spaces: Spaces | None) -> str | None:

@@ -320,8 +320,8 @@ def analyse_shot(task: ShotTask, threads: int) -> Analysed:
         shot = trimmed(shot, _open(task, shot))
         if shot != task.shot:
             notes.append(
-                f"the media cuts inside of the handles: frames {shot.frames} are analysed instead "
-                f"of {task.shot.frames}"
+                f"the media cuts inside of the head and tail frames: frames {shot.frames} are "
+                f"analysed instead of {task.shot.frames}"
             )
     clip = _open(task, shot)
     analysis_options = dataclasses.replace(options.analysis, threads=threads)

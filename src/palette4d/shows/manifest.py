@@ -34,7 +34,7 @@ class Entry:
     status : str
         `DONE`, `FAILED` or `TO_DO`.
     frames : (int, int) or None
-        The first and last frame of the sidecar: the shot's, less of a handle where the media cuts.
+        The first and last frame of the sidecar: fewer head or tail frames where the media cuts.
     error : str
         Why it failed.
     """

@@ -1,6 +1,6 @@
-"""Shots: the stretches of media that get a palette each, named, with the frames that are analysed.
+"""Shots: ranges of media that get a palette each, with a name and the frames to analyse.
 
-Input: a clip with cuts, here, or an edit (`timeline`). Output: `Shot`s, which `show` analyses.
+Input: a clip with cuts, here, or an edit (`timeline`). Output: `Shot`s, which `batch` analyses.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Place:
 
 @dataclasses.dataclass(frozen=True)
 class Shot:
-    """A stretch of one clip that gets a palette.
+    """A range of one clip's frames that gets a palette.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Shot:
     clip : str
         What `open_clip` reads; "" where the media is missing.
     first, last : int
-        The frames that are analysed, handles included; the clip's own numbers.
+        The frames that are analysed, head and tail frames included; the clip's own numbers.
     used : (int, int)
         The first and the last frame that the edit shows.
     step : int
@@ -172,7 +172,7 @@ def cuts_of(clip: Clip, progress: Callable[[int, int], None] | None = None) -> l
 
 
 def trimmed(shot: Shot, clip: Clip) -> Shot:
-    """Return a shot of an edit whose handles end at the media's cuts.
+    """Return a shot of an edit whose head and tail frames end at the media's cuts.
 
     Parameters
     ----------
