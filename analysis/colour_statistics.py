@@ -22,13 +22,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d.analysis import colour_histogram
 from palette4d.analysis.frame_statistics import FrameStatistics, pooled
 from palette4d.analysis.losses import LOST_SHARE, thread_count
 from palette4d.analysis.options import AnalysisOptions
 
 from palette4d import _core
 from palette4d.common.text import counted
+from palette4d.media import colour_histogram
 from palette4d.media.clip_base import Fill, FrameError, named
 
 if TYPE_CHECKING:

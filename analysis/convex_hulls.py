@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +43,16 @@ def hull_mesh(points: F64) -> Palette:
     inwards = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
     faces[inwards] = faces[inwards][:, ::-1]
     return Palette(rgb, faces.astype(np.int32))
+
+
+def two_sided(polygon: NDArray[np.integer[Any]]) -> I32:
+    """Return the triangles of the front and back of a flat polygon, (n,) corners in order."""
+    n = len(polygon)
+    front = [(0, i, i + 1) for i in range(1, n - 1)]
+    # The back is a fan from the next corner: the two sides must not share a diagonal.
+    back = [(1, (i + 2) % n, (i + 1) % n) for i in range(1, n - 1)]
+    faces: I32 = polygon[np.array(front + back)].astype(np.int32)
+    return faces
 
 
 def hull_planes(rgb: F64) -> F64 | None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d.analysis.convex_hulls import THIN, hull_mesh
+from palette4d.analysis.convex_hulls import THIN, hull_mesh, two_sided
 from palette4d.analysis.frame_statistics import Gamut
 from palette4d.analysis.losses import NO_FACES, palette_loss, refine_palette
 from palette4d.analysis.options import AnalysisOptions
@@ -95,11 +95,7 @@ def flat_palette(points: F64, options: AnalysisOptions) -> Palette | None:
     polygon: NDArray[np.int32] = ConvexHull(along[:, :2]).vertices  # anticlockwise
     while len(polygon) > max(3, options.palette_size):
         polygon = np.delete(polygon, _least_corner(along[polygon, :2]))
-    n = len(polygon)
-    front = [(0, i, i + 1) for i in range(1, n - 1)]
-    # The back is a fan from the next corner: the two sides must not share a diagonal.
-    back = [(1, (i + 2) % n, (i + 1) % n) for i in range(1, n - 1)]
-    return Palette(points[polygon], np.array(front + back, np.int32))
+    return Palette(points[polygon], two_sided(np.arange(len(polygon))))
 
 
 def _least_corner(corners: F64) -> int:

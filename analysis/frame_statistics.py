@@ -22,7 +22,7 @@ class FrameStatistics:
     frame : the frame number.
     colours : the colours that losses are measured on.
     coarse : fewer of them, for stages that only compare alternatives.
-    histogram : `colour_histogram.histogram` of the frame, for the detection of cuts.
+    histogram : `media.colour_histogram` of the frame, for the detection of cuts.
     low, high : (3,) float64 the bounding box of the colours.
     pixels, ignored : how many pixels count, and how many do not.
     """

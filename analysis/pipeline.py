@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from palette4d.analysis import (
     block_merging,
     colour_statistics,
-    cuts,
     frame_hulls,
     glue,
     stop_insertion,
@@ -42,7 +41,7 @@ from palette4d import _core
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import counted
 from palette4d.grade import sidecar
-from palette4d.media import colour_space
+from palette4d.media import colour_space, cuts
 from palette4d.media.array_clip import ArrayClip
 from palette4d.media.clip_base import Clip, describe, even_step
 from palette4d.media.colour_space import SpaceOptions
@@ -160,7 +159,7 @@ def analyze(
     )
     skipped = sorted(clip.skipped)
     usable, missing = _usable(clip.frames, gathered.frames)
-    if starts := cuts.find_cuts(usable):
+    if starts := cuts.find_cuts((frame.frame, frame.histogram) for frame in usable):
         if not allow_cuts:
             raise Palette4dError(f"{clip.source}: {cuts.refusal(clip.frames, starts)}")
         missing.append(cuts.note(starts))

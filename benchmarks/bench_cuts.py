@@ -24,9 +24,10 @@ from pathlib import Path
 import numpy as np
 import scenedetect
 from numpy.typing import NDArray
-from palette4d.analysis import colour_statistics, cuts
+from palette4d.analysis import colour_statistics
 from palette4d.analysis.options import AnalysisOptions
 
+from palette4d.media import cuts
 from palette4d.media.clip import open_clip
 from palette4d.shows.shots import BINS
 
@@ -43,7 +44,7 @@ def ours(frames: Frames) -> list[int]:
         colour_statistics.gather(i, frame.astype(np.float32) / 255, options)
         for i, frame in enumerate(frames)
     ]
-    return cuts.find_cuts([s for s in gathered if s is not None])
+    return cuts.find_cuts((s.frame, s.histogram) for s in gathered if s is not None)
 
 
 def theirs(make: Callable[[], scenedetect.SceneDetector]) -> Callable[[Frames], list[int]]:

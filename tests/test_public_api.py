@@ -115,3 +115,19 @@ def test_a_bake_holds_what_is_not_saved_yet(tmp_path: Path) -> None:
     with pytest.raises(palette4d.Palette4dError):
         palette4d.bake(doc, frame=99, path=tmp_path / "late.cube")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["edited.cube", "plain.cube"]
+
+
+@pytest.mark.parametrize(
+    "settings", [{"vertexes": 3}, {"vertices": -1}, {"method": "best"}, {"eta1": 2}]
+)
+def test_settings_that_do_not_exist_are_refused(settings: dict[str, Any]) -> None:
+    with pytest.raises(palette4d.Palette4dError):
+        palette4d.analyze(np.zeros((2, 4, 4, 3)), **settings)
+
+
+def test_every_setting_of_the_command_line_can_be_given(clip_folder: Path) -> None:
+    doc = palette4d.analyze(
+        clip_folder / "shot.####.png", frames="1-2", method="static", lambda_=20, threads=1
+    )
+    assert doc.fields()["quality"]["options"]["lambda"] == 20
+    assert doc.fields()["quality"]["options"]["method"] == "static"

@@ -39,11 +39,11 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d.analysis.convex_hulls import THIN
+from palette4d.analysis.convex_hulls import THIN, hull_mesh, two_sided
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
 from palette4d.analysis.losses import NO_FACES
 from palette4d.analysis.polytope import Section, SkewPolytope
@@ -178,8 +178,9 @@ def convex_polytope(points: F64, frames: F64, scale: float = 1.0) -> SkewPolytop
     noise[:, -1] = 0
     for jitter in JITTERS:
         try:
-            hull = _hull(flat.coordinates + jitter * noise)
-            lattice = _Lattice(points[hull.used], hull)
+            moved = flat.coordinates + jitter * noise
+            hull = _hull(moved)
+            lattice = _Lattice(points[hull.used], hull, flat.back(moved)[hull.used])
             return _sections(lattice, frames)
         except _IllFormedError:
             continue
@@ -365,16 +366,17 @@ def _nearest(numbers: F64, times: F64) -> F64:
 
 
 class _Lattice:
-    """The vertices, edges and facets of a hull in d dimensions, the last of which is time."""
+    """The vertices, edges and facets of a hull in d dimensions, the last of which is time.
 
-    def __init__(self, vertices: F64, hull: _Hull) -> None:
-        self.vertices = vertices
+    `shape` are the vertices as the hull sees them, told apart and normalised.
+    """
+
+    def __init__(self, vertices: F64, hull: _Hull, shape: F64) -> None:
+        self.vertices, self.shape = vertices, shape
         self.dimensions = hull.points.shape[1]
         self.times, self.level = np.unique(vertices[:, 3], return_inverse=True)
-        self.facet_vertices: dict[int, set[int]] = {}
         around: dict[Cut, set[int]] = {}
         for simplex, facet in zip(hull.simplices.tolist(), hull.facets.tolist(), strict=True):
-            self.facet_vertices.setdefault(facet, set()).update(simplex)
             for v in simplex:
                 around.setdefault((v,), set()).add(facet)
             for u, w in itertools.combinations(sorted(simplex, key=self._place), 2):
@@ -406,123 +408,34 @@ class _Lattice:
         return [c for c in self.facets if len(c) == 2 and level[c[0]] <= i < level[c[1]]]
 
     def colours(self, cuts: Sequence[Cut], t: float) -> F64:
-        """Return the (n, 3) colours of a slice."""
-        u = self.vertices[[c[0] for c in cuts]]
-        w = self.vertices[[c[-1] for c in cuts]]
-        span = w[:, 3] - u[:, 3]
-        weight = (t - u[:, 3]) / np.where(span > 0, span, 1)
-        out: F64 = u[:, :3] + weight[:, None] * (w - u)[:, :3]
+        """Return the (n, 3) colours of the shape in the slice at t."""
+        early, late = ([cut[end] for cut in cuts] for end in (0, -1))
+        start, end = self.vertices[early, 3], self.vertices[late, 3]
+        weight = (t - start) / np.where(end > start, end - start, 1)
+        out: F64 = self.shape[early, :3] + weight[:, None] * (
+            self.shape[late, :3] - self.shape[early, :3]
+        )
         return out
 
     def surface(self, cuts: Sequence[Cut], t: float) -> I32:
-        """Return the (f, 3) outward triangles over the cuts of the slice at t; none for a line."""
-        inside: dict[int, set[int]] = {}
-        for n, cut in enumerate(cuts):
-            for facet in self.facets[cut]:
-                inside.setdefault(facet, set()).add(n)
-        if self.dimensions <= 2 or len(cuts) <= 2:
-            if len(cuts) > 2:
-                raise _IllFormedError
+        """Return the outward triangles over the cuts of the slice at t, which is convex; none for a
+        point or a line, two sides for a polygon."""
+        if len(cuts) <= 2:
             return NO_FACES
-        # A facet that lies in the slice bounds nothing of it.
-        for facet, members in self.facet_vertices.items():
-            if {cuts[n] for n in inside.get(facet, ())} == {(v,) for v in members}:
-                del inside[facet]
-        if self.dimensions == 3:
-            sides = {frozenset(members) for members in inside.values() if len(members) == 2}
-            return _two_sided(_cycle(sides, set(range(len(cuts)))))
-        cycles: dict[frozenset[int], list[int]] = {}
-        for members in inside.values():
-            if len(members) > 2 and frozenset(members) not in cycles:
-                shared = (members & other for other in inside.values())
-                sides = {frozenset(pair) for pair in shared if len(pair) == 2}
-                cycles[frozenset(members)] = _cycle(sides, members)
-        polygons = list(cycles.values())
-        if len(polygons) == 1 and len(polygons[0]) == len(cuts):
-            return _two_sided(polygons[0])
-        faces = np.array([f for p in _oriented(polygons) for f in _fan(p)], np.int32)
-        if not _is_sphere(faces, len(cuts)):
+        colours = self.colours(cuts, t)
+        axes = _axes(colours, EXACTLY_FLAT)
+        try:
+            if len(axes) == 2:
+                polygon = ConvexHull(colours @ axes.T).vertices
+                faces, corners = two_sided(polygon), len(polygon)
+            else:
+                mesh = hull_mesh(colours)
+                faces, corners = mesh.faces, len(mesh.rgb)
+        except QhullError:
+            raise _IllFormedError from None
+        if corners != len(cuts):  # all cuts of a convex polytope are corners
             raise _IllFormedError
-        corners = self.colours(cuts, t)[faces]
-        corners = corners - corners.mean(axis=(0, 1))
-        volume = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
-        return faces if volume >= 0 else np.ascontiguousarray(faces[:, ::-1])
-
-
-def _cycle(sides: Iterable[frozenset[int]], members: set[int]) -> list[int]:
-    """Return the members of a polygon in the order in which its sides join them."""
-    beside: dict[int, list[int]] = {member: [] for member in sorted(members)}
-    for side in sides:
-        for a, b in itertools.permutations(side):
-            beside[a].append(b)
-    if any(len(both) != 2 for both in beside.values()):
-        raise _IllFormedError
-    start = min(members)
-    order, at = [start], min(beside[start])
-    while at != start:
-        one, other = beside[at]
-        order.append(at)
-        at = other if one == order[-2] else one
-    if len(order) != len(members):
-        raise _IllFormedError
-    return order
-
-
-def _fan(polygon: Sequence[int]) -> Iterator[tuple[int, int, int]]:
-    for a, b in itertools.pairwise(polygon[1:]):
-        yield polygon[0], a, b
-
-
-def _two_sided(polygon: list[int]) -> I32:
-    """Return a flat polygon's front and back, whose fans share no diagonal."""
-    back = [polygon[1], polygon[0], *polygon[:1:-1]]
-    return np.array([*_fan(polygon), *_fan(back)], np.int32)
-
-
-def _oriented(polygons: list[list[int]]) -> list[list[int]]:
-    """Turn the polygons of a closed surface round until neighbours agree."""
-    at_side: dict[frozenset[int], list[int]] = {}
-    for n, polygon in enumerate(polygons):
-        for side in _sides(polygon):
-            at_side.setdefault(frozenset(side), []).append(n)
-    if not polygons or any(len(both) != 2 for both in at_side.values()):
-        raise _IllFormedError
-    out, pending = {0: polygons[0]}, [0]
-    while pending:
-        n = pending.pop()
-        for side in _sides(out[n]):
-            for m in at_side[frozenset(side)]:
-                if m not in out:
-                    same = side in set(_sides(polygons[m]))
-                    out[m] = polygons[m][::-1] if same else polygons[m]
-                    pending.append(m)
-    return [out[n] for n in sorted(out)]
-
-
-def _sides(polygon: Sequence[int]) -> list[tuple[int, int]]:
-    return list(zip(polygon, [*polygon[1:], polygon[0]], strict=True))
-
-
-def _is_sphere(faces: I32, corners: int) -> bool:
-    """Whether the triangles are one closed, oriented surface with one ring around each corner."""
-    after: list[dict[int, int]] = [{} for _ in range(corners)]
-    for a, b, c in faces.tolist():
-        for at, left, right in ((a, b, c), (b, c, a), (c, a, b)):
-            if left in after[at]:
-                return False
-            after[at][left] = right
-    for ring in after:
-        if not ring:
-            return False
-        start = at = next(iter(ring))
-        steps = 0
-        while steps == 0 or at != start:
-            if at not in ring:
-                return False
-            at, steps = ring[at], steps + 1
-        if steps != len(ring):
-            return False
-    return len(faces) == 2 * corners - 4
+        return faces
 
 
 # ------------------------------------------------------------------------------------- sections

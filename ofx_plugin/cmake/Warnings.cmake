@@ -2,6 +2,5 @@
 option(PALETTE4D_WERROR "Treat warnings as errors" OFF)
 add_library(palette4d_warnings INTERFACE)
 target_compile_options(palette4d_warnings INTERFACE
-  $<$<CXX_COMPILER_ID:GNU,Clang,AppleClang>:-Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
-    $<$<BOOL:${PALETTE4D_WERROR}>:-Werror>>
-  $<$<CXX_COMPILER_ID:MSVC>:/W4 $<$<BOOL:${PALETTE4D_WERROR}>:/WX>>)
+  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
+  $<$<BOOL:${PALETTE4D_WERROR}>:-Werror>)

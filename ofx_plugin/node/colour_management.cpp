@@ -27,8 +27,10 @@ void prefer_colour(const Suites& suites, OfxImageEffectHandle effect, const Prop
     if (!chosen.result.loaded) return;
     const Sidecar& sidecar = chosen.result.loaded->sidecar();
     const bool in_palette_space = params.int_now(kParamPictureIn).value_or(0) == 1;
-    const std::vector<std::string> wanted = colourspaces_of(
-        encoding_of(sidecar, in_palette_space), *style == kOfxImageEffectColourManagementCore);
+    const bool linear = linear_picture(params, sidecar, 0) != nullptr;
+    const std::vector<std::string> wanted =
+        colourspaces_of(linear ? "scene_linear" : encoding_of(sidecar, in_palette_space),
+                        *style == kOfxImageEffectColourManagementCore);
     const std::string name = std::string(kOfxImageClipPropPreferredColourspaces) + "_" +
                              kOfxImageEffectSimpleSourceClipName;
     // The basic style knows the generic spaces alone, which stand last.

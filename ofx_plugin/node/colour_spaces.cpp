@@ -246,6 +246,27 @@ std::vector<std::string> colourspaces_of(const std::string& encoding, bool core)
     return {};
 }
 
+std::shared_ptr<const ColourConversion> from_linear(const std::string& encoding) {
+    const Space* space = space_of(encoding);
+    const std::string wanted = plain(encoding);
+    if (wanted == "linear" || wanted == "scenelinear" || (space && space->kind == Kind::kLinear)) {
+        return std::make_shared<const ColourConversion>();
+    }
+    if (!space || space->kind != Kind::kSdr) return nullptr;
+    const std::string name = space->name ? space->name : space->aliases.front();
+    const auto starts = [&](const char* with) { return name.rfind(with, 0) == 0; };
+    // IEC 61966-2-1, ITU-R BT.709, BT.1886 and SMPTE RP 431-2.
+    double gamma = 2.2, offset = 0;
+    if (starts("srgb") || starts("displayp3")) gamma = 2.4, offset = 0.055;
+    if (starts("camera_rec709")) gamma = 1 / 0.45, offset = 0.099;
+    if (starts("rec1886") || starts("g24")) gamma = 2.4;
+    if (starts("p3")) gamma = 2.6;
+    if (starts("g18")) gamma = 1.8;
+    const bool mirrored = offset == 0;
+    return std::make_shared<const ColourConversion>(std::vector<ConversionStep>{
+        GammaStep{{gamma, gamma, gamma}, {offset, offset, offset}, mirrored, /*inverse=*/true}});
+}
+
 Vec3 luminance_weights(const std::string& encoding) {
     const Space* space = space_of(encoding);
     return weights_of(space ? *space->gamut : kRec709);

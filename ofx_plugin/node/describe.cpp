@@ -8,16 +8,15 @@
 namespace palette4d::node {
 namespace {
 
-bool define_clip(const Suites& suites, OfxImageEffectHandle effect, const char* name) {
+bool define_clip(const Suites& suites, OfxImageEffectHandle effect, const char* name,
+                 std::initializer_list<const char*> components) {
     OfxPropertySetHandle handle = nullptr;
     if (!suites.effect->clipDefine ||
         suites.effect->clipDefine(effect, name, &handle) != kOfxStatOK) {
         return false;
     }
     const Properties clip(suites, handle);
-    // RGBA first: hosts that know one layout only take the first. Alpha alone passes through.
-    clip.set_strings(kOfxImageEffectPropSupportedComponents,
-                     {kOfxImageComponentRGBA, kOfxImageComponentRGB, kOfxImageComponentAlpha});
+    clip.set_strings(kOfxImageEffectPropSupportedComponents, components);
     clip.set_int(kOfxImageEffectPropSupportsTiles, 1);
     clip.set_int(kOfxImageEffectPropTemporalClipAccess, 0);
     return true;
@@ -41,9 +40,11 @@ OfxStatus describe(const Suites& suites, OfxImageEffectHandle effect) {
                     "Recolours a clip by the edits made to its time-varying colour palette.");
     node.set_string(kOfxImageEffectPluginPropGrouping, "Color");
 
-    node.set_strings(kOfxImageEffectPropSupportedContexts,
-                     {kOfxImageEffectContextFilter, kOfxImageEffectContextGeneral});
-    // Float before byte. No short and no half: a host that has 16 bits then hands over float.
+    node.set_strings(
+        kOfxImageEffectPropSupportedContexts,
+        {kOfxImageEffectContextFilter, kOfxImageEffectContextGeneral, kOfxImageEffectContextPaint});
+    // Float before byte. Short and half are rendered where a host hands them over, but not asked
+    // for: a host with 16-bit pictures then hands over float.
     node.set_strings(kOfxImageEffectPropSupportedPixelDepths,
                      {kOfxBitDepthFloat, kOfxBitDepthByte});
 
@@ -62,9 +63,16 @@ OfxStatus describe(const Suites& suites, OfxImageEffectHandle effect) {
     return kOfxStatOK;
 }
 
-OfxStatus describe_in_context(const Suites& suites, OfxImageEffectHandle effect) {
-    if (!define_clip(suites, effect, kOfxImageEffectSimpleSourceClipName) ||
-        !define_clip(suites, effect, kOfxImageEffectOutputClipName)) {
+OfxStatus describe_in_context(const Suites& suites, OfxImageEffectHandle effect,
+                              const Properties& in_args) {
+    // RGBA first: hosts that know one layout only take the first. Alpha alone passes through.
+    const auto pictures = {kOfxImageComponentRGBA, kOfxImageComponentRGB, kOfxImageComponentAlpha};
+    if (!define_clip(suites, effect, kOfxImageEffectSimpleSourceClipName, pictures) ||
+        !define_clip(suites, effect, kOfxImageEffectOutputClipName, pictures)) {
+        return kOfxStatFailed;
+    }
+    if (in_args.get_string(kOfxImageEffectPropContext) == kOfxImageEffectContextPaint &&
+        !define_clip(suites, effect, kBrushClipName, {kOfxImageComponentAlpha})) {
         return kOfxStatFailed;
     }
     OfxParamSetHandle params = nullptr;

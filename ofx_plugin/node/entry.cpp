@@ -41,7 +41,7 @@ OfxStatus dispatch(const char* action, OfxImageEffectHandle effect, OfxPropertyS
     }
     if (is(kOfxImageEffectActionGetOutputColourspace)) return output_colour(out);
     if (is(kOfxActionDescribe)) return describe(host, effect);
-    if (is(kOfxImageEffectActionDescribeInContext)) return describe_in_context(host, effect);
+    if (is(kOfxImageEffectActionDescribeInContext)) return describe_in_context(host, effect, in);
     if (is(kOfxActionCreateInstance)) {
         create_instance(host, effect);
         return kOfxStatOK;
@@ -50,20 +50,8 @@ OfxStatus dispatch(const char* action, OfxImageEffectHandle effect, OfxPropertyS
         destroy_instance(effect);
         return kOfxStatOK;
     }
-    if (is(kOfxActionBeginInstanceChanged)) {
-        changes_begin(effect, in);
-        return kOfxStatOK;
-    }
     if (is(kOfxActionInstanceChanged)) {
         instance_changed(host, effect, in);
-        return kOfxStatOK;
-    }
-    if (is(kOfxActionEndInstanceChanged)) {
-        changes_end(host, effect, in);
-        return kOfxStatOK;
-    }
-    if (is(kOfxActionSyncPrivateData)) {
-        update_instance(host, effect);
         return kOfxStatOK;
     }
     return kOfxStatReplyDefault;
@@ -90,7 +78,7 @@ OfxPlugin g_plugin = {kOfxImageEffectPluginApi,
                       kOfxImageEffectPluginApiVersion,
                       "org.palette4d.Palette4D",
                       1,
-                      2,
+                      3,
                       &remember_host,
                       &main_entry};
 

@@ -34,6 +34,16 @@ void prepare(FrameSetup& setup, const Params& params, LoadedSidecar& loaded, dou
     if (sidecar.conversion && !settings.in_palette_space) {
         // Shares its ownership: a sidecar may be read anew while this is drawn.
         drawing.conversion = {sidecar.conversion, &sidecar.conversion->steps};
+    } else if (settings.scene_linear) {
+        drawing.conversion = linear_picture(params, sidecar, time);
+        if (!drawing.conversion) {
+            setup.passes = true;
+            setup.problem = "Picture is in: found a palette in '" + sidecar.clip.encoding +
+                            "', expected sRGB, Rec.709 or another display encoding; choose Input "
+                            "space and give the node its picture in that encoding";
+            return;
+        }
+        if (drawing.conversion->identity()) drawing.conversion = nullptr;
     }
     if (settings.output == Output::kOutside) {
         drawing.reader = loaded.surface_at(frame);
@@ -76,7 +86,7 @@ void prepare(FrameSetup& setup, const Params& params, LoadedSidecar& loaded, dou
 }  // namespace
 
 FrameSetup frame_setup_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time,
-                          Interpolation interpolation) {
+                          Interpolation interpolation, std::optional<double> source_frame) {
     FrameSetup setup;
     const Params params(suites, effect);
     const Chosen chosen = chosen_sidecar(params, time);
@@ -95,8 +105,8 @@ FrameSetup frame_setup_at(const Suites& suites, OfxImageEffectHandle effect, Ofx
     if (settings.keep > 0 && settings.own_lightness) {
         settings.lightness = luminance_weights(encoding_of(sidecar, settings.in_palette_space));
     }
-    const FrameAt at =
-        frame_at(sidecar.clip, time_settings_at(params, time), host_clip(suites, effect), time);
+    const FrameAt at = frame_at(sidecar.clip, time_settings_at(params, time),
+                                host_clip(suites, effect, source_frame), time);
     if (!std::isfinite(at.frame)) {
         setup.problem = path +
                         ": the host's time and the node's parameters of time give no frame; "

@@ -1,6 +1,7 @@
 // What a node does to one moment of its clip: parameters and time in, what is to be drawn out.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "host.hpp"
@@ -25,6 +26,7 @@ struct FrameSetup {
 /// The setup of an instance at a time. Reads parameters in the way allowed while rendering.
 /// Problems are in the result; throws std::bad_alloc only.
 FrameSetup frame_setup_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time,
-                          Interpolation interpolation = Interpolation::kNever);
+                          Interpolation interpolation = Interpolation::kNever,
+                          std::optional<double> source_frame = std::nullopt);
 
 }  // namespace palette4d::node

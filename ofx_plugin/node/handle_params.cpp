@@ -8,12 +8,15 @@
 #include <vector>
 
 #include "model/handles.hpp"
-#include "sidecar_choice.hpp"
+#include "outputs.hpp"
 
 namespace palette4d::node {
 namespace {
 
 constexpr double kLargest = 1e6;  ///< what a sidecar may hold
+/// The colours' default. A host's reset button sets it and reports a user's edit, so that it is a
+/// colour that nobody chooses.
+constexpr Vec3 kUnset = {0.5, 0.5, 0.501};
 
 /// One slot's names and labels. The strings live as long as the process: hosts may keep them.
 struct Slot {
@@ -87,16 +90,19 @@ void define_handle_params(ParamDefiner& define) {
                    "Which edits apply: those in the sidecar, those made here with the handles "
                    "below, or both; where both have one, the handle here counts."},
                   {"Sidecar", "Host", "Both"}, static_cast<int>(EditsFrom::kBoth));
-    define.button({kParamResetHandles, "Reset handles", "Takes all handles here out of use."});
+    define.button({kParamResetHandles, "Reset handles",
+                   "Switches all handles here off and removes their keyframes."});
     for (const Slot& slot : slots()) {
-        define.flag({slot.use.c_str(), slot.use_label.c_str(),
-                     "Whether the colour below takes the place of the palette's. Changing the "
-                     "colour switches this on, in hosts that tell the node of changes."},
-                    false);
+        define
+            .flag({slot.use.c_str(), slot.use_label.c_str(),
+                   "Whether the colour replaces the palette's. Changing the colour switches this "
+                   "on, in hosts that tell the node of changes."},
+                  false)
+            .set_int(kOfxParamPropLayoutHint, kOfxParamPropLayoutHintNoNewLine);
         define.colour({slot.colour.c_str(), slot.colour_label.c_str(),
-                       "The new colour of this handle, in the numbers of the palette's own "
-                       "encoding. May be keyframed."},
-                      {0, 0, 0}, -kLargest, kLargest);
+                       "The new colour of this handle, in the palette's encoding, or in linear "
+                       "light where Picture is in says Scene-linear. May be keyframed."},
+                      kUnset, -kLargest, kLargest);
     }
     define.begin_group("handleIds", "Which handles");
     for (const Slot& slot : slots()) {
@@ -115,6 +121,7 @@ EditsAt edits_at(const Params& params, const Sidecar& sidecar, OfxTime time) {
     result.edits.sidecar = from != static_cast<int>(EditsFrom::kHost);
     if (from == static_cast<int>(EditsFrom::kSidecar)) return result;
     std::vector<HandleColour>& colours = result.edits.host;
+    const auto linear = linear_picture(params, sidecar, time);
     for (std::size_t i = 0; i < slots().size(); ++i) {
         const Slot& slot = slots()[i];
         if (params.int_at(slot.use.c_str(), time).value_or(0) == 0) continue;
@@ -131,7 +138,7 @@ EditsAt edits_at(const Params& params, const Sidecar& sidecar, OfxTime time) {
         // Of two slots with one handle the last counts.
         const auto same = [&](const HandleColour& other) { return other.handle == handle; };
         colours.erase(std::remove_if(colours.begin(), colours.end(), same), colours.end());
-        colours.push_back({handle, *rgb});
+        colours.push_back({handle, linear ? linear->to_palette(*rgb) : *rgb});
     }
     std::sort(colours.begin(), colours.end(),
               [](const HandleColour& a, const HandleColour& b) { return a.handle < b.handle; });
@@ -161,91 +168,110 @@ void notice_undone(const Params& params, ShownHandles& shown) {
     for (std::size_t i = 0; i < shown.size(); ++i) {
         ShownHandle& slot = shown[i];
         if (all_are_back && slot.before) {
-            slot = {slot.before, std::nullopt, slot.given};
+            slot = {slot.before, std::nullopt, slot.given, false};
         } else if (holds(params, slots()[i], slot.declined)) {  // done again
-            slot = {slot.declined, slot.given, std::nullopt};
+            slot = {slot.declined, slot.given, std::nullopt, false};
         }
     }
 }
 
-void show_no_handles(const Params& params) {
-    for (const Slot& slot : slots()) {
-        set_text(params.properties(slot.colour.c_str()), kOfxPropLabel, slot.colour_label);
+void label_handles(const Params& params, const Chosen& chosen) {
+    const Sidecar* sidecar = chosen.sidecar();
+    if (chosen.any && !sidecar) return;
+    std::vector<Handle> handles;
+    if (sidecar) handles = handles_of(sidecar->polytope, sidecar->edits);
+    for (std::size_t i = 0; i < slots().size(); ++i) {
+        const Slot& slot = slots()[i];
+        const std::string id = params.string_now(slot.id.c_str()).value_or("");
+        const int at = sidecar ? handle_of(*sidecar, i, id) : -1;
+        set_text(params.properties(slot.colour.c_str()), kOfxPropLabel,
+                 at < 0 ? slot.colour_label : label_of(handles[static_cast<std::size_t>(at)]));
+        // A slot in use stays visible, so that it can be switched off.
+        const bool in_use = params.int_now(slot.use.c_str()).value_or(0) != 0;
         for (const char* name : {slot.colour.c_str(), slot.use.c_str(), slot.id.c_str()}) {
-            set_secret(params.properties(name), false);
+            set_secret(params.properties(name), sidecar && at < 0 && !in_use);
         }
     }
 }
 
-void show_handles(const Params& params, const Sidecar* sidecar, ShownHandles& shown) {
+void show_handles(const Params& params, const Chosen& chosen, ShownHandles& shown) {
+    const Sidecar* sidecar = chosen.sidecar();
     if (!sidecar) return;
     bool given_one = false;
     const std::vector<Handle> handles = handles_of(sidecar->polytope, sidecar->edits);
+    const auto linear = linear_picture(params, *sidecar, 0);
     for (std::size_t i = 0; i < slots().size(); ++i) {
         const Slot& slot = slots()[i];
-        const bool in_use = params.int_now(slot.use.c_str()).value_or(0) != 0;
         const std::string id = params.string_now(slot.id.c_str()).value_or("");
         const int at = handle_of(*sidecar, i, id);
-        const Handle* handle = at < 0 ? nullptr : &handles[static_cast<std::size_t>(at)];
-        const Properties colour = params.properties(slot.colour.c_str());
-        set_text(colour, kOfxPropLabel, handle ? label_of(*handle) : slot.colour_label);
-        // One that is in use stays to be seen, so that it can be taken out of use.
-        for (const char* name : {slot.colour.c_str(), slot.use.c_str(), slot.id.c_str()}) {
-            set_secret(params.properties(name), !handle && !in_use);
-        }
-        if (!handle || in_use || params.animated(slot.colour.c_str())) continue;
+        const bool in_use = params.int_now(slot.use.c_str()).value_or(0) != 0;
+        if (at < 0 || in_use || params.animated(slot.colour.c_str())) continue;
+        const Vec3& own = handles[static_cast<std::size_t>(at)].rgb;
+        const Vec3 rgb = linear ? linear->to_clip(own) : own;
         const auto now = params.rgb_now(slot.colour.c_str());
         if (!now) continue;
-        // Of a project that was opened it is not known; there an id says that it was in use.
-        const bool untouched = shown[i].given ? close(*now, *shown[i].given) : id.empty();
-        if (close(*now, handle->rgb)) {
-            shown[i].given = handle->rgb;
+        if (close(*now, rgb)) {
+            shown[i].given = rgb;
             continue;
         }
+        // The instance of a project that was opened has given nothing; an id shows earlier use.
+        const bool untouched =
+            shown[i].given ? close(*now, *shown[i].given) : id.empty() || close(*now, kUnset);
         const std::optional<Vec3>& declined = shown[i].declined;
-        if (!untouched || (declined && close(handle->rgb, *declined))) continue;
+        if (!untouched || (declined && close(rgb, *declined))) continue;
         if (!given_one) {
             for (ShownHandle& other : shown) other.before.reset();
         }
         given_one = true;
-        if (params.set_rgb(slot.colour.c_str(), handle->rgb)) {
-            shown[i] = {handle->rgb, now, std::nullopt};
-        }
+        if (params.set_rgb(slot.colour.c_str(), rgb)) shown[i] = {rgb, now, std::nullopt, false};
     }
 }
 
-bool handle_changed(const Params& params, const Sidecar* sidecar, const std::string& name,
-                    ShownHandles& shown) {
-    if (name == kParamResetHandles) {
-        shown = {};
-        for (const Slot& slot : slots()) {
-            if (params.int_now(slot.use.c_str()).value_or(0)) params.set_int(slot.use.c_str(), 0);
-            if (!params.string_now(slot.id.c_str()).value_or("").empty()) {
-                params.set_string(slot.id.c_str(), "");
-            }
-        }
-        return true;
+namespace {
+
+/// The slot is as it was described, and has its handle's colour from show_handles().
+void reset(const Params& params, const Slot& slot, ShownHandle& shown) {
+    if (params.animated(slot.colour.c_str())) params.remove_keys(slot.colour.c_str());
+    if (params.int_now(slot.use.c_str()).value_or(0) != 0) params.set_int(slot.use.c_str(), 0);
+    if (!params.string_now(slot.id.c_str()).value_or("").empty()) {
+        params.set_string(slot.id.c_str(), "");
     }
-    if (name == kParamSidecar || name == kParamReload) {
+    shown = {params.rgb_now(slot.colour.c_str()), std::nullopt, shown.declined, false};
+}
+
+void colour_changed(const Params& params, const Chosen& chosen, const Slot& slot,
+                    ShownHandle& shown) {
+    if (holds(params, slot, kUnset)) return reset(params, slot, shown);
+    const bool in_use = params.int_now(slot.use.c_str()).value_or(0) != 0;
+    if (holds(params, slot, shown.given)) {
+        if (in_use && shown.switched_on) reset(params, slot, shown);
+    } else if (!in_use && chosen.any) {
+        shown.switched_on = params.set_int(slot.use.c_str(), 1);
+    }
+}
+
+}  // namespace
+
+void handle_changed(const Params& params, const Chosen& chosen, const std::string& name,
+                    ShownHandles& shown) {
+    if (name == kParamSidecar || name == kParamReload || name == kParamResetHandles) {
         for (ShownHandle& slot : shown) slot.declined.reset();
+    }
+    if (name == kParamResetHandles) {
+        for (std::size_t i = 0; i < slots().size(); ++i) reset(params, slots()[i], shown[i]);
     }
     for (std::size_t i = 0; i < slots().size(); ++i) {
         const Slot& slot = slots()[i];
         if (name != slot.colour && name != slot.use) continue;
-        if (name == slot.colour && params.int_now(slot.use.c_str()) == 0) {
-            // What was shown all along is no edit: the host has undone one.
-            if (holds(params, slot, shown[i].given)) break;
-            params.set_int(slot.use.c_str(), 1);
-        }
+        if (name == slot.colour) colour_changed(params, chosen, slot, shown[i]);
         const bool in_use = params.int_now(slot.use.c_str()).value_or(0) != 0;
-        if (!in_use || !sidecar || !params.string_now(slot.id.c_str()).value_or("").empty()) break;
+        const Sidecar* sidecar = chosen.sidecar();
+        if (!in_use || !sidecar || !params.string_now(slot.id.c_str()).value_or("").empty()) return;
         const int at = handle_of(*sidecar, i, "");
-        if (at < 0) break;
+        if (at < 0) return;
         const std::vector<Handle> handles = handles_of(sidecar->polytope, sidecar->edits);
         params.set_string(slot.id.c_str(), handles[static_cast<std::size_t>(at)].id);
-        return true;
     }
-    return false;
 }
 
 }  // namespace palette4d::node

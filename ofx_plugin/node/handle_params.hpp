@@ -10,7 +10,7 @@
 
 #include "param_define.hpp"
 #include "params.hpp"
-#include "sidecar_cache.hpp"
+#include "sidecar_choice.hpp"
 
 namespace palette4d::node {
 
@@ -35,31 +35,34 @@ EditsAt edits_at(const Params& params, const Sidecar& sidecar, OfxTime time);
 int handle_at(const Params& params, const Sidecar& sidecar, int slot, OfxTime time);
 /// How many slots are in use, outside of rendering.
 int handles_in_use(const Params& params);
-/// The colours that show_handles() has given to an instance's slot, and nobody else.
+/// What an instance remembers of a slot, for as long as the host keeps the instance.
 struct ShownHandle {
-    std::optional<Vec3> given;     ///< the last one
-    std::optional<Vec3> before;    ///< what it took the place of, if it was among the last given
+    std::optional<Vec3> given;     ///< the last colour that show_handles() has set
+    std::optional<Vec3> before;    ///< what that replaced, if it was among the last set
     std::optional<Vec3> declined;  ///< one that the user has undone
+    bool switched_on = false;      ///< by handle_changed(), and not by the user
 };
 using ShownHandles = std::array<ShownHandle, kHandleSlots>;
 
-/// For instance changes only. Labels the slots after the sidecar's handles, hides those that it has
-/// no handle for, and gives slots that are not in use their handle's colour, so that they begin
-/// from there; one that holds another colour than was given to it keeps that, since the user has
-/// taken it out of use, or has changed it and the host is about to say so. Without a sidecar all
-/// stay as they are.
-void show_handles(const Params& params, const Sidecar* sidecar, ShownHandles& shown);
-/// For instance changes only, where no sidecar is chosen: the slots look as they were described.
-void show_no_handles(const Params& params);
-/// For instance changes only, first of all. A host may undo what show_handles() has set, and tell
-/// of it as of the user's edits, which it is not: all colours that were given together are what
-/// they were before. They are not given again at once, or there would be no way back beyond that
-/// step.
+/// Labels the slots after the sidecar's handles and hides those that it has no handle for. Without
+/// a chosen sidecar the slots look as they were described; while a file cannot be read they stay
+/// as they are. Sets properties only, which any action may do.
+void label_handles(const Params& params, const Chosen& chosen);
+
+// All below: in kOfxActionInstanceChanged only.
+
+/// Gives slots that are not in use their handle's colour, so that an edit starts from it. A slot
+/// that holds any other colour than the one that it was given keeps that: the user has switched the
+/// slot off, or has changed the colour and the host is about to say so.
+void show_handles(const Params& params, const Chosen& chosen, ShownHandles& shown);
+/// Call this first. A host may undo what show_handles() has set, and report it as the user's edits,
+/// which it is not: all colours that were set together are what they were before. They are not set
+/// again at once, or the user could never undo beyond that step.
 void notice_undone(const Params& params, ShownHandles& shown);
-/// For instance changes by the user. A colour that is changed comes into use; a slot that comes
-/// into use keeps its handle's id, whatever the sidecar's order will be. Where a sidecar is chosen,
-/// or read on demand, undone colours are given again. True when it set anything.
-bool handle_changed(const Params& params, const Sidecar* sidecar, const std::string& name,
+/// What the user changed. A changed colour switches its slot on, and the slot keeps its handle's
+/// id, whatever the order in the sidecar will be. The colour's default, to which the host's reset
+/// buttons go, switches the slot off, and so does undo of the edit that switched it on.
+void handle_changed(const Params& params, const Chosen& chosen, const std::string& name,
                     ShownHandles& shown);
 
 }  // namespace palette4d::node

@@ -19,6 +19,8 @@ struct Suites {
     const OfxMultiThreadSuiteV1* thread = nullptr;  ///< optional
     const OfxMessageSuiteV1* message = nullptr;     ///< optional
     const OfxMessageSuiteV2* message2 = nullptr;    ///< optional
+    /// Natron, which says so by a property of its own; its name is a preference of the user.
+    bool is_natron = false;
 };
 
 /// Remembers the host (OfxSetHost and OfxPlugin::setHost; a null host is ignored).

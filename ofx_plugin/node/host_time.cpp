@@ -1,5 +1,7 @@
 #include "host_time.hpp"
 
+#include "paths.hpp"
+
 namespace palette4d::node {
 namespace {
 
@@ -73,12 +75,18 @@ TimeSettings time_settings_at(const Params& params, OfxTime time) {
     return settings;
 }
 
-HostClip host_clip(const Suites& suites, OfxImageEffectHandle effect) {
+HostClip host_clip(const Suites& suites, OfxImageEffectHandle effect,
+                   std::optional<double> source_frame) {
     HostClip host;
+    host.source_frame = source_frame;
     OfxPropertySetHandle handle = nullptr;
     if (suites.effect->getPropertySet &&
         suites.effect->getPropertySet(effect, &handle) == kOfxStatOK) {
-        host.rate = Properties(suites, handle).get_double(kOfxImageEffectPropFrameRate);
+        const Properties instance(suites, handle);
+        host.rate = instance.get_double(kOfxImageEffectPropFrameRate);
+        if (const auto media = instance.get_string(kResolvePropSrcFilePath)) {
+            host.first_number = first_number(*media);
+        }
     }
     OfxImageClipHandle clip = nullptr;
     handle = nullptr;

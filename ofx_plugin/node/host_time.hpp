@@ -21,7 +21,9 @@ void define_time_params(ParamDefiner& define);
 
 /// None of these is animated: `time` is for asking while rendering.
 TimeSettings time_settings_at(const Params& params, OfxTime time);
-/// What the host reports about the source clip. Allowed in every action of an instance.
-HostClip host_clip(const Suites& suites, OfxImageEffectHandle effect);
+/// What the host reports about the source clip; `source_frame` is what the action's arguments say
+/// of the media. Allowed in every action of an instance.
+HostClip host_clip(const Suites& suites, OfxImageEffectHandle effect,
+                   std::optional<double> source_frame = std::nullopt);
 
 }  // namespace palette4d::node

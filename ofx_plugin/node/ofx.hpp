@@ -16,6 +16,15 @@
 #define kOfxImageEffectPropNoSpatialAwareness "OfxImageEffectPropNoSpatialAwareness"
 #endif
 
+// From Nuke's extension, which Natron knows too: the next parameter stays on this one's row.
+#define kOfxParamPropLayoutHint "OfxParamPropLayoutHint"
+#define kOfxParamPropLayoutHintNoNewLine 2
+
+// DaVinci Resolve's: of the effect instance, the media's file (of a sequence its first); of the
+// render action's arguments, the frame of that media, an index from 0.
+#define kResolvePropSrcFilePath "OfxImageEffectPropSrcFilePath"
+#define kResolvePropSrcFrame "OfxImageEffectPropSrcFrame"
+
 // From OFX 1.5: headers of older SDKs lack all of it, and those of newer ones bring a configuration
 // of some thousand lines along that is not needed here.
 #if defined(__has_include)

@@ -69,13 +69,15 @@ void keep_lightness(const Rows& rows, const OutputSettings& settings) {
     }
 }
 
-void mix_in_source(const Rows& rows, double mix) {
+/// `mask` multiplies `mix`, pixel by pixel; empty for 1.
+void mix_in_source(const Rows& rows, double mix, const std::vector<float>& mask) {
     for (std::size_t i = 0; i < rows.pixels * rows.channels; ++i) {
         const float from = rows.source[i];
         float& to = rows.result[i];
         if (from == to) continue;
+        const double share = mask.empty() ? mix : mix * mask[i / rows.channels];
         to = std::isfinite(from) && std::isfinite(to)
-                 ? static_cast<float>(from + mix * (static_cast<double>(to) - from))
+                 ? static_cast<float>(from + share * (static_cast<double>(to) - from))
                  : from;
     }
 }
@@ -191,7 +193,27 @@ void draw_rows(const Rows& rows, const Drawing& drawing) {
         }
         if (settings.keep > 0) keep_lightness(rows, settings);
     }
-    if (settings.mix < 1) mix_in_source(rows, settings.mix);
+    if (settings.mix < 1) mix_in_source(rows, settings.mix, {});
+}
+
+/// A mask's numbers, 0 to 1, row after row; 0 where it has no pixels.
+std::vector<float> mask_of(const Image& mask, const OfxRectI& rows) {
+    const auto width = static_cast<std::size_t>(rows.x2 - rows.x1);
+    std::vector<float> shares(width * static_cast<std::size_t>(rows.y2 - rows.y1));
+    const OfxRectI covered = intersect(rows, mask.bounds);
+    if (is_empty(covered)) return shares;
+    const auto channels = static_cast<std::size_t>(mask.channels);
+    std::vector<float> numbers(static_cast<std::size_t>(covered.x2 - covered.x1) * channels);
+    for (int y = covered.y1; y < covered.y2; ++y) {
+        read_floats(mask, {covered.x1, y, covered.x2, y + 1}, numbers.data());
+        float* to = &shares[static_cast<std::size_t>(y - rows.y1) * width +
+                            static_cast<std::size_t>(covered.x1 - rows.x1)];
+        for (std::size_t i = channels - 1; i < numbers.size(); i += channels) {
+            const float share = numbers[i];
+            *to++ = share > 0 ? std::min(share, 1.0f) : 0.0f;
+        }
+    }
+    return shares;
 }
 
 }  // namespace
@@ -227,11 +249,12 @@ void define_output_params(ParamDefiner& define) {
                    "is known."},
                   {"Auto", "Rec.709", "Rec.2020", "P3", "ACES AP1", "Rec.601"});
     define.choice({kParamPictureIn, "Picture is in",
-                   "Input space: the numbers of the clip that was analysed, such as scene-linear "
-                   "light; the sidecar knows the way to the palette's and back. Palette space: the "
-                   "palette's own numbers, such as ACEScct, as a host that converts by itself has "
-                   "them. Without a conversion in the sidecar both are the same."},
-                  {"Input space", "Palette space"});
+                   "Input space: the code values of the analysed clip. Palette space: those of the "
+                   "palette, such as ACEScct, for hosts that convert by themselves. Without a "
+                   "conversion in the sidecar both are the same. Scene-linear: linear light, for a "
+                   "palette in sRGB, Rec.709 or another display encoding; the handles' colours are "
+                   "linear too."},
+                  {"Input space", "Palette space", "Scene-linear"});
     define.number({kParamMix, "Mix", "From the source (0) to what is put out (1)."},
                   {1, 0, 1, 0, 1}, 0.01, 3, true);
     define.end_group();
@@ -253,8 +276,15 @@ OutputSettings output_settings_at(const Params& params, OfxTime time) {
         settings.lightness = of > spaces ? kRec601 : luminance_weights(kLightnessOf[of - 1]);
     }
     settings.in_palette_space = params.int_at(kParamPictureIn, time).value_or(0) == 1;
+    settings.scene_linear = params.int_at(kParamPictureIn, time).value_or(0) == 2;
     settings.mix = clamped(params.double_at(kParamMix, time), 1, 0, 1);
     return settings;
+}
+
+std::shared_ptr<const ColourConversion> linear_picture(const Params& params, const Sidecar& sidecar,
+                                                       OfxTime time) {
+    if (sidecar.conversion || params.int_at(kParamPictureIn, time).value_or(0) != 2) return nullptr;
+    return from_linear(sidecar.clip.encoding);
 }
 
 const std::string& encoding_of(const Sidecar& sidecar, bool in_palette_space) {
@@ -291,8 +321,8 @@ void draw(const Image& in, const Image& out, const OfxRectI& area, const Drawing
     const OfxRectI covered = intersect(area, in.bounds);
     clear_around(out, area, covered);
     if (is_empty(covered)) return;
-    const bool edit_alone =
-        settings.output == Output::kRecoloured && settings.keep == 0 && settings.mix == 1;
+    const bool edit_alone = settings.output == Output::kRecoloured && settings.keep == 0 &&
+                            settings.mix == 1 && !drawing.mask;
     if (edit_alone && in.depth == Depth::kFloat) {
         RecolourOptions options;
         options.strength = settings.strength;
@@ -321,11 +351,13 @@ void draw(const Image& in, const Image& out, const OfxRectI& area, const Drawing
         if (in.opaque && settings.is_matte() && settings.in_alpha) {
             for (std::size_t i = channels - 1; i < count; i += channels) source[i] = 1;
         }
-        draw_rows({source.data(), drawn, count / channels, channels, in.premultiplied}, drawing);
+        const Rows pixels{source.data(), drawn, count / channels, channels, in.premultiplied};
+        draw_rows(pixels, drawing);
         for (int r = rows.y1; settings.output == Output::kPalette && r < rows.y2; ++r) {
             draw_strip(drawn + row * static_cast<std::size_t>(r - rows.y1), rows.x1, rows.x2, r,
                        channels, drawing);
         }
+        if (drawing.mask) mix_in_source(pixels, 1, mask_of(*drawing.mask, rows));
         write_floats(drawn, out, rows);
     }
 }

@@ -39,6 +39,7 @@ struct OutputSettings {
     Vec3 lightness{0, 0, 0};        ///< weights of red, green and blue; they sum to 1
     double mix = 1;                 ///< 0 the source, 1 what is put out
     bool in_palette_space = false;  ///< the picture has the palette's numbers already
+    bool scene_linear = false;      ///< the picture and the host's colours are linear light
 
     /// The source comes out, whatever else is set.
     bool passes() const { return mix == 0 || (output == Output::kRecoloured && strength == 0); }
@@ -49,6 +50,10 @@ OutputSettings output_settings_at(const Params& params, OfxTime time);
 /// that the output is not opaque even where the source is.
 void prefer_alpha(const Suites& suites, OfxImageEffectHandle effect, const Properties& out_args);
 
+/// From scene-linear numbers to the palette's, where *Picture is in* says so and the sidecar has no
+/// conversion of its own; else null, also for a palette whose encoding has no known curve.
+std::shared_ptr<const ColourConversion> linear_picture(const Params& params, const Sidecar& sidecar,
+                                                       OfxTime time);
 /// What the node's picture is in: the sidecar's input, or with the choice its palette's space.
 const std::string& encoding_of(const Sidecar& sidecar, bool in_palette_space);
 
@@ -65,10 +70,12 @@ struct Drawing {
     /// at whose foot they stand.
     std::vector<Vec3> original, edited;
     OfxRectI picture{};
+    /// Where the result shows, by its alpha or its only channel; null: everywhere.
+    const Image* mask = nullptr;
 };
 
 /// Draws what `in` covers of `area`; the rest becomes transparent black. Both images have the same
-/// format, of three or four channels in bytes or floats.
+/// format, of three or four channels.
 void draw(const Image& in, const Image& out, const OfxRectI& area, const Drawing& drawing);
 
 }  // namespace palette4d::node

@@ -18,9 +18,8 @@ void define_params(const Suites& suites, OfxParamSetHandle params) {
         define.text({kParamStatus, "Status",
                      "What was loaded, which of its frames is shown, or what is wrong with the "
                      "sidecar."},
-                    kOfxParamStringIsLabel, "No sidecar chosen");
+                    kOfxParamStringIsMultiLine, "No sidecar chosen");
     status.set_int(kOfxParamPropEnabled, 0);
-    status.set_int(kOfxParamPropPersistant, 0);
     status.set_int(kOfxParamPropEvaluateOnChange, 0);
     status.set_int(kOfxParamPropCanUndo, 0);
     define.number({kParamStrength, "Strength",
@@ -33,7 +32,7 @@ void define_params(const Suites& suites, OfxParamSetHandle params) {
 }
 
 Params::Params(const Suites& suites, OfxImageEffectHandle effect)
-    : suites_(suites), suite_(suites.parameter) {
+    : suites_(suites), effect_(effect), suite_(suites.parameter) {
     if (!suites.effect->getParamSet || suites.effect->getParamSet(effect, &set_) != kOfxStatOK) {
         set_ = nullptr;
     }
@@ -66,6 +65,15 @@ Properties Params::properties(const char* name) const {
         handle = nullptr;
     }
     return {suites_, handle};
+}
+
+std::string Params::media() const {
+    OfxPropertySetHandle handle = nullptr;
+    if (!suites_.effect->getPropertySet ||
+        suites_.effect->getPropertySet(effect_, &handle) != kOfxStatOK) {
+        return "";
+    }
+    return Properties(suites_, handle).get_string(kResolvePropSrcFilePath).value_or("");
 }
 
 std::optional<std::string> Params::string_at(const char* name, OfxTime time) const {
@@ -175,6 +183,12 @@ bool Params::set_rgb(const char* name, const std::array<double, 3>& value) const
     const OfxParamHandle param = find(name);
     return param && suite_->paramSetValue &&
            suite_->paramSetValue(param, value[0], value[1], value[2]) == kOfxStatOK;
+}
+
+bool Params::remove_keys(const char* name) const {
+    begin_step();
+    const OfxParamHandle param = find(name);
+    return param && suite_->paramDeleteAllKeys && suite_->paramDeleteAllKeys(param) == kOfxStatOK;
 }
 
 }  // namespace palette4d::node

@@ -47,16 +47,20 @@ public:
     bool set_string(const char* name, const std::string& value) const;
     bool set_int(const char* name, int value) const;
     bool set_rgb(const char* name, const std::array<double, 3>& value) const;
+    bool remove_keys(const char* name) const;
     /// The same for a parameter that cannot be undone: it is no step's.
     bool note_string(const char* name, const std::string& value) const;
     /// An instance's parameter's own properties (label, secret, enabled, hint).
     Properties properties(const char* name) const;
+    /// The file of the media, in a host that tells it; else empty.
+    std::string media() const;
 
 private:
     OfxParamHandle find(const char* name) const;
     void begin_step() const;
 
     const Suites& suites_;
+    OfxImageEffectHandle effect_;
     const OfxParameterSuiteV1* suite_;
     OfxParamSetHandle set_ = nullptr;
     mutable const char* step_ = nullptr;  ///< the label of one that is to begin

@@ -67,6 +67,26 @@ std::string unpasted(std::string path) {
     return plain;
 }
 
+/// Natron puts its project's folder before every path that does not start with a slash. This takes
+/// the folder away where the whole is no file and the rest is one of the forms that are ours.
+std::string without_project(const std::string& path) {
+    std::error_code error;
+    const fs::path whole = fs::u8path(path);
+    if (whole.is_relative() || fs::exists(whole, error)) return path;
+    std::string name;
+    for (std::size_t at = path.find('/', 1); at != std::string::npos; at = path.find('/', at + 1)) {
+        const std::string rest = path.substr(at + 1);
+        const auto starts = [&](const char* with) { return rest.rfind(with, 0) == 0; };
+        name.clear();
+        if (starts("$") || starts("%")) variable_at(rest, 0, name);
+        if (!name.empty() || rest == "~" || starts("~/") || starts("file:/") || starts("\"") ||
+            starts("'")) {
+            return rest;
+        }
+    }
+    return path;
+}
+
 std::vector<fs::path> search_folders(const std::string& folder) {
     std::vector<fs::path> folders;
     if (!folder.empty()) folders.push_back(fs::u8path(expanded(folder)));
@@ -80,7 +100,65 @@ std::vector<fs::path> search_folders(const std::string& folder) {
     return folders;
 }
 
+constexpr const char* kEnding = ".p4d.json";
+
+bool is_still(const fs::path& media) {
+    std::string ending = media.extension().u8string();
+    for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    for (const char* known : {".exr", ".dpx", ".tif", ".tiff", ".png", ".jpg", ".jpeg", ".cin",
+                              ".tga", ".sgi", ".ari", ".dng", ".jp2", ".j2k", ".j2c", ".bmp"}) {
+        if (ending == known) return true;
+    }
+    return false;
+}
+
+/// The length of a name without a frame's number or the place of one at its end.
+std::size_t without_number(const std::string& stem) {
+    const std::size_t end = stem.find_last_not_of("0123456789#@%d[]-");
+    if (end == std::string::npos || end + 1 == stem.size()) return stem.size();
+    const std::size_t name = stem.find_last_not_of("._- ", end);
+    return name == std::string::npos ? stem.size() : name + 1;
+}
+
+/// A clip's name without ending and, of a sequence, without number.
+std::string clip_name(const std::string& path) {
+    const fs::path file = fs::u8path(path);
+    const std::string stem = file.stem().u8string();
+    return is_still(file) ? stem.substr(0, without_number(stem)) : stem;
+}
+
 }  // namespace
+
+std::optional<std::string> find_beside(const std::string& media, const std::string& folder) {
+    const fs::path file = fs::u8path(media);
+    if (!file.has_filename()) return std::nullopt;
+    std::vector<fs::path> folders = search_folders(meant(folder));
+    folders.insert(folders.begin(), file.parent_path());
+    for (const fs::path& base : folders) {
+        for (const std::string& name : {file.stem().u8string(), clip_name(media)}) {
+            const fs::path path = base / fs::u8path(name + kEnding);
+            if (is_file(path)) return path.u8string();
+        }
+    }
+    return std::nullopt;
+}
+
+std::optional<double> first_number(const std::string& media) {
+    const fs::path file = fs::u8path(media);
+    if (!is_still(file)) return std::nullopt;
+    const std::string stem = file.stem().u8string();
+    const std::string rest = stem.substr(without_number(stem));
+    const std::size_t digit = rest.find_first_of("0123456789");
+    if (digit == std::string::npos) return std::nullopt;
+    return std::strtod(
+        rest.substr(digit, rest.find_first_not_of("0123456789", digit) - digit).c_str(), nullptr);
+}
+
+bool same_clip(const std::string& media, const std::string& source) {
+    return clip_name(media) == clip_name(source);
+}
+
+std::string meant(const std::string& path) { return unpasted(without_project(path)); }
 
 std::string expanded(const std::string& path) {
     std::string result, name;
@@ -113,17 +191,14 @@ std::string expanded(const std::string& path) {
 }
 
 std::optional<std::string> find_file(const std::string& path, const std::string& folder) {
-    const std::string plain = unpasted(path);
+    const std::string plain = meant(path);
     if (plain != path) {
         if (const auto found = find_file(plain, folder)) return found;
-    }
-    if (const std::string plain_folder = unpasted(folder); plain_folder != folder) {
-        return find_file(path, plain_folder);
     }
     const fs::path given = fs::u8path(expanded(path));
     if (given.empty()) return std::nullopt;
     if (given.is_absolute() && is_file(given)) return given.u8string();
-    const std::vector<fs::path> folders = search_folders(folder);
+    const std::vector<fs::path> folders = search_folders(meant(folder));
     if (given.is_relative()) {
         for (const fs::path& base : folders) {
             if (is_file(base / given)) return (base / given).u8string();
@@ -136,8 +211,8 @@ std::optional<std::string> find_file(const std::string& path, const std::string&
     return std::nullopt;
 }
 
-std::string words_of_missing(const std::string& pasted) {
-    const std::string path = unpasted(pasted);
+std::string words_of_missing(const std::string& given_path) {
+    const std::string path = meant(given_path);
     std::string name;
     for (std::size_t at = 0; at < path.size(); ++at) {
         if (path[at] != '$' && path[at] != '%') continue;

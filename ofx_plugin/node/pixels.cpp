@@ -3,17 +3,21 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <string>
 
 namespace palette4d::node {
 namespace {
 
-int bytes_of_depth(const std::string& depth) {
-    if (depth == kOfxBitDepthByte) return 1;
-    if (depth == kOfxBitDepthShort || depth == kOfxBitDepthHalf) return 2;
-    if (depth == kOfxBitDepthFloat) return 4;
-    return 0;
+std::optional<Depth> depth_of(const std::string& depth) {
+    if (depth == kOfxBitDepthByte) return Depth::kByte;
+    if (depth == kOfxBitDepthShort) return Depth::kShort;
+    if (depth == kOfxBitDepthHalf) return Depth::kHalf;
+    if (depth == kOfxBitDepthFloat) return Depth::kFloat;
+    return std::nullopt;
 }
+
+int bytes_of(Depth depth) { return depth == Depth::kByte ? 1 : depth == Depth::kFloat ? 4 : 2; }
 
 int channels_of(const std::string& components) {
     if (components == kOfxImageComponentRGBA) return 4;
@@ -27,15 +31,54 @@ std::string either(const Properties& image, const Properties& clip, const char* 
     return clip.get_string(name).value_or("");
 }
 
-/// Adding it leaves a float of 0 to 255 no digits after the point, rounded as IEEE 754 does.
+/// Added to a float of 0 to 65535, this leaves no fraction, rounded as IEEE 754 does.
 constexpr float kNoFraction = 12582912.0f;  // 1.5 * 2^23
 
-/// To the nearest, halves to the even one: as `palette4d render` rounds.
-std::uint8_t to_byte(float value) {
-    // NaN fails both comparisons' opposites: it becomes 0.
+/// To the nearest integer, halves to the even one: as `palette4d render` rounds. NaN becomes 0.
+template <class Integer>
+Integer to_integer(float value) {
+    constexpr Integer largest = std::numeric_limits<Integer>::max();
     if (!(value > 0.0f)) return 0;
-    if (value >= 1.0f) return 255;
-    return static_cast<std::uint8_t>((value * 255.0f + kNoFraction) - kNoFraction);
+    if (value >= 1.0f) return largest;
+    return static_cast<Integer>((value * static_cast<float>(largest) + kNoFraction) - kNoFraction);
+}
+
+std::uint32_t bits_of(float value) {
+    std::uint32_t bits;
+    std::memcpy(&bits, &value, sizeof bits);
+    return bits;
+}
+
+float float_of(std::uint32_t bits) {
+    float value;
+    std::memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
+/// IEEE 754 binary16. Every half, payloads of NaNs included, comes back with its own bits.
+float from_half(std::uint16_t half) {
+    const std::uint32_t sign = (half & 0x8000u) << 16, exponent = half >> 10 & 31u;
+    const std::uint32_t fraction = half & 0x3ffu;
+    if (exponent == 31) return float_of(sign | 0x7f800000u | fraction << 13);
+    if (exponent > 0) return float_of(sign | (exponent + 112) << 23 | fraction << 13);
+    const float magnitude = static_cast<float>(fraction) * 0x1p-24f;
+    return sign ? -magnitude : magnitude;
+}
+
+std::uint16_t to_half(float value) {
+    const std::uint32_t sign = bits_of(value) >> 16 & 0x8000u, size = bits_of(value) & 0x7fffffffu;
+    std::uint32_t half;
+    if (size > 0x7f800000u) {
+        half = 0x7c00u | std::max(1u, size >> 13 & 0x3ffu);
+    } else if (size >= 0x477ff000u) {
+        half = 0x7c00u;  // from 65520 on infinity is nearest
+    } else if (size < 0x38800000u) {
+        // From 0.5 on a float's last place is that of the halves below 2^-14.
+        half = bits_of(float_of(size) + 0.5f) - bits_of(0.5f);
+    } else {
+        half = (size + 0xfffu + (size >> 13 & 1u) - (112u << 23)) >> 13;
+    }
+    return static_cast<std::uint16_t>(sign | half);
 }
 
 }  // namespace
@@ -52,12 +95,11 @@ std::optional<Image> read_image(const Properties& image, const Properties& clip)
     result.definition = image.get_rect(kOfxImagePropRegionOfDefinition).value_or(*bounds);
     if (is_empty(result.definition)) result.definition = *bounds;
     result.row_bytes = *row_bytes;
-    const std::string depth = either(image, clip, kOfxImageEffectPropPixelDepth);
-    result.depth = depth == kOfxBitDepthByte    ? Depth::kByte
-                   : depth == kOfxBitDepthFloat ? Depth::kFloat
-                                                : Depth::kOther;
+    const auto depth = depth_of(either(image, clip, kOfxImageEffectPropPixelDepth));
+    if (!depth) return std::nullopt;
+    result.depth = *depth;
     result.channels = channels_of(either(image, clip, kOfxImageEffectPropComponents));
-    result.pixel_bytes = bytes_of_depth(depth) * result.channels;
+    result.pixel_bytes = bytes_of(*depth) * result.channels;
     if (result.channels == 4) {
         const std::string alpha = either(image, clip, kOfxImageEffectPropPreMultiplication);
         result.premultiplied = alpha == kOfxImagePreMultiplied;
@@ -79,29 +121,57 @@ OfxRectI intersect(const OfxRectI& a, const OfxRectI& b) {
 
 bool is_empty(const OfxRectI& rect) { return rect.x1 >= rect.x2 || rect.y1 >= rect.y2; }
 
-void read_floats(const Image& image, const OfxRectI& area, float* to) {
+namespace {
+
+/// Each number of an area's rows; the image's are of type `Number`.
+template <class Number, class Each>
+void each_number(const Image& image, const OfxRectI& area, Each each) {
     const std::size_t row =
         static_cast<std::size_t>(area.x2 - area.x1) * static_cast<std::size_t>(image.channels);
-    for (int y = area.y1; y < area.y2; ++y, to += row) {
-        if (image.depth == Depth::kFloat) {
-            std::memcpy(to, image.at(area.x1, y), row * sizeof(float));
-            continue;
-        }
-        const auto* from = reinterpret_cast<const std::uint8_t*>(image.at(area.x1, y));
-        for (std::size_t i = 0; i < row; ++i) to[i] = static_cast<float>(from[i]) / 255.0f;
+    for (int y = area.y1; y < area.y2; ++y) {
+        auto* numbers = reinterpret_cast<Number*>(image.at(area.x1, y));
+        for (std::size_t i = 0; i < row; ++i) each(numbers[i]);
+    }
+}
+
+}  // namespace
+
+void read_floats(const Image& image, const OfxRectI& area, float* to) {
+    switch (image.depth) {
+        case Depth::kByte:
+            each_number<std::uint8_t>(
+                image, area, [&](std::uint8_t n) { *to++ = static_cast<float>(n) / 255.0f; });
+            break;
+        case Depth::kShort:
+            each_number<std::uint16_t>(
+                image, area, [&](std::uint16_t n) { *to++ = static_cast<float>(n) / 65535.0f; });
+            break;
+        case Depth::kHalf:
+            each_number<std::uint16_t>(image, area, [&](std::uint16_t n) { *to++ = from_half(n); });
+            break;
+        case Depth::kFloat:
+            each_number<float>(image, area, [&](float n) { *to++ = n; });
+            break;
     }
 }
 
 void write_floats(const float* from, const Image& image, const OfxRectI& area) {
-    const std::size_t row =
-        static_cast<std::size_t>(area.x2 - area.x1) * static_cast<std::size_t>(image.channels);
-    for (int y = area.y1; y < area.y2; ++y, from += row) {
-        if (image.depth == Depth::kFloat) {
-            std::memcpy(image.at(area.x1, y), from, row * sizeof(float));
-            continue;
-        }
-        auto* bytes = reinterpret_cast<std::uint8_t*>(image.at(area.x1, y));
-        for (std::size_t i = 0; i < row; ++i) bytes[i] = to_byte(from[i]);
+    switch (image.depth) {
+        case Depth::kByte:
+            each_number<std::uint8_t>(
+                image, area, [&](std::uint8_t& n) { n = to_integer<std::uint8_t>(*from++); });
+            break;
+        case Depth::kShort:
+            each_number<std::uint16_t>(
+                image, area, [&](std::uint16_t& n) { n = to_integer<std::uint16_t>(*from++); });
+            break;
+        case Depth::kHalf:
+            each_number<std::uint16_t>(image, area,
+                                       [&](std::uint16_t& n) { n = to_half(*from++); });
+            break;
+        case Depth::kFloat:
+            each_number<float>(image, area, [&](float& n) { n = *from++; });
+            break;
     }
 }
 

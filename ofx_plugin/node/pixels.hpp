@@ -9,14 +9,14 @@
 
 namespace palette4d::node {
 
-enum class Depth { kByte, kFloat, kOther };
+enum class Depth { kByte, kShort, kHalf, kFloat };
 
 /// An image as its property set describes it.
 struct Image {
     char* data = nullptr;  ///< the pixel at (bounds.x1, bounds.y1)
     OfxRectI bounds{};
     std::ptrdiff_t row_bytes = 0;
-    Depth depth = Depth::kOther;
+    Depth depth = Depth::kFloat;
     int channels = 0;
     int pixel_bytes = 0;
     bool premultiplied = false;  ///< only ever for four channels
@@ -39,8 +39,8 @@ bool is_empty(const OfxRectI& rect);
 /// The two hold the same pixels in the same layout, so that one can be copied to the other.
 bool same_format(const Image& a, const Image& b);
 
-/// The pixels of an area within the bounds, bytes or floats, row after row without gaps. Bytes are
-/// byte / 255, and come back rounded and clamped.
+/// The pixels of an area within the bounds, row after row without gaps. Integers are value / 255 or
+/// value / 65535, and come back rounded and clamped; halves come back rounded.
 void read_floats(const Image& image, const OfxRectI& area, float* to);
 void write_floats(const float* from, const Image& image, const OfxRectI& area);
 

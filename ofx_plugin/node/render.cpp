@@ -4,6 +4,7 @@
 #include <new>
 #include <optional>
 
+#include "describe.hpp"
 #include "frame_setup.hpp"
 #include "instance.hpp"
 #include "pixels.hpp"
@@ -50,6 +51,15 @@ private:
     std::optional<Image> pixels_;
 };
 
+/// In this context the host's brush says where the grade shows.
+bool is_paint(const Suites& suites, OfxImageEffectHandle effect) {
+    OfxPropertySetHandle handle = nullptr;
+    return suites.effect->getPropertySet &&
+           suites.effect->getPropertySet(effect, &handle) == kOfxStatOK &&
+           Properties(suites, handle).get_string(kOfxImageEffectPropContext) ==
+               kOfxImageEffectContextPaint;
+}
+
 /// Draws the window; on an exception the source is copied instead, and the exception goes on.
 OfxStatus draw_window(const Suites& suites, OfxImageEffectHandle effect, const Image& in,
                       const Image& out, const OfxRectI& window, const FrameSetup& setup) {
@@ -71,6 +81,8 @@ OfxStatus is_identity(const Suites& suites, OfxImageEffectHandle effect, const P
                       const Properties& out_args) {
     const std::optional<double> time = in_args.get_double(kOfxPropTime);
     if (!time) return kOfxStatReplyDefault;
+    // Of a host that tells the media's frame when it renders, and not here.
+    if (!Params(suites, effect).media().empty()) return kOfxStatReplyDefault;
     const FrameSetup setup = frame_setup_at(suites, effect, *time);
     // With a problem there is something to render: the message.
     if (!setup.passes || !setup.problem.empty() || !setup.note.empty()) return kOfxStatReplyDefault;
@@ -100,18 +112,22 @@ OfxStatus render(const Suites& suites, OfxImageEffectHandle effect, const Proper
     }
     const Image& in = *source.pixels();
 
+    std::optional<double> source_frame;
+    if (const auto index = in_args.get_int(kResolvePropSrcFrame)) source_frame = *index;
+    note_source_frame(effect, *time, source_frame);
     FrameSetup setup;
     try {
         const Mode mode = mode_at(Params(suites, effect), *time);
         setup =
-            frame_setup_at(suites, effect, *time, interpolation_of(mode, in_args, out.definition));
+            frame_setup_at(suites, effect, *time,
+                           interpolation_of(suites, mode, in_args, out.definition), source_frame);
     } catch (...) {
         copy(in, out, window);
         throw;
     }
     report(suites, effect, setup.problem.empty() ? setup.note : setup.problem);
-    // Depths and layouts that the node did not ask for pass through too.
-    if (setup.passes || in.depth == Depth::kOther || in.channels < 3) {
+    // Alpha alone passes through too.
+    if (setup.passes || in.channels < 3) {
         copy(in, out, window);
         return kOfxStatOK;
     }
@@ -124,6 +140,15 @@ OfxStatus render(const Suites& suites, OfxImageEffectHandle effect, const Proper
             copy(in, out, window);
             return kOfxStatOK;
         }
+    }
+    std::optional<ClipImage> brush;
+    if (is_paint(suites, effect)) {
+        brush.emplace(suites, effect, kBrushClipName, *time);
+        if (!brush->pixels()) {
+            copy(in, out, window);
+            return brush->absent() ? kOfxStatOK : kOfxStatFailed;
+        }
+        setup.drawing.mask = &*brush->pixels();
     }
     return draw_window(suites, effect, in, out, window, setup);
 }

@@ -1,14 +1,20 @@
 #include "sidecar_cache.hpp"
 
+#if !defined(_WIN32)
+#include <sys/stat.h>
+#endif
+
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
+#include <ctime>
 #include <exception>
 #include <filesystem>
 #include <fstream>
 #include <new>
 #include <optional>
 #include <thread>
+#include <tuple>
 #include <utility>
 
 #include "model/lineage.hpp"
@@ -26,14 +32,40 @@ constexpr std::size_t kMaxTexts = 8;
 // File systems store times as coarsely as two seconds (FAT): younger files may change unseen.
 constexpr auto kSettled = std::chrono::seconds(3);
 
-/// What the file system says about a file; a change of it means that the file is to be read again.
+/// What the file system says about a file; the file is read again when any of it changes. Tools
+/// that copy a file may keep its time and size, but cannot set the time of the change itself.
 struct Stamp {
     fs::file_time_type modified{};
     std::uintmax_t bytes = 0;
+    std::uintmax_t device = 0, inode = 0;               ///< 0 where the system has none
+    std::int64_t change_seconds = 0, change_nanos = 0;  ///< likewise
     bool operator==(const Stamp& other) const {
-        return modified == other.modified && bytes == other.bytes;
+        const auto all = [](const Stamp& s) {
+            return std::tie(s.modified, s.bytes, s.device, s.inode, s.change_seconds,
+                            s.change_nanos);
+        };
+        return all(*this) == all(other);
     }
 };
+
+/// Adds what the standard library does not tell.
+void identify(Stamp& stamp, const fs::path& path) {
+#if defined(_WIN32)
+    static_cast<void>(stamp), static_cast<void>(path);
+#else
+    struct stat about{};
+    if (::stat(path.c_str(), &about) != 0) return;
+#if defined(__APPLE__)
+    const timespec& changed = about.st_ctimespec;
+#else
+    const timespec& changed = about.st_ctim;
+#endif
+    stamp.device = static_cast<std::uintmax_t>(about.st_dev);
+    stamp.inode = static_cast<std::uintmax_t>(about.st_ino);
+    stamp.change_seconds = changed.tv_sec;
+    stamp.change_nanos = changed.tv_nsec;
+#endif
+}
 
 /// One path's latest reading. Its mutex makes threads that want the same new file read it once.
 struct Entry {
@@ -72,6 +104,7 @@ std::optional<Stamp> stamp_of(const fs::path& path, std::string& problem) {
     Stamp stamp;
     if (!error) stamp.modified = fs::last_write_time(path, error);
     if (!error) stamp.bytes = fs::file_size(path, error);
+    if (!error) identify(stamp, path);
     if (error) {
         problem = "the file cannot be examined (" + error.message() + ")";
         return std::nullopt;
@@ -100,15 +133,6 @@ std::optional<std::string> text_of(const fs::path& path, std::uintmax_t expected
     return text;
 }
 
-/// 64-bit FNV-1a in hexadecimal digits, and the length.
-std::string revision_of(const std::string& text) {
-    std::uint64_t hash = 0xcbf29ce484222325u;
-    for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
-    std::string digits;
-    for (int shift = 60; shift >= 0; shift -= 4) digits += "0123456789abcdef"[hash >> shift & 15];
-    return digits + "-" + std::to_string(text.size());
-}
-
 SidecarResult parse(const std::string& text, const std::string& path) {
     SidecarResult result;
     try {
@@ -130,7 +154,8 @@ void refresh(Entry& entry, const fs::path& path, const std::string& name) {
         if (!before) break;
         const bool same = entry.read && *before == entry.stamp;
         if (same && entry.settled) return;
-        const bool settled = Clock::now() - before->modified > kSettled;
+        const bool settled = Clock::now() - before->modified > kSettled &&
+                             std::time(nullptr) - before->change_seconds > kSettled.count();
         std::optional<std::string> text = text_of(path, before->bytes);
         if (!text) {
             problem = "the file cannot be read";
@@ -184,6 +209,15 @@ std::shared_ptr<Entry> entry_of(const std::string& key) {
 }
 
 }  // namespace
+
+/// 64-bit FNV-1a in hexadecimal digits.
+std::string revision_of(const std::string& text) {
+    std::uint64_t hash = 0xcbf29ce484222325u;
+    for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
+    std::string digits;
+    for (int shift = 60; shift >= 0; shift -= 4) digits += "0123456789abcdef"[hash >> shift & 15];
+    return digits + "-" + std::to_string(text.size());
+}
 
 LoadedSidecar::LoadedSidecar(Sidecar sidecar, std::string revision)
     : sidecar_(std::move(sidecar)), revision_(std::move(revision)) {}

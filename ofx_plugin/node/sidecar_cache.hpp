@@ -82,13 +82,16 @@ struct SidecarResult {
     std::string problem;
 };
 
-/// The sidecar at a UTF-8 path, read when it is new or has changed on disk (time or size; for a
-/// file written within the last seconds its content, since a clock tick may hide a second write).
-/// Unusable files give a problem, never an exception but std::bad_alloc.
+/// The sidecar at a UTF-8 path, read when it is new or has changed on disk: another file, size or
+/// time of its content or of its directory entry. A file written within the last seconds is
+/// compared by content, because a clock tick may hide a second write. Unusable files give a
+/// problem, never an exception but std::bad_alloc.
 SidecarResult load_sidecar(const std::string& path);
 
 /// The same for text already in memory; `name` stands for the file in problems.
 SidecarResult load_sidecar_text(const std::string& text, const std::string& name);
+/// Tells one text from another: a hash and the length.
+std::string revision_of(const std::string& text);
 /// A file's text as it is now; empty when it cannot be read or is larger than a sidecar may be.
 std::optional<std::string> sidecar_text(const std::string& path);
 

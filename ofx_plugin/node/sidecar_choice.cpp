@@ -1,5 +1,6 @@
 #include "sidecar_choice.hpp"
 
+#include <cstdlib>
 #include <utility>
 
 #include "paths.hpp"
@@ -18,27 +19,69 @@ void note_text(const Params& params, const char* name, const std::string& text) 
     if (differs(params, name, text)) params.note_string(name, text);
 }
 
+/// A host caches frames by its parameters. The revision names what the frames show, a failure too,
+/// and counts, so that no earlier value returns: the host may have cached a frame under it after
+/// the file changed and before the node could say so.
+void note_revision(const Params& params, const Chosen& chosen, bool reloaded) {
+    const std::string before = params.string_now(kParamRevision).value_or("");
+    const std::size_t sign = before.find('#');
+    std::string state;
+    if (chosen.result.loaded) {
+        state = chosen.result.loaded->revision();
+    } else if (chosen.any) {
+        state = "failed-" + revision_of(chosen.result.problem);
+    }
+    if (!reloaded && state == before.substr(0, sign)) return;
+    const long count =
+        sign == std::string::npos ? 0 : std::strtol(before.c_str() + sign + 1, nullptr, 10);
+    note_text(params, kParamRevision, state + "#" + std::to_string(count + 1));
+}
+
+/// The sidecar of the clip's name, or the project's copy of one of that name: a node that was
+/// copied to another clip carries the copy of the first.
+void find_by_name(Chosen& chosen, const std::string& folder, const std::string& copy) {
+    if (const auto found = find_beside(chosen.media, folder)) {
+        chosen.any = true;
+        chosen.path = *found;
+        chosen.result = load_sidecar(chosen.path);
+        if (chosen.result.loaded) return;
+    }
+    if (copy.empty()) return;
+    SidecarResult kept = load_sidecar_text(copy, chosen.media + " (the project's copy)");
+    if (!kept.loaded || !same_clip(chosen.media, kept.loaded->sidecar().clip.source)) return;
+    chosen.any = chosen.embedded = true;
+    chosen.broken = std::move(chosen.result.problem);
+    chosen.path = chosen.media;
+    chosen.result = std::move(kept);
+}
+
 }  // namespace
 
 void define_file_params(ParamDefiner& define) {
     define
         .text({kParamSidecar, "Sidecar",
-               "The file that 'palette4d analyze' made of the clip: its palette and the edits of "
-               "it. The path may begin with ~ and name environment variables. The file is read "
-               "again whenever it changes."},
+               "The file that 'palette4d analyze' wrote for the clip: its palette and the edits. "
+               "The path may start with ~ and contain environment variables. The node reloads the "
+               "file whenever it changes."},
               kOfxParamStringIsFilePath)
         .set_int(kOfxParamPropStringFilePathExists, 1);
     define
         .text({kParamClipFolder, "Clip's folder",
-               "The folder that a relative path of the sidecar starts from, and in which one that "
-               "is not where its path says is looked for by its name. Filled in when a sidecar is "
-               "chosen, where its clip is found."},
+               "A relative path of the sidecar starts here. A sidecar that is not where its path "
+               "says is searched here by its name. The node fills this in when you choose a "
+               "sidecar whose clip it finds."},
               kOfxParamStringIsDirectoryPath)
         .set_int(kOfxParamPropStringFilePathExists, 0);
-    define.button({kParamReload, "Reload", "Looks at the sidecar's file again, now."});
+    define.flag({kParamFindByName, "Find by clip's name",
+                 "While Sidecar is empty, the node uses the sidecar that has the clip's name: for "
+                 "shot.mov it searches shot.p4d.json beside the clip, in Clip's folder and in "
+                 "PALETTE4D_PATH. Works in hosts that tell the clip's file: DaVinci Resolve."},
+                true);
+    define.button({kParamReload, "Reload",
+                   "Reads the sidecar's file again and makes the host render its frames again."});
     define.flag({kParamEmbed, "Embed",
-                 "Keeps a copy of the sidecar in the project, for use where there is no file, or "
-                 "one that cannot be read."},
+                 "Keeps a copy of the sidecar in the project. The node uses the copy while the "
+                 "file is missing or cannot be read."},
                 false);
     for (const char* name : {kParamEmbedded, kParamRevision}) {
         const Properties hidden = define.text(
@@ -54,16 +97,23 @@ Chosen chosen_sidecar(const Params& params, std::optional<OfxTime> time) {
         return (time ? params.string_at(name, *time) : params.string_now(name)).value_or("");
     };
     Chosen chosen;
-    const std::string given = text(kParamSidecar);
-    chosen.any = !given.empty();
-    if (!chosen.any) return chosen;
+    const std::string given = text(kParamSidecar), copy = text(kParamEmbedded);
+    chosen.media = params.media();
+    if (given.empty()) {
+        const int by_name =
+            (time ? params.int_at(kParamFindByName, *time) : params.int_now(kParamFindByName))
+                .value_or(1);
+        if (by_name == 0 || chosen.media.empty()) return chosen;
+        find_by_name(chosen, text(kParamClipFolder), copy);
+        return chosen;
+    }
+    chosen.any = true;
     const auto found = find_file(given, text(kParamClipFolder));
     if (found) {
         chosen.path = *found;
         chosen.result = load_sidecar(chosen.path);
         if (chosen.result.loaded) return chosen;
     }
-    const std::string copy = text(kParamEmbedded);
     if (!copy.empty()) {
         SidecarResult kept = load_sidecar_text(copy, given + " (the project's copy)");
         if (kept.loaded || !found) {
@@ -76,7 +126,7 @@ Chosen chosen_sidecar(const Params& params, std::optional<OfxTime> time) {
     }
     if (found) return chosen;
     // It says what is wrong.
-    chosen.path = expanded(given);
+    chosen.path = expanded(meant(given));
     chosen.result = load_sidecar(chosen.path);
     const std::string missing = words_of_missing(given);
     if (!chosen.result.loaded && !missing.empty()) {
@@ -86,8 +136,12 @@ Chosen chosen_sidecar(const Params& params, std::optional<OfxTime> time) {
 }
 
 std::string keep_files(const Params& params, Chosen& chosen, const std::string& param) {
+    if (param == kParamReload) {
+        purge_sidecars();
+        chosen = chosen_sidecar(params, std::nullopt);
+    }
+    note_revision(params, chosen, param == kParamReload);
     const LoadedSidecar* loaded = chosen.result.loaded.get();
-    if (loaded) note_text(params, kParamRevision, loaded->revision());
     if (loaded && !chosen.embedded && param == kParamSidecar) {
         const std::string folder = clip_folder(chosen.path, loaded->sidecar().clip.source);
         if (!folder.empty() && differs(params, kParamClipFolder, folder)) {
@@ -96,7 +150,10 @@ std::string keep_files(const Params& params, Chosen& chosen, const std::string& 
     }
     if (params.int_now(kParamEmbed).value_or(0) == 0) {
         note_text(params, kParamEmbedded, "");
-        if (chosen.embedded) chosen = chosen_sidecar(params, std::nullopt);
+        if (chosen.embedded) {
+            chosen = chosen_sidecar(params, std::nullopt);
+            note_revision(params, chosen, false);
+        }
         return "";
     }
     if (chosen.embedded) {

@@ -15,11 +15,11 @@ constexpr std::int64_t kLatticePays = 1920 * 1080;
 
 void define_mode_param(ParamDefiner& define) {
     define.choice({kParamMode, "Mode",
-                   "Exact: every colour is worked out by itself. Lattice: colours are interpolated "
-                   "where that is within 0.002 of exact, which is several times as fast in large "
-                   "pictures. Auto: the lattice where the picture is 1920x1080 or larger, needs "
-                   "no conversion, and the host says that it renders for somebody who watches, or "
-                   "a draft; exact for all else, such as a final render."},
+                   "Exact: computes every colour. Lattice: interpolates colours where that is "
+                   "within 0.002 of exact, which is several times as fast in large pictures. Auto: "
+                   "Lattice while the host says that it plays or renders a draft, in pictures of "
+                   "1920x1080 or more that need no conversion; Exact for all else, and always in "
+                   "Natron."},
                   {"Auto", "Exact", "Lattice"});
 }
 
@@ -28,10 +28,10 @@ Mode mode_at(const Params& params, OfxTime time) {
     return mode == 1 ? Mode::kExact : mode == 2 ? Mode::kLattice : Mode::kAuto;
 }
 
-Interpolation interpolation_of(Mode mode, const Properties& render_arguments,
+Interpolation interpolation_of(const Suites& suites, Mode mode, const Properties& render_arguments,
                                const OfxRectI& picture) {
     if (mode == Mode::kLattice) return Interpolation::kAlways;
-    if (mode == Mode::kExact) return Interpolation::kNever;
+    if (mode == Mode::kExact || suites.is_natron) return Interpolation::kNever;
     const std::int64_t width = static_cast<std::int64_t>(picture.x2) - picture.x1;
     const std::int64_t height = static_cast<std::int64_t>(picture.y2) - picture.y1;
     // Either may be as large as 2^32.

@@ -22,7 +22,8 @@ Mode mode_at(const Params& params, OfxTime time);
 /// How a render with these arguments is to interpolate: Auto does where the host tells that
 /// somebody watches it being made, or that a draft will do, and where interpolating is faster: the
 /// picture, of which this render may be a part, is large, and no conversion takes most of the time.
-Interpolation interpolation_of(Mode mode, const Properties& render_arguments,
+/// Natron's cache would give such frames to a final render, so that Auto is exact there.
+Interpolation interpolation_of(const Suites& suites, Mode mode, const Properties& render_arguments,
                                const OfxRectI& picture);
 
 /// What the status says of a lattice's largest error.

@@ -4,6 +4,8 @@
 #include <optional>
 #include <sstream>
 
+#include "paths.hpp"
+
 namespace palette4d::node {
 namespace {
 
@@ -21,25 +23,36 @@ std::string describe(const Sidecar& sidecar) {
          << static_cast<double>(clip.rate_num) / static_cast<double>(clip.rate_den) << " fps, "
          << counted(sidecar.polytope.vertices().size(), "palette vertex", "palette vertices")
          << ", " << counted(edits, "edit", "edits");
-    if (sidecar.conversion) {
-        text << "; " << sidecar.conversion->input_space << ", palette in " << clip.encoding;
-    }
     return text.str();
 }
 
 }  // namespace
 
-std::string status_of(const Chosen& chosen, int handles, const std::string& copy,
-                      const std::string& shown) {
-    if (!chosen.any) return "No sidecar chosen";
+std::string words_of_picture(const Sidecar& sidecar, const std::string& picture) {
+    std::string text = "expects the picture in " + picture;
+    if (picture != sidecar.clip.encoding) text += "; the palette is in " + sidecar.clip.encoding;
+    return text;
+}
+
+std::string status_of(const Chosen& chosen, int handles, const std::string& expects,
+                      const std::string& copy, const std::string& shown) {
+    if (!chosen.any) {
+        return chosen.media.empty() ? "No sidecar chosen"
+                                    : "No sidecar chosen, and none has the name of " + chosen.media;
+    }
     if (!chosen.result.loaded) return chosen.result.problem;
     std::string text = describe(chosen.result.loaded->sidecar());
     if (handles > 0) {
         text +=
             ", " + counted(static_cast<std::size_t>(handles), "handle", "handles") + " in use here";
     }
-    if (!copy.empty()) text += "; " + copy;
-    if (!shown.empty()) text += "; " + shown;
+    const std::string& source = chosen.result.loaded->sidecar().clip.source;
+    if (!chosen.media.empty() && !same_clip(chosen.media, source)) {
+        text += "\nnote: this sidecar is of " + source + ", and the host's clip is " + chosen.media;
+    }
+    for (const std::string& line : {expects, copy, shown}) {
+        if (!line.empty()) text += "\n" + line;
+    }
     return text;
 }
 

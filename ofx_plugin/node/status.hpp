@@ -7,9 +7,12 @@
 
 namespace palette4d::node {
 
-/// What was loaded, or what is wrong. `handles` are in use in the host; `copy` says what there is
-/// to say of the project's copy, and `shown` which frame is shown: empty for nothing.
-std::string status_of(const Chosen& chosen, int handles, const std::string& copy,
-                      const std::string& shown);
+/// Which encoding the node's picture must have.
+std::string words_of_picture(const Sidecar& sidecar, const std::string& picture);
+
+/// What was loaded, or what is wrong. `handles` are in use in the host. A line each, left out where
+/// empty: `expects` is the picture's encoding, `copy` about the project's copy, `shown` the frame.
+std::string status_of(const Chosen& chosen, int handles, const std::string& expects,
+                      const std::string& copy, const std::string& shown);
 
 }  // namespace palette4d::node

@@ -54,10 +54,17 @@ Start start_of(const ClipInfo& clip, const TimeSettings& settings, const HostCli
 FrameAt frame_at(const ClipInfo& clip, const TimeSettings& settings, const HostClip& host,
                  double time) {
     const double first = static_cast<double>(clip.first), last = static_cast<double>(clip.last);
-    const Start start = start_of(clip, settings, host);
     FrameAt at;
-    at.frame = first + (time - start.time) * start.ratio * settings.speed +
-               (settings.in_point + settings.offset);
+    double since_first = 0;
+    if (settings.automatic && host.source_frame && *host.source_frame >= 0) {
+        const bool sequence = clip.source.find_first_of("#%") != std::string::npos;
+        const double numbered_from = sequence ? host.first_number.value_or(first) : 0;
+        since_first = numbered_from + *host.source_frame - first;
+    } else {
+        const Start start = start_of(clip, settings, host);
+        since_first = (time - start.time) * start.ratio;
+    }
+    at.frame = first + since_first * settings.speed + (settings.in_point + settings.offset);
     if (settings.reverse) at.frame = first + last - at.frame;
     const double step = static_cast<double>(clip.step);
     if (at.frame < first - kRounding) at.place = FrameAt::Place::kBefore;

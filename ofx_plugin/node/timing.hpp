@@ -10,8 +10,10 @@ namespace palette4d::node {
 
 /// What the host reports about the clip, as far as it does.
 struct HostClip {
-    std::optional<double> first, last;  ///< times of the first and last frame that there are
-    std::optional<double> rate;         ///< of the host's times, a second
+    std::optional<double> first, last;     ///< times of the first and last frame that there are
+    std::optional<double> rate;            ///< of the host's times, a second
+    std::optional<double> source_frame{};  ///< of the media, from 0, whatever the time is
+    std::optional<double> first_number{};  ///< of the media's frames, where it is a sequence
 };
 
 struct TimeSettings {
@@ -35,8 +37,9 @@ struct FrameAt {
 /// Automatic: where all of the host's range lies within the clip's frame numbers, times are those
 /// numbers; else the range's first time is the clip's first frame, and where the range is as long
 /// as the clip lasts at the host's rate, rather than as the clip has frames, times go by rates.
-/// Without a range, time 0 is the clip's first frame. A clip's last frame lasts until the next
-/// would come.
+/// Without a range, time 0 is the clip's first frame. Where the host tells the media's frame, that
+/// counts and not the time: a movie's frames are numbered from 0, a sequence's as its files are. A
+/// clip's last frame lasts until the next would come.
 FrameAt frame_at(const ClipInfo& clip, const TimeSettings& settings, const HostClip& host,
                  double time);
 

@@ -33,6 +33,7 @@ typedef struct OfxImageMemoryStruct* OfxImageMemoryHandle;
 
 #define kOfxImageEffectContextFilter "OfxImageEffectContextFilter"
 #define kOfxImageEffectContextGeneral "OfxImageEffectContextGeneral"
+#define kOfxImageEffectContextPaint "OfxImageEffectContextPaint"
 
 #define kOfxImageEffectActionGetRegionOfDefinition "OfxImageEffectActionGetRegionOfDefinition"
 #define kOfxImageEffectActionGetRegionsOfInterest "OfxImageEffectActionGetRegionsOfInterest"

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from palette4d._core import __version__
     from palette4d.grade.document import Document
-    from palette4d.lut_export.bake import BakeResult
+    from palette4d.lut_export.bake import bake
     from palette4d.media.clip import Clip, open_clip
 
 __all__ = [
@@ -40,6 +40,7 @@ __all__ = [
 _HOMES = {
     "Document": "palette4d.grade.document",
     "__version__": "palette4d._core",
+    "bake": "palette4d.lut_export.bake",
     "open_clip": "palette4d.media.clip",
 }
 
@@ -78,8 +79,9 @@ def analyze(
     input_space: str | None = None,
     palette_space: str | None = None,
     ocio_config: str | None = None,
+    method: str = "skew",
     progress: Callable[[str, int, int], object] | None = None,
-    **options: Any,
+    **settings: float,
 ) -> "Document":
     """Find the time-varying palette of a clip.
 
@@ -87,7 +89,8 @@ def analyze(
     ----------
     clip : str, path, clip or array
         What `open_clip` opens, or what it has opened, or an array (frames, height, width, 3) of
-        float code values, 0..1 as a rule. The frame numbers of an array are its indices.
+        float code values, 0..1 as a rule. The frame numbers of an array are its indices. The next
+        three parameters are for files.
     frames : str, optional
         Only these frames of a file or folder, evenly spaced: "1001-1100x2".
     rate : Fraction, optional
@@ -102,8 +105,11 @@ def analyze(
         code values.
     progress : callable, optional
         Called as ``progress(stage, done, total)``; `print` will do.
-    **options
-        Settings of the analysis, such as ``vertices=16`` (`palette4d analyze --help-all`).
+    method : {"skew", "paper", "static", "rgbt"}
+        The default is the one to use; the others are for comparison.
+    **settings
+        Numbers that `palette4d analyze --help-all` lists, such as ``vertices=16``; "lambda" is
+        ``lambda_``.
 
     Returns
     -------
@@ -113,75 +119,29 @@ def analyze(
     Raises
     ------
     Palette4dError
-        The clip cannot be read, its frames are not evenly spaced, or it has sudden cuts.
+        The clip cannot be read, its frames are not evenly spaced, it has sudden cuts, or a setting
+        is unknown or out of range.
     """
     from palette4d.analysis import pipeline
-    from palette4d.analysis.options import AnalysisOptions
+    from palette4d.analysis.options import AnalysisOptions, check_methods, parse_setting
     from palette4d.grade.document import Document
-    from palette4d.media import colour_space
     from palette4d.media.array_clip import ArrayClip
     from palette4d.media.clip import Clip, open_clip
+    from palette4d.media.colour_space import SpaceOptions
 
+    given = dict(parse_setting(f"{name.rstrip('_')}={value}") for name, value in settings.items())
+    check_methods(method, given)
     if isinstance(clip, str | os.PathLike):
         opened: Clip = open_clip(
             os.fspath(clip), frames=frames, rate=rate, skip_bad_frames=skip_bad_frames
         )
     else:
         opened = clip if isinstance(clip, Clip) else ArrayClip(clip, first=0)
-    spaces = colour_space.spaces_of(
-        opened, colour_space.SpaceOptions(input_space, palette_space, ocio_config)
+    found = pipeline.analyze(
+        opened,
+        AnalysisOptions(method=method, **given),
+        progress,
+        spaces=SpaceOptions(input_space, palette_space, ocio_config),
+        allow_cuts=allow_cuts,
     )
-    opened = colour_space.converted(opened, spaces)
-    fields, found = pipeline.analyze_clip(
-        opened, AnalysisOptions(**options), progress, allow_cuts=allow_cuts
-    )
-    notes = colour_space.record(fields, opened, spaces)
-    return Document(fields, (*notes, *found.remarks))
-
-
-def bake(
-    source: "str | os.PathLike[str] | Document",
-    frame: float,
-    path: str | os.PathLike[str],
-    *,
-    size: int = 33,
-    force: bool = False,
-    **options: Any,
-) -> "BakeResult":
-    """Write the edit at one time as a 3D LUT or an ASC CDL, and measure the file's error.
-
-    Parameters
-    ----------
-    source : path or Document
-        A sidecar, or a document.
-    frame : float
-        The time, a frame number of the clip; fractions are allowed.
-    path : path
-        The file to write; its extension chooses the format.
-    size : int
-        Samples a side, 2..129.
-    force : bool
-        Replace an existing file.
-    **options
-        As `palette4d bake` has them.
-
-    Raises
-    ------
-    Palette4dError
-        An argument cannot be used; nothing was written.
-    """
-    import tempfile
-    from pathlib import Path
-
-    from palette4d.grade import sidecar
-    from palette4d.grade.document import Document
-    from palette4d.lut_export.bake import BakeOptions
-    from palette4d.lut_export.bake import bake as bake_file
-
-    settings = BakeOptions(frame, size, **options)
-    if not isinstance(source, Document):
-        return bake_file(Path(source), Path(path), settings, force=force)
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "document.p4d.json"
-        sidecar.save(source.fields(), file)
-        return bake_file(file, Path(path), settings, force=force)
+    return Document(found.document, found.notes)

@@ -14,7 +14,7 @@ from typing import Any
 import any_clips
 import numpy as np
 import pytest
-from palette4d.analysis import colour_statistics, cuts, pipeline
+from palette4d.analysis import colour_statistics, pipeline
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.pipeline import Analysis
 from scipy.spatial import ConvexHull
@@ -22,6 +22,7 @@ from scipy.spatial import ConvexHull
 from palette4d import _core
 from palette4d.cli import main
 from palette4d.grade import sidecar
+from palette4d.media import cuts
 from palette4d.media.clip import Clip, open_clip
 
 # kind: most of L, most handles, most distance of a pixel outside. Each is about one and a half
@@ -275,7 +276,7 @@ def test_no_other_kind_is_taken_for_a_cut(kind, analysed):
         colour_statistics.gather(number, image, AnalysisOptions())
         for number, image in found.clip.iter_colours()
     ]
-    assert cuts.find_cuts(gathered) == []
+    assert cuts.find_cuts((frame.frame, frame.histogram) for frame in gathered) == []
 
 
 @pytest.mark.parametrize("kind", ["interlaced", "hdr_exr", "monochrome"])

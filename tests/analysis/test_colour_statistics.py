@@ -10,9 +10,7 @@ import pytest
 from analysis_frames import mixture, noise
 from clip_files import grey_levels, write_image
 from palette4d.analysis import colour_statistics, frame_hulls, pipeline
-from palette4d.analysis.colour_histogram import histogram
 from palette4d.analysis.colour_statistics import budget, chosen_frames, gather, gather_clip
-from palette4d.analysis.cuts import difference
 from palette4d.analysis.frame_statistics import Gamut, pooled
 from palette4d.analysis.losses import palette_loss
 from palette4d.analysis.options import AnalysisOptions
@@ -20,6 +18,8 @@ from palette4d.analysis.options import AnalysisOptions
 from palette4d import _core
 from palette4d.media.array_clip import ArrayClip
 from palette4d.media.clip import FrameError, open_clip
+from palette4d.media.colour_histogram import histogram
+from palette4d.media.cuts import difference
 
 
 def same(a: _core.ColourTree, b: _core.ColourTree) -> bool:

@@ -140,6 +140,16 @@ def test_a_link_stays_a_link(old: Path) -> None:
     assert names(folder) == ["link.cube"]
 
 
+def test_a_link_that_leads_nowhere_is_replaced(tmp_path: Path) -> None:
+    link = tmp_path / "link.cube"
+    link.symlink_to("gone")
+    with replacing(link, force=True) as temporary:
+        temporary.write_bytes(b"new")
+    assert not link.is_symlink()
+    assert link.read_bytes() == b"new"
+    assert names(tmp_path) == ["link.cube"]
+
+
 def test_a_file_that_exists_is_replaced_only_on_request(old: Path) -> None:
     with pytest.raises(Palette4dError), replacing(old):
         raise AssertionError("the body must not run")

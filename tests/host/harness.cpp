@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
@@ -100,8 +101,10 @@ void fill(strict::Picture& picture, unsigned seed, bool odd_values) {
         for (int x = layout.bounds.x1; x < layout.bounds.x2; ++x) {
             for (int c = 0; c < layout.channels; ++c) {
                 const auto r = static_cast<unsigned>(random());
-                if (layout.depth == strict::Depth::kByte) {
-                    picture.at(x, y)[c] = static_cast<unsigned char>(r >> 24);
+                unsigned char* to = picture.at(x, y) + layout.number_bytes() * c;
+                if (layout.depth == strict::Depth::kByte || layout.depth == strict::Depth::kShort) {
+                    std::memcpy(to, reinterpret_cast<const unsigned char*>(&r) + 2,
+                                static_cast<std::size_t>(layout.number_bytes()));
                     continue;
                 }
                 float value = static_cast<float>(r >> 8) / 16777216.0f;
@@ -109,7 +112,8 @@ void fill(strict::Picture& picture, unsigned seed, bool odd_values) {
                 if (odd_values && r % 61 == 0) value = odd[(r / 61) % std::size(odd)];
                 // Fully transparent pixels, too.
                 if (c == 3 && r % 17 == 0) value = 0.0f;
-                std::memcpy(picture.at(x, y) + 4 * c, &value, 4);
+                const std::vector<unsigned char> bytes = stored(layout, {value});
+                std::memcpy(to, bytes.data(), bytes.size());
             }
         }
     }
@@ -125,15 +129,7 @@ std::vector<unsigned char> recoloured(const palette4d::Sidecar& sidecar, double 
     const std::vector<unsigned char> pixels = picture.pixels(area);
     const strict::Layout& layout = picture.layout();
     const int width = area.x2 - area.x1, height = area.y2 - area.y1;
-    const bool bytes = layout.depth == strict::Depth::kByte;
-    std::vector<float> values(static_cast<std::size_t>(width) * height * layout.channels);
-    if (bytes) {
-        for (std::size_t i = 0; i < values.size(); ++i) {
-            values[i] = static_cast<float>(pixels[i]) / 255.0f;
-        }
-    } else {
-        std::memcpy(values.data(), pixels.data(), pixels.size());
-    }
+    std::vector<float> values = floats(layout, pixels);
     const std::ptrdiff_t stride = static_cast<std::ptrdiff_t>(width) * layout.channels * 4;
     RecolourOptions options;
     options.strength = strength;
@@ -142,23 +138,14 @@ std::vector<unsigned char> recoloured(const palette4d::Sidecar& sidecar, double 
     if (sidecar.conversion) options.conversion = &sidecar.conversion->steps;
     recolourer.apply({values.data(), width, height, layout.channels, stride},
                      {values.data(), width, height, layout.channels, stride}, options);
-    std::vector<unsigned char> result(pixels.size());
-    if (bytes) {
-        for (std::size_t i = 0; i < values.size(); ++i) {
-            const float v = values[i] * 255.0f;
-            result[i] = static_cast<unsigned char>(std::nearbyint(std::fmin(std::fmax(v, 0), 255)));
-        }
-    } else {
-        std::memcpy(result.data(), values.data(), result.size());
-    }
-    return result;
+    return stored(layout, values);
 }
 
 OfxRectI rect(int x1, int y1, int x2, int y2) { return {x1, y1, x2, y2}; }
 
 std::vector<strict::Layout> layouts() {
     std::vector<strict::Layout> all;
-    for (const strict::Depth depth : {strict::Depth::kFloat, strict::Depth::kByte}) {
+    for (const strict::Depth depth : strict::kDepths) {
         for (const int channels : {3, 4}) {
             for (const char* alpha :
                  {kOfxImageUnPreMultiplied, kOfxImagePreMultiplied, kOfxImageOpaque}) {
@@ -183,28 +170,104 @@ strict::Picture source_of(const strict::Layout& layout) {
     if (layout.premultiplication != kOfxImagePreMultiplied) return source;
     for (int y = layout.bounds.y1; y < layout.bounds.y2; ++y) {
         for (int x = layout.bounds.x1; x < layout.bounds.x2; ++x) {
-            for (int c = 0; c < 3; ++c) {
-                if (layout.depth == strict::Depth::kByte) {
-                    unsigned char* p = source.at(x, y);
-                    p[c] = static_cast<unsigned char>(p[c] * p[3] / 255);
-                } else {
-                    source.floats(x, y)[c] *= source.floats(x, y)[3];
-                }
-            }
+            std::vector<float> pixel = floats(layout, source.pixels({x, y, x + 1, y + 1}));
+            for (std::size_t c = 0; c < 3; ++c) pixel[c] *= pixel[3];
+            const std::vector<unsigned char> bytes = stored(layout, pixel);
+            std::memcpy(source.at(x, y), bytes.data(), bytes.size());
         }
     }
     return source;
 }
 
+namespace {
+
+/// IEEE 754 binary16, slowly.
+float half_value(unsigned half) {
+    const int exponent = static_cast<int>(half >> 10 & 31),
+              fraction = static_cast<int>(half & 1023);
+    const double sign = half & 0x8000 ? -1 : 1;
+    if (exponent == 31) {
+        return fraction ? std::numeric_limits<float>::quiet_NaN()
+                        : static_cast<float>(sign * std::numeric_limits<double>::infinity());
+    }
+    return static_cast<float>(
+        sign * std::ldexp(exponent ? fraction + 1024 : fraction, (exponent ? exponent : 1) - 25));
+}
+
+unsigned nearest_half(float value) {
+    const unsigned sign = std::signbit(value) ? 0x8000 : 0;
+    const double size = std::abs(static_cast<double>(value));
+    if (std::isnan(value)) return sign | 0x7e00;
+    int exponent = 0;
+    std::frexp(size, &exponent);
+    // Halves of that size are multiples of this.
+    const double step = std::ldexp(1, std::max(exponent, -13) - 11);
+    const double rounded = size > 1e6 ? 1e6 : std::nearbyint(size / step) * step;
+    if (rounded >= 65536) return sign | 0x7c00;
+    std::frexp(rounded, &exponent);
+    if (exponent <= -14) return sign | static_cast<unsigned>(std::ldexp(rounded, 24));
+    return sign | (static_cast<unsigned>(exponent + 14) << 10) |
+           (static_cast<unsigned>(std::ldexp(rounded, 11 - exponent)) & 1023);
+}
+
+}  // namespace
+
 std::vector<float> floats(const strict::Layout& layout, const std::vector<unsigned char>& pixels) {
-    std::vector<float> values(layout.depth == strict::Depth::kByte ? pixels.size()
-                                                                   : pixels.size() / 4);
-    if (layout.depth == strict::Depth::kByte) {
-        for (std::size_t i = 0; i < values.size(); ++i) values[i] = pixels[i] / 255.0f;
-    } else {
-        std::memcpy(values.data(), pixels.data(), pixels.size());
+    const auto bytes = static_cast<std::size_t>(layout.number_bytes());
+    std::vector<float> values(pixels.size() / bytes);
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        const unsigned char* at = &pixels[i * bytes];
+        std::uint16_t word = 0;
+        if (bytes == 2) std::memcpy(&word, at, 2);
+        switch (layout.depth) {
+            case strict::Depth::kByte:
+                values[i] = static_cast<float>(*at) / 255.0f;
+                break;
+            case strict::Depth::kShort:
+                values[i] = static_cast<float>(word) / 65535.0f;
+                break;
+            case strict::Depth::kHalf:
+                values[i] = half_value(word);
+                break;
+            case strict::Depth::kFloat:
+                std::memcpy(&values[i], at, 4);
+                break;
+        }
     }
     return values;
+}
+
+double rounding(strict::Depth depth, double number) {
+    switch (depth) {
+        case strict::Depth::kByte:
+            return 0.505 / 255;
+        case strict::Depth::kShort:
+            return 0.505 / 65535;
+        case strict::Depth::kHalf:
+            return std::max(std::abs(number) * 0x1.02p-11, 0x1p-25);
+        case strict::Depth::kFloat:
+            break;
+    }
+    return 0;
+}
+
+std::vector<unsigned char> stored(const strict::Layout& layout, const std::vector<float>& values) {
+    const auto bytes = static_cast<std::size_t>(layout.number_bytes());
+    std::vector<unsigned char> pixels(values.size() * bytes);
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        if (layout.depth == strict::Depth::kFloat) {
+            std::memcpy(&pixels[i * bytes], &values[i], bytes);
+            continue;
+        }
+        unsigned word = nearest_half(values[i]);
+        if (layout.depth != strict::Depth::kHalf) {
+            const float most = bytes == 1 ? 255.0f : 65535.0f;
+            word = static_cast<unsigned>(
+                std::nearbyint(std::fmin(std::fmax(values[i] * most, 0.0f), most)));
+        }
+        std::memcpy(&pixels[i * bytes], &word, bytes);  // little-endian, as all that we build for
+    }
+    return pixels;
 }
 
 }  // namespace test

@@ -61,9 +61,9 @@ std::string sidecar(const std::string& name = "clip.p4d.json", bool edited = tru
 /// Colours inside and outside the palette, below 0 and above 1; for float, NaN and infinities too.
 void fill(strict::Picture& picture, unsigned seed = 1, bool odd_values = true);
 
-/// What the core makes of an area of a picture: float or byte pixels without gaps. Bytes go through
-/// byte / 255, and come back rounded and clamped. `frame` is the sidecar's, and so is the
-/// conversion.
+/// What the core makes of an area of a picture: pixels without gaps, of any depth. Integers go
+/// through value / 255 or value / 65535, and come back rounded and clamped. `frame` is the
+/// sidecar's, and so is the conversion.
 std::vector<unsigned char> recoloured(const palette4d::Sidecar& sidecar, double frame,
                                       const strict::Picture& picture, const OfxRectI& area,
                                       double strength = 1);
@@ -74,8 +74,11 @@ OfxRectI rect(int x1, int y1, int x2, int y2);
 std::vector<strict::Layout> layouts();
 /// A picture as fill() makes it, whose premultiplied colours go with its alpha.
 strict::Picture source_of(const strict::Layout& layout);
-/// Float or byte pixels as floats.
+/// Pixels of any depth as floats, and back.
 std::vector<float> floats(const strict::Layout& layout, const std::vector<unsigned char>& pixels);
+/// How far a number of that size may be from what is stored.
+double rounding(strict::Depth depth, double number = 1);
+std::vector<unsigned char> stored(const strict::Layout& layout, const std::vector<float>& values);
 
 /// An instance of the node that has a sidecar.
 struct Ready {

@@ -85,6 +85,13 @@ void check_descriptor(const OfxImageEffectStruct& effect) {
         require(clip->second->properties.has(kOfxImageEffectPropSupportedComponents),
                 std::string("no components of clip ") + name);
     }
+    if (activity().context == kOfxImageEffectContextPaint) {
+        const auto brush = effect.clips.find("Brush");
+        require(brush != effect.clips.end() &&
+                    brush->second->properties.text(kOfxImageEffectPropSupportedComponents) ==
+                        kOfxImageComponentAlpha,
+                "no clip Brush of alpha alone in the Paint context");
+    }
     for (const auto& [name, param] : effect.params.params) check_param(effect, name, *param);
     for (const std::string& name : slave_params(effect)) {
         require(effect.params.params.count(name) != 0,

@@ -28,7 +28,9 @@ OfxStatus define(OfxImageEffectHandle effect, const char* name, OfxPropertySetHa
         return kOfxStatErrBadHandle;
     }
     const std::string given = name;
-    if (given != kOfxImageEffectSimpleSourceClipName && given != kOfxImageEffectOutputClipName) {
+    const bool paints = given == "Brush" && activity().context == kOfxImageEffectContextPaint;
+    if (given != kOfxImageEffectSimpleSourceClipName && given != kOfxImageEffectOutputClipName &&
+        !paints) {
         host.fault("clipDefine: this context has no clip " + given);
     }
     auto clip = std::make_unique<OfxImageClipStruct>(
@@ -72,6 +74,9 @@ std::string components(int channels) {
                            : kOfxImageComponentAlpha;
 }
 
+constexpr const char* kBitDepths[] = {kOfxBitDepthByte, kOfxBitDepthShort, kOfxBitDepthHalf,
+                                      kOfxBitDepthFloat};
+
 void put_rect(OfxPropertySetStruct& set, const char* name, const OfxRectI& rect) {
     set.put_all(name, {rect.x1, rect.y1, rect.x2, rect.y2});
 }
@@ -87,7 +92,9 @@ OfxStatus get_image(OfxImageClipHandle clip, OfxTime, const OfxRectD*,
         return kOfxStatErrBadHandle;
     }
     const bool is_output = clip->name == kOfxImageEffectOutputClipName;
-    const Picture* picture = is_output ? now.output : now.source;
+    const Picture* picture = is_output                                           ? now.output
+                             : clip->name == kOfxImageEffectSimpleSourceClipName ? now.source
+                                                                                 : now.brush;
     *image = nullptr;
     if (!picture) return kOfxStatFailed;  // "assume the image was black and transparent"
     const Layout& layout = picture->layout();
@@ -99,7 +106,7 @@ OfxStatus get_image(OfxImageClipHandle clip, OfxTime, const OfxRectD*,
     put_rect(*set, kOfxImagePropRegionOfDefinition, layout.definition.value_or(layout.bounds));
     set->put(kOfxImagePropRowBytes, static_cast<int>(picture->row_bytes()));
     set->put(kOfxImageEffectPropPixelDepth,
-             std::string(layout.depth == Depth::kByte ? kOfxBitDepthByte : kOfxBitDepthFloat));
+             std::string(kBitDepths[static_cast<int>(layout.depth)]));
     set->put(kOfxImageEffectPropComponents, components(layout.channels));
     set->put(kOfxImageEffectPropPreMultiplication, layout.premultiplication);
     set->put(kOfxImagePropField, std::string(kOfxImageFieldNone));

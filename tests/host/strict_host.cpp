@@ -50,6 +50,7 @@ void Host::configure(Config config) {
     refused_ = false;
     properties_.put_all(kOfxPropAPIVersion, {1, config_.api_minor});
     properties_.put(kOfxImageEffectPropSupportsTiles, int{config_.tiles});
+    properties_.put("NatronOfxHostIsNatron", int{config_.natron});
     properties_.put(kOfxImageEffectPropSupportsMultiResolution, int{config_.multi_resolution});
 }
 
@@ -65,7 +66,9 @@ std::vector<std::string> Host::take_faults() {
 }
 
 bool Host::has_undo_steps() const {
-    return config_.edit_answer == kOfxStatOK && !config_.null_functions.count("paramEditBegin") &&
+    // Natron's window undoes nothing that a plugin sets outside of such a block.
+    return !config_.natron && config_.edit_answer == kOfxStatOK &&
+           !config_.null_functions.count("paramEditBegin") &&
            !config_.null_functions.count("paramEditEnd") && !refused() && !config_.incomplete;
 }
 
@@ -225,6 +228,9 @@ Plugin::~Plugin() {
 
 OfxStatus Plugin::call(const char* action, const void* handle, OfxPropertySetHandle in_args,
                        OfxPropertySetHandle out_args) {
+    if (activity().locked) {
+        Host::get().fault("paramEditEnd: " + std::string(action) + " waits for its lock for ever");
+    }
     const std::string before = std::exchange(activity().action, action);
     const OfxStatus status = plugin_->mainEntry(action, handle, in_args, out_args);
     activity().action = before;
@@ -240,6 +246,7 @@ std::unique_ptr<OfxImageEffectStruct> Plugin::describe(const std::string& contex
     if (call(kOfxActionDescribe, effect.get(), nullptr, nullptr) != kOfxStatOK) return nullptr;
     OfxPropertySetStruct in(kInArgs);
     in.put(kOfxImageEffectPropContext, context);
+    activity().context = context;
     if (call(kOfxImageEffectActionDescribeInContext, effect.get(), &in, nullptr) != kOfxStatOK) {
         return nullptr;
     }

@@ -78,6 +78,7 @@ struct OfxParamStruct {
     std::map<double, strict::Value> keys{};
     /// The plugin has set an instance's, which had another value before.
     std::function<void(const std::string& name, const strict::Value& before)> on_set{};
+    OfxParamSetStruct* set = nullptr;  ///< an instance's, that it is of
 };
 
 namespace strict {
@@ -86,6 +87,7 @@ namespace strict {
 struct UndoStep {
     std::string label;
     std::map<std::string, Value> before;  ///< the values that it took the place of
+    std::map<std::string, std::map<double, Value>> keys{};  ///< the keys that it removed
 };
 
 }  // namespace strict
@@ -98,6 +100,7 @@ struct OfxParamSetStruct {
     std::vector<std::string> order;
     std::optional<strict::UndoStep> open_step{};
     std::vector<strict::UndoStep> steps{};  ///< the oldest first
+    std::function<void()> on_edit_end{};    ///< what the host does while it holds its lock
 };
 
 struct OfxImageClipStruct {
@@ -125,7 +128,8 @@ namespace strict {
 
 // ---------------------------------------------------------------- pictures
 
-enum class Depth { kByte, kFloat };
+enum class Depth { kByte, kShort, kHalf, kFloat };
+inline constexpr Depth kDepths[] = {Depth::kByte, Depth::kShort, Depth::kHalf, Depth::kFloat};
 
 struct Layout {
     OfxRectI bounds{0, 0, 16, 16};
@@ -139,7 +143,8 @@ struct Layout {
 
     int width() const { return bounds.x2 - bounds.x1; }
     int height() const { return bounds.y2 - bounds.y1; }
-    int pixel_bytes() const { return channels * (depth == Depth::kByte ? 1 : 4); }
+    int number_bytes() const { return depth == Depth::kByte ? 1 : depth == Depth::kFloat ? 4 : 2; }
+    int pixel_bytes() const { return channels * number_bytes(); }
 };
 
 /// Pixels between guard bytes, in any layout.
@@ -181,6 +186,12 @@ struct Config {
     std::vector<double> frame_range{};   ///< of the source, as instances report it; empty: not
     double frame_rate = 0;               ///< likewise; 0: not
     OfxStatus edit_answer = kOfxStatOK;  ///< of paramEditBegin and its End
+    /// What Natron's source does: paramEditEnd asks for clip preferences under a lock that every
+    /// action takes, and a message's arguments are lost.
+    bool natron = false;
+    /// The folder that file and folder parameters get put before them where they do not start with
+    /// a slash; empty: as they are.
+    std::string project{};
 };
 
 /// The process' one host. Change its configuration only while no plugin runs.
@@ -227,9 +238,12 @@ private:
 struct Activity {
     std::string action;  ///< empty outside actions
     bool worker = false;
+    bool locked = false;  ///< by the host: an action that it sends now waits for ever
     Picture* output = nullptr;
     const Picture* source = nullptr;
+    const Picture* brush = nullptr;
     std::set<OfxPropertySetHandle>* images = nullptr;
+    std::string context{};  ///< that is being described
 };
 Activity& activity();
 
@@ -320,6 +334,10 @@ public:
     std::map<std::string, Value> put_back(const std::map<std::string, Value>& values);
     /// The user undoes the last step of the plugin's; what put_back() does it again with.
     std::map<std::string, Value> undo();
+    /// The host's button: every parameter goes to its default, a colour component after component,
+    /// each reported as the user's edit, and then all of them once more.
+    void restore_defaults() { restore_defaults(effect_.params.order); }
+    void restore_defaults(const std::vector<std::string>& names);
     /// How often the plugin has set a parameter.
     int settings(const std::string& param) { return settings_[param]; }
     OfxStatus sync();
@@ -336,8 +354,13 @@ public:
     OfxStatus output_colourspace(std::string& name);
     /// Renders `window`; null source: the host has no picture. Checks images and guards afterwards.
     OfxStatus render(double time, const Picture* source, Picture& output, const OfxRectI& window);
+    /// The same from a host's cache, which knows a frame by its time and by the parameters that are
+    /// evaluated on change.
+    std::vector<unsigned char> cached(double time, const Picture& source);
     /// What the next renders' arguments say besides the ordinary.
     std::map<std::string, Value> extra_arguments;
+    /// Of the Paint context.
+    const Picture* brush = nullptr;
     /// Every render is done twice, and a difference is a fault.
     bool twice = false;
 
@@ -350,6 +373,8 @@ private:
     std::set<std::string> slaves_;           ///< parameters that the preferences depend on
     std::set<std::string> set_since_;        ///< parameters that were set since preferred_
     std::optional<Properties> preferred_{};  ///< what the plugin last answered
+    using FrameKey = std::pair<double, std::vector<std::pair<Value, std::map<double, Value>>>>;
+    std::map<FrameKey, std::vector<unsigned char>> cache_;
 
     void tell(const std::string& param, const Value& before);
     /// Asks for the clip preferences as hosts do, after CreateInstance and changes of the

@@ -67,6 +67,8 @@ Imitation natron() {
     host.config.missing_properties = later_than(4);
     host.config.frame_range = {10, 20};
     host.config.frame_rate = 24;
+    host.config.natron = true;
+    host.config.project = "/nowhere/a project";
     host.tile = 16;
     for (const double scale : {1.0, 0.5, 0.25}) {
         Layout layout =

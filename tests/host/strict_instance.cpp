@@ -53,9 +53,18 @@ Instance::Instance(Plugin& plugin, const OfxImageEffectStruct& descriptor,
                              static_cast<int>(copy->properties.number(kOfxParamPropSecret)));
         copy->value = initial_value(param);
         copy->on_set = [this](const std::string& set, const Value& before) { tell(set, before); };
+        copy->set = &effect_.params;
         effect_.params.params[name] = std::move(copy);
         effect_.params.order.push_back(name);
     }
+    effect_.params.on_edit_end = [this] {
+        for (const std::string& name : set_since_) {
+            if (slaves_.count(name) == 0) continue;
+            OfxPropertySetStruct out(kOutArgs);
+            clip_preferences(out);
+            return;
+        }
+    };
 }
 
 Instance::~Instance() {
@@ -134,7 +143,55 @@ std::map<std::string, Value> Instance::undo() {
     if (undo_steps().empty()) throw std::runtime_error("nothing to undo");
     const UndoStep step = undo_steps().back();
     effect_.params.steps.pop_back();
+    for (const auto& [name, keys] : step.keys) animate(name, keys);
     return put_back(step.before);
+}
+
+void Instance::restore_defaults(const std::vector<std::string>& names) {
+    const auto has_value = [&](const std::string& name) {
+        const std::string& type = effect_.params.params.at(name)->type;
+        return type != kOfxParamTypeGroup && type != kOfxParamTypePushButton;
+    };
+    for (const std::string& name : names) {
+        OfxParamStruct& param = *effect_.params.params.at(name);
+        if (!has_value(name)) continue;
+        param.keys.clear();
+        const Value initial = initial_value(param);
+        if (param.type != kOfxParamTypeRGB) {
+            if (param.value == initial) continue;
+            set(name, initial);
+            changed(name);
+            continue;
+        }
+        for (std::size_t c = 0; c < 3; ++c) {
+            Colour colour = std::get<Colour>(param.value);
+            if (colour[c] == std::get<Colour>(initial)[c]) continue;
+            colour[c] = std::get<Colour>(initial)[c];
+            set(name, colour);
+            changed(name);
+        }
+    }
+    for (const std::string& name : names) {
+        if (has_value(name)) changed(name);
+    }
+}
+
+std::vector<unsigned char> Instance::cached(double time, const Picture& source) {
+    FrameKey key{time, {}};
+    for (const std::string& name : effect_.params.order) {
+        const OfxParamStruct& param = *effect_.params.params.at(name);
+        const OfxPropertySetStruct& p = param.properties;
+        if (p.has(kOfxParamPropEvaluateOnChange) && p.number(kOfxParamPropEvaluateOnChange) == 0) {
+            continue;
+        }
+        key.second.emplace_back(param.value, param.keys);
+    }
+    const auto found = cache_.find(key);
+    if (found != cache_.end()) return found->second;
+    Picture output(source.layout());
+    const OfxRectI& all = source.layout().bounds;
+    if (render(time, &source, output, all) != kOfxStatOK) return {};
+    return cache_[key] = output.pixels(all);
 }
 
 OfxStatus Instance::bracket(const char* action, const std::string& reason) {
@@ -240,7 +297,7 @@ OfxStatus Instance::render_once(double time, const Picture* source, Picture& out
     const std::vector<unsigned char> output_before = output.storage();
     std::set<OfxPropertySetHandle> images;
     const Activity before = activity();
-    activity() = {"", false, &output, source, &images};
+    activity() = {"", false, false, &output, source, brush, &images};
     OfxPropertySetStruct in = render_arguments(time, window);
     in.put_all(kOfxImageEffectPropRenderScale, {output.layout().scale, output.layout().scale});
     for (const auto& [name, value] : extra_arguments) in.put(name, value);

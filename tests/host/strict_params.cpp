@@ -27,6 +27,25 @@ bool of_a_frame() {
     return action == kOfxImageEffectActionRender || action == kOfxImageEffectActionIsIdentity;
 }
 
+/// Values may be set "from within a kOfxActionInstanceChanged or interact action" (ofxParam.h).
+bool may_set(const char* function) {
+    const std::string& action = activity().action;
+    if (action == kOfxActionInstanceChanged) return true;
+    Host::get().fault(std::string(function) + ": not allowed in " + action);
+    return false;
+}
+
+/// A path as the host hands it out.
+std::string path_of(const OfxParamStruct& param) {
+    const std::string& text = std::get<std::string>(param.value);
+    const std::string& project = Host::get().config().project;
+    const std::string mode = param.properties.text(kOfxParamPropStringMode);
+    const bool is_path =
+        mode == kOfxParamStringIsFilePath || mode == kOfxParamStringIsDirectoryPath;
+    if (project.empty() || !is_path || text.empty() || text[0] == '/') return text;
+    return project + "/" + text;
+}
+
 OfxStatus define(OfxParamSetHandle set, const char* type, const char* name,
                  OfxPropertySetHandle* properties) {
     const Call call("paramDefine");
@@ -119,7 +138,7 @@ OfxStatus read(OfxParamHandle param, double time, va_list arguments) {
     if (param->type == kOfxParamTypeDouble) {
         *va_arg(arguments, double*) = at_time<double>(*param, time);
     } else if (param->type == kOfxParamTypeString) {
-        *va_arg(arguments, char**) = lend(std::get<std::string>(param->value));
+        *va_arg(arguments, char**) = lend(path_of(*param));
     } else if (param->type == kOfxParamTypeRGB) {
         for (const double component : at_time<Colour>(*param, time)) {
             *va_arg(arguments, double*) = component;
@@ -154,13 +173,7 @@ OfxStatus get_value_at(OfxParamHandle param, OfxTime time, ...) {
 OfxStatus set_value(OfxParamHandle param, ...) {
     const Call call("paramSetValue");
     if (call.refused()) return kOfxStatFailed;
-    const std::string& action = activity().action;
-    if (action != kOfxActionCreateInstance && action != kOfxActionBeginInstanceChanged &&
-        action != kOfxActionInstanceChanged && action != kOfxActionEndInstanceChanged &&
-        action != kOfxActionSyncPrivateData) {
-        Host::get().fault("paramSetValue: not allowed in " + action);
-        return kOfxStatFailed;
-    }
+    if (!may_set("paramSetValue")) return kOfxStatFailed;
     if (!param || !has_value(*param)) {
         Host::get().fault("paramSetValue: no parameter, or one without a value");
         return kOfxStatErrBadHandle;
@@ -203,7 +216,16 @@ OfxStatus num_keys(OfxParamHandle param, unsigned int* count) {
 OfxStatus key_time(OfxParamHandle, unsigned int, OfxTime*) { return unexpected("paramGetKeyTime"); }
 OfxStatus key_index(OfxParamHandle, OfxTime, int, int*) { return unexpected("paramGetKeyIndex"); }
 OfxStatus delete_key(OfxParamHandle, OfxTime) { return unexpected("paramDeleteKey"); }
-OfxStatus delete_keys(OfxParamHandle) { return unexpected("paramDeleteAllKeys"); }
+OfxStatus delete_keys(OfxParamHandle param) {
+    const Call call("paramDeleteAllKeys");
+    if (call.refused() || !param || !may_set("paramDeleteAllKeys")) return kOfxStatFailed;
+    const Value before = param->value;
+    const std::map<double, Value> keys = std::exchange(param->keys, {});
+    if (!keys.empty()) param->value = keys.begin()->second;
+    if (param->on_set) param->on_set(param->name, before);
+    if (param->set && param->set->open_step) param->set->open_step->keys.emplace(param->name, keys);
+    return kOfxStatOK;
+}
 OfxStatus copy(OfxParamHandle, OfxParamHandle, OfxTime, const OfxRangeD*) {
     return unexpected("paramCopy");
 }
@@ -239,6 +261,11 @@ OfxStatus edit_end(OfxParamSetHandle set) {
         Host::get().fault("paramEditEnd: nothing to undo was set");
     }
     set->steps.push_back(*std::exchange(set->open_step, std::nullopt));
+    if (Host::get().config().natron && set->on_edit_end) {
+        activity().locked = true;
+        set->on_edit_end();
+        activity().locked = false;
+    }
     return kOfxStatOK;
 }
 
@@ -260,6 +287,7 @@ SuiteTable parameter_suite() {
              {"paramGetValueAtTime", offsetof(S, paramGetValueAtTime)},
              {"paramSetValue", offsetof(S, paramSetValue)},
              {"paramGetNumKeys", offsetof(S, paramGetNumKeys)},
+             {"paramDeleteAllKeys", offsetof(S, paramDeleteAllKeys)},
              {"paramEditBegin", offsetof(S, paramEditBegin)},
              {"paramEditEnd", offsetof(S, paramEditEnd)}}};
 }

@@ -34,7 +34,10 @@ const std::map<std::string, Rule>& rules() {
         {kOfxPropVersionLabel, {kString, 1, kHost | kEffectDescriptor, kEffectDescriptor}},
         {kOfxPropPluginDescription, {kString, 1, kEffectDescriptor, kEffectDescriptor}},
         {kOfxPropAPIVersion, {kInt, 0, kHost, 0}},
+        {"NatronOfxHostIsNatron", {kInt, 1, kHost, 0}},  // its own
         {kOfxPluginPropFilePath, {kString, 1, kEffectDescriptor, 0}},
+        {"OfxImageEffectPropSrcFilePath", {kString, 1, kEffect, 0}},  // Resolve's
+        {"OfxImageEffectPropSrcFrame", {kInt, 1, kInArgs, 0}},        // likewise
         {kOfxPropTime, {kDouble, 1, kInArgs | kOutArgs, kOutArgs}},
         {kOfxPropIsInteractive, {kInt, 1, kEffect | kInArgs, 0}},
         {kOfxPropChangeReason, {kString, 1, kInArgs, 0}},
@@ -115,6 +118,7 @@ const std::map<std::string, Rule>& rules() {
         {kOfxParamPropHint, {kString, 1, kAnyParam, kParamDescriptor | kParam}},
         {kOfxParamPropParent, {kString, 1, kAnyParam, kParamDescriptor}},
         {kOfxParamPropEnabled, {kInt, 1, kAnyParam, kParamDescriptor | kParam}},
+        {"OfxParamPropLayoutHint", {kInt, 1, kAnyParam, kParamDescriptor}},  // Nuke's, Natron's
         {kOfxParamPropIncrement, {kDouble, 1, kAnyParam, kParamDescriptor}},
         {kOfxParamPropDigits, {kInt, 1, kAnyParam, kParamDescriptor}},
         {kOfxParamPropDoubleType, {kString, 1, kAnyParam, kParamDescriptor}},
@@ -164,7 +168,8 @@ const std::map<std::string, std::set<std::string>>& words_of() {
                                                      kOfxImageComponentAlpha};
     static const std::map<std::string, std::set<std::string>> words = {
         {kOfxImageEffectPropSupportedContexts,
-         {kOfxImageEffectContextFilter, kOfxImageEffectContextGeneral}},
+         {kOfxImageEffectContextFilter, kOfxImageEffectContextGeneral,
+          kOfxImageEffectContextPaint}},
         {kOfxImageEffectPropSupportedPixelDepths, {kOfxBitDepthByte, kOfxBitDepthFloat}},
         {kOfxImageEffectPropSupportedComponents, components},
         {"OfxImageClipPropComponents_Source", components},
@@ -306,7 +311,9 @@ OfxStatus get_one(const char* function, OfxPropertySetHandle set, const char* na
     const auto found = set->values.find(name);
     if (found == set->values.end()) return kOfxStatErrUnknown;  // this host does not tell
     if (static_cast<std::size_t>(index) >= found->second.size()) return kOfxStatErrBadIndex;
-    *value = std::get<T>(found->second[static_cast<std::size_t>(index)]);
+    const T* stored = std::get_if<T>(&found->second[static_cast<std::size_t>(index)]);
+    if (!stored) return kOfxStatErrValue;  // a host that is wrong about its own property
+    *value = *stored;
     return kOfxStatOK;
 }
 

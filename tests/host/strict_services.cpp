@@ -105,7 +105,13 @@ OfxStatus take(const char* function, void* handle, const char* type, const char*
         return kOfxStatErrBadHandle;
     }
     char text[4096];
-    std::vsnprintf(text, sizeof text, format, arguments);
+    if (host.config().natron) {
+        // It passes the list of arguments as if it were the first of them.
+        const char* none = "";
+        std::snprintf(text, sizeof text, format, none, none, none, none);
+    } else {
+        std::vsnprintf(text, sizeof text, format, arguments);
+    }
     auto* effect = static_cast<OfxImageEffectStruct*>(handle);
     const std::lock_guard<std::mutex> lock(effect->mutex);
     effect->messages.emplace_back(text);

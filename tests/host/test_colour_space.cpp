@@ -69,7 +69,7 @@ TEST(the_picture_goes_to_the_palettes_space_and_back) {
     Node node;
     palette4d::Sidecar plain = node.parsed;
     plain.conversion = nullptr;
-    for (const Depth depth : {Depth::kFloat, Depth::kByte}) {
+    for (const Depth depth : kDepths) {
         for (const int channels : {3, 4}) {
             for (const char* alpha : {kOfxImageUnPreMultiplied, kOfxImagePreMultiplied}) {
                 if (channels == 3 && alpha == std::string(kOfxImagePreMultiplied)) continue;
@@ -236,7 +236,8 @@ TEST(the_status_names_both_spaces) {
     Node node;
     CHECK(node.instance->changed("sidecar") == kOfxStatOK);
     const std::string status = node.instance->text("status");
-    EXPECT(status.find("ACEScg, palette in ACEScct") != std::string::npos, status);
+    EXPECT(status.find("the picture in ACEScg; the palette is in ACEScct") != std::string::npos,
+           status);
 }
 
 TEST(a_host_that_negotiates_colour_is_asked_for_what_the_picture_is_to_be_in) {

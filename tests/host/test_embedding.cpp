@@ -1,4 +1,6 @@
 // What a project keeps of its sidecar: a copy, the clip's folder, and the revision.
+#include <set>
+
 #include "harness.hpp"
 
 using namespace strict;
@@ -53,7 +55,7 @@ TEST(an_embedded_sidecar_travels_with_the_project) {
     }
     CHECK(project.render(*there) == project.edited());
     CHECK(there->effect().persistent_message.empty());
-    CHECK(there->sync() == kOfxStatOK);
+    CHECK(there->changed("", "", kOfxChangeTime) == kOfxStatOK);
     CHECK(there->text("status").find("the project's copy") != std::string::npos);
     CHECK(there->text("embedded") == sidecar_text());
     // A file that is there counts, and its copy follows.
@@ -145,21 +147,41 @@ TEST(the_clips_folder_is_filled_in) {
     CHECK(project.node->text("clipFolder") == "/elsewhere");
 }
 
-TEST(the_revision_follows_the_content) {
+TEST(the_revision_names_what_is_shown) {
     // A host keeps frames by the parameters: when the content changes, so does one of them.
     Project project;
+    Instance& node = *project.node;
     const std::string path = sidecar();
+    CHECK(node.text("revision").empty());
     project.choose(path);
-    const std::string first = project.node->text("revision");
-    CHECK(!first.empty());
-    CHECK(project.node->changed("reload") == kOfxStatOK);
-    CHECK(project.node->text("revision") == first);
-    CHECK(project.node->settings("revision") == 1);
+    std::set<std::string> seen = {"", node.text("revision")};
+    CHECK(seen.size() == 2);
+    // The same content, told again: nothing to do.
+    CHECK(node.changed("strength") == kOfxStatOK);
+    CHECK(node.settings("revision") == 1);
+    const auto expect_new = [&](const char* words) {
+        EXPECT(seen.insert(node.text("revision")).second, words);
+    };
     write("clip.p4d.json", sidecar_text(false));
-    CHECK(project.node->changed("reload") == kOfxStatOK);
-    CHECK(project.node->text("revision") != first);
+    CHECK(node.changed("strength") == kOfxStatOK);
+    expect_new("another content");
     CHECK(project.says("0 edits"));
     write("clip.p4d.json", sidecar_text());
-    CHECK(project.node->changed("reload") == kOfxStatOK);
-    CHECK(project.node->text("revision") == first);
+    CHECK(node.changed("strength") == kOfxStatOK);
+    expect_new("a content that was there before");
+    for (int i = 0; i < 3; ++i) {
+        CHECK(node.changed("reload") == kOfxStatOK);
+        expect_new("Reload");
+    }
+    write("clip.p4d.json", "no JSON");
+    CHECK(node.changed("strength") == kOfxStatOK);
+    expect_new("a file that broke");
+    fs::remove(path);
+    CHECK(node.changed("strength") == kOfxStatOK);
+    expect_new("a file that went away");
+    CHECK(node.changed("strength") == kOfxStatOK);
+    CHECK(node.settings("revision") == 8);
+    sidecar();
+    CHECK(node.changed("strength") == kOfxStatOK);
+    expect_new("a file that came back");
 }

@@ -68,15 +68,19 @@ TEST(unusable_sidecars_pass_the_picture_through) {
     CHECK(scene.message().empty());
 }
 
-TEST(a_message_is_shown_once_and_taken_away) {
+TEST(a_message_stays_until_its_cause_goes) {
     Scene scene;
     scene.instance->set("sidecar", std::string("/nowhere.p4d.json"));
-    for (int i = 0; i < 5; ++i) scene.render(i);
-    CHECK(scene.instance->effect().messages.size() == 1);
+    for (int i = 0; i < 5; ++i) {
+        scene.render(i);
+        CHECK(scene.message().find("/nowhere.p4d.json") != std::string::npos);
+        // Hosts clear messages on their own, Natron when any path changes.
+        scene.instance->effect().persistent_message.clear();
+    }
     scene.instance->set("sidecar", std::string());
     scene.render();
     CHECK(scene.message().empty());
-    CHECK(scene.instance->effect().messages.size() == 1);
+    CHECK(scene.instance->effect().messages.size() == 5);
     // An instance of its own has its own message.
     const auto other = scene.plugin.create();
     CHECK(other->effect().messages.empty());
@@ -129,7 +133,7 @@ TEST(the_status_follows_the_file) {
     const std::string good = "box: frames 10-20 at 24 fps, 16 palette vertices, ";
     node.set("sidecar", path);
     CHECK(node.changed("sidecar") == kOfxStatOK);
-    CHECK(node.text("status") == good + "3 edits; time 0 is frame 10");
+    CHECK(node.text("status").find(good + "3 edits\n") == 0);
     struct Way {
         const char* words;
         std::function<OfxStatus()> poke;
@@ -142,13 +146,6 @@ TEST(the_status_follows_the_file) {
          [&] { return node.changed(kOfxTypeParameter, "strength", kOfxChangeTime); }},
         {"the time", [&] { return node.changed("", "", kOfxChangeTime); }},
         {"the clip", [&] { return node.changed(kOfxTypeClip, "Source", kOfxChangeUserEdited); }},
-        {"End", [&] { return node.bracket(kOfxActionEndInstanceChanged, kOfxChangeUserEdited); }},
-        {"End without arguments",
-         [&] {
-             return scene.plugin.call(kOfxActionEndInstanceChanged, &node.effect(), nullptr,
-                                      nullptr);
-         }},
-        {"SyncPrivateData", [&] { return node.sync(); }},
     };
     for (const Way& way : ways) {
         // Every step changes the text: it is set once, and a second poke leaves it alone.
@@ -197,13 +194,14 @@ TEST(the_status_is_set_only_where_it_may_be) {
         const OfxStatus status = scene.plugin.call(action, &node.effect(), nullptr, nullptr);
         CHECK(status == kOfxStatOK || status == kOfxStatReplyDefault);
     }
-    // What has changed is not told yet.
-    CHECK(node.bracket(kOfxActionBeginInstanceChanged, kOfxChangeUserEdited) == kOfxStatOK);
+    // What has changed is not told yet, or is over.
+    for (const char* action : {kOfxActionBeginInstanceChanged, kOfxActionEndInstanceChanged}) {
+        node.bracket(action, kOfxChangeUserEdited);
+    }
+    node.sync();
     // The plugin's own setting, told later instead of at once.
-    CHECK(node.bracket(kOfxActionBeginInstanceChanged, kOfxChangePluginEdited) == kOfxStatOK);
     CHECK(node.changed(kOfxTypeParameter, "status", kOfxChangePluginEdited) == kOfxStatOK);
     CHECK(node.changed(kOfxTypeParameter, "status", kOfxChangeUserEdited) == kOfxStatOK);
-    CHECK(node.bracket(kOfxActionEndInstanceChanged, kOfxChangePluginEdited) == kOfxStatOK);
     CHECK(node.text("status") == old);
     CHECK(node.settings("status") == before);
     CHECK(node.changed("strength") == kOfxStatOK);

@@ -96,7 +96,7 @@ def test_kdenlive_has_the_nodes_numbers(node: Described) -> None:
 def test_kdenlive_has_the_nodes_switches_and_colours(node: Described) -> None:
     for kind, type_, default, said in (
         ("bool", "OfxParamTypeBoolean", "0", 0),
-        ("color", "OfxParamTypeRGB", "0x000000ff", [0, 0, 0]),
+        ("color", "OfxParamTypeRGB", "0x808080ff", [0.5, 0.5, 0.501]),
     ):
         found = {name for name, row in rows().items() if row.attrib["type"] == kind}
         assert found == {name for name in rows() if node[name]["type"] == type_}
@@ -166,10 +166,10 @@ def test_what_kdenlive_stores_at_first_is_the_nodes_defaults(scene: Scene) -> No
     frames, said = scene.render(**at_first)
     assert "persistent" not in said
     scene.check(frames, sidecar)
-    # A handle that is switched on and left alone is black, and not the blue of '#000000FF'.
+    # A handle that is switched on and left alone has the default's grey.
     used, _ = scene.render(**(at_first | {"handle15On": "1"}))
-    black, _ = scene.render(sidecar=path, handle15On=1, handle15="#000000")
-    assert all(np.array_equal(a, b) for a, b in zip(used, black, strict=True))
+    grey, _ = scene.render(sidecar=path, handle15On=1, handle15="#808080")
+    assert all(np.array_equal(a, b) for a, b in zip(used, grey, strict=True))
     assert not all(np.array_equal(a, b) for a, b in zip(used, frames, strict=True))
 
 

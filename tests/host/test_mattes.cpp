@@ -64,7 +64,7 @@ void check_matte(const Layout& layout, const Picture& source, const Picture& out
     const auto channels = static_cast<std::size_t>(layout.channels);
     const bool premultiplied = channels == 4 && layout.premultiplication == kOfxImagePreMultiplied;
     const bool opaque = channels == 4 && layout.premultiplication == kOfxImageOpaque;
-    if (layout.depth == Depth::kByte) tolerance += 0.5 / 255;
+    tolerance += rounding(layout.depth);
     double lowest = 1, highest = 0;
     for (std::size_t i = 0; i < in.size() / channels; ++i) {
         const float* p = &in[i * channels];

@@ -75,13 +75,13 @@ def crimson_autumn(
     the orange that it ends in crimson; until frame 28 the leaves stay as they were."""
     sidecar = tmp_path_factory.mktemp("seasons") / "seasons.p4d.json"
     palette4d("analyze", seasons, "-o", sidecar, "--quiet")
+    summer = ("--near", "0.91,0.84,0.04", "--frame", 28)
+    palette4d("edit", sidecar, "set", *summer, "--rgb", 0.91, 0.84, 0.04)
     for leaves, frame, colour in (
         ("0.95,0.85,0", 35, (0.9, 0.35, 0.1)),
         ("1,0.6,0", 49, (0.8, 0.12, 0.15)),
     ):
         palette4d("edit", sidecar, "set", "--near", leaves, "--frame", frame, "--rgb", *colour)
-    summer = ("--near", "0.91,0.84,0.04", "--frame", 28)
-    palette4d("edit", sidecar, "stop", *summer, "--rgb", 0.91, 0.84, 0.04)
     return render_both_ways(melt, bundle, sidecar, seasons)
 
 

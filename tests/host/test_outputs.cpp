@@ -174,11 +174,12 @@ TEST(mix_goes_from_the_source_to_what_is_put_out) {
             const auto in = floats(layout, source.pixels(layout.bounds));
             const auto all = floats(layout, whole.pixels(layout.bounds));
             const auto mixed = floats(layout, half.pixels(layout.bounds));
-            const double step = layout.depth == Depth::kByte ? 1.01 / 255 : 1e-6;
+            const double step = 2 * rounding(layout.depth) + 1e-6;
             for (std::size_t i = 0; i < in.size(); ++i) {
                 if (!std::isfinite(in[i]) || !std::isfinite(all[i])) continue;
-                // Bytes do not tell what lies beyond them.
-                if (layout.depth == Depth::kByte && (all[i] == 0 || all[i] == 1)) continue;
+                // Integers do not tell what lies beyond them.
+                const bool integers = layout.depth == Depth::kByte || layout.depth == Depth::kShort;
+                if (integers && (all[i] == 0 || all[i] == 1)) continue;
                 const double expected = (static_cast<double>(in[i]) + all[i]) / 2;
                 EXPECT(std::abs(mixed[i] - expected) <= step * std::max(1.0, std::abs(expected)),
                        "found " + std::to_string(mixed[i]) + ", expected " +
@@ -193,7 +194,7 @@ TEST(an_alpha_clip_passes) {
     Ready node;
     for (const int output : {0, 1, 2, 3}) {
         node.set("output", output);
-        for (const Depth depth : {Depth::kFloat, Depth::kByte}) {
+        for (const Depth depth : kDepths) {
             Layout layout;
             layout.channels = 1;
             layout.depth = depth;

@@ -26,7 +26,7 @@ TEST(every_layout_gives_the_cores_bytes) {
     Ready node;
     const OfxRectI bounds[] = {rect(0, 0, 37, 53), rect(-19, -30, 18, 23), rect(1000, 5, 1037, 58)};
     for (const OfxRectI& b : bounds) {
-        for (const Depth depth : {Depth::kFloat, Depth::kByte}) {
+        for (const Depth depth : kDepths) {
             for (const int channels : {3, 4}) {
                 for (const bool premultiplied : {false, true}) {
                     if (premultiplied && channels == 3) continue;
@@ -149,7 +149,7 @@ TEST(an_unedited_palette_returns_every_bit) {
     Plugin plugin(bundle());
     const auto instance = plugin.create();
     instance->set("sidecar", sidecar("plain.p4d.json", false));
-    for (const Depth depth : {Depth::kFloat, Depth::kByte}) {
+    for (const Depth depth : kDepths) {
         for (const char* premultiplication : {kOfxImagePreMultiplied, kOfxImageUnPreMultiplied}) {
             Layout layout;
             layout.bounds = rect(0, 0, 64, 64);
@@ -183,7 +183,7 @@ TEST(an_edit_that_moves_nothing_here_returns_every_byte) {
 
 TEST(a_source_smaller_than_the_window_is_framed_in_black) {
     Ready node;
-    for (const Depth depth : {Depth::kFloat, Depth::kByte}) {
+    for (const Depth depth : kDepths) {
         for (const bool passing : {false, true}) {
             node.instance->set("strength", passing ? 0.0 : 1.0);
             for (const OfxRectI& b : {rect(5, 4, 20, 31), rect(-9, -9, 3, 60), rect(30, 30, 90, 90),

@@ -155,8 +155,6 @@ TEST(calls_in_the_wrong_place_are_noticed) {
          {"not a descriptor's parameters", [](Now& n) { define(n, kOfxParamTypeBoolean, "x"); }},
          {"of one that has none",
           [&](Now& n) { g.param->paramGetValue(handle_of(n, "group"), &value); }},
-         {"one without a value",
-          [](Now& n) { g.param->paramSetValue(handle_of(n, "group"), 1.0); }},
          {"clipGetImage: not while rendering",
           [&](Now& n) { g.effect->clipGetImage(clip_of(n, "Source"), 0, nullptr, &image); }},
          {"an unknown type",
@@ -169,6 +167,8 @@ TEST(calls_in_the_wrong_place_are_noticed) {
     expect_each(
         kOfxActionInstanceChanged,
         {{"in answer to the plugin's own setting", set_number},
+         {"one without a value",
+          [](Now& n) { g.param->paramSetValue(handle_of(n, "group"), 1.0); }},
          {"number would be undone in a step of its own", set_number},
          {"or no label", [](Now& n) { g.param->paramEditBegin(n.params, ""); }},
          {"or no label", [](Now& n) { g.param->paramEditBegin(n.params, nullptr); }},
@@ -183,6 +183,13 @@ TEST(calls_in_the_wrong_place_are_noticed) {
               g.param->paramEditBegin(n.params, "x");
               g.param->paramEditEnd(n.params);
           }}});
+    const Breach remove_keys = [](Now& n) { g.param->paramDeleteAllKeys(handle_of(n, "number")); };
+    for (const char* action :
+         {kCreate, kOfxActionBeginInstanceChanged, kOfxActionEndInstanceChanged, kRender,
+          kOfxImageEffectActionGetClipPreferences}) {
+        expect("paramSetValue: not allowed", faults_of(action, set_number));
+        expect("paramDeleteAllKeys: not allowed", faults_of(action, remove_keys));
+    }
     for (const char* action : {kCreate, kOfxActionEndInstanceChanged}) {
         expect("paramEditBegin: only while an instance changes",
                faults_of(action, [](Now& n) { g.param->paramEditBegin(n.params, "x"); }));
@@ -190,8 +197,6 @@ TEST(calls_in_the_wrong_place_are_noticed) {
     expect_each(kRender,
                 {{"paramGetValue: while rendering",
                   [&](Now& n) { g.param->paramGetValue(handle_of(n, "number"), &value); }},
-                 {"paramSetValue: not allowed",
-                  [](Now& n) { g.param->paramSetValue(handle_of(n, "number"), 0.5); }},
                  {"paramGetDerivative: not expected",
                   [&](Now& n) { g.param->paramGetDerivative(handle_of(n, "number"), 0, &value); }},
                  {"called in a spawned thread", [](Now& n) {
@@ -238,6 +243,20 @@ TEST(wrong_renders_are_noticed) {
     expect("not the same twice", faults_of(kRender, [](Now&) {
                g.answer = g.renders % 2 ? kOfxStatOK : kOfxStatFailed;
            }));
+}
+
+TEST(a_lock_that_an_action_waits_for_is_noticed) {
+    Config config;
+    config.natron = true;
+    Host::get().configure(config);
+    const auto set_in_a_step = [](Now& n) {
+        if (g.param->paramEditBegin(n.params, "x") != kOfxStatOK) return;
+        g.param->paramSetValue(handle_of(n, "number"), 0.5);
+        g.param->paramEditEnd(n.params);
+    };
+    g.slave = "number";
+    expect("waits for its lock for ever", faults_of(kOfxActionInstanceChanged, set_in_a_step));
+    g.slave.clear();
 }
 
 TEST(texts_that_are_kept_become_rubbish) {

@@ -60,7 +60,6 @@ struct LossKernels {
     void (*pull)(const double* counts, int size, const LossReach& reach, LossLeaf& leaf);
 
     /// One for each set of instructions that this build has.
-    static const LossKernels& portable();
     static const LossKernels& baseline();
     static const LossKernels& avx2();
     static const LossKernels& avx512();

@@ -75,10 +75,8 @@ private:
 
     template <int Write>
     void fetch(const float* block) const {
-#if defined(__GNUC__)
         constexpr int kLine = 64 / sizeof(float);
         for (int i = 0; i < kSize * channels_; i += kLine) __builtin_prefetch(block + i, Write);
-#endif
     }
 
     /// False when some of its pixels' cells or parts have to be made first.
@@ -136,7 +134,8 @@ private:
     }
 
     /// Leaves no more than so many blocks, which wait for what other threads make.
-    void do_waiting(std::size_t most_left) {
+    // Not inlined: row(), where the time goes, inlines block() instead.
+    [[gnu::noinline]] void do_waiting(std::size_t most_left) {
         const auto done = [&](const Waiting& w) { return block(w.from, w.to, w.count); };
         for (;;) {
             builder_.run();

@@ -162,15 +162,11 @@ PALETTE4D_INLINE void store_pixel(float* to, Four after) {
         return;
     }
     // Not through memory, as compilers copy twelve bytes of a register.
-#if defined(__GNUC__)
     typedef double Two __attribute__((vector_size(16)));
     const double red_green = ((Two)after)[0];
     const float blue = after[2];
     std::memcpy(to, &red_green, sizeof red_green);
     std::memcpy(to + 2, &blue, sizeof blue);
-#else
-    std::memcpy(to, &after, 3 * sizeof(float));
-#endif
 }
 
 PALETTE4D_INLINE const float* node_at(const float* nodes, std::size_t bytes) {

@@ -80,7 +80,6 @@ struct LatticeKernels {
                   float* to, int channels, float strength, bool premultiplied);
 
     /// One for each set of instructions that this build has.
-    static const LatticeKernels& portable();
     static const LatticeKernels& baseline();
     static const LatticeKernels& avx2();
     static const LatticeKernels& avx512();

@@ -116,7 +116,6 @@ struct BlockKernels {
     Kernels<double> twofold;
 
     /// One for each set of instructions that this build has.
-    static const BlockKernels& portable();
     static const BlockKernels& baseline();
     static const BlockKernels& avx2();
     static const BlockKernels& avx512();

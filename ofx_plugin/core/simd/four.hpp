@@ -6,7 +6,6 @@
 
 namespace {
 
-#if defined(__GNUC__)
 typedef float Four __attribute__((vector_size(16)));
 inline Four all_four(float x) { return x - Four{}; }
 inline Four max(Four a, Four b) { return a > b ? a : b; }
@@ -14,28 +13,6 @@ inline Four max(Four a, Four b) { return a > b ? a : b; }
 inline Four where_negative(Four x, Four a, Four b) { return x < 0.0f ? a : b; }
 /// a where x is 0, else b.
 inline Four where_zero(Four x, Four a, Four b) { return x != 0.0f ? b : a; }
-#else
-struct Four {
-    float at[4];
-    float operator[](int c) const { return at[c]; }
-};
-#define PALETTE4D_FOUR(name, parameters, expression)      \
-    inline Four name parameters {                         \
-        Four r;                                           \
-        for (int c = 0; c < 4; ++c) r.at[c] = expression; \
-        return r;                                         \
-    }
-PALETTE4D_FOUR(all_four, (float x), x)
-PALETTE4D_FOUR(operator+, (Four a, Four b), a[c] + b[c])
-PALETTE4D_FOUR(operator-, (Four a, Four b), a[c] - b[c])
-PALETTE4D_FOUR(operator*, (Four a, Four b), a[c] * b[c])
-PALETTE4D_FOUR(operator/, (Four a, Four b), a[c] / b[c])
-PALETTE4D_FOUR(operator*, (float a, Four b), a* b[c])
-PALETTE4D_FOUR(max, (Four a, Four b), a[c] > b[c] ? a[c] : b[c])
-PALETTE4D_FOUR(where_negative, (Four x, Four a, Four b), x[c] < 0 ? a[c] : b[c])
-PALETTE4D_FOUR(where_zero, (Four x, Four a, Four b), x[c] != 0 ? b[c] : a[c])
-#undef PALETTE4D_FOUR
-#endif
 
 inline Four abs(Four a) { return max(a, -1.0f * a); }
 

@@ -11,12 +11,8 @@ namespace {
 /// This build has its kernels, and the processor its instructions.
 bool usable(InstructionSet set) {
     switch (set) {
-        case InstructionSet::kPortable:
-            return true;
-#if defined(PALETTE4D_HAS_baseline)
         case InstructionSet::kBaseline:
             return true;
-#endif
             // __builtin_cpu_supports also asks whether the operating system saves the registers.
 #if defined(PALETTE4D_HAS_avx2)
         case InstructionSet::kAvx2:
@@ -47,8 +43,8 @@ InstructionSet best() {
 const std::vector<InstructionSet>& instruction_sets() {
     static const std::vector<InstructionSet> sets = [] {
         std::vector<InstructionSet> found;
-        for (const InstructionSet set : {InstructionSet::kPortable, InstructionSet::kBaseline,
-                                         InstructionSet::kAvx2, InstructionSet::kAvx512}) {
+        for (const InstructionSet set :
+             {InstructionSet::kBaseline, InstructionSet::kAvx2, InstructionSet::kAvx512}) {
             if (usable(set)) found.push_back(set);
         }
         return found;
@@ -58,8 +54,6 @@ const std::vector<InstructionSet>& instruction_sets() {
 
 const char* name_of(InstructionSet set) {
     switch (set) {
-        case InstructionSet::kPortable:
-            return "portable";
         case InstructionSet::kBaseline:
             return "baseline";
         case InstructionSet::kAvx2:

@@ -9,10 +9,6 @@ namespace palette4d {
 template <class Kernels>
 const Kernels& kernels_of(InstructionSet set) {
     switch (resolved(set)) {
-#if defined(PALETTE4D_HAS_baseline)
-        case InstructionSet::kBaseline:
-            return Kernels::baseline();
-#endif
 #if defined(PALETTE4D_HAS_avx2)
         case InstructionSet::kAvx2:
             return Kernels::avx2();
@@ -22,7 +18,7 @@ const Kernels& kernels_of(InstructionSet set) {
             return Kernels::avx512();
 #endif
         default:
-            return Kernels::portable();
+            return Kernels::baseline();
     }
 }
 

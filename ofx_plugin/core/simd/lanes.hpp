@@ -1,144 +1,27 @@
 // Numbers side by side: the arithmetic of the kernels, several pixels at a time.
 //
-// The build defines PALETTE4D_LANES_BYTES, the width of the registers, or PALETTE4D_LANES_PORTABLE
-// for plain C++, and compiles each kernel source once for each set of instructions. Everything is
-// in an unnamed namespace and inlined: sources compiled for different processors must not share a
-// function. Operations are those that IEEE 754 rounds correctly (+ - * / sqrt) and selections, none
-// is fused: all widths give the same bits.
+// GCC's and Clang's vector types, with intrinsics on x86. The build defines PALETTE4D_LANES_BYTES,
+// the width of the registers, and compiles each kernel source once for each set of instructions.
+// Everything is in an unnamed namespace and inlined: sources compiled for different processors must
+// not share a function. Operations are those that IEEE 754 rounds correctly (+ - * / sqrt) and
+// selections, none is fused: all widths give the same bits.
 #pragma once
 
 #include <cmath>
 #include <cstring>
 
-#if !defined(PALETTE4D_LANES_PORTABLE) && defined(__SSE2__)
+#if defined(__SSE2__)
 #include <immintrin.h>
 #define PALETTE4D_LANES_X86
 #endif
-#if defined(__AVX512F__) && defined(__GNUC__) && !defined(__clang__)
+#if defined(__AVX512F__) && !defined(__clang__)
 // GCC 12's own header: _mm512_min_pd and its like start from _mm512_undefined_pd() on purpose.
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
 #endif
 
-#if defined(__GNUC__)
 #define PALETTE4D_INLINE inline __attribute__((always_inline))
-#else
-#define PALETTE4D_INLINE inline
-#endif
 
 namespace {
-
-#if defined(PALETTE4D_LANES_PORTABLE)
-
-template <class T>
-struct Lanes {
-    static constexpr int kCount = 32 / static_cast<int>(sizeof(T));
-    T at[kCount];
-};
-template <class T>
-struct LaneMask {
-    bool at[Lanes<T>::kCount];
-};
-
-// A loop an operation, over independent elements: compilers make vectors of them.
-#define PALETTE4D_EACH for (int lane = 0; lane < Lanes<T>::kCount; ++lane)
-#define PALETTE4D_BINARY(Result, Operand, name, expression)                     \
-    template <class T>                                                          \
-    PALETTE4D_INLINE Result<T> name(const Operand<T>& a, const Operand<T>& b) { \
-        Result<T> r;                                                            \
-        PALETTE4D_EACH r.at[lane] = expression;                                 \
-        return r;                                                               \
-    }
-#define PALETTE4D_OPERATOR(Result, Operand, op) \
-    PALETTE4D_BINARY(Result, Operand, operator op, a.at[lane] op b.at[lane])
-PALETTE4D_OPERATOR(Lanes, Lanes, +)
-PALETTE4D_OPERATOR(Lanes, Lanes, -)
-PALETTE4D_OPERATOR(Lanes, Lanes, *)
-PALETTE4D_OPERATOR(Lanes, Lanes, /)
-PALETTE4D_OPERATOR(LaneMask, Lanes, <)
-PALETTE4D_OPERATOR(LaneMask, Lanes, <=)
-PALETTE4D_OPERATOR(LaneMask, Lanes, >)
-PALETTE4D_OPERATOR(LaneMask, Lanes, >=)
-PALETTE4D_BINARY(LaneMask, LaneMask, operator&, a.at[lane] && b.at[lane])
-PALETTE4D_BINARY(LaneMask, LaneMask, operator|, a.at[lane] || b.at[lane])
-PALETTE4D_BINARY(Lanes, Lanes, min, a.at[lane] < b.at[lane] ? a.at[lane] : b.at[lane])
-PALETTE4D_BINARY(Lanes, Lanes, max, a.at[lane] > b.at[lane] ? a.at[lane] : b.at[lane])
-
-template <class T>
-PALETTE4D_INLINE Lanes<T> all(T value) {
-    Lanes<T> r;
-    PALETTE4D_EACH r.at[lane] = value;
-    return r;
-}
-template <class T>
-PALETTE4D_INLINE Lanes<T> load(const T* from) {
-    Lanes<T> r;
-    PALETTE4D_EACH r.at[lane] = from[lane];
-    return r;
-}
-template <class T>
-PALETTE4D_INLINE void store(T* to, const Lanes<T>& a) {
-    PALETTE4D_EACH to[lane] = a.at[lane];
-}
-template <class T>
-PALETTE4D_INLINE Lanes<T> sqrt(const Lanes<T>& a) {
-    Lanes<T> r;
-    PALETTE4D_EACH r.at[lane] = std::sqrt(a.at[lane]);
-    return r;
-}
-template <class T>
-PALETTE4D_INLINE Lanes<T> abs(const Lanes<T>& a) {
-    Lanes<T> r;
-    PALETTE4D_EACH r.at[lane] = std::abs(a.at[lane]);
-    return r;
-}
-/// Towards zero; below 2^24.
-template <class T>
-PALETTE4D_INLINE Lanes<T> truncated(const Lanes<T>& a) {
-    Lanes<T> r;
-    PALETTE4D_EACH r.at[lane] = static_cast<T>(static_cast<int>(a.at[lane]));
-    return r;
-}
-PALETTE4D_INLINE void store_whole(int* to, const Lanes<float>& a) {
-    for (int lane = 0; lane < Lanes<float>::kCount; ++lane) to[lane] = static_cast<int>(a.at[lane]);
-}
-PALETTE4D_INLINE Lanes<float> load_whole(const int* from) {
-    Lanes<float> r;
-    for (int lane = 0; lane < Lanes<float>::kCount; ++lane) {
-        r.at[lane] = static_cast<float>(from[lane]);
-    }
-    return r;
-}
-/// Of so many times 16 bytes.
-PALETTE4D_INLINE void store_offsets(unsigned* to, const Lanes<float>& a) {
-    for (int lane = 0; lane < Lanes<float>::kCount; ++lane) {
-        to[lane] = 16u * static_cast<unsigned>(static_cast<int>(a.at[lane]));
-    }
-}
-template <class T>
-PALETTE4D_INLINE Lanes<T> select(const LaneMask<T>& m, const Lanes<T>& a, const Lanes<T>& b) {
-    Lanes<T> r;
-    PALETTE4D_EACH r.at[lane] = m.at[lane] ? a.at[lane] : b.at[lane];
-    return r;
-}
-template <class T>
-PALETTE4D_INLINE bool any(const LaneMask<T>& m) {
-    bool found = false;
-    PALETTE4D_EACH found |= m.at[lane];
-    return found;
-}
-/// A bit a lane, the first lane's the lowest.
-PALETTE4D_INLINE unsigned bits(const LaneMask<double>& m) {
-    unsigned found = 0;
-    for (int lane = 0; lane < Lanes<double>::kCount; ++lane) {
-        found |= static_cast<unsigned>(m.at[lane]) << lane;
-    }
-    return found;
-}
-#undef PALETTE4D_EACH
-#undef PALETTE4D_BINARY
-#undef PALETTE4D_OPERATOR
-
-#else  // GCC's and Clang's vector types, for x86 and any other processor
 
 template <class T>
 struct IntegerOf;
@@ -302,7 +185,6 @@ PALETTE4D_INLINE unsigned bits(LaneMask<double> m) {
     return found;
 }
 
-#endif
 #endif
 
 }  // namespace

@@ -47,8 +47,9 @@ def make_folder(folder: Path) -> None:
 
 
 def link_target(path: str | os.PathLike[str]) -> Path:
-    """Return the file that a link leads to, else the path itself: a link stays a link."""
-    return Path(os.path.realpath(path)) if Path(path).is_symlink() else Path(path)
+    """Return the file that a link leads to, or the path itself where there is none."""
+    path = Path(path)
+    return Path(os.path.realpath(path)) if path.is_symlink() and path.exists() else path
 
 
 @contextmanager
@@ -65,7 +66,7 @@ def replacing(
     Parameters
     ----------
     path : Path
-        The file to write; a symbolic link is followed.
+        The file to write; a symbolic link to a file stays and is followed.
     force : bool
         Replace a file that exists.
     check : callable, optional
@@ -98,7 +99,7 @@ def replacing(
         temporary.replace(path)
     except OSError as error:
         raise WriteError(
-            f"{path}: could not be written: {error.strerror or error}; expected a disk with room, "
+            f"{path}: cannot be written: {error.strerror or error}; expected a disk with room, "
             "make some or choose another folder"
         ) from error
     finally:

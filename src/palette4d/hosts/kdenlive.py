@@ -64,8 +64,7 @@ def _row(parameter: Parameter) -> ElementTree.Element:
         case Switch():
             row.attrib |= {"type": "bool", "default": "0"}
         case Colour():
-            # As 0xRRGGBBAA, which MLT reads as Kdenlive means it: of '#000000FF', its own
-            # default, the one takes the last two digits for alpha and the other the first two.
-            row.attrib |= {"type": "color", "default": "0x000000ff"}
+            # MLT and Kdenlive read 0xRRGGBBAA alike; they disagree where '#' has eight digits.
+            row.attrib |= {"type": "color", "default": "0x808080ff"}
     ElementTree.SubElement(row, "name").text = parameter.label
     return row

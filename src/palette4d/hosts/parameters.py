@@ -48,7 +48,7 @@ class Switch(Parameter):
 
 @dataclass(frozen=True)
 class Colour(Parameter):
-    """A colour with keyframes, 8 bits a channel in MLT; black by default."""
+    """A colour with keyframes, 8 bits a channel in MLT; grey by default."""
 
 
 HANDLES = 32
@@ -105,7 +105,12 @@ ALL: tuple[Parameter, ...] = (
         "Auto",
     ),
     MIX,
-    Choice("pictureIn", "Picture is in", ("Input space", "Palette space"), "Input space"),
+    Choice(
+        "pictureIn",
+        "Picture is in",
+        ("Input space", "Palette space", "Scene-linear"),
+        "Input space",
+    ),
     Choice("mode", "Mode", ("Auto", "Exact", "Lattice"), "Auto"),
     EDITS_FROM,
     *TIME,

@@ -9,10 +9,11 @@ import dataclasses
 import itertools
 from collections.abc import Callable, Iterable, Iterator
 
-from palette4d.analysis import colour_statistics, cuts
+from palette4d.analysis import colour_statistics
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import file_safe
+from palette4d.media import cuts
 from palette4d.media.clip_base import Clip, even_step, hidden
 
 #: Colour bins of a frame that the search for cuts looks at.
@@ -163,11 +164,11 @@ def cuts_of(clip: Clip, progress: Callable[[int, int], None] | None = None) -> l
                 return
             yield number, histogram
 
-    starts = cuts.find_cuts_of(before())
+    starts = cuts.find_cuts(before())
     if not shown:  # alpha is not used
         return starts
     rest = ((number, histogram) for number, histogram, is_hidden in frames if not is_hidden)
-    return cuts.find_cuts_of(itertools.chain(shown, rest))
+    return cuts.find_cuts(itertools.chain(shown, rest))
 
 
 def trimmed(shot: Shot, clip: Clip) -> Shot:

@@ -163,14 +163,14 @@ TEST(every_instruction_set_gives_the_same_bits) {
             return palette_loss(tree, palette, {}, {50, 50, 0, 0.1, 0.1}, &gradient, set);
         };
         std::vector<Vec3> expected;
-        const FrameLoss portable = result(InstructionSet::kPortable, expected);
+        const FrameLoss baseline = result(InstructionSet::kBaseline, expected);
         for (const InstructionSet set : instruction_sets()) {
             std::vector<Vec3> gradient;
             const FrameLoss loss = result(set, gradient);
-            CHECK_EQUAL(loss.R, portable.R);
-            CHECK_EQUAL(loss.E, portable.E);
-            CHECK_EQUAL(loss.outside, portable.outside);
-            CHECK_EQUAL(loss.max_distance, portable.max_distance);
+            CHECK_EQUAL(loss.R, baseline.R);
+            CHECK_EQUAL(loss.E, baseline.E);
+            CHECK_EQUAL(loss.outside, baseline.outside);
+            CHECK_EQUAL(loss.max_distance, baseline.max_distance);
             CHECK(gradient == expected);
         }
     }

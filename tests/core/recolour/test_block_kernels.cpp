@@ -266,13 +266,13 @@ TEST(numbers_at_the_ends_of_the_range_keep_the_promise) {
 TEST(all_instruction_sets_give_the_same_bits) {
     Random random(6);
     CHECK(!instruction_sets().empty());
-    CHECK(instruction_sets().front() == InstructionSet::kPortable);
+    CHECK(instruction_sets().front() == InstructionSet::kBaseline);
     for (int round = 0; round < 4 * kBodies; ++round) {
         const Subject subject = edited(body(round % kBodies, random), random);
         const Recolourer recolourer = subject.recolourer();
         const std::vector<float> colours = awkward_colours(subject.mesh, random, 500);
         RecolourOptions options = with(Precision::kSingle);
-        options.instructions = InstructionSet::kPortable;
+        options.instructions = InstructionSet::kBaseline;
         const std::vector<float> expected = recoloured(recolourer, colours, options);
         for (const InstructionSet set : instruction_sets()) {
             options.instructions = set;
@@ -283,8 +283,8 @@ TEST(all_instruction_sets_give_the_same_bits) {
 
 TEST(instructions_that_are_not_there_are_refused) {
     const std::vector<InstructionSet>& there = instruction_sets();
-    for (const InstructionSet set : {InstructionSet::kPortable, InstructionSet::kBaseline,
-                                     InstructionSet::kAvx2, InstructionSet::kAvx512}) {
+    for (const InstructionSet set :
+         {InstructionSet::kBaseline, InstructionSet::kAvx2, InstructionSet::kAvx512}) {
         if (std::find(there.begin(), there.end(), set) != there.end()) {
             CHECK(resolved(set) == set);
         } else {

@@ -8,13 +8,13 @@ import time
 import numpy as np
 import pytest
 from any_clips import harbour, landscape, linear
-from palette4d.analysis import cuts
-from palette4d.analysis.colour_histogram import histogram
 from palette4d.analysis.colour_statistics import gather
 from palette4d.analysis.frame_statistics import FrameStatistics
 from palette4d.analysis.options import AnalysisOptions
 
+from palette4d.media import cuts
 from palette4d.media.clip import open_clip
+from palette4d.media.colour_histogram import histogram
 
 
 def gathered(pictures, first: int = 0, step: int = 1) -> list[FrameStatistics]:
@@ -25,9 +25,14 @@ def gathered(pictures, first: int = 0, step: int = 1) -> list[FrameStatistics]:
     ]
 
 
+def pairs(frames):
+    """Return what cuts are found by."""
+    return [(frame.frame, frame.histogram) for frame in frames]
+
+
 def found(pictures, first: int = 0, step: int = 1) -> list[int]:
     """Return the cuts of (h, w, 3) pictures."""
-    return cuts.find_cuts(gathered(pictures, first, step))
+    return cuts.find_cuts(pairs(gathered(pictures, first, step)))
 
 
 def frames(count: int) -> list:
@@ -185,15 +190,15 @@ def test_seasons_has_no_cut_however_it_is_sampled(seasons):
     gathered = [gather(n, image[::2, ::2], AnalysisOptions()) for n, image in clip.iter_colours()]
     for step in (1, 2, 3, 5):
         sampled = gathered[::step]
-        assert cuts.find_cuts(sampled) == []
+        assert cuts.find_cuts(pairs(sampled)) == []
         for length in (3, 5, 8):
             for start in range(len(sampled) - length + 1):
-                assert cuts.find_cuts(sampled[start : start + length]) == []
+                assert cuts.find_cuts(pairs(sampled[start : start + length])) == []
     # Winter beside summer is one.
     spliced = [
         dataclasses.replace(s, frame=i) for i, s in enumerate([*gathered[:8], *gathered[20:28]])
     ]
-    assert cuts.find_cuts(spliced) == [8]
+    assert cuts.find_cuts(pairs(spliced)) == [8]
 
 
 def test_the_measure_is_the_share_of_other_pixels():
@@ -214,7 +219,7 @@ def test_time_is_linear_and_small():
     one = gather(0, picture.astype(np.float32), AnalysisOptions())
     some = [dataclasses.replace(one, frame=i) for i in range(100)]
     start = time.process_time()
-    assert cuts.find_cuts(some) == []
+    assert cuts.find_cuts(pairs(some)) == []
     assert time.process_time() - start < 1.0  # 10 ms a frame, ten times what it takes
 
 

@@ -27,7 +27,6 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d.analysis.frame_statistics import FrameStatistics
 
 from palette4d.common.text import counted
 
@@ -45,13 +44,11 @@ SURE = 3
 MOST_SHOWN = 8
 
 
-def find_cuts(statistics: Sequence[FrameStatistics]) -> list[int]:
-    """Return the numbers of the frames that begin a new shot, rising; none for a single shot."""
-    return find_cuts_of((frame.frame, frame.histogram) for frame in statistics)
+def find_cuts(histograms: Iterable[tuple[int, F64]]) -> list[int]:
+    """Return the numbers of the frames that begin a new shot, rising; none for a single shot.
 
-
-def find_cuts_of(histograms: Iterable[tuple[int, F64]]) -> list[int]:
-    """Return the same for (frame number, histogram) pairs; few of them are held at a time."""
+    Takes (frame number, histogram) pairs in order of time, and holds few of them at a time.
+    """
     numbers, gaps = _gaps(histograms)
     return [numbers[i] for i in range(1, len(numbers)) if _is_cut(gaps, i)]
 
