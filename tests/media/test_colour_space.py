@@ -203,7 +203,7 @@ def test_every_kind_of_transform_becomes_a_step() -> None:
         (table_of([0.5, 0.5, 0.5]), "curve that is level"),
         (
             ocio.MatrixTransform([1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1.0]),
-            "cannot convert|inverse",
+            "no way|inver",
         ),
     ],
 )
