@@ -63,7 +63,7 @@ LEAST_COLOURS = 4
 STIFFER = 10.0
 
 T = TypeVar("T")
-Progress = Callable[[str, int, int], None]
+Progress = Callable[[str, int, int], object]
 """Called as progress(stage, done, total)."""
 
 
@@ -269,7 +269,7 @@ class _Run:
         self.notes: list[str] = []
         self.bound: float | None = None
 
-    def counter(self, stage: str) -> Callable[[int, int], None]:
+    def counter(self, stage: str) -> Callable[[int, int], object]:
         """Return the progress callback of one stage."""
         return lambda done, total: self.report(stage, done, total)
 

@@ -19,7 +19,8 @@ void define_params(const Suites& suites, OfxParamSetHandle params) {
                      "What was loaded, which of its frames is shown, or what is wrong with the "
                      "sidecar."},
                     kOfxParamStringIsMultiLine, "No sidecar chosen");
-    status.set_int(kOfxParamPropEnabled, 0);
+    // Natron writes what is not enabled in black on dark grey.
+    status.set_int(kOfxParamPropEnabled, suites.is_natron);
     status.set_int(kOfxParamPropEvaluateOnChange, 0);
     status.set_int(kOfxParamPropCanUndo, 0);
     define.number({kParamStrength, "Strength",

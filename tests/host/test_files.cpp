@@ -126,6 +126,29 @@ TEST(a_changed_sidecar_is_read_again) {
     CHECK(scene.message().empty());
 }
 
+TEST(a_file_of_the_same_size_and_time_is_another_file) {
+    Scene scene;
+    const std::string path = sidecar();
+    const std::string swapped =
+        sidecar_text().replace(sidecar_text().find("[0.2, 0.7, 0.1]"), 15, "[0.2, 0.1, 0.7]");
+    age(path, 1000);
+    const auto stamp = std::filesystem::last_write_time(path);
+    scene.instance->set("sidecar", path);
+    const auto first = scene.render();
+    // Renamed over it, as from an archive; then written in place with the time put back.
+    std::filesystem::last_write_time(write("new.p4d.json", swapped), stamp);
+    std::filesystem::rename(folder() / "new.p4d.json", path);
+    const auto second = scene.render();
+    CHECK(second ==
+          recoloured(palette4d::read_sidecar(path), 12, scene.source, scene.layout.bounds));
+    CHECK(second != first);
+    sidecar();
+    std::filesystem::last_write_time(path, stamp);
+    CHECK(scene.render() == first);
+    CHECK(scene.instance->changed("reload") == kOfxStatOK);
+    CHECK(scene.render() == first);
+}
+
 TEST(the_status_follows_the_file) {
     Scene scene;
     Instance& node = *scene.instance;
