@@ -55,7 +55,7 @@ FEWEST_OUTSIDE, MOST_OUTSIDE_SHARE = 5, 0.01
 # hardly changes a hull, and keeps the end of a true highlight.
 OUTLYING = 0.1
 
-Progress = Callable[[int, int], None]
+Progress = Callable[[int, int], object]
 
 
 @dataclasses.dataclass(frozen=True)

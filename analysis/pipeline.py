@@ -63,7 +63,7 @@ LEAST_COLOURS = 4
 STIFFER = 10.0
 
 T = TypeVar("T")
-Progress = Callable[[str, int, int], None]
+Progress = Callable[[str, int, int], object]
 """Called as progress(stage, done, total)."""
 
 
@@ -269,7 +269,7 @@ class _Run:
         self.notes: list[str] = []
         self.bound: float | None = None
 
-    def counter(self, stage: str) -> Callable[[int, int], None]:
+    def counter(self, stage: str) -> Callable[[int, int], object]:
         """Return the progress callback of one stage."""
         return lambda done, total: self.report(stage, done, total)
 
@@ -300,6 +300,7 @@ def _skew(run: _Run) -> SkewPolytope:
         size = min(options.palette_size, max(LEAST_COLOURS, most // 2))
         run.options = options = dataclasses.replace(options, palette_size=size)
     hulls = [_static(run), *static_hull.plain_hulls(run.frames, run.gamut, options)]
+    run.report("static_hull", static_hull.STARTS, static_hull.STARTS)
     convex = [h for h in hulls if h is hulls[0] or not _is_concave(h, run)]
     simple = min(convex, key=lambda hull: run.losses(hull).L_prime)
     bound = run.bound = run.losses(simple).L_prime

@@ -61,7 +61,7 @@ def search(
     frames: Sequence[FrameStatistics],
     gamut: Gamut,
     options: AnalysisOptions,
-    progress: Callable[[int, int], None],
+    progress: Callable[[int, int], object],
 ) -> tuple[int | None, SkewPolytope]:
     """Return which start the best polytope comes from (None: the static hull), and the polytope.
 
@@ -104,7 +104,7 @@ def remove_singly(
     frames: Sequence[FrameStatistics],
     gamut: Gamut,
     options: AnalysisOptions,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], object] | None = None,
     bound: float = math.inf,
 ) -> list[Priced]:
     """Return the polytope with fewer and fewer vertices, most vertices first.

@@ -21,7 +21,7 @@ from palette4d.analysis.vertex_removal import NEGLIGIBLE, RemovalTrials
 LOCAL_EVALUATIONS = 40
 JOINT_EVALUATIONS = 150
 
-Counter = Callable[[int, int], None]
+Counter = Callable[[int, int], object]
 
 
 def merge_blocks(

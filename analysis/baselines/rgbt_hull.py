@@ -84,7 +84,7 @@ def rgbt_polytope(
     frames: Sequence[FrameStatistics],
     gamut: Gamut,
     vertices: int = VERTICES,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], object] | None = None,
 ) -> SkewPolytope:
     """Return the simplified convex hull of all frames' colours in RGB and time.
 
@@ -133,7 +133,7 @@ def simplified(
     last: float,
     gamut: Gamut,
     vertices: int,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], object] | None = None,
 ) -> F64:
     """Return at most `vertices` points, between the frames `first` and `last`, around the (n, 4)
     points.
@@ -237,7 +237,7 @@ def _hull(points: F64) -> _Hull:
 
 
 def _simplify(
-    hull: _Hull, vertices: int, limits: F64, progress: Callable[[int, int], None] | None = None
+    hull: _Hull, vertices: int, limits: F64, progress: Callable[[int, int], object] | None = None
 ) -> _Hull:
     """Contract edges until at most `vertices` are left, the new ones within the limits."""
     total = max(len(hull.points) - vertices, 0)

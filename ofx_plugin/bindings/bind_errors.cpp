@@ -31,9 +31,10 @@ void translate(std::exception_ptr thrown) {
 
 }  // namespace
 
-/// palette4d.common.errors holds the classes, so that code without the core can name them; SidecarError is
-/// a Palette4dError with the attributes file, pointer, found and expected.
+/// palette4d.common.errors holds the classes, so that code without the core can name them;
+/// SidecarError is a Palette4dError with the attributes file, pointer, found and expected.
 void bind_errors(py::module_& module) {
-    module.attr("SidecarError") = py::module_::import("palette4d.common.errors").attr("SidecarError");
+    module.attr("SidecarError") =
+        py::module_::import("palette4d.common.errors").attr("SidecarError");
     py::register_local_exception_translator(&translate);
 }

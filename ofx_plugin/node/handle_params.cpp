@@ -68,7 +68,8 @@ bool holds(const Params& params, const Slot& slot, const std::optional<Vec3>& co
 std::string label_of(const Handle& handle) {
     std::ostringstream text;
     text.imbue(std::locale::classic());
-    text << handle.id << (handle.stop ? ", stop at " : ", frame ") << std::round(100 * handle.frame) / 100;
+    text << handle.id << (handle.stop ? ", stop at " : ", frame ")
+         << std::round(100 * handle.frame) / 100;
     return text.str();
 }
 

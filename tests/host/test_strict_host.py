@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from host.strict_node import StrictNode
+from host.strict_node import Picture, StrictNode
 from numpy.typing import NDArray
 
 from palette4d import _core
@@ -48,13 +48,20 @@ def through_the_core(
     cut = _core.slice_at(sidecar.polytope, frame)
     edited = _core.edited_colours(sidecar.polytope, sidecar.edits, cut)
     recolourer = _core.Recolourer(cut.rgb, edited, cut.faces)
-    if image.dtype == np.float32:
+    conversion = None if sidecar.conversion is None else sidecar.conversion.steps
+
+    def apply(values: Picture) -> Picture:
         return recolourer.apply(
-            image, strength=strength, premultiplied=premultiplied, precision="single"
-        ).tobytes()
-    values = image.astype(np.float32) / np.float32(255)
-    moved = recolourer.apply(values, strength=strength, precision="single")
-    return quantised(moved, "uint8").tobytes()
+            values,
+            strength=strength,
+            premultiplied=premultiplied,
+            precision="single",
+            conversion=conversion,
+        )
+
+    if image.dtype == np.float32:
+        return apply(image).tobytes()
+    return quantised(apply(image.astype(np.float32) / np.float32(255)), "uint8").tobytes()
 
 
 def golden() -> list[Path]:

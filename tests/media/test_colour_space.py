@@ -203,7 +203,7 @@ def test_every_kind_of_transform_becomes_a_step() -> None:
         (table_of([0.5, 0.5, 0.5]), "curve that is level"),
         (
             ocio.MatrixTransform([1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1.0]),
-            "cannot convert|inverse",
+            "no way|inver",
         ),
     ],
 )
@@ -295,7 +295,7 @@ def test_hulls_in_linear_light_are_useless(linear_clip: str, tmp_path: Path, cap
     log = analyse(linear_clip, tmp_path / "log.p4d.json", "--input-space", "ACEScg")
     assert "scene-linear" not in capsys.readouterr().err
     linear = analyse(linear_clip, tmp_path / "lin.p4d.json")
-    assert "say what it is with --input-space" in capsys.readouterr().err
+    assert "--input-space" in capsys.readouterr().err
     assert "conversion" not in linear["clip"]
     worse = linear["quality"]["stages"][-1]["L"] / log["quality"]["stages"][-1]["L"]
     assert worse > 5

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import shlex
 import sys
 import time
@@ -201,6 +200,7 @@ def run(args: argparse.Namespace) -> int:
     from palette4d.analysis import pipeline
     from palette4d.cli import analysis_report
     from palette4d.grade import sidecar
+    from palette4d.grade.document import Document
     from palette4d.media.clip import open_clip
     from palette4d.media.colour_space import SpaceOptions
 
@@ -218,9 +218,7 @@ def run(args: argparse.Namespace) -> int:
         analysis = pipeline.analyze(clip, options, bars, spaces=spaces, allow_cuts=args.allow_cuts)
     finally:
         bars.close()
-    document = analysis.document
-    document["clip"]["source"] = _beside(document["clip"]["source"], args.output)
-    sidecar.save(document, args.output, on_edits=args.on_edits)
+    Document(analysis.document).save(args.output, on_edits=args.on_edits)
     for note in analysis.notes:
         print(f"palette4d: note: {note}", file=sys.stderr)
     if args.json:
@@ -243,16 +241,6 @@ def _options(args: argparse.Namespace) -> AnalysisOptions:
     except Palette4dError as error:
         args.usage_error(str(error))
     return AnalysisOptions(method=args.method, **given)
-
-
-def _beside(source: str, output: Path) -> str:
-    """Return a relative source as seen from the sidecar's folder, so that both may move."""
-    if Path(source).is_absolute():
-        return source
-    try:
-        return Path(os.path.relpath(source, output.absolute().parent)).as_posix()
-    except ValueError:  # on another drive
-        return str(Path(source).absolute())
 
 
 class _Bars:

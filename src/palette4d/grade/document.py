@@ -5,7 +5,6 @@ it back. The core is asked for every colour, so that a recolouring has the node'
 """
 
 import copy
-import difflib
 import json
 import math
 import os
@@ -25,6 +24,7 @@ from palette4d.common.files import link_target
 from palette4d.common.text import counted
 from palette4d.grade import edits, sidecar
 from palette4d.grade.edits import Change, Colour, Edit, Setting, Settings, as_colour
+from palette4d.grade.handles import Handles, unknown
 from palette4d.grade.palette import FAR, Near, Palette, palette_at
 from palette4d.grade.sidecar import Fields, OnEdits
 
@@ -82,6 +82,7 @@ class Document:
     def _start(self, data: bytes, core: _core.Sidecar) -> None:
         self._fields: Fields = json.loads(data)
         self._core: _core.Sidecar | None = core  # of `_settings`; None: to be parsed when needed
+        self._handles = Handles(self._fields["polytope"])
         self._settings = edits.from_fields(self._fields["edits"])
         self._saved = self._settings
         self._done: list[Edit] = []
@@ -92,7 +93,7 @@ class Document:
         first, last, _ = self.frames
         return (
             f"<Document {self._fields['clip']['name']!r}: frames {first} to {last}, "
-            f"{counted(len(self._vertices), 'vertex', 'vertices')}, "
+            f"{counted(len(self._handles.vertices), 'vertex', 'vertices')}, "
             f"{counted(len(self._settings), 'edit')}>"
         )
 
@@ -130,7 +131,7 @@ class Document:
         """Whether the clip is scene-linear, or its palette reaches far above 1 all the same."""
         clip = self._fields["clip"]
         names = (clip["encoding"], clip.get("conversion", {}).get("input_space", ""))
-        brightest = max(max(vertex["rgb"]) for vertex in self._vertices)
+        brightest = max(max(v["rgb"]) for v in self._handles.vertices.values())
         return any(_LINEAR.search(name) for name in names) or brightest > 2
 
     @property
@@ -152,16 +153,6 @@ class Document:
     def history(self) -> tuple[Edit, ...]:
         """The edits since the document was loaded, in order, without those taken back."""
         return tuple(self._done)
-
-    @property
-    def _vertices(self) -> list[dict[str, Any]]:
-        found: list[dict[str, Any]] = self._fields["polytope"]["vertices"]
-        return found
-
-    @property
-    def _edges(self) -> list[dict[str, Any]]:
-        found: list[dict[str, Any]] = self._fields["polytope"]["edges"]
-        return found
 
     def check_frame(self, frame: float) -> None:
         """Refuse a time outside the clip."""
@@ -200,8 +191,8 @@ class Document:
         """Return the edited colour of a vertex or stop, or of an edge at a frame."""
         if id in self._settings:
             return self._settings[id].rgb
-        if frame is None or _find(self._vertices, id) is not None:
-            return as_colour(self._vertex(id)["rgb"])
+        if frame is None or id in self._handles.vertices:
+            return as_colour(self._handles.vertex(id, self._settings)["rgb"])
         self.check_frame(frame)
         self._check_inside(id, frame)
         palette = self.palette(frame)
@@ -212,8 +203,8 @@ class Document:
         setting = self._settings.get(id)
         if setting is not None and setting.edge is not None:
             return f"stop {id} (edge {setting.edge}, frame {setting.frame:g})"
-        if (vertex := _find(self._vertices, id)) is not None:
-            return f"vertex {id} (frame {vertex['frame']:g})"
+        if id in self._handles.vertices:
+            return f"vertex {id} (frame {self._handles.vertices[id]['frame']:g})"
         return id
 
     def near(self, rgb: Iterable[float], *, frame: float) -> Near:
@@ -241,7 +232,7 @@ class Document:
             return id_
         if (stop := self._stop_at(id_, frame)) is not None:
             return stop
-        away = {end: abs(self._vertex(end)["frame"] - frame) for end in ends}
+        away = {end: abs(self._handles.vertex(end)["frame"] - frame) for end in ends}
         nearest = min(ends, key=lambda end: away[end])
         return nearest if away[nearest] <= self.frames[2] / 2 else None
 
@@ -254,7 +245,7 @@ class Document:
         if before is not None:
             after = Setting(new, before.edge, before.frame)
         else:
-            self._vertex(id)
+            self._handles.vertex(id, self._settings)
             after = Setting(new)
         self.apply(Edit((Change(id, before, after),)))
 
@@ -313,7 +304,7 @@ class Document:
         new, wanted = as_colour(rgb), as_colour(near)
         found = self.near(wanted, frame=frame)
         if found.distance > FAR and not anyway:
-            raise Palette4dError(_too_far(wanted, found))
+            raise Palette4dError(found.refusal(wanted))
         if found.handle is not None:
             self.set(found.handle, rgb=new)
             return found
@@ -329,13 +320,13 @@ class Document:
         """Move a stop in time, within its edge."""
         before = self._settings.get(stop)
         if before is None or before.edge is None:
-            if _find(self._vertices, stop) is not None:
+            if stop in self._handles.vertices:
                 raise Palette4dError(
                     f"{stop} is a palette vertex, whose time the analysis found; only stops move "
                     "in time. Its colour moves with --by"
                 )
             stops = [id_ for id_, setting in self._settings.items() if setting.edge is not None]
-            raise _unknown(stop, "stop", stops)
+            raise unknown(stop, "stop", stops)
         self.check_frame(frame)
         self._check_inside(before.edge, frame)
         there = self._stop_at(before.edge, frame)
@@ -349,7 +340,7 @@ class Document:
     def reset(self, id: str | None = None) -> None:
         """Give a vertex its own colour back, remove a stop, or (None) reset everything."""
         if id is not None and id not in self._settings:
-            self._vertex(id)
+            self._handles.vertex(id, self._settings)
             return
         ids = list(self._settings) if id is None else [id]
         if ids:
@@ -554,18 +545,7 @@ class Document:
     # ------------------------------------------------------------------------------------ details
 
     def _taken(self) -> frozenset[str]:
-        return frozenset(entry["id"] for entry in (*self._vertices, *self._edges))
-
-    def _vertex(self, id_: str) -> dict[str, Any]:
-        found = _find(self._vertices, id_)
-        if found is not None:
-            return found
-        if _find(self._edges, id_) is not None:
-            raise Palette4dError(
-                f"{id_} is an edge, whose colour changes in time; say at which frame it gets one, "
-                f"as in `set {id_} --frame T --rgb R G B`"
-            )
-        raise _unknown(id_, "vertex or stop", [v["id"] for v in self._vertices] + [*self._settings])
+        return frozenset((*self._handles.vertices, *self._handles.edges))
 
     def _stop_at(self, edge: str, frame: float) -> str | None:
         for id_, setting in self._settings.items():
@@ -574,26 +554,12 @@ class Document:
         return None
 
     def _check_inside(self, edge: str, frame: float) -> None:
-        found = _find(self._edges, edge)
-        if found is None and (edge in self._settings or _find(self._vertices, edge)):
+        if edge in self._settings or edge in self._handles.vertices:
             raise Palette4dError(
                 f"{self.named(edge)} has a time of its own; --frame goes with an edge, or with "
                 f"--near. Use `set {edge} --rgb R G B`"
             )
-        if found is None:
-            raise _unknown(edge, "edge", [entry["id"] for entry in self._edges])
-        start, end = self._vertex(found["from"]), self._vertex(found["to"])
-        for vertex in (start, end):
-            if frame == vertex["frame"]:
-                raise Palette4dError(
-                    f"at frame {frame:g} edge {edge} has its end {vertex['id']}, which needs no "
-                    f"stop; use `set {vertex['id']} --rgb R G B`"
-                )
-        if not start["frame"] < frame < end["frame"]:
-            raise Palette4dError(
-                f"edge {edge} runs from {start['id']} at frame {start['frame']:g} to {end['id']} "
-                f"at frame {end['frame']:g}; found frame {frame:g}, expected one in between"
-            )
+        self._handles.check_inside(edge, frame)
 
 
 def _with_edits(fields: Fields, settings: Settings) -> Fields:
@@ -605,32 +571,6 @@ def _finite(frame: float) -> float:
     if not math.isfinite(frame):
         raise Palette4dError(f"found the frame {frame}, expected a finite number")
     return float(frame)
-
-
-def _find(entries: list[dict[str, Any]], id_: str) -> dict[str, Any] | None:
-    return next((entry for entry in entries if entry["id"] == id_), None)
-
-
-def _unknown(id_: str, kind: str, ids: list[str]) -> Palette4dError:
-    near = difflib.get_close_matches(id_, ids, n=5, cutoff=0.5) or ids[:5]
-    if not near:
-        return Palette4dError(f"there is no {kind} {id_!r}; the file holds none")
-    return Palette4dError(
-        f"there is no {kind} {id_!r}; did you mean {' or '.join(near)}? "
-        "`palette4d info SIDECAR` lists all ids"
-    )
-
-
-def _too_far(wanted: Colour, found: Near) -> str:
-    shown = ", ".join(f"{value:.4g}" for value in wanted)
-    there = ", ".join(f"{value:.4g}" for value in found.rgb)
-    made_of = ", ".join(f"{id_} {share:.0%}" for id_, share in found.shares[:5] if share >= 0.005)
-    return (
-        f"the palette colour nearest to ({shown}) at frame {found.frame:g} is ({there}) of "
-        f"{found.id}, {found.distance:.3g} away; expected one within {FAR:g}. A pixel of ({shown}) "
-        f"is made of {made_of}. Edit one of these, or edit {found.id} anyway (--anyway; "
-        "anyway=True)"
-    )
 
 
 def _checked_image(image: F32) -> F32:

@@ -80,6 +80,18 @@ class Near:
     distance: float
     shares: list[tuple[str, float]]
 
+    def refusal(self, wanted: Colour) -> str:
+        """Return why this palette colour is too far from the one that was asked for."""
+        shown = ", ".join(f"{value:.4g}" for value in wanted)
+        there = ", ".join(f"{value:.4g}" for value in self.rgb)
+        made_of = ", ".join(f"{id_} {part:.0%}" for id_, part in self.shares[:5] if part >= 0.005)
+        return (
+            f"the palette colour nearest to ({shown}) at frame {self.frame:g} is ({there}) of "
+            f"{self.id}, {self.distance:.3g} away; expected one within {FAR:g}. A pixel of "
+            f"({shown}) is made of {made_of}. Edit one of these, or edit {self.id} anyway "
+            "(--anyway; anyway=True)"
+        )
+
 
 def palette_at(sidecar: _core.Sidecar, frame: float) -> Palette:
     """Return the palette of a sidecar at a time."""

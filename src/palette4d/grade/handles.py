@@ -1,0 +1,73 @@
+"""A palette's vertices and edges by id. An id that does not exist is an error with advice."""
+
+import difflib
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from palette4d.common.errors import Palette4dError
+
+
+class Handles:
+    """The vertices and edges of a sidecar's polytope.
+
+    Attributes
+    ----------
+    vertices, edges : dict of str to dict
+        The sidecar's members by id, in the sidecar's order.
+    """
+
+    def __init__(self, polytope: Mapping[str, Any]) -> None:
+        self.vertices: dict[str, dict[str, Any]] = {v["id"]: v for v in polytope["vertices"]}
+        self.edges: dict[str, dict[str, Any]] = {e["id"]: e for e in polytope["edges"]}
+
+    def vertex(self, id_: str, others: Iterable[str] = ()) -> dict[str, Any]:
+        """Return a vertex.
+
+        Raises
+        ------
+        Palette4dError
+            There is none of this id; the error names ids that are similar, `others` among them.
+        """
+        if id_ in self.vertices:
+            return self.vertices[id_]
+        if id_ in self.edges:
+            raise Palette4dError(
+                f"{id_} is an edge, whose colour changes in time; say at which frame it gets one, "
+                f"as in `set {id_} --frame T --rgb R G B`"
+            )
+        raise unknown(id_, "vertex or stop", [*self.vertices, *others])
+
+    def check_inside(self, edge: str, frame: float) -> None:
+        """Refuse a place for a stop that is not between the ends of an edge.
+
+        Raises
+        ------
+        Palette4dError
+            There is no such edge, or the frame is not strictly between its ends.
+        """
+        if edge not in self.edges:
+            raise unknown(edge, "edge", self.edges)
+        start, end = (self.vertices[self.edges[edge][name]] for name in ("from", "to"))
+        for vertex in (start, end):
+            if frame == vertex["frame"]:
+                raise Palette4dError(
+                    f"at frame {frame:g} edge {edge} has its end {vertex['id']}, which needs no "
+                    f"stop; use `set {vertex['id']} --rgb R G B`"
+                )
+        if not start["frame"] < frame < end["frame"]:
+            raise Palette4dError(
+                f"edge {edge} runs from {start['id']} at frame {start['frame']:g} to {end['id']} "
+                f"at frame {end['frame']:g}; found frame {frame:g}, expected one in between"
+            )
+
+
+def unknown(id_: str, kind: str, ids: Iterable[str]) -> Palette4dError:
+    """Return the error that names ids like one that does not exist."""
+    known = list(ids)
+    near = difflib.get_close_matches(id_, known, n=5, cutoff=0.5) or known[:5]
+    if not near:
+        return Palette4dError(f"there is no {kind} {id_!r}; the file holds none")
+    return Palette4dError(
+        f"there is no {kind} {id_!r}; did you mean {' or '.join(near)}? "
+        "`palette4d info SIDECAR` lists all ids"
+    )
