@@ -279,7 +279,7 @@ def test_no_other_kind_is_taken_for_a_cut(kind, analysed):
     assert cuts.find_cuts((frame.frame, frame.histogram) for frame in gathered) == []
 
 
-@pytest.mark.parametrize("kind", ["interlaced", "hdr_exr", "monochrome"])
+@pytest.mark.parametrize("kind", ["interlaced", "monochrome"])
 def test_through_the_command(kind, tmp_path, capsys):
     folder = tmp_path / "clip"
     folder.mkdir()
