@@ -129,7 +129,9 @@ def analyze(
     from palette4d.media.clip import Clip, open_clip
     from palette4d.media.colour_space import SpaceOptions
 
-    given = dict(parse_setting(f"{name.rstrip('_')}={value}") for name, value in settings.items())
+    given: dict[str, Any] = dict(
+        parse_setting(f"{name.rstrip('_')}={value}") for name, value in settings.items()
+    )
     check_methods(method, given)
     if isinstance(clip, str | os.PathLike):
         opened: Clip = open_clip(
