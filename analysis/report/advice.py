@@ -2,7 +2,7 @@
 
 Input: the `Report` of a finished palette, the options it was found with, and the farthest pixel at
 each stage. Output: sentences. A remedy names only options that affect the method in use.
-docs/palettes.md lists the warnings and the clips on which the remedies were tried.
+docs/palettes.md lists the warnings, docs/lab/palettes.md the clips that show the remedies.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Clips of every kind, from real files through the real reader and the whole analysis.
 
-`docs/clips.md` states for each kind what is asserted here.
+`docs/lab/clips.md` states for each kind what is asserted here.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from palette4d.media import cuts
 from palette4d.media.clip import Clip, open_clip
 
 # kind: most of L, most handles, most distance of a pixel outside. Each is about one and a half
-# times what was measured, which docs/clips.md states.
+# times what was measured, which docs/lab/clips.md states.
 KINDS = {
     "clean": (0.03, 16, 0.02),
     "flash": (0.03, 32, 0.02),

@@ -16,7 +16,7 @@ is a small difference. The difference of a frame from the one before is a cut wh
 A dissolve is a change in time that a palette follows: it is no cut. A cut between pictures of equal
 colours is not detected, and does no harm. Two frames alone show no cut, since the speed of the clip
 is unknown. A lasting change of light, such as a lamp switched on, is a cut to a palette too.
-docs/clips.md has the figures behind the limits.
+docs/lab/clips.md has the figures behind the limits.
 """
 
 from __future__ import annotations
