@@ -107,12 +107,11 @@ def test_near_hits_exactly(plain: str, capsys: pytest.CaptureFixture[str], frame
     assert len(edited["vertices"]) + len(edited["stops"]) == 1
 
 
-def test_near_a_vertex_in_time_moves_it(plain: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_near_a_vertex_in_time_moves_it(plain: str) -> None:
     arguments = ["edit", plain, "set", "--near", "#e61a1a", "--frame", "9.25", "--rgb", "0,0,1"]
     assert main.main(arguments) == 0
     assert [entry["vertex"] for entry in edits_of(plain)["vertices"]] == ["v6"]
-    assert edited_slice(plain, 9)[1] == [0, 0, 1]
-    assert "at 9.25" in capsys.readouterr().out
+    assert [0, 0, 1] in [pytest.approx(colour, abs=1e-12) for colour in edited_slice(plain, 9.25)]
 
 
 def test_near_takes_an_existing_stop(edited: str) -> None:
@@ -165,16 +164,15 @@ def test_by_reads_what_rgb_reads(plain: str, by: list[str]) -> None:
     assert edits_of(plain)["vertices"][0]["rgb"][0] == pytest.approx(0.2, abs=0.01)
 
 
-@pytest.mark.parametrize("verb", ["set", "stop"])
-def test_an_edge_at_a_frame(plain: str, verb: str) -> None:
-    assert main.main(["edit", plain, verb, "e2", "--frame", "3", "--rgb", "0", "0", "1"]) == 0
+def test_an_edge_at_a_frame(plain: str) -> None:
+    assert main.main(["edit", plain, "set", "e2", "--frame", "3", "--rgb", "0", "0", "1"]) == 0
     assert edits_of(plain)["stops"] == [
         {"id": "s1", "edge": "e2", "frame": 3, "rgb": [0.0, 0.0, 1.0]}
     ]
 
 
 def test_stop_changes_its_moment_and_fades(plain: str) -> None:
-    assert main.main(["edit", plain, "stop", "e2", "--frame", "3", "--rgb", "0", "0", "1"]) == 0
+    assert main.main(["edit", plain, "set", "e2", "--frame", "3", "--rgb", "0", "0", "1"]) == 0
     assert edits_of(plain)["stops"] == [
         {"id": "s1", "edge": "e2", "frame": 3, "rgb": [0.0, 0.0, 1.0]}
     ]
@@ -187,13 +185,13 @@ def test_stop_changes_its_moment_and_fades(plain: str) -> None:
 
 def test_stop_again_recolours(plain: str) -> None:
     for colour in ("1,0,0", "0,1,0"):
-        assert main.main(["edit", plain, "stop", "e2", "--frame", "3", "--rgb", colour]) == 0
+        assert main.main(["edit", plain, "set", "e2", "--frame", "3", "--rgb", colour]) == 0
     assert [stop["rgb"] for stop in edits_of(plain)["stops"]] == [[0.0, 1.0, 0.0]]
 
 
 def test_stop_ids_are_stable_and_new(edited: str) -> None:
     assert main.main(["edit", edited, "reset", "s1"]) == 0
-    assert main.main(["edit", edited, "stop", "e1", "--frame", "3", "--rgb", "1,1,1"]) == 0
+    assert main.main(["edit", edited, "set", "e1", "--frame", "3", "--rgb", "1,1,1"]) == 0
     assert [stop["id"] for stop in edits_of(edited)["stops"]] == ["s3", "s2", "s4"]
 
 
@@ -229,7 +227,7 @@ def test_reset(edited: str, capsys: pytest.CaptureFixture[str]) -> None:
 def test_reset_gives_the_file_back(plain: str) -> None:
     before = Path(plain).read_bytes()
     assert main.main(["edit", plain, "set", "v4", "--rgb", "1,1,1"]) == 0
-    assert main.main(["edit", plain, "stop", "e3", "--frame", "2.5", "--rgb", "1,1,1"]) == 0
+    assert main.main(["edit", plain, "set", "e3", "--frame", "2.5", "--rgb", "1,1,1"]) == 0
     assert main.main(["edit", plain, "reset"]) == 0
     assert Path(plain).read_bytes() == before
 
@@ -281,7 +279,7 @@ def test_errors_leave_the_file_alone(
     [
         [],
         ["paint", "v4"],
-        ["stop", "e3", "--frame", "nan", "--rgb", "1,1,1"],
+        ["set", "e3", "--frame", "nan", "--rgb", "1,1,1"],
         ["move", "s1", "--by", "1", "2"],
         ["move", "s1", "--by", "1", "2", "nan"],
         ["set", "v4"],
@@ -307,7 +305,7 @@ def test_wrong_usage_is_2(edited: str, words: list[str]) -> None:
         (["set", "v1", "--rgb", "-0.5", "0", "1"], (3, 3)),
         (["set", "--near", "-0.1,0.9,0.1", "--frame", "0", "--rgb", "1", "0", "1"], (3, 3)),
         (["set", "--near", "0.1,0.1,0.1", "--frame", "2.5", "--rgb", "-1,0,1"], (2, 4)),
-        (["stop", "e1", "--frame", "2.5", "--rgb", "#102030"], (2, 4)),
+        (["set", "e1", "--frame", "2.5", "--rgb", "#102030"], (2, 4)),
         (["move", "s1", "--frame", "3", "--by", "-0.1", "-0.1", "-0.1"], (2, 3)),
         (["reset", "s1"], (2, 2)),
     ],

@@ -123,7 +123,7 @@ def recoloured_sample(
     summer = ("--near", "0.2,0.45,0.95", "--frame", 1)
     palette4d("edit", sidecar, "set", *summer, "--rgb", 0.5, 0.2, 0.9)
     yellow = ("--near", "0.75,0.6,0.1", "--frame", 22.5)
-    palette4d("edit", sidecar, "stop", *yellow, "--rgb", 0.95, 0.3, 0.6)
+    palette4d("edit", sidecar, "set", *yellow, "--rgb", 0.95, 0.3, 0.6)
     night = ("--near", "0.02,0.07,0.28", "--frame", 48)
     palette4d("edit", sidecar, "set", *night, "--rgb", 0.0, 0.4, 0.25)
     return render_both_ways(melt, bundle, sidecar, clip)

@@ -53,11 +53,9 @@ def _action(
     name: str,
     usage: str,
     description: str,
-    aliases: tuple[str, ...] = (),
 ) -> argparse.ArgumentParser:
     return actions.add_parser(
         name,
-        aliases=aliases,
         help=description.split(".")[0],
         description=textwrap.fill(description, 79),
         usage=f"palette4d edit [-h] SIDECAR {name} {usage}",
@@ -72,9 +70,8 @@ def _add_set(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
         "set",
         "(ID | EDGE --frame T | --near C --frame T) --rgb C",
         "give a palette colour another colour. With --near, the palette colour nearest to the one "
-        "that you see at a frame gets the new colour there: its vertex moves if it has one at that "
-        "frame, else a stop is added.",
-        aliases=("stop",),
+        "that you see at a frame gets the new colour there: its vertex moves if it has one within "
+        "half a frame, else a stop is added.",
     )
     parser.add_argument("id", nargs="?", metavar="ID", help="a vertex, a stop, or an edge")
     parser.add_argument(
@@ -167,9 +164,8 @@ def run_set(args: argparse.Namespace) -> int:
             document.stop(args.id, frame=args.frame, rgb=args.rgb)
     document.save()
     handle = document.history[-1].changes[0].id
-    lines.append(f"{document.named(handle)}: {shown(before)} -> {shown(args.rgb)}")
-    if args.near is not None and (now := document.colour(found.id, frame=args.frame)) != args.rgb:
-        lines.append(f"between frames, at {args.frame:g}, it is {shown(now)}")
+    at = f" at frame {args.frame:g}" if args.frame is not None else ""
+    lines.append(f"{document.named(handle)}: {shown(before)} -> {shown(args.rgb)}{at}")
     print("\n".join(lines))
     return 0
 

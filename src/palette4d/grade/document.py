@@ -30,6 +30,9 @@ from palette4d.grade.sidecar import Fields, OnEdits
 
 F32 = NDArray[np.float32]
 
+#: A vertex that has less of the colour at a frame than this is left alone: it would move too far.
+LEAST_SHARE = 0.5
+
 #: Names of scene-linear colour spaces: "Linear", "lin_rec709", "ACEScg", "ACES2065-1", ...
 _LINEAR = re.compile(r"\blin(ear)?(\b|_)|scene.linear|acescg|aces2065", re.IGNORECASE)
 
@@ -275,8 +278,8 @@ class Document:
     ) -> Near:
         """Give the palette colour nearest to one that is seen at a frame a new colour there.
 
-        It moves the vertex if there is one within half a frame step, else the stop at that time,
-        else it adds a stop.
+        It moves the vertex if there is one within half a frame step, so far that the colour at the
+        frame is `rgb`; else the stop at that time; else it adds a stop.
 
         Parameters
         ----------
@@ -305,11 +308,30 @@ class Document:
         found = self.near(wanted, frame=frame)
         if found.distance > FAR and not anyway:
             raise Palette4dError(found.refusal(wanted))
-        if found.handle is not None:
-            self.set(found.handle, rgb=new)
-            return found
-        handle = self.stop(found.id, frame=frame, rgb=new)
+        handle, moved = found.handle, new
+        if handle in self._handles.vertices and handle != found.id:
+            share = self._share(handle, found.id, frame)
+            if share < LEAST_SHARE:
+                handle = None
+            else:
+                own = self.colour(handle)
+                moved = as_colour(
+                    [o + (n - f) / share for o, n, f in zip(own, new, found.rgb, strict=True)]
+                )
+        if handle is not None:
+            self.set(handle, rgb=moved)
+        else:
+            handle = self.stop(found.id, frame=frame, rgb=new)
         return Near(frame, found.id, handle, found.rgb, found.distance, found.shares)
+
+    def _share(self, vertex: str, edge: str, frame: float) -> float:
+        """Return the weight, 0..1, of an end of an edge in the edge's displacement at a frame."""
+        at = self._handles.vertex(vertex)["frame"]
+        ends = self._handles.edges[edge]
+        knots = [self._handles.vertex(ends[end])["frame"] for end in ("from", "to")]
+        knots += [setting.frame for setting in self._settings.values() if setting.edge == edge]
+        nearest = min(abs(knot - at) for knot in knots if knot != at)
+        return max(0.0, 1 - abs(frame - at) / nearest)
 
     def shift(self, id: str, *, by: Iterable[float]) -> None:
         """Add three offsets to the colour of a vertex or a stop."""
