@@ -326,11 +326,12 @@ class Document:
 
     def _share(self, vertex: str, edge: str, frame: float) -> float:
         """Return the weight, 0..1, of an end of an edge in the edge's displacement at a frame."""
-        at = self._handles.vertex(vertex)["frame"]
+        at: float = self._handles.vertex(vertex)["frame"]
         ends = self._handles.edges[edge]
-        knots = [self._handles.vertex(ends[end])["frame"] for end in ("from", "to")]
-        knots += [setting.frame for setting in self._settings.values() if setting.edge == edge]
-        nearest = min(abs(knot - at) for knot in knots if knot != at)
+        knots: list[float] = [self._handles.vertex(ends[end])["frame"] for end in ("from", "to")]
+        stops = [each for each in self._settings.values() if each.edge == edge]
+        knots += [stop.frame for stop in stops if stop.frame is not None]
+        nearest: float = min(abs(knot - at) for knot in knots if knot != at)
         return max(0.0, 1 - abs(frame - at) / nearest)
 
     def shift(self, id: str, *, by: Iterable[float]) -> None:
