@@ -14,20 +14,20 @@ namespace palette4d {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-/// Distances below this share of the palette's extent are rounding.
+/// Distances below this share of the palette's extent count as rounding.
 constexpr double kRounding = 1e-12;
-/// Faces whose height is below this share of their longest side have no usable normal. What they
-/// would add to mean value coordinates is of the same order.
+/// A face whose height is below this share of its longest side has no usable normal. Skipping it
+/// changes mean value coordinates by about that share.
 constexpr double kThin = 1e-8;
-/// Closer to a face's plane than this share of the distance to its nearest corner, the terms of the
-/// face's mean vector cancel; they are then taken as differences from their values in the plane.
+/// Closer to a face's plane than this share of the distance to its nearest corner, terms of the
+/// mean vector cancel. They are then computed as differences from their values in the plane.
 constexpr double kNearPlane = 0.05;
-/// Total weights below this share of the weights' own sizes are rounding.
+/// A total weight below this share of the weights' magnitudes counts as rounding.
 constexpr double kVanishing = 1e-11;
-/// Further out than this many extents the weights (of the size of the distance, and of both signs)
-/// have lost too many digits to reproduce anything.
+/// Farther out than this many extents, the weights are large and of both signs: too few digits
+/// remain to reproduce the colour.
 constexpr double kFar = 1000;
-/// Colours further out than this are drawn in first, so that no product overflows.
+/// Colours farther out are first pulled in to this distance, so that no product overflows.
 constexpr double kReach = 1e30;
 
 void set_to(double value, std::size_t n, double* weights) {
@@ -107,8 +107,8 @@ PaletteBody::PaletteBody(std::vector<Vec3> rgb, std::vector<Face> faces)
             return std::abs(dot(first_plane->normal, colour - corner)) <= tolerance_;
         });
     }
-    // The two sides of a flat body may be cut into different triangles, but a colour must always be
-    // weighed on the same side, or the weights would jump where it crosses one of their edges.
+    // The two sides of a flat body may have different triangles. Every colour uses the same side,
+    // or its weights would jump at the other side's edges.
     for (std::size_t f = 0; f < faces_.size(); ++f) {
         if (flat_ && (planes_[f].degenerate || dot(planes_[f].normal, first_plane->normal) < 0)) {
             continue;
@@ -175,7 +175,7 @@ PaletteBody::Closest PaletteBody::closest_point(const Vec3& p, bool visible_only
             continue;
         }
         const Closest here = closest_on_face(p, f);
-        // Among faces at the same distance the first one counts, whatever the rounding.
+        // Of faces at the same distance the first one wins, whatever the rounding.
         if (here.distance < best.distance - tolerance_) best = here;
     }
     return best;
