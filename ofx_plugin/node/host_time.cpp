@@ -5,7 +5,7 @@
 namespace palette4d::node {
 namespace {
 
-// A clip of four million frames is 48 hours at 24 frames a second; Resolve wants finite ranges.
+// Four million frames are 48 hours at 24 frames a second; Resolve needs finite ranges.
 constexpr double kMostFrames = 4e6;
 constexpr Range<double> kFrames = {0, -kMostFrames, kMostFrames, -1000, 1000};
 
@@ -66,7 +66,7 @@ TimeSettings time_settings_at(const Params& params, OfxTime time) {
     settings.host_rate = number(kParamHostRate, 0);
     settings.in_point = number(kParamInPoint, 0);
     settings.offset = number(kParamFrameOffset, 0);
-    // 0 is what a host has that took no default from us: a clip that stands still is none.
+    // 0 comes from a host that ignored our default: a clip never stands still.
     settings.speed = number(kParamSpeed, 1);
     if (!(settings.speed > 0)) settings.speed = 1;
     settings.reverse = chosen(kParamReverse);

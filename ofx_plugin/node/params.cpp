@@ -19,7 +19,7 @@ void define_params(const Suites& suites, OfxParamSetHandle params) {
                      "What was loaded, which of its frames is shown, or what is wrong with the "
                      "sidecar."},
                     kOfxParamStringIsMultiLine, "No sidecar chosen");
-    // Natron writes what is not enabled in black on dark grey.
+    // Natron draws disabled text black on dark grey, so the status stays enabled there.
     status.set_int(kOfxParamPropEnabled, suites.is_natron);
     status.set_int(kOfxParamPropEvaluateOnChange, 0);
     status.set_int(kOfxParamPropCanUndo, 0);

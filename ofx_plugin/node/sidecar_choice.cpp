@@ -14,14 +14,14 @@ bool differs(const Params& params, const char* name, const std::string& text) {
     return now && *now != text;
 }
 
-/// For the hidden ones, which cannot be undone.
+/// Sets one of the hidden parameters, which have no undo.
 void note_text(const Params& params, const char* name, const std::string& text) {
     if (differs(params, name, text)) params.note_string(name, text);
 }
 
-/// A host caches frames by its parameters. The revision names what the frames show, a failure too,
-/// and counts, so that no earlier value returns: the host may have cached a frame under it after
-/// the file changed and before the node could say so.
+/// A host caches frames by parameter values, so the revision names the content or the failure. A
+/// counter makes each value unique: the host may hold a frame cached under the old value after the
+/// file changed.
 void note_revision(const Params& params, const Chosen& chosen, bool reloaded) {
     const std::string before = params.string_now(kParamRevision).value_or("");
     const std::size_t sign = before.find('#');
@@ -37,8 +37,8 @@ void note_revision(const Params& params, const Chosen& chosen, bool reloaded) {
     note_text(params, kParamRevision, state + "#" + std::to_string(count + 1));
 }
 
-/// The sidecar of the clip's name, or the project's copy of one of that name: a node that was
-/// copied to another clip carries the copy of the first.
+/// The sidecar with the clip's name, or the project's copy if that has the name too. A node pasted
+/// to another clip still has the first clip's copy.
 void find_by_name(Chosen& chosen, const std::string& folder, const std::string& copy) {
     if (const auto found = find_beside(chosen.media, folder)) {
         chosen.any = true;
@@ -125,7 +125,7 @@ Chosen chosen_sidecar(const Params& params, std::optional<OfxTime> time) {
         }
     }
     if (found) return chosen;
-    // It says what is wrong.
+    // Loads it anyway, for its error message.
     chosen.path = expanded(meant(given));
     chosen.result = load_sidecar(chosen.path);
     const std::string missing = words_of_missing(given);
