@@ -15,7 +15,7 @@ using namespace palette4d::bindings;
 
 namespace {
 
-/// (..., 3) numbers to float64 ones of the same shape.
+/// Converts (..., 3) numbers to float64 of the same shape.
 DoubleArray converted(const py::array_t<double, py::array::c_style | py::array::forcecast>& colours,
                       Vec3 (ColourConversion::*by)(const Vec3&) const,
                       const ColourConversion& self) {

@@ -16,7 +16,7 @@ using namespace palette4d::bindings;
 
 namespace {
 
-/// (h, w, 3 or 4) float32 whose pixels are packed within a row; rows may lie anywhere.
+/// Requires (h, w, 3 or 4) float32 with packed pixels in each row; rows may have any stride.
 void require_image(const py::array& image, const char* what) {
     const std::string name(what);
     if (!py::isinstance<py::array_t<float>>(image)) {
@@ -57,7 +57,7 @@ View view_of(const py::array& image, Pixel* data) {
             static_cast<int>(image.shape(2)), image.strides(0)};
 }
 
-/// Whether two images that are not the very same rows share memory.
+/// Whether two images share memory without being exactly the same rows.
 bool overlap(const py::array& a, const py::array& b) {
     if (a.size() == 0 || b.size() == 0) return false;
     if (a.data() == b.data() && a.strides(0) == b.strides(0)) return false;
@@ -87,7 +87,7 @@ InstructionSet instructions_from(const std::string& name) {
     throw py::value_error("instructions: found '" + name + "', expected one of " + names);
 }
 
-/// By a Recolourer or a Lattice.
+/// Recolours with a Recolourer or a Lattice.
 template <class Map>
 py::array apply(const Map& self, const py::array& image, double strength, bool premultiplied,
                 int threads, const py::object& out, const std::string& precision,

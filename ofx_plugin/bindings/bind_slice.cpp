@@ -34,7 +34,7 @@ DoubleArray weights_of(const Slice& self) {
     return array;
 }
 
-/// A slice of another polytope must not be read past this one's ends.
+/// Refuses a slice of another polytope: its indices could be out of range here.
 void require_slice_of(const Polytope& polytope, const Slice& slice) {
     const int vertices = static_cast<int>(polytope.vertices().size());
     const int edges = static_cast<int>(polytope.edges().size());

@@ -89,29 +89,30 @@ void set_secret(const Properties& properties, bool secret) {
 void define_handle_params(ParamDefiner& define) {
     define.begin_group("handles", "Palette handles");
     define.choice({kParamEditsFrom, "Edits from",
-                   "Which edits apply: those in the sidecar, those made here with the handles "
-                   "below, or both; where both have one, the handle here counts."},
+                   "Which edits apply: the sidecar's, the edits made with the handles below, or "
+                   "both. If both edit a handle, the edit made here wins."},
                   {"Sidecar", "Host", "Both"}, static_cast<int>(EditsFrom::kBoth));
     define.button({kParamResetHandles, "Reset handles",
-                   "Switches all handles here off and removes their keyframes."});
+                   "Switches off all handles below and removes their keyframes."});
     for (const Slot& slot : slots()) {
         define
             .flag({slot.use.c_str(), slot.use_label.c_str(),
-                   "Whether the colour replaces the palette's. Changing the colour switches this "
-                   "on, in hosts that tell the node of changes."},
+                   "On: this colour replaces the palette colour. A change of the colour switches "
+                   "this on, in hosts that report changes to the node."},
                   false)
             .set_int(kOfxParamPropLayoutHint, kOfxParamPropLayoutHintNoNewLine);
         define.colour({slot.colour.c_str(), slot.colour_label.c_str(),
-                       "The new colour of this handle, in the palette's encoding, or in linear "
-                       "light where Picture is in says Scene-linear. May be keyframed."},
+                       "The new colour of this handle, in the palette's encoding. It is linear "
+                       "light if Picture is in is set to Scene-linear. May be keyframed."},
                       kUnset, -kLargest, kLargest);
     }
     define.begin_group("handleIds", "Which handles");
     for (const Slot& slot : slots()) {
-        define.text({slot.id.c_str(), slot.id_label.c_str(),
-                     "The id of the palette vertex or colour stop that this handle moves, as "
-                     "'palette4d info' lists it. Empty: the sidecar's next one in order."},
-                    kOfxParamStringIsSingleLine);
+        define.text(
+            {slot.id.c_str(), slot.id_label.c_str(),
+             "The id of the palette vertex or colour stop that this handle edits. 'palette4d info' "
+             "lists the ids. Empty: the handle of the same number in the sidecar."},
+            kOfxParamStringIsSingleLine);
     }
     define.end_group();
 }

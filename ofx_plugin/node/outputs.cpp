@@ -220,41 +220,39 @@ std::vector<float> mask_of(const Image& mask, const OfxRectI& rows) {
 void define_output_params(ParamDefiner& define) {
     define.begin_group("outputs", "Output");
     define.choice({kParamOutput, "Output",
-                   "Recoloured: the graded picture. Weight of a handle: how much of a palette "
-                   "colour is in each pixel, followed through time, a soft key. Palette: the "
-                   "graded picture with this frame's palette at its foot, the palette's own "
-                   "colours above and the new ones below. Outside: what the palette does not "
-                   "enclose."},
+                   "Recoloured: the graded picture. Weight of a handle: a soft key that follows "
+                   "one palette colour through time. Palette: the graded picture with this frame's "
+                   "palette at the bottom, original colours above and new colours below. Outside: "
+                   "a matte of the colours outside the palette."},
                   {"Recoloured", "Weight of a handle", "Palette", "Outside"});
     define.integer({kParamWeightOf, "Handle",
-                    "The handle whose weight is put out: 2 for the one at Use 2 below."},
+                    "The handle for Weight of a handle: 2 is the handle of Use 2 below."},
                    {1, 1, 100000, 1, 32});
-    define.choice({kParamMatteIn, "Matte in",
-                   "Picture: a matte (weight, outside) is a grey picture. Alpha: the picture keeps "
-                   "its colours, and its alpha (1 where it is opaque) is multiplied by the "
-                   "matte."},
-                  {"Picture", "Alpha"});
-    define.number({kParamOutsideReach, "Outside at",
-                   "The distance from the palette at which Outside is white; nearer to it, it is "
-                   "grey."},
-                  {0.05, 0.0001, 100, 0.001, 1}, 0.01, 4, false);
+    define.choice(
+        {kParamMatteIn, "Matte in",
+         "Picture: outputs the matte (Weight of a handle or Outside) as a grey picture. Alpha: "
+         "keeps the picture's colours and multiplies its alpha (1 if opaque) by the matte."},
+        {"Picture", "Alpha"});
+    define.number(
+        {kParamOutsideReach, "Outside at",
+         "The distance from the palette at which Outside is white. Nearer colours are grey."},
+        {0.05, 0.0001, 100, 0.001, 1}, 0.01, 4, false);
     define.number({kParamKeepLightness, "Keep lightness",
-                   "How much of the source's lightness the graded picture keeps: 0 none of it, 1 "
-                   "all of it, so that hue and saturation alone change."},
+                   "How much of the source's lightness the graded picture keeps: 0 none, 1 all. At "
+                   "1 only hue and saturation change."},
                   {0, 0, 1, 0, 1}, 0.01, 3, true);
     define.choice({kParamLightnessOf, "Lightness of",
-                   "Whose weights of red, green and blue make up lightness. Auto: those of the "
-                   "space that the picture is in by the sidecar, Rec.709 where it names none that "
-                   "is known."},
+                   "The colour space whose luminance weights define lightness. Auto: the sidecar's "
+                   "colour space, or Rec.709 if the node does not know that space."},
                   {"Auto", "Rec.709", "Rec.2020", "P3", "ACES AP1", "Rec.601"});
     define.choice({kParamPictureIn, "Picture is in",
-                   "Input space: the code values of the analysed clip. Palette space: those of the "
-                   "palette, such as ACEScct, for hosts that convert by themselves. Without a "
-                   "conversion in the sidecar both are the same. Scene-linear: linear light, for a "
-                   "palette in sRGB, Rec.709 or another display encoding; the handles' colours are "
-                   "linear too."},
+                   "The node's input colour space. Input space: the analysed clip's code values. "
+                   "Palette space: the palette's code values, such as ACEScct, for hosts that "
+                   "convert themselves. Without a conversion in the sidecar both are the same. "
+                   "Scene-linear: linear light, for a palette in sRGB, Rec.709 or another display "
+                   "encoding. The handles' colours are then linear too."},
                   {"Input space", "Palette space", "Scene-linear"});
-    define.number({kParamMix, "Mix", "From the source (0) to what is put out (1)."},
+    define.number({kParamMix, "Mix", "Blends from the source (0) to the output (1)."},
                   {1, 0, 1, 0, 1}, 0.01, 3, true);
     define.end_group();
 }

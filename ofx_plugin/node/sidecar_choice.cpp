@@ -75,17 +75,18 @@ void define_file_params(ParamDefiner& define) {
     define.flag({kParamFindByName, "Find by clip's name",
                  "While Sidecar is empty, the node uses the sidecar that has the clip's name: for "
                  "shot.mov it searches shot.p4d.json beside the clip, in Clip's folder and in "
-                 "PALETTE4D_PATH. Works in hosts that tell the clip's file: DaVinci Resolve."},
+                 "PALETTE4D_PATH. Works in hosts that report the clip's file: DaVinci Resolve."},
                 true);
     define.button({kParamReload, "Reload",
-                   "Reads the sidecar's file again and makes the host render its frames again."});
+                   "Reloads the sidecar's file and makes the host render its frames again."});
     define.flag({kParamEmbed, "Embed",
                  "Keeps a copy of the sidecar in the project. The node uses the copy while the "
                  "file is missing or cannot be read."},
                 false);
     for (const char* name : {kParamEmbedded, kParamRevision}) {
         const Properties hidden = define.text(
-            {name, name == kParamEmbedded ? "Embedded sidecar" : "Revision", "Kept by the node."},
+            {name, name == kParamEmbedded ? "Embedded sidecar" : "Revision",
+             "The node sets this value."},
             name == kParamEmbedded ? kOfxParamStringIsMultiLine : kOfxParamStringIsSingleLine);
         hidden.set_int(kOfxParamPropSecret, 1);
         hidden.set_int(kOfxParamPropCanUndo, 0);

@@ -78,7 +78,7 @@ template <class T>
 PALETTE4D_INLINE void store(T* to, Lanes<T> a) {
     std::memcpy(to, &a.v, sizeof a.v);
 }
-/// Towards zero; below 2^24.
+/// Rounds towards zero; values below 2^24 only.
 template <class T>
 PALETTE4D_INLINE Lanes<T> truncated(Lanes<T> a) {
     using Whole = typename Lanes<T>::Integers;
@@ -94,7 +94,7 @@ PALETTE4D_INLINE Lanes<float> load_whole(const int* from) {
     std::memcpy(&whole, from, sizeof whole);
     return {__builtin_convertvector(whole, Lanes<float>::Vector)};
 }
-/// Of so many times 16 bytes.
+/// Stores byte offsets of elements that are 16 bytes each.
 PALETTE4D_INLINE void store_offsets(unsigned* to, Lanes<float> a) {
     const auto whole = __builtin_convertvector(a.v, Lanes<float>::Integers) << 4;
     std::memcpy(to, &whole, sizeof whole);
@@ -142,7 +142,7 @@ PALETTE4D_INLINE bool any(LaneMask<T> m) {
     return _mm512_test_epi32_mask((__m512i)m.v, (__m512i)m.v) != 0;
 #endif
 }
-/// A bit a lane, the first lane's the lowest.
+/// One bit per lane, the first lane lowest.
 PALETTE4D_INLINE unsigned bits(LaneMask<double> m) {
 #if PALETTE4D_LANES_BYTES == 16
     return static_cast<unsigned>(_mm_movemask_pd((__m128d)m.v));
@@ -176,7 +176,7 @@ PALETTE4D_INLINE bool any(LaneMask<T> m) {
     for (int lane = 0; lane < Lanes<T>::kCount; ++lane) found |= m.v[lane] != 0;
     return found;
 }
-/// A bit a lane, the first lane's the lowest.
+/// One bit per lane, the first lane lowest.
 PALETTE4D_INLINE unsigned bits(LaneMask<double> m) {
     unsigned found = 0;
     for (int lane = 0; lane < Lanes<double>::kCount; ++lane) {
