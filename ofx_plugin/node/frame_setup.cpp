@@ -72,7 +72,7 @@ void prepare(FrameSetup& setup, const Params& params, LoadedSidecar& loaded, dou
             try {
                 drawing.edit = loaded.lattice_at(frame, edits.edits);
             } catch (const std::bad_alloc&) {
-                add_note(setup, "there is no memory for a lattice: computed exactly");
+                add_note(setup, "not enough memory for a lattice: computed exactly");
             }
         }
     }
@@ -109,8 +109,8 @@ FrameSetup frame_setup_at(const Suites& suites, OfxImageEffectHandle effect, Ofx
                                 host_clip(suites, effect, source_frame), time);
     if (!std::isfinite(at.frame)) {
         setup.problem = path +
-                        ": the host's time and the node's parameters of time give no frame; "
-                        "expected numbers";
+                        ": found no frame: the host's time or a parameter in Time is not a finite "
+                        "number; check these parameters";
         return setup;
     }
     if (at.passes) return setup;

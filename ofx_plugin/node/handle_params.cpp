@@ -135,7 +135,7 @@ EditsAt edits_at(const Params& params, const Sidecar& sidecar, OfxTime time) {
         if (handle < 0) {
             result.note = slot.colour + ": the sidecar has no handle " +
                           (id.empty() ? std::to_string(i + 1) : "'" + id + "'") +
-                          "; choose one of its ids, or take this one out of use";
+                          "; enter one of its ids, or switch off Use for this handle";
             continue;
         }
         // If two slots have the same handle, the last one counts.

@@ -217,8 +217,8 @@ std::string words_of_missing(const std::string& given_path) {
         if (path[at] != '$' && path[at] != '%') continue;
         const std::size_t end = variable_at(path, at, name);
         if (!name.empty() && !std::getenv(name.c_str())) {
-            return "the environment that the host was started in has no variable " + name +
-                   "; start the host where it is set, or write out what it stands for";
+            return "the host's environment has no variable " + name +
+                   "; set it and restart the host, or write its value into the path";
         }
         at = end - 1;
     }
@@ -228,10 +228,10 @@ std::string words_of_missing(const std::string& given_path) {
     const bool relative = given.is_relative();
     std::string words = "the file does not exist";
     words +=
-        relative ? " in Clip's folder, " : ", and there is none of its name in Clip's folder or ";
+        relative ? " in Clip's folder, " : ", and no file with its name is in Clip's folder or ";
     words += kSearchPath;
     if (relative) words += " or " + fs::current_path(error).u8string();
-    return words + "; choose the file again, or the folder that it is in as Clip's folder";
+    return words + "; choose the file again, or set Clip's folder to its folder";
 }
 
 std::string clip_folder(const std::string& path, const std::string& source) {

@@ -158,15 +158,16 @@ std::string keep_files(const Params& params, Chosen& chosen, const std::string& 
         return "";
     }
     if (chosen.embedded) {
-        return "the project's copy, since " +
+        return "the project's copy, because " +
                (chosen.broken.empty() ? "there is no file" : chosen.broken);
     }
     if (!loaded) return "";
     const std::optional<std::string> file = sidecar_text(chosen.path);
     if (!file) return "";
     note_text(params, kParamEmbedded, *file);
-    return params.string_now(kParamEmbedded) == file ? "a copy is in the project"
-                                                     : "the host does not keep a copy of it";
+    return params.string_now(kParamEmbedded) == file
+               ? "a copy is in the project"
+               : "the host did not store a copy in the project";
 }
 
 }  // namespace palette4d::node

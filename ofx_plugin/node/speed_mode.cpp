@@ -49,8 +49,8 @@ std::string words_of(const Lattice& lattice) {
     std::ostringstream text;
     text.imbue(std::locale::classic());
     text.precision(2);
-    text << "lattice, largest error measured " << lattice.largest_error() << " (at most "
-         << Lattice::kTolerance << " is wanted)";
+    text << "lattice, largest error measured " << lattice.largest_error() << " (limit "
+         << Lattice::kTolerance << ")";
     return text.str();
 }
 
