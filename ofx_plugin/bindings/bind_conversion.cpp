@@ -45,7 +45,7 @@ void bind_conversion(py::module_& module) {
                 return std::make_shared<ColourConversion>(palette4d::parse_conversion(steps, name));
             }),
             py::arg("steps"), py::arg("name") = "<steps>",
-            "From the JSON text of the steps; SidecarError when they are no such chain.")
+            "Parses the JSON text of the steps. Raises SidecarError if they are invalid.")
         .def_property_readonly("identity", &ColourConversion::identity)
         .def(
             "to_palette",

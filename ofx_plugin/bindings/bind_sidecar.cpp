@@ -133,5 +133,5 @@ void bind_sidecar(py::module_& module) {
             return bound(palette4d::parse_sidecar(bytes, name));
         },
         py::arg("text"), py::arg("name") = "<text>",
-        "The same for text (str or bytes) in memory; `name` stands for the file in errors.");
+        "The same for text (str or bytes) in memory; `name` replaces the file name in errors.");
 }

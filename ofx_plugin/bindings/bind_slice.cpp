@@ -72,7 +72,7 @@ void bind_slice(py::module_& module) {
             return slice_at(polytope, frame);
         },
         py::arg("polytope"), py::arg("frame"),
-        "The palette at any real frame; outside the clip, that of its first or last frame.");
+        "The palette at any real frame; outside the clip, the palette of its first or last frame.");
     module.def(
         "edited_colours",
         [](const Polytope& polytope, const Edits& edits, const Slice& slice) {

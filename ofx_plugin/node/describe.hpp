@@ -1,4 +1,4 @@
-// What the node tells the host about itself.
+// Describes the node to the host: properties, clips and parameters.
 #pragma once
 
 #include "host.hpp"
