@@ -1,25 +1,25 @@
-// The kernels of block_kernels.hpp for the width that lanes.hpp was included with. Included by one
-// source an instruction set; includes nothing with code of its own.
+// The kernels of block_kernels.hpp, compiled for the vector width that lanes.hpp has here. One
+// source per instruction set includes this file. It must include no header that defines functions
+// for all processors.
 //
 // Mean value coordinates, as in palette_body.cpp, with v = corner - p:
 //     w_i = m . c_i / det(v),  c_i = v_j x v_k,  m = 1/2 sum over the sides of theta c / |c|.
-// theta / |c| = (theta / sin theta) / (|v_a| |v_b|). With k = cos(theta / 2), half the length of
-// the sum of the two unit vectors, theta / sin theta = P(k) / k where P(k) = acos(k) / sqrt(1 -
-// k^2) is smooth on [0, 1]: a polynomial, and no trigonometry. Edges belong to two faces and are
-// worked out once; the factor 1/2 is common to all weights.
+// A polynomial replaces trigonometry:
+//     theta / |c| = (theta / sin theta) / (|v_a| |v_b|),  theta / sin theta = P(k) / k.
+// Here k = cos(theta / 2) is half the length of the sum of the two unit vectors. P(k) = acos(k) /
+// sqrt(1 - k^2) is smooth on [0, 1]. Edges are computed once for both faces; the factor 1/2 is
+// common to all weights and left out.
 //
-// Which results are good: rounding puts
-// - an error of a few eps / k into an edge's theta c / |c|, and of a few eps into every c_i /
-// |v|^2,
-//   so that the weight w_i of a face is off by about eps z / (k |v_i|) with
-//   z = |v_i| |v_j| |v_k| / |det(v)|, the inverse of the solid angle's sine;
-// - a relative error of a few eps z into det(v), hence a common factor into the three weights W_f
-// of
-//   one face, which displaces the result only as far as other faces have a share in it: by
+// Which results are good? Rounding adds these errors:
+// - a few eps / k to an edge's theta c / |c|, and a few eps to every c_i / |v|^2. The weight w_i of
+//   a face is then off by about eps z / (k |v_i|). z = |v_i| |v_j| |v_k| / |det(v)| is the inverse
+//   of the solid angle's sine;
+// - a few eps z, relative, to det(v). This scales the three weights W_f of one face. It moves the
+//   result only where other faces have weight too: by
 //   eps sum_f z_f |W_f| (sum_g |W_g| - |W_f|) / W^2.
-// Both are summed up with the smallest k and |v|, times the spread of the vertices' displacements.
-// Where that exceeds the tolerance (near edges, in the planes of faces, beyond the range of T) the
-// verdict is 0, as it is where anything was not a number.
+// The sum of both uses the smallest k and |v|, times the spread of the vertices' displacements.
+// The verdict is 0 where the sum exceeds the tolerance: near edges, in the planes of faces, beyond
+// the range of T. It is also 0 where a value is NaN.
 #include "recolour/block_kernels.hpp"
 
 #include "simd/lanes.hpp"

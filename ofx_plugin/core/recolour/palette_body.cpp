@@ -213,19 +213,19 @@ void PaletteBody::prepare_edges(Workspace& w) const {
     }
 }
 
-// The mean vector of a face seen from p (the integral of the unit normals over its spherical
-// triangle) is m = 1/2 sum_j theta_j c_j / |c_j|, where c_j = v_{j+1} x v_{j+2} with v = corner - p
-// and theta_j the angle between them; its corners' weights solve sum_i w_i v_i = m, hence
-// w_i = m . c_i / det(v). Over a closed surface the mean vectors cancel, so that p is the weighted
-// mean of the corners.
+// The mean vector m of a face seen from p is the integral of the unit normals over its spherical
+// triangle: m = 1/2 sum_j theta_j c_j / |c_j|. Here v = corner - p, c_j = v_{j+1} x v_{j+2}, and
+// theta_j is the angle between these two. The corners' weights solve sum_i w_i v_i = m, hence
+// w_i = m . c_i / det(v). Over a closed surface the mean vectors cancel, so p is the weighted mean
+// of the corners.
 //
-// Close to the plane of the face, at height h, det(v) = 2 h area goes to zero. There every c_j is
-// split into a_j n in direction of the unit normal n (a_j: twice the area that p's foot spans with
-// side j) and h n x e_j (e_j: the side), which gives w_i = (a_i S + h^2 e_i . E) / (4 h area) with
-// S = sum_j theta_j a_j / |c_j| and E = sum_j theta_j e_j / |c_j|. S is 2 pi above the face and
-// nearly zero beside it: seen from the foot, the angles with the signs of the a_j sum to 2 pi or 0
-// exactly, and only the differences from that, all of order h^2, are summed up. That way nothing is
-// lost even when h is of the order of the rounding.
+// Close to the face's plane, at height h, det(v) = 2 h area goes to zero. There every c_j is split
+// into a_j n and h n x e_j. n is the unit normal, e_j the side, and a_j twice the area that p's
+// foot spans with side j. This gives w_i = (a_i S + h^2 e_i . E) / (4 h area) with S = sum_j
+// theta_j a_j / |c_j| and E = sum_j theta_j e_j / |c_j|. S is 2 pi above the face and nearly zero
+// beside it. Seen from the foot, the angles with the signs of the a_j sum to exactly 2 pi or 0.
+// Only the differences from that sum, all of order h^2, are added. So no precision is lost, even
+// when h is as small as the rounding.
 bool PaletteBody::mean_value_or_fail(const Vec3& p, double* weights, Workspace& w) const {
     const std::size_t n = rgb_.size();
     set_to(0, n, weights);

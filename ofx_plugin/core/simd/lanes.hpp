@@ -1,10 +1,10 @@
-// Numbers side by side: the arithmetic of the kernels, several pixels at a time.
+// Vector arithmetic for the kernels: several pixels at a time.
 //
-// GCC's and Clang's vector types, with intrinsics on x86. The build defines PALETTE4D_LANES_BYTES,
-// the width of the registers, and compiles each kernel source once for each set of instructions.
-// Everything is in an unnamed namespace and inlined: sources compiled for different processors must
-// not share a function. Operations are those that IEEE 754 rounds correctly (+ - * / sqrt) and
-// selections, none is fused: all widths give the same bits.
+// Uses GCC's and Clang's vector types, with intrinsics on x86. The build defines the register width
+// PALETTE4D_LANES_BYTES and compiles each kernel source once for each instruction set. Everything
+// is inlined, in an unnamed namespace: sources compiled for different processors must not share a
+// function. All widths give the same bits: only selections and operations that IEEE 754 rounds
+// correctly (+ - * / sqrt), never fused.
 #pragma once
 
 #include <cmath>
@@ -15,7 +15,7 @@
 #define PALETTE4D_LANES_X86
 #endif
 #if defined(__AVX512F__) && !defined(__clang__)
-// GCC 12's own header: _mm512_min_pd and its like start from _mm512_undefined_pd() on purpose.
+// False alarm in GCC 12's header: _mm512_min_pd and others use _mm512_undefined_pd() on purpose.
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
 #endif
 
