@@ -1,4 +1,4 @@
-// NumPy arrays to and from the core's vectors, with errors that say what was found.
+// Converts between NumPy arrays and the core's vectors; errors say what was found.
 #pragma once
 
 #include <pybind11/numpy.h>
@@ -18,13 +18,14 @@ using IntArray = py::array_t<int, py::array::c_style>;
 
 /// "(4, 3)"
 std::string shape_text(const py::array& array);
-/// Anything NumPy turns into an (n, 3) array of real numbers. `what` names it in the ValueError.
+/// From anything that NumPy converts to an (n, 3) array of real numbers. `what` names it in the
+/// ValueError.
 std::vector<Vec3> colours_from(const py::object& object, const char* what);
 /// The same for (n, 4): colours and times.
 std::vector<std::array<double, 4>> vertices_from(const py::object& object, const char* what);
-/// Anything NumPy turns into (n,) real numbers.
+/// From anything that NumPy converts to (n,) real numbers.
 std::vector<double> numbers_from(const py::object& object, const char* what);
-/// (f, 3) integers; an empty array of any shape is no faces.
+/// (f, 3) integers; an empty array of any shape means no faces.
 std::vector<Face> faces_from(const py::object& object);
 /// (n,) float64.
 DoubleArray to_array(const std::vector<double>& numbers);

@@ -18,7 +18,7 @@ using namespace palette4d::bindings;
 
 namespace {
 
-/// What is minimised beside the paper's losses.
+/// The extra loss terms that are minimised with the paper's.
 double shape_of(const FrameLoss& loss, const LossWeights& weights) {
     return weights.convexity * loss.D + loss.S + weights.lambda * loss.E;
 }

@@ -20,7 +20,7 @@ using namespace palette4d::bindings;
 
 namespace {
 
-/// The array itself where samples within a row are packed, else a copy in which they are.
+/// The array itself if samples are packed in each row, else a packed copy.
 template <class Sample>
 py::array_t<Sample> packed_rows(const py::array& array) {
     py::ssize_t step = sizeof(Sample);

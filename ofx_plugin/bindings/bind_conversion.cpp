@@ -15,7 +15,7 @@ using namespace palette4d::bindings;
 
 namespace {
 
-/// (..., 3) numbers to float64 ones of the same shape.
+/// Converts (..., 3) numbers to float64 of the same shape.
 DoubleArray converted(const py::array_t<double, py::array::c_style | py::array::forcecast>& colours,
                       Vec3 (ColourConversion::*by)(const Vec3&) const,
                       const ColourConversion& self) {
@@ -45,7 +45,7 @@ void bind_conversion(py::module_& module) {
                 return std::make_shared<ColourConversion>(palette4d::parse_conversion(steps, name));
             }),
             py::arg("steps"), py::arg("name") = "<steps>",
-            "From the JSON text of the steps; SidecarError when they are no such chain.")
+            "Parses the JSON text of the steps. Raises SidecarError if they are invalid.")
         .def_property_readonly("identity", &ColourConversion::identity)
         .def(
             "to_palette",

@@ -1,4 +1,4 @@
-// The one place where C++ exceptions become Python exceptions.
+// Translates C++ exceptions to Python exceptions; no other file does.
 #include <pybind11/pybind11.h>
 
 #include <exception>
@@ -10,7 +10,7 @@
 
 namespace {
 
-/// Paths may hold bytes that are not UTF-8; Python keeps them as surrogates, as os.fsdecode does.
+/// Paths may not be valid UTF-8; decodes them with surrogates, as os.fsdecode does.
 py::object decoded(const std::string& text) {
     return py::reinterpret_steal<py::object>(
         PyUnicode_DecodeUTF8(text.data(), static_cast<Py_ssize_t>(text.size()), "surrogateescape"));
@@ -31,7 +31,7 @@ void translate(std::exception_ptr thrown) {
 
 }  // namespace
 
-/// palette4d.common.errors holds the classes, so that code without the core can name them;
+/// palette4d.common.errors holds the classes, so that code without the core can use them.
 /// SidecarError is a Palette4dError with the attributes file, pointer, found and expected.
 void bind_errors(py::module_& module) {
     module.attr("SidecarError") =

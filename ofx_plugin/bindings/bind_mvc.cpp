@@ -49,7 +49,7 @@ py::tuple palette_weight_table(const py::object& points, const py::object& rgb,
     return py::make_tuple(weights, distances);
 }
 
-/// W_p W_t of eq. 7: the slice's weights, handed on to the two ends of each edge.
+/// W_p W_t of eq. 7: distributes the slice's weights to the two ends of each edge.
 DoubleArray polytope_weight_table(const py::object& points, const Polytope& polytope,
                                   double frame) {
     const std::vector<Vec3> p = colours_from(points, "points");

@@ -1,4 +1,4 @@
-// The 4D skew polytope for Python: what it is made of, read only.
+// The 4D skew polytope for Python, read only.
 #include <pybind11/stl.h>
 
 #include "arrays.hpp"

@@ -16,7 +16,7 @@ using namespace palette4d::bindings;
 
 namespace {
 
-/// (h, w, 3 or 4) float32 whose pixels are packed within a row; rows may lie anywhere.
+/// Requires (h, w, 3 or 4) float32 with packed pixels in each row; rows may have any stride.
 void require_image(const py::array& image, const char* what) {
     const std::string name(what);
     if (!py::isinstance<py::array_t<float>>(image)) {
@@ -36,10 +36,9 @@ void require_image(const py::array& image, const char* what) {
     const py::ssize_t channel = sizeof(float), pixel = channel * image.shape(2);
     if (image.strides(2) != channel || (image.shape(1) > 1 && image.strides(1) != pixel)) {
         throw py::value_error(name + ": found strides of " + std::to_string(image.strides(1)) +
-                              " bytes a pixel and " + std::to_string(image.strides(2)) +
-                              " a channel, expected packed rows (" + std::to_string(pixel) +
-                              " and " + std::to_string(channel) +
-                              "); numpy.ascontiguousarray makes them so");
+                              " bytes per pixel and " + std::to_string(image.strides(2)) +
+                              " per channel, expected packed rows (" + std::to_string(pixel) +
+                              " and " + std::to_string(channel) + "); use numpy.ascontiguousarray");
     }
     if (image.shape(0) > 1 && std::abs(image.strides(0)) < pixel * image.shape(1)) {
         throw py::value_error(name + ": found rows " + std::to_string(image.strides(0)) +
@@ -57,7 +56,7 @@ View view_of(const py::array& image, Pixel* data) {
             static_cast<int>(image.shape(2)), image.strides(0)};
 }
 
-/// Whether two images that are not the very same rows share memory.
+/// Whether two images share memory without being exactly the same rows.
 bool overlap(const py::array& a, const py::array& b) {
     if (a.size() == 0 || b.size() == 0) return false;
     if (a.data() == b.data() && a.strides(0) == b.strides(0)) return false;
@@ -87,7 +86,7 @@ InstructionSet instructions_from(const std::string& name) {
     throw py::value_error("instructions: found '" + name + "', expected one of " + names);
 }
 
-/// By a Recolourer or a Lattice.
+/// Recolours with a Recolourer or a Lattice.
 template <class Map>
 py::array apply(const Map& self, const py::array& image, double strength, bool premultiplied,
                 int threads, const py::object& out, const std::string& precision,
@@ -109,7 +108,8 @@ py::array apply(const Map& self, const py::array& image, double strength, bool p
         }
         if (overlap(image, result)) {
             throw py::value_error(
-                "out: found memory that overlaps the image's, expected the same rows or others");
+                "out: found memory that overlaps the image's, expected the same rows or separate "
+                "memory");
         }
     }
     const auto in_view = view_of<ConstImageView>(image, static_cast<const float*>(image.data()));
@@ -142,14 +142,14 @@ void bind_recolour(py::module_& module) {
              py::arg("original"), py::arg("edited"), py::arg("faces"))
         .def_property_readonly(
             "identity", [](const Recolourer& self) { return !self.moves(); },
-            "No colour moves: apply() copies bit for bit.")
+            "True when no colour moves: apply() then copies bit for bit.")
         .def("apply", &apply<Recolourer>, py::arg("image"), py::kw_only(),
              py::arg("strength") = 1.0, py::arg("premultiplied") = false, py::arg("threads") = 1,
              py::arg("out") = py::none(), py::arg("precision") = "double",
              py::arg("instructions") = "best", py::arg("conversion") = py::none(),
              "(h, w, 3 or 4) float32 in and out; threads 0 means one per processor.");
     py::class_<Lattice>(module, "Lattice",
-                        "One frame's recolouring by interpolation where that is exact enough.")
+                        "Recolours one frame by interpolation within a tolerance, else exactly.")
         .def(py::init([](const std::shared_ptr<Recolourer>& recolourer) {
                  return std::make_unique<Lattice>(recolourer);
              }),
@@ -159,7 +159,7 @@ void bind_recolour(py::module_& module) {
              py::arg("precision") = "single", py::arg("instructions") = "best",
              py::arg("conversion") = py::none(), "As Recolourer.apply().")
         .def_property_readonly("largest_error", &Lattice::largest_error,
-                               "Of (interpolated - exact) / max(|exact|, 0.1), as seen so far.")
+                               "The largest |interpolated - exact| / max(|exact|, 0.1) so far.")
         .def_property_readonly(
             "size",
             [](const Lattice& self) {
@@ -172,7 +172,7 @@ void bind_recolour(py::module_& module) {
                 result["colours"] = size.colours;
                 return result;
             },
-            "What it holds at the moment.");
+            "Counts of what the lattice holds now.");
     module.attr("LATTICE_TOLERANCE") = Lattice::kTolerance;
     module.def(
         "instruction_sets",
@@ -181,5 +181,5 @@ void bind_recolour(py::module_& module) {
             for (const InstructionSet set : instruction_sets()) names.emplace_back(name_of(set));
             return names;
         },
-        "Those that Recolourer.apply() can use here, slowest first.");
+        "The instruction sets that Recolourer.apply() can use here, slowest first.");
 }

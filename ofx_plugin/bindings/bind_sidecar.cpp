@@ -16,7 +16,7 @@ using palette4d::Vec3;
 
 namespace {
 
-/// Edits by index, as the core wants them, with the ids that Python wants.
+/// Edits by index for the core, with the ids for Python.
 struct NamedEdits : Edits {
     std::vector<std::string> vertex_ids, edge_ids;
 };
@@ -39,14 +39,14 @@ std::unique_ptr<BoundSidecar> bound(Sidecar sidecar) {
     return result;
 }
 
-/// Bytes of a path: str, bytes or os.PathLike, in the file system's encoding.
+/// The bytes of a path (str, bytes or os.PathLike) in the file system's encoding.
 std::string path_bytes(const py::object& path) {
     PyObject* converted = nullptr;
     if (PyUnicode_FSConverter(path.ptr(), &converted) == 0) throw py::error_already_set();
     return std::string(py::reinterpret_steal<py::bytes>(converted));
 }
 
-/// UTF-8 of a str, or bytes as they are; a lone surrogate passes, for the reader to refuse.
+/// UTF-8 of a str, or bytes unchanged. Lone surrogates pass, so that the reader refuses them.
 std::string text_bytes(const py::object& text) {
     if (py::isinstance<py::bytes>(text)) return text.cast<std::string>();
     if (!py::isinstance<py::str>(text)) {
@@ -113,7 +113,7 @@ void bind_sidecar(py::module_& module) {
             "edits", [](const BoundSidecar& self) { return &self.edits; },
             py::return_value_policy::reference_internal)
         .def_property_readonly("conversion", [](const BoundSidecar& self) {
-            // Shared with the sidecar, and never written to.
+            // Shared with the sidecar; Python cannot modify it.
             return std::const_pointer_cast<palette4d::ClipConversion>(self.sidecar.conversion);
         });
 
@@ -133,5 +133,5 @@ void bind_sidecar(py::module_& module) {
             return bound(palette4d::parse_sidecar(bytes, name));
         },
         py::arg("text"), py::arg("name") = "<text>",
-        "The same for text (str or bytes) in memory; `name` stands for the file in errors.");
+        "The same for text (str or bytes) in memory; `name` replaces the file name in errors.");
 }

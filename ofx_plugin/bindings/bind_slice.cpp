@@ -34,7 +34,7 @@ DoubleArray weights_of(const Slice& self) {
     return array;
 }
 
-/// A slice of another polytope must not be read past this one's ends.
+/// Refuses a slice of another polytope: its indices could be out of range here.
 void require_slice_of(const Polytope& polytope, const Slice& slice) {
     const int vertices = static_cast<int>(polytope.vertices().size());
     const int edges = static_cast<int>(polytope.edges().size());
@@ -72,7 +72,7 @@ void bind_slice(py::module_& module) {
             return slice_at(polytope, frame);
         },
         py::arg("polytope"), py::arg("frame"),
-        "The palette at any real frame; outside the clip, that of its first or last frame.");
+        "The palette at any real frame; outside the clip, the palette of its first or last frame.");
     module.def(
         "edited_colours",
         [](const Polytope& polytope, const Edits& edits, const Slice& slice) {

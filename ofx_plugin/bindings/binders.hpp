@@ -1,5 +1,4 @@
-// One binder a subject; module.cpp calls them in the order in which their types depend on each
-// other.
+// One binder per subject; module.cpp calls them in the order of their types' dependencies.
 #pragma once
 
 #include <pybind11/pybind11.h>

@@ -1,4 +1,4 @@
-// palette4d._core: the compiled core for Python. One call per subject.
+// palette4d._core: the compiled core for Python. Calls one binder per subject.
 #include "binders.hpp"
 
 PYBIND11_MODULE(_core, module) {

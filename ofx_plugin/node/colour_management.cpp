@@ -33,7 +33,7 @@ void prefer_colour(const Suites& suites, OfxImageEffectHandle effect, const Prop
                         *style == kOfxImageEffectColourManagementCore);
     const std::string name = std::string(kOfxImageClipPropPreferredColourspaces) + "_" +
                              kOfxImageEffectSimpleSourceClipName;
-    // The basic style knows the generic spaces alone, which stand last.
+    // The basic style knows only the generic spaces, which come last.
     std::size_t first = 0;
     if (*style == kOfxImageEffectColourManagementBasic && wanted.size() > 1) first = 1;
     int index = 0;

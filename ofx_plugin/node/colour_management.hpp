@@ -1,16 +1,16 @@
-// Colour management of OFX 1.5: the node wants pictures in the encoding its sidecar was analysed
-// in, and gives them back in it. Hosts that negotiate no colour are not asked for anything.
+// Colour management of OFX 1.5: the node asks for the encoding of its sidecar and returns the
+// picture in it. A host without colour management is not asked for anything.
 #pragma once
 
 #include "host.hpp"
 
 namespace palette4d::node {
 
-/// In Describe: the node understands the names of the standard's configuration.
+/// In Describe: the node supports the standard's configuration.
 void describe_colour(const Properties& node);
-/// In GetClipPreferences: what the source should be in.
+/// In GetClipPreferences: the colour space that the node prefers for its source.
 void prefer_colour(const Suites& suites, OfxImageEffectHandle effect, const Properties& out_args);
-/// kOfxImageEffectActionGetOutputColourspace: that of the source.
+/// kOfxImageEffectActionGetOutputColourspace: the source's colour space.
 OfxStatus output_colour(const Properties& out_args);
 
 }  // namespace palette4d::node

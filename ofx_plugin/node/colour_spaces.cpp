@@ -17,7 +17,7 @@ constexpr Gamut with_d65(double rx, double ry, double gx, double gy, double bx, 
 }
 
 // ITU-R BT.709 and BT.2020, SMPTE RP 431-2 and EG 432-1, Adobe RGB (1998), Academy S-2008-001 and
-// S-2014-004, and the makers' own papers.
+// S-2014-004, and the manufacturers' white papers.
 constexpr Gamut kRec709 = with_d65(0.64, 0.33, 0.30, 0.60, 0.15, 0.06);
 constexpr Gamut kRec2020 = with_d65(0.708, 0.292, 0.170, 0.797, 0.131, 0.046);
 constexpr Gamut kP3 = with_d65(0.680, 0.320, 0.265, 0.690, 0.150, 0.060);
@@ -45,9 +45,9 @@ enum class Kind { kSdr, kHdr, kLinear, kLog };
 constexpr const char* kGeneric[] = {"ofx_display_sdr", "ofx_display_hdr", "ofx_scene_linear",
                                     "ofx_scene_log"};
 
-/// A space of the standard's configuration, and what sidecars and files call it besides.
+/// A colour space of the standard's configuration, and its other names in sidecars and files.
 struct Space {
-    const char* name;  ///< null: the configuration has none, but it has primaries
+    const char* name;  ///< null: not in the configuration; only its primaries are known
     Kind kind;
     bool core;
     const Gamut* gamut;
@@ -186,8 +186,8 @@ const std::vector<Space>& spaces() {
     return all;
 }
 
-/// Letters and digits alone, small, and short for linear: "Linear Rec. 709", "lin_rec709" and
-/// "LIN REC-709" are one.
+/// Only letters and digits, in lower case, with "linear" shortened to "lin": "Linear Rec. 709",
+/// "lin_rec709" and "LIN REC-709" match.
 std::string plain(const std::string& text) {
     std::string result;
     for (const char c : text) {
@@ -211,8 +211,8 @@ const Space* space_of(const std::string& encoding) {
     return nullptr;
 }
 
-/// The amounts of the primaries that make white (SMPTE RP 177-1993): as each has a luminance of 1,
-/// they are their shares of white's.
+/// The amounts of the primaries that make white (SMPTE RP 177-1993). Each primary has luminance 1,
+/// so the amounts are their shares of white's luminance.
 Vec3 weights_of(const Gamut& gamut) {
     // Columns X, Z and 1 of each primary, divided by its Y; Cramer's rule.
     const auto column = [](const double (&c)[2]) -> Vec3 {
@@ -237,7 +237,7 @@ std::vector<std::string> colourspaces_of(const std::string& encoding, bool core)
         if (core && !space->core) return {generic};
         return {space->name, generic};
     }
-    // Nothing more is said of these: any space of the kind will do.
+    // These names say no more than the kind, so any space of that kind will do.
     const std::string wanted = plain(encoding);
     if (wanted == "linear" || wanted == "scenelinear") return {kGeneric[2]};
     if (wanted == "log" || wanted == "logarithmic" || wanted == "printingdensity") {

@@ -1,4 +1,4 @@
-// Colour spaces by the names that sidecars and files have for them.
+// Finds colour spaces by the names that sidecars and files use.
 #pragma once
 
 #include <memory>
@@ -10,18 +10,17 @@
 
 namespace palette4d::node {
 
-/// The names that the standard's configuration (ofx-native-v1.5_aces-v1.3_ocio-v2.3) has for an
-/// encoding, best first, with the generic space that it belongs to last; empty for one that is not
-/// in it. `core`: of its core spaces alone, as hosts want whose colour management knows no others.
+/// The names of an encoding in the standard's configuration (ofx-native-v1.5_aces-v1.3_ocio-v2.3).
+/// Best match first, its generic space last; empty for an unknown encoding. `core` limits them to
+/// core spaces, for hosts whose colour management knows no others.
 std::vector<std::string> colourspaces_of(const std::string& encoding, bool core = false);
 
-/// From scene-linear numbers of a display-referred encoding's primaries to the encoding; a
-/// conversion that changes nothing for linear encodings, null for all others (logs, HDR, unknown).
+/// The conversion from scene-linear values in the primaries of a display-referred encoding to that
+/// encoding. For linear encodings it changes nothing; null for all others (logs, HDR, unknown).
 std::shared_ptr<const ColourConversion> from_linear(const std::string& encoding);
 
-/// The weights of red, green and blue in the luminance of light of an encoding's primaries; they
-/// sum to 1, and are negative where a primary is no colour that can be seen. Those of Rec.709 for
-/// an encoding that is not known.
+/// The luminance weights of an encoding's red, green and blue; Rec.709's for an unknown encoding.
+/// They sum to 1. A weight is negative where the primary is not a visible colour.
 Vec3 luminance_weights(const std::string& encoding);
 
 }  // namespace palette4d::node

@@ -30,7 +30,7 @@ OfxStatus describe(const Suites& suites, OfxImageEffectHandle effect) {
         suites.effect->getPropertySet(effect, &handle) != kOfxStatOK || !handle) {
         return kOfxStatFailed;
     }
-    // Properties that a host does not know or refuses keep that host's defaults.
+    // Properties that a host does not know or refuses keep the host's defaults.
     const Properties node(suites, handle);
     node.set_string(kOfxPropLabel, "Palette4D");
     node.set_string(kOfxPropShortLabel, "Palette4D");
@@ -43,8 +43,8 @@ OfxStatus describe(const Suites& suites, OfxImageEffectHandle effect) {
     node.set_strings(
         kOfxImageEffectPropSupportedContexts,
         {kOfxImageEffectContextFilter, kOfxImageEffectContextGeneral, kOfxImageEffectContextPaint});
-    // Float before byte. Short and half are rendered where a host hands them over, but not asked
-    // for: a host with 16-bit pictures then hands over float.
+    // Float before byte. The node renders short and half but does not ask for them: so hosts with
+    // 16-bit pictures hand over float.
     node.set_strings(kOfxImageEffectPropSupportedPixelDepths,
                      {kOfxBitDepthFloat, kOfxBitDepthByte});
 
@@ -57,7 +57,7 @@ OfxStatus describe(const Suites& suites, OfxImageEffectHandle effect) {
     node.set_int(kOfxImageEffectPropSupportsMultipleClipDepths, 0);
     node.set_int(kOfxImageEffectPropSupportsMultipleClipPARs, 0);
     node.set_string(kOfxImageEffectPropCPURenderSupported, "true");
-    // One pixel's result depends on that pixel only: a host may take the node into a LUT.
+    // A pixel's result depends on that pixel only, so a host may bake the node into a LUT.
     node.set_string(kOfxImageEffectPropNoSpatialAwareness, "true");
     describe_colour(node);
     return kOfxStatOK;
@@ -65,7 +65,7 @@ OfxStatus describe(const Suites& suites, OfxImageEffectHandle effect) {
 
 OfxStatus describe_in_context(const Suites& suites, OfxImageEffectHandle effect,
                               const Properties& in_args) {
-    // RGBA first: hosts that know one layout only take the first. Alpha alone passes through.
+    // RGBA first: hosts that support one layout take the first. Alpha clips pass through.
     const auto pictures = {kOfxImageComponentRGBA, kOfxImageComponentRGB, kOfxImageComponentAlpha};
     if (!define_clip(suites, effect, kOfxImageEffectSimpleSourceClipName, pictures) ||
         !define_clip(suites, effect, kOfxImageEffectOutputClipName, pictures)) {
@@ -84,7 +84,7 @@ OfxStatus describe_in_context(const Suites& suites, OfxImageEffectHandle effect,
     OfxPropertySetHandle handle = nullptr;
     if (suites.effect->getPropertySet &&
         suites.effect->getPropertySet(effect, &handle) == kOfxStatOK) {
-        // Hosts ask for clip_preferences() again when one of these changes, and else never.
+        // Hosts call clip_preferences() again only when one of these parameters changes.
         Properties(suites, handle)
             .set_strings(kOfxImageEffectPropClipPreferencesSlaveParam,
                          {kParamSidecar, kParamClipFolder, kParamRevision, kParamPictureIn,

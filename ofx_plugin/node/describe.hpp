@@ -1,20 +1,20 @@
-// What the node tells the host about itself.
+// Describes the node to the host: properties, clips and parameters.
 #pragma once
 
 #include "host.hpp"
 
 namespace palette4d::node {
 
-/// The clip that the standard wants in the Paint context, of alpha alone.
+/// The alpha clip that the standard requires in the Paint context.
 inline constexpr const char* kBrushClipName = "Brush";
 
 /// kOfxActionDescribe.
 OfxStatus describe(const Suites& suites, OfxImageEffectHandle effect);
-/// kOfxActionDescribeInContext: the same clips and parameters in every context.
+/// kOfxActionDescribeInContext: all contexts have the same clips and parameters.
 OfxStatus describe_in_context(const Suites& suites, OfxImageEffectHandle effect,
                               const Properties& in_args);
-/// kOfxImageEffectActionGetClipPreferences: a still picture comes out different from frame to
-/// frame, and the source is wanted in the sidecar's encoding.
+/// kOfxImageEffectActionGetClipPreferences: a still differs from frame to frame, and the source
+/// should be in the sidecar's encoding.
 OfxStatus clip_preferences(const Suites& suites, OfxImageEffectHandle effect,
                            const Properties& out_args);
 

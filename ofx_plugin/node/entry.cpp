@@ -1,4 +1,4 @@
-// The bundle's three entry points and the dispatch of actions. No exception passes this file.
+// The bundle's three entry points and the dispatch of actions. No exception leaves this file.
 #include <cstring>
 #include <exception>
 #include <memory>
@@ -60,7 +60,7 @@ OfxStatus dispatch(const char* action, OfxImageEffectHandle effect, OfxPropertyS
 OfxStatus main_entry(const char* action, const void* handle, OfxPropertySetHandle in_args,
                      OfxPropertySetHandle out_args) {
     if (!action) return kOfxStatReplyDefault;
-    // The standard passes every effect as a const pointer and takes it back without.
+    // The standard passes effects as const pointers, but its suites take them as non-const.
     const auto effect = static_cast<OfxImageEffectHandle>(const_cast<void*>(handle));
     try {
         return dispatch(action, effect, in_args, out_args);
@@ -73,7 +73,7 @@ OfxStatus main_entry(const char* action, const void* handle, OfxPropertySetHandl
 
 void remember_host(OfxHost* host) { set_host(host); }
 
-// Bump the version when parameters change: hosts cache what they described by it.
+// Raise the version when parameters change: hosts cache the description under it.
 OfxPlugin g_plugin = {kOfxImageEffectPluginApi,
                       kOfxImageEffectPluginApiVersion,
                       "org.palette4d.Palette4D",

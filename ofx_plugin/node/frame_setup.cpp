@@ -18,13 +18,13 @@ namespace palette4d::node {
 
 namespace {
 
-/// One more thing for the user to know.
+/// Appends a note for the user.
 void add_note(FrameSetup& setup, const std::string& note) {
     if (!setup.note.empty() && !note.empty()) setup.note += "; ";
     setup.note += note;
 }
 
-/// Prepares what the output asks for. Throws what slicing throws.
+/// Prepares the chosen output. Throws what slicing throws.
 void prepare(FrameSetup& setup, const Params& params, LoadedSidecar& loaded, double frame,
              OfxTime time, Interpolation interpolation) {
     Drawing& drawing = setup.drawing;
@@ -32,7 +32,7 @@ void prepare(FrameSetup& setup, const Params& params, LoadedSidecar& loaded, dou
     const Sidecar& sidecar = loaded.sidecar();
     setup.passes = false;
     if (sidecar.conversion && !settings.in_palette_space) {
-        // Shares its ownership: a sidecar may be read anew while this is drawn.
+        // Shares ownership: the sidecar may be reloaded during the render.
         drawing.conversion = {sidecar.conversion, &sidecar.conversion->steps};
     } else if (settings.scene_linear) {
         drawing.conversion = linear_picture(params, sidecar, time);
@@ -72,7 +72,7 @@ void prepare(FrameSetup& setup, const Params& params, LoadedSidecar& loaded, dou
             try {
                 drawing.edit = loaded.lattice_at(frame, edits.edits);
             } catch (const std::bad_alloc&) {
-                add_note(setup, "there is no memory for a lattice: computed exactly");
+                add_note(setup, "not enough memory for a lattice: computed exactly");
             }
         }
     }
@@ -109,8 +109,8 @@ FrameSetup frame_setup_at(const Suites& suites, OfxImageEffectHandle effect, Ofx
                                 host_clip(suites, effect, source_frame), time);
     if (!std::isfinite(at.frame)) {
         setup.problem = path +
-                        ": the host's time and the node's parameters of time give no frame; "
-                        "expected numbers";
+                        ": found no frame: the host's time or a parameter in Time is not a finite "
+                        "number; check these parameters";
         return setup;
     }
     if (at.passes) return setup;

@@ -1,4 +1,4 @@
-// What a node does to one moment of its clip: parameters and time in, what is to be drawn out.
+// What a node draws for one frame, from its parameters and the time.
 #pragma once
 
 #include <optional>
@@ -10,21 +10,21 @@
 
 namespace palette4d::node {
 
-/// Whether a setup has a lattice.
+/// When a setup may use a lattice.
 enum class Interpolation { kNever, kWithoutConversion, kAlways };
 
 struct FrameSetup {
     /// The picture passes through unchanged.
     bool passes = true;
     Drawing drawing;
-    /// Why the picture passes through although a sidecar was asked for; empty when all is well.
+    /// Why the picture passes through although a sidecar is chosen; empty without a problem.
     std::string problem;
-    /// What else the user should know; empty when all is well.
+    /// What else the user should know; empty for nothing.
     std::string note;
 };
 
-/// The setup of an instance at a time. Reads parameters in the way allowed while rendering.
-/// Problems are in the result; throws std::bad_alloc only.
+/// The setup of an instance at a time. Reads parameters as rendering allows. Reports problems in
+/// the result; throws std::bad_alloc only.
 FrameSetup frame_setup_at(const Suites& suites, OfxImageEffectHandle effect, OfxTime time,
                           Interpolation interpolation = Interpolation::kNever,
                           std::optional<double> source_frame = std::nullopt);

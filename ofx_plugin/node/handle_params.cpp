@@ -13,12 +13,13 @@
 namespace palette4d::node {
 namespace {
 
-constexpr double kLargest = 1e6;  ///< what a sidecar may hold
-/// The colours' default. A host's reset button sets it and reports a user's edit, so that it is a
+constexpr double kLargest = 1e6;  ///< a sidecar's limit for colours
+/// The colours' default. A host's reset button sets it and reports a user's edit, so it must be a
 /// colour that nobody chooses.
 constexpr Vec3 kUnset = {0.5, 0.5, 0.501};
 
-/// One slot's names and labels. The strings live as long as the process: hosts may keep them.
+/// One slot's names and labels. The strings live as long as the process, since hosts may keep the
+/// pointers.
 struct Slot {
     std::string colour, use, id;
     std::string colour_label, use_label, id_label;
@@ -39,7 +40,7 @@ const std::array<Slot, kHandleSlots>& slots() {
     return all;
 }
 
-/// The place of a slot's handle in handles_of(), or -1. `id` is what the slot holds.
+/// The index in handles_of() of a slot's handle, or -1. `id` is the slot's id parameter.
 int handle_of(const Sidecar& sidecar, std::size_t slot, const std::string& id) {
     if (!id.empty()) return find_handle(sidecar.polytope, sidecar.edits, id);
     const std::size_t count = sidecar.polytope.vertices().size() + sidecar.edits.stops.size();
@@ -51,14 +52,14 @@ bool usable(const Vec3& rgb) {
 }
 
 bool close(const Vec3& a, const Vec3& b) {
-    // Hosts keep colours as floats.
+    // Hosts store colours as floats.
     for (std::size_t c = 0; c < 3; ++c) {
         if (!(std::abs(a[c] - b[c]) <= 1e-6 * std::max(1.0, std::abs(b[c])))) return false;
     }
     return true;
 }
 
-/// Whether a slot holds a colour, at all times.
+/// Whether a slot has this colour at all times.
 bool holds(const Params& params, const Slot& slot, const std::optional<Vec3>& colour) {
     if (!colour) return false;
     const auto now = params.rgb_now(slot.colour.c_str());
@@ -88,29 +89,30 @@ void set_secret(const Properties& properties, bool secret) {
 void define_handle_params(ParamDefiner& define) {
     define.begin_group("handles", "Palette handles");
     define.choice({kParamEditsFrom, "Edits from",
-                   "Which edits apply: those in the sidecar, those made here with the handles "
-                   "below, or both; where both have one, the handle here counts."},
+                   "Which edits apply: the sidecar's, the edits made with the handles below, or "
+                   "both. If both edit a handle, the edit made here wins."},
                   {"Sidecar", "Host", "Both"}, static_cast<int>(EditsFrom::kBoth));
     define.button({kParamResetHandles, "Reset handles",
-                   "Switches all handles here off and removes their keyframes."});
+                   "Switches off all handles below and removes their keyframes."});
     for (const Slot& slot : slots()) {
         define
             .flag({slot.use.c_str(), slot.use_label.c_str(),
-                   "Whether the colour replaces the palette's. Changing the colour switches this "
-                   "on, in hosts that tell the node of changes."},
+                   "On: this colour replaces the palette colour. A change of the colour switches "
+                   "this on, in hosts that report changes to the node."},
                   false)
             .set_int(kOfxParamPropLayoutHint, kOfxParamPropLayoutHintNoNewLine);
         define.colour({slot.colour.c_str(), slot.colour_label.c_str(),
-                       "The new colour of this handle, in the palette's encoding, or in linear "
-                       "light where Picture is in says Scene-linear. May be keyframed."},
+                       "The new colour of this handle, in the palette's encoding. It is linear "
+                       "light if Picture is in is set to Scene-linear. May be keyframed."},
                       kUnset, -kLargest, kLargest);
     }
     define.begin_group("handleIds", "Which handles");
     for (const Slot& slot : slots()) {
-        define.text({slot.id.c_str(), slot.id_label.c_str(),
-                     "The id of the palette vertex or colour stop that this handle moves, as "
-                     "'palette4d info' lists it. Empty: the sidecar's next one in order."},
-                    kOfxParamStringIsSingleLine);
+        define.text(
+            {slot.id.c_str(), slot.id_label.c_str(),
+             "The id of the palette vertex or colour stop that this handle edits. 'palette4d info' "
+             "lists the ids. Empty: the handle of the same number in the sidecar."},
+            kOfxParamStringIsSingleLine);
     }
     define.end_group();
 }
@@ -133,10 +135,10 @@ EditsAt edits_at(const Params& params, const Sidecar& sidecar, OfxTime time) {
         if (handle < 0) {
             result.note = slot.colour + ": the sidecar has no handle " +
                           (id.empty() ? std::to_string(i + 1) : "'" + id + "'") +
-                          "; choose one of its ids, or take this one out of use";
+                          "; enter one of its ids, or switch off Use for this handle";
             continue;
         }
-        // Of two slots with one handle the last counts.
+        // If two slots have the same handle, the last one counts.
         const auto same = [&](const HandleColour& other) { return other.handle == handle; };
         colours.erase(std::remove_if(colours.begin(), colours.end(), same), colours.end());
         colours.push_back({handle, linear ? linear->to_palette(*rgb) : *rgb});
@@ -170,7 +172,7 @@ void notice_undone(const Params& params, ShownHandles& shown) {
         ShownHandle& slot = shown[i];
         if (all_are_back && slot.before) {
             slot = {slot.before, std::nullopt, slot.given, false};
-        } else if (holds(params, slots()[i], slot.declined)) {  // done again
+        } else if (holds(params, slots()[i], slot.declined)) {  // redone
             slot = {slot.declined, slot.given, std::nullopt, false};
         }
     }
@@ -187,7 +189,7 @@ void label_handles(const Params& params, const Chosen& chosen) {
         const int at = sidecar ? handle_of(*sidecar, i, id) : -1;
         set_text(params.properties(slot.colour.c_str()), kOfxPropLabel,
                  at < 0 ? slot.colour_label : label_of(handles[static_cast<std::size_t>(at)]));
-        // A slot in use stays visible, so that it can be switched off.
+        // A slot in use stays visible, so that the user can switch it off.
         const bool in_use = params.int_now(slot.use.c_str()).value_or(0) != 0;
         for (const char* name : {slot.colour.c_str(), slot.use.c_str(), slot.id.c_str()}) {
             set_secret(params.properties(name), sidecar && at < 0 && !in_use);
@@ -215,7 +217,7 @@ void show_handles(const Params& params, const Chosen& chosen, ShownHandles& show
             shown[i].given = rgb;
             continue;
         }
-        // The instance of a project that was opened has given nothing; an id shows earlier use.
+        // After a project is opened, the instance has set nothing yet; an id shows earlier use.
         const bool untouched =
             shown[i].given ? close(*now, *shown[i].given) : id.empty() || close(*now, kUnset);
         const std::optional<Vec3>& declined = shown[i].declined;
@@ -230,7 +232,7 @@ void show_handles(const Params& params, const Chosen& chosen, ShownHandles& show
 
 namespace {
 
-/// The slot is as it was described, and has its handle's colour from show_handles().
+/// Restores the slot's defaults; show_handles() then sets its handle's colour.
 void reset(const Params& params, const Slot& slot, ShownHandle& shown) {
     if (params.animated(slot.colour.c_str())) params.remove_keys(slot.colour.c_str());
     if (params.int_now(slot.use.c_str()).value_or(0) != 0) params.set_int(slot.use.c_str(), 0);

@@ -6,7 +6,7 @@ namespace palette4d::node {
 namespace {
 
 std::atomic<const OfxHost*> g_host{nullptr};
-// Read by every action, replaced by Load; through std::atomic_load/store only.
+// Every action reads it and Load replaces it; use std::atomic_load/store only.
 std::shared_ptr<const Suites> g_suites;
 
 template <typename Suite>

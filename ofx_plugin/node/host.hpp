@@ -1,4 +1,4 @@
-// The host's suites, and calls that survive a host which lacks or refuses any of them.
+// The host's suites, with calls that are safe where a host lacks or refuses them.
 #pragma once
 
 #include <initializer_list>
@@ -10,7 +10,7 @@
 
 namespace palette4d::node {
 
-/// What the host handed out at Load. Optional suites are null where the host has none.
+/// The suites from Load. Optional suites are null where the host has none.
 struct Suites {
     OfxPropertySetHandle host = nullptr;
     const OfxPropertySuiteV1* property = nullptr;
@@ -19,21 +19,21 @@ struct Suites {
     const OfxMultiThreadSuiteV1* thread = nullptr;  ///< optional
     const OfxMessageSuiteV1* message = nullptr;     ///< optional
     const OfxMessageSuiteV2* message2 = nullptr;    ///< optional
-    /// Natron, which says so by a property of its own; its name is a preference of the user.
+    /// Detected by a property of Natron's own, because the user can change the host's name.
     bool is_natron = false;
 };
 
 /// Remembers the host (OfxSetHost and OfxPlugin::setHost; a null host is ignored).
 void set_host(const OfxHost* host);
-/// Fetches the suites; false when there is no host or one without the required suites. May be
-/// called again at any time, also while other threads render: they keep what they hold.
+/// Fetches the suites; false when there is no host or a required suite is missing. May be called
+/// again while other threads render: they keep their suites.
 bool load_suites();
 /// The suites of the last successful Load; null before it. Valid for the life of the host.
 std::shared_ptr<const Suites> suites();
 
-/// A property set seen through a host's suite. Every getter is empty, and every setter false, when
-/// the host has no such property, refuses it or lacks the function. Strings are copied at once:
-/// the host's own live only until the next suite call.
+/// A property set, read through the host's suite. Where the host lacks or refuses a property or
+/// function, getters are empty and setters return false. Strings are copied at once: the host's own
+/// are valid only until the next suite call.
 class Properties {
 public:
     Properties(const Suites& suites, OfxPropertySetHandle handle)
@@ -51,9 +51,9 @@ public:
     bool set_double(const char* name, double value, int index = 0) const;
     bool set_string(const char* name, const char* value, int index = 0) const;
     bool set_pointer(const char* name, void* value, int index = 0) const;
-    /// Sets a property of several values. One that is refused is left out, not left open.
+    /// Sets a property of several values; the values after a refused one move up.
     void set_strings(const char* name, std::initializer_list<const char*> values) const;
-    /// The same for numbers whose place counts: nothing is set after one that is refused.
+    /// The same for numbers whose index matters: stops at the first that is refused.
     void set_doubles(const char* name, std::initializer_list<double> values) const;
 
 private:

@@ -5,7 +5,7 @@
 namespace palette4d::node {
 namespace {
 
-// A clip of four million frames is 48 hours at 24 frames a second; Resolve wants finite ranges.
+// Four million frames are 48 hours at 24 frames a second; Resolve needs finite ranges.
 constexpr double kMostFrames = 4e6;
 constexpr Range<double> kFrames = {0, -kMostFrames, kMostFrames, -1000, 1000};
 
@@ -14,43 +14,44 @@ constexpr Range<double> kFrames = {0, -kMostFrames, kMostFrames, -1000, 1000};
 void define_time_params(ParamDefiner& define) {
     define.begin_group("time", "Time");
     define.choice({kParamTiming, "Timing",
-                   "Auto: where the clip begins, and its rate, are what the host reports. Manual: "
-                   "the three parameters below say so. The status says which frame is shown."},
+                   "Auto: the node reads the clip's start and rate from the host. Manual: you set "
+                   "them with the three parameters below. Status says which frame is shown."},
                   {"Auto", "Manual"});
     define.number({kParamFirstFrame, "First frame at",
-                   "Manual timing: the host's time at which the clip's first frame stands."},
+                   "Manual timing: the host's time of the clip's first frame."},
                   kFrames, 1, 2, false);
     define.choice({kParamConform, "Conform",
-                   "Manual timing. Frame for frame: each frame of the host is one of the clip, "
-                   "whatever the rates, as where 24 frames a second were conformed to 23.976. By "
-                   "rates: seconds count, as where they play at their own speed on a timeline of "
-                   "60."},
+                   "Manual timing. Frame for frame: each frame of the host shows one frame of the "
+                   "clip, for example 24 fps conformed to 23.976. By rates: the clip plays at its "
+                   "own speed in seconds, for example 24 fps on a timeline of 60."},
                   {"Frame for frame", "By rates"});
     define.number({kParamHostRate, "Host's rate",
-                   "Manual timing by rates: frames a second of the host's timeline; 0 for what the "
+                   "Manual timing by rates: the timeline's frames per second. 0: the rate that the "
                    "host reports."},
                   {0, 0, 1000, 0, 120}, 1, 3, false);
     define.number(
-        {kParamInPoint, "In-point", "How many frames the host has cut off the clip's beginning."},
+        {kParamInPoint, "In-point", "How many frames the host trims from the start of the clip."},
         kFrames, 1, 2, false);
-    define.number({kParamFrameOffset, "Frame offset",
-                   "Frames added to the one that all else here gives, to put right what is left."},
-                  kFrames, 1, 2, false);
+    define.number(
+        {kParamFrameOffset, "Frame offset",
+         "Frames to add to the result of all other time settings, as a final correction."},
+        kFrames, 1, 2, false);
     define.number(
         {kParamSpeed, "Speed",
-         "Frames of the clip for each frame of the host: 2 where it plays twice as fast."},
+         "Frames of the clip for each frame of the host: 2 if the clip plays twice as fast."},
         {1, 0.001, 1000, 0.1, 10}, 0.1, 4, false);
     define.flag({kParamReverse, "Reverse",
-                 "The host plays the clip backwards: its last frame comes first, and the in-point "
-                 "counts from there."},
+                 "Switch this on if the host plays the clip backwards. In-point then counts from "
+                 "the clip's last frame."},
                 false);
     define.choice({kParamBefore, "Before the clip",
-                   "What times before the clip's first frame show: its first palette, or the "
-                   "source."},
+                   "Before the clip's first frame: Hold uses its first palette, Pass through shows "
+                   "the source."},
                   {"Hold", "Pass through"});
-    define.choice({kParamAfter, "After the clip",
-                   "What times after the clip's last frame show: its last palette, or the source."},
-                  {"Hold", "Pass through"});
+    define.choice(
+        {kParamAfter, "After the clip",
+         "After the clip's last frame: Hold uses its last palette, Pass through shows the source."},
+        {"Hold", "Pass through"});
     define.end_group();
 }
 
@@ -66,7 +67,7 @@ TimeSettings time_settings_at(const Params& params, OfxTime time) {
     settings.host_rate = number(kParamHostRate, 0);
     settings.in_point = number(kParamInPoint, 0);
     settings.offset = number(kParamFrameOffset, 0);
-    // 0 is what a host has that took no default from us: a clip that stands still is none.
+    // 0 comes from a host that ignored our default: a clip never stands still.
     settings.speed = number(kParamSpeed, 1);
     if (!(settings.speed > 0)) settings.speed = 1;
     settings.reverse = chosen(kParamReverse);

@@ -1,4 +1,4 @@
-// The parameters of time, and what the host reports about its clip.
+// The time parameters, and what the host reports about its clip.
 #pragma once
 
 #include "param_define.hpp"
@@ -19,10 +19,10 @@ inline constexpr const char* kParamAfter = "after";
 
 void define_time_params(ParamDefiner& define);
 
-/// None of these is animated: `time` is for asking while rendering.
+/// None of these is animated; `time` is needed because rendering may only read with a time.
 TimeSettings time_settings_at(const Params& params, OfxTime time);
-/// What the host reports about the source clip; `source_frame` is what the action's arguments say
-/// of the media. Allowed in every action of an instance.
+/// What the host reports about the source clip. `source_frame` is the media frame from the action's
+/// arguments. Allowed in every action of an instance.
 HostClip host_clip(const Suites& suites, OfxImageEffectHandle effect,
                    std::optional<double> source_frame = std::nullopt);
 

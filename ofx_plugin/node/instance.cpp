@@ -18,8 +18,8 @@ namespace {
 
 constexpr const char* kMessageId = "palette4d.sidecar";
 
-// Kept by handle and not in the host's property kOfxPropInstanceData, which a host may refuse: a
-// record that cannot be had back would be lost, and its instance would not load.
+// Instances by effect handle. The host's property kOfxPropInstanceData is no alternative: where a
+// host refuses it, the record would be lost and the instance would not load.
 struct Registry {
     std::mutex mutex;
     std::map<OfxImageEffectHandle, std::shared_ptr<Instance>> instances;
@@ -37,7 +37,7 @@ std::shared_ptr<Instance> find(OfxImageEffectHandle effect) {
     return found == all.instances.end() ? nullptr : found->second;
 }
 
-/// The text as a format of its own. Natron reads the arguments of a format wrongly.
+/// Escapes the text for use as a format, since Natron misreads a format's arguments.
 std::string as_format(const std::string& text) {
     std::string format;
     for (const char c : text) format += c == '%' ? "%%" : std::string(1, c);
@@ -47,7 +47,7 @@ std::string as_format(const std::string& text) {
 void show(const Suites& suites, OfxImageEffectHandle effect, const std::string& problem,
           bool is_new) {
     const std::string format = as_format(problem);
-    // A host may offer the suite with holes in it: version 2 without its new functions.
+    // A host may offer version 2 of the suite with null functions.
     if (suites.message2 && suites.message2->setPersistentMessage) {
         suites.message2->setPersistentMessage(effect, kOfxMessageError, kMessageId, format.c_str());
     } else if (is_new && suites.message && suites.message->message) {
@@ -57,7 +57,7 @@ void show(const Suites& suites, OfxImageEffectHandle effect, const std::string& 
     }
 }
 
-/// What a host calls the step that undoes what the node has set after a change of `param`.
+/// The host's label for the undo step of what the node sets after a change of `param`.
 const char* step_after(const std::string& param) {
     if (param == kParamSidecar) return "Show the sidecar's handles";
     if (param == kParamResetHandles) return "Reset handles";
@@ -70,7 +70,7 @@ void create_instance(const Suites& suites, OfxImageEffectHandle effect) {
     {
         Registry& all = registry();
         const std::lock_guard<std::mutex> lock(all.mutex);
-        // A host that never destroyed an instance may use its address again: begin afresh.
+        // A host that never destroyed an instance may reuse its address, so always start fresh.
         all.instances[effect] = std::make_shared<Instance>();
     }
     const Params params(suites, effect);
@@ -86,10 +86,10 @@ void destroy_instance(OfxImageEffectHandle effect) {
 void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const Properties& args) {
     const std::string name = args.get_string(kOfxPropName).value_or("");
     const std::optional<std::string> reason = args.get_string(kOfxPropChangeReason);
-    // The user cannot change the status, so that this is the plugin's own setting.
+    // The user cannot change the status, so the plugin itself set it.
     if (name == kParamStatus || reason == kOfxChangePluginEdited) return;
-    // Hosts report the plugin's own settings from within the call that sets them, and some of them
-    // do not say what changed: this would never end.
+    // Hosts report the plugin's own changes from within the call, some without a reason. Without
+    // this guard the updates would never end.
     thread_local bool updating = false;
     if (updating) return;
     struct Guard {
@@ -100,11 +100,11 @@ void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const P
     // A colour that follows its keyframes is not an edit.
     const std::string param = reason == kOfxChangeUserEdited ? name : "";
     Params params(suites, effect);
-    // Natron holds a mutex while paramEditEnd calls the plugin back, which waits for it for ever.
+    // Natron holds a mutex while paramEditEnd calls the plugin back, which then deadlocks.
     if (!suites.is_natron) params.one_undo_step(step_after(param));
     Chosen chosen = chosen_sidecar(params, std::nullopt);
     const std::string copy = keep_files(params, chosen, param);
-    // Not under the instance's lock: setting a parameter may have the host wait for a render.
+    // Not under the instance's lock: setting a parameter may make the host wait for a render.
     const std::shared_ptr<Instance> instance = find(effect);
     ShownHandles handles;
     std::optional<double> source_less_time;
@@ -126,7 +126,8 @@ void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const P
     const std::optional<OfxTime> time = args.get_double(kOfxPropTime);
     if (sidecar && time) {
         const TimeSettings settings = time_settings_at(params, *time);
-        // Before the first render the two are the same, as on Resolve's Edit and Color pages.
+        // Before the first render, assume that media frame and time are equal, as on Resolve's
+        // pages.
         if (!source_less_time && !chosen.media.empty()) source_less_time = 0;
         std::optional<double> source_frame;
         if (source_less_time) source_frame = *time + *source_less_time;

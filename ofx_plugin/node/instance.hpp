@@ -10,30 +10,30 @@
 
 namespace palette4d::node {
 
-/// What the plugin remembers about an instance. All else is in the host's parameters.
+/// What the plugin remembers about an instance. Everything else is in the host's parameters.
 struct Instance {
     std::mutex mutex;
     std::string message;  ///< the last problem or note; empty for none
     ShownHandles shown;
-    std::optional<double> source_less_time;  ///< the media's frame less the time, last rendered
+    std::optional<double> source_less_time;  ///< media frame minus time, at the last render
 };
 
-/// The actions of an instance's life. They never fail: without its record an instance still
-/// renders. CreateInstance labels the handles and sets no values: the standard allows that in
-/// kOfxActionInstanceChanged alone.
+/// The actions of an instance's life. They never fail: an instance renders even without its record.
+/// CreateInstance labels the handles and sets no values, since the standard allows values only in
+/// kOfxActionInstanceChanged.
 void create_instance(const Suites& suites, OfxImageEffectHandle effect);
 void destroy_instance(OfxImageEffectHandle effect);
-/// kOfxActionInstanceChanged: brings the parameters that the plugin sets up to date, whatever
-/// changed, because the sidecar's file may have changed too. The host undoes all of it in one step.
+/// kOfxActionInstanceChanged: updates the parameters that the plugin sets after any change, because
+/// the sidecar's file may have changed too. The host undoes all of it in one step.
 void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const Properties& args);
 
-/// What a render was told, for the status: changes are told without the media's frame.
+/// Stores the media frame of a render for the status, since changes come without it.
 void note_source_frame(OfxImageEffectHandle effect, OfxTime time,
                        std::optional<double> source_frame);
 
 /// Shows a problem as the instance's persistent message, or clears the message when `problem` is
-/// empty. Allowed while rendering. Hosts clear messages on their own, so that a problem is shown
-/// again at each render; a log takes it once.
+/// empty. Allowed while rendering. Each render shows the problem again, because hosts clear
+/// messages themselves; a log gets it once.
 void report(const Suites& suites, OfxImageEffectHandle effect, const std::string& problem);
 
 }  // namespace palette4d::node

@@ -1,4 +1,4 @@
-// The OpenFX interface, and the names that older SDKs do not have yet.
+// The OpenFX interface, with names that older SDKs lack.
 #pragma once
 
 #include "ofxCore.h"
@@ -8,7 +8,7 @@
 #include "ofxParam.h"
 #include "ofxProperty.h"
 
-// From OFX 1.4 (with GPU rendering, whose header needs nothing else from us) and OFX 1.5.1.
+// From OFX 1.4 (in ofxGPURender.h, which we do not need otherwise) and OFX 1.5.1.
 #ifndef kOfxImageEffectPropCPURenderSupported
 #define kOfxImageEffectPropCPURenderSupported "OfxImageEffectPropCPURenderSupported"
 #endif
@@ -16,17 +16,17 @@
 #define kOfxImageEffectPropNoSpatialAwareness "OfxImageEffectPropNoSpatialAwareness"
 #endif
 
-// From Nuke's extension, which Natron knows too: the next parameter stays on this one's row.
+// Nuke's extension, which Natron supports too: keeps the next parameter on the same row.
 #define kOfxParamPropLayoutHint "OfxParamPropLayoutHint"
 #define kOfxParamPropLayoutHintNoNewLine 2
 
-// DaVinci Resolve's: of the effect instance, the media's file (of a sequence its first); of the
-// render action's arguments, the frame of that media, an index from 0.
+// DaVinci Resolve's. On the effect instance: the media file, or a sequence's first file. In the
+// render action's arguments: the frame of that media, counted from 0.
 #define kResolvePropSrcFilePath "OfxImageEffectPropSrcFilePath"
 #define kResolvePropSrcFrame "OfxImageEffectPropSrcFrame"
 
-// From OFX 1.5: headers of older SDKs lack all of it, and those of newer ones bring a configuration
-// of some thousand lines along that is not needed here.
+// From OFX 1.5: older SDKs lack all of it. Newer ones include a configuration of thousands of
+// lines, which is not needed here.
 #if defined(__has_include)
 #if __has_include("ofxColour.h")
 #define OFX_NO_DEFAULT_COLORSPACE_HEADER

@@ -8,17 +8,17 @@
 namespace palette4d::node {
 namespace {
 
-// Floats of one chunk of rows, source and result together: they stay in the second-level cache.
+// Floats in one chunk of rows, source and result: small enough for the second-level cache.
 constexpr std::size_t kChunkFloats = 32768;
-/// Colours so near to the palette's surface count as inside: what the surface is known to.
+/// Colours this near to the palette's surface count as inside: the surface is no more precise.
 constexpr double kAtSurface = 1e-3;
-/// From here on floats have too few digits left for a weight beside the colour.
+/// Above this, a float has too few digits for the weight added to the colour.
 constexpr float kLarge = 256;
-constexpr int kStripPart = 8;  ///< of the picture's height
+constexpr int kStripPart = 8;  ///< the strip's height is 1/8 of the picture's
 
-/// The options of kParamLightnessOf after the first: spaces by name.
+/// The spaces of kParamLightnessOf, after its first option.
 constexpr const char* kLightnessOf[] = {"Rec.709", "Rec.2020", "P3-D65", "ACEScg"};
-constexpr Vec3 kRec601 = {0.299, 0.587, 0.114};  // of luma, as ITU-R BT.601 has it
+constexpr Vec3 kRec601 = {0.299, 0.587, 0.114};  // luma weights of ITU-R BT.601
 
 double clamped(const std::optional<double>& value, double initial, double low, double high) {
     const double given = value.value_or(initial);
@@ -39,14 +39,14 @@ bool finite(const float* rgb) {
     return std::isfinite(rgb[0]) && std::isfinite(rgb[1]) && std::isfinite(rgb[2]);
 }
 
-/// As far away as can be; not where a channel is no number.
+/// Whether a channel is infinite and none is NaN: infinities count as outside, NaNs do not.
 bool infinite(const float* rgb) {
     const auto is_infinite = [](float c) { return std::isinf(c); };
     return std::none_of(rgb, rgb + 3, [](float c) { return std::isnan(c); }) &&
            std::any_of(rgb, rgb + 3, is_infinite);
 }
 
-/// Rows of pixels in floats, and what is done to them.
+/// Rows of float pixels.
 struct Rows {
     const float* source;
     float* result;
@@ -55,8 +55,8 @@ struct Rows {
     bool premultiplied;
 };
 
-/// Puts the source's lightness back in, the same amount in each channel: differences of colour, and
-/// with them hue, stay as the edit made them.
+/// Restores the source's lightness by adding the same amount to each channel. Differences between
+/// channels, and with them hue, stay as edited.
 void keep_lightness(const Rows& rows, const OutputSettings& settings) {
     for (std::size_t i = 0; i < rows.pixels; ++i) {
         const float* from = rows.source + i * rows.channels;
@@ -69,7 +69,7 @@ void keep_lightness(const Rows& rows, const OutputSettings& settings) {
     }
 }
 
-/// `mask` multiplies `mix`, pixel by pixel; empty for 1.
+/// `mask` multiplies `mix` for each pixel; an empty mask counts as 1.
 void mix_in_source(const Rows& rows, double mix, const std::vector<float>& mask) {
     for (std::size_t i = 0; i < rows.pixels * rows.channels; ++i) {
         const float from = rows.source[i];
@@ -82,8 +82,7 @@ void mix_in_source(const Rows& rows, double mix, const std::vector<float>& mask)
     }
 }
 
-/// The colours without their alpha, in the palette's numbers: (pixels, 3), NaN where they have
-/// none.
+/// Unpremultiplied colours in the palette's code values: (pixels, 3); NaN where alpha is 0.
 std::vector<float> straight_colours(const Rows& rows, const ColourConversion* conversion) {
     std::vector<float> straight(rows.pixels * 3);
     for (std::size_t i = 0; i < rows.pixels; ++i) {
@@ -101,8 +100,8 @@ std::vector<float> straight_colours(const Rows& rows, const ColourConversion* co
     return straight;
 }
 
-/// The weight of one colour; `read` is that plus the colour. The smallest channel tells it best,
-/// and double precision where even that is large.
+/// The weight of one colour; `read` is the colour plus the weight. The smallest channel is the most
+/// precise one; where it is large too, double precision is used.
 double weight_of(const float* colour, const float* read, const Recolourer& reader) {
     const auto smaller = [](float a, float b) { return std::abs(a) < std::abs(b); };
     const std::ptrdiff_t c = std::min_element(colour, colour + 3, smaller) - colour;
@@ -111,7 +110,7 @@ double weight_of(const float* colour, const float* read, const Recolourer& reade
     return exact[static_cast<std::size_t>(c)] - colour[c];
 }
 
-/// What a matte says of one colour, from 0 to 1; `read` is the colour plus what its reader adds.
+/// The matte of one colour, 0 to 1; `read` is the colour plus what the reader adds.
 double matte_of(const float* colour, const float* read, const Drawing& drawing) {
     const OutputSettings& settings = drawing.settings;
     if (settings.output == Output::kOutside && infinite(colour)) return 1;
@@ -150,7 +149,7 @@ void draw_matte(const Rows& rows, const Drawing& drawing) {
     }
 }
 
-/// The strip's part of one row of the picture, where row `y` crosses it.
+/// Draws the palette strip in row `y` of the picture, if the strip covers that row.
 void draw_strip(float* row, int x1, int x2, int y, std::size_t channels, const Drawing& drawing) {
     const OfxRectI& picture = drawing.picture;
     const std::int64_t width = static_cast<std::int64_t>(picture.x2) - picture.x1;
@@ -178,7 +177,7 @@ void draw_rows(const Rows& rows, const Drawing& drawing) {
         RecolourOptions options;
         options.strength = settings.strength;
         options.premultiplied = rows.premultiplied;
-        options.threads = 1;  // the host's threads share the rows already
+        options.threads = 1;  // the rows are already shared among the host's threads
         const auto width = static_cast<int>(rows.pixels);
         const auto channels = static_cast<int>(rows.channels);
         const auto stride =
@@ -196,7 +195,7 @@ void draw_rows(const Rows& rows, const Drawing& drawing) {
     if (settings.mix < 1) mix_in_source(rows, settings.mix, {});
 }
 
-/// A mask's numbers, 0 to 1, row after row; 0 where it has no pixels.
+/// The mask as values 0 to 1, row by row; 0 outside the mask's image.
 std::vector<float> mask_of(const Image& mask, const OfxRectI& rows) {
     const auto width = static_cast<std::size_t>(rows.x2 - rows.x1);
     std::vector<float> shares(width * static_cast<std::size_t>(rows.y2 - rows.y1));
@@ -221,41 +220,39 @@ std::vector<float> mask_of(const Image& mask, const OfxRectI& rows) {
 void define_output_params(ParamDefiner& define) {
     define.begin_group("outputs", "Output");
     define.choice({kParamOutput, "Output",
-                   "Recoloured: the graded picture. Weight of a handle: how much of a palette "
-                   "colour is in each pixel, followed through time, a soft key. Palette: the "
-                   "graded picture with this frame's palette at its foot, the palette's own "
-                   "colours above and the new ones below. Outside: what the palette does not "
-                   "enclose."},
+                   "Recoloured: the graded picture. Weight of a handle: a soft key that follows "
+                   "one palette colour through time. Palette: the graded picture with this frame's "
+                   "palette at the bottom, original colours above and new colours below. Outside: "
+                   "a matte of the colours outside the palette."},
                   {"Recoloured", "Weight of a handle", "Palette", "Outside"});
     define.integer({kParamWeightOf, "Handle",
-                    "The handle whose weight is put out: 2 for the one at Use 2 below."},
+                    "The handle for Weight of a handle: 2 is the handle of Use 2 below."},
                    {1, 1, 100000, 1, 32});
-    define.choice({kParamMatteIn, "Matte in",
-                   "Picture: a matte (weight, outside) is a grey picture. Alpha: the picture keeps "
-                   "its colours, and its alpha (1 where it is opaque) is multiplied by the "
-                   "matte."},
-                  {"Picture", "Alpha"});
-    define.number({kParamOutsideReach, "Outside at",
-                   "The distance from the palette at which Outside is white; nearer to it, it is "
-                   "grey."},
-                  {0.05, 0.0001, 100, 0.001, 1}, 0.01, 4, false);
+    define.choice(
+        {kParamMatteIn, "Matte in",
+         "Picture: outputs the matte (Weight of a handle or Outside) as a grey picture. Alpha: "
+         "keeps the picture's colours and multiplies its alpha (1 if opaque) by the matte."},
+        {"Picture", "Alpha"});
+    define.number(
+        {kParamOutsideReach, "Outside at",
+         "The distance from the palette at which Outside is white. Nearer colours are grey."},
+        {0.05, 0.0001, 100, 0.001, 1}, 0.01, 4, false);
     define.number({kParamKeepLightness, "Keep lightness",
-                   "How much of the source's lightness the graded picture keeps: 0 none of it, 1 "
-                   "all of it, so that hue and saturation alone change."},
+                   "How much of the source's lightness the graded picture keeps: 0 none, 1 all. At "
+                   "1 only hue and saturation change."},
                   {0, 0, 1, 0, 1}, 0.01, 3, true);
     define.choice({kParamLightnessOf, "Lightness of",
-                   "Whose weights of red, green and blue make up lightness. Auto: those of the "
-                   "space that the picture is in by the sidecar, Rec.709 where it names none that "
-                   "is known."},
+                   "The colour space whose luminance weights define lightness. Auto: the sidecar's "
+                   "colour space, or Rec.709 if the node does not know that space."},
                   {"Auto", "Rec.709", "Rec.2020", "P3", "ACES AP1", "Rec.601"});
     define.choice({kParamPictureIn, "Picture is in",
-                   "Input space: the code values of the analysed clip. Palette space: those of the "
-                   "palette, such as ACEScct, for hosts that convert by themselves. Without a "
-                   "conversion in the sidecar both are the same. Scene-linear: linear light, for a "
-                   "palette in sRGB, Rec.709 or another display encoding; the handles' colours are "
-                   "linear too."},
+                   "The node's input colour space. Input space: the analysed clip's code values. "
+                   "Palette space: the palette's code values, such as ACEScct, for hosts that "
+                   "convert themselves. Without a conversion in the sidecar both are the same. "
+                   "Scene-linear: linear light, for a palette in sRGB, Rec.709 or another display "
+                   "encoding. The handles' colours are then linear too."},
                   {"Input space", "Palette space", "Scene-linear"});
-    define.number({kParamMix, "Mix", "From the source (0) to what is put out (1)."},
+    define.number({kParamMix, "Mix", "Blends from the source (0) to the output (1)."},
                   {1, 0, 1, 0, 1}, 0.01, 3, true);
     define.end_group();
 }
@@ -265,7 +262,7 @@ OutputSettings output_settings_at(const Params& params, OfxTime time) {
     settings.output = output_of(params.int_at(kParamOutput, time));
     settings.weight_of = params.int_at(kParamWeightOf, time).value_or(1);
     settings.in_alpha = params.int_at(kParamMatteIn, time).value_or(0) == 1;
-    // Not every host keeps a parameter inside its range.
+    // Some hosts do not keep a parameter inside its range.
     settings.reach = clamped(params.double_at(kParamOutsideReach, time), 0.05, 1e-4, 100);
     settings.strength = clamped(params.double_at(kParamStrength, time), 1, 0, 1);
     settings.keep = clamped(params.double_at(kParamKeepLightness, time), 0, 0, 1);
@@ -305,7 +302,7 @@ void prefer_alpha(const Suites& suites, OfxImageEffectHandle effect, const Prope
         return;
     }
     const Properties source(suites, handle);
-    // Of a clip of alpha alone there are no colours to tell a matte by.
+    // An alpha-only clip has no colours for a matte.
     if (source.get_string(kOfxImageEffectPropComponents) == kOfxImageComponentAlpha) return;
     for (const char* name : {kOfxImageEffectSimpleSourceClipName, kOfxImageEffectOutputClipName}) {
         const std::string components = std::string("OfxImageClipPropComponents_") + name;

@@ -1,4 +1,4 @@
-// What the node puts out: the recoloured picture, or what a palette tells about one, as a matte.
+// The node's output: the recoloured picture, or a matte made from the palette.
 #pragma once
 
 #include <array>
@@ -30,52 +30,52 @@ void define_output_params(ParamDefiner& define);
 
 struct OutputSettings {
     Output output = Output::kRecoloured;
-    int weight_of = 1;              ///< a slot of the handles, counted from 1; beyond them a handle
-    bool in_alpha = false;          ///< mattes multiply alpha instead of being a grey picture
-    double reach = 0.05;            ///< distance from the palette at which a colour is all outside
-    double strength = 1;            ///< 0 to 1
-    double keep = 0;                ///< of the source's lightness, 0 to 1
-    bool own_lightness = true;      ///< weighed as the sidecar's picture is, and not by a choice
-    Vec3 lightness{0, 0, 0};        ///< weights of red, green and blue; they sum to 1
-    double mix = 1;                 ///< 0 the source, 1 what is put out
-    bool in_palette_space = false;  ///< the picture has the palette's numbers already
-    bool scene_linear = false;      ///< the picture and the host's colours are linear light
+    int weight_of = 1;          ///< a slot, counted from 1; beyond the last slot the nth handle
+    bool in_alpha = false;      ///< mattes multiply alpha; else they are grey pictures
+    double reach = 0.05;        ///< distance from the palette at which Outside is 1
+    double strength = 1;        ///< 0 to 1
+    double keep = 0;            ///< share of the source's lightness to keep, 0 to 1
+    bool own_lightness = true;  ///< weights follow the sidecar's encoding, not the user's choice
+    Vec3 lightness{0, 0, 0};    ///< weights of red, green and blue; they sum to 1
+    double mix = 1;             ///< 0 the source, 1 the output
+    bool in_palette_space = false;  ///< the picture is already in the palette's code values
+    bool scene_linear = false;      ///< the picture and the host's colours are scene-linear
 
-    /// The source comes out, whatever else is set.
+    /// The output is the source, whatever the other settings are.
     bool passes() const { return mix == 0 || (output == Output::kRecoloured && strength == 0); }
     bool is_matte() const { return output == Output::kWeight || output == Output::kOutside; }
 };
 OutputSettings output_settings_at(const Params& params, OfxTime time);
-/// Tells a host that asks for preferences what a matte in alpha needs: a channel to stand in, and
-/// that the output is not opaque even where the source is.
+/// Clip preferences for a matte in alpha: an alpha channel, and an output that is not opaque even
+/// where the source is.
 void prefer_alpha(const Suites& suites, OfxImageEffectHandle effect, const Properties& out_args);
 
-/// From scene-linear numbers to the palette's, where *Picture is in* says so and the sidecar has no
-/// conversion of its own; else null, also for a palette whose encoding has no known curve.
+/// The conversion from scene-linear to the palette's code values, where *Picture is in* selects it
+/// and the sidecar has no conversion. Else null, also where the encoding has no known curve.
 std::shared_ptr<const ColourConversion> linear_picture(const Params& params, const Sidecar& sidecar,
                                                        OfxTime time);
-/// What the node's picture is in: the sidecar's input, or with the choice its palette's space.
+/// The encoding of the node's picture: the sidecar's input space, or the palette's if chosen.
 const std::string& encoding_of(const Sidecar& sidecar, bool in_palette_space);
 
-/// What is drawn, all of it read only: threads share it.
+/// What one render draws. Read-only, so that threads share it.
 struct Drawing {
     OutputSettings settings;
-    /// The edit, exact or interpolated; null where the picture keeps its colours.
+    /// The edit, exact or interpolated; null where colours do not change.
     std::shared_ptr<const ColourMap> edit;
     /// For mattes: weight_reader() or surface_reader().
     std::shared_ptr<const Recolourer> reader;
-    /// From the picture's numbers to the palette's; null where they are the same.
+    /// From the picture's code values to the palette's; null where they are equal.
     std::shared_ptr<const ColourConversion> conversion;
-    /// For Output::kPalette: the slice's colours before and after the edit, and the whole picture,
-    /// at whose foot they stand.
+    /// For Output::kPalette: the slice's colours before and after the edit, and the bounds of the
+    /// whole picture, which has the strip at its bottom.
     std::vector<Vec3> original, edited;
     OfxRectI picture{};
-    /// Where the result shows, by its alpha or its only channel; null: everywhere.
+    /// Limits the result by its alpha or only channel; null for no limit.
     const Image* mask = nullptr;
 };
 
-/// Draws what `in` covers of `area`; the rest becomes transparent black. Both images have the same
-/// format, of three or four channels.
+/// Draws the part of `area` that `in` covers; the rest becomes transparent black. Both images have
+/// the same format, with three or four channels.
 void draw(const Image& in, const Image& out, const OfxRectI& area, const Drawing& drawing);
 
 }  // namespace palette4d::node

@@ -20,7 +20,7 @@ void ParamDefiner::begin_group(const char* name, const char* label) {
     group_ = nullptr;
     const Properties group = define(kOfxParamTypeGroup, {name, label, nullptr});
     group.set_int(kOfxParamPropGroupOpen, 0);
-    // Without its group a parameter still has its place in the list.
+    // If the host refuses the group, parameters still appear in order.
     if (group) group_ = name;
 }
 

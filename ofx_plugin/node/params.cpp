@@ -16,15 +16,14 @@ void define_params(const Suites& suites, OfxParamSetHandle params) {
 
     const Properties status =
         define.text({kParamStatus, "Status",
-                     "What was loaded, which of its frames is shown, or what is wrong with the "
-                     "sidecar."},
+                     "The loaded sidecar and the frame shown, or what is wrong with the sidecar."},
                     kOfxParamStringIsMultiLine, "No sidecar chosen");
-    // Natron writes what is not enabled in black on dark grey.
+    // Natron draws disabled text black on dark grey, so the status stays enabled there.
     status.set_int(kOfxParamPropEnabled, suites.is_natron);
     status.set_int(kOfxParamPropEvaluateOnChange, 0);
     status.set_int(kOfxParamPropCanUndo, 0);
     define.number({kParamStrength, "Strength",
-                   "How much of the edit is applied: 0 is the original picture, 1 the edit."},
+                   "How much of the edit applies: 0 is the original picture, 1 the full edit."},
                   {1, 0, 1, 0, 1}, 0.01, 3, true);
     define_mode_param(define);
     define_output_params(define);

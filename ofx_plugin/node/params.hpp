@@ -1,4 +1,4 @@
-// The node's parameters. Their names are saved in users' projects: they never change.
+// The node's parameters. Users' projects save their names: never change them.
 #pragma once
 
 #include <array>
@@ -14,11 +14,10 @@ inline constexpr const char* kParamStrength = "strength";
 inline constexpr const char* kParamFrameOffset = "frameOffset";
 inline constexpr const char* kParamStatus = "status";
 
-/// Defines them in a context's descriptor. A property or a parameter that the host refuses keeps
-/// its default.
+/// Defines them in a context's descriptor. What the host refuses keeps the host's default.
 void define_params(const Suites& suites, OfxParamSetHandle params);
 
-/// Reads and writes one instance's parameters. Empty where the host refuses.
+/// Reads and writes one instance's parameters. Results are empty where the host refuses.
 class Params {
 public:
     Params(const Suites& suites, OfxImageEffectHandle effect);
@@ -26,33 +25,33 @@ public:
     Params(const Params&) = delete;
     Params& operator=(const Params&) = delete;
 
-    /// At a time: the one way that is allowed while rendering.
+    /// With a time: the only way that is allowed while rendering.
     std::optional<std::string> string_at(const char* name, OfxTime time) const;
     std::optional<double> double_at(const char* name, OfxTime time) const;
-    /// Integers, choices (the option's number) and booleans (0 or 1).
+    /// Integers, choices (the option's index) and booleans (0 or 1).
     std::optional<int> int_at(const char* name, OfxTime time) const;
     std::optional<std::array<double, 3>> rgb_at(const char* name, OfxTime time) const;
-    /// Without a time: for actions other than rendering.
+    /// Without a time: for all actions except rendering.
     std::optional<std::string> string_now(const char* name) const;
     std::optional<double> double_now(const char* name) const;
     std::optional<int> int_now(const char* name) const;
     std::optional<std::array<double, 3>> rgb_now(const char* name) const;
-    /// Whether the host has keyframes for it.
+    /// Whether the parameter has keyframes.
     bool animated(const char* name) const;
-    /// What is set from now on is undone in one step, which ends with this object; a host without
-    /// such steps does as it does. In kOfxActionInstanceChanged alone, says the standard. Nothing
-    /// set, no step.
+    /// Makes all later changes one undo step, which ends with this object. Without changes there is
+    /// no step; hosts without undo steps ignore it. The standard allows this in
+    /// kOfxActionInstanceChanged only.
     void one_undo_step(const char* label) { step_ = label; }
-    /// For instance changes only, never while rendering.
+    /// Only in kOfxActionInstanceChanged, never while rendering.
     bool set_string(const char* name, const std::string& value) const;
     bool set_int(const char* name, int value) const;
     bool set_rgb(const char* name, const std::array<double, 3>& value) const;
     bool remove_keys(const char* name) const;
-    /// The same for a parameter that cannot be undone: it is no step's.
+    /// The same for a parameter without undo; it belongs to no step.
     bool note_string(const char* name, const std::string& value) const;
-    /// An instance's parameter's own properties (label, secret, enabled, hint).
+    /// The instance's own properties of a parameter (label, secret, enabled, hint).
     Properties properties(const char* name) const;
-    /// The file of the media, in a host that tells it; else empty.
+    /// The media file, in hosts that report it; else empty.
     std::string media() const;
 
 private:
@@ -63,7 +62,7 @@ private:
     OfxImageEffectHandle effect_;
     const OfxParameterSuiteV1* suite_;
     OfxParamSetHandle set_ = nullptr;
-    mutable const char* step_ = nullptr;  ///< the label of one that is to begin
+    mutable const char* step_ = nullptr;  ///< the label of a step that has not begun
     mutable bool in_step_ = false;
 };
 

@@ -21,7 +21,7 @@ constexpr const char* kHome = "HOME";
 
 bool in_name(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; }
 
-/// The end of a variable that starts at `at`, and its name; an empty name for none.
+/// The end of the variable that starts at `at`, and its name; the name is empty for no variable.
 std::size_t variable_at(const std::string& path, std::size_t at, std::string& name) {
     name.clear();
     std::size_t begin = at + 1, end = begin;
@@ -40,8 +40,7 @@ bool is_file(const fs::path& path) {
     return fs::is_regular_file(path, error);
 }
 
-/// What a path means that was pasted with a blank or a line's end around it, in quotes, or as a
-/// URL.
+/// Cleans a pasted path: blanks or line ends around it, quotes, or a file:// URL.
 std::string unpasted(std::string path) {
     const auto blank = [](char c) { return std::isspace(static_cast<unsigned char>(c)) != 0; };
     while (!path.empty() && blank(path.back())) path.pop_back();
@@ -67,8 +66,8 @@ std::string unpasted(std::string path) {
     return plain;
 }
 
-/// Natron puts its project's folder before every path that does not start with a slash. This takes
-/// the folder away where the whole is no file and the rest is one of the forms that are ours.
+/// Natron prefixes every path that does not start with a slash with its project's folder. Removes
+/// that prefix where the whole is no file and the rest is one of our forms.
 std::string without_project(const std::string& path) {
     std::error_code error;
     const fs::path whole = fs::u8path(path);
@@ -112,7 +111,7 @@ bool is_still(const fs::path& media) {
     return false;
 }
 
-/// The length of a name without a frame's number or the place of one at its end.
+/// The length of a name without a frame number, or its placeholder, at the end.
 std::size_t without_number(const std::string& stem) {
     const std::size_t end = stem.find_last_not_of("0123456789#@%d[]-");
     if (end == std::string::npos || end + 1 == stem.size()) return stem.size();
@@ -120,7 +119,7 @@ std::size_t without_number(const std::string& stem) {
     return name == std::string::npos ? stem.size() : name + 1;
 }
 
-/// A clip's name without ending and, of a sequence, without number.
+/// A clip's name without extension and, for a sequence, without frame number.
 std::string clip_name(const std::string& path) {
     const fs::path file = fs::u8path(path);
     const std::string stem = file.stem().u8string();
@@ -218,8 +217,8 @@ std::string words_of_missing(const std::string& given_path) {
         if (path[at] != '$' && path[at] != '%') continue;
         const std::size_t end = variable_at(path, at, name);
         if (!name.empty() && !std::getenv(name.c_str())) {
-            return "the environment that the host was started in has no variable " + name +
-                   "; start the host where it is set, or write out what it stands for";
+            return "the host's environment has no variable " + name +
+                   "; set it and restart the host, or write its value into the path";
         }
         at = end - 1;
     }
@@ -229,10 +228,10 @@ std::string words_of_missing(const std::string& given_path) {
     const bool relative = given.is_relative();
     std::string words = "the file does not exist";
     words +=
-        relative ? " in Clip's folder, " : ", and there is none of its name in Clip's folder or ";
+        relative ? " in Clip's folder, " : ", and no file with its name is in Clip's folder or ";
     words += kSearchPath;
     if (relative) words += " or " + fs::current_path(error).u8string();
-    return words + "; choose the file again, or the folder that it is in as Clip's folder";
+    return words + "; choose the file again, or set Clip's folder to its folder";
 }
 
 std::string clip_folder(const std::string& path, const std::string& source) {

@@ -1,4 +1,4 @@
-// Where a sidecar is. Sees neither OpenFX nor the core.
+// Finds sidecar files. Depends neither on OpenFX nor on the core.
 #pragma once
 
 #include <filesystem>
@@ -7,39 +7,38 @@
 
 namespace palette4d::node {
 
-/// Folders in which sidecars are looked for, separated as in PATH.
+/// Folders in which the node searches sidecars, separated as in PATH.
 inline constexpr const char* kSearchPath = "PALETTE4D_PATH";
 
-/// The path (UTF-8) with a leading ~ and $NAME, ${NAME} and %NAME% replaced by what the environment
-/// has; a name that it does not have is left as it is.
+/// The path (UTF-8) with a leading ~ and $NAME, ${NAME} and %NAME% replaced from the environment.
+/// Unknown names stay as they are.
 std::string expanded(const std::string& path);
 
-/// The file that a path means: itself; a relative one in `folder`, in the folders of PALETTE4D_PATH
-/// or in the working folder; else a file of its name in `folder` or in those of PALETTE4D_PATH.
-/// Either may be pasted: with blanks around it, in quotes, as a file:// URL; and a host may have
-/// put its project's folder before it. `folder` is expanded too and may be empty. Empty when there
-/// is no such file.
+/// The file for a path: the file itself; a relative path is searched in `folder`, PALETTE4D_PATH
+/// and the working folder. Else a file with its name in `folder` or PALETTE4D_PATH. Accepts pasted
+/// paths, with blanks, quotes or as a file:// URL, and a project folder that the host prefixed.
+/// `folder` is expanded too and may be empty. Empty when there is no such file.
 std::optional<std::string> find_file(const std::string& path, const std::string& folder);
 
-/// The path without what find_file() overlooks.
+/// The path as find_file() reads it, without blanks, quotes and prefixes.
 std::string meant(const std::string& path);
 
-/// The sidecar of a media file, by its name: `shot.mov` and `shot.1001.exr` have `shot.p4d.json`,
-/// beside them, in `folder` or in the folders of PALETTE4D_PATH. Empty when there is none.
+/// The sidecar of a media file by its name: `shot.mov` and `shot.1001.exr` have `shot.p4d.json`.
+/// Searched beside the media, in `folder` and in PALETTE4D_PATH. Empty when there is none.
 std::optional<std::string> find_beside(const std::string& media, const std::string& folder);
 
-/// The number of a sequence's first frame by the path of that frame, or of them all (`[1-9]`);
-/// empty for a movie.
+/// The number of a sequence's first frame, from that frame's path or a range (`[1-9]`); empty for a
+/// movie.
 std::optional<double> first_number(const std::string& media);
 
-/// Whether a media file and a clip that a sidecar names are of one name, but for frame numbers and
-/// endings.
+/// Whether a media file and a sidecar's clip have the same name, apart from frame numbers and
+/// extensions.
 bool same_clip(const std::string& media, const std::string& source);
 
-/// Why find_file() found nothing, and what to do; empty where something else than a file is there.
+/// Why find_file() found nothing, and what to do; empty where the path exists but is not a file.
 std::string words_of_missing(const std::string& path);
 
-/// The folder of a clip, as the sidecar at `path` names its source; empty where there is none.
+/// The folder of a sidecar's source clip; empty where there is none.
 std::string clip_folder(const std::string& path, const std::string& source);
 
 }  // namespace palette4d::node

@@ -31,10 +31,10 @@ std::string either(const Properties& image, const Properties& clip, const char* 
     return clip.get_string(name).value_or("");
 }
 
-/// Added to a float of 0 to 65535, this leaves no fraction, rounded as IEEE 754 does.
+/// Adding this to a float of 0 to 65535 removes the fraction, with the rounding of IEEE 754.
 constexpr float kNoFraction = 12582912.0f;  // 1.5 * 2^23
 
-/// To the nearest integer, halves to the even one: as `palette4d render` rounds. NaN becomes 0.
+/// To the nearest integer, ties to even, as `palette4d render` rounds. NaN becomes 0.
 template <class Integer>
 Integer to_integer(float value) {
     constexpr Integer largest = std::numeric_limits<Integer>::max();
@@ -55,7 +55,7 @@ float float_of(std::uint32_t bits) {
     return value;
 }
 
-/// IEEE 754 binary16. Every half, payloads of NaNs included, comes back with its own bits.
+/// IEEE 754 binary16. Every half, even a NaN with payload, returns with its own bits.
 float from_half(std::uint16_t half) {
     const std::uint32_t sign = (half & 0x8000u) << 16, exponent = half >> 10 & 31u;
     const std::uint32_t fraction = half & 0x3ffu;
@@ -71,9 +71,9 @@ std::uint16_t to_half(float value) {
     if (size > 0x7f800000u) {
         half = 0x7c00u | std::max(1u, size >> 13 & 0x3ffu);
     } else if (size >= 0x477ff000u) {
-        half = 0x7c00u;  // from 65520 on infinity is nearest
+        half = 0x7c00u;  // 65520 and above round to infinity
     } else if (size < 0x38800000u) {
-        // From 0.5 on a float's last place is that of the halves below 2^-14.
+        // At 0.5, a float's last place equals the step of halves below 2^-14.
         half = bits_of(float_of(size) + 0.5f) - bits_of(0.5f);
     } else {
         half = (size + 0xfffu + (size >> 13 & 1u) - (112u << 23)) >> 13;
@@ -123,7 +123,7 @@ bool is_empty(const OfxRectI& rect) { return rect.x1 >= rect.x2 || rect.y1 >= re
 
 namespace {
 
-/// Each number of an area's rows; the image's are of type `Number`.
+/// Visits each value of an area's rows; the image's values have type `Number`.
 template <class Number, class Each>
 void each_number(const Image& image, const OfxRectI& area, Each each) {
     const std::size_t row =

@@ -14,7 +14,7 @@
 namespace palette4d::node {
 namespace {
 
-/// One clip of an instance and its image at a time; releases the image whatever happens.
+/// One clip of an instance and its image at a time; always releases the image.
 class ClipImage {
 public:
     ClipImage(const Suites& suites, OfxImageEffectHandle effect, const char* name, OfxTime time)
@@ -39,9 +39,9 @@ public:
     ClipImage(const ClipImage&) = delete;
     ClipImage& operator=(const ClipImage&) = delete;
 
-    /// The host has no picture here: transparent black, says the standard.
+    /// The host has no picture here: the standard then asks for transparent black.
     bool absent() const { return absent_; }
-    /// Empty also when there is a picture that cannot be read.
+    /// Also empty for a picture that cannot be read.
     const std::optional<Image>& pixels() const { return pixels_; }
 
 private:
@@ -51,7 +51,7 @@ private:
     std::optional<Image> pixels_;
 };
 
-/// In this context the host's brush says where the grade shows.
+/// In this context the host's brush is a mask for the result.
 bool is_paint(const Suites& suites, OfxImageEffectHandle effect) {
     OfxPropertySetHandle handle = nullptr;
     return suites.effect->getPropertySet &&
@@ -60,7 +60,7 @@ bool is_paint(const Suites& suites, OfxImageEffectHandle effect) {
                kOfxImageEffectContextPaint;
 }
 
-/// Draws the window; on an exception the source is copied instead, and the exception goes on.
+/// Draws the window. On an exception it copies the source and rethrows.
 OfxStatus draw_window(const Suites& suites, OfxImageEffectHandle effect, const Image& in,
                       const Image& out, const OfxRectI& window, const FrameSetup& setup) {
     try {
@@ -81,16 +81,16 @@ OfxStatus is_identity(const Suites& suites, OfxImageEffectHandle effect, const P
                       const Properties& out_args) {
     const std::optional<double> time = in_args.get_double(kOfxPropTime);
     if (!time) return kOfxStatReplyDefault;
-    // Of a host that tells the media's frame when it renders, and not here.
+    // Such hosts report the media frame when they render, but not in this action.
     if (!Params(suites, effect).media().empty()) return kOfxStatReplyDefault;
     const FrameSetup setup = frame_setup_at(suites, effect, *time);
-    // With a problem there is something to render: the message.
+    // With a problem, the node must render to show its message.
     if (!setup.passes || !setup.problem.empty() || !setup.note.empty()) return kOfxStatReplyDefault;
     report(suites, effect, "");
     if (!out_args.set_string(kOfxPropName, kOfxImageEffectSimpleSourceClipName)) {
         return kOfxStatReplyDefault;
     }
-    out_args.set_double(kOfxPropTime, *time);  // where it is refused it is this time already
+    out_args.set_double(kOfxPropTime, *time);  // hosts that refuse this use the current time anyway
     return kOfxStatOK;
 }
 
@@ -106,7 +106,7 @@ OfxStatus render(const Suites& suites, OfxImageEffectHandle effect, const Proper
 
     const ClipImage source(suites, effect, kOfxImageEffectSimpleSourceClipName, *time);
     if (!source.pixels() || !same_format(*source.pixels(), out)) {
-        // Never leave a host's uninitialised memory on the screen.
+        // Never show the host's uninitialised memory.
         clear(out, window);
         return source.absent() ? kOfxStatOK : kOfxStatFailed;
     }
@@ -126,13 +126,13 @@ OfxStatus render(const Suites& suites, OfxImageEffectHandle effect, const Proper
         throw;
     }
     report(suites, effect, setup.problem.empty() ? setup.note : setup.problem);
-    // Alpha alone passes through too.
+    // Alpha-only pictures pass through too.
     if (setup.passes || in.channels < 3) {
         copy(in, out, window);
         return kOfxStatOK;
     }
     setup.drawing.picture = out.definition;
-    // A host that takes the node into a LUT asks for colours alone, whatever lies where.
+    // A host that bakes a LUT wants colours only, so no mattes and no strip.
     if (in_args.get_string(kOfxImageEffectPropNoSpatialAwareness) == "true" &&
         setup.drawing.settings.output == Output::kPalette) {
         setup.drawing.settings.output = Output::kRecoloured;

@@ -1,15 +1,15 @@
-// The actions that concern pictures.
+// The render and identity actions.
 #pragma once
 
 #include "host.hpp"
 
 namespace palette4d::node {
 
-/// kOfxImageEffectActionIsIdentity: the source, where this frame has nothing to recolour.
+/// kOfxImageEffectActionIsIdentity: returns the source where this frame has nothing to recolour.
 OfxStatus is_identity(const Suites& suites, OfxImageEffectHandle effect, const Properties& in_args,
                       const Properties& out_args);
-/// kOfxImageEffectActionRender. Fails only when the host does not give it an output image or a
-/// time; the picture passes through, with a message, when there is no usable sidecar.
+/// kOfxImageEffectActionRender. Fails only when the host gives no output image or no time. Without
+/// a usable sidecar the picture passes through, with a message.
 OfxStatus render(const Suites& suites, OfxImageEffectHandle effect, const Properties& in_args);
 
 }  // namespace palette4d::node

@@ -25,20 +25,20 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = fs::file_time_type::clock;
 
-/// Prepared frames that a sidecar keeps: more than a host has in work at a time.
+/// Prepared frames kept for each sidecar: more than a host renders at a time.
 std::size_t most_frames() { return std::max<std::size_t>(32, 4 * LoadedSidecar::most_lattices()); }
 constexpr std::size_t kMaxSidecars = 32;
 constexpr std::size_t kMaxTexts = 8;
-// File systems store times as coarsely as two seconds (FAT): younger files may change unseen.
+// File times may be as coarse as two seconds (FAT), so newer files may change unnoticed.
 constexpr auto kSettled = std::chrono::seconds(3);
 
-/// What the file system says about a file; the file is read again when any of it changes. Tools
-/// that copy a file may keep its time and size, but cannot set the time of the change itself.
+/// A file's identity and times; the file is reloaded when any of them changes. Copy tools can
+/// preserve a file's time and size, but not the time of its status change.
 struct Stamp {
     fs::file_time_type modified{};
     std::uintmax_t bytes = 0;
     std::uintmax_t device = 0, inode = 0;               ///< 0 where the system has none
-    std::int64_t change_seconds = 0, change_nanos = 0;  ///< likewise
+    std::int64_t change_seconds = 0, change_nanos = 0;  ///< likewise 0 where the system has none
     bool operator==(const Stamp& other) const {
         const auto all = [](const Stamp& s) {
             return std::tie(s.modified, s.bytes, s.device, s.inode, s.change_seconds,
@@ -48,7 +48,7 @@ struct Stamp {
     }
 };
 
-/// Adds what the standard library does not tell.
+/// Adds what the standard library does not report.
 void identify(Stamp& stamp, const fs::path& path) {
 #if defined(_WIN32)
     static_cast<void>(stamp), static_cast<void>(path);
@@ -67,13 +67,13 @@ void identify(Stamp& stamp, const fs::path& path) {
 #endif
 }
 
-/// One path's latest reading. Its mutex makes threads that want the same new file read it once.
+/// The latest load of one path. Its mutex ensures that only one thread loads a new file.
 struct Entry {
     std::mutex mutex;
     bool read = false;
     Stamp stamp;
-    bool settled = false;  ///< the stamp was old enough at the reading to be trusted
-    std::string text;      ///< kept until settled, to see whether a young file really changed
+    bool settled = false;  ///< the stamp was old enough to be trusted when the file was read
+    std::string text;      ///< kept until settled, to see whether the content really changed
     SidecarResult result;
     std::uint64_t last_use = 0;
 };
@@ -81,7 +81,7 @@ struct Entry {
 struct Cache {
     std::mutex mutex;
     std::map<std::string, std::shared_ptr<Entry>> entries;
-    std::list<std::pair<std::string, SidecarResult>> texts;  ///< those that projects carry
+    std::list<std::pair<std::string, SidecarResult>> texts;  ///< copies from projects
     std::uint64_t uses = 0;
 };
 
@@ -117,7 +117,7 @@ std::optional<Stamp> stamp_of(const fs::path& path, std::string& problem) {
     return stamp;
 }
 
-/// The file's text, at most one byte more than a sidecar may have (the parser then refuses it).
+/// The file's text, at most one byte longer than the limit, which the parser then refuses.
 std::optional<std::string> text_of(const fs::path& path, std::uintmax_t expected) {
     std::ifstream file(path, std::ios::binary);
     if (!file) return std::nullopt;
@@ -146,7 +146,7 @@ SidecarResult parse(const std::string& text, const std::string& path) {
     return result;
 }
 
-/// Brings an entry up to date with its file; its mutex is held.
+/// Updates an entry from its file; the caller holds its mutex.
 void refresh(Entry& entry, const fs::path& path, const std::string& name) {
     std::string problem;
     for (int attempt = 0; attempt < 3; ++attempt) {
@@ -161,7 +161,7 @@ void refresh(Entry& entry, const fs::path& path, const std::string& name) {
             problem = "the file cannot be read";
             break;
         }
-        // Written while it was read: what was read may be two halves.
+        // The file changed while it was read, so the text may mix two versions.
         const std::optional<Stamp> after = stamp_of(path, problem);
         if (!after) break;
         if (!(*after == *before)) {
@@ -253,7 +253,7 @@ std::pair<std::vector<Vec3>, std::vector<Vec3>> LoadedSidecar::palette_at(
 LoadedSidecar::Key LoadedSidecar::clamped(const Key& wanted) const {
     Key key = wanted;
     double& frame = std::get<double>(key);
-    // All of the time before the clip is its first frame, all after it the last.
+    // All times before the clip show its first frame, all times after it the last.
     const Polytope& polytope = sidecar_.polytope;
     if (frame < polytope.first_frame()) frame = polytope.first_frame();
     if (frame > polytope.last_frame()) frame = polytope.last_frame();
@@ -281,7 +281,7 @@ std::shared_ptr<LoadedSidecar::Prepared> LoadedSidecar::entry(const Key& key) {
 std::shared_ptr<const Recolourer> LoadedSidecar::prepared(const Key& wanted) {
     const Key key = clamped(wanted);
     const std::shared_ptr<Prepared> prepared = entry(key);
-    // Only threads that want this very frame wait for it.
+    // Only threads that want this frame wait for it.
     const std::lock_guard<std::mutex> lock(prepared->building);
     if (!prepared->recolourer) prepared->recolourer = prepare(key);
     return prepared->recolourer;
@@ -290,7 +290,7 @@ std::shared_ptr<const Recolourer> LoadedSidecar::prepared(const Key& wanted) {
 std::size_t LoadedSidecar::most_lattices() {
     static const std::size_t most =
         std::max<std::size_t>(12, std::thread::hardware_concurrency() + 4);
-    return most;  // asked for every tile, and the processors are the system's to count
+    return most;  // called for every tile, and counting processors is a system call
 }
 
 std::shared_ptr<const Lattice> LoadedSidecar::lattice_at(double frame, const AppliedEdits& edits) {
@@ -382,7 +382,7 @@ SidecarResult load_sidecar_text(const std::string& text, const std::string& name
     const SidecarResult result = parse(text, name);
     const std::lock_guard<std::mutex> lock(all.mutex);
     for (const auto& [known, other] : all.texts) {
-        if (known == text) return other;  // another thread was quicker: share what it prepares
+        if (known == text) return other;  // another thread was faster: share its result
     }
     all.texts.emplace_front(text, result);
     if (all.texts.size() > kMaxTexts) all.texts.pop_back();

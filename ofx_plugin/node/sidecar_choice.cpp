@@ -14,14 +14,14 @@ bool differs(const Params& params, const char* name, const std::string& text) {
     return now && *now != text;
 }
 
-/// For the hidden ones, which cannot be undone.
+/// Sets one of the hidden parameters, which have no undo.
 void note_text(const Params& params, const char* name, const std::string& text) {
     if (differs(params, name, text)) params.note_string(name, text);
 }
 
-/// A host caches frames by its parameters. The revision names what the frames show, a failure too,
-/// and counts, so that no earlier value returns: the host may have cached a frame under it after
-/// the file changed and before the node could say so.
+/// A host caches frames by parameter values, so the revision names the content or the failure. A
+/// counter makes each value unique: the host may hold a frame cached under the old value after the
+/// file changed.
 void note_revision(const Params& params, const Chosen& chosen, bool reloaded) {
     const std::string before = params.string_now(kParamRevision).value_or("");
     const std::size_t sign = before.find('#');
@@ -37,8 +37,8 @@ void note_revision(const Params& params, const Chosen& chosen, bool reloaded) {
     note_text(params, kParamRevision, state + "#" + std::to_string(count + 1));
 }
 
-/// The sidecar of the clip's name, or the project's copy of one of that name: a node that was
-/// copied to another clip carries the copy of the first.
+/// The sidecar with the clip's name, or the project's copy if that has the name too. A node pasted
+/// to another clip still has the first clip's copy.
 void find_by_name(Chosen& chosen, const std::string& folder, const std::string& copy) {
     if (const auto found = find_beside(chosen.media, folder)) {
         chosen.any = true;
@@ -75,17 +75,18 @@ void define_file_params(ParamDefiner& define) {
     define.flag({kParamFindByName, "Find by clip's name",
                  "While Sidecar is empty, the node uses the sidecar that has the clip's name: for "
                  "shot.mov it searches shot.p4d.json beside the clip, in Clip's folder and in "
-                 "PALETTE4D_PATH. Works in hosts that tell the clip's file: DaVinci Resolve."},
+                 "PALETTE4D_PATH. Works in hosts that report the clip's file: DaVinci Resolve."},
                 true);
     define.button({kParamReload, "Reload",
-                   "Reads the sidecar's file again and makes the host render its frames again."});
+                   "Reloads the sidecar's file and makes the host render its frames again."});
     define.flag({kParamEmbed, "Embed",
                  "Keeps a copy of the sidecar in the project. The node uses the copy while the "
                  "file is missing or cannot be read."},
                 false);
     for (const char* name : {kParamEmbedded, kParamRevision}) {
         const Properties hidden = define.text(
-            {name, name == kParamEmbedded ? "Embedded sidecar" : "Revision", "Kept by the node."},
+            {name, name == kParamEmbedded ? "Embedded sidecar" : "Revision",
+             "The node sets this value."},
             name == kParamEmbedded ? kOfxParamStringIsMultiLine : kOfxParamStringIsSingleLine);
         hidden.set_int(kOfxParamPropSecret, 1);
         hidden.set_int(kOfxParamPropCanUndo, 0);
@@ -125,7 +126,7 @@ Chosen chosen_sidecar(const Params& params, std::optional<OfxTime> time) {
         }
     }
     if (found) return chosen;
-    // It says what is wrong.
+    // Loads it anyway, for its error message.
     chosen.path = expanded(meant(given));
     chosen.result = load_sidecar(chosen.path);
     const std::string missing = words_of_missing(given);
@@ -157,15 +158,16 @@ std::string keep_files(const Params& params, Chosen& chosen, const std::string& 
         return "";
     }
     if (chosen.embedded) {
-        return "the project's copy, since " +
+        return "the project's copy, because " +
                (chosen.broken.empty() ? "there is no file" : chosen.broken);
     }
     if (!loaded) return "";
     const std::optional<std::string> file = sidecar_text(chosen.path);
     if (!file) return "";
     note_text(params, kParamEmbedded, *file);
-    return params.string_now(kParamEmbedded) == file ? "a copy is in the project"
-                                                     : "the host does not keep a copy of it";
+    return params.string_now(kParamEmbedded) == file
+               ? "a copy is in the project"
+               : "the host did not store a copy in the project";
 }
 
 }  // namespace palette4d::node

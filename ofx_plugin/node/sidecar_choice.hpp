@@ -1,4 +1,4 @@
-// The parameters that say which sidecar, and the copy that a project carries.
+// The parameters that select the sidecar, and the project's copy of it.
 #pragma once
 
 #include <optional>
@@ -20,23 +20,22 @@ inline constexpr const char* kParamRevision = "revision";
 void define_file_params(ParamDefiner& define);
 
 struct Chosen {
-    bool any = false;  ///< a sidecar was asked for, or found by the clip's name
+    bool any = false;  ///< the user chose a sidecar, or the clip's name found one
     SidecarResult result;
-    std::string path;       ///< where it was found, or where it was expected
-    bool embedded = false;  ///< it is the project's copy, since there is no file that can be read
-    std::string broken;     ///< what is wrong with that file, where there is one
-    std::string media;      ///< the clip's file, in a host that tells it
+    std::string path;       ///< where it is, or where it was expected
+    bool embedded = false;  ///< the project's copy is used, since the file cannot be read
+    std::string broken;     ///< what is wrong with the file, if there is one
+    std::string media;      ///< the clip's file, in hosts that report it
 
-    /// Null where there is none, or none that can be read.
+    /// Null when there is none or it cannot be read.
     const Sidecar* sidecar() const { return result.loaded ? &result.loaded->sidecar() : nullptr; }
 };
-/// The sidecar that the parameters name; with a time in the way that is allowed while rendering.
+/// The sidecar that the parameters select. With a time, reads them as rendering allows.
 Chosen chosen_sidecar(const Params& params, std::optional<OfxTime> time);
 
-/// For instance changes only: keeps the project's copy and the clip's folder up to date, and the
-/// revision, by which a host knows that the frames in its cache are old. `param` is what the user
-/// changed. Returns what the status says of the copy; replaces `chosen` where that copy has gone,
-/// and where the user reloads.
+/// For instance changes only. Updates the project's copy, the clip's folder and the revision, whose
+/// change tells the host to discard cached frames. `param` is what the user changed. Returns the
+/// status line about the copy. Replaces `chosen` when that copy was removed or the user reloads.
 std::string keep_files(const Params& params, Chosen& chosen, const std::string& param);
 
 }  // namespace palette4d::node

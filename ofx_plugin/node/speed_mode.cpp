@@ -7,8 +7,8 @@
 namespace palette4d::node {
 namespace {
 
-/// A lattice costs what the picture's different colours cost: from so many pixels on, less than
-/// computing each exactly, whatever the edit (`bench_lattice.py --size`).
+/// A lattice's cost depends on how many different colours the picture has. Above this many pixels
+/// it beats exact rendering for every edit (`bench_lattice.py --size`).
 constexpr std::int64_t kLatticePays = 1920 * 1080;
 
 }  // namespace
@@ -34,7 +34,7 @@ Interpolation interpolation_of(const Suites& suites, Mode mode, const Properties
     if (mode == Mode::kExact || suites.is_natron) return Interpolation::kNever;
     const std::int64_t width = static_cast<std::int64_t>(picture.x2) - picture.x1;
     const std::int64_t height = static_cast<std::int64_t>(picture.y2) - picture.y1;
-    // Either may be as large as 2^32.
+    // Divides, since the product could overflow: either may be as large as 2^32.
     if (width <= 0 || height <= (kLatticePays - 1) / width) return Interpolation::kNever;
     const auto says = [&](const char* name) {
         return render_arguments.get_int(name).value_or(0) != 0;
@@ -49,8 +49,8 @@ std::string words_of(const Lattice& lattice) {
     std::ostringstream text;
     text.imbue(std::locale::classic());
     text.precision(2);
-    text << "lattice, largest error measured " << lattice.largest_error() << " (at most "
-         << Lattice::kTolerance << " is wanted)";
+    text << "lattice, largest error measured " << lattice.largest_error() << " (limit "
+         << Lattice::kTolerance << ")";
     return text.str();
 }
 

@@ -1,4 +1,4 @@
-// How exactly a node recolours: colour by colour, or from a lattice that plays in real time.
+// How a node recolours: exactly, or from a lattice that plays in real time.
 #pragma once
 
 #include <string>
@@ -19,14 +19,14 @@ void define_mode_param(ParamDefiner& define);
 
 Mode mode_at(const Params& params, OfxTime time);
 
-/// How a render with these arguments is to interpolate: Auto does where the host tells that
-/// somebody watches it being made, or that a draft will do, and where interpolating is faster: the
-/// picture, of which this render may be a part, is large, and no conversion takes most of the time.
-/// Natron's cache would give such frames to a final render, so that Auto is exact there.
+/// Whether a render with these arguments interpolates. Auto does so for interactive or draft
+/// renders of large pictures without a costly conversion. The picture's full size counts, not this
+/// render's part. In Natron, Auto is exact: its cache would use interpolated frames for the final
+/// render.
 Interpolation interpolation_of(const Suites& suites, Mode mode, const Properties& render_arguments,
                                const OfxRectI& picture);
 
-/// What the status says of a lattice's largest error.
+/// The status text for a lattice's largest error.
 std::string words_of(const Lattice& lattice);
 
 }  // namespace palette4d::node

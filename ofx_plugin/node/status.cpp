@@ -38,7 +38,7 @@ std::string status_of(const Chosen& chosen, int handles, const std::string& expe
                       const std::string& copy, const std::string& shown) {
     if (!chosen.any) {
         return chosen.media.empty() ? "No sidecar chosen"
-                                    : "No sidecar chosen, and none has the name of " + chosen.media;
+                                    : "No sidecar chosen, and none found for " + chosen.media;
     }
     if (!chosen.result.loaded) return chosen.result.problem;
     std::string text = describe(chosen.result.loaded->sidecar());

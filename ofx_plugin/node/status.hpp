@@ -10,8 +10,9 @@ namespace palette4d::node {
 /// Which encoding the node's picture must have.
 std::string words_of_picture(const Sidecar& sidecar, const std::string& picture);
 
-/// What was loaded, or what is wrong. `handles` are in use in the host. A line each, left out where
-/// empty: `expects` is the picture's encoding, `copy` about the project's copy, `shown` the frame.
+/// What was loaded, or what is wrong. `handles` counts the host's handles in use. The others are
+/// one line each, omitted when empty: `expects` the picture's encoding, `copy` the project's copy,
+/// `shown` the frame.
 std::string status_of(const Chosen& chosen, int handles, const std::string& expects,
                       const std::string& copy, const std::string& shown);
 

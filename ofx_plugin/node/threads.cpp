@@ -9,7 +9,7 @@
 namespace palette4d::node {
 namespace {
 
-// Small enough to notice an abort soon and to share evenly, large enough to be worth the asking.
+// Small enough to notice an abort soon and to share evenly; large enough for low overhead.
 constexpr int kBandRows = 16;
 
 struct Work {
@@ -35,7 +35,7 @@ struct Work {
                 const std::int64_t y2 = std::min<std::int64_t>(last, y1 + kBandRows);
                 band(static_cast<int>(y1), static_cast<int>(y2));
             } catch (...) {
-                // The host's threads are no place for an exception.
+                // Exceptions must not enter the host's threads.
                 const std::lock_guard<std::mutex> lock(mutex);
                 if (!error) error = std::current_exception();
                 stopped = true;
@@ -62,7 +62,7 @@ void for_each_band(const Suites& suites, int first, int last,
     const auto wanted =
         static_cast<unsigned int>(std::min<std::int64_t>(work.bands, std::min(processors, 1024u)));
     if (wanted > 1) host->multiThread(&run_band, wanted, &work);
-    // Whatever a host that refused or started fewer threads left undone; nothing, as a rule.
+    // Does the rest where a host refused or started fewer threads; usually nothing.
     work.run();
     if (work.error) std::rethrow_exception(work.error);
 }

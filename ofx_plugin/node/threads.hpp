@@ -1,4 +1,4 @@
-// Bands of rows, shared among the host's threads.
+// Runs bands of rows in the host's threads.
 #pragma once
 
 #include <functional>
@@ -7,10 +7,10 @@
 
 namespace palette4d::node {
 
-/// Calls band(y1, y2) for disjoint bands of rows that make up [first, last), in the threads of the
-/// host's MultiThread suite where it has one, else in this one. `stop` is asked before each band
-/// and ends the work early. Both are called from several threads at once. The first exception of a
-/// band ends the work and is thrown again here.
+/// Calls band(y1, y2) for disjoint bands of rows that cover [first, last). Uses the host's
+/// MultiThread suite if there is one, else this thread. Calls `stop` before each band, and ends
+/// early when it returns true. Both may run in several threads at once. The first exception in a
+/// band ends the work and is rethrown here.
 void for_each_band(const Suites& suites, int first, int last,
                    const std::function<void(int, int)>& band, const std::function<bool()>& stop);
 

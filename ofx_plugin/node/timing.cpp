@@ -7,17 +7,17 @@
 namespace palette4d::node {
 namespace {
 
-/// Times a little beside a frame by the rounding of a rate are on it.
+/// A time this close to a frame is on it: rates are rounded.
 constexpr double kRounding = 1e-6;
 constexpr double kLargestTime = 1e9;
-/// Hosts round a clip's length at their own rate down, up or to the nearest frame.
+/// Hosts round a clip's length at their own rate, by up to one frame either way.
 constexpr double kFrameMoreOrLess = 1 + kRounding;
 
 double rate_of(const ClipInfo& clip) {
     return static_cast<double>(clip.rate_num) / static_cast<double>(clip.rate_den);
 }
 
-/// Where the clip begins on the host's time, and frames of the clip a frame of the host.
+/// The host's time of the clip's first frame, and clip frames per host frame.
 struct Start {
     double time;
     double ratio;
@@ -31,8 +31,8 @@ Start start_of(const ClipInfo& clip, const TimeSettings& settings, const HostCli
         const bool by_rates = settings.by_rates && is_rate(rate);
         return {settings.start, by_rates ? rate_of(clip) / *rate : 1.0};
     }
-    // Hosts without a clip report 0 to 0, which begins where no word does, and those with an
-    // endless one numbers beyond all clips.
+    // Hosts without a clip report 0 to 0, as if the clip started at 0. Hosts with an endless clip
+    // report huge numbers.
     if (!host.first || !host.last || !(*host.first <= *host.last) ||
         !(std::abs(*host.first) < kLargestTime) || !(std::abs(*host.last) < kLargestTime)) {
         return {0, 1};
@@ -43,7 +43,7 @@ Start start_of(const ClipInfo& clip, const TimeSettings& settings, const HostCli
     if (!is_rate(host.rate)) return {*host.first, 1};
     const double frames = last - first + step, ratio = rate_of(clip) / *host.rate;
     const double shown = *host.last - *host.first + 1, kept = frames / ratio;
-    // A trim is as long as neither: of it nothing is known but where it begins.
+    // A trimmed clip has neither length, so only its start is known.
     const bool by_rates = std::abs(shown - kept) <= kFrameMoreOrLess &&
                           std::abs(shown - kept) < std::abs(shown - frames);
     return {*host.first, by_rates ? ratio : 1.0};

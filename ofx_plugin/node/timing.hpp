@@ -1,4 +1,4 @@
-// Which frame of the analysed clip a time of the host shows. Sees the core only, not OpenFX.
+// Maps a host time to a frame of the analysed clip. Depends on the core only, not on OpenFX.
 #pragma once
 
 #include <optional>
@@ -8,42 +8,41 @@
 
 namespace palette4d::node {
 
-/// What the host reports about the clip, as far as it does.
+/// What the host reports about the clip; empty where it reports nothing.
 struct HostClip {
-    std::optional<double> first, last;     ///< times of the first and last frame that there are
-    std::optional<double> rate;            ///< of the host's times, a second
-    std::optional<double> source_frame{};  ///< of the media, from 0, whatever the time is
-    std::optional<double> first_number{};  ///< of the media's frames, where it is a sequence
+    std::optional<double> first, last;     ///< times of the first and last frame
+    std::optional<double> rate;            ///< host frames per second
+    std::optional<double> source_frame{};  ///< media frame from 0, independent of the time
+    std::optional<double> first_number{};  ///< of the media's frames, for a sequence
 };
 
 struct TimeSettings {
     bool automatic = true;
-    double start = 0;       ///< the host's time of the clip's first frame; not where automatic
-    bool by_rates = false;  ///< times pass at the host's rate, frames at the clip's; likewise
-    double host_rate = 0;   ///< 0: the reported one; likewise
-    double in_point = 0;    ///< frames of the clip before the first one that the host shows
+    double start = 0;       ///< host time of the clip's first frame; manual timing only
+    bool by_rates = false;  ///< seconds count, at the host's and the clip's rate; likewise
+    double host_rate = 0;   ///< 0: the reported rate; likewise
+    double in_point = 0;    ///< clip frames before the first one that the host shows
     double offset = 0;      ///< frames added
-    double speed = 1;       ///< frames of the clip a frame of the host
-    bool reverse = false;   ///< from the clip's last frame to its first
-    bool pass_before = false, pass_after = false;  ///< else the first and the last frame hold
+    double speed = 1;       ///< clip frames per host frame
+    bool reverse = false;   ///< plays from the clip's last frame to its first
+    bool pass_before = false, pass_after = false;  ///< else the first and last palette hold
 };
 
 struct FrameAt {
-    double frame = 0;  ///< not clamped to the clip; not finite where the settings are not
+    double frame = 0;  ///< not clamped to the clip; not finite if a setting is not
     enum class Place { kBefore, kInside, kAfter } place = Place::kInside;
-    bool passes = false;  ///< outside, where the settings let the picture through
+    bool passes = false;  ///< outside the clip, where the picture passes through
 };
 
-/// Automatic: where all of the host's range lies within the clip's frame numbers, times are those
-/// numbers; else the range's first time is the clip's first frame, and where the range is as long
-/// as the clip lasts at the host's rate, rather than as the clip has frames, times go by rates.
-/// Without a range, time 0 is the clip's first frame. Where the host tells the media's frame, that
-/// counts and not the time: a movie's frames are numbered from 0, a sequence's as its files are. A
-/// clip's last frame lasts until the next would come.
+/// Automatic timing, in this order. A reported media frame decides: numbered from 0 for a movie, by
+/// file for a sequence. If the host's range lies within the clip's frame numbers, times are those
+/// numbers. Otherwise the range's first time is the clip's first frame. Times count in seconds if
+/// the range's length matches the clip's duration at the host's rate, but not its frame count.
+/// Without a range, time 0 is the clip's first frame. A clip's last frame lasts one frame.
 FrameAt frame_at(const ClipInfo& clip, const TimeSettings& settings, const HostClip& host,
                  double time);
 
-/// "time 3 is frame 13", and what is shown where that is none of the clip's.
+/// "time 3 is frame 13", and what is shown when that is outside the clip.
 std::string words_of(double time, const FrameAt& at);
 
 }  // namespace palette4d::node

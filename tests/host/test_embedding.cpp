@@ -98,7 +98,7 @@ TEST(the_copy_stands_in_for_a_file_that_cannot_be_read) {
     const std::string& said = project.node->effect().persistent_message;
     EXPECT(said.find(path) != std::string::npos, said);
     CHECK(project.node->changed("reload") == kOfxStatOK);
-    CHECK(project.says("the project's copy, since " + path));
+    CHECK(project.says("the project's copy, because " + path));
     CHECK(project.node->text("embedded") == sidecar_text());
     const std::string plain = sidecar_text(false);
     write("clip.p4d.json", plain);

@@ -150,8 +150,8 @@ TEST(a_missing_file_is_said_with_where_it_was_looked_for) {
         const std::string said = words_of_missing(path);
         EXPECT(said.find(words) != std::string::npos, path + ": " + said);
     };
-    says("/nowhere/a.p4d.json", "does not exist, and there is none of its name in Clip's folder");
-    says("$P4D_SHOW/a.p4d.json", "does not exist, and there is none of its name");
+    says("/nowhere/a.p4d.json", "does not exist, and no file with its name is in Clip's folder");
+    says("$P4D_SHOW/a.p4d.json", "does not exist, and no file with its name");
     says("a.p4d.json", "PALETTE4D_PATH or " + fs::current_path().u8string());
     for (const char* path : {"$P4D_NONE/a.json", "$P4D_SHOW/${P4D_NONE}.json", "%P4D_NONE%/100%"}) {
         says(path, "no variable P4D_NONE");

@@ -108,7 +108,7 @@ def test_where_there_is_no_room_for_a_lattice_the_picture_is_exact(
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    assert "no memory for a lattice: computed exactly" in done.stdout
+    assert "not enough memory for a lattice: computed exactly" in done.stdout
     assert output.read_bytes() == through_the_core(path, frame, image, 1.0, premultiplied=False)
 
 

@@ -10,7 +10,7 @@
 namespace palette4d {
 namespace {
 
-/// Powers of two end here, well within float: whatever an edit asks for stays a number.
+/// Exponents are clamped here, well within float, so that no edit overflows.
 constexpr double kLargestExponent = 120;
 
 std::string text_of(double value) {
@@ -28,7 +28,7 @@ Vec3 product(const MatrixStep& step, const Vec3& x) {
     return y;
 }
 
-/// By cofactors; false where there is none within double's precision.
+/// Inverts by cofactors; false when the matrix is singular in double precision.
 bool inverted(const MatrixStep& step, MatrixStep& result) {
     const auto& m = step.matrix;
     const Vec3 a{m[0], m[1], m[2]}, b{m[3], m[4], m[5]}, c{m[6], m[7], m[8]};
@@ -47,7 +47,7 @@ bool inverted(const MatrixStep& step, MatrixStep& result) {
     return true;
 }
 
-/// Where the straight line of a gamma ends, and its slope.
+/// The end of a gamma's straight line, and its slope.
 struct Toe {
     double end, slope;
 };
@@ -118,7 +118,7 @@ public:
             rising(curve.y, at + "/y");
         }
     }
-    void operator()(const MatrixStep&) const {}  // by its inverse
+    void operator()(const MatrixStep&) const {}  // uses its inverse
 
 private:
     [[noreturn]] void fail(const std::string& member, double found,

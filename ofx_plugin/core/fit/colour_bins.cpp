@@ -14,7 +14,7 @@
 namespace palette4d {
 namespace {
 
-constexpr int kBlockBits = 9;  // of a key; the table is taken and cleared by blocks
+constexpr int kBlockBits = 9;  // of a key; the table is read and cleared in blocks
 constexpr std::size_t kBlock = std::size_t{1} << kBlockBits;
 constexpr std::uint32_t kMiddle = 0b111000000;  // of a block: cell 4 of 8 in all three directions
 constexpr int kCodeBits = 24;
@@ -22,11 +22,11 @@ constexpr std::size_t kCodes = std::size_t{1} << kCodeBits;
 constexpr std::size_t kMostMeans = std::size_t{1} << 20;
 constexpr float kLeastAlpha = 1.0f / 255;
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-// Cell numbers have 16 bits; that of 0 is in the middle, and those of 0 to 255, which 8-bit colours
-// have, share their upper bits.
+// Cell numbers have 16 bits. Zero is in the middle, and numbers 0 to 255 (8-bit colours) share
+// their upper bits.
 constexpr int kZero = 1 << 15;
 
-/// Every third bit of the result holds one of x, for three numbers to be interleaved.
+/// Spreads the bits of x to every third bit, so that three numbers can be interleaved.
 constexpr std::uint64_t spread(std::uint64_t x) {
     x = (x | x << 16) & 0x00FF0000FF0000FFull;
     x = (x | x << 8) & 0xF00F00F00F00F00Full;
@@ -57,7 +57,7 @@ struct Spread {
 };
 constexpr Spread kSpread;
 
-/// Number of the cell that a finite value lies in: 1/255 wide up to 1, in proportion beyond.
+/// The cell number of a finite value: cells are 1/255 wide up to 1, and widen in proportion beyond.
 std::uint64_t cell_number(double x) {
     const double size = std::abs(x) * 255;
     const double n = size < 255.5 ? size : 255 * (1 + std::log(size / 255));
@@ -80,7 +80,7 @@ void check_channels(int channels) {
                                     " channels, expected 3 (RGB) or 4 (RGBA)");
 }
 
-/// Y'CbCr to R'G'B' in single precision, step by step as a recolouring reads the same picture.
+/// Y'CbCr to R'G'B' in single precision, with the same steps as the renderer's decoder.
 class Matrix {
 public:
     explicit Matrix(const LumaChroma& how)
@@ -132,7 +132,7 @@ void ColourBinner::begin(Kind kind) {
         throw std::invalid_argument(
             "a frame's samples are of one kind; take() it or clear() first");
     if (!table_) {
-        // Of zeroed pages only those that are used take memory.
+        // calloc's zeroed pages take memory only once they are touched.
         table_.reset(static_cast<std::uint32_t*>(std::calloc(kCodes, sizeof(std::uint32_t))));
         if (!table_) throw std::bad_alloc();
         touched_.assign(kCodes / kBlock, 0);
@@ -175,7 +175,8 @@ void ColourBinner::add_luma_chroma(const Rows<std::uint8_t> (&planes)[3], const 
     }
 }
 
-/// Counts the first n of `codes_`. Two loops: the scattered stores of one at a time overlap better.
+/// Counts the first n of `codes_`. Two loops: their scattered stores overlap better than those of
+/// one.
 void ColourBinner::count_codes(std::size_t n) {
     const std::uint32_t* const codes = codes_.data();
     std::uint8_t* const touched = touched_.data();
@@ -273,7 +274,7 @@ void ColourBinner::add_row(int width) {
     cells_.resize(n);
     std::int32_t* const cells = cells_.data();
     for (std::size_t x = 0; x < n; ++x) {
-        // Which 8-bit colour is nearest; what has none, or is not a number, is outside.
+        // The nearest 8-bit colour. Values without one, NaN included, count as outside.
         const float p = r[x] * 255 + 0.5f, q = g[x] * 255 + 0.5f, s = b[x] * 255 + 0.5f;
         const bool inside = (p >= 0) & (p < 256) & (q >= 0) & (q < 256) & (s >= 0) & (s < 256);
         const int i = static_cast<int>(inside ? p : 0), j = static_cast<int>(inside ? q : 0),
@@ -308,11 +309,11 @@ void ColourBinner::add_row(int width) {
     }
     pixels_ += counted;
     ignored_ += static_cast<double>(n) - counted;
-    // Grain gives nearly every pixel a colour of its own: memory stays bounded on the way, too.
+    // With grain nearly every pixel has its own colour, so limit memory while rows are added.
     if (means_.size() > kMostMeans) widen();
 }
 
-/// The index of a cell's mean, plus 1, in the table or beside it; a fresh one where there is none.
+/// The index of a cell's mean, plus 1, in the table or the map; adds a mean where there is none.
 std::uint32_t ColourBinner::index_of(std::uint64_t key) {
     const bool inside = key << shift_ >> kCodeBits == kUnitCube >> kCodeBits;
     const auto code = static_cast<std::uint32_t>(key & ((kCodes >> shift_) - 1));
@@ -326,7 +327,7 @@ std::uint32_t ColourBinner::index_of(std::uint64_t key) {
     return index;
 }
 
-/// Merges cells by eights until few enough are left.
+/// Merges cells eight to one until few enough are left.
 void ColourBinner::widen() {
     while (means_.size() > kMostMeans / 2 && shift_ < kCodeBits) {
         std::vector<std::uint64_t> keys;
@@ -369,11 +370,11 @@ Vec3 ColourBinner::colour_of(std::uint32_t code) const {
     return {r, g, b};
 }
 
-/// Calls use(code, value) for all entries of the table that are not 0, in order, after
-/// begin(first code) of each block that has some, and leaves them 0.
+/// Calls use(code, value) for all nonzero entries of the table in order, and zeroes them. Calls
+/// begin(first code) before each block that has some.
 template <class Begin, class Use>
 void ColourBinner::drain(Begin begin_block, Use use) {
-    constexpr std::size_t kGroup = 4;  // most entries are 0: looked at four at a time
+    constexpr std::size_t kGroup = 4;  // most entries are 0: tested four at a time
     for (std::size_t block = 0; block < touched_.size(); ++block) {
         if (!touched_[block]) continue;
         touched_[block] = 0;
@@ -389,7 +390,7 @@ void ColourBinner::drain(Begin begin_block, Use use) {
     }
 }
 
-/// Sampled 8-bit codes: the table holds their counts.
+/// Samples 8-bit codes: the table holds their counts.
 ColourBins ColourBinner::sampled_codes(std::size_t most) {
     std::vector<Vec3> places;
     drain([&](std::uint32_t first) { places.push_back(colour_of(first | kMiddle)); },
@@ -407,9 +408,9 @@ ColourBins ColourBinner::sampled_codes(std::size_t most) {
     return out;
 }
 
-/// Sampled means: the table, and beyond 0..1 the map, hold their indices plus 1.
+/// Samples means: the table, and the map for colours beyond 0..1, hold their indices plus 1.
 ColourBins ColourBinner::sampled_means(std::size_t most) {
-    codes_.clear();  // the means' order
+    codes_.clear();  // reused for the order of the means
     const auto append = [&](std::uint32_t index) {
         drained_.keys.push_back(keys_[index - 1] << shift_);
         drained_.counts.push_back(means_[index - 1].count);

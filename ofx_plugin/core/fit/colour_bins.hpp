@@ -1,5 +1,5 @@
-// Colour statistics of a frame: its pixels gathered in cells, of which a bounded number stand for
-// all.
+// Colour statistics of a frame: pixels are collected in cells, and a bounded number of colours
+// represents them all.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +13,7 @@
 
 namespace palette4d {
 
-/// Colours of a frame, each with the number of pixels it stands for.
+/// Colours of a frame, each with the number of pixels it represents.
 struct ColourBins {
     std::vector<std::uint64_t> keys;  ///< their cells (`ColourCells`)
     std::vector<Vec3> rgb;
@@ -28,44 +28,43 @@ struct Rows {
     std::ptrdiff_t row_bytes;
 };
 
-/// How Y'CbCr samples of 8 to 16 bits become R'G'B' (ITU-T H.273, section 8.3).
+/// How to convert Y'CbCr samples of 8 to 16 bits to R'G'B' (ITU-T H.273, section 8.3).
 struct LumaChroma {
     double red, blue;  ///< weights in luma, K_R and K_B
     int bits;
     bool full_range;
 };
 
-/// Gathers a frame's pixels, handed over in strips of any height, row by row.
+/// Collects a frame's pixels, given in strips of any height, row by row.
 ///
 /// 8-bit samples are counted by their exact colour. All others go into cells 1/255 wide between 0
-/// and 1, whose width grows in proportion to the colour beyond; a cell keeps the mean of its
-/// pixels. Memory is bounded: where a frame has more than a million cells, they are merged by
-/// eights. What is not finite does not count, nor does what has an alpha below 1/255, which does
-/// not show in 8 bit. A frame has samples of one kind; another throws std::invalid_argument, as do
-/// channels other than 3 or 4.
+/// and 1; beyond 1 cells widen in proportion. Each cell keeps the mean of its pixels. Memory is
+/// bounded: above a million cells, cells are merged eight to one. Pixels that are not finite do not
+/// count, nor do those with alpha below 1/255, invisible in 8 bit. A frame has samples of one kind
+/// and 3 or 4 channels; otherwise throws std::invalid_argument.
 class ColourBinner {
 public:
     ColourBinner() = default;
 
-    /// Colours value / 255, or over alpha when they are premultiplied.
+    /// Colours are value / 255, divided by alpha when premultiplied.
     void add(const Rows<std::uint8_t>& rows, bool premultiplied);
-    /// Samples whose upper `bits` bits are the value, over its largest.
+    /// Samples whose upper `bits` bits hold the value; colours are value / its maximum.
     void add(const Rows<std::uint16_t>& rows, int bits, bool premultiplied);
     void add(const Rows<float>& rows, bool premultiplied);
-    /// Three planes of one size (channels 1); colours are clamped to 0..1.
+    /// Three planes of one size (one channel each); colours are clamped to 0..1.
     void add_luma_chroma(const Rows<std::uint8_t> (&planes)[3], const LumaChroma& how);
     void add_luma_chroma(const Rows<std::uint16_t> (&planes)[3], const LumaChroma& how);
-    /// Colours with counts, such as other bins. Throws std::invalid_argument unless all are finite
-    /// and all counts positive.
+    /// Colours with counts, such as those of other bins. Throws std::invalid_argument unless all
+    /// are finite and all counts positive.
     void add_colours(const std::vector<Vec3>& rgb, const std::vector<double>& counts);
 
     double pixels() const { return pixels_; }            ///< that count
-    double ignored() const { return ignored_; }          ///< the others
-    double transparent() const { return transparent_; }  ///< those ignored for their alpha
+    double ignored() const { return ignored_; }          ///< that do not count
+    double transparent() const { return transparent_; }  ///< ignored because of their alpha
 
-    /// At most `most` colours that stand for all (`sample_colours`); forgets the frame.
+    /// At most `most` colours that represent the frame (`sample_colours`); then clears the frame.
     ColourBins take(std::size_t most);
-    /// Forgets the frame, and keeps the memory for the next one.
+    /// Clears the frame and keeps the memory for the next one.
     void clear();
 
 private:
@@ -96,11 +95,11 @@ private:
     Kind kind_ = Kind::none;
     LumaChroma how_{};
     double pixels_ = 0, ignored_ = 0, transparent_ = 0;
-    /// By the Morton code of an 8-bit colour: its pixels, or the index of its mean, plus 1.
+    /// Indexed by the Morton code of an 8-bit colour: its pixel count, or its mean's index plus 1.
     std::unique_ptr<std::uint32_t[], Free> table_;
     std::vector<std::uint8_t> touched_;  ///< blocks of the table that are not all 0
-    int shift_ = 0;                      ///< bits by which keys have been widened
-    std::vector<std::uint64_t> keys_;    ///< of the means
+    int shift_ = 0;                      ///< bits by which the cells have been merged
+    std::vector<std::uint64_t> keys_;    ///< cells of the means
     std::vector<Mean> means_;
     std::unordered_map<std::uint64_t, std::uint32_t> outside_;  ///< means beyond 0..1, by key
     ColourCells drained_;

@@ -10,12 +10,12 @@ namespace palette4d {
 namespace {
 
 constexpr int kBlockBits = 9;      // of a key: a block is 8x8x8 cells
-constexpr int kPerOctave = 64;     // steps in which group widths are told apart
+constexpr int kPerOctave = 64;     // steps that distinguish group widths
 constexpr double kSurface = 0.05;  // depth, in extents, at which groups are twice as wide
-constexpr std::size_t kAxes = 48;  // directions in which the surface is looked for
+constexpr std::size_t kAxes = 48;  // directions that find the surface
 constexpr std::uint64_t kGoldenRatio = 0x9E3779B97F4A7C15ull;  // its fraction, times 2^64
 
-/// Which bit of two keys is the highest that differs; keys are never equal.
+/// The highest bit in which two keys differ; keys are never equal.
 int highest_difference(std::uint64_t a, std::uint64_t b) {
     std::uint64_t x = a ^ b;
     int bit = 0;
@@ -38,8 +38,8 @@ int highest_difference_within(std::uint64_t a, std::uint64_t b) {
     return highest[static_cast<std::size_t>(a ^ b)];
 }
 
-/// What a group up to and including bit `bit` of its key costs: its width, on a logarithmic scale.
-/// A bit more halves one of three sides.
+/// The cost of a group that spans bits up to `bit` of its key: the logarithm of its width. One more
+/// bit doubles one of the three sides.
 int width_cost(int bit) { return (bit + 1) * kPerOctave / 3; }
 
 /// Directions spread evenly over half a sphere (a Fibonacci spiral).
@@ -55,7 +55,7 @@ std::array<std::array<float, 3>, kAxes> make_axes() {
     return axes;
 }
 
-/// For each place, how much less a group there costs than one at depth 0, in `width_cost`'s units.
+/// For each place, how much less a group costs there than at depth 0, in `width_cost`'s units.
 std::vector<int> surface_costs(const std::vector<Vec3>& places) {
     const std::size_t n = places.size();
     Vec3 low = places[0], high = places[0];
@@ -89,7 +89,7 @@ std::vector<int> surface_costs(const std::vector<Vec3>& places) {
     }
     std::vector<int> costs(n);
     for (std::size_t i = 0; i < n; ++i) {
-        // Cells outside of the unit cube grow with their distance from it.
+        // Cells outside the unit cube grow with their distance from it.
         double scale = 1;
         for (const double v : places[i]) scale = std::max(scale, std::abs(v));
         const double wider = std::log2(scale) - std::log2(1 + depth[i] / kSurface);
@@ -98,8 +98,9 @@ std::vector<int> surface_costs(const std::vector<Vec3>& places) {
     return costs;
 }
 
-/// The cost of the smallest larger cell that holds both neighbours of each boundary between blocks.
-/// `bits` are the keys' highest differing bits there, `costs` those of the blocks.
+/// For each boundary between blocks: the cost of the smallest larger cell that holds both
+/// neighbours. `bits` are the highest differing bits of the keys there, `costs` the costs of the
+/// blocks.
 std::vector<int> boundary_costs(const std::vector<int>& bits, const std::vector<int>& costs) {
     struct Run {
         int cost;              // the largest of its blocks
@@ -125,8 +126,8 @@ std::vector<int> boundary_costs(const std::vector<int>& bits, const std::vector<
     return out;
 }
 
-/// Costs of all boundaries between neighbouring cells: monotone, so that those below any limit make
-/// whole larger cells of what they divide.
+/// Costs of all boundaries between neighbouring cells. They are monotone: merging all below a limit
+/// leaves whole larger cells.
 std::vector<int> all_costs(const ColourCells& cells, const std::vector<Vec3>& places) {
     const std::vector<std::size_t> blocks = colour_blocks(cells);
     if (places.size() + 1 != blocks.size())
@@ -147,7 +148,7 @@ std::vector<int> all_costs(const ColourCells& cells, const std::vector<Vec3>& pl
     return out;
 }
 
-/// The lowest cost that may not be merged, so that at most `most` groups are left.
+/// The lowest cost that is not merged, so that at most `most` groups are left.
 int limit_for(const std::vector<int>& costs, std::size_t most) {
     const int lowest = *std::min_element(costs.begin(), costs.end());
     std::vector<std::size_t> histogram;

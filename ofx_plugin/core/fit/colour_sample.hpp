@@ -1,4 +1,4 @@
-// Which colours stand for a frame that has more of them than can be kept.
+// Chooses colours that represent a frame with more colours than can be kept.
 #pragma once
 
 #include <cstddef>
@@ -11,31 +11,30 @@ namespace palette4d {
 
 /// Cells of a fine grid in colour space and how many pixels lie in each.
 struct ColourCells {
-    /// The cell's three numbers, bit by bit in turns (a Morton code): cells with equal upper bits
-    /// share a larger cell. Rising, no two equal.
+    /// The cell's three numbers, interleaved bit by bit (a Morton code): cells with equal upper
+    /// bits share a larger cell. Strictly increasing.
     std::vector<std::uint64_t> keys;
     std::vector<double> counts;  ///< pixels of each cell, positive
 };
 
-/// Groups of neighbouring cells, each with one of them that stands for all.
+/// Groups of neighbouring cells; one cell represents each group.
 struct ColourSample {
     std::vector<std::size_t> chosen;  ///< indices of cells, rising
     std::vector<double> counts;       ///< pixels of each group
 };
 
-/// The blocks of 8x8x8 cells that `cells` touch: the index of each one's first cell, and the number
-/// of cells at the end.
+/// The blocks of 8x8x8 cells that `cells` touch: the index of each block's first cell, then the
+/// number of cells.
 std::vector<std::size_t> colour_blocks(const ColourCells& cells);
 
-/// At most `most` groups, all cells when there are no more.
+/// At most `most` groups; all cells when there are no more.
 ///
-/// What a palette is measured by (section 3) happens where the colours end, so groups grow with
-/// the distance from there: their width is in proportion to a twentieth of the colours' extent plus
-/// the depth below the surface of (a polytope around) all colours. Each group is represented by one
-/// of its cells, drawn with a probability in proportion to its pixels: a mean lies inside of a
-/// palette more often than its pixels do, and would make the reconstruction loss (eq. 2) too small;
-/// one that is drawn does not. The draws are a low-discrepancy sequence, so the result depends on
-/// nothing but the arguments. `places` are colours of the `colour_blocks`, such as their centres.
+/// The losses (section 3) depend on the outermost colours, so groups there are small. A group's
+/// width grows in proportion to its depth below the surface of the colours, plus a twentieth of
+/// their extent. One cell represents each group, drawn with a probability in proportion to its
+/// pixels. A mean would lie inside the palette too often and make the reconstruction loss (eq. 2)
+/// too small. The draws are a low-discrepancy sequence, so the result depends on the arguments
+/// only. `places` are colours of the `colour_blocks`, such as their centres.
 ColourSample sample_colours(const ColourCells& cells, const std::vector<Vec3>& places,
                             std::size_t most);
 

@@ -113,13 +113,13 @@ Vec3 ColourTree::nearest_mean(const Vec3& v, double k) const {
     if (!finite(v) || !(k > 0))
         throw std::invalid_argument("nearest_mean needs a finite colour and a positive k");
     k = std::min(k, total_);
-    // Candidates sorted by distance; the farthest group of ties goes as soon as the rest suffices.
+    // Candidates sorted by distance. The farthest group of ties is dropped once the rest suffices.
     struct Search {
         std::vector<Candidate> best;
         std::vector<std::pair<double, int>> stack;
     };
     thread_local Search of_this_thread;
-    Search& search = of_this_thread;  // once: each mention of a thread_local may be a call
+    Search& search = of_this_thread;  // once: each use of a thread_local may be a call
     auto& [best, stack] = search;
     best.clear();
     stack.clear();
@@ -143,7 +143,7 @@ Vec3 ColourTree::nearest_mean(const Vec3& v, double k) const {
             }
             continue;
         }
-        // All at once, past the leaf's end, too: compilers make vectors of it.
+        // Always a whole leaf, padding included, so that compilers vectorise the loop.
         double squared[kLeafSize];
         const double *const x = channel(0) + node.begin, *const y = channel(1) + node.begin,
                             *const z = channel(2) + node.begin;

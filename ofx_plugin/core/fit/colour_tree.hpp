@@ -1,4 +1,4 @@
-// A frame's colours as a k-d tree of weighted points: what the losses of section 3 are measured on.
+// A frame's colours as a k-d tree of weighted points; the losses of section 3 are computed on it.
 #pragma once
 
 #include <array>
@@ -9,8 +9,8 @@
 
 namespace palette4d {
 
-/// Weighted colours (a colour and how many pixels have it), kept in a balanced k-d tree whose nodes
-/// carry bounding boxes, so that whole subtrees inside a palette cost one test.
+/// Weighted colours (a colour and its pixel count) in a balanced k-d tree. Nodes have bounding
+/// boxes, so a subtree inside the palette costs one test.
 class ColourTree {
 public:
     static constexpr int kLeafSize = 16;  ///< most colours of a leaf
@@ -21,7 +21,7 @@ public:
         int left, right;  ///< children, -1 in a leaf
     };
 
-    /// Boxes side by side, to be tested together.
+    /// Boxes stored side by side, to be tested together.
     struct Boxes {
         static constexpr int kSize = 8;
         double sides[2][3][kSize];  ///< low and high, axis by axis
@@ -31,28 +31,28 @@ public:
     /// n colours (finite) and n positive counts. Throws std::invalid_argument otherwise.
     ColourTree(std::vector<Vec3> rgb, std::vector<double> counts);
 
-    /// The mean of the k pixels nearest to v (v_N of eq. 3); all pixels when there are fewer than
-    /// k. Pixels tied at the k-th distance share what is left evenly, so their order does not
-    /// matter. Throws std::invalid_argument unless v is finite and k > 0.
+    /// The mean of the k pixels nearest to v (v_N of eq. 3), or of all pixels when there are fewer.
+    /// Pixels tied at the k-th distance share the remaining count, so their order does not matter.
+    /// Throws std::invalid_argument unless v is finite and k > 0.
     Vec3 nearest_mean(const Vec3& v, double k) const;
 
     std::size_t size() const { return size_; }
     Vec3 rgb(int i) const { return {channel_[0][i], channel_[1][i], channel_[2][i]}; }
-    /// size() numbers, and kLeafSize more that stand for nothing, to be read past a leaf's end.
+    /// size() numbers, and kLeafSize more as padding for reads past a leaf's end.
     const double* channel(int c) const { return channel_[c].data(); }
     const double* counts() const { return counts_.data(); }  ///< likewise
     const std::vector<Node>& nodes() const { return nodes_; }
     const std::vector<int>& leaves() const { return leaves_; }  ///< their nodes, in order
-    /// The tree once more, wide and shallow: first the leaves' boxes in order, Boxes::kSize by
-    /// kSize; each further level has one box around each Boxes of the level before; the last has
-    /// one Boxes.
+    /// The tree again, wide and shallow. The first level has the leaves' boxes in order,
+    /// Boxes::kSize at a time. Each further level has one box around each Boxes of the level
+    /// before; the last has one Boxes.
     const std::vector<std::vector<Boxes>>& levels() const { return levels_; }
     double total() const { return total_; }
 
 private:
     struct Colour {
         Vec3 rgb;
-        int index;  ///< among those given
+        int index;  ///< index in the given order
     };
     int build(int begin, int end, std::vector<Colour>& order);
     void build_levels();

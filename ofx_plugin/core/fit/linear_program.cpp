@@ -7,7 +7,7 @@
 namespace palette4d {
 namespace {
 
-constexpr double kSlack = 1e-10;  // a constraint met this closely counts as met
+constexpr double kSlack = 1e-10;  // constraints met within this count as met
 
 template <int N>
 using Point = std::array<double, N>;
@@ -21,7 +21,7 @@ double margin(const HalfSpace<N>& h, const Point<N>& x) {
     return value;
 }
 
-/// The optimum in the box alone.
+/// The optimum in the box, without constraints.
 template <int N>
 Point<N> corner(const Point<N>& c, const Point<N>& low, const Point<N>& high) {
     Point<N> x;
@@ -64,8 +64,8 @@ Solution<1> solve<1>(const Point<1>& c, const std::vector<HalfSpace<1>>& constra
     return Point<1>{c[0] >= 0 ? lo : hi};
 }
 
-/// The optimum on the boundary of h, in the first `count` constraints and the box: a program of one
-/// dimension less, the variable with the largest coefficient in h eliminated.
+/// The optimum on the boundary of h, under the first `count` constraints and the box. It is a
+/// program with one dimension less: eliminates the variable with the largest coefficient in h.
 template <int N>
 Solution<N> on_boundary(const Point<N>& c, const HalfSpace<N>& h,
                         const std::vector<HalfSpace<N>>& constraints, std::size_t count,

@@ -1,5 +1,5 @@
-// The kernels of loss_kernels.hpp for the width that lanes.hpp was included with. Each box' and
-// each colour's result depends on it alone.
+// The kernels of loss_kernels.hpp, compiled for the vector width that lanes.hpp has here. Results
+// depend on the single box or colour only.
 #include "fit/loss_kernels.hpp"
 
 #include "simd/lanes.hpp"
@@ -12,7 +12,7 @@ void reach(const palette4d::LossFacet* facets, const int* which, int count,
     using Numbers = Lanes<double>;
     for (int i = 0; i < count; ++i) {
         const palette4d::LossFacet& f = facets[which[i]];
-        // The boxes' corners farthest along the normal.
+        // The corner of each box that is farthest along the normal.
         const double *const x = sides[f.high[0]][0], *const y = sides[f.high[1]][1],
                             *const z = sides[f.high[2]][2];
         unsigned found = 0;
@@ -31,7 +31,7 @@ PALETTE4D_INLINE Lanes<double> height_above(const palette4d::LossFacet& f, const
     return ((all(f.normal[0]) * x + all(f.normal[1]) * y) + all(f.normal[2]) * z) + all(f.offset);
 }
 
-/// Of the edges of the facets that a colour sees, the closest: the first of those equally close.
+/// The closest edge of the facets that a colour sees; the first one of equally close edges.
 PALETTE4D_INLINE void closest_edge(const palette4d::LossFacet* facets, const int* which, int count,
                                    const Lanes<double>& x, const Lanes<double>& y,
                                    const Lanes<double>& z, const LaneMask<double>& wanted,

@@ -8,18 +8,17 @@
 
 namespace palette4d {
 
-/// A vertex or colour this close to a plane counts as in it. By rounding, a colour in the plane of
-/// several facets may lie above one whose triangle is elsewhere.
+/// A vertex or colour this close to a plane counts as in it. Because of rounding, a colour in the
+/// plane of several facets may lie above one that is elsewhere in the plane.
 constexpr double kFlat = 1e-9;
 
-/// All vertex triples that support the hull. Coplanar vertices give overlapping triangles, which
-/// does no harm to a closest point. `solid` is false for flat palettes: then every triple is a
-/// facet; for colours on a line, every pair, as a degenerate triangle.
+/// All vertex triples that support the hull. Coplanar vertices give overlapping triangles, which is
+/// harmless for closest points. `solid` is false for flat palettes: every triple is then a facet.
+/// For colours on a line, every pair is a degenerate triangle.
 struct PaletteHull {
     std::vector<LossFacet> facets;
     bool solid = false;
 
-    /// Replaces both.
     void build(const std::vector<Vec3>& palette);
 };
 

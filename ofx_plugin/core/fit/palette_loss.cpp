@@ -11,7 +11,7 @@
 namespace palette4d {
 namespace {
 
-/// Six times the volumes by which faces fold inwards, summed over the mesh's edges.
+/// Sum over the mesh's edges of six times the volume by which its two faces fold inwards.
 double concavity(const std::vector<Vec3>& v, const std::vector<Face>& faces, double scale,
                  std::vector<Vec3>* gradient) {
     double sum = 0;
@@ -42,8 +42,8 @@ double concavity(const std::vector<Vec3>& v, const std::vector<Face>& faces, dou
     return sum;
 }
 
-/// S of palette_loss.hpp. Colours that are one (a split or a merge) cannot be told which way to
-/// part.
+/// S of palette_loss.hpp. Two equal colours (a split or a merge) have no direction to part in, so
+/// they add no gradient.
 double closeness(const std::vector<Vec3>& v, double separation, std::vector<Vec3>* gradient) {
     double sum = 0;
     for (std::size_t i = 0; i < v.size(); ++i)
@@ -61,8 +61,8 @@ double closeness(const std::vector<Vec3>& v, double separation, std::vector<Vec3
     return sum;
 }
 
-/// How far apart colours should stay in this frame: where its own colours are all near each other,
-/// as in black, palette colours pushed farther apart would leave them.
+/// The separation to use in this frame. Where all its colours are close, as in black, a larger one
+/// would push palette colours away from them.
 double separation_within(const ColourTree& colours, double separation) {
     const ColourTree::Node& all = colours.nodes()[0];
     double extent = 0;
@@ -75,7 +75,7 @@ double separation_within(const ColourTree& colours, double separation) {
 FrameLoss palette_loss(const ColourTree& colours, const std::vector<Vec3>& palette,
                        const std::vector<Face>& faces, const LossWeights& weights,
                        std::vector<Vec3>* gradient, InstructionSet instructions) {
-    // A frame's loss takes microseconds: finding memory for it would take its share of them.
+    // A frame's loss takes microseconds, so allocations would be a large share.
     struct Scratch {
         PaletteHull hull;
         ReconstructionScratch reconstruction;

@@ -12,18 +12,18 @@ namespace palette4d {
 
 struct LossWeights {
     double lambda = 50;     ///< of eq. 4
-    double k = 50;          ///< pixels a vertex is compared with in eq. 3
-    double convexity = 0;   ///< weight of the concavity D below; 0 in every figure reported
-    double separation = 0;  ///< how far apart colours should stay (S below); 0 likewise
-    double reach = 0;       ///< where a pixel outside counts twice (E below); 0: nowhere, likewise
+    double k = 50;          ///< pixels that a vertex is compared with in eq. 3
+    double convexity = 0;   ///< weight of the concavity D below; 0 in every reported figure
+    double separation = 0;  ///< distance to keep between palette colours (S below); 0 likewise
+    double reach = 0;       ///< where a pixel outside costs twice (E below); 0: never, likewise
 };
 
-/// What one frame contributes. R, C as in the paper; D is the concavity of the triangle mesh: the
-/// sum over its edges of six times the volume by which the two faces fold inwards (0 when convex).
-/// S is the sum over pairs of colours nearer than s, at distance d, of (s - d)^2 / 2s: a distance,
-/// as R and C are; s is the separation, at most a quarter of the extent of the frame's own colours.
-/// E is the mean over the pixels of d q / (1 + q / 8), q = (d / reach)^3, d their distance outside:
-/// what is rare but far outside weighs hardly anything in R, the mean of d.
+/// One frame's losses. R and C are as in the paper. D is the concavity of the triangle mesh: the
+/// sum over its edges of six times the volume by which the two faces fold inwards. S is the sum
+/// over pairs of colours nearer than s, at distance d, of (s - d)^2 / 2s. s is the separation,
+/// limited to a quarter of the extent of the frame's colours. E is the mean over the pixels of d q
+/// / (1 + q / 8) with q = (d / reach)^3, where d is their distance outside. E adds weight to rare
+/// colours far outside, which hardly count in R, the mean of d.
 struct FrameLoss {
     double R = 0;
     double C = 0;
@@ -31,13 +31,13 @@ struct FrameLoss {
     double S = 0;
     double E = 0;
     double outside = 0;       ///< share of pixels outside, by more than 1e-6
-    double max_distance = 0;  ///< of a pixel outside
+    double max_distance = 0;  ///< largest distance of a pixel outside
 };
 
-/// The body is the convex hull of the n palette colours, as in eq. 2; fewer than four colours, or
-/// flat ones, are handled. `faces` (may be empty) serve D only. `gradient`, when not null, receives
-/// the n derivatives of lambda (R + E) + C + convexity D + S; v_N of eq. 3 counts as constant (it
-/// is, almost everywhere, on a finite set of pixels). All instruction sets give the same bits.
+/// The body is the convex hull of the n palette colours, as in eq. 2; fewer than four colours and
+/// flat ones work too. `faces` (may be empty) are for D only. `gradient`, unless null, receives the
+/// n derivatives of lambda (R + E) + C + convexity D + S. It treats v_N of eq. 3 as constant, which
+/// holds almost everywhere. All instruction sets give the same bits.
 FrameLoss palette_loss(const ColourTree& colours, const std::vector<Vec3>& palette,
                        const std::vector<Face>& faces, const LossWeights& weights,
                        std::vector<Vec3>* gradient,

@@ -16,7 +16,7 @@ struct Point {
     double weight;
 };
 
-/// Where a track is at `frame`: eq. 6. Times at the ends are allowed to be off by rounding only.
+/// A track's colour at `frame`: eq. 6. Times outside the track are accepted within rounding only.
 Point locate(const std::vector<int>& track, const std::vector<Vec4>& vertices, double frame) {
     if (track.size() == 1) return {track[0], track[0], 0};
     std::size_t next = 1;
@@ -33,7 +33,7 @@ const BlockTopology& block_of(const std::vector<BlockTopology>& blocks, double f
     throw std::invalid_argument("no block covers frame " + std::to_string(frame));
 }
 
-/// Memory that one frame after the other uses.
+/// Memory that a thread reuses from frame to frame.
 struct Scratch {
     std::vector<Point> points;
     std::vector<Vec3> palette, slice_gradient;
@@ -122,7 +122,7 @@ std::vector<FrameLoss> polytope_loss(const std::vector<Vec4>& vertices,
     try {
         for (int i = 1; i < used; ++i) pool.emplace_back(work, i);
     } catch (const std::system_error&) {
-        // No more threads to be had: those that run share the frames.
+        // The system gives no more threads: those that run share the frames.
     }
     work(0);
     for (std::thread& t : pool) t.join();

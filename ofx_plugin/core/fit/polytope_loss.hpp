@@ -1,5 +1,5 @@
-// The losses of a whole 4D skew polytope (eq. 8 without its weights), frame by frame, with the
-// gradient with respect to the 4D vertices: chain rule through the slicing of eq. 6.
+// The losses of a whole 4D skew polytope (eq. 8 without its weights), frame by frame. The gradient
+// for the 4D vertices follows from the chain rule through the slicing of eq. 6.
 #pragma once
 
 #include <memory>
@@ -9,7 +9,7 @@
 
 namespace palette4d {
 
-/// (r, g, b, t) with t a frame number.
+/// (r, g, b, t), where t is a frame number.
 using Vec4 = std::array<double, 4>;
 
 /// The topology of one block: tracks as in polytope.hpp, and its faces.
@@ -25,11 +25,11 @@ struct FrameColours {
     std::shared_ptr<const ColourTree> colours;
 };
 
-/// Losses of the frames `which` (indices of `frames`, each inside a block). `gradient`, when not
-/// null, receives sum over `which` of the derivative of lambda (R + E) + C + convexity D + S with
-/// respect to the vertices (r, g, b, t). Frames are shared among `threads` threads; the sums are
-/// taken in order, so the result does not depend on their number. Throws std::invalid_argument for
-/// a frame that no block or track covers.
+/// Losses of the frames `which` (indices into `frames`, each inside a block). `gradient`, unless
+/// null, receives the sum over these frames of the derivative of lambda (R + E) + C + convexity D +
+/// S by (r, g, b, t). `threads` threads share the frames; sums are made in order, so the result
+/// does not depend on their number. Throws std::invalid_argument for a frame that no block or track
+/// covers.
 std::vector<FrameLoss> polytope_loss(const std::vector<Vec4>& vertices,
                                      const std::vector<BlockTopology>& blocks,
                                      const std::vector<FrameColours>& frames,

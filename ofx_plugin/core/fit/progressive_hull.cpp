@@ -125,7 +125,7 @@ private:
         at_[b].clear();
         position_[a] = entry.x;
         --left_;
-        // Every edge with a face that changed: those at a, the ring, and the ring's own edges.
+        // All edges with a changed face: at a, on the ring, and from the ring outwards.
         std::set<std::pair<int, int>> touched;
         for (int v : ring)
             for (int w : neighbours(v)) touched.insert({std::min(v, w), std::max(v, w)});
@@ -153,7 +153,7 @@ std::vector<Vec3> progressive_hull(const std::vector<Vec3>& rgb, const std::vect
                 throw std::invalid_argument("a face names vertex " + std::to_string(v));
     for (const Vec3& v : rgb)
         if (!finite(v)) throw std::invalid_argument("progressive_hull needs finite vertices");
-    // The bounds and tolerances are meant for colours of about unit size: work in a unit cube.
+    // Bounds and tolerances assume colours of about unit size, so work in a unit cube.
     Vec3 low = rgb.at(0), high = rgb.at(0);
     for (const Vec3& v : rgb)
         for (int c = 0; c < 3; ++c) {

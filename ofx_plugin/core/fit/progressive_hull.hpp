@@ -8,10 +8,10 @@
 namespace palette4d {
 
 /// Contracts edges of a closed convex triangle mesh until at most `target` (>= 4) vertices are
-/// left. Each step takes the edge whose contraction adds the least volume; the new vertex minimises
-/// that volume under the linear constraints that the mesh still encloses the old one (a linear
-/// program in three variables). Returns the vertices of the enclosing polyhedron; they may leave
-/// the unit cube. Throws std::invalid_argument when the mesh is not closed or a vertex not finite.
+/// left. Each step takes the edge whose contraction adds the least volume. The new vertex minimises
+/// that volume while the mesh still encloses the old one (a linear program in three variables).
+/// Returns the vertices of the enclosing polyhedron, which may lie outside the unit cube. Throws
+/// std::invalid_argument when the mesh is not closed or a vertex is not finite.
 std::vector<Vec3> progressive_hull(const std::vector<Vec3>& rgb, const std::vector<Face>& faces,
                                    int target);
 

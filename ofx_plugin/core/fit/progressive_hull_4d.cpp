@@ -23,14 +23,14 @@ template <int N>
 using Point = std::array<double, N>;
 template <int N>
 using Simplex = std::array<int, N>;
-/// A face of a link, or a ridge: at most three vertices, increasing, 21 bits each; none are 0.
+/// A face of a link, or a ridge: at most three vertices, increasing, 21 bits each, never 0.
 using FaceKey = std::uint64_t;
 constexpr int kKeyBits = 21;
 constexpr std::size_t kMostPoints = (std::size_t{1} << kKeyBits) - 1;
 
 FaceKey with_vertex(FaceKey key, int v) { return key << kKeyBits | (static_cast<FaceKey>(v) + 1); }
 
-/// Insertion sort (GCC 12 warns of std::sort on so few).
+/// Insertion sort: GCC 12 warns about std::sort on so few elements.
 void sort_few(int* numbers, int count) {
     for (int i = 1; i < count; ++i)
         for (int j = i; j > 0 && numbers[j] < numbers[j - 1]; --j)
@@ -44,7 +44,7 @@ double dot(const Point<N>& a, const Point<N>& b) {
     return sum;
 }
 
-/// The vector at right angles to N - 1 vectors: the cofactors of a determinant's first row. Its
+/// The vector perpendicular to N - 1 vectors: the cofactors of a determinant's first row. Its
 /// product with x - p is N! times the volume of the simplex between the facet and x.
 template <int N>
 Point<N> normal_of(const std::array<Point<N>, N - 1>& rows);
@@ -112,7 +112,7 @@ public:
             queue_.pop();
             const auto current = stamp_.find({entry.a, entry.b});
             if (current == stamp_.end() || current->second != entry.stamp) continue;
-            // Facets around it changed since: what it costs now may not be the least any more.
+            // Its facets have changed since it was queued, so its cost is outdated.
             if (std::max(touched_[entry.a], touched_[entry.b]) > entry.stamp)
                 evaluate(entry.a, entry.b);
             else
@@ -136,7 +136,7 @@ private:
         }
     };
 
-    /// The facet's outward normal, of (N - 1)! times its area, and its place: a . x = b on it.
+    /// The facet's plane a . x = b. a is the outward normal, (N - 1)! times the area long.
     HalfSpace<N> plane_of(const Simplex<N>& s) const {
         std::array<Point<N>, N - 1> rows;
         for (int r = 1; r < N; ++r)
@@ -159,7 +159,7 @@ private:
         return std::find(simplices_[s].begin(), simplices_[s].end(), v) != simplices_[s].end();
     }
 
-    /// All faces of the simplices around v (and w, unless w is v) without v and w.
+    /// All faces of the simplices around v (and w, unless w is v), without v and w.
     std::vector<FaceKey> link(int v, int w) const {
         std::vector<FaceKey> out;
         for (int s : stars_[v]) {
@@ -186,8 +186,8 @@ private:
         return links_[v];
     }
 
-    /// Whether the hull stays a sphere when a and b become one: what both touch must be what the
-    /// edge between them touches (the link condition of Dey et al. 1999).
+    /// Whether the hull stays a sphere when a and b merge: the common part of both links must be
+    /// the link of their edge (the link condition of Dey et al. 1999).
     bool contractible(int a, int b) {
         const std::vector<FaceKey>&of_a = link_of(a), &of_b = link_of(b);
         std::vector<FaceKey> shared;
@@ -196,7 +196,7 @@ private:
         return shared == link(a, b);
     }
 
-    /// Queues the edge with what its contraction adds now, or leaves it out where it cannot be.
+    /// Queues the edge with the volume that its contraction adds, unless it cannot be contracted.
     void evaluate(int a, int b) {
         if (a > b) std::swap(a, b);
         stamp_.erase({a, b});
@@ -263,8 +263,8 @@ private:
             links_[w].clear();
         }
         for (int w : ring) evaluate(a, w);
-        // Of the other edges whose facets changed, those in the queue wait until their turn; those
-        // that could not be contracted may be so now.
+        // Other edges with changed facets: queued ones are evaluated when their turn comes. Edges
+        // that could not be contracted may be possible now.
         std::set<std::pair<int, int>> again;
         for (int v : ring)
             for (int w : neighbours(v)) {
@@ -278,11 +278,11 @@ private:
     std::vector<Simplex<N>> simplices_;
     std::vector<HalfSpace<N>> planes_;
     std::vector<std::vector<int>> stars_;      // facets at each vertex, increasing
-    std::vector<std::vector<FaceKey>> links_;  // of those vertices that were asked for
+    std::vector<std::vector<FaceKey>> links_;  // links of vertices that were requested
     std::vector<long> touched_;                // when a facet at the vertex last changed
     std::vector<HalfSpace<N>> limits_;
     std::map<std::pair<int, int>, long> stamp_;
-    std::set<std::pair<int, int>> waiting_;  // edges that cannot be contracted at present
+    std::set<std::pair<int, int>> waiting_;  // edges that cannot be contracted now
     std::priority_queue<Entry> queue_;
     long clock_ = 0;
     int left_ = 0;
@@ -335,7 +335,7 @@ std::vector<std::array<double, N>> progressive_hull_nd(
     const std::vector<std::array<int, N>>& simplices, int target,
     const std::vector<Limit<N>>& limits) {
     check<N>(points, simplices, limits);
-    // The bounds and tolerances are meant for unit size; volumes keep their order.
+    // Bounds and tolerances assume unit size; scaling keeps the order of volumes.
     Point<N> low = points[simplices[0][0]], extent{};
     for (const Simplex<N>& s : simplices)
         for (int v : s)

@@ -7,7 +7,7 @@
 
 namespace palette4d {
 
-/// A limit on where new vertices may lie: the points x with a . x >= b.
+/// A limit for new vertices: the points x with a . x >= b.
 template <int N>
 struct Limit {
     std::array<double, N> a;
@@ -15,16 +15,15 @@ struct Limit {
 };
 
 /// Contracts edges of a convex hull until at most `target` (>= N + 1) vertices are left, or no edge
-/// can be contracted any more. `simplices` are the hull's facets, N points each: segments for N =
-/// 2, triangles for N = 3, tetrahedra for N = 4; their orientation does not matter. Each step takes
-/// the edge whose contraction adds the least volume; the new vertex minimises that volume under the
-/// linear constraints that the hull still encloses the old one and that the vertex keeps the limits
-/// (a linear program in N variables). Volumes are those after the axes are scaled to one length
-/// each, which does not change their order, so the unit of time is free.
+/// can be contracted. `simplices` are the hull's facets, N points each, in any orientation:
+/// segments, triangles or tetrahedra for N = 2, 3 or 4. Each step takes the edge whose contraction
+/// adds the least volume. The new vertex minimises that volume, while the hull still encloses the
+/// old one and the vertex stays within the limits (a linear program in N variables). All axes are
+/// first scaled to one length. This keeps the order of volumes, so the unit of time is free.
 ///
-/// Returns the vertices that are left: their convex hull encloses the points to about 1e-7 of the
-/// extent. The result depends on nothing but the arguments. Throws std::invalid_argument when the
-/// facets are not closed (each ridge between two), or a number is not finite. N is 2, 3 or 4.
+/// Returns the remaining vertices: their convex hull encloses the points to about 1e-7 of the
+/// extent. The result depends on the arguments only. Throws std::invalid_argument when the facets
+/// are not closed (each ridge between two) or a number is not finite.
 template <int N>
 std::vector<std::array<double, N>> progressive_hull_nd(
     const std::vector<std::array<double, N>>& points,

@@ -13,8 +13,8 @@ constexpr int kLeaf = LossLeaf::kSize;
 static_assert(ColourTree::kLeafSize == kLeaf, "a leaf at a time");
 static_assert(ColourTree::Boxes::kSize == LossKernels::kBoxes, "so many boxes at a time");
 
-// Of E, times the distance itself: farther out a pixel's weight does not grow any more, so that
-// a few pixels that are wrong (hot ones, say) cannot blow up the palette.
+// Largest weight in E per unit of distance. Farther out the weight stays constant, so that a few
+// wrong pixels (hot ones, say) cannot blow up the palette.
 constexpr double kMostReach = 8;
 
 struct Closest {
@@ -90,8 +90,9 @@ public:
     }
 
 private:
-    /// The boxes number `group` of a level against the `count` facets that may be reached by them.
-    /// Each operation is monotonic, rounded too: what a box reaches, the one around it reaches.
+    /// Tests box group number `group` of a level against the `count` facets that its boxes may
+    /// reach. All operations are monotonic, even rounded: an outer box reaches all that its inner
+    /// boxes reach.
     void visit(std::size_t level, std::size_t group, const int* which, int count) {
         const ColourTree::Boxes& boxes = colours_.levels()[level][group];
         const std::size_t mine = level * hull_.facets.size();
@@ -123,7 +124,7 @@ private:
         kernels_.pull(colours_.counts() + node.begin, size, reach_, leaf_);
         add_up(size);
         if (!gradient_) return;
-        // Lists rather than branches, which would be foreseen for one colour of two.
+        // Lists instead of branches: those would be mispredicted for every second colour.
         int straight[kLeaf], beside[kLeaf], straight_count = 0, beside_count = 0;
         for (int i = 0; i < size; ++i) {
             const bool outside = leaf_.distance[i] > 0, on = leaf_.facet[i] >= 0;
@@ -147,7 +148,7 @@ private:
         }
     }
 
-    /// All colours against all facets, which have no outside: the palette has no inside.
+    /// The palette is flat: tests all colours against all facets, which have no inside.
     void flat() {
         const int colours = static_cast<int>(colours_.size());
         for (int begin = 0; begin < colours; begin += kLeaf) {
@@ -168,7 +169,7 @@ private:
         }
     }
 
-    /// Colours inside add zeros, which change no sum.
+    /// Colours inside add zeros, which do not change the sums.
     void add_up(int size) {
         double sum = sum_, far_sum = far_sum_, count = count_, most = max_;
         for (int i = 0; i < size; ++i) {
@@ -183,7 +184,8 @@ private:
         max_ = most;
     }
 
-    /// Of the leaf's i-th colour, whose closest point `count` corners make up.
+    /// Adds the gradient of the leaf's i-th colour, whose closest point lies between `count`
+    /// corners.
     template <int count>
     void add_gradient(int i, const Vec3& p, const Face& at, const Vec3& weight) {
         Vec3 u = p;

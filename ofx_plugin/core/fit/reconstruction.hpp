@@ -1,4 +1,4 @@
-// Eq. 2 and what goes with it: how far a frame's colours lie outside a palette's hull.
+// Eq. 2 and related measures: how far a frame's colours lie outside a palette's hull.
 #pragma once
 
 #include <vector>
@@ -9,22 +9,22 @@
 
 namespace palette4d {
 
-/// Memory that one reconstruction after the other can use, so that none has to be found anew.
+/// Memory that is reused from one reconstruction to the next.
 struct ReconstructionScratch {
-    /// How the colours above a facet pull at it, in all and on its corners 1 and 2: together with
-    /// the normal, their gradient.
+    /// How the colours above a facet pull at it, in total and at corners 1 and 2. With the normal,
+    /// this gives their gradient.
     struct Load {
         double all = 0;
         double corner[2] = {0, 0};
     };
 
-    std::vector<int> facets;        // a list a level of the tree
-    std::vector<unsigned> reached;  // likewise
-    std::vector<Load> loads;        // one a facet
+    std::vector<int> facets;        // one list per level of the tree
+    std::vector<unsigned> reached;  // one list per level too
+    std::vector<Load> loads;        // one per facet
 };
 
-/// Sets R, E, outside and max_distance of `loss`, with E's `reach` as in LossWeights; `gradient`,
-/// when not null, becomes the derivatives of R + E. `hull` is that of `palette`.
+/// Sets R, E, outside and max_distance of `loss`, with E's `reach` as in LossWeights. `gradient`,
+/// unless null, receives the derivatives of R + E. `hull` must be built from `palette`.
 void measure_reconstruction(const ColourTree& colours, const std::vector<Vec3>& palette,
                             const PaletteHull& hull, double reach, const LossKernels& kernels,
                             ReconstructionScratch& scratch, FrameLoss& loss,

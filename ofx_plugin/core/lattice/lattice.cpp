@@ -12,9 +12,9 @@
 
 namespace palette4d {
 
-/// Blocks of pixels with some in cells that nobody has made yet wait until there are a few of them,
-/// for the cells to be made many at a time and yet before too many others wait for the same; pixels
-/// in parts that are not good enough go on to the exact worker.
+/// Blocks with pixels in unknown cells wait, so that many cells are built at a time. Only few
+/// blocks wait, or other threads would wait for the same cells. Pixels in parts that miss the
+/// tolerance go to the exact worker.
 class Lattice::Worker final : public RowWorker {
 public:
     Worker(const Recolourer& recolourer, Store& store, const RecolourOptions& options, int channels)
@@ -62,9 +62,10 @@ public:
 private:
     static constexpr int kSize = LatticeBlock::kSize;
     static constexpr std::size_t kWaiting = 16, kMostLeft = 256;
-    static constexpr int kSampleEvery = 16;  ///< blocks; a pixel of one is also evaluated exactly
+    static constexpr int kSampleEvery =
+        16;  ///< blocks; one of its pixels is also evaluated exactly
 
-    /// Blocks that are asked of memory early: work on one takes as long as that.
+    /// How many blocks ahead memory is prefetched: a fetch takes about as long as work on a block.
     static constexpr int kAhead = 2;
 
     struct Waiting {
@@ -79,7 +80,7 @@ private:
         for (int i = 0; i < kSize * channels_; i += kLine) __builtin_prefetch(block + i, Write);
     }
 
-    /// False when some of its pixels' cells or parts have to be made first.
+    /// False when some of its pixels' cells or parts must be built first.
     bool block(const float* from, float* to, int count) {
         LatticeBlock& b = block_;
         kernels_.locate(store_.domain(), b, from, channels_, count, premultiplied_);
@@ -106,8 +107,8 @@ private:
         return true;
     }
 
-    /// The states in block_, and together in what they differ from kGood: below 0 when some are
-    /// cut.
+    /// Fills the states in block_. Returns how they differ from kGood, combined: below 0 when some
+    /// pixels are in cut cells.
     std::int32_t look_up(int count) {
         int* const states = block_.state;
         const int* const numbers = block_.number;
@@ -120,7 +121,7 @@ private:
         return others;
     }
 
-    /// What has to be made, by this thread unless another is at it. True when there is nothing.
+    /// Claims missing cells and parts that no other thread builds. True when none is missing.
     bool claim(int count) {
         bool made = true;
         for (int i = 0; i < count; ++i) {
@@ -133,8 +134,8 @@ private:
         return made;
     }
 
-    /// Leaves no more than so many blocks, which wait for what other threads make.
-    // Not inlined: row(), where the time goes, inlines block() instead.
+    /// Finishes waiting blocks until at most `most_left` are left; those wait for other threads.
+    /// Not inlined, so that row(), the hot loop, can inline block() instead.
     [[gnu::noinline]] void do_waiting(std::size_t most_left) {
         const auto done = [&](const Waiting& w) { return block(w.from, w.to, w.count); };
         for (;;) {
@@ -182,7 +183,7 @@ private:
     Store::Builder builder_;
     LatticeBlock block_{};
     std::vector<Waiting> waiting_;
-    std::size_t left_ = 0;  ///< of those, when some were done last
+    std::size_t left_ = 0;  ///< blocks still waiting after the last do_waiting()
     std::vector<float> sampled_, sampled_moves_;
     long long interpolated_ = 0, blocks_ = 0;
 };

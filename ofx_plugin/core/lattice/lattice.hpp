@@ -1,5 +1,4 @@
-// Recolouring of images by interpolation: as fast as a 3D LUT, and as close to the exact
-// recolouring as is asked for, colour by colour.
+// Recolouring of images by interpolation: as fast as a 3D LUT, with a bounded error per colour.
 #pragma once
 
 #include <memory>
@@ -8,26 +7,23 @@
 
 namespace palette4d {
 
-/// One frame's displacements at the nodes of a lattice, interpolated tetrahedrally between them.
+/// One frame's displacements at the nodes of a lattice, interpolated tetrahedrally in between.
 ///
-/// The lattice spans the unit cube and the palette's bounding box, and a sixteenth of that more on
-/// every side. It is made while it is used: of its 72^3 cells only those that pixels lie in, eight
-/// (2 x 2 x 2) at a time. Where these tell by their 27 nodes that the interpolation in one is good,
-/// it is. Others are looked at in seven more points that are evaluated exactly, in twelve more
-/// where that does not settle it, and those that err by too much are halved along each axis. Their
-/// parts are treated alike; those of convex palettes of no more than a sixth of the lattice are
-/// halved once more. Parts that are not good enough, and all that lies outside, are recoloured
-/// exactly. What a cell holds depends on the palette and the edit only. Used by many threads at a
-/// time.
+/// The lattice spans the unit cube and the palette's bounding box, plus a margin on every side. It
+/// has 72^3 cells and is built on demand, eight cells (2 x 2 x 2) at a time. A cell whose 27 nodes
+/// show a smooth displacement is used as it is. Any other is probed at seven points, then at twelve
+/// more where seven do not decide. A cell whose error is too large is cut into eight parts, which
+/// are tested the same way. Parts of convex palettes that fill at most a sixth of the lattice may
+/// be cut once more. Parts that miss the tolerance, and colours outside the lattice, are recoloured
+/// exactly. A cell's content depends on the palette and the edit only. Thread-safe.
 ///
-/// Where the palette is convex (PaletteRegions), colours outside of it are not interpolated: their
-/// displacement is an affine function of them, region by region. Nodes are then the inside's mean
-/// value coordinates, beyond the surface as well, so that a cell that the surface crosses is
-/// interpolated below it, as smoothly as if it were not there.
+/// Outside a convex palette (PaletteRegions) the displacement is affine in each region and needs no
+/// interpolation. Its nodes then hold mean value coordinates extended beyond the surface. So cells
+/// that the surface crosses interpolate smoothly.
 class Lattice final : public ColourMap {
 public:
-    /// Of (interpolated - exact) / max(|exact|, 0.1), channel by channel. Where cells are looked at
-    /// less is asked for, since an error is larger in between.
+    /// Bound of |interpolated - exact| / max(|exact|, 0.1) for each channel. Probes use a tighter
+    /// tolerance, since the error between them is larger.
     static constexpr double kTolerance = 0.002;
 
     /// Throws std::invalid_argument for null.
@@ -39,29 +35,28 @@ public:
     const Recolourer& recolourer() const { return *recolourer_; }
 
     bool moves() const override { return recolourer_->moves(); }
-    /// Colours outside of the lattice or in parts that are not good enough have the Recolourer's
-    /// bits, as have all for precision double and at a strength beyond 0 to 1. kTolerance holds in
+    /// Bit-identical to the Recolourer for colours outside the lattice or in parts that miss the
+    /// tolerance. So is all of precision double, and any strength beyond 0 to 1. kTolerance is in
     /// the palette's code values.
     std::unique_ptr<RowWorker> worker(const RecolourOptions& options, int channels) const override;
 
-    /// The largest error, measured as kTolerance says and at strength 1, that was seen so far: of
-    /// the points looked at in the cells in use and of about every thousandth pixel, evaluated
-    /// exactly as well. 0 before the first apply().
+    /// The largest error so far, as kTolerance measures it and at strength 1; 0 before the first
+    /// apply(). It covers the probes of used cells and about every thousandth pixel, evaluated
+    /// exactly too.
     double largest_error() const;
 
-    /// What the lattice holds at the moment.
     struct Size {
-        long long cells = 0;    ///< made
-        long long cut = 0;      ///< cells and parts that were halved
-        long long parts = 0;    ///< of these
-        long long exact = 0;    ///< parts that are not good enough, among those in use
-        long long colours = 0;  ///< evaluated exactly for all this
+        long long cells = 0;    ///< built
+        long long cut = 0;      ///< cells and parts cut into eight
+        long long parts = 0;    ///< parts that these cuts made
+        long long exact = 0;    ///< parts in use that are recoloured exactly
+        long long colours = 0;  ///< colours evaluated exactly to build the lattice
     };
     Size size() const;
 
 private:
-    class Store;   ///< nodes, cells, and how they are made
-    class Worker;  ///< a thread's work
+    class Store;   ///< nodes and cells, and how they are built
+    class Worker;  ///< one thread's work
 
     std::shared_ptr<const Recolourer> recolourer_;
     std::unique_ptr<Store> store_;

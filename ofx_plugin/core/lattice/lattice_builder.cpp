@@ -1,4 +1,4 @@
-// How the cells of a Lattice are made.
+// Builds the cells of a Lattice.
 #include <algorithm>
 #include <thread>
 
@@ -8,20 +8,20 @@
 namespace palette4d {
 namespace {
 
-/// Where there are regions, what is interpolated is smooth: what it may be off at the probes; along
-/// three nodes in a line, of which it is a quarter between two; near an edge of the palette, where
-/// it bends most between the probes; and what going on beyond the surface may be off.
+/// Largest errors allowed where the displacement is smooth (PaletteRegions): at the probes; on
+/// lines of three nodes, where the error in between is a quarter; near a palette edge, where probes
+/// see least of the bend; and for extrapolation beyond the surface.
 constexpr float kMostSmooth = 0.0012f, kMostSmoothInLine = 2.0f * kMostSmooth,
                 kMostAtEdge = 0.0004f, kMostBeyond = 0.0003f;
-/// What is off by no more than so much of that at the middles of the body and of its faces is good.
-/// Else those of its edges are looked at as well, which may be half as much again.
+/// Up to this share of the limit at the middles of body and faces, a cell is accepted. Above it the
+/// middles of the edges are probed too, whose errors may be half as much again.
 constexpr float kSurely = 0.75f;
-/// Elsewhere a crease may lie between the nodes, or a jump beyond a dent: every cell is looked at
-/// itself, in all of these middles.
+/// Without PaletteRegions, a crease may lie between nodes, or a jump outside a concavity. So every
+/// cell is probed at all these middles.
 constexpr float kMostCreased = 0.0006f;
 
-/// Whether, in one of the eight parts of a cube of 3 x 3 x 3 nodes that have `moved`, the
-/// displacement goes on beyond the plane as below it: above, it is that of four columns.
+/// Whether the displacement below the plane, extended above it, agrees with the affine one there.
+/// Tests one of the eight parts of a cube of 3 x 3 x 3 nodes; `columns` are the affine function.
 template <class ColourOf>
 bool goes_on(const LatticePlane& plane, const float* columns, int part, const Four* moved,
              const ColourOf& colour_of) {
@@ -54,8 +54,8 @@ Lattice::Store::Builder::Builder(Store& store, InstructionSet instructions) : st
 Lattice::Store::Builder::~Builder() { give_up(); }
 
 void Lattice::Store::Builder::claim(int number, std::int32_t state) {
-    // On the list first: what is claimed and on none would be waited for for ever.
-    if (state == kUnknown) {  // its group's first cell stands for all
+    // Listed before it is claimed: other threads would wait forever for a claimed cell on no list.
+    if (state == kUnknown) {  // the group's first cell represents the group
         const int group = group_of(number);
         groups_.push_back({group, {}});
         if (!store_.state(group).compare_exchange_strong(state, kClaimed)) groups_.pop_back();
@@ -74,7 +74,7 @@ void Lattice::Store::Builder::run() noexcept {
     }
 }
 
-/// What is claimed and undone is recoloured exactly.
+/// Claimed cells that were not built are recoloured exactly.
 void Lattice::Store::Builder::give_up() noexcept {
     for (const int node : taken_) {
         std::uint8_t taken = kTaken;
@@ -103,12 +103,13 @@ PaletteRegions::Within Lattice::Store::Builder::within_part(int brick,
                                                             const LatticePlace& place) const {
     const PaletteRegions::Within found =
         within(place, store_.bricks_[brick].half / 2, PaletteRegions::kInside);
-    // Without nodes nothing is interpolated, should a rounding find some of the inside after all.
+    // A brick without nodes cannot interpolate, even if rounding finds some of the inside in a
+    // part.
     if (brick >= kLatticeBricks && found.inside) return {PaletteRegions::kSeveral, -1, false};
     return found;
 }
 
-/// False where none of its cells is interpolated, nor cut.
+/// False when none of its cells is interpolated or cut.
 bool Lattice::Store::Builder::find_regions(Group& group) const {
     const Cell cell = cell_at(group.number);
     const LatticePlace place = place_of(cell);
@@ -170,7 +171,7 @@ void Lattice::Store::Builder::publish_group(const Group& group) {
     bool known = true;
     const auto node_at = [&](int n) {
         const int node = Cell{cell.x + n / 9, cell.y + n / 3 % 3, cell.z + n % 3}.first_node();
-        std::uint8_t state;  // other threads may be at it
+        std::uint8_t state;  // other threads may write it
         while ((state = store_.node_states_[node].load(std::memory_order_acquire)) == kTaken) {
             std::this_thread::yield();
         }
@@ -185,8 +186,8 @@ void Lattice::Store::Builder::publish_group(const Group& group) {
     store_.cells_ += 8;
 }
 
-/// The states of the eight parts of a cube of 3 x 3 x 3 nodes, `half` of its width apart. What is
-/// smooth is off in a half of a line by a quarter of what it is off at the line's middle.
+/// The states of the eight parts of a cube of 3 x 3 x 3 nodes, `half` of its width apart. A smooth
+/// function's error in half of a line is a quarter of that at the line's middle.
 template <class NodeAt>
 void Lattice::Store::Builder::judge(const LatticePlace& place, float half, const NodeAt& node_at,
                                     const Parts& within, std::int32_t* states) const {
@@ -199,7 +200,7 @@ void Lattice::Store::Builder::judge(const LatticePlace& place, float half, const
         return judge_alike(true);
     }
     Four moved[kBrickNodes];
-    for (int n = 0; n < kBrickNodes; ++n) moved[n] = load_four(node_at(n));  // waits for some
+    for (int n = 0; n < kBrickNodes; ++n) moved[n] = load_four(node_at(n));  // may wait
     if (!store_.regions_) return judge_alike(false);
     const auto colour_of = [&](int n) {
         return colour_at(store_.low_, store_.step_,
@@ -216,8 +217,7 @@ void Lattice::Store::Builder::judge(const LatticePlace& place, float half, const
         farthest = max(farthest, beyond[i]);
     }
     const bool all_good = largest_of(farthest) <= 0;
-    // What was cut bends too much for the lines to tell of one part beside others that are not
-    // good.
+    // In a cut cell, lines are no proof that one part is good when others are not.
     const bool is_brick = half < kCellWidth;
     for (std::size_t part = 0; part < 8; ++part) {
         bool good = all_good;
@@ -229,7 +229,7 @@ void Lattice::Store::Builder::judge(const LatticePlace& place, float half, const
         states[part] = first_state_of(within[part], good);
         if (!within[part].inside || states[part] < kLatticeFirstPlane) continue;
         const LatticePlane& plane = store_.planes_[static_cast<std::size_t>(within[part].plane)];
-        const int face = plane.sides[1] / 8;  // region
+        const int face = plane.sides[1] / 8;  // of the face
         if (goes_on(plane, store_.node(kLatticeFirstRegion + 4 * face), static_cast<int>(part),
                     moved, colour_of)) {
             states[part] = kGood;
@@ -300,8 +300,8 @@ void Lattice::Store::Builder::make_jobs() {
 Lattice::Store::Builder::Job Lattice::Store::Builder::job_of(int number) const {
     if (number < kLatticeCells) {
         const Cell cell = cell_at(number);
-        // What its group was made by, which has no nodes where it found none of the inside: from
-        // elsewhere, a box that touches a wall may be found on the other side of it.
+        // Search from where its group was searched: from elsewhere, rounding may put a box that
+        // touches a wall on the other side. A group found to have no inside has no nodes.
         Group group{group_of(number), {}};
         find_regions(group);
         const int part = 4 * (cell.x % 2) + 2 * (cell.y % 2) + cell.z % 2;
@@ -331,7 +331,7 @@ Lattice::Store::Builder::Job Lattice::Store::Builder::job_of(int number) const {
 const float* Lattice::Store::Builder::probe(const std::vector<Job>& jobs, std::size_t first,
                                             std::size_t last) {
     const std::size_t count = jobs.size() * (last - first);
-    colours_.resize(3 * count + 1);  // written by fours
+    colours_.resize(3 * count + 1);  // store_four() writes one number more
     float* to = colours_.data();
     for (const Job& job : jobs) {
         for (std::size_t p = first; p < last; ++p, to += 3) {
@@ -343,13 +343,13 @@ const float* Lattice::Store::Builder::probe(const std::vector<Job>& jobs, std::s
     return node_displacements(colours_.data(), count);
 }
 
-/// At the probes `first` to `last` - 1, which have moved so far.
+/// The error at the probes `first` to `last` - 1, whose exact displacements are in `moved`.
 float Lattice::Store::Builder::error_of(const Job& job, const float* moved, std::size_t first,
                                         std::size_t last) const {
     Four corners[8];
     for (int k = 0; k < 8; ++k) corners[k] = load_four(store_.node(job.corner(k)));
-    // How far the corners are from affine, face by face, is seen where no probe is: a quarter of it
-    // is the error of what is bilinear.
+    // The twist of each face's corners shows the error between the probes: for a bilinear function
+    // it is a quarter of the twist.
     constexpr int kFaces[6][4] = {{0, 1, 2, 3}, {4, 5, 6, 7}, {0, 1, 4, 5},
                                   {2, 3, 6, 7}, {0, 2, 4, 6}, {1, 3, 5, 7}};
     Four twist{};
@@ -372,7 +372,7 @@ float Lattice::Store::Builder::error_of(const Job& job, const float* moved, std:
 void Lattice::Store::Builder::cut(const Job& job, const float* middles, const float* edges) {
     const bool empty = !middles;
     const std::int32_t brick = empty ? kLatticeBricks + store_.cut_empty_++ : store_.cut_++;
-    if (!empty && brick >= kLatticeBricks) {  // never, by most_inside(); but it would be memory
+    if (!empty && brick >= kLatticeBricks) {  // ruled out by most_inside()
         publish(job.number, kExact);
         return;
     }
@@ -400,7 +400,7 @@ void Lattice::Store::Builder::cut(const Job& job, const float* middles, const fl
     publish(job.number, -1 - brick);
 }
 
-/// Where its inside is, or is not, interpolated well.
+/// The state of a cell or part whose inside is interpolated within the tolerance (`good`) or not.
 std::int32_t Lattice::Store::Builder::state_of(const PaletteRegions::Within& within,
                                                bool good) const {
     if (within.region == PaletteRegions::kSeveral) return kExact;
@@ -410,7 +410,7 @@ std::int32_t Lattice::Store::Builder::state_of(const PaletteRegions::Within& wit
     return lattice_plane(within.plane + (exact ? count : 0));
 }
 
-/// The same before it was looked at itself.
+/// The same before the cell or part is probed.
 std::int32_t Lattice::Store::Builder::first_state_of(const PaletteRegions::Within& within,
                                                      bool good) const {
     if (within.region == PaletteRegions::kSeveral || (within.inside && (!good || within.edge)))

@@ -1,5 +1,5 @@
-// Where the nodes, cells and parts of a Lattice are, and how they lie to each other. In an unnamed
-// namespace, as four.hpp.
+// Positions of a Lattice's nodes, cells and parts, and their neighbours. In an unnamed namespace,
+// like four.hpp.
 #pragma once
 
 #include <algorithm>
@@ -13,10 +13,10 @@ namespace {
 
 constexpr int kSide = kLatticeSide, kNodeSide = kSide + 1;
 
-/// Of one of the eight corners or parts of something, along an axis: number 4 x + 2 y + z.
+/// The place, 0 or 1, along an axis of one of eight corners or parts: number 4 x + 2 y + z.
 constexpr int bit(int corner, int axis) { return corner >> (2 - axis) & 1; }
 
-/// Of a brick: along each axis, in halves of what it cuts.
+/// Node positions in a brick along each axis, in halves of the cut cell's width.
 struct BrickPlaces {
     float at[kBrickNodes][4]{};
     constexpr BrickPlaces() {
@@ -29,14 +29,14 @@ struct BrickPlaces {
 };
 constexpr BrickPlaces kPlaces;
 
-/// Where the interpolation of a cell or part is looked at: the other nodes of the brick that it
-/// would be cut into, the middles of it and of its faces, then those of its edges. Each corner has
-/// a part in one, so that a crease that cuts a corner off is seen as well.
+/// Where a cell or part is probed: the nodes that its brick would add. First the middles of body
+/// and faces, then of the edges. Every corner touches a probe, so a crease that cuts off a corner
+/// is seen.
 struct Probes {
     static constexpr std::size_t kMiddles = 7, kAll = 19;
     struct Probe {
-        int node;     ///< of the brick
-        int ends[2];  ///< it is half way between these two corners
+        int node;     ///< node number in the brick
+        int ends[2];  ///< the probe is half way between these two corners
     };
     Probe all[kAll]{};
 
@@ -55,14 +55,14 @@ struct Probes {
 };
 constexpr Probes kProbes;
 
-/// The lines through 3 x 3 x 3 nodes that edges of the tetrahedra lie on, three nodes each.
+/// Lines of three nodes in a cube of 3 x 3 x 3 nodes, along edges of the tetrahedra.
 struct Lines {
     static constexpr std::size_t kCount = 37, kTouching = 19;
     struct Line {
         int middle, step;
     };
     Line all[kCount]{};
-    int of_part[8][kTouching]{};  ///< those that touch one of the eight parts
+    int of_part[8][kTouching]{};  ///< lines that touch each of the eight parts
 
     constexpr Lines() {
         int count = 0, touching[8] = {};
@@ -96,12 +96,12 @@ inline Cell cell_at(int number) {
     return {number / (kSide * kSide), number / kSide % kSide, number % kSide};
 }
 
-/// Of a group that is known by its first cell.
+/// A cell of the group, given the group's first cell.
 inline int group_cell(int group, int part) {
     return group + (bit(part, 0) * kSide + bit(part, 1)) * kSide + bit(part, 2);
 }
 
-/// Of the group that a cell is in.
+/// The group that a cell belongs to.
 inline int group_of(int number) {
     const Cell cell = cell_at(number);
     return number - (cell.x % 2 * kSide + cell.y % 2) * kSide - cell.z % 2;
@@ -112,7 +112,7 @@ inline LatticePlace place_of(const Cell& cell) {
              kCellWidth * static_cast<float>(cell.z), 0}};
 }
 
-/// Places are whole numbers, so that a place has one colour, whatever it is counted from.
+/// Places are whole numbers: a place has the same colour from any cell that it is computed from.
 inline Four colour_at(const float* low, const float* step, Four place) {
     return load_four(low) + place * load_four(step);
 }
@@ -120,7 +120,7 @@ inline Four colour_at(const float* low, const float* step, Four place) {
 struct Point {
     float at[4];
 };
-/// Of something that is so wide from there on.
+/// The centre of a cube `width` wide whose lowest corner is `place`.
 inline Point centre_of(const float* low, const float* step, const LatticePlace& place,
                        float half_width) {
     Point centre;
@@ -128,7 +128,7 @@ inline Point centre_of(const float* low, const float* step, const LatticePlace& 
     return centre;
 }
 
-/// What errors are measured in, as lattice_error() does.
+/// The unit of relative errors, as in lattice_error().
 inline Four size_of(Four colour, Four moved) {
     const Four exact = colour + moved, least = all_four(0.1f);
     return where_negative(colour * exact, least, max(abs(exact), least));

@@ -1,4 +1,4 @@
-// The kernels of lattice_kernels.hpp for the width that lanes.hpp was included with.
+// The kernels of lattice_kernels.hpp, compiled for the vector width that lanes.hpp has here.
 #include "lattice/lattice_kernels.hpp"
 
 #include "simd/four.hpp"
@@ -13,7 +13,7 @@ using palette4d::LatticePlane;
 template <int Channels>
 void spread(LatticeBlock& block, const float* from, int count) {
     constexpr int kSize = LatticeBlock::kSize;
-    if (count == kSize) {  // a length the compiler knows, for the many
+    if (count == kSize) {  // constant size: the compiler can unroll this, the usual case
         for (int i = 0; i < kSize; ++i) {
             for (int c = 0; c < 3; ++c) block.colour[c][i] = from[i * Channels + c];
         }
@@ -83,7 +83,7 @@ void descend(LatticeBlock& block, int count) {
                            node = (half[0] * three + half[1]) * three + half[2];
         store_whole(block.number + at, select(cut, all(kFirst) + all(kParts) * brick + part,
                                               load_whole(block.number + at)));
-        // Of bricks without nodes none is asked for; this one is there, whatever it holds.
+        // Bricks without nodes need none; clamping keeps the address inside the array.
         const Lanes<float> nodes = all(kFirstNode) + all(kNodes) * min(brick, all(kLastBrick));
         store(block.first + at, select(cut, nodes + node, load(block.first + at)));
         store(block.cut + at, select(cut, one, load(block.cut + at)));
@@ -92,7 +92,7 @@ void descend(LatticeBlock& block, int count) {
 
 std::int32_t choose_sides(const LatticePlane* planes, LatticeBlock& block, int count) {
     constexpr int kFirst = palette4d::kLatticeFirstPlane;
-    int chosen[LatticeBlock::kSize], chosen_count = 0;  // no branch: there is no rule for it
+    int chosen[LatticeBlock::kSize], chosen_count = 0;  // no branch: it would be mispredicted
     for (int i = 0; i < count; ++i) {
         chosen[chosen_count] = i;
         chosen_count += block.state[i] >= kFirst;
@@ -138,8 +138,8 @@ void weigh(LatticeBlock& block, int count) {
         };
         const Lanes<float> step_x = select(cut, all(kBrickSide * kBrickSide), all(kSide * kSide)),
                            step_y = select(cut, all(kBrickSide), all(kSide)), step_z = one;
-        // From the first corner along the axis that the colour is farthest along, then along the
-        // second, then the last.
+        // Walks the tetrahedron's nodes from the first corner: along the colour's largest
+        // coordinate, then its second, then its smallest.
         const LaneMask<float> xy = x >= y, xz = x >= z, yz = y >= z;
         const Lanes<float> longest =
             select(xy, select(xz, step_x, step_z), select(yz, step_y, step_z));
@@ -161,7 +161,7 @@ PALETTE4D_INLINE void store_pixel(float* to, Four after) {
         store_four(to, after);
         return;
     }
-    // Not through memory, as compilers copy twelve bytes of a register.
+    // Two doubles in a register: compilers copy twelve bytes through memory.
     typedef double Two __attribute__((vector_size(16)));
     const double red_green = ((Two)after)[0];
     const float blue = after[2];
@@ -173,7 +173,7 @@ PALETTE4D_INLINE const float* node_at(const float* nodes, std::size_t bytes) {
     return reinterpret_cast<const float*>(reinterpret_cast<const char*>(nodes) + bytes);
 }
 
-/// What pixel i of the block becomes.
+/// The recoloured pixel i of the block.
 template <bool Premultiplied>
 PALETTE4D_INLINE Four blended(const float* nodes, const LatticeBlock& block, int i, Four before,
                               float strength) {
@@ -181,12 +181,12 @@ PALETTE4D_INLINE Four blended(const float* nodes, const LatticeBlock& block, int
         return block.weight[k][i] * load_four(node_at(nodes, block.corner[k][i]));
     };
     const Four step = strength * ((part(0) + part(1)) + (part(2) + part(3)));
-    // There is nothing to add where alpha may be no number.
+    // The select avoids NaN: alpha may be NaN where the step is 0.
     return where_zero(step, before, before + (Premultiplied ? before[3] : 1.0f) * step);
 }
 
 #if defined(PALETTE4D_LANES_X86) && PALETTE4D_LANES_BYTES > 16
-/// The same for eight pixels from i on, two in a register: half of the instructions.
+/// The same for eight pixels from i on, two in a register, in half the instructions.
 template <int Channels, bool Premultiplied>
 PALETTE4D_INLINE void blend_eight(const float* nodes, const LatticeBlock& block, int i, bool last,
                                   const float* from, float* to, float strength) {
@@ -228,7 +228,7 @@ PALETTE4D_INLINE void blend_eight(const float* nodes, const LatticeBlock& block,
             store_pixel<3>(there + 3, _mm256_extractf128_ps(after, 1));
         }
     };
-    // A loop over constants that compilers leave a loop.
+    // Calls spelled out: compilers do not unroll a loop over these constants.
     blend_two(0);
     blend_two(2);
     blend_two(4);
@@ -250,7 +250,7 @@ void blend_all(const float* nodes, const LatticeBlock& block, int count, const f
         Four before;
         if (Channels == 4) {
             before = load_four(one);
-        } else {  // what lies behind the third channel may be somebody else's
+        } else {  // a fourth float may lie beyond the row
             const float padded[4] = {one[0], one[1], one[2], 0};
             before = load_four(padded);
         }

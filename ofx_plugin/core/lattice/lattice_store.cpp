@@ -17,15 +17,15 @@ constexpr std::size_t kMostStates = kLatticeFirstPart + kMostBricks * kBrickPart
 static_assert(kMostNodes <= 1 << 24 && kMostStates <= 1 << 24, "floats count nodes and parts");
 static_assert(PaletteRegions::kMostRegions <= kLatticeMostRegions, "their nodes have room");
 
-/// For what filters and codecs add; so many cells that no node, not even a brick's, lies at 0 or 1:
-/// palettes often have faces in those planes, where coordinates need double precision.
+/// The margin holds overshoot from filters and codecs. Its width keeps all nodes off 0 and 1:
+/// palettes often have faces there, where coordinates need double precision.
 constexpr double kMarginCells = 4.1, kMargin = kMarginCells / (kLatticeSide - 2 * kMarginCells);
 
 }  // namespace
 
 #if defined(__linux__)
 
-// In pages of 2 MiB where the system has some: a new page costs as much time as 40 colours.
+// Uses pages of 2 MiB where possible: a fault on a new page costs as much time as 40 colours.
 Zeros::Zeros(std::size_t bytes) : size_(bytes + kHugePage), data_(nullptr) {
     void* const all = mmap(nullptr, size_, PROT_READ | PROT_WRITE,
                            MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
@@ -76,8 +76,8 @@ Lattice::Store::Store(const Recolourer& recolourer)
     regions_ = PaletteRegions::of(recolourer.body(), recolourer.displacement(), step_, farthest);
     if (!regions_) return;
     add_regions();
-    // Parts are cut too where all those of the inside could be: that depends on the palette alone,
-    // never on what pictures have asked for.
+    // Parts are cut again only if all parts of the inside would fit. That depends on the palette
+    // alone, not on the pictures rendered so far.
     const std::size_t most = regions_->most_inside(low_, kCellWidth, kLatticeSide);
     if (most * (1 + kBrickParts) <= kLatticeBricks) finest_half_ = kPartWidth / 4;
 }

@@ -1,4 +1,4 @@
-// The nodes and cells of a Lattice, made by many threads at a time as they are asked for.
+// The nodes and cells of a Lattice, built by many threads on demand.
 #pragma once
 
 #include <algorithm>
@@ -17,15 +17,15 @@
 
 namespace palette4d {
 
-/// Zeros that cost nothing where nobody touches them: the system gives the pages when they are. All
-/// in one piece, so that it is large enough for that.
+/// Zeroed memory in one block: the system allocates a page when it is first touched. One large
+/// block allows large pages.
 class Zeros {
 public:
     explicit Zeros(std::size_t bytes);
     ~Zeros();
     Zeros(const Zeros&) = delete;
     Zeros& operator=(const Zeros&) = delete;
-    /// The next part of it; the sizes must add up.
+    /// The next array in the block; the sizes must add up.
     template <class T>
     T* take(std::size_t count) {
         T* const taken = reinterpret_cast<T*>(data_ + taken_);
@@ -39,22 +39,21 @@ private:
     std::size_t taken_ = 0;
 };
 
-/// What Lattice::kTolerance is held against, at strength 1; at a lower one the error is no larger.
+/// The error that Lattice::kTolerance limits, at strength 1; at lower strengths it is no larger.
 inline double lattice_error(double colour, double displacement, double error) {
     const double exact = colour + displacement;
-    // At a strength between 0 and 1 a channel that changes its sign goes through 0.
+    // Somewhere between strength 0 and 1, a channel that changes its sign is 0.
     const double size = colour * exact < 0 ? 0.1 : std::max(std::abs(exact), 0.1);
     return std::abs(error) / size;
 }
 
-/// In quarters of a cell, so that nodes lie at whole numbers and probes at half ones at least; the
-/// last is 0.
+/// In quarters of a cell: nodes lie at whole numbers, probes at multiples of a half. The last is 0.
 struct LatticePlace {
     float at[4];
 };
 constexpr float kCellWidth = 4, kPartWidth = kCellWidth / 2;
 
-/// Of what is cut: where it is, and half of its width, which is that of its parts.
+/// A cut cell or part: its place and half its width, which is the width of its parts.
 struct LatticeBrick {
     LatticePlace place;
     float half;
@@ -62,8 +61,8 @@ struct LatticeBrick {
 
 class Lattice::Store {
 public:
-    /// States. Cells are made eight at a time (a group), with all nodes between them: where these
-    /// tell that a cell is fine it is good, else suspect until it was looked at itself.
+    /// Cells are built eight at a time (a group) with all nodes between them. A cell whose nodes
+    /// show a smooth displacement becomes good; others stay suspect until they are probed.
     enum : std::int32_t { kUnknown = 0, kClaimed, kSuspect, kGood = kLatticeGood, kExact };
     using State = std::atomic<std::int32_t>;
 
@@ -72,7 +71,7 @@ public:
     const LatticeDomain& domain() const { return domain_; }
     const float* nodes() const { return nodes_; }
     const LatticePlane* planes() const { return planes_.data(); }
-    /// Of a cell or part, by its number.
+    /// The state of a cell or part by its number.
     State& state(int number) { return states_[static_cast<std::size_t>(number)]; }
 
     class Builder;
@@ -90,43 +89,43 @@ private:
 
     const Recolourer& recolourer_;
     std::unique_ptr<const PaletteRegions> regions_;
-    std::vector<LatticePlane> planes_;  ///< between them; then all again, with an exact inside
+    std::vector<LatticePlane> planes_;  ///< between regions; then all again, with an exact inside
     LatticeDomain domain_;
-    float low_[4], step_[4];  ///< of the domain; a quarter of a cell
+    float low_[4], step_[4];  ///< the domain's lowest corner; a quarter of a cell
     Zeros memory_;
-    float* const nodes_;  ///< 4 numbers each
+    float* const nodes_;  ///< four floats each
     LatticeBrick* const bricks_;
     State* const states_;
-    std::atomic<std::uint8_t>* const node_states_;  ///< of the cells; a brick is made in one piece
-    float finest_half_;                             ///< of the width of what is not cut any more
+    std::atomic<std::uint8_t>* const node_states_;  ///< of the cells; a brick is built at once
+    float finest_half_;  ///< half the width of the smallest cells or parts
     std::atomic<std::int32_t> cut_{0}, cut_empty_{0};  ///< bricks with nodes, and without
     std::atomic<long long> cells_{0}, exact_{0}, colours_{0};
     std::atomic<double> largest_error_{0};
 };
 
-/// Makes what one thread has claimed.
+/// Builds what one thread has claimed.
 class Lattice::Store::Builder {
 public:
     Builder(Store& store, InstructionSet instructions);
-    /// What was claimed and not made is recoloured exactly.
+    /// Cells that were claimed and not built are recoloured exactly.
     ~Builder();
     Builder(const Builder&) = delete;
     Builder& operator=(const Builder&) = delete;
 
-    /// To be made by run(): what is unknown or suspect, unless another thread was faster.
+    /// Adds an unknown or suspect cell or part to the list for run(), unless another thread has it.
     void claim(int number, std::int32_t state);
     bool claimed() const { return !groups_.empty() || !jobs_.empty(); }
-    /// On return nothing of it is kClaimed any more.
+    /// On return nothing of this list is kClaimed any more.
     void run() noexcept;
 
-    /// Evaluates `count` colours at strength 1: displacements (count, 3), and a number more.
+    /// Evaluates `count` colours at strength 1. Returns (count, 3) floats; one more is readable.
     const float* displacements(const float* colours, std::size_t count);
 
 private:
-    /// A cell or part that is suspect.
+    /// A suspect cell or part.
     struct Job {
         LatticePlace place;
-        float half;  ///< of its width
+        float half;  ///< half of its width
         int number, node, step_x, step_y;
         PaletteRegions::Within within;
         bool is_cell() const { return number < kLatticeCells; }
@@ -137,8 +136,8 @@ private:
 
     using Parts = std::array<PaletteRegions::Within, 8>;
     struct Group {
-        int number;    ///< its first cell's
-        Parts within;  ///< its cells
+        int number;    ///< the group's first cell
+        Parts within;  ///< regions of its cells
     };
 
     void give_up() noexcept;
@@ -150,7 +149,7 @@ private:
     void publish_group(const Group& group);
     void make_jobs();
     Job job_of(int number) const;
-    /// What the probes `first` to `last` - 1 of jobs have moved.
+    /// The exact displacements at the probes `first` to `last` - 1 of all jobs.
     const float* probe(const std::vector<Job>& jobs, std::size_t first, std::size_t last);
     float error_of(const Job& job, const float* moved, std::size_t first, std::size_t last) const;
     void cut(const Job& job, const float* middles, const float* edges);
@@ -163,12 +162,12 @@ private:
         store_.state(number).store(state, std::memory_order_release);
     }
 
-    /// By mean value coordinates everywhere where there are regions, else exactly.
+    /// With PaletteRegions, mean value coordinates even outside; without, the exact displacements.
     const float* node_displacements(const float* colours, std::size_t count);
 
     Store& store_;
     std::unique_ptr<RowWorker> exact_;
-    std::unique_ptr<MeanValueWorker> mean_value_;  ///< where there are regions
+    std::unique_ptr<MeanValueWorker> mean_value_;  ///< only with PaletteRegions
     std::vector<Group> groups_;
     std::vector<int> taken_;
     std::vector<Job> jobs_, to_look_at_;

@@ -59,8 +59,8 @@ void MeanValueWorker::displacements(const float* colours, std::size_t count, flo
         [&](std::size_t i) { one_by_one(others_[i].first, others_[i].second); });
 }
 
-/// In a face's plane, for one. Outside that is not what the closest point does, which bends at the
-/// surface: a node with it between others would be seen by half only.
+/// Needed in the plane of a face, for example. Outside, never the closest point: it bends at the
+/// surface, and a node that used it would not match its neighbours.
 void MeanValueWorker::one_by_one(const float* colour, float* moved) {
     const Vec3 p{static_cast<double>(colour[0]), static_cast<double>(colour[1]),
                  static_cast<double>(colour[2])};

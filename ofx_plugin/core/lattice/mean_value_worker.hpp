@@ -1,4 +1,4 @@
-// One thread's displacements by mean value coordinates, outside of the palette as well.
+// One thread's displacements by mean value coordinates, also outside the palette.
 #pragma once
 
 #include <utility>
@@ -10,13 +10,13 @@
 
 namespace palette4d {
 
-/// Outside, the coordinates go on across a face as smoothly as they are inside, for a while.
+/// Outside, these coordinates extend smoothly across a face, for a short distance.
 class MeanValueWorker {
 public:
-    /// `recolourer` must outlive this, move some colour and be solid.
+    /// `recolourer` must outlive this, move some colour, and have a solid palette.
     MeanValueWorker(const Recolourer& recolourer, InstructionSet instructions);
 
-    /// Of `count` colours, (count, 3).
+    /// Writes the displacements of `count` colours, (count, 3).
     void displacements(const float* colours, std::size_t count, float* moved);
 
 private:
@@ -29,7 +29,7 @@ private:
         Scratch<T> scratch;
         Block<T> block{};
         Stage(const PlanMemory<T>& memory, const Kernels<T>& of);
-        /// The displacements that can be promised; failed(i) for the others.
+        /// Writes the displacements whose error is bounded; calls failed(i) for the others.
         template <class From, class To, class Failed>
         void run(std::size_t count, const From& from, const To& to, const Failed& failed);
     };

@@ -10,13 +10,13 @@
 namespace palette4d {
 namespace {
 
-/// What the rounding of an affine displacement's numbers may come to.
+/// Largest rounding error of an affine displacement in single precision.
 constexpr double kRounding = 2e-5;
-/// Displacements that differ by no more than this are taken for the same.
+/// Displacements that differ by no more than this count as equal.
 constexpr float kAlike = 8e-5f;
 constexpr std::size_t kMostWalls = PaletteRegions::kMostRegions;
 
-/// base + (p - start) . gradient change, summed over the gradients.
+/// base + (p - start) . gradient * change, summed over the gradients.
 struct AffineSum {
     Vec3 start;
     PaletteRegions::Affine sum{};
@@ -42,7 +42,7 @@ struct PaletteRegions::Rooms {
             box[i] = half_width * reach[i];
         }
     }
-    /// Whether the whole box is behind one of the walls.
+    /// Whether the whole box lies outside one of the walls.
     bool behind_one() const {
         for (std::size_t i = 0; i < count; ++i) {
             if (centre[i] + box[i] < 0) return true;
@@ -116,8 +116,7 @@ bool PaletteRegions::add_surface(const PaletteBody& body, const std::vector<Vec3
         const Vec3 along = body.rgb()[to] - start;
         const auto normal_of = [&](const Side& side) { return body.normal(index(side.face) - 1); };
         if (two.size() != 2 || norm(along) <= 0) return false;
-        // Of faces in one plane as well: no colour is closest to their edge, whose region has no
-        // width then, but a box that lies across it is known by it.
+        // Coplanar faces too: their edge's region has no width, but boxes across the edge need it.
         AffineSum moved{start, {displacement[from]}};
         moved.add((1 / dot(along, along)) * along, displacement[to] - displacement[from]);
         const int edge = add_region(moved.sum);
@@ -130,8 +129,8 @@ bool PaletteRegions::add_surface(const PaletteBody& body, const std::vector<Vec3
             if (vertices.count(end) == 0) vertices[end] = add_region({displacement[end]});
             add_plane(end == to ? along : -1 * along, body.rgb()[end], edge, vertices[end]);
         }
-        // Above the first face: it, else the edge or the second face. Below: the inside, or the
-        // same of the second face.
+        // Above the first face: that face, else the edge or the second face. Below it: the inside,
+        // or again the edge or the second face.
         const int second = chosen(plane[1]);
         const int first = chosen(add_plane(two[0].outwards, start, two[0].face, second));
         const int below = chosen(add_plane(normal_of(two[1]), start, kInside, second));
@@ -195,7 +194,7 @@ bool PaletteRegions::touches_inside(const float* centre, float half_width) const
     return !Rooms(walls_[kInside], centre, half_width).behind_one();
 }
 
-/// Adds the regions that the box touches, `region` and from it on; false where they are too many.
+/// Adds the regions that the box touches, starting at `region`. False when there are too many.
 bool PaletteRegions::find(int region, const float* centre, float half_width, Found& found) const {
     const Walls& walls = walls_[index(region)];
     const Rooms rooms(walls, centre, half_width);
@@ -214,7 +213,7 @@ bool PaletteRegions::find(int region, const float* centre, float half_width, Fou
 
 PaletteRegions::Around PaletteRegions::around(const float* centre, float half_width,
                                               int start) const {
-    // Across the walls that the centre is farthest behind to where it is.
+    // Steps to the region of the centre, each time across the wall that it violates most.
     constexpr int kMostSteps = 16;
     int region = start;
     for (int step = 0; step < kMostSteps; ++step) {
@@ -240,11 +239,11 @@ PaletteRegions::Around PaletteRegions::around(const float* centre, float half_wi
 }
 
 std::size_t PaletteRegions::most_inside(const float* low, float width, int side) const {
-    // A row of boxes along blue goes behind each of the inside's walls once, so that those which
-    // are behind none follow each other.
+    // A row of boxes along blue crosses each wall of the inside once, so the boxes inside all walls
+    // are consecutive.
     const Walls& walls = walls_[kInside];
     const double half = width / 2, blue = low[2] + half * unit_[2];
-    constexpr double kSlack = 1e-3;  // of a box, for what single precision rounds
+    constexpr double kSlack = 1e-3;  // of a box, for rounding in single precision
     std::size_t most = 0;
     for (int x = 0; x < side; ++x) {
         const double red = low[0] + (2 * x + 1) * half * unit_[0];
@@ -290,7 +289,7 @@ PaletteRegions::Within PaletteRegions::within(const float* centre, float half_wi
     if (at_centre.crossings == 0) return {region, -1, region == kInside};
     const Walls& walls = walls_[index(region)];
     Found found;
-    // The most frequent ones need no search.
+    // Boxes across one wall are the most frequent and need no search.
     const int beyond_one = walls.beyond[at_centre.crossed];
     if (at_centre.crossings == 1 && within_two(region, beyond_one, centre, half_width)) {
         found.count = 2;

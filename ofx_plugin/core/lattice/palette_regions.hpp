@@ -1,4 +1,4 @@
-// The colours around a convex palette, by what of it is the closest.
+// Divides the colours around a convex palette by the closest part of its surface.
 #pragma once
 
 #include <array>
@@ -10,64 +10,65 @@
 
 namespace palette4d {
 
-/// Space divided into the inside of a palette and, outside, what is closest to the same face, edge
-/// or vertex. All regions are convex, bounded by planes that two of them share; outside, the
-/// displacement is an affine function in each, and inside, away from the surface, a smooth one.
+/// Space is divided into the inside and, outside, one region for each face, edge and vertex that is
+/// closest. All regions are convex, with planes between them. The displacement is affine in each
+/// outer region; inside it is smooth, away from the surface.
 class PaletteRegions {
 public:
     static constexpr int kInside = 0, kSeveral = -1;
-    /// More than in any palette that is worked with.
+    /// Larger than any practical palette.
     static constexpr std::size_t kMostRegions = 256;
 
-    /// A choice: `below` is where normal . p < offset. What there is on either side is a region, or
-    /// another choice, chosen(): they make trees.
+    /// A choice: `below` holds where normal . p < offset. Each side is a region or another choice,
+    /// chosen(), so choices form trees.
     struct Plane {
         Vec3 normal;
         double offset;
         int below, above;
     };
     static constexpr int chosen(int plane) { return -1 - plane; }
-    /// The displacement is the first of these and the others times red, green and blue.
+    /// The displacement is the first vector plus the others times red, green and blue.
     using Affine = std::array<Vec3, 4>;
 
     /// For boxes whose half widths are multiples of `unit`, with colours no farther than `size`
-    /// from 0. Null for a palette that is not convex, or where single precision is not enough.
+    /// from 0. Null for a non-convex palette, or where single precision is not enough.
     static std::unique_ptr<const PaletteRegions> of(const PaletteBody& body,
                                                     const std::vector<Vec3>& displacement,
                                                     const float* unit, double size);
 
     const std::vector<Plane>& planes() const { return planes_; }
-    /// Of a region; zeros inside.
+    /// The affine displacement of a region; zeros for the inside.
     const Affine& affine(std::size_t region) const { return affine_[region]; }
     std::size_t count() const { return affine_.size(); }
 
-    /// The regions of all colours of a box: one, where the displacement is that one's; or those
-    /// that the choices from `plane` on lead to; or neither (kSeveral, -1).
+    /// The regions of all colours in a box. Either one `region` whose displacement holds for all,
+    /// or the choices that start at `plane`, or neither (kSeveral, -1).
     struct Within {
         int region, plane;
-        bool inside;        ///< the inside is one of them
-        bool edge = false;  ///< and an edge of it
+        bool inside;        ///< the inside is one of the regions
+        bool edge = false;  ///< the inside and one of its edges are among them
     };
     Within within(const float* centre, float half_width, int start = kInside) const;
-    /// The centre's region, or kSeveral where it was not found, and how many of the planes around
-    /// it cross the box: 0 where the region is the whole box's. It is looked for from `start` on.
+    /// The region of the box's centre, or kSeveral when it was not found. `crossings` counts that
+    /// region's planes that cross the box: 0 when the whole box is in the region. The search begins
+    /// at `start`.
     struct Around {
         int region, crossings;
-        std::size_t crossed;  ///< the last of those planes, as the region counts them
+        std::size_t crossed;  ///< the last of those planes, by the region's numbering
     };
     Around around(const float* centre, float half_width, int start) const;
 
-    /// At least as many of the boxes of a grid, `side` along each axis, `width` wide and from `low`
-    /// on, as within() says have some of the inside.
+    /// An upper bound on how many boxes of a grid contain some of the inside, as within() finds it.
+    /// The grid has `side` boxes of `width` along each axis, from `low` on.
     std::size_t most_inside(const float* low, float width, int side) const;
 
 private:
-    /// Of one region, a number each.
+    /// One region's walls.
     struct Walls {
         std::vector<float> normal[3], offset, reach;  ///< inwards; of a box of half width 1
         std::vector<int> plane, beyond;
     };
-    /// How far a box's centre is from the walls, and how far the box.
+    /// Signed distances of a box's centre from the walls, and the box's extent towards them.
     struct Rooms;
     /// Regions that a box touches.
     struct Found;
@@ -86,8 +87,8 @@ private:
     std::vector<Plane> planes_;
     std::vector<Affine> affine_;
     std::vector<Walls> walls_;
-    std::vector<int> edge_faces_[2];  ///< a region's, where it is an edge's; else -1
-    std::vector<int> edge_choices_;   ///< between those, the edge and the inside
+    std::vector<int> edge_faces_[2];  ///< for an edge's region its two faces; else -1
+    std::vector<int> edge_choices_;   ///< of an edge's region: its first choice; else -1
     std::array<float, 3> unit_{};
 };
 

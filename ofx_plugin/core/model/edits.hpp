@@ -18,7 +18,7 @@ struct Stop {
 };
 
 struct Edits {
-    /// One entry a polytope vertex; empty where the vertex keeps its colour.
+    /// One element per polytope vertex; empty where the vertex keeps its colour.
     std::vector<std::optional<Vec3>> vertex_rgb;
     /// At most one stop per edge and frame; any order.
     std::vector<Stop> stops;

@@ -1,4 +1,4 @@
-// Handles: what edits hold on to, and new colours for them from somebody else than the sidecar.
+// Handles: the colours that a user can edit, and new colours for them from the host.
 #pragma once
 
 #include <string>
@@ -13,14 +13,14 @@ namespace palette4d {
 struct Handle {
     std::string id;
     bool stop;
-    int index;  ///< of polytope.vertices(), or of edits.stops
+    int index;  ///< into polytope.vertices(), or edits.stops
     double frame;
-    Vec3 rgb;  ///< as edited; the vertex' own colour where it is not
+    Vec3 rgb;  ///< as edited, else the vertex's own colour
 };
 
-/// All handles: the vertices in the polytope's order, then the stops in theirs.
+/// All handles: the polytope's vertices in order, then the stops in order.
 std::vector<Handle> handles_of(const Polytope& polytope, const Edits& edits);
-/// The place of an id in handles_of(), or -1.
+/// The index of an id in handles_of(), or -1.
 int find_handle(const Polytope& polytope, const Edits& edits, const std::string& id);
 
 /// A new colour for handles_of()[handle].
@@ -29,9 +29,9 @@ struct HandleColour {
     Vec3 rgb;
 };
 
-/// The edits with new colours laid over them; without `keep` the new colours alone. A stop without
-/// a new colour is then no stop, a vertex has its own colour. Throws std::invalid_argument for a
-/// handle that does not exist and for a colour that is not finite.
+/// The edits overridden by new colours; without `keep` the new colours alone. Stops without a new
+/// colour are then dropped, and vertices keep their own colour. Throws std::invalid_argument for an
+/// unknown handle or a colour that is not finite.
 Edits with_colours(const Polytope& polytope, const Edits& edits, bool keep,
                    const std::vector<HandleColour>& colours);
 

@@ -16,7 +16,7 @@ Lineage::Lineage(const Polytope& polytope, const Edits& edits, int handle)
     }
     if (at < vertices_.size()) {
         follow(polytope, handle, true);
-        vertices_[at] = false;  // to be met again on the way back
+        vertices_[at] = false;  // so that the way back visits it again
         follow(polytope, handle, false);
         return;
     }
@@ -27,7 +27,7 @@ Lineage::Lineage(const Polytope& polytope, const Edits& edits, int handle)
 }
 
 void Lineage::follow(const Polytope& polytope, int vertex, bool forwards) {
-    // Edges run forwards in time: no vertex comes before itself.
+    // Edges run forwards in time, so the search ends.
     std::vector<int> open = {vertex};
     while (!open.empty()) {
         const int from = open.back();

@@ -1,4 +1,4 @@
-// Which of a slice's colours a handle was or became, and displacements that read a palette out.
+// Follows a handle through time, and builds displacements that measure a palette.
 #pragma once
 
 #include <vector>
@@ -8,11 +8,11 @@
 
 namespace palette4d {
 
-/// What a handle can be followed to along the polytope's edges, forwards and backwards in time: a
-/// split leads to all its branches, a merge back to all that were merged.
+/// All vertices that a handle reaches along the polytope's edges, forwards and backwards in time. A
+/// split leads to all its branches, and a merge back to all merged colours.
 class Lineage {
 public:
-    /// `handle` counts as handles_of() does. Throws std::invalid_argument where there is none.
+    /// `handle` is an index in handles_of(). Throws std::invalid_argument when it does not exist.
     Lineage(const Polytope& polytope, const Edits& edits, int handle);
     bool holds(const SlicePoint& point) const;
 
@@ -22,11 +22,11 @@ private:
     std::vector<bool> vertices_, edges_;
 };
 
-/// Edited colours with which a Recolourer adds, to each channel, the sum of the weights of a
-/// handle's lineage: 0 where the colour has no part in the pixel, 1 where it is all of it.
+/// Edited colours that make a Recolourer add, to each channel, the summed weights of a handle's
+/// lineage. That is 0 where the colour has no part in the pixel, 1 where it is all of it.
 std::vector<Vec3> weight_reader(const Slice& slice, const Lineage& lineage);
-/// Edited colours with which a Recolourer adds q(p), the colour itself inside of the palette and
-/// the closest colour of its surface outside.
+/// Edited colours that make a Recolourer add q(p): the colour itself inside the palette, the
+/// closest surface colour outside.
 std::vector<Vec3> surface_reader(const Slice& slice);
 
 }  // namespace palette4d

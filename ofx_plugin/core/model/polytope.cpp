@@ -56,7 +56,7 @@ int Polytope::find_edge(const std::string& id) const {
 }
 
 int Polytope::section_at(double frame) const {
-    // The first section that ends at or after the frame; a transition lends its end to the block.
+    // The first section that ends at or after the frame; a transition's end belongs to the block.
     auto at = std::lower_bound(sections_.begin(), sections_.end(), frame,
                                [](const Section& section, double t) { return section.last < t; });
     if (at == sections_.end()) return static_cast<int>(sections_.size()) - 1;

@@ -11,7 +11,7 @@ namespace palette4d {
 using Vec3 = std::array<double, 3>;
 using Face = std::array<int, 3>;
 
-/// A palette colour at a time. `rgb` is in the clip's own encoding (any finite value), `frame` is
+/// A palette colour at one frame. `rgb` is in the palette's encoding (any finite value). `frame` is
 /// the time t in the clip's frame numbers (not normalised; may be fractional).
 struct Vertex {
     std::string id;
@@ -27,16 +27,15 @@ struct Edge {
     int to;
 };
 
-/// A stretch of time in which the sliced palette has one topology: a block (section 5.3.1), closed
-/// [first, last], or the transition between two adjacent blocks, open (first, last).
+/// A time span with one palette topology: a block (section 5.3.1), closed [first, last], or a
+/// transition between two adjacent blocks, open (first, last).
 ///
-/// A track is one palette colour through that time: vertex indices in increasing frame order, each
-/// consecutive pair joined by an edge, covering [first, last] (it may begin before and end after:
-/// an edge runs through block boundaries once boundary vertices were removed). A track of one
-/// vertex is allowed only when first == last == that vertex's frame. `faces` are triangles of track
-/// indices: a closed 2-manifold, each directed edge once, seen anticlockwise from outside. Palettes
-/// of one colour (1 track) and of a line of colours (2 tracks) have no faces; a flat palette is a
-/// two-sided polygon.
+/// A track is one palette colour over that span: vertex indices in increasing frame order,
+/// consecutive vertices joined by an edge. Tracks cover [first, last] and may exceed it, since an
+/// edge may cross block boundaries. A track of one vertex is allowed only when first == last ==
+/// that vertex's frame. `faces` are triangles of track indices: a closed 2-manifold, each directed
+/// edge once, anticlockwise from outside. Palettes of one colour (1 track) or two (2 tracks) have
+/// no faces; a flat palette is a two-sided polygon.
 struct Section {
     double first;
     double last;
@@ -45,8 +44,8 @@ struct Section {
     std::vector<Face> faces;
 };
 
-/// What is wrong with a polytope, and where: `pointer` is relative to the polytope, in the terms of
-/// the sidecar ("/blocks/1/faces/3", "/transitions/0/tracks/2", "/edges/5/from").
+/// What is wrong with a polytope, and where. `pointer` is relative to the polytope, as in the
+/// sidecar ("/blocks/1/faces/3", "/transitions/0/tracks/2", "/edges/5/from").
 struct PolytopeProblem {
     std::string pointer;
     std::string found;
@@ -56,8 +55,8 @@ struct PolytopeProblem {
 class Polytope {
 public:
     Polytope() = default;
-    /// Blocks and transitions alternate: sections[0] is a block, then transition, block, …
-    /// Throws SidecarError (empty file name) when an invariant does not hold.
+    /// Blocks and transitions alternate: sections[0] is a block, then transition, block, … Throws
+    /// SidecarError (with an empty file name) when an invariant is violated.
     Polytope(std::vector<Vertex> vertices, std::vector<Edge> edges, std::vector<Section> sections);
 
     const std::vector<Vertex>& vertices() const { return vertices_; }
@@ -70,14 +69,14 @@ public:
     /// Index of the vertex / edge with that id, or -1.
     int find_vertex(const std::string& id) const;
     int find_edge(const std::string& id) const;
-    /// The section whose topology holds at `frame` (clamped to the clip). Blocks win at their ends.
+    /// The section at `frame` (clamped to the clip). At a block's ends the block wins.
     int section_at(double frame) const;
 
 private:
     std::vector<Vertex> vertices_;
     std::vector<Edge> edges_;
     std::vector<Section> sections_;
-    // Indices in sorted order, for binary searches.
+    // Indices in sorted order, for binary search.
     std::vector<int> edges_by_ends_, vertices_by_id_, edges_by_id_;
 };
 

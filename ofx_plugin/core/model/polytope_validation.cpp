@@ -34,7 +34,7 @@ bool within(double number, double limit) {
     return std::isfinite(number) && std::abs(number) <= limit;
 }
 
-/// Checks one section, and names its parts in problems.
+/// Checks one section, and names its parts in error messages.
 class SectionCheck {
 public:
     SectionCheck(const Polytope& polytope, std::size_t index)
@@ -75,7 +75,8 @@ public:
         sphere(static_cast<int>(tracks));
     }
 
-    /// Where track i passes a boundary of the section: a vertex (twice the same index) or an edge.
+    /// Where track i crosses a boundary of the section: at a vertex (its index twice) or on an
+    /// edge.
     std::pair<int, int> passage(std::size_t i, double frame) const {
         const auto& track = section_.tracks[i];
         const auto after =
@@ -119,7 +120,7 @@ private:
         }
     }
 
-    /// Indices in range, and every directed edge exactly once with its opposite present.
+    /// Checks that indices are in range, and each directed edge occurs once, with its opposite.
     void closed_surface(int tracks) const {
         const auto& faces = section_.faces;
         std::set<std::pair<int, int>> directed;
@@ -153,8 +154,8 @@ private:
         }
     }
 
-    /// Every track used, one ring of faces around each (so nothing is pinched), in one piece, and
-    /// vertices - edges + faces = 2. Needs a closed surface.
+    /// Checks for a sphere: every track is used and has one ring of faces (no pinched vertices),
+    /// all faces connect, and vertices - edges + faces = 2. Needs a closed surface.
     void sphere(int tracks) const {
         const auto& faces = section_.faces;
         std::vector<std::vector<std::pair<int, int>>> around(static_cast<std::size_t>(tracks));
@@ -202,7 +203,7 @@ private:
                      " tracks hang together with track 0)",
                  "one connected surface");
         }
-        // Closed: as many sides as 3 f / 2, so v - e + f = 2 is f = 2 v - 4.
+        // A closed mesh has 3 f / 2 edges, so v - e + f = 2 gives f = 2 v - 4.
         const std::size_t expected = 2 * static_cast<std::size_t>(tracks) - 4;
         if (faces.size() != expected) {
             fail(place_ + "/faces", text(faces.size()) + " faces",
@@ -218,8 +219,8 @@ private:
     std::string place_;
 };
 
-/// What passes the boundary must be the same on both sides: every transition track starts (ends) on
-/// a track of the block, and every track of the block goes on.
+/// Tracks must match on both sides of the boundary: every transition track starts (ends) on a track
+/// of the block, and every track of the block continues.
 void check_continuity(const SectionCheck& block, std::size_t block_tracks,
                       const SectionCheck& transition, std::size_t transition_tracks, double frame) {
     std::set<std::pair<int, int>> of_block, of_transition;

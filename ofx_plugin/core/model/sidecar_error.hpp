@@ -1,4 +1,4 @@
-// The one error of an unusable sidecar: what was found where, and what was expected.
+// The error for an unusable sidecar: what was found where, and what was expected.
 #pragma once
 
 #include <cstddef>
@@ -7,7 +7,7 @@
 
 namespace palette4d {
 
-/// Raised for every unusable sidecar. what() is "FILE: POINTER: found X, expected Y".
+/// Thrown for every unusable sidecar. what() is "FILE: POINTER: found X, expected Y".
 class SidecarError : public std::runtime_error {
 public:
     SidecarError(std::string file, std::string pointer, std::string found, std::string expected);
@@ -20,7 +20,7 @@ private:
     std::string file_, pointer_, found_, expected_;
 };
 
-/// Text for a message: valid UTF-8 on one line, at most `limit` bytes and an ellipsis.
+/// Text for a message: valid UTF-8 on one line, at most `limit` bytes plus an ellipsis.
 std::string printable(const std::string& text, std::size_t limit);
 /// A short text in quotes, made printable.
 std::string in_quotes(const std::string& text);

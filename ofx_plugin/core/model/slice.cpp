@@ -12,13 +12,13 @@ Vec3 mixed(const Vec3& u, const Vec3& v, double weight) {
             u[2] + weight * (v[2] - u[2])};
 }
 
-/// Where between two frames, in [0, 1): rounding must not reach the later one.
+/// Position between two frames, in [0, 1): rounding must not reach 1.
 double weight_between(double from, double to, double frame) {
     const double weight = (frame - from) / (to - from);
     return weight < 1.0 ? weight : std::nextafter(1.0, 0.0);
 }
 
-/// Where a track is at a frame that it covers.
+/// A track's position at a frame that it covers.
 SlicePoint point_on(const Polytope& polytope, const std::vector<int>& track, double frame) {
     const auto& vertices = polytope.vertices();
     const auto after = std::upper_bound(track.begin(), track.end(), frame,
@@ -73,7 +73,7 @@ std::vector<Vec3> edited_colours(const Polytope& polytope, const Edits& edits, c
             if (edited(point.from)) result[i] = colour(point.from);
             continue;
         }
-        // The stops around the frame; the edge's own end where there is none on that side.
+        // The stops on both sides of the frame; the edge's end where a side has none.
         const Stop* before = nullptr;
         const Stop* after = nullptr;
         for (const Stop& stop : edits.stops) {

@@ -1,4 +1,4 @@
-// Slicing (section 4.1.2, eqs. 5 and 6): the polyhedral palette of one moment.
+// Slicing (section 4.1.2, eqs. 5 and 6): the polyhedral palette of one frame.
 #pragma once
 
 #include <vector>
@@ -8,9 +8,9 @@
 
 namespace palette4d {
 
-/// Where a sliced vertex lies in 4D (a row of W_t in eq. 6):
-/// rgb = (1 - weight) * vertices[from].rgb + weight * vertices[to].rgb.
-/// On a vertex, from == to and weight == 0, and edge is -1.
+/// A sliced vertex's position in 4D (a row of W_t in eq. 6): rgb = (1 - weight) *
+/// vertices[from].rgb + weight * vertices[to].rgb. On a vertex, from == to, weight == 0, and edge
+/// is -1.
 struct SlicePoint {
     int edge;
     int from;
@@ -22,17 +22,17 @@ struct SlicePoint {
 struct Slice {
     double frame;  ///< after clamping to the clip
     int section;
-    std::vector<Vec3> rgb;          ///< n original palette colours, one a track
+    std::vector<Vec3> rgb;          ///< n original palette colours, one per track
     std::vector<SlicePoint> where;  ///< n
     std::vector<Face> faces;
 };
 
-/// Eq. 5 at any real frame; outside the clip, the first or last frame. NaN is an
-/// std::invalid_argument.
+/// Eq. 5 at any real frame; outside the clip, its first or last frame. Throws std::invalid_argument
+/// for NaN.
 Slice slice_at(const Polytope& polytope, double frame);
 
 /// The edited colours of a slice's n vertices: linear in time between edited vertices and stops.
-/// Bit-identical to slice.rgb[i] wherever neither end vertex nor a stop of the edge is edited.
+/// Bit-identical to slice.rgb[i] where neither end vertex nor a stop of the edge is edited.
 std::vector<Vec3> edited_colours(const Polytope& polytope, const Edits& edits, const Slice& slice);
 
 }  // namespace palette4d

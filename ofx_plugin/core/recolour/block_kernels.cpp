@@ -1,25 +1,25 @@
-// The kernels of block_kernels.hpp for the width that lanes.hpp was included with. Included by one
-// source an instruction set; includes nothing with code of its own.
+// The kernels of block_kernels.hpp, compiled for the vector width that lanes.hpp has here. One
+// source per instruction set includes this file. It must include no header that defines functions
+// for all processors.
 //
 // Mean value coordinates, as in palette_body.cpp, with v = corner - p:
 //     w_i = m . c_i / det(v),  c_i = v_j x v_k,  m = 1/2 sum over the sides of theta c / |c|.
-// theta / |c| = (theta / sin theta) / (|v_a| |v_b|). With k = cos(theta / 2), half the length of
-// the sum of the two unit vectors, theta / sin theta = P(k) / k where P(k) = acos(k) / sqrt(1 -
-// k^2) is smooth on [0, 1]: a polynomial, and no trigonometry. Edges belong to two faces and are
-// worked out once; the factor 1/2 is common to all weights.
+// A polynomial replaces trigonometry:
+//     theta / |c| = (theta / sin theta) / (|v_a| |v_b|),  theta / sin theta = P(k) / k.
+// Here k = cos(theta / 2) is half the length of the sum of the two unit vectors. P(k) = acos(k) /
+// sqrt(1 - k^2) is smooth on [0, 1]. Edges are computed once for both faces; the factor 1/2 is
+// common to all weights and left out.
 //
-// Which results are good: rounding puts
-// - an error of a few eps / k into an edge's theta c / |c|, and of a few eps into every c_i /
-// |v|^2,
-//   so that the weight w_i of a face is off by about eps z / (k |v_i|) with
-//   z = |v_i| |v_j| |v_k| / |det(v)|, the inverse of the solid angle's sine;
-// - a relative error of a few eps z into det(v), hence a common factor into the three weights W_f
-// of
-//   one face, which displaces the result only as far as other faces have a share in it: by
+// Which results are good? Rounding adds these errors:
+// - a few eps / k to an edge's theta c / |c|, and a few eps to every c_i / |v|^2. The weight w_i of
+//   a face is then off by about eps z / (k |v_i|). z = |v_i| |v_j| |v_k| / |det(v)| is the inverse
+//   of the solid angle's sine;
+// - a few eps z, relative, to det(v). This scales the three weights W_f of one face. It moves the
+//   result only where other faces have weight too: by
 //   eps sum_f z_f |W_f| (sum_g |W_g| - |W_f|) / W^2.
-// Both are summed up with the smallest k and |v|, times the spread of the vertices' displacements.
-// Where that exceeds the tolerance (near edges, in the planes of faces, beyond the range of T) the
-// verdict is 0, as it is where anything was not a number.
+// The sum of both uses the smallest k and |v|, times the spread of the vertices' displacements.
+// The verdict is 0 where the sum exceeds the tolerance: near edges, in the planes of faces, beyond
+// the range of T. It is also 0 where a value is NaN.
 #include "recolour/block_kernels.hpp"
 
 #include "simd/lanes.hpp"
@@ -30,7 +30,7 @@ using palette4d::Block;
 using palette4d::kTurn;
 using palette4d::Plan;
 
-/// What is rounded: half a unit in the last place, and the polynomial P in k - 1/2.
+/// Rounding errors: half a unit in the last place, and the error of the polynomial P in k - 1/2.
 template <class T>
 struct Arithmetic;
 template <>
@@ -57,8 +57,8 @@ struct Arithmetic<double> {
         -0.0006080051604331022926, 0.0003930690971890260609,  -0.0001962553205833683415,
         0.0001270840088995349303,  -0.0001860909222978246287, 0.0001211730583111653754};
 };
-// Roundings on the way to each, counted generously, to first order; what comes of it is held
-// against double precision in tests/core/test_block_kernels.cpp.
+// Upper bounds on the rounding errors in each result, to first order.
+// tests/core/test_block_kernels.cpp compares them with double precision.
 template <class T>
 constexpr T kWeightError = 16;
 template <class T>
@@ -76,8 +76,8 @@ PALETTE4D_INLINE Powers<T> powers_of(Lanes<T> y) {
     const Lanes<T> y2 = y * y, y4 = y2 * y2, y8 = y4 * y4;
     return {{y, y2, y4, y8, y8 * y8}};
 }
-/// Coefficients First to First + Count - 1 of P, halves first (Estrin's scheme): a processor has
-/// more to do at a time than with Horner's.
+/// Evaluates Count coefficients of P from First on, halves first (Estrin's scheme): shorter
+/// dependency chains than Horner's.
 template <class T, int First, int Count>
 struct Polynomial {
     static constexpr int kLog = Count > 16 ? 4 : Count > 8 ? 3 : Count > 4 ? 2 : Count > 2 ? 1 : 0;
@@ -138,13 +138,13 @@ PALETTE4D_INLINE void store3(T* to, Lanes3<T> a) {
     store(to + n, a.y);
     store(to + 2 * n, a.z);
 }
-/// vertex - colour, both in two parts.
+/// vertex - colour, with both parts of each position.
 template <class T>
 PALETTE4D_INLINE Lanes3<T> from_colour(const T* high, const T* low, Lanes3<T> p, Lanes3<T> rest) {
     return (all3(high) - p) + (all3(low) - rest);
 }
 
-/// `p` from the first vertex.
+/// `p` minus the first vertex.
 template <class T>
 PALETTE4D_INLINE Lanes<T> classify_convex(const Plan<T>& plan, Lanes3<T> p, T shell, T at_surface) {
     const Lanes<T> one = all(T(1));
@@ -157,7 +157,7 @@ PALETTE4D_INLINE Lanes<T> classify_convex(const Plan<T>& plan, Lanes3<T> p, T sh
                   select(depth < all(-shell), all(T(-1)), all(at_surface)));
 }
 
-/// Counts the faces above the colour, signed by whether the ray leaves or enters there.
+/// Counts the faces above the colour, signed: whether the ray leaves or enters the body there.
 template <class T>
 PALETTE4D_INLINE Lanes<T> classify_by_ray(const Plan<T>& plan, Lanes3<T> p, T shell, T at_surface,
                                           T* scratch) {
@@ -218,8 +218,8 @@ template <class T>
 void mean_value(const Plan<T>& plan, Block<T>& block, int count, T tolerance, T* scratch) {
     using A = Arithmetic<T>;
     constexpr int n = Lanes<T>::kCount;
-    // A vertex: v, its unit vector, 1 / |v|, the weight so far. An edge: c, theta c / |c|,
-    // 1 / (|v_a| |v_b|), k.
+    // Scratch per vertex: v, its unit vector, 1 / |v|, the weight so far. Per edge: c, theta c /
+    // |c|, 1 / (|v_a| |v_b|), k.
     constexpr int kVertex = 8 * n, kEdge = 8 * n;
     T* const vertices = scratch;
     T* const edges = scratch + kVertex * plan.vertex_count;
@@ -250,8 +250,8 @@ void mean_value(const Plan<T>& plan, Block<T>& block, int count, T tolerance, T*
             store(edge + 6 * n, load(a + 6 * n) * load(b + 6 * n));
             store(edge + 7 * n, k);
         }
-        // A loop of its own: the chain of dependent steps is long, and a processor that looks ahead
-        // sees more edges at a time.
+        // A separate loop: its long dependency chain leaves room for the processor to overlap
+        // edges.
         for (int e = 0; e < plan.edge_count; ++e) {
             T* const edge = edges + kEdge * e;
             const Lanes<T> k = load(edge + 7 * n);
@@ -304,7 +304,7 @@ void mean_value(const Plan<T>& plan, Block<T>& block, int count, T tolerance, T*
         LaneMask<T> good =
             (all(A::kEpsilon * plan.spread) * error <= all(tolerance) * total * total) &
             (largest_inverse < limit);
-        // Black and white are in many pictures and many palettes.
+        // Colours on a vertex: black and white are common in pictures and in palettes.
         if (any(largest_inverse >= limit)) {
             for (int i = 0; i < plan.vertex_count; ++i) {
                 const Lanes3<T> v = load3(vertices + kVertex * i);
@@ -327,7 +327,7 @@ void closest(const Plan<T>& plan, Block<T>& block, int count, T tolerance, T* sc
     using A = Arithmetic<T>;
     constexpr int n = Lanes<T>::kCount;
     constexpr T kNever = sizeof(T) == 4 ? T(1e38) : T(1e300);
-    // A segment: where on it, distance squared. A triangle: two weights, distance squared.
+    // Per segment: position on it, squared distance. Per triangle: two weights, squared distance.
     constexpr int kSegment = 2 * n, kTriangle = 3 * n;
     T* const segments = scratch;
     T* const triangles = scratch + kSegment * plan.segment_count;
@@ -361,7 +361,7 @@ void closest(const Plan<T>& plan, Block<T>& block, int count, T tolerance, T* sc
             best = min(distance2, best);
         }
 
-        // All points that are the closest as far as rounding lets one see must move alike.
+        // All points that are equally close, within rounding, must have the same displacement.
         const Lanes<T> distance = sqrt(best), size = distance + all(plan.extent);
         const Lanes<T> seen = best + all(kDistanceError<T> * A::kEpsilon) * size * distance +
                               all(A::kEpsilon * A::kEpsilon * 64) * size * size;

@@ -1,17 +1,17 @@
-// The recolouring of 64 colours at a time: data that recolour_plan.cpp prepares and the kernels of
-// one instruction set. Plain data and pointers only: this is seen by sources that are compiled for
-// other processors than the rest (see lanes.hpp).
+// Recolours 64 colours at a time: the data, prepared by recolour_plan.cpp, and the kernels of one
+// instruction set. Plain data and pointers only: sources compiled for other processors include this
+// (see lanes.hpp).
 #pragma once
 
 #include <cstddef>
 
 namespace palette4d {
 
-/// A rotation; the last row is the direction of the rays that tell the inside of a body. No edge of
-/// a real palette has it.
+/// A rotation. Its last row is the direction of the rays that test whether a colour is inside. No
+/// edge of a real palette is parallel to it.
 constexpr double kTurn[3][3] = {{-0.48, 0.6, 0.64}, {0.8, 0, 0.6}, {0.36, 0.8, -0.48}};
 
-/// Colours, channel by channel, on their way through one kernel.
+/// A block of colours on their way through a kernel, channel by channel.
 template <class T>
 struct Block {
     static constexpr int kSize = 64;
@@ -24,14 +24,14 @@ struct Block {
     alignas(64) T verdict[kSize];  ///< result, see Kernels
 };
 
-/// One palette and its edit, rounded to T; what the formulas of palette_body.cpp need of it.
-/// Positions are split into two numbers, so that differences to them are exact to the last place.
+/// One palette and its edit, rounded to T, as the formulas of palette_body.cpp need them. Each
+/// position is split into two numbers, so that differences are exact to the last place.
 template <class T>
 struct Plan {
     struct Vertex {
         T high[3], low[3];
         T delta[3];  ///< its displacement
-        T ray[3];    ///< from the first vertex, turned; see Face::ray_normal
+        T ray[3];    ///< position from the first vertex, rotated; see Face::ray_normal
     };
     struct Mover {
         std::size_t vertex;
@@ -40,13 +40,13 @@ struct Plan {
     struct Edge {
         std::size_t a, b;
     };
-    /// Corners in ascending order i < j < k, so that every edge is run along in one direction.
+    /// Corners in ascending order i < j < k, so that every edge has one direction.
     struct Face {
         std::size_t i, j, k;
         std::size_t jk, ik, ij;
-        T sign;  ///< -1 when the face runs round the other way
-        /// The normal in coordinates turned so that no edge of a real palette is parallel to the
-        /// third axis, along which rays are cast; positive upwards where sign says so.
+        T sign;  ///< -1 when the face has the opposite orientation
+        /// The normal, rotated so that no edge of a real palette is parallel to the rays (third
+        /// axis). It points up where ray_sign is +1.
         T ray_normal[3];
         T ray_sign;  ///< +1 when a ray upwards leaves the body through the face, -1 when it enters
     };
@@ -58,9 +58,9 @@ struct Plan {
         T high[3], low[3], along[3];
         T inverse_length2;
         T delta[3], change[3];
-        T slope;  ///< most displacement a unit of length
+        T slope;  ///< largest displacement per unit of length
     };
-    /// A face of the surface: from its first corner, the gradients of the other two's weights.
+    /// A face of the surface: its first corner and the gradients of the other two corners' weights.
     struct Triangle {
         T high[3], low[3], normal[3], gradient_j[3], gradient_k[3];
         T delta[3], change_j[3], change_k[3];
@@ -70,39 +70,39 @@ struct Plan {
     const Vertex* vertices;
     const Mover* movers;
     const Edge* edges;
-    const Face* faces;  ///< without those too thin to have a normal
+    const Face* faces;  ///< without faces too thin to have a normal
     const Plane* planes;
     const Segment* segments;
     const Triangle* triangles;
     int vertex_count, mover_count, edge_count, face_count, plane_count;
     int segment_count, triangle_count;
-    bool convex;  ///< planes tell the inside; else rays do
-    bool solid;   ///< else all is outside: one or two colours, a flat palette
+    bool convex;  ///< planes test for the inside; otherwise rays do
+    bool solid;   ///< false for one or two colours and flat palettes: every colour is outside
     T extent;     ///< diagonal of the bounding box
-    T steepness;  ///< about the most displacement a unit of length, inside and on the surface
+    T steepness;  ///< estimate of the largest displacement per unit of length
     T spread;     ///< largest difference between two vertices' displacements, channel by channel
 };
 
-/// The kernels of one instruction set for one type. `count` colours, rounded up to whole registers,
-/// are read and written; what lies behind the last must be numbers. `scratch` holds
-/// scratch_size(plan) numbers, aligned to 64 bytes. Each colour's result depends on it alone.
+/// The kernels of one instruction set and one type. They read and write `count` colours, rounded up
+/// to whole registers; the padding must hold numbers, not NaN. `scratch` holds scratch_size(plan)
+/// values, aligned to 64 bytes. Each colour's result depends on that colour only.
 template <class T>
 struct Kernels {
-    /// verdict: 1 inside, -1 outside, `at_surface` where the surface is closer than `shell`, 0
-    /// where a body that is not convex seems to bend too close by to tell.
+    /// Sets verdict: 1 inside, -1 outside, `at_surface` when closer to the surface than `shell`. It
+    /// is 0 when a non-convex body bends too close by to decide.
     void (*classify)(const Plan<T>& plan, Block<T>& block, int count, T shell, T at_surface,
                      T* scratch);
     /// Mean value coordinates. verdict: 1 when the displacement is within `tolerance` of the exact
-    /// one, 0 when that cannot be promised.
+    /// one, 0 when that is not guaranteed.
     void (*mean_value)(const Plan<T>& plan, Block<T>& block, int count, T tolerance, T* scratch);
-    /// The closest point of the surface. verdict as above.
+    /// The closest point on the surface. verdict as for mean_value.
     void (*closest)(const Plan<T>& plan, Block<T>& block, int count, T tolerance, T* scratch);
-    /// moved becomes the colour that is seen plus `strength` times moved, times alpha where
-    /// premultiplied. Channels that do not move keep their bits, a negative zero included.
+    /// Sets moved to the seen colour plus `strength` times moved, times alpha where premultiplied.
+    /// Channels that do not move keep their bits, even a negative zero.
     void (*move)(Block<T>& block, int count, T strength, bool premultiplied);
 };
 
-/// Numbers of scratch memory that kernels of any instruction set need.
+/// Size of the scratch memory, enough for any instruction set.
 template <class T>
 int scratch_size(const Plan<T>& plan) {
     constexpr int kMostLanes = 128 / static_cast<int>(sizeof(T));
@@ -115,7 +115,7 @@ struct BlockKernels {
     Kernels<float> single;
     Kernels<double> twofold;
 
-    /// One for each set of instructions that this build has.
+    /// One for each instruction set in this build.
     static const BlockKernels& baseline();
     static const BlockKernels& avx2();
     static const BlockKernels& avx512();

@@ -19,8 +19,8 @@
 namespace palette4d {
 namespace {
 
-/// Rows that a thread takes at once. Adjacent rows share colours: threads that each worked on one
-/// of them would wait for each other while the cells of a Lattice are made.
+/// Rows that a thread takes at once. Adjacent rows share colours: on neighbouring rows, threads
+/// would wait for each other's Lattice cells.
 constexpr int kMostRowsAtOnce = 16;
 
 template <class View>
@@ -81,15 +81,16 @@ void copy_rows(const ConstImageView& in, const ImageView& out) {
     }
 }
 
-/// Hands out the numbers 0 to count - 1, each once; -1 when there are none left.
+/// Returns the numbers 0 to count - 1, each once; then -1.
 using NextRow = std::function<int()>;
 
-/// Calls `work` in up to `threads` threads (0: one per processor), this one among them. After an
-/// exception no more rows are handed out; the first one is thrown when all threads have returned.
+/// Calls `work` in up to `threads` threads, this one included (0: one per processor). After an
+/// exception no more rows are handed out. The first exception is rethrown when all threads have
+/// returned.
 void share_rows(int count, int threads, const std::function<void(const NextRow&)>& work) {
     if (threads == 0) threads = static_cast<int>(std::thread::hardware_concurrency());
     threads = std::clamp(threads, 1, std::max(count, 1));
-    // Several rows in a piece, as long as there is work for all to the end.
+    // Several rows at a time, but few enough to keep all threads busy to the end.
     const int band = std::clamp(count / threads / 8, 1, kMostRowsAtOnce);
     std::atomic<int> next{0};
     std::exception_ptr problem;
@@ -116,15 +117,15 @@ void share_rows(int count, int threads, const std::function<void(const NextRow&)
     try {
         for (int i = 1; i < threads; ++i) helpers.emplace_back(guarded);
     } catch (const std::system_error&) {
-        // No more threads to be had: those that run share the rows.
+        // The system gives no more threads: those that run share the rows.
     }
     guarded();
     for (std::thread& helper : helpers) helper.join();
     if (problem) std::rethrow_exception(problem);
 }
 
-/// Rows in other code values than the palette's: pixels are gathered, converted and recoloured as a
-/// row of their own.
+/// Rows whose code values differ from the palette's: pixels are collected, converted, and
+/// recoloured as one row.
 class ConvertedRows : public RowWorker {
 public:
     ConvertedRows(const ColourMap& map, const RecolourOptions& options, int channels)
@@ -164,8 +165,8 @@ public:
             Vec3 at = pixels_[i].exact;
             bool moved = false;
             for (std::size_t c = 0; c < 3; ++c) {
-                // The edit's step is added to the unrounded value: nothing jumps where an edit
-                // begins.
+                // Adds the edit's step to the unrounded value, so that there is no jump where an
+                // edit begins.
                 const double step = static_cast<double>(after_[3 * i + c]) - before_[3 * i + c];
                 at[c] += step;
                 moved |= step != 0;
@@ -184,7 +185,7 @@ private:
         double alpha;
         float* out;
     };
-    /// Pixels that are converted before they are recoloured together.
+    /// Pixels converted and recoloured at a time.
     static constexpr std::size_t kPiece = 16384;
     static constexpr double kLargest = std::numeric_limits<float>::max();
 

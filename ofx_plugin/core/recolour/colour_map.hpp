@@ -1,5 +1,5 @@
-// The one road from an image to its recoloured copy: rows are shared among threads, colours are
-// divided by alpha, converted to the palette's space, displaced, and taken back.
+// The one path from an image to its recoloured copy. Threads share the rows; colours are
+// unpremultiplied, converted to the palette's space, displaced, and converted back.
 #pragma once
 
 #include <cstddef>
@@ -25,29 +25,28 @@ struct ImageView {
 
 /// How exactly a colour's displacement is computed.
 enum class Precision {
-    /// Many colours at a time, in float where an estimate of the error, made along with each
-    /// result, allows that, else in double. Channels of straight colours are within
-    /// kSingleTolerance of kDouble (times the largest difference between two vertices'
-    /// displacements times strength, where that is above 1), and within half a unit in the last
-    /// place of the result.
+    /// Many colours at a time, in float where the error estimate allows it, else in double.
+    /// Straight colours differ from kDouble by at most kSingleTolerance, plus half a unit in the
+    /// last place. The tolerance scales with (largest difference between two vertices'
+    /// displacements) * strength where that is above 1.
     kSingle,
-    /// One colour after another by PaletteBody, in double throughout: the reference for kSingle.
+    /// One colour at a time by PaletteBody, all in double: the reference for kSingle.
     kDouble,
 };
 inline constexpr double kSingleTolerance = 1e-4;
 
 struct RecolourOptions {
     double strength = 1.0;       ///< 0 returns the input, 1 the edit; linear, not clamped
-    bool premultiplied = false;  ///< RGBA only: colours are divided by alpha first; alpha 0 passes
+    bool premultiplied = false;  ///< RGBA only: divides colours by alpha first; alpha 0 passes
     int threads = 1;             ///< 0: one per processor
     Precision precision = Precision::kSingle;
     InstructionSet instructions = InstructionSet::kBest;  ///< of kSingle; the result is the same
     /// From the image's code values to the palette's; null where they are the same. Colours that
-    /// the edit does not move keep their bits; the others are converted in double precision.
+    /// the edit does not move keep their bits; others are converted in double.
     const ColourConversion* conversion = nullptr;
 };
 
-/// How many colours of an apply() were computed in each way; copied colours are not counted.
+/// How many colours of an apply() each method computed; copied colours are not counted.
 struct RecolourCounts {
     long long interpolated = 0;  ///< by a Lattice
     long long single = 0;        ///< many at a time in float
@@ -68,34 +67,33 @@ struct RecolourCounts {
 class RowWorker {
 public:
     virtual ~RowWorker() = default;
-    /// Adjacent pixels. `from` and `to` must stay valid until finish() returns; all is written
-    /// then.
+    /// Adjacent pixels. `from` and `to` must stay valid until finish() returns; only then is all of
+    /// it written.
     virtual void row(const float* from, float* to, int width) = 0;
     virtual void finish() = 0;
     virtual RecolourCounts counts() const = 0;
 };
 
-/// A map of colours to colours; many threads may use one object.
+/// A map from colours to colours. Thread-safe.
 class ColourMap {
 public:
     virtual ~ColourMap() = default;
-    /// Some colour moves; else apply() copies.
+    /// False when no colour moves; apply() then copies.
     virtual bool moves() const = 0;
-    /// For pixels of so many channels. Ignores options.threads and options.conversion;
-    /// options.premultiplied is only ever set for four channels. The map must outlive the worker.
+    /// A worker for pixels of this many channels. Ignores options.threads and options.conversion;
+    /// options.premultiplied is true for four channels only. The map must outlive the worker.
     virtual std::unique_ptr<RowWorker> worker(const RecolourOptions& options,
                                               int channels) const = 0;
 
-    /// `in` and `out` have the same size and channels; they may be the same memory. A pixel's
-    /// result depends on that pixel and the options only: not on the number of threads, the image
-    /// around it, where it lies, or the processor. Colours with a NaN or an infinity pass, as do
-    /// premultiplied ones whose alpha is 0 or not finite. Throws std::invalid_argument on
-    /// mismatched views and for instructions that this processor does not have.
+    /// `in` and `out` have the same size and channels, and may be the same memory. A pixel's result
+    /// depends on that pixel and the options only, not on threads, position or processor. Colours
+    /// with NaN or infinity pass; so do premultiplied ones whose alpha is 0 or not finite. Throws
+    /// std::invalid_argument for mismatched views or instructions that this processor lacks.
     RecolourCounts apply(const ConstImageView& in, const ImageView& out,
                          const RecolourOptions& options) const;
 };
 
-/// A pixel that can be recoloured: finite colours, and alpha that they can be divided by.
+/// Whether the pixel can be recoloured: finite colours, and an alpha that can divide them.
 inline bool recolourable(const float* pixel, bool premultiplied) {
     // NaN where a channel is not finite: 0 times infinity is NaN.
     return 0 * pixel[0] + 0 * pixel[1] + 0 * pixel[2] == 0 &&

@@ -13,10 +13,9 @@ namespace palette4d {
 
 namespace {
 
-/// Pixels are gathered in blocks and sorted into those inside the palette and those outside; a
-/// kernel for each computes their displacement. Pixels that a kernel cannot guarantee go to the
-/// next, more precise stage: float, double, one by one. A pixel's stage depends on its colour
-/// alone.
+/// Collects pixels in blocks and sorts them into inside and outside the palette; one kernel for
+/// each computes the displacement. Pixels whose error a kernel cannot guarantee go to the next
+/// stage: float, double, one by one. A pixel's stage depends on its colour alone.
 class Pipeline final : public ExactWorker {
 public:
     Pipeline(const Recolourer& recolourer, const RecolourOptions& options, int channels)
@@ -70,16 +69,16 @@ private:
               kernels_(kernels),
               strength_(static_cast<T>(options.strength)),
               divide_(options.premultiplied),
-              // Half of what is promised: the rest is for rounding the result.
+              // Half of the guaranteed tolerance; the other half is for rounding the result.
               tolerance_(static_cast<T>(
                   kSingleTolerance / 2 *
                   std::max(1 / std::abs(options.strength), static_cast<double>(plan_.spread)))),
               next_(next),
               scratch_(plan_) {
             if (!usable_) return;
-            // Pictures have many colours that lie on the surface exactly, in a face where a channel
-            // is 0 or 1: they take the closest point. Where the surface is, is rounded by about
-            // `step`; where a step of that length matters the next stage is asked.
+            // Many colours lie exactly on the surface, where a channel is 0 or 1: they use the
+            // closest point. The surface itself is rounded by about `step`. Where a step of that
+            // length matters, the next stage decides.
             const T step = 16 * std::numeric_limits<T>::epsilon() * plan_.extent;
             if (step * plan_.steepness > tolerance_ / 4) {
                 shell_ = step;
@@ -87,7 +86,7 @@ private:
             }
         }
 
-        /// Up to Block::kSize pixels that lie next to each other.
+        /// Up to Block::kSize adjacent pixels.
         template <int Channels>
         void run(const float* in, float* out, int count) {
             Batch& batch = incoming_;
@@ -131,7 +130,7 @@ private:
             }
         }
 
-        /// One pixel that is recolourable(); `to` may be `from`.
+        /// Recolours one pixel that is recolourable(); `to` may be `from`.
         void recolour(const float* from, float* to) {
             if (!usable_) {
                 next_.recolour(from, to);
@@ -174,7 +173,7 @@ private:
             }
         };
 
-        /// The kernel that all of a block's verdicts ask for; null when they differ.
+        /// The kernel for the whole block when its verdicts agree, else null.
         Kernel same_kernel(const Block<T>& block, int count) const {
             int inside = 0, outside = 0;
             for (int i = 0; i < count; ++i) {
@@ -199,14 +198,14 @@ private:
             batch.count = 0;
         }
 
-        /// To the pixels that its verdict puts it with.
+        /// Adds the pixel to the batch that its verdict selects.
         void add(const Batch& batch, int i, const float* from, float* to) {
             const T verdict = batch.block.verdict[i];
             if (verdict == 0) {
                 next_.recolour(from, to);
                 return;
             }
-            Batch& other = sorted_[verdict < 0];  // no branch: pictures have no rule for it
+            Batch& other = sorted_[verdict < 0];  // no branch: it would be mispredicted
             const int at = other.count++;
             other.from[at] = from;
             other.to[at] = to;
@@ -249,7 +248,7 @@ private:
         T at_surface_ = -1;
         Next& next_;
         Scratch<T> scratch_;
-        Batch incoming_, sorted_[2];  ///< those inside, those outside
+        Batch incoming_, sorted_[2];  ///< inside, outside
         long long count_ = 0;
     };
 

@@ -1,4 +1,4 @@
-// One thread's work in Precision::kSingle.
+// One thread's work for Precision::kSingle.
 #pragma once
 
 #include <memory>
@@ -7,7 +7,7 @@
 
 namespace palette4d {
 
-/// Also takes single pixels; their bits are those of row().
+/// Single pixels too, with the same bits as row().
 class ExactWorker : public RowWorker {
 public:
     virtual void pixel(const float* from, float* to) = 0;

@@ -44,9 +44,9 @@ void OneByOne::recolour(const float* from, float* to) {
     const double alpha = divide_ ? from[3] : 1.0;
     const Vec3& moved = displacement(straight_colour(from, divide_));
     for (std::size_t c = 0; c < 3; ++c) {
-        // Multiplying the displaced colour by alpha again is the same as this, less rounding.
+        // Equals multiplying the displaced colour by alpha, with less rounding.
         const double step = alpha * (strength_ * moved[c]);
-        // Channels that do not move keep their bits, a negative zero included.
+        // Channels that do not move keep their bits, even a negative zero.
         to[c] = step != 0 ? static_cast<float>(from[c] + step) : from[c];
     }
 }

@@ -1,4 +1,4 @@
-// One thread's work in Precision::kDouble, colour by colour.
+// One thread's work for Precision::kDouble, colour by colour.
 #pragma once
 
 #include <cstddef>
@@ -8,8 +8,8 @@
 
 namespace palette4d {
 
-/// Colours repeat, in flat areas and in 8-bit images: a worker remembers some displacements. They
-/// depend on the colour alone, so the result does not change.
+/// Caches some displacements, since colours repeat in flat areas and in 8-bit images. They depend
+/// on the colour alone, so the cache does not change results.
 class OneByOne final : public RowWorker {
 public:
     /// `recolourer` must outlive this and move some colour.
@@ -18,7 +18,7 @@ public:
     void row(const float* from, float* to, int width) override;
     void finish() override {}
     RecolourCounts counts() const override { return {0, 0, 0, count_}; }
-    /// One pixel that is recolourable().
+    /// Recolours one pixel that is recolourable().
     void recolour(const float* from, float* to);
 
 private:

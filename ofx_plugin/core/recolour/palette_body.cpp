@@ -14,20 +14,20 @@ namespace palette4d {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-/// Distances below this share of the palette's extent are rounding.
+/// Distances below this share of the palette's extent count as rounding.
 constexpr double kRounding = 1e-12;
-/// Faces whose height is below this share of their longest side have no usable normal. What they
-/// would add to mean value coordinates is of the same order.
+/// A face whose height is below this share of its longest side has no usable normal. Skipping it
+/// changes mean value coordinates by about that share.
 constexpr double kThin = 1e-8;
-/// Closer to a face's plane than this share of the distance to its nearest corner, the terms of the
-/// face's mean vector cancel; they are then taken as differences from their values in the plane.
+/// Closer to a face's plane than this share of the distance to its nearest corner, terms of the
+/// mean vector cancel. They are then computed as differences from their values in the plane.
 constexpr double kNearPlane = 0.05;
-/// Total weights below this share of the weights' own sizes are rounding.
+/// A total weight below this share of the weights' magnitudes counts as rounding.
 constexpr double kVanishing = 1e-11;
-/// Further out than this many extents the weights (of the size of the distance, and of both signs)
-/// have lost too many digits to reproduce anything.
+/// Farther out than this many extents, the weights are large and of both signs: too few digits
+/// remain to reproduce the colour.
 constexpr double kFar = 1000;
-/// Colours further out than this are drawn in first, so that no product overflows.
+/// Colours farther out are first pulled in to this distance, so that no product overflows.
 constexpr double kReach = 1e30;
 
 void set_to(double value, std::size_t n, double* weights) {
@@ -107,8 +107,8 @@ PaletteBody::PaletteBody(std::vector<Vec3> rgb, std::vector<Face> faces)
             return std::abs(dot(first_plane->normal, colour - corner)) <= tolerance_;
         });
     }
-    // The two sides of a flat body may be cut into different triangles, but a colour must always be
-    // weighed on the same side, or the weights would jump where it crosses one of their edges.
+    // The two sides of a flat body may have different triangles. Every colour uses the same side,
+    // or its weights would jump at the other side's edges.
     for (std::size_t f = 0; f < faces_.size(); ++f) {
         if (flat_ && (planes_[f].degenerate || dot(planes_[f].normal, first_plane->normal) < 0)) {
             continue;
@@ -175,7 +175,7 @@ PaletteBody::Closest PaletteBody::closest_point(const Vec3& p, bool visible_only
             continue;
         }
         const Closest here = closest_on_face(p, f);
-        // Among faces at the same distance the first one counts, whatever the rounding.
+        // Of faces at the same distance the first one wins, whatever the rounding.
         if (here.distance < best.distance - tolerance_) best = here;
     }
     return best;
@@ -213,19 +213,19 @@ void PaletteBody::prepare_edges(Workspace& w) const {
     }
 }
 
-// The mean vector of a face seen from p (the integral of the unit normals over its spherical
-// triangle) is m = 1/2 sum_j theta_j c_j / |c_j|, where c_j = v_{j+1} x v_{j+2} with v = corner - p
-// and theta_j the angle between them; its corners' weights solve sum_i w_i v_i = m, hence
-// w_i = m . c_i / det(v). Over a closed surface the mean vectors cancel, so that p is the weighted
-// mean of the corners.
+// The mean vector m of a face seen from p is the integral of the unit normals over its spherical
+// triangle: m = 1/2 sum_j theta_j c_j / |c_j|. Here v = corner - p, c_j = v_{j+1} x v_{j+2}, and
+// theta_j is the angle between these two. The corners' weights solve sum_i w_i v_i = m, hence
+// w_i = m . c_i / det(v). Over a closed surface the mean vectors cancel, so p is the weighted mean
+// of the corners.
 //
-// Close to the plane of the face, at height h, det(v) = 2 h area goes to zero. There every c_j is
-// split into a_j n in direction of the unit normal n (a_j: twice the area that p's foot spans with
-// side j) and h n x e_j (e_j: the side), which gives w_i = (a_i S + h^2 e_i . E) / (4 h area) with
-// S = sum_j theta_j a_j / |c_j| and E = sum_j theta_j e_j / |c_j|. S is 2 pi above the face and
-// nearly zero beside it: seen from the foot, the angles with the signs of the a_j sum to 2 pi or 0
-// exactly, and only the differences from that, all of order h^2, are summed up. That way nothing is
-// lost even when h is of the order of the rounding.
+// Close to the face's plane, at height h, det(v) = 2 h area goes to zero. There every c_j is split
+// into a_j n and h n x e_j. n is the unit normal, e_j the side, and a_j twice the area that p's
+// foot spans with side j. This gives w_i = (a_i S + h^2 e_i . E) / (4 h area) with S = sum_j
+// theta_j a_j / |c_j| and E = sum_j theta_j e_j / |c_j|. S is 2 pi above the face and nearly zero
+// beside it. Seen from the foot, the angles with the signs of the a_j sum to exactly 2 pi or 0.
+// Only the differences from that sum, all of order h^2, are added. So no precision is lost, even
+// when h is as small as the rounding.
 bool PaletteBody::mean_value_or_fail(const Vec3& p, double* weights, Workspace& w) const {
     const std::size_t n = rgb_.size();
     set_to(0, n, weights);

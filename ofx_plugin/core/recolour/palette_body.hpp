@@ -7,11 +7,11 @@
 
 namespace palette4d {
 
-/// What the one-shot functions of mvc.hpp compute, with everything that does not depend on the
-/// queried colour worked out once. Immutable; share it among threads, with a Workspace for each.
+/// Computes what the functions of mvc.hpp do, with everything precomputed that does not depend on
+/// the colour. Immutable: threads share it, each with its own Workspace.
 class PaletteBody {
 public:
-    /// Memory that one thread's queries reuse.
+    /// Memory that one thread reuses between queries.
     class Workspace {
         friend class PaletteBody;
         std::vector<Vec3> to_vertex_;
@@ -21,14 +21,14 @@ public:
     };
 
     PaletteBody() = default;
-    /// n finite colours and the faces between them. Throws std::invalid_argument for no colours,
-    /// for a colour that is not finite, for a face with a bad index, for faces among fewer than
-    /// three colours and for three or more colours without faces.
+    /// n finite colours and the faces between them. Throws std::invalid_argument for no colours, a
+    /// colour that is not finite, or a bad index in a face. Also for faces among fewer than three
+    /// colours, and for three or more colours without faces.
     PaletteBody(std::vector<Vec3> rgb, std::vector<Face> faces);
 
     const std::vector<Vec3>& rgb() const { return rgb_; }
     const std::vector<Face>& faces() const { return faces_; }
-    /// What the block kernels' plans are made of (recolour_plan.hpp).
+    /// Inputs of the block kernels' plans (recolour_plan.hpp).
     bool convex() const { return convex_; }
     bool flat() const { return flat_; }
     double extent() const { return extent_; }
@@ -36,22 +36,22 @@ public:
     const Vec3& normal(std::size_t face) const { return planes_[face].normal; }
     const std::vector<std::size_t>& skin() const { return skin_; }
 
-    /// mean_value_coordinates() of mvc.hpp; a p that is not finite gives NaN weights.
+    /// As mean_value_coordinates() of mvc.hpp; NaN weights when p is not finite.
     void mean_value(const Vec3& p, double* weights, Workspace& workspace) const;
-    /// palette_weights() of mvc.hpp; a p that is not finite gives NaN weights and distance.
+    /// As palette_weights() of mvc.hpp; NaN weights and distance when p is not finite.
     Projection project(const Vec3& p, double* weights, Workspace& workspace) const;
 
 private:
     struct Side {
-        int edge;     ///< of edges_
+        int edge;     ///< index into edges_
         double sign;  ///< -1 where the face runs along the edge backwards
     };
     struct Plane {
         Vec3 normal;  ///< unit, outwards
         double twice_area;
-        bool degenerate;                ///< too thin for a normal
-        std::array<Vec3, 3> along;      ///< the side opposite each corner, from the next corner on
-        std::array<double, 3> length2;  ///< of those sides, squared
+        bool degenerate;            ///< too thin for a normal
+        std::array<Vec3, 3> along;  ///< the side opposite each corner, starting at the next corner
+        std::array<double, 3> length2;  ///< the sides' lengths, squared
         std::array<Side, 3> sides;
     };
     struct Closest {
@@ -75,10 +75,10 @@ private:
     std::vector<Plane> planes_;
     std::vector<std::array<int, 2>> edges_;
     double extent_ = 0;     ///< diagonal of the bounding box
-    double tolerance_ = 0;  ///< distances below it are rounding
+    double tolerance_ = 0;  ///< smaller distances count as rounding
     bool convex_ = false;
     bool flat_ = false;              ///< all colours in one plane
-    std::vector<std::size_t> skin_;  ///< faces that make up the surface (one side of a flat body)
+    std::vector<std::size_t> skin_;  ///< faces of the surface (one side of a flat body)
 };
 
 }  // namespace palette4d

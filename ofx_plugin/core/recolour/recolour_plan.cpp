@@ -62,7 +62,7 @@ PlanMemory<T>::PlanMemory(const PaletteBody& body, const std::vector<Vec3>& disp
         movers_.push_back(mover);
     }
     plan_.spread = static_cast<T>(largest(high - low));
-    // Numbers such as the products of three lengths, and of their inverses, must not overflow.
+    // Leaves room, so that products of three lengths and of their inverses do not overflow.
     const double room = sizeof(T) == sizeof(float) ? 1e6 : 1e40;
     usable_ = body.extent() > 1 / room && size < room && largest(high - low) < room;
     if (!usable_) return;

@@ -1,4 +1,4 @@
-// A palette and its edit as the kernels of block_kernels.hpp want them.
+// A palette and its edit in the form that block_kernels.hpp needs.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace palette4d {
 
-/// The memory behind a Plan.
+/// The memory that a Plan points to.
 template <class T>
 class PlanMemory {
 public:
@@ -18,7 +18,7 @@ public:
     PlanMemory& operator=(const PlanMemory&) = delete;
 
     const Plan<T>& plan() const { return plan_; }
-    /// The palette's lengths, squared and multiplied, stay within the range of T.
+    /// Whether squares and products of the palette's lengths stay within the range of T.
     bool usable() const { return usable_; }
 
 private:
@@ -39,7 +39,7 @@ private:
 extern template class PlanMemory<float>;
 extern template class PlanMemory<double>;
 
-/// What kernels want for scratch memory.
+/// Scratch memory for kernels, aligned.
 template <class T>
 class Scratch {
 public:
@@ -55,7 +55,7 @@ private:
     std::vector<T> memory_;
 };
 
-/// Both precisions of one palette and edit.
+/// The plans of one palette and edit in both precisions.
 struct RecolourPlan {
     RecolourPlan(const PaletteBody& body, const std::vector<Vec3>& displacement)
         : single(body, displacement), twofold(body, displacement) {}

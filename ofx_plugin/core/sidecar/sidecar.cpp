@@ -20,24 +20,24 @@ namespace {
 
 using Json = nlohmann::json;
 
-/// Deeper nesting is refused while parsing; the format itself nests six deep.
+/// The parser refuses deeper nesting; the format itself has six levels.
 constexpr std::size_t kMaxDepth = 64;
-/// More JSON values than this are refused while parsing: it bounds the memory that a file of at
-/// most kMaxSidecarBytes can ask for ("[],[],[]" costs twenty times its text).
+/// The parser refuses more JSON values than this, to bound memory: "[],[],[]" takes twenty times
+/// the memory of its text.
 constexpr std::size_t kMaxValues = 4'000'000;
-/// Colours and frame numbers lie within bounds, so that geometry never overflows.
+/// Limits for colours and frame numbers, so that geometry never overflows.
 constexpr double kMaxColour = 1e6;
 constexpr std::int64_t kMaxFrame = 1'000'000'000;
 constexpr std::int64_t kMaxRate = 2'147'483'647;
 constexpr std::int64_t kMaxSize = 1'000'000;
 constexpr std::size_t kMaxIdLength = 64;
-/// Of a conversion; a curve over all half floats has 63 488 samples.
+/// Limits of a conversion; a curve over all half floats has 63 488 samples.
 constexpr std::size_t kMaxSteps = 64;
 constexpr std::size_t kMaxSamples = 100'000;
-/// Numbers of a conversion: what scene-linear light of half floats needs, with room.
+/// Limit for a conversion's numbers: above the range of half floats.
 constexpr double kMaxConversion = 1e9;
 
-/// What a value is, for the "found" of an error.
+/// Describes a value for the "found" part of an error.
 std::string described(const Json& value) {
     switch (value.type()) {
         case Json::value_t::null:
@@ -72,7 +72,7 @@ std::string token(const std::string& name) {
 
 // ------------------------------------------------------------------------------- text to tree
 
-/// Builds a Json from parser events; refuses depth, bulk and repeated names as soon as they show.
+/// Builds a Json from parser events; refuses excessive depth, size and duplicate names early.
 class TreeBuilder {
 public:
     explicit TreeBuilder(const std::string& text, const std::string& file)
@@ -86,7 +86,7 @@ public:
     bool number_unsigned(Json::number_unsigned_t value) { return add(Json(value)); }
     bool number_float(Json::number_float_t value, const std::string&) { return add(Json(value)); }
     bool string(std::string& value) { return add(Json(std::move(value))); }
-    bool binary(Json::binary_t&) { return false; }  // text has none
+    bool binary(Json::binary_t&) { return false; }  // never in text
 
     bool start_object(std::size_t) { return open(Json::object()); }
     bool start_array(std::size_t) { return open(Json::array()); }
@@ -162,7 +162,7 @@ private:
         return true;
     }
 
-    /// Where the parser stands: members already placed are named through the frame that holds them.
+    /// The JSON pointer of the parser's position.
     std::string pointer() const {
         std::string path;
         for (std::size_t i = 0; i < open_.size(); ++i) {
@@ -222,7 +222,7 @@ Json json_tree(const std::string& text, const std::string& file) {
 
 // ------------------------------------------------------------------------------- tree to values
 
-/// A value and the way to it. The JSON pointer is only spelt out when something is wrong.
+/// A value and its path. The JSON pointer is only built for an error.
 class Cursor {
 public:
     Cursor(const Json& root, const std::string& file) : value_(&root), file_(&file) {}
@@ -257,7 +257,7 @@ public:
     void require_object() const {
         if (!value_->is_object()) wrong("an object");
     }
-    /// An object with exactly the members `names`, and perhaps `optional`.
+    /// Requires an object with exactly the members `names`; `optional` may be missing.
     void require_members(std::initializer_list<const char*> names,
                          const char* optional = nullptr) const {
         require_object();
@@ -275,7 +275,7 @@ public:
         }
         for (const char* name : names) member(name);
     }
-    /// An object of free names whose values are numbers, texts, true, false or null.
+    /// Requires an object with any names, whose values are numbers, texts, true, false or null.
     void require_scalars() const {
         require_object();
         for (const auto& [name, value] : value_->items()) {
@@ -316,8 +316,8 @@ public:
     std::int64_t integer(std::int64_t lowest, std::int64_t highest) const {
         const std::string expected =
             "an integer from " + std::to_string(lowest) + " to " + std::to_string(highest);
-        // Every bound of this file is exact in a double, and 24.0 and 2.4e1 are the integer 24, as
-        // in JSON Schema.
+        // As in JSON Schema, 24.0 and 2.4e1 are the integer 24. All bounds here are exact in
+        // double.
         const double number = value_->is_number() ? value_->get<double>() : 0.5;
         if (std::trunc(number) != number || number < static_cast<double>(lowest) ||
             number > static_cast<double>(highest)) {
@@ -355,7 +355,7 @@ private:
 
 using Index = std::unordered_map<std::string, int>;
 
-/// Vertices, edges and stops share one set of ids, so that an id alone names a thing.
+/// Vertices, edges and stops share one set of ids, so an id alone identifies a handle.
 void claim(std::set<std::string>& taken, const Cursor& where, const std::string& id) {
     if (!taken.insert(id).second) {
         where.fail("the id " + in_quotes(id) + " a second time", "an id of its own");
@@ -618,7 +618,7 @@ Polytope read_polytope(const Cursor& where, const ClipInfo& clip, const std::str
         if (i + 1 == block_count) break;
         const Cursor transition = transitions.element(i);
         transition.require_members({"tracks", "faces"});
-        // A transition fills the time between its two blocks, which is why it has no frames.
+        // A transition has no frames of its own: it fills the time between its two blocks.
         const Cursor next = blocks.element(i + 1);
         next.require_members({"first", "last", "tracks", "faces"});
         Section between{sections.back().last, next.member("first").frame(), true, {}, {}};
@@ -732,7 +732,7 @@ Sidecar read_sidecar(const std::string& path) {
         throw SidecarError(path, "", "no such file", wanted);
     }
     if (fs::is_directory(status)) throw SidecarError(path, "", "a folder", wanted);
-    // A pipe or a device could keep a host waiting for ever.
+    // Reading a pipe or device could block the host forever.
     if (!fs::is_regular_file(status)) throw SidecarError(path, "", "no regular file", wanted);
     std::ifstream stream(native, std::ios::binary);
     if (!stream) throw SidecarError(path, "", "a file that cannot be opened", wanted);
@@ -741,7 +741,7 @@ Sidecar read_sidecar(const std::string& path) {
     while (stream.read(chunk.data(), static_cast<std::streamsize>(chunk.size())),
            stream.gcount() > 0) {
         text.append(chunk.data(), static_cast<std::size_t>(stream.gcount()));
-        if (text.size() > kMaxSidecarBytes) break;  // refused below, by its size
+        if (text.size() > kMaxSidecarBytes) break;  // the parser refuses it by its size
     }
     if (stream.bad()) throw SidecarError(path, "", "a file that cannot be read", wanted);
     return parse_sidecar(text, path);

@@ -1,4 +1,4 @@
-// The sidecar file: reading and full validation. The only writer is Python's analysis/sidecar.py.
+// Reads and fully validates the sidecar file. Its only writer is Python's analysis/sidecar.py.
 #pragma once
 
 #include <cstdint>
@@ -15,17 +15,17 @@ namespace palette4d {
 struct ClipInfo {
     std::string name;
     std::string source;
-    std::int64_t first = 0, last = 0, step = 1;  ///< frame numbers, last - first divisible by step
+    std::int64_t first = 0, last = 0, step = 1;  ///< frame numbers; step divides last - first
     std::int64_t rate_num = 24, rate_den = 1;    ///< frames per second
     std::int64_t width = 0, height = 0;
-    std::string encoding;  ///< of every colour of the palette
+    std::string encoding;  ///< of all palette colours
 };
 
-/// From the code values of the clip to those of the palette.
+/// From the clip's code values to the palette's.
 struct ClipConversion {
-    std::string input_space;  ///< of the clip's files, the name that the config has for it
-    std::string config;       ///< the OpenColorIO config that both names are of
-    double error = 0;         ///< the largest difference that was measured from OpenColorIO
+    std::string input_space;  ///< the encoding of the clip's files, by its name in the config
+    std::string config;       ///< the OpenColorIO config of both names
+    double error = 0;         ///< largest measured difference from OpenColorIO
     ColourConversion steps;
 };
 
@@ -33,18 +33,18 @@ struct Sidecar {
     ClipInfo clip;
     Polytope polytope;
     Edits edits;
-    /// Null where the palette is in the clip's own numbers.
+    /// Null where the palette is in the clip's own code values.
     std::shared_ptr<const ClipConversion> conversion;
 };
 
 inline constexpr int kSidecarVersion = 1;
 inline constexpr std::uint64_t kMaxSidecarBytes = 64u << 20;
 
-/// Reads and validates a file (UTF-8 path). Throws SidecarError; never trusts a count or an index.
+/// Reads and validates a file (UTF-8 path). Throws SidecarError; checks every count and index.
 Sidecar read_sidecar(const std::string& path);
-/// The same for text already in memory; `name` stands in for the file in errors.
+/// The same for text in memory; `name` replaces the file name in errors.
 Sidecar parse_sidecar(const std::string& text, const std::string& name);
-/// The member "steps" of a sidecar's conversion alone.
+/// Parses only the member "steps" of a sidecar's conversion.
 ColourConversion parse_conversion(const std::string& text, const std::string& name);
 
 }  // namespace palette4d

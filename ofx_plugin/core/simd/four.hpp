@@ -1,5 +1,5 @@
-// Four numbers side by side on any processor: a node of a Lattice, or a colour and one more. In an
-// unnamed namespace, as lanes.hpp and for its reasons.
+// Four floats in a vector on any processor: a node of a Lattice, or a colour plus one value. In an
+// unnamed namespace, like lanes.hpp and for its reasons.
 #pragma once
 
 #include <cstring>

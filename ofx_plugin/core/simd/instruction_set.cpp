@@ -8,7 +8,7 @@
 namespace palette4d {
 namespace {
 
-/// This build has its kernels, and the processor its instructions.
+/// Whether this build has the kernels and the processor has the instructions.
 bool usable(InstructionSet set) {
     switch (set) {
         case InstructionSet::kBaseline:

@@ -1,12 +1,12 @@
-// The processor's instructions that recolouring uses, chosen when the program runs.
+// The instruction set for recolouring, chosen at run time.
 #pragma once
 
 #include <vector>
 
 namespace palette4d {
 
-/// All give the same bits for the same colour: the same operations in the same order, each rounded
-/// as IEEE 754 says and none fused. They differ in speed only.
+/// All sets give the same bits for the same colour: the same IEEE 754 operations in the same order,
+/// none fused. They differ in speed only.
 enum class InstructionSet {
     kBest,      ///< the fastest that this processor has
     kBaseline,  ///< what the architecture guarantees: SSE2 on x86-64, NEON on 64-bit ARM
@@ -14,13 +14,13 @@ enum class InstructionSet {
     kAvx512,
 };
 
-/// What this program was built with and this processor has, slowest first; never kBest.
+/// The sets in this build that this processor supports, slowest first; never kBest.
 const std::vector<InstructionSet>& instruction_sets();
 /// "best", "baseline", "avx2", "avx512".
 const char* name_of(InstructionSet set);
-/// The set itself, or for kBest the last of instruction_sets(), unless the environment variable
-/// PALETTE4D_INSTRUCTIONS names another of them (read once). Throws std::invalid_argument for a set
-/// that this processor does not have.
+/// The set itself. kBest gives the last of instruction_sets(), or the one in the environment
+/// variable PALETTE4D_INSTRUCTIONS (read once). Throws std::invalid_argument for a set that this
+/// processor does not support.
 InstructionSet resolved(InstructionSet set);
 
 }  // namespace palette4d

@@ -1,11 +1,11 @@
-// From an instruction set to the kernels that were compiled for it.
+// Selects the kernels for an instruction set.
 #pragma once
 
 #include "simd/instruction_set.hpp"
 
 namespace palette4d {
 
-/// The kernels of resolved(set). CMakeLists.txt defines which sets this build has.
+/// The kernels of resolved(set). CMakeLists.txt defines the sets in this build.
 template <class Kernels>
 const Kernels& kernels_of(InstructionSet set) {
     switch (resolved(set)) {

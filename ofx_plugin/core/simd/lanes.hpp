@@ -1,10 +1,10 @@
-// Numbers side by side: the arithmetic of the kernels, several pixels at a time.
+// Vector arithmetic for the kernels: several pixels at a time.
 //
-// GCC's and Clang's vector types, with intrinsics on x86. The build defines PALETTE4D_LANES_BYTES,
-// the width of the registers, and compiles each kernel source once for each set of instructions.
-// Everything is in an unnamed namespace and inlined: sources compiled for different processors must
-// not share a function. Operations are those that IEEE 754 rounds correctly (+ - * / sqrt) and
-// selections, none is fused: all widths give the same bits.
+// Uses GCC's and Clang's vector types, with intrinsics on x86. The build defines the register width
+// PALETTE4D_LANES_BYTES and compiles each kernel source once for each instruction set. Everything
+// is inlined, in an unnamed namespace: sources compiled for different processors must not share a
+// function. All widths give the same bits: only selections and operations that IEEE 754 rounds
+// correctly (+ - * / sqrt), never fused.
 #pragma once
 
 #include <cmath>
@@ -15,7 +15,7 @@
 #define PALETTE4D_LANES_X86
 #endif
 #if defined(__AVX512F__) && !defined(__clang__)
-// GCC 12's own header: _mm512_min_pd and its like start from _mm512_undefined_pd() on purpose.
+// False alarm in GCC 12's header: _mm512_min_pd and others use _mm512_undefined_pd() on purpose.
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
 #endif
 
@@ -78,7 +78,7 @@ template <class T>
 PALETTE4D_INLINE void store(T* to, Lanes<T> a) {
     std::memcpy(to, &a.v, sizeof a.v);
 }
-/// Towards zero; below 2^24.
+/// Rounds towards zero; values below 2^24 only.
 template <class T>
 PALETTE4D_INLINE Lanes<T> truncated(Lanes<T> a) {
     using Whole = typename Lanes<T>::Integers;
@@ -94,7 +94,7 @@ PALETTE4D_INLINE Lanes<float> load_whole(const int* from) {
     std::memcpy(&whole, from, sizeof whole);
     return {__builtin_convertvector(whole, Lanes<float>::Vector)};
 }
-/// Of so many times 16 bytes.
+/// Stores byte offsets of elements that are 16 bytes each.
 PALETTE4D_INLINE void store_offsets(unsigned* to, Lanes<float> a) {
     const auto whole = __builtin_convertvector(a.v, Lanes<float>::Integers) << 4;
     std::memcpy(to, &whole, sizeof whole);
@@ -142,7 +142,7 @@ PALETTE4D_INLINE bool any(LaneMask<T> m) {
     return _mm512_test_epi32_mask((__m512i)m.v, (__m512i)m.v) != 0;
 #endif
 }
-/// A bit a lane, the first lane's the lowest.
+/// One bit per lane, the first lane lowest.
 PALETTE4D_INLINE unsigned bits(LaneMask<double> m) {
 #if PALETTE4D_LANES_BYTES == 16
     return static_cast<unsigned>(_mm_movemask_pd((__m128d)m.v));
@@ -176,7 +176,7 @@ PALETTE4D_INLINE bool any(LaneMask<T> m) {
     for (int lane = 0; lane < Lanes<T>::kCount; ++lane) found |= m.v[lane] != 0;
     return found;
 }
-/// A bit a lane, the first lane's the lowest.
+/// One bit per lane, the first lane lowest.
 PALETTE4D_INLINE unsigned bits(LaneMask<double> m) {
     unsigned found = 0;
     for (int lane = 0; lane < Lanes<double>::kCount; ++lane) {
