@@ -1,9 +1,9 @@
 """Block merging, section 5.3: blocks of topologically consistent frames.
 
 Input: a palette for each frame, and which neighbours are consistent. Output: few `Block`s, each
-with one topology. In a merge one block adopts the topology of the other: the palettes of its frames
-become refinements of their neighbour's palette, frame after frame (eq. 9). Merging is greedy, by
-the block configuration loss (eqs. 8 and 10).
+with one topology. A merge gives one block the topology of the other. Frame after frame, a palette
+is replaced by the refined palette of its neighbour (eq. 9). Merging is greedy and minimises the
+block configuration loss (eqs. 8 and 10).
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from palette4d.analysis.losses import palette_loss, refine_palette
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Palette
 
-# Evaluations of a frame's refinement: it starts where that of its neighbour ended.
+# Evaluations per frame are few: refinement starts from the neighbour's refined palette.
 EVALUATIONS = 30
-# A frame whose loss differs by less than this share from its neighbour's keeps the palette.
+# A frame keeps its neighbour's palette if their losses differ by less than this share.
 SAME = 1e-3
 
 
@@ -32,7 +32,7 @@ class Block:
     Attributes
     ----------
     first : index of its first frame.
-    palettes : one a frame; all have the same faces, and colour i corresponds to colour i.
+    palettes : one per frame; all have the same faces, and colour i corresponds to colour i.
     losses : L (eq. 4) of each frame.
     """
 
@@ -85,7 +85,7 @@ class Merge:
 
     Attributes
     ----------
-    change : the rise of the sum of theta_i L_i; a lower bound of it until all frames are done.
+    change : the increase of the sum of theta_i L_i; a lower bound until all frames are done.
     """
 
     def __init__(
@@ -151,8 +151,8 @@ def merge_sequence(
 ) -> Iterator[tuple[float, list[Block]]]:
     """Yield the configurations of greedy merging and their losses, from `blocks` to one block.
 
-    The loss is the sum of theta_i L_i. A merge goes on only while it may be the best: its change
-    never falls from frame to frame, since losses are never negative.
+    The loss is the sum of theta_i L_i. A merge continues only while it may be the best. Its change
+    never decreases from frame to frame, because losses are never negative.
     """
     current = list(blocks)
     total = sum(b.weighted_loss(len(frames), options) for b in current)
@@ -166,14 +166,14 @@ def merge_sequence(
                 if key not in tried:
                     tried[key] = Merge(keep, adopt, frames, gamut, options)
                 queue.append((tried[key].change, i, keep is b, tried[key]))
-        heapq.heapify(queue)  # changes, then places: merges themselves are never compared
+        heapq.heapify(queue)  # the place breaks ties: merges themselves cannot be compared
         while not queue[0][3].done:
             _, i, backwards, best = queue[0]
             best.advance()
             heapq.heapreplace(queue, (best.change, i, backwards, best))
         change, i, _, best = queue[0]
         gone = {id(current[i]), id(current[i + 1])}
-        # Object ids are used again: forget the merges of the blocks that end here.
+        # Python reuses object ids: forget the merges of blocks that end here.
         tried = {key: value for key, value in tried.items() if not gone & set(key)}
         current[i : i + 2] = [best.finish()]
         total += change

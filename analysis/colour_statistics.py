@@ -1,13 +1,11 @@
-"""Colour statistics: what the analysis keeps of the pixels of each frame.
+"""Colour statistics: the weighted colours that the analysis keeps for each frame.
 
-Input: a clip, or an image. Output: weighted colours of each frame in k-d trees of bounded size, so
-that memory grows neither with the resolution nor, beyond `MOST_COLOURS`, with the number of frames.
-Pixels that are not finite or have an alpha below 1/255 do not count; if that leaves no pixel in any
-frame, alpha is ignored.
+Input: a clip, or an image. Output: k-d trees of bounded size. Memory does not grow with the
+resolution, nor, beyond `MOST_COLOURS`, with the number of frames. Pixels that are not finite or
+have an alpha below 1/255 do not count. If that leaves no pixel in any frame, alpha is ignored.
 
-The losses of section 3 are exact for 8-bit frames with no more distinct colours than are kept.
-Otherwise the colours are a sample, dense near the hull of the frame's colours; tests measure its
-error.
+The losses of section 3 are exact for 8-bit frames whose distinct colours are all kept. Otherwise
+the colours are a sample, dense near the hull of the frame's colours. Tests measure its error.
 """
 
 from __future__ import annotations
@@ -34,25 +32,25 @@ from palette4d.media.clip_base import Fill, FrameError, named
 if TYPE_CHECKING:
     from palette4d.media.clip import Clip
 
-# Pixels after which freed memory is returned: glibc keeps the gaps that frames of changing sizes
-# leave between the colours that stay.
+# Pixels after which freed memory is returned to the system: glibc would keep the gaps that frames
+# of different sizes leave.
 TRIM_EVERY = 50_000_000
-# Colours kept of all frames together, about 100 MB. Four times as many gave no better palettes.
+# Colours kept for all frames together, about 100 MB. Four times as many gave no better palettes.
 MOST_COLOURS = 2_000_000
-# Clips with fewer frames keep more coarse colours of each, at most so many times as many.
+# Shorter clips keep more coarse colours per frame, at most this many times as many.
 SHORT, RICHER = 48, 2
-# Of a longer clip every n-th frame is analysed: a palette is linear in time anyway.
+# In a longer clip only every n-th frame is analysed: a palette is linear in time anyway.
 MOST_FRAMES = 3000
-# Colours and coarse colours kept of a frame, however many frames there are.
+# Least colours and coarse colours per frame, for any number of frames.
 FEWEST_COLOURS, FEWEST_COARSE = 1024, 512
-# Bytes for frames that are read at the same time, and the most frames.
+# Limits of the frames that are read at the same time: bytes, and frames.
 MEMORY, MOST_WORKERS = 400 << 20, 8
 # Most bytes of a binner's table.
 TABLE = 64 << 20
-# A colour outside 0..1 counts on so many pixels of a small frame, on this share of a tiny one.
+# A colour outside 0..1 counts from this many pixels of a small frame, this share of a tiny frame.
 FEWEST_OUTSIDE, MOST_OUTSIDE_SHARE = 5, 0.01
-# Outliers are farther outside than this share of the extent of the clip's other colours: less
-# hardly changes a hull, and keeps the end of a true highlight.
+# Outliers are farther outside than this share of the extent of the clip's other colours. Nearer
+# colours hardly change a hull and may be the end of a true highlight.
 OUTLYING = 0.1
 
 Progress = Callable[[int, int], object]
@@ -60,8 +58,10 @@ Progress = Callable[[int, int], object]
 
 @dataclasses.dataclass(frozen=True)
 class ClipStatistics:
-    """The statistics of frames by number, None where no pixel counts; and notes for the user about
-    frames that are left out, unused alpha and clipped outliers. The clip lists its bad frames."""
+    """The statistics of frames by number (None if no pixel counts), and notes for the user.
+
+    Notes are about frames left out, unused alpha and clipped outliers. The clip lists bad frames.
+    """
 
     frames: dict[int, FrameStatistics | None]
     notes: tuple[str, ...]
@@ -105,7 +105,7 @@ def gather_clip(
 
     most = min(MOST_WORKERS, MEMORY // (TABLE + 12 * pixels), len(chosen))
     workers = max(1, min(thread_count(options), most))
-    # Closing ends the threads whatever happens: the traceback of an error would keep them alive.
+    # Close the generator to end its threads: the traceback of an error would keep them alive.
     with contextlib.closing(_in_order(clip.fills(chosen), taken, workers)) as results:
         for done, (number, result) in enumerate(results, start=1):
             try:
@@ -128,7 +128,7 @@ def gather_clip(
             "colours change linearly between them"
         )
     if any(found[number] is not None for number in found.keys() - hidden):
-        found |= dict.fromkeys(hidden)  # alpha is used: nothing of these frames shows
+        found |= dict.fromkeys(hidden)  # alpha is used, and these frames are fully transparent
     elif hidden:
         notes.append(_unused_alpha(clip.premultiplied))
     usable = {number: one for number, one in found.items() if one is not None}
@@ -137,14 +137,14 @@ def gather_clip(
 
 
 def chosen_frames(frames: Sequence[int]) -> list[int]:
-    """Return all frames, or, of very many, every n-th and the last."""
+    """Return all frames; in very long clips every n-th frame and the last."""
     step = -(-(len(frames) - 1) // (MOST_FRAMES - 1)) if len(frames) > MOST_FRAMES else 1
     chosen = list(frames[::step])
     return chosen if chosen[-1] == frames[-1] else [*chosen, frames[-1]]
 
 
 def budget(frames: int, options: AnalysisOptions) -> tuple[int, int]:
-    """Return how many colours and coarse colours are kept of each of so many frames."""
+    """Return how many colours and coarse colours to keep per frame of a clip of this length."""
     share = MOST_COLOURS / (frames * (options.colours + options.coarse_colours))
     if share >= 1:
         richer = min(RICHER, max(1.0, SHORT / frames))
@@ -160,10 +160,11 @@ def without_outliers(
 ) -> tuple[dict[int, FrameStatistics], tuple[str, ...]]:
     """Return frames whose outliers are clipped to the border of the other colours, and a note.
 
-    The border of each channel and side is what enough pixels of some frame reach, never inside
-    0..1. Enough are `LOST_SHARE` of a frame, at most `options.k`, which hold a handle. Pixels are
-    counted in each frame, since a hot pixel is in all frames; but the border is the clip's, so that
-    a highlight may begin small. Frames without outliers are returned as they are.
+    Each channel has a lower and an upper border, never inside 0..1. A border is the farthest value
+    that enough pixels of one frame reach: `LOST_SHARE` of a frame, at most `options.k`. So many
+    pixels are worth a handle. Pixels are counted per frame, because a hot pixel is in all frames.
+    The borders hold for the whole clip, so that a highlight may begin small. Frames without
+    outliers are returned unchanged.
     """
     if not frames:
         return {}, ()
@@ -187,7 +188,7 @@ def without_outliers(
         binner = _core.ColourBinner()
         binner.add_colours(clipped, counts)
         taken = binner.take(colours, coarse)
-        assert taken is not None  # there were colours
+        assert taken is not None  # frames without pixels have no tree
         fine, few, lowest, highest = taken
         kept[number] = dataclasses.replace(one, colours=fine, coarse=few, low=lowest, high=highest)
     if not kept:
@@ -201,8 +202,10 @@ def without_outliers(
 
 
 def _reached(frame: FrameStatistics, options: AnalysisOptions) -> NDArray[np.float64]:
-    """Return (2, 3) the least and largest value of each channel that enough pixels reach, at most 0
-    and at least 1."""
+    """Return the (2, 3) least and largest values of each channel that enough pixels reach.
+
+    The least values are at most 0, the largest at least 1.
+    """
     enough = min(
         options.k,
         max(FEWEST_OUTSIDE, LOST_SHARE * frame.pixels),
@@ -217,7 +220,7 @@ def _reached(frame: FrameStatistics, options: AnalysisOptions) -> NDArray[np.flo
             values = sign * frame.colours.rgb[:, channel]
             outside = np.flatnonzero(values > border)
             outside = outside[np.argsort(-values[outside], kind="stable")]
-            # Rounded means of counts may fall short of a whole number.
+            # Rounding may leave the mean of counts just below a whole number.
             there = np.flatnonzero(np.cumsum(frame.colours.counts[outside]) >= enough - 1e-6)
             if len(there):
                 out[side, channel] = sign * values[outside[there[0]]]
@@ -227,7 +230,7 @@ def _reached(frame: FrameStatistics, options: AnalysisOptions) -> NDArray[np.flo
 def _taken(
     frame: int, binner: _core.ColourBinner, colours: int, coarse: int, pixels: int
 ) -> FrameStatistics | None:
-    """Take the colours of a frame; those that were counted stand for all of its `pixels`."""
+    """Return the statistics of a frame; its counted pixels represent all of its `pixels`."""
     looked_at = binner.pixels + binner.ignored
     scale = pixels / looked_at if looked_at else 1.0
     count, ignored = round(scale * binner.pixels), round(scale * binner.ignored)
@@ -278,7 +281,7 @@ def _in_order(
 
 
 def _unused_alpha(premultiplied: bool) -> str:
-    """Say that no pixel of a clip shows, and what that means for its recolouring."""
+    """Return the note for a clip whose pixels all have alpha 0, and its effect on recolouring."""
     text = "alpha is 0 in every pixel of the clip: it was ignored, and the clip taken for opaque"
     if premultiplied:
         text += (

@@ -1,4 +1,4 @@
-"""Convex hulls of colours: as meshes, as planes, and how far a mesh is from its own hull."""
+"""Convex hulls of colours, as meshes and as planes, and the concavity of meshes."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from scipy.spatial import ConvexHull, QhullError
 F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
 
-# Colours within half an 8-bit step of a plane, a line or a point have no extent beyond it.
+# Colours within half an 8-bit step of a plane, a line or a point count as flat.
 THIN = 0.5 / 255
 # A concavity of a hull thinner than two 8-bit steps is invisible.
 FLAT = 2 / 255
-# A slice that lacks more than this share of its convex hull counts as not convex.
+# A slice that lacks more than this share of its convex hull counts as non-convex.
 CONCAVE = 0.05
-# The least extent of a frame's colours for a judgement of shape.
+# The shape of a slice is judged only if the frame's colours have at least this extent.
 NARROW = 0.24
 
 
@@ -90,14 +90,14 @@ def concavity(rgb: F64, faces: I32) -> float:
         hull = ConvexHull(rgb)
     except QhullError:
         return 0.0
-    if hull.volume <= FLAT * hull.area / 2:  # its mean thickness
+    if hull.volume <= FLAT * hull.area / 2:  # the mean thickness of the hull
         return 0.0
-    # A mesh that is turned inside out has a negative volume: it lacks everything.
+    # A mesh turned inside out has a negative volume, so it lacks its whole hull.
     return float(np.clip(1 - volume / hull.volume, 0.0, 1.0))
 
 
 def deepest_concavity(polytope: SkewPolytope, frames: Iterable[FrameStatistics]) -> float:
-    """Return the largest share of its convex hull that a slice lacks, of frames not `narrow`."""
+    """Return the largest share of its hull that a slice lacks; `narrow` frames are skipped."""
     found = (
         concavity(polytope.colours_at(block, frame.frame), block.faces)
         for frame in frames

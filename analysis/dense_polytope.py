@@ -1,8 +1,8 @@
 """The skew polytope between block merging and vertex removal: a vertex for each colour and frame.
 
-Input: blocks with a palette a frame, and the inter-frame edges between blocks. A removed vertex
+Input: blocks with one palette per frame, and the inter-frame edges between blocks. A removed vertex
 becomes a ghost on the edge between its neighbours in time (section 5.4.1). Splitting and merging
-vertices and those of the first and last frame are never removed.
+vertices are never removed, nor are vertices in the first and last frame.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class DensePolytope:
     Parameters
     ----------
     frames : frame numbers.
-    blocks : for each block a palette a frame, all with the same faces.
+    blocks : for each block one palette per frame, all with the same faces.
     links : inter-frame edges between each block and the next, pairs of colours.
     faces_between : (f, 3) triangles over these edges; without them transitions have no faces.
 
@@ -84,7 +84,7 @@ class DensePolytope:
         return rgb
 
     def removable(self, vertex: int) -> bool:
-        """Whether section 5.4.1 allows removal, and no two edges would become the same."""
+        """Whether section 5.4.1 allows removal and no two edges would coincide."""
         if not self.alive[vertex]:
             return False
         if len(self.before[vertex]) != 1 or len(self.after[vertex]) != 1:
@@ -92,8 +92,8 @@ class DensePolytope:
         return (self.before[vertex][0], self.after[vertex][0]) not in self.chain
 
     def ghosts(self, vertex: int) -> list[tuple[int, int, F64]]:
-        """Return (frame index, colour, (3,) position) of all that moves when `vertex` is
-        removed."""
+        """Return (frame index, colour, (3,) position) of each colour that the removal of `vertex`
+        would move."""
         v, w = self.before[vertex][0], self.after[vertex][0]
         start, end = self.frames[self.at[v][0]], self.frames[self.at[w][0]]
         a, b = self.colour(v), self.colour(w)
@@ -116,14 +116,14 @@ class DensePolytope:
             self.position[i][s] = rgb
 
     def polytope(self) -> SkewPolytope:
-        """Return the polytope of the vertices that are left."""
+        """Return the polytope of the remaining vertices."""
         keep = [v for v, alive in enumerate(self.alive) if alive]
         index = {v: n for n, v in enumerate(keep)}
         edge_of = {ghost: edge for edge, chain in self.chain.items() for ghost in chain}
         vertices = np.array([[*self.colour(v), self.frames[self.at[v][0]]] for v in keep])
 
         def through(nodes: Sequence[int]) -> tuple[int, ...]:
-            """Return the track that passes the given vertices and ghosts."""
+            """Return the track through the given vertices and ghosts."""
             out = [index[v] for v in nodes if self.alive[v]]
             if not self.alive[nodes[0]]:
                 out.insert(0, index[edge_of[nodes[0]][0]])

@@ -31,11 +31,11 @@ def frame_palette(colours: _core.ColourTree, gamut: Gamut, options: AnalysisOpti
     mesh = hull_mesh(colours.rgb)
     simple = _core.progressive_hull(mesh.rgb, mesh.faces, options.palette_size)
     if len(simple) > options.palette_size:
-        # No edge of a sliver-thin hull can be contracted: take its extreme points instead.
+        # No edge of a sliver-thin hull can be contracted: use its extreme points instead.
         simple = extreme_points(mesh.rgb, options.palette_size)
     best = hull_mesh(merge_close(gamut.clip(simple), close))
     best_loss = palette_loss(colours, best.rgb, options)
-    # Refining may push a vertex inside: the second round starts from the new hull.
+    # Refining may push a vertex inside the hull, so the second round starts from the new hull.
     for _ in range(2):
         moved = refine_palette(colours, best, gamut, options)
         palette = hull_mesh(merge_close(moved, close))

@@ -1,4 +1,4 @@
-"""What the stages know of a clip: the colours of each frame, and the gamut that they span."""
+"""The input of all stages: the colours of each frame, and the gamut that they span."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ class FrameStatistics:
     Attributes
     ----------
     frame : the frame number.
-    colours : the colours that losses are measured on.
-    coarse : fewer of them, for stages that only compare alternatives.
+    colours : the colours for the losses.
+    coarse : fewer colours, for stages that only compare alternatives.
     histogram : `media.colour_histogram` of the frame, for the detection of cuts.
     low, high : (3,) float64 the bounding box of the colours.
-    pixels, ignored : how many pixels count, and how many do not.
+    pixels, ignored : how many pixels count, and how many are ignored.
     """
 
     frame: int
@@ -72,5 +72,5 @@ def pooled(trees: Sequence[_core.ColourTree], most: int) -> _core.ColourTree:
     for tree in trees:
         binner.add_colours(tree.rgb, tree.counts)
     taken = binner.take(most, most)
-    assert taken is not None  # a tree has at least one colour
+    assert taken is not None  # each tree needs at least one colour
     return taken[0]

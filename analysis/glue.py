@@ -1,14 +1,14 @@
 """Gluing, section 5.2.2: the palettes of two frames become a two-frame 4D skew polytope.
 
-Input: two palettes. Output: `Glue`: the inter-frame edges (pairs of colour indices) that obey the
-two inter-degree rules and the two topological rules at the least total colour distance, searched
-exhaustively (branch and bound) among the edges of the 4D convex hull of both palettes; and the
-triangle mesh between the two frames, whose corners are these edges.
+Input: two palettes. Output: `Glue`, the inter-frame edges (pairs of colour indices) and the
+triangle mesh between the two frames, whose corners are these edges. The edges obey the two
+inter-degree rules and the two topological rules at the least total colour distance. The search is
+exhaustive (branch and bound) among the edges of the 4D convex hull of both palettes.
 
-The search then goes on among all pairs of colours, and a shorter solution there wins. The paper
-searches the edges of the hull only, but colours inside the hull of both frames then link to
-unrelated ones. If the triangulations of the two palettes cannot be mapped onto each other, no
-solution exists; topological rule 2 is then broken as little as possible.
+A second search tries all pairs of colours; a shorter solution wins. The paper searches only the
+edges of the hull, but then colours inside the hull of both frames link to unrelated colours. If the
+two triangulations cannot be mapped onto each other, no solution exists. Then the edges break
+topological rule 2 as little as possible.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
 Bool = NDArray[np.bool_]
 
-# After so many nodes the best solution so far is taken; real clips need far fewer.
+# After this many nodes the search returns its best solution; real clips need far fewer.
 MOST_NODES = 200_000
-# The cost of a broken rule, above any colour distance that it saves.
+# The cost of a broken rule: more than any colour distance that it could save.
 BROKEN = 10.0
 
 
@@ -39,8 +39,9 @@ class Glue:
     Attributes
     ----------
     links : (i, j) pairs, colour i of the first palette to colour j of the second, sorted.
-    broken : how many intra-frame edges break topological rule 2 (0 wherever possible).
-    consistent : all one-to-one and the same connectivity (section 5.3).
+    broken : how many intra-frame edges break topological rule 2 (0 if a solution exists).
+    consistent : all links are one-to-one, and both palettes have the same connectivity
+        (section 5.3).
     complete : whether the search saw every solution; otherwise the links are the best found.
     """
 
@@ -92,7 +93,7 @@ def hull_pairs(first: F64, second: F64) -> Bool:
 
 
 class _Search:
-    """Branch and bound over the first palette's colours, each choosing the colours it links to."""
+    """Branch and bound: each colour of the first palette chooses the colours that it links to."""
 
     def __init__(
         self,
@@ -108,8 +109,8 @@ class _Search:
         self.distance = distance.tolist()
         self.near_first: list[list[bool]] = first.adjacency().tolist()
         self.near_second: list[list[bool]] = second.adjacency().tolist()
-        # Sets of the second palette's colours are bits of a number. `around`: each colour with its
-        # neighbours; `linked`: the colours that each colour of the first palette links to.
+        # Bits of an integer are a set of the second palette's colours. `around`: each colour with
+        # its neighbours; `linked`: the colours that each colour of the first palette links to.
         self.around = [
             1 << u | sum(1 << w for w in range(self.m) if self.near_second[u][w])
             for u in range(self.m)
@@ -120,13 +121,13 @@ class _Search:
         self.before = [
             [w for w in self.order[:at] if self.near_first[v][w]] for at, v in enumerate(self.order)
         ]
-        self.rest = [0.0] * (self.n + 1)  # the least cost of the colours that follow
+        self.rest = [0.0] * (self.n + 1)  # the least cost of all later colours
         for at in range(self.n - 1, -1, -1):
             costs = [cost for cost, *_ in self.choices[self.order[at]]]
             self.rest[at] = self.rest[at + 1] + (min(costs) if costs else np.inf)
         self.chosen: list[tuple[int, ...]] = [()] * self.n
         self.users: list[list[int]] = [[] for _ in range(self.m)]
-        self.best = bound  # only solutions shorter than this are wanted
+        self.best = bound  # only shorter solutions count
         self.best_links: tuple[tuple[int, int], ...] | None = None
         self.best_broken = 0
         self.nodes = 0
@@ -210,7 +211,7 @@ class _Search:
 
 
 def _breadth_first(adjacency: Bool) -> list[int]:
-    """Order the vertices so that each touches an earlier one: rules prune early."""
+    """Order the vertices so that each touches an earlier one: then the rules prune early."""
     order = [int(np.argmax(adjacency.sum(axis=1)))]
     while len(order) < len(adjacency):
         rest = [v for v in range(len(adjacency)) if v not in order]
@@ -258,10 +259,9 @@ def _triangle(a: int, b: int, c: int) -> tuple[int, int, int]:
 def transition_faces(first: Palette, second: Palette, links: tuple[tuple[int, int], ...]) -> I32:
     """Return the (f, 3) triangles over the links: the topology between the two frames.
 
-    Where colours only split it is the second palette's mesh, where they only merge the first's.
-    Where both happen the second's mesh is taken and each merging vertex is split into its tracks,
-    along the cut that reproduces most of the first palette's triangles (all of them when the rules
-    hold).
+    If colours only split, it is the second palette's mesh; if they only merge, the first's. If
+    colours split and merge, it is the second palette's mesh with each merging vertex split into its
+    tracks. The cut reproduces most of the first palette's triangles, or all if the rules hold.
     """
     late = [j for _, j in links]
     early = [i for i, _ in links]
@@ -311,5 +311,5 @@ def _split_vertex(
         score = len(wanted & {_triangle(*(early[v] for v in face)) for face in candidate})
         if best is None or score > best[0]:
             best = score, candidate
-    assert best is not None  # a closed mesh has at least three neighbours round every vertex
+    assert best is not None  # in a closed mesh every vertex has at least three neighbours
     return best[1]

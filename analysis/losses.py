@@ -1,4 +1,4 @@
-"""The paper's losses (eqs. 2 to 4, 8, 11, 12), and minimising them inside a box."""
+"""The paper's losses (eqs. 2 to 4, 8, 11, 12), and their minimisation inside a box."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from palette4d import _core
 F64 = NDArray[np.float64]
 ValueAndGradient = Callable[[F64], tuple[float, F64]]
 I32 = NDArray[np.int32]
-# The ways in which NLopt stops early: rounding leaves no progress, or `force_stop` was called.
+# NLopt stops early when rounding prevents progress or `force_stop` was called.
 STOPPED = (
     nlopt.RoundoffLimited,
     nlopt.ForcedStop,
     nlopt.runtime_error,
     nlopt.invalid_argument,
 )
-# A pixel farther outside than this is lost: no edit of the palette reaches it. A smaller share of a
-# frame is taken for hot pixels or glints.
+# A pixel farther outside than this is lost: edits of the palette do not reach it. A smaller share
+# of a frame counts as hot pixels or glints.
 LOST, LOST_SHARE = 0.25, 1e-4
 NO_FACES: I32 = np.zeros((0, 3), np.int32)
 
@@ -53,7 +53,7 @@ def thread_count(options: AnalysisOptions) -> int:
 
 
 def loss_weights(options: AnalysisOptions) -> _core.LossWeights:
-    """Return the weights of the paper's losses alone: all reported figures use them."""
+    """Return the weights of the paper's losses alone, as in all reported figures."""
     return _core.LossWeights(options.lambda_, options.k)
 
 
@@ -63,7 +63,7 @@ def reach_weights(options: AnalysisOptions, scale: float) -> _core.LossWeights:
 
 
 def shaped_weights(options: AnalysisOptions, scale: float, faces: bool = True) -> _core.LossWeights:
-    """Return the weights of what is minimised: the paper's losses, convexity, separation and reach.
+    """Return the weights of the objective: the paper's losses, convexity, separation and reach.
 
     Losses are distances and convexity is a volume: `scale` (of `Gamut`) relates the two.
     """
@@ -88,7 +88,7 @@ def smoothness(
     """Eq. 11 and its (n, 4) gradient with respect to the vertices; `length` is the clip's, in
     frames, `weights` of the edges are 1 in the paper.
 
-    Edges without extent in time (there are none in a valid polytope) count as nothing.
+    Edges without extent in time count as zero; a valid polytope has no such edges.
     """
     gradient = np.zeros_like(vertices)
     if len(edges) == 0:
@@ -133,7 +133,7 @@ def refine_palette(
     """Move the colours of a palette to lower eq. 4 (Wang et al. 2019); return them, (n, 3).
 
     All colours move together, inside boxes of half width `hull_box` and inside the gamut. The
-    options `convexity` and `separation` count too. The result is never worse than the palette.
+    options `convexity` and `separation` count too. The result is never worse than the input.
     """
     faces, n = palette.faces, len(palette.rgb)
     weights = shaped_weights(options, gamut.scale, len(faces) > 0)
@@ -158,19 +158,19 @@ def minimise(
 ) -> F64:
     """Minimise a function inside a box (NLopt, L-BFGS); return the best point of all evaluations.
 
-    The losses have kinks (a pixel enters the palette, the nearest pixels change), where a line
-    search may fail. That ends the search, and the best point still counts.
+    The losses have kinks: a pixel enters the palette, or the nearest pixels change. A line search
+    may fail there. The search then ends, and the function returns the best point so far.
     """
     best_value, best = objective(x)[0], x.copy()
     failures: list[BaseException] = []
     solver = nlopt.opt(nlopt.LD_LBFGS, len(x))
-    # The solver holds `call`. A strong reference back would make a cycle through C++, which is
-    # never freed, with all that the objective holds.
+    # The solver holds `call`. A strong reference back would make a cycle through C++ that is never
+    # freed.
     running = weakref.proxy(solver)
 
     def call(point: F64, gradient: F64) -> float:
         nonlocal best_value, best
-        if failures:  # a line search goes on for a few calls before it stops
+        if failures:  # a line search makes a few more calls before it stops
             return float("inf")
         try:
             value, slope = objective(point)
@@ -179,7 +179,7 @@ def minimise(
             if value < best_value:
                 best_value, best = value, point.copy()
             return value
-        except BaseException as error:  # NLopt drops what a callback raises, Ctrl-C included
+        except BaseException as error:  # NLopt drops the exceptions of callbacks, Ctrl-C included
             failures.append(error)
             running.force_stop()
             return float("inf")

@@ -1,7 +1,8 @@
 """Eq. 12 as a function of the vertices of a polytope, and joint moves of vertices that lower it.
 
-Vertex refinement (section 5.5), the structure search and the static hull share this: the boxes that
-vertices may move in, the frames that a vertex affects, and NLopt with the core's exact gradient.
+Vertex refinement (section 5.5), the structure search and the static hull share this module. It
+knows the boxes of the vertices and the frames that a vertex affects. It minimises with NLopt and
+the core's exact gradient.
 """
 
 from __future__ import annotations
@@ -27,9 +28,9 @@ from palette4d import _core
 
 F64 = NDArray[np.float64]
 
-# Two vertices of a track stay this many frames apart: a steeper change would be a cut.
+# Least distance in frames between two vertices of a track: a steeper change would be a cut.
 LEAST_GAP = 0.5
-# Weight in eq. 11 of the change to and from a colour that is there for a short time only.
+# Weight in eq. 11 of the edges to and from a colour that exists for a short time only.
 BRIEF = 0.25
 
 
@@ -82,8 +83,9 @@ def refine_jointly(
 ) -> tuple[SkewPolytope, float]:
     """Move all vertices together in their boxes; return the polytope and the value of `Objective`.
 
-    The value is never above that of the given polytope, clipped to the gamut. Vertices in `brief`
-    (see `Objective`) keep their times: the mean over all frames would shorten such a colour.
+    The value is never above the value of the given polytope, clipped to the gamut. Vertices in
+    `brief` (see `Objective`) keep their times: the mean over all frames would shorten such a
+    colour.
     """
     evaluate = Objective(polytope, frames, options, gamut, coarse, brief)
     vertices = polytope.vertices.copy()
@@ -96,7 +98,7 @@ def refine_jointly(
 def move_all(evaluate: Objective, vertices: F64, most_evaluations: int) -> F64:
     """Return the vertices after a joint move of all of them."""
     moving = np.arange(len(vertices))
-    # Neighbours in time share the gap between them, so that both may move at once.
+    # Each neighbour in time gets half the gap between them, so that both may move at once.
     box = evaluate.box(vertices, moving, share=0.5)
     return move(evaluate, vertices, moving, evaluate.everything, box, most_evaluations)
 
@@ -121,7 +123,7 @@ def move(
     lower, upper = ((bound / evaluate.scale).ravel() for bound in box)
     best = minimise(objective, start, lower, upper, most_evaluations, tolerance=1e-5)
     out = vertices.copy()
-    # Scaling back and forth rounds: a vertex at the edge of its box must not leave its block.
+    # Scaling rounds; the clip keeps a vertex at the edge of its box inside its block.
     out[moving] = np.clip(best.reshape(-1, 4) * evaluate.scale, *box)
     fixed = evaluate.fixed[moving]
     out[moving[fixed], 3] = vertices[moving[fixed], 3]
@@ -131,8 +133,8 @@ def move(
 class Objective:
     """Eq. 12 over a choice of frames, plus the terms for convexity, separation and reach.
 
-    Vertices in `brief` belong to a colour that is there for a short time only. It may appear and
-    vanish quickly: in eq. 11 edges that end at these vertices have the weight `BRIEF`.
+    Vertices in `brief` belong to a colour that exists for a short time only. It may appear and
+    vanish quickly: in eq. 11 the edges that end at these vertices have the weight `BRIEF`.
     """
 
     def __init__(
@@ -154,7 +156,7 @@ class Objective:
         self.quick = np.where(np.isin(self.edges, list(brief)).any(axis=1), BRIEF, 1.0)
         self.length = polytope.length()
         self.fixed = polytope.fixed_times()
-        # As in the paper, times are divided by the clip's length, so that all four axes are alike.
+        # As in the paper, times are divided by the clip's length: all four axes have one scale.
         self.scale = np.array([1.0, 1.0, 1.0, self.length])
         self.before, self.after = polytope.neighbours()
         self.block = np.zeros((len(polytope.vertices), 2))

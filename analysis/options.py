@@ -1,5 +1,7 @@
-"""The options of an analysis: one table of names, defaults (the paper's where it has one), limits
-and the methods that each option affects."""
+"""The options of an analysis: one table of names, defaults, limits and methods.
+
+Defaults are the paper's, where it has one. Methods are the methods that the option affects.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,7 @@ def _option(
 
 @dataclasses.dataclass(frozen=True)
 class AnalysisOptions:
-    """Options of `palette4d analyze`. `OPTIONS` explains them; `lambda_` is called `lambda` there.
+    """Options of `palette4d analyze`. `OPTIONS` explains them, with `lambda` for `lambda_`.
 
     Raises
     ------

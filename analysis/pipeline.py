@@ -1,9 +1,9 @@
-"""From a clip to a sidecar document: this module alone knows the order of the stages.
+"""From a clip to a sidecar document. Only this module knows the order of the stages.
 
 clip -> colour_statistics -> frame_hulls -> glue -> block_merging -> vertex_removal
 -> structure_search -> stop_insertion -> vertex_refinement -> polytope -> sidecar document
 
-Three other methods serve as comparisons: `baselines`.
+`baselines` holds three other methods for comparison.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ from palette4d.media.array_clip import ArrayClip
 from palette4d.media.clip_base import Clip, describe, even_step
 from palette4d.media.colour_space import SpaceOptions
 
-#: The stages that tell their progress, in order.
+#: The stages that report their progress, in order.
 STAGES = (
     "colour_statistics",
     "static_hull",
@@ -57,9 +57,9 @@ STAGES = (
     "vertex_removal",
     "vertex_refinement",
 )
-# A palette has at least so many colours, however few vertices are asked for.
+# A palette has at least this many colours, whatever `vertices` is.
 LEAST_COLOURS = 4
-# The factor of `convexity` in a second search, where the first result is not convex.
+# The factor of `convexity` in a second search, after a non-convex first result.
 STIFFER = 10.0
 
 T = TypeVar("T")
@@ -84,12 +84,12 @@ class StageResult:
 
 @dataclasses.dataclass(frozen=True)
 class Found:
-    """What the stages found.
+    """The result of all stages.
 
     Attributes
     ----------
     polytope : the palette.
-    stages : what each stage reached.
+    stages : vertices, blocks and losses after each stage.
     notes : notes and warnings for the user.
     bound : L' of the best convex static palette, which the result never exceeds; None for methods
         without this bound.
@@ -109,7 +109,7 @@ class Analysis(Found):
     ----------
     document : the sidecar document, not yet written.
     report : how good the finished palette is.
-    colours : one line about the colour spaces, None if none is used.
+    colours : one line about the colour spaces, None without colour spaces.
     """
 
     document: dict[str, Any]
@@ -127,14 +127,14 @@ def analyze(
 ) -> Analysis:
     """Find the time-varying palette of a clip.
 
-    Frames are read one after the other; memory does not grow with their resolution and number.
+    Frames are read one after the other. Memory does not grow with their resolution or number.
 
     Parameters
     ----------
     clip : an opened clip, or an array (frames, height, width, 3) of code values 0 to 1.
-    options : the defaults if left out.
+    options : by default `AnalysisOptions()`.
     progress : called as progress(stage, done, total).
-    spaces : colour spaces of the clip and of its palette; by default only $OCIO counts.
+    spaces : colour spaces of the clip and of its palette; by default those of $OCIO, if it is set.
     allow_cuts : analyse a clip with sudden cuts as one shot.
 
     Raises
@@ -222,8 +222,8 @@ def _usable(
 ) -> tuple[list[FrameStatistics], list[str]]:
     """Return the statistics of the frames that have pixels, and notes about the others.
 
-    The palette covers the whole clip: a first or last frame without pixels takes the colours of its
-    nearest neighbour.
+    The palette covers the whole clip. If the first or last frame has no pixels, it takes the
+    colours of the nearest frame with pixels.
     """
     numbers = list(frames)
     have = {n: s for n, s in gathered.items() if s is not None}
@@ -254,7 +254,7 @@ def find_polytope(
 
 
 class _Run:
-    """One analysis: the frames, what each stage reached, and notes for the user."""
+    """One analysis: the frames, the results of each stage, and notes for the user."""
 
     def __init__(
         self,
@@ -274,7 +274,7 @@ class _Run:
         return lambda done, total: self.report(stage, done, total)
 
     def counted(self, stage: str, results: Iterable[T], total: int) -> Iterator[T]:
-        """Yield results, and tell the progress of their stage."""
+        """Yield results, and report the progress of their stage."""
         for done, result in enumerate(results, start=1):
             yield result
             self.report(stage, done, total)
@@ -284,17 +284,17 @@ class _Run:
         return losses_of(polytope, self.frames, self.options)
 
     def result(self, stage: str, polytope: SkewPolytope, blocks: int | None = None) -> StageResult:
-        """Return what a stage reached."""
+        """Return the vertices, blocks and losses after a stage."""
         count = len(polytope.blocks) if blocks is None else blocks
         return StageResult(stage, len(polytope.vertices), count, self.losses(polytope))
 
     def record(self, stage: str, polytope: SkewPolytope) -> None:
-        """Record what a stage reached."""
+        """Record the vertices, blocks and losses after a stage."""
         self.stages.append(self.result(stage, polytope))
 
 
 def _skew(run: _Run) -> SkewPolytope:
-    """Sections 5.2 to 5.5, with a structure whose handles are worth their cost (the default)."""
+    """Sections 5.2 to 5.5. Each handle of the result is worth its cost (the default method)."""
     options = run.options
     if most := options.vertices:  # a colour has a vertex at both ends of the clip
         size = min(options.palette_size, max(LEAST_COLOURS, most // 2))
@@ -339,8 +339,10 @@ class _Searched:
 
 
 def _searched(run: _Run, options: AnalysisOptions, simple: SkewPolytope, bound: float) -> _Searched:
-    """Go through the stages from frame hulls to refinement; L' of the result is at most `bound`,
-    that of the static hull `simple`."""
+    """Run the stages from frame hulls to refinement.
+
+    L' of the result is at most `bound`, the L' of the static hull `simple`.
+    """
     frames, gamut = run.frames, run.gamut
     blocks, first = _consistent_blocks(run, options)
     sequence = block_merging.merge_sequence(blocks, frames, gamut, options)

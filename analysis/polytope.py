@@ -1,7 +1,7 @@
 """The 4D skew polytope (section 4.1) as the analysis builds it, and its form in the sidecar.
 
-Times are frame numbers. `Palette` is one frame's polyhedron; `SkewPolytope` the whole: vertices,
-and for each block and each transition between blocks the tracks (chains of vertices) and the
+Times are frame numbers. `Palette` is one frame's polyhedron. `SkewPolytope` is the palette of the
+clip: vertices, and for each block and each transition the tracks (chains of vertices) and the
 triangles over them.
 """
 
@@ -27,7 +27,7 @@ class Palette:
     faces: I32
 
     def adjacency(self) -> NDArray[np.bool_]:
-        """Return the (n, n) intra-frame edges; colours of a palette without faces all touch."""
+        """Return the (n, n) intra-frame edges; without faces, every colour touches every other."""
         n = len(self.rgb)
         if len(self.faces) == 0:
             return ~np.eye(n, dtype=bool)
@@ -72,13 +72,13 @@ class SkewPolytope:
         return max(self.blocks[-1].last - self.blocks[0].first, 1.0)
 
     def fixed_times(self) -> NDArray[np.bool_]:
-        """Which vertices may not move in time: in the first or last frame, splitting or merging."""
+        """Vertices that may not move in time: in the first or last frame, splitting or merging."""
         before, after = self.neighbours()
         single = [len(b) == 1 and len(a) == 1 for b, a in zip(before, after, strict=True)]
         return ~np.array(single, bool)
 
     def neighbours(self) -> tuple[list[list[int]], list[list[int]]]:
-        """Return, for each vertex, the vertices its edges come from and those they go to."""
+        """Return, for each vertex, its earlier and its later neighbours in time."""
         before: list[list[int]] = [[] for _ in self.vertices]
         after: list[list[int]] = [[] for _ in self.vertices]
         for u, v in self.edges().tolist():
@@ -87,18 +87,17 @@ class SkewPolytope:
         return before, after
 
     def colours_at(self, block: Section, time: float) -> F64:
-        """Return the (n, 3) colours of a block's tracks at a time, held beyond their ends."""
+        """Return the (n, 3) colours of a block's tracks at a time; constant beyond their ends."""
         tracks = (self.vertices[list(track)] for track in block.tracks)
         return np.array(
             [[np.interp(time, t[:, 3], t[:, channel]) for channel in range(3)] for t in tracks]
         )
 
     def extended_tracks(self) -> list[list[list[int]]]:
-        """Return each block's tracks, each going on to the next vertex before and after it.
+        """Return each block's tracks, extended by one vertex at either end.
 
-        A vertex at the block's end may move into the block; the track then goes on behind it. Only
-        splitting and merging vertices, which stay where they are, have no single vertex to go on
-        to.
+        A vertex at the block's end may move into the block; the track must then continue behind it.
+        Tracks are not extended past splitting and merging vertices, which never move.
         """
         before, after = self.neighbours()
 
@@ -120,8 +119,10 @@ class SkewPolytope:
         return dataclasses.replace(self, vertices=vertices, blocks=tuple(blocks))
 
     def with_stop(self, edge: tuple[int, int], stop: Sequence[float]) -> SkewPolytope:
-        """Return the polytope with one vertex more, the last one, (r, g, b, frame) on an edge: in
-        all tracks that run along it, across blocks as well."""
+        """Return the polytope with one more vertex, (r, g, b, frame) on an edge.
+
+        It is the last vertex, in all tracks along that edge, also across blocks.
+        """
         vertices = np.vstack([self.vertices, stop])
         new = len(self.vertices)
 
@@ -142,8 +143,10 @@ class SkewPolytope:
         )
 
     def removable(self) -> list[int]:
-        """Return the vertices that section 5.4.1 lets go: neither at the clip's ends nor splitting
-        or merging, and no two edges would become one."""
+        """Return the vertices that section 5.4.1 allows to remove.
+
+        They are not at the clip's ends and do not split or merge, and no two edges would coincide.
+        """
         before, after = self.neighbours()
         edges = {(int(u), int(v)) for u, v in self.edges()}
         return [
@@ -153,7 +156,7 @@ class SkewPolytope:
         ]
 
     def without(self, vertex: int) -> SkewPolytope:
-        """Return the polytope without a removable vertex: its neighbours in time become joined."""
+        """Return the polytope without a removable vertex; an edge joins its neighbours in time."""
         before, after = (side[vertex][0] for side in self.neighbours())
 
         def rejoined(track: tuple[int, ...]) -> tuple[int, ...]:
@@ -179,7 +182,7 @@ class SkewPolytope:
     def fields(self) -> dict[str, Any]:
         """Return the sidecar's "polytope": ids v1, v2, … and e1, e2, … in order of time.
 
-        Ids are given once, here; edits refer to them.
+        Only this function assigns ids; edits refer to them.
         """
         order = sorted(
             range(len(self.vertices)), key=lambda i: (self.vertices[i, 3], *self.vertices[i, :3], i)
@@ -228,5 +231,5 @@ def _covering(section: Section, track: Sequence[int], vertices: F64) -> tuple[in
 
 
 def _number(x: float) -> int | float:
-    """Whole frame numbers as integers, others as they are."""
+    """Return whole frame numbers as integers, and others unchanged."""
     return int(x) if float(x).is_integer() else float(x)

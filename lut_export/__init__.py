@@ -1,4 +1,4 @@
-"""Exports: the edit as files that other programs read, each with its error stated.
+"""Exports: the edit as files that other programs read. Each file states its error.
 
     sidecar -> frame_edit -> shaper, lut3d (or cdl) -> formats, writers -> file -> bake_error
 

@@ -1,8 +1,8 @@
 """Bake an edit at one time into a file, and state the error of that file.
 
-`frame_edit` is the edit, `shaper` and `lut3d` sample it (or `cdl` fits it), `formats` and `writers`
-make a file of it, and `bake_error` reads that back and compares it with the edit. `bake_job` does
-that until the error is small enough.
+`frame_edit` is the edit. `shaper` and `lut3d` sample it, or `cdl` fits it. `formats` and `writers`
+write the file. `bake_error` reads the file back and compares it with the edit. `bake_job` repeats
+this with larger LUTs until the error is small enough.
 """
 
 import hashlib
@@ -37,26 +37,26 @@ F32 = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class BakeResult:
-    """What was written, and how far it is from the exact edit.
+    """The file that was written, and its error.
 
     Attributes
     ----------
     output, format, title : str
-        The file, the name of its format in `formats.FORMATS`, and that for people.
+        The file, the name of its format in `formats.FORMATS`, and the format's title for people.
     id : str
         A URN: the same for the same content.
     sidecar : str or None
-        The sidecar's file; None for a document that was never saved.
+        The sidecar's path; None for a document that was never saved.
     sidecar_sha256 : str
         The hash of the sidecar's bytes.
     size : int or None
         Samples a side; None for a CDL.
     shaper : Shaper
-        With the domain outside of which the file clamps.
+        Its domain is where the file does not clamp.
     encoding : str
         The colour space that the file takes and returns.
     conversion : str or None
-        The conversion to the palette's colour space, and where it is; None without one.
+        The conversion to the palette's colour space, and its place in the file; None without one.
     palette : (low, high)
         The smallest and largest code value of the palette's colours at any time, in the domain's
         colour space.
@@ -67,15 +67,15 @@ class BakeResult:
     identity : bool
         Nothing is edited at that time.
     viewing : str
-        How colours were taken for deltaE.
+        The colour encoding that deltaE assumes.
     grid : Measure
         The error on the dense grid over the domain.
     clip : Measure or None
         The error on the colours of the clip's frame; None without one.
     clip_frame : int or None
-        The frame of the clip that was measured (the nearest to a fractional time).
+        The clip's frame for `clip`: the nearest to a fractional time.
     error : float
-        The largest relative error on the clip's colours, or on the dense grid without a clip:
+        The largest relative error on the clip's colours, or on the dense grid without a clip.
         ``max_error`` limits it.
     """
 
@@ -104,7 +104,7 @@ class BakeResult:
 
     @property
     def visible(self) -> bool:
-        """Whether the error can be seen on the clip's own colours: deltaE 2000 above 1."""
+        """Whether the error is visible on the clip's own colours: deltaE 2000 above 1."""
         return self.clip is not None and self.clip.worst.delta_e_largest > VISIBLE
 
 
@@ -148,18 +148,18 @@ def bake(
     max_error : float, optional
         The 3D LUT grows until `BakeResult.error` is at most this.
     space : str
-        What the file takes and returns: "input" (the clip's code values), "palette", or a colour
-        space of the config.
+        The colour space of the file's input and output: "input" (the clip's code values),
+        "palette", or a colour space of the config.
     ocio_config : str, optional
         The config that knows `space`; by default the sidecar's, else ``$OCIO``, else OpenColorIO's
         built-in studio config.
     clip : str or (h, w, 3 or 4) float array, optional
-        The clip, or its picture at `frame`: the error is measured on its colours, and they choose
-        the shaper. By default the clip that the sidecar names, if it is there.
+        The clip, or its picture at `frame`. Its colours choose the shaper and are measured for the
+        error. By default the clip that the sidecar names, if it exists.
     force : bool
         Replace an existing file.
     threads : int
-        0: one a processor; the file does not depend on it.
+        0: one per processor; the file does not depend on it.
 
     Returns
     -------
@@ -171,7 +171,7 @@ def bake(
     SidecarError
         The sidecar is unusable.
     Palette4dError
-        An argument cannot be used, or the error stays above `max_error`; nothing was written.
+        An argument is invalid, or the error stays above `max_error`; nothing was written.
     """
     settings = BakeSettings(size, strength, format, shaper, domain, max_error, space, ocio_config)
     output = Path(path)
@@ -209,7 +209,7 @@ def bake(
         content, readers, grid, on_clip = grow(job, temporary)
         about = describe(job, content, (grid, on_clip))
         if format_.described:
-            # Once more, now with its errors in it; the colours stay the same.
+            # Write it again, now with its errors; the colours stay the same.
             job.write(temporary, content, about)
             check_same(load(temporary, format_.readings), readers, job, output)
     return BakeResult(
@@ -259,8 +259,7 @@ def check_target(path: Path, force: bool) -> None:
     Raises
     ------
     Palette4dError
-        As `common.files.refuse_existing`; also when `path` is a device or a pipe, which a file
-        would replace.
+        As `common.files.refuse_existing`; also when `path` is a device or a pipe.
     """
     if path.exists() and not path.is_file() and not path.is_dir():
         raise Palette4dError(
@@ -278,7 +277,7 @@ def check_settings(
     Raises
     ------
     Palette4dError
-        Time, size, strength, shaper or domain are out of range or do not go with the format.
+        Time, size, strength, shaper or domain is out of range or does not fit the format.
     """
     frame_edit(sidecar, frame, settings.strength)
     if format_.is_cdl:
@@ -310,10 +309,10 @@ def _picture(
 def _choose_shaper(
     settings: BakeSettings, format_: LutFormat, palette: NDArray[Any], image: F32 | None
 ) -> Shaper:
-    """Return the shaper that the settings and the colours ask for.
+    """Return the shaper for the settings and the colours.
 
-    The frame's colours decide whether one is needed; a shaper covers the palette, too, so that the
-    LUTs of one clip resemble each other. Without a frame the palette decides. `palette` holds the
+    The frame's colours decide whether the LUT needs a shaper; without a frame, the palette decides.
+    The shaper also covers the palette, so that all LUTs of a clip are similar. `palette` holds the
     (n, 3) colours of the whole palette, in the colour space of `image`.
     """
     if settings.domain is not None:
@@ -333,7 +332,7 @@ def _choose_shaper(
 
 
 def nearer(size: int | None) -> str:
-    """Return what is nearer to an edit than a 3D LUT of a size; None: than a CDL."""
+    """Return advice for less error than a 3D LUT of this size has; None: than a CDL has."""
     if size is None:
         return "a 3D LUT (.clf, .cube) is nearer"
     exact = "the node and `palette4d render` are exact"

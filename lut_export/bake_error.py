@@ -1,8 +1,8 @@
 """The error of a file: how far it is from the exact edit, over a set of colours.
 
-a is the colour that OpenColorIO computes with the file read back, b the core's in double precision.
-The error therefore contains interpolation, the rounding of the file's code values, and the clamping
-of colours outside the LUT's domain. There are three measures, the mean and the largest of each:
+a is the colour that OpenColorIO computes from the file; b is the core's colour in double precision.
+So the error includes interpolation, rounding of the file's code values, and clamping outside the
+LUT's domain. There are three measures, each with its mean and its largest value:
 
 - absolute: |a - b| per channel;
 - relative: |a - b| / max(|b|, 0.1) per channel, the measure of CLF's implementation guide;
@@ -32,17 +32,17 @@ F64 = NDArray[np.float64]
 #: The denominator of the relative error is at least this.
 FLOOR = 0.1
 
-#: Colours that one thread works on at a time: what fits in a processor's cache.
+#: Colours in one piece of a thread's work: they fit in a processor's cache.
 PIECE = 1 << 14
 
-#: deltaE is measured on about so many colours of a larger set, evenly spread over it.
+#: deltaE is measured on at most about this many colours, evenly spread over the set.
 DELTA_E_COLOURS = 1 << 20
 
 
 #: A file read back: (n, 3) float32 colours -> (n, 3) float32.
 Reader = Callable[[F32], F32]
 
-#: How hosts may read a file: a name for people, then the setter of OpenColorIO's FileTransform.
+#: The ways in which hosts read a file: a name, then a setter of OpenColorIO's FileTransform.
 READINGS = {
     "linear": ("setInterpolation", "INTERP_LINEAR"),
     "tetrahedral": ("setInterpolation", "INTERP_TETRAHEDRAL"),
@@ -52,9 +52,9 @@ READINGS = {
 
 
 def load(path: Path, readings: Iterable[str]) -> dict[str, Reader]:
-    """Read a file back through OpenColorIO, as hosts with each of some `READINGS` do.
+    """Read a file back through OpenColorIO, once for each of the given `READINGS`.
 
-    A LUT that names its own interpolation keeps that.
+    If a LUT names its own interpolation, that is used.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def load(path: Path, readings: Iterable[str]) -> dict[str, Reader]:
     """
     import PyOpenColorIO as ocio
 
-    # OpenColorIO caches files by name: drop what was at this name before.
+    # OpenColorIO caches files by name: drop an earlier file of this name.
     ocio.ClearAllCaches()
     found: dict[str, Reader] = {}
     for name in readings:
@@ -71,7 +71,7 @@ def load(path: Path, readings: Iterable[str]) -> dict[str, Reader]:
         transform = ocio.FileTransform(src=str(path.absolute()))
         getattr(transform, setter)(getattr(ocio, value))
         try:
-            # An empty context: the environment's would replace "$HOME" in a folder's name.
+            # An empty context: the environment would replace "$HOME" in a folder's name.
             found[name] = ExactProcessor(
                 ocio.Config.CreateRaw().getProcessor(
                     ocio.Context(), transform, ocio.TRANSFORM_DIR_FORWARD
@@ -144,9 +144,9 @@ def measure(
     Parameters
     ----------
     colours : (h, w, 3 or more) float array
-        What to compare on. Colours with a NaN or an infinity are left out: no LUT holds them.
+        The colours to compare. NaNs and infinities are left out: no LUT can hold them.
     readers : mapping
-        The file, by its readings.
+        For each reading, a function that applies the file.
     edit : FrameEdit
         The exact edit.
     viewing : Viewing
@@ -154,9 +154,9 @@ def measure(
     domain : (low, high)
         Of the file, for `Measure.outside_domain`.
     threads : int
-        0: one a processor; the result does not depend on it.
+        0: one per processor; the result does not depend on it.
     shaped : callable, optional
-        From colours to the code values of the domain.
+        Converts colours to the code values of the domain.
 
     Returns
     -------
@@ -174,7 +174,7 @@ def measure(
     if not count:
         return None
     seen = sum(part.delta_e_colours for part in parts)
-    # In the order of the pieces, so that the sums do not depend on the threads.
+    # Add in the order of the pieces: the sums must not depend on the threads.
     total = np.sum([part.sums for part in parts], axis=0) / [3 * count, 3 * count, max(seen, 1)]
     largest = np.max([part.maxima for part in parts], axis=0)
     return Measure(
@@ -228,7 +228,7 @@ def _compare(
 
 
 def stated(value: float, digits: int = 3) -> str:
-    """Return an error with three significant digits, rounded up: what is stated must hold.
+    """Return an error with three significant digits, rounded up so that the statement is true.
 
     >>> stated(0.0123401), stated(0.0), stated(0.5)
     ('0.0124', '0', '0.5')
@@ -250,7 +250,7 @@ def figures_text(figures: Figures) -> str:
 
 
 def figures_info(figures: Figures) -> dict[str, str]:
-    """Return errors as the Info of a CLF names them."""
+    """Return errors under their names in the Info of a CLF."""
     return {
         "RelativeMean": stated(figures.relative_mean),
         "RelativeLargest": stated(figures.relative_largest),

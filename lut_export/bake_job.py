@@ -1,4 +1,4 @@
-"""One bake: its content, written, read back and measured, in larger and larger files if need be."""
+"""One bake: write the file, read it back, measure it, and repeat with a larger LUT if needed."""
 
 import hashlib
 import json
@@ -35,13 +35,13 @@ from palette4d.common.errors import Palette4dError
 F32 = NDArray[np.float32]
 Content = lut3d.Lut3D | cdls.Cdl
 
-#: The namespace of the files' ids (RFC 9562, version 5), drawn once for this project.
+#: The namespace of the files' ids (RFC 9562, version 5), chosen once for this project.
 NAMESPACE = uuid.UUID("09823ba4-0bc8-43a9-995d-cb9a6abeb5b3")
 
 
 @dataclass(frozen=True)
 class BakeSettings:
-    """What to bake at each frame; `bake` explains the members."""
+    """The settings of a bake at any frame; `bake` explains the members."""
 
     size: int = 33
     strength: float = 1.0
@@ -55,7 +55,7 @@ class BakeSettings:
 
 @dataclass(frozen=True)
 class Job:
-    """What stays the same while a LUT grows."""
+    """The part of a bake that does not change while the LUT grows."""
 
     sidecar: _core.Sidecar
     sha256: str
@@ -72,12 +72,12 @@ class Job:
 
     @property
     def steps(self) -> tuple[Step, ...]:
-        """The conversion beside the 3D LUT; empty where the LUT contains it."""
+        """The conversion beside the 3D LUT; empty if the LUT contains it."""
         return self.space.steps if self.format.discrete else ()
 
     @property
     def conversion(self) -> str | None:
-        """The conversion and where it is; None without one."""
+        """The conversion and its place in the file; None without one."""
         if not self.space.steps:
             return None
         where = "beside the 3D LUT, as transforms" if self.steps else "within the 3D LUT"
@@ -89,16 +89,16 @@ class Job:
         return self.space.of_palette(grid).astype(np.float32) if self.steps else grid
 
     def measured(self, colours: F32, readers: Mapping[str, Reader]) -> Measure | None:
-        """Compare a file that was read back with the edit on some colours."""
+        """Compare the file, read back, with the edit on the given colours."""
         domain = (self.shaper.low, self.shaper.high)
         shaped = self.space.to_palette if self.steps else None
         return measure(colours, readers, self.edit, self.viewing, domain, self.threads, shaped)
 
     def content(self, size: int) -> Content:
-        """Return what the file holds."""
+        """Return the file's content: a 3D LUT or a CDL."""
         if self.format.is_cdl:
             return cdls.fit(self.edit, self.dense() if self.image is None else self.image)
-        # In a list of transforms the LUT takes and returns the palette's code values.
+        # In a list of transforms, the LUT's input and output are the palette's code values.
         edit = replace(self.edit, conversion=None) if self.steps else self.edit
         return lut3d.sample(edit, size, self.shaper, self.threads, self.steps)
 
@@ -114,7 +114,7 @@ class Job:
 
 
 def grow(job: Job, path: Path) -> tuple[Content, dict[str, Reader], Measure, Measure | None]:
-    """Write files, larger and larger ones if need be, until the error is small enough."""
+    """Write files with larger and larger LUTs until the error is small enough."""
     limit, size = job.settings.max_error, job.settings.size
     while True:
         content = job.content(size)
@@ -155,7 +155,7 @@ def _too_far(job: Job, size: int, grid: Measure, clip: Measure | None) -> str:
 def check_same(
     written: Mapping[str, Reader], measured: Mapping[str, Reader], job: Job, output: Path
 ) -> None:
-    """Make sure that the final file holds what was measured."""
+    """Check that the final file has the colours that were measured."""
     colours = job.dense()
     for name, reader in written.items():
         if not np.array_equal(reader(colours), measured[name](colours)):
@@ -170,7 +170,7 @@ def describe(
     content: Content,
     errors: tuple[Measure, Measure | None] | None,
 ) -> Description:
-    """Return what the file says about itself; the lines repeat the names and values of its Info."""
+    """Return the file's description of itself; its lines repeat its Info."""
     name, frame = job.sidecar.clip["name"], frame_text(job.frame)
     encoding = job.space.name or "the clip's own encoding"
     info: dict[str, Any] = {

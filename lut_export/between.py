@@ -1,8 +1,8 @@
-"""How far looks that change every N-th frame are from the edit at the frames between.
+"""The error of looks at the frames between the baked frames.
 
-Each frame shows the look of the nearest baked frame. The palette's colours move linearly in time
-between the frames at which the edit turns, so that the error is largest halfway between two baked
-frames or where the edit turns; only these frames are measured.
+Each frame shows the look of the nearest baked frame. Between the frames at which the edit changes
+its slope, the palette's colours move linearly in time. So the error is largest halfway between two
+baked frames, or where the slope changes. Only these frames are measured.
 """
 
 import bisect
@@ -19,7 +19,7 @@ from palette4d import _core
 from palette4d.colour.difference import delta_e_2000, viewing_of
 from palette4d.media.source_clip import frame_colours
 
-#: The largest deltaE 2000 between two looks that a config is written with, unless told.
+#: Above this deltaE 2000 between two looks, a config is written only with `anyway`.
 LARGEST_DELTA_E = 2.0
 
 #: At most about this many colours of a frame are compared.
@@ -35,7 +35,7 @@ class BetweenError:
     delta_e : float
         Between the edit at `frame` and the edit at `look`, the frame whose look is shown there.
     frame, look : int
-        The frame with the largest error, and the frame of its look.
+        The frame with the largest error, and the baked frame whose look it shows.
     on_clip : bool
         Measured on the clip's colours at `frame`; False: on a grid over the palette's range.
     """
@@ -59,18 +59,18 @@ def between_error(
     strength: float = 1.0,
     clip: str | None = None,
 ) -> BetweenError | None:
-    """Return the largest error between looks; None where every frame has its own.
+    """Return the largest error between looks; None if every frame has its own look.
 
     Parameters
     ----------
     path, sidecar : Path, Sidecar
         The sidecar's file, and the core's view of it.
     baked : tuple of int
-        Rising frames that have a look.
+        The frames that have a look, in rising order.
     strength : float
-        As baked.
+        The strength of the baked looks.
     clip : str, optional
-        The clip; by default where the sidecar says.
+        The clip; by default the clip that the sidecar names.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def between_error(
 def _colours(
     path: Path, sidecar: _core.Sidecar, frame: int, clip: str | None
 ) -> tuple[NDArray[np.floating], bool]:
-    """Return (n, 3) colours in the palette's space, of the clip's frame where it can be read."""
+    """Return (n, 3) colours in the palette's space: the clip's frame, or a grid if unreadable."""
     image, _ = frame_colours(path, sidecar.clip, frame, clip)
     if image is None:
         palette = sidecar.polytope.vertices[:, :3]

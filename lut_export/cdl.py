@@ -1,8 +1,8 @@
 """The ASC CDL nearest to the edit at one time, for hosts without LUTs.
 
-A CDL is ten numbers: slope, offset and power for each channel, and a saturation (ASC CDL 1.2). They
-are fitted by least squares of the relative error (`bake_error`), on the clip's colours at that time
-or, without them, on the dense grid. The remaining error is stated like that of a 3D LUT.
+A CDL is ten numbers: slope, offset and power for each channel, and a saturation (ASC CDL 1.2). A
+least-squares fit of the relative error (`bake_error`) finds them. It uses the clip's colours at
+that time, or the dense grid without a clip. The remaining error is stated as for a 3D LUT.
 """
 
 from dataclasses import dataclass
@@ -17,13 +17,13 @@ from palette4d.lut_export.writers import Description, one_line
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-#: Luma of ASC CDL 1.2, that of Rec.709.
+#: The luma weights of ASC CDL 1.2 (those of Rec.709).
 LUMA = np.array([0.2126, 0.7152, 0.0722])
 
-#: At most about this many colours, evenly spread over those that are given, are fitted.
+#: The fit uses at most about this many of the given colours, evenly spread.
 FITTED = 10_000
 
-#: Digits after the point of the ten numbers.
+#: Decimal places of the ten numbers.
 DIGITS = 6
 
 #: OpenColorIO's names of the formats.
@@ -48,7 +48,7 @@ class Cdl:
     saturation: float = 1.0
 
     def apply(self, colours: F64) -> F64:
-        """Return the (n, 3) replacements of (n, 3) colours, not clamped: negatives get no power."""
+        """Return (n, 3) results for (n, 3) colours, not clamped; power skips negatives."""
         return _apply(np.array([*self.slope, *self.offset, *self.power, self.saturation]), colours)
 
 
@@ -60,14 +60,14 @@ def _apply(numbers: F64, colours: F64) -> F64:
 
 
 def fit(edit: FrameEdit, colours: F32) -> Cdl:
-    """Return the CDL nearest to an edit on some colours.
+    """Return the CDL nearest to an edit on the given colours.
 
     Parameters
     ----------
     edit : FrameEdit
-        What to fit.
+        The edit to fit.
     colours : (h, w, 3) float32
-        On what; colours that are not finite are left out.
+        The colours of the fit; NaNs and infinities are left out.
     """
     if edit.identity:
         return Cdl()
@@ -85,7 +85,7 @@ def fit(edit: FrameEdit, colours: F32) -> Cdl:
         return ((_apply(numbers, points) - wanted) / scale).ravel()
 
     start = np.array([1.0] * 3 + [0.0] * 3 + [1.0] * 3 + [1.0])
-    # Slope, power and saturation are not negative by the standard; powers near 0 make steps.
+    # The standard forbids negative slope, power and saturation; powers near 0 make steps.
     low = np.array([0.0] * 3 + [-10.0] * 3 + [0.1] * 3 + [0.0])
     high = np.array([100.0] * 3 + [10.0] * 3 + [10.0] * 3 + [10.0])
     found = least_squares(residual, start, bounds=(low, high), max_nfev=200)

@@ -3,10 +3,10 @@
 DIR/config.ocio            the config: a copy of a base config, with looks and views added
 DIR/luts/SHOT/SHOT.F.clf   the edit of a shot at each of its frames F, and SHOT.default.clf
 
-There is one look a shot, in the shot's own encoding as process space. Its file transform names the
-file by the context variable FRAME: a host that sets it shows the look of that frame. The look
-`palette4d` names the shot by the context variable SHOT, too, and each view of the base has one more
-view that applies it.
+Each shot has one look. Its process space is the shot's own encoding. The look's file name contains
+the context variable FRAME: a host that sets FRAME shows the look of that frame. The look
+`palette4d` also contains the variable SHOT. For each view of the base there is a new view with this
+look.
 """
 
 import copy
@@ -38,7 +38,7 @@ from palette4d.common.files import make_folder, refuse_existing, replacing
 from palette4d.common.text import checked_name, counted, file_safe
 from palette4d.jobs.workers import Workers
 
-#: The value of FRAME when a host does not set it, and the name of the file for that.
+#: The value of FRAME if the host does not set it; a file of that name exists.
 NO_FRAME = "default"
 
 
@@ -49,15 +49,15 @@ class Shot:
     Attributes
     ----------
     name : str
-        Of the look, of the files, and for SHOT.
+        The name of the look and of the files, and the value of SHOT.
     process_space : str
         A colour space of the config.
     first, last : int
-        The clip's frames, for each of which there is a file.
+        The clip's first and last frame. Each frame has a file.
     baked : Series
-        The files that were baked; the others are links to the nearest of them.
+        The files that were baked; all other files are links to the nearest baked file.
     between : BetweenError or None
-        The error at the frames between; None where every frame was baked.
+        The error at the frames between baked frames; None if every frame was baked.
     """
 
     name: str
@@ -76,7 +76,7 @@ class Shot:
 
 @dataclass(frozen=True)
 class WrittenConfig:
-    """What was written; `views` are (display, view), `notes` what a user should know."""
+    """The config that was written; `views` are (display, view), `notes` are for the user."""
 
     path: Path
     base: str
@@ -107,24 +107,24 @@ def write_config(
     sidecars : list of Path
         The shots.
     folder : Path
-        Where the config and its LUTs go.
+        The folder for the config and its LUTs.
     settings : BakeSettings, optional
-        For every frame; the format is CLF by default, and the colour space always the palette's:
+        For every frame. The format is CLF by default. The colour space is always the palette's:
         OpenColorIO itself converts to a look's process space.
     choose : callable
-        sidecar -> the frames to bake; the other frames show the nearest of them.
+        sidecar -> the frames to bake; each other frame shows the nearest baked frame.
     base : str, optional
         A config's file, an .ocioz archive or an ``ocio://`` name; by default `BUILT_IN`.
     names : tuple of str, optional
-        The shots' names, in the order of the sidecars; by default the clips'.
+        The shots' names, in the order of the sidecars; by default the clips' names.
     process_space : str, optional
-        For all shots; by default by each sidecar's encoding.
+        The process space of all shots; by default each sidecar's encoding.
     clip : str, optional
-        The clip, for shapers and errors; by default where each sidecar says.
+        The clip, for shapers and errors; by default the clip that each sidecar names.
     workers : Workers, optional
-        Who bakes.
+        The processes or the farm that bake.
     force : bool
-        Replace a config that is there, and looks of the same names.
+        Replace an existing config, and looks of the same names.
     anyway : bool
         Write the config even where the error between the baked frames is above `LARGEST_DELTA_E`.
     progress : callable, optional
@@ -133,10 +133,9 @@ def write_config(
     Raises
     ------
     Palette4dError
-        Two shots of one name, a base that cannot be used or lacks a process space, a config that is
-        there already, too large an error between the frames: nothing was written then. Or a frame
-        could not be baked, or OpenColorIO refuses the result: then there are whole LUTs, but no
-        config.
+        Nothing was written: two shots have one name, the base is unusable or lacks a process space,
+        a config exists already, or the error between frames is too large. Only LUTs were written: a
+        frame could not be baked, or OpenColorIO refuses the config.
     """
     import PyOpenColorIO as ocio
 
@@ -243,7 +242,7 @@ def _refuse_far(names: list[str], between: list[BetweenError | None]) -> None:
     ]
     if far:
         raise Palette4dError(
-            f"the edit changes too much between the frames with a look: found {'; '.join(far)}; "
+            f"the edit changes too much between the baked frames: found {'; '.join(far)}; "
             f"expected at most {LARGEST_DELTA_E:g}. Choose more frames (a smaller --every), or "
             "write the config with --anyway; nothing was written"
         )
@@ -264,7 +263,7 @@ def _link(
     baked: tuple[int, ...],
     every: tuple[int, ...],
 ) -> None:
-    """Give every frame a file: its own, or a link to that of the nearest baked frame."""
+    """Give every frame a file: its own, or a link to the file of the nearest baked frame."""
 
     def file(frame: object) -> str:
         return f"{name}.{frame}{format_.extension}"
@@ -277,7 +276,7 @@ def _link(
         try:
             place.symlink_to(target)
         except OSError:
-            # A file system without links.
+            # The file system has no links: copy.
             shutil.copyfile(luts / target, place)
 
 
@@ -324,7 +323,7 @@ def _add_looks(
 
 
 def _add_views(config: Any) -> list[tuple[str, str]]:
-    """For every view of colours (not of data) add one with the look of the shot and the frame."""
+    """For every view of colours (not of data) add a view with the look of the shot and frame."""
     added = []
     some_active = config.getNumActiveViews() > 0
     for display in [str(name) for name in config.getDisplays()]:
@@ -349,7 +348,7 @@ def _add_views(config: Any) -> list[tuple[str, str]]:
 
 
 def _validate(config: Any, shots: list[Shot], views: list[tuple[str, str]]) -> None:
-    """Validate a config by OpenColorIO, and make a viewer's processors at each shot's ends."""
+    """Validate a config with OpenColorIO, and build the viewer processors at each shot's ends."""
     import PyOpenColorIO as ocio
 
     config.validate()

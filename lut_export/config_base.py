@@ -1,4 +1,4 @@
-"""The config that looks are added to: a copy of it, its colour space for a shot, its own files."""
+"""The base config: its editable copy, its colour space for a shot, and its own files."""
 
 import os
 import re
@@ -19,7 +19,7 @@ from palette4d.common.errors import Palette4dError
 #: The folder of the LUTs, beside the config.
 LUTS = "luts"
 
-#: The look whose shot and frame are both variables.
+#: The look for all shots: SHOT and FRAME are both variables.
 ANY_SHOT = "palette4d"
 
 
@@ -31,13 +31,13 @@ def load_base(base: str) -> tuple[Any, bool]:
 def space_of_sidecar(config: Any, base: str, sidecar: _core.Sidecar, wanted: str | None) -> str:
     """Return the name of the config's colour space for a sidecar's code values.
 
-    Looked up by name, alias or role, under every name of the encoding; then by OpenColorIO among
-    the colour spaces that convert alike, where the config has the roles for that.
+    The lookup is by name, alias or role, under every name of the encoding. Otherwise OpenColorIO
+    looks for a colour space that converts alike, if the config has the roles for that.
 
     Raises
     ------
     Palette4dError
-        There is none; or the encoding is not known.
+        There is no such colour space, or the encoding is unknown.
     """
     import PyOpenColorIO as ocio
 
@@ -68,12 +68,12 @@ def space_of_sidecar(config: Any, base: str, sidecar: _core.Sidecar, wanted: str
 
 
 def refuse_looks(config: Any, base: str, names: list[str]) -> None:
-    """Refuse a base that has looks of these names, upper and lower case alike.
+    """Refuse a base that has looks of these names, in upper or lower case.
 
     Raises
     ------
     Palette4dError
-        Names the first that is there.
+        The message names the first such look.
     """
     there = {str(name).lower() for name in config.getLookNames()}
     for name in names:
@@ -86,7 +86,7 @@ def refuse_looks(config: Any, base: str, names: list[str]) -> None:
 
 
 def relocate(config: Any, base: str, archive: bool, folder: Path) -> list[str]:
-    """Make the base's own files found from the new place; return notes on that."""
+    """Let the new config find the base's own files; return notes about them."""
     import PyOpenColorIO as ocio
 
     notes: list[str] = []
@@ -99,7 +99,7 @@ def relocate(config: Any, base: str, archive: bool, folder: Path) -> list[str]:
             there = Path(base).absolute().parent
             root = "" if there == folder.absolute() else str(there)
         config.clearSearchPaths()
-        # First: only a base that palette4d wrote can have files of the same names.
+        # Put it first: only a base that palette4d wrote can have files of the same names.
         config.addSearchPath(LUTS)
         for path in own or [""]:
             absolute = Path(path).is_absolute() or path.startswith(("$", "%"))
@@ -108,7 +108,7 @@ def relocate(config: Any, base: str, archive: bool, folder: Path) -> list[str]:
                 config.addSearchPath(found or ".")
         if root and not archive:
             notes.append(f"the base's own files are still read from {root}")
-        # Once a config lists variables, OpenColorIO ignores all others of the environment.
+        # If a config lists variables, OpenColorIO ignores all other environment variables.
         if not list(config.getEnvironmentVarNames()):
             notes += _declare_variables(config)
     else:

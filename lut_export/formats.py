@@ -1,10 +1,10 @@
-"""The formats of files that an edit can be baked to: names, extensions, what they can hold.
+"""The file formats of bakes: names, extensions and abilities.
 
-Two extensions have two formats each, and the first in `FORMATS` is the default:
+Two extensions have two formats each; the first in `FORMATS` is the default:
 
-- .cube: without a shaper both dialects hold the same lines: every program reads the default,
-  Resolve's. Only Resolve's dialect can hold a shaper.
-- .3dl: Flame's is the plain file that most programs read; Lustre's has a header of its own.
+- .cube: Resolve's dialect is the default, and only it can hold a shaper. Without a shaper both
+  dialects have the same lines, which every program reads.
+- .3dl: Flame's dialect is the plain file that most programs read. Lustre's has a header.
 """
 
 import difflib
@@ -28,13 +28,13 @@ class LutFormat:
     Attributes
     ----------
     name : str
-        For ``--format`` and ``--json``; a 3D LUT's is OpenColorIO's own where that is short.
+        For ``--format`` and ``--json``; for 3D LUTs OpenColorIO's name, if it is short.
     title : str
-        For people.
+        The name for people.
     extension : str
         With the dot, lower case.
     readings : tuple of str
-        How hosts may read it, names of `reading.READINGS`; the error is stated for each.
+        The ways in which hosts read it (`bake_error.READINGS`); the error is stated for each.
     rounding : str
         The precision of the file's code values.
     write : callable or None
@@ -42,13 +42,13 @@ class LutFormat:
     shaper : bool
         Whether it can hold a shaper.
     described : bool
-        Whether it can say what it is: comments or metadata.
+        Whether it can describe itself in comments or metadata.
     discrete : bool
-        Whether it holds a list of transforms: also a conversion before and after the 3D LUT.
+        Whether it holds a list of transforms, so also conversions before and after the 3D LUT.
     smallest : int
-        Samples a side.
+        The least number of samples per side.
     powers : bool
-        Only 2^k + 1 samples a side.
+        It allows only 2^k + 1 samples per side.
     """
 
     name: str
@@ -74,7 +74,7 @@ class LutFormat:
         Raises
         ------
         Palette4dError
-            With the sizes that it can.
+            The message lists the sizes that it can hold.
         """
         if size < self.smallest or (self.powers and size not in self.sizes()):
             raise Palette4dError(
@@ -83,16 +83,16 @@ class LutFormat:
             )
 
     def sizes(self) -> list[int]:
-        """Return the sizes 2^k + 1 that it can hold, rising."""
+        """Return the sizes 2^k + 1 that it can hold, in rising order."""
         powers = [2**k + 1 for k in range(8)]
         return [size for size in powers if self.smallest <= size <= LARGEST]
 
     def larger(self, size: int) -> int | None:
-        """Return the next size with half the spacing, at most the largest; None after that."""
+        """Return the next size (half the spacing, at most the largest); None after the largest."""
         return None if size >= LARGEST else min(2 * (size - 1) + 1, LARGEST)
 
 
-# Only the transform formats say how to interpolate; with all others hosts offer either.
+# Only transform formats name the interpolation; for the others hosts offer both kinds.
 _EITHER = ("linear", "tetrahedral")
 _CDL = ("clamped", "not clamped")
 
@@ -149,7 +149,7 @@ def format_named(name: str) -> LutFormat:
     Raises
     ------
     Palette4dError
-        The name is not known; the message lists the near ones, or all.
+        The name is unknown; the message lists similar names, or all.
     """
     wanted = name.lower()
     for known in FORMATS:
@@ -166,13 +166,13 @@ def format_named(name: str) -> LutFormat:
 
 
 def format_of(path: Path, name: str | None = None) -> LutFormat:
-    """Return the format of a file: the one named, else that of its extension.
+    """Return the format of a file: the named format, else the format of its extension.
 
     Raises
     ------
     Palette4dError
-        The extension is not known, the message lists those that are; or it is not that of the
-        format named.
+        The extension is unknown (the message lists the known ones), or does not fit the named
+        format.
     """
     extension = path.suffix.lower()
     if name is not None:
@@ -192,7 +192,7 @@ def format_of(path: Path, name: str | None = None) -> LutFormat:
 
 
 def shaper_warning(name: str) -> str | None:
-    """Return what a user should know of a shaper in a format, None for nothing."""
+    """Return a note for the user about a shaper in a format, or None."""
     if name != "resolve_cube":
         return None
     return (

@@ -1,6 +1,7 @@
 """The edit of a sidecar at one time, as a function of colours.
 
-Only this module of the bakes calls the core; sampling, fitting and measuring take a `FrameEdit`.
+In `lut_export`, only this module calls the core. Sampling, fitting and measuring take a
+`FrameEdit`.
 """
 
 from dataclasses import dataclass
@@ -45,7 +46,7 @@ class FrameEdit:
     palette : (n, 3) float64
         The slice's colours before the edit (eq. 5).
     edited : (n, 3) float64
-        The same colours after it.
+        The same colours after the edit.
     faces : (f, 3) int32
         The slice's triangles.
     strength : float
@@ -53,7 +54,7 @@ class FrameEdit:
     recolourer : Recolourer
         The node's own code for the edit.
     conversion : ColourConversion or None
-        From the colours' space to the palette's; None where they are the same.
+        From the colours' space to the palette's space; None if they are the same.
     """
 
     palette: F64
@@ -69,13 +70,13 @@ class FrameEdit:
         return self.recolourer.identity or self.strength == 0
 
     def apply(self, colours: F32, threads: int = 0) -> F32:
-        """Return the node's result for (h, w, 3) float32 colours; 0 threads: one a processor."""
+        """Return the node's result for (h, w, 3) float32 colours; 0 threads: one per processor."""
         return self.recolourer.apply(
             colours, strength=self.strength, threads=threads, conversion=self.conversion
         )
 
     def exact(self, colours: ArrayLike) -> F64:
-        """Return the (m, 3) float64 replacements of (m, 3) finite colours, nothing rounded."""
+        """Return the (m, 3) float64 results for (m, 3) finite colours, without rounding."""
         points = np.asarray(colours, dtype=np.float64)
         if self.identity:
             return points
@@ -105,7 +106,7 @@ def frame_edit(
     strength : float
         0..1, as in the node.
     conversion : ColourConversion, optional
-        From the space of the edit's colours to the palette's.
+        From the space of the edit's colours to the palette's space.
 
     Raises
     ------

@@ -19,8 +19,8 @@ F32 = NDArray[np.float32]
 #: OpenColorIO reads and writes sizes from 2 to 129.
 SMALLEST, LARGEST = 2, 129
 
-#: Size of the grid that errors are measured on. It is prime: its colours are at every place within
-#: a LUT's cells, whatever the LUT's size, and on no node but the centre.
+#: Size of the dense grid for errors. It is prime: for every LUT size, the grid's colours fall at
+#: many places inside the LUT's cells, and on no node but the centre.
 DENSE = 67
 
 
@@ -31,13 +31,13 @@ class Lut3D:
     Attributes
     ----------
     values : (N, N, N, 3) float32
-        ``values[r, g, b]`` is the colour that replaces the r-th red, g-th green and b-th blue. Blue
-        is fastest in memory: the order of `OpenColorIO.Lut3DTransform.setData` and of CLF.
+        ``values[r, g, b]`` is the output for the r-th red, g-th green and b-th blue. Blue is
+        fastest in memory, as in `OpenColorIO.Lut3DTransform.setData` and in CLF.
     shaper : Shaper
         From code values to the LUT's 0..1.
     steps : tuple of dict
-        A conversion before the shaper, whose inverse follows the LUT (`spaces`), in formats that
-        hold both.
+        A conversion before the shaper, in formats with lists of transforms (`spaces`). Its inverse
+        follows the LUT.
     """
 
     values: F32
@@ -46,7 +46,7 @@ class Lut3D:
 
     @property
     def size(self) -> int:
-        """N, the samples a side."""
+        """N, the samples per side."""
         return int(self.values.shape[0])
 
 
@@ -83,13 +83,13 @@ def sample(
     Parameters
     ----------
     edit : FrameEdit
-        The edit at one time, of the colours that `steps` lead to.
+        The edit at one time, in the colour space after `steps`.
     size : int
         N, 2..129.
     shaper : Shaper
         The domain.
     threads : int
-        0: one a processor; the result does not depend on it.
+        0: one per processor; the result does not depend on it.
     steps : tuple of dict
         See `Lut3D.steps`.
 

@@ -1,11 +1,10 @@
-"""A dated series: the edit at many frames, a file each, and an index of them.
+"""A series: the edit at many frames, one file per frame, and an index of the files.
 
-The index records, for each file, the sidecar's state, the settings and the file's hash. So a series
-can be interrupted and resumed: a file that matches is kept, and a file that does not is replaced
-only with ``force``.
+For each file, the index records the sidecar's state, the settings and the file's hash. So a series
+can be interrupted and resumed. A matching file is kept. A file that does not match is replaced only
+with ``force``.
 
-Frames are baked in other processes or on other machines. Their files come back to this process,
-which alone writes in the folder.
+Other processes or machines bake the frames. Only this process writes in the folder.
 """
 
 import hashlib
@@ -37,7 +36,7 @@ from palette4d.common.files import make_folder, replacing
 from palette4d.common.text import checked_name, file_safe
 from palette4d.jobs.workers import Failed, Workers
 
-#: Seconds between two writings of the index while frames are baked.
+#: Seconds between two updates of the index file while frames are baked.
 INDEX_EVERY = 2.0
 
 
@@ -48,17 +47,17 @@ class Request:
     Attributes
     ----------
     sidecar, folder : Path
-        From where, to where.
+        The input, and the folder for the files.
     frames : tuple of int
-        Rising frame numbers.
+        Frame numbers in rising order.
     settings : BakeSettings
         For every frame. ``format`` must be set.
     name : str or None
-        The files' common name; None: the clip's.
+        The files' common name; None: the clip's name.
     padding : int
         Digits of the frame numbers in the names.
     clip : str or None
-        The clip, for shapers and errors; None: where the sidecar says.
+        The clip, for shapers and errors; None: the clip that the sidecar names.
     force : bool
         Replace files that differ.
     """
@@ -75,7 +74,7 @@ class Request:
 
 @dataclass(frozen=True)
 class Series:
-    """What was exported.
+    """An exported series.
 
     Attributes
     ----------
@@ -84,9 +83,9 @@ class Series:
     document : dict
         Its content.
     baked, kept : list of int
-        Frames whose files were written, and those whose files were there already.
+        Frames whose files were written, and frames whose files were kept.
     failed : dict of int to str
-        What kept the others from being written.
+        The error message of each frame that failed.
     """
 
     index: Path
@@ -114,10 +113,9 @@ def every(sidecar: _core.Sidecar, step: int) -> tuple[int, ...]:
 
 
 def stops(sidecar: _core.Sidecar) -> tuple[int, ...]:
-    """Return the frames at which the edit turns.
+    """Return the frames of the stops, the edited palette colours and their neighbours.
 
-    These are the times of the colour stops and of the edited palette colours, and those of the
-    palette colours beside them, where an edit begins or has faded; each rounded to a frame.
+    At a neighbouring palette colour an edit begins or ends. Each time is rounded to a frame.
 
     Raises
     ------
@@ -147,7 +145,7 @@ def check_frames(sidecar: _core.Sidecar, frames: tuple[int, ...]) -> tuple[int, 
     Raises
     ------
     Palette4dError
-        Names the first that is not.
+        The message names the first frame outside.
     """
     low, high = _limits(sidecar)
     outside = [frame for frame in frames if not low <= frame <= high]
@@ -184,24 +182,25 @@ def export(
     Parameters
     ----------
     requests : sequence of Request
-        What to bake; missing folders are made.
+        The series to bake; missing folders are created.
     workers : Workers, optional
-        Who bakes; they read the sidecars. By default a process for each processor.
+        The processes or the farm that bake; they read the sidecars. By default a process for each
+        processor.
     progress : callable, optional
         Called with (frames done, frames in all), the first time before any is baked.
 
     Returns
     -------
     list of Series
-        One for each request, also when some frames failed.
+        One for each request, even if some frames failed.
 
     Raises
     ------
     Palette4dError
-        Nothing can be baked, or files that differ are there and `force` is false; then nothing was
-        written. `WriteError`: the disk is full, say; the files that are there are whole.
+        Nothing was written: nothing can be baked, or other files exist and `force` is false.
+        `WriteError`: for example, the disk is full; all written files are complete.
     KeyboardInterrupt
-        Ctrl-C; the files that are there are whole, and the indexes list them.
+        Ctrl-C; all written files are complete, and the indexes list them.
     """
     exports = [_Export(request) for request in requests]
     for one in exports:
@@ -232,10 +231,10 @@ def export(
 
 
 class _Export:
-    """A series in progress: what is to be done, and what was done."""
+    """A series in progress: the frames to bake, and the frames that are done."""
 
     def __init__(self, request: Request) -> None:
-        """Refuse what can be refused before the first frame is baked."""
+        """Check the request before the first frame is baked."""
         self.request, settings = request, request.settings
         sidecar = _core.read_sidecar(str(request.sidecar))
         assert settings.format is not None
@@ -253,7 +252,7 @@ class _Export:
         for frame in todo:
             target = request.folder / names[frame]
             if target.exists():
-                # A file without an entry may match: an export that was killed may have left it.
+                # A file without an entry may match: a killed export may have left it.
                 check_target(target, request.force or frame not in known)
         # Absolute: other processes may have another working folder.
         clip = None if request.clip is None else str(Path.cwd() / request.clip)
@@ -267,11 +266,11 @@ class _Export:
 
     @property
     def done(self) -> int:
-        """The number of frames that are there, or failed."""
+        """The number of frames that are done or failed."""
         return len(self.kept) + len(self.baked) + len(self.failed)
 
     def take(self, frame: int, outcome: tuple[Entry, bytes] | Failed) -> None:
-        """Write a file that was baked; note what failed."""
+        """Write a baked file, or record its failure."""
         if isinstance(outcome, Failed):
             self.failed[frame] = outcome.text
             return
@@ -279,7 +278,7 @@ class _Export:
         try:
             _put(self.request.folder / self.tasks[frame].file, data, self.request.force)
         except WriteError:
-            raise  # all others would fail, too
+            raise  # all other files would fail, too
         except Palette4dError as error:
             self.failed[frame] = str(error)
             return
@@ -295,7 +294,7 @@ class _Export:
             write_index(self.index, self.header, self.entries)
 
     def series(self) -> Series:
-        """Return what was exported."""
+        """Return the exported series."""
         document = document_of(self.header, self.entries)
         failed = dict(sorted(self.failed.items()))
         return Series(self.index, document, sorted(self.baked), self.kept, failed)
@@ -334,7 +333,7 @@ def _matches(path: Path, entry: Entry | None) -> bool:
 
 
 def failures_text(failed: dict[int, str]) -> str:
-    """Return what went wrong, a line for each message with the frames that it concerns."""
+    """Return the failures: one line per message, with its frames."""
     by_text: dict[str, list[int]] = {}
     for frame, text in failed.items():
         by_text.setdefault(text, []).append(frame)

@@ -1,4 +1,4 @@
-"""The index of a dated series, ``NAME.series.json`` (docs/files.md)."""
+"""The index of a series, ``NAME.series.json`` (docs/files.md)."""
 
 import hashlib
 import json
@@ -18,7 +18,7 @@ SCHEMA, VERSION = "palette4d.series", 1
 
 Entry = dict[str, Any]
 
-#: What differs when these members of an index differ.
+#: For each member of an index, the words for a difference in it.
 _CHANGED = {
     "schema": "another program",
     "version": "another version of the index",
@@ -28,7 +28,7 @@ _CHANGED = {
 
 
 def header_of(sidecar: _core.Sidecar, path: Path, settings: BakeSettings) -> dict[str, Any]:
-    """Return what an index says of all its files: the sidecar's state and the settings."""
+    """Return the index members for all files: the sidecar's state and the settings."""
     clip = sidecar.clip
     options = {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(settings).items()}
     return {
@@ -51,7 +51,7 @@ def header_of(sidecar: _core.Sidecar, path: Path, settings: BakeSettings) -> dic
 
 
 def entry_of(path: Path, result: BakeResult) -> Entry:
-    """Return what an index says of one file."""
+    """Return the index entry of one file."""
     clip = None if result.clip is None else asdict(result.clip.worst)
     return {
         "frame": int(result.frame),
@@ -74,7 +74,7 @@ def document_of(header: dict[str, Any], entries: dict[int, Entry]) -> dict[str, 
 
 
 def write_index(path: Path, header: dict[str, Any], entries: dict[int, Entry]) -> None:
-    """Replace an index atomically; a line an entry."""
+    """Replace an index atomically; one line per entry."""
     lines = [json.dumps(entry) for entry in document_of(header, entries)["frames"]]
     head = json.dumps(header, indent=2).removesuffix("\n}")
     text = head + ',\n  "frames": [\n    ' + ",\n    ".join(lines) + "\n  ]\n}\n"

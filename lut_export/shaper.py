@@ -6,8 +6,8 @@ before it:
 - "none": the code values themselves, 0..1;
 - "linear": u = (x - low) / (high - low);
 - "log": u = (f(x) - f(low)) / (f(high) - f(low)) with f(x) = log2(x / OFFSET + 1) for x >= 0 and
-  its tangent below. In scene-linear light the nodes are then about even in stops. The curve is
-  straight through black, and a camera style Log of CLF, so that no 1D LUT approximates it.
+  its tangent below. In scene-linear code values the nodes are then about evenly spaced in stops.
+  The curve is straight through black. It is exactly a camera-style Log of CLF, without a 1D LUT.
 
 Colours outside low..high are clamped.
 """
@@ -24,22 +24,22 @@ from palette4d.common.errors import Palette4dError
 F64 = NDArray[np.float64]
 
 Kind = Literal["none", "linear", "log"]
-#: A kind, or "auto": the colours decide.
+#: The kinds of shaper; with "auto" the colours decide.
 Choice = Literal["auto", "none", "linear", "log"]
 
-#: Where the log curve turns from even steps to even ratios: 0.85 stops below middle grey.
+#: The log curve is about linear below this code value, which is 0.85 stops below middle grey.
 OFFSET = 0.1
 
-#: Up to this width of the domain a linear shaper is chosen: log encodings that leave 0..1 a little.
+#: "auto" chooses a linear shaper up to this domain width: log encodings just beyond 0..1.
 LINEAR_WIDTH = 2.0
 
-#: The limit of a sidecar's colours.
+#: The largest colour value that a sidecar allows.
 LARGEST = 1e6
 
 
 @dataclass(frozen=True)
 class Shaper:
-    """A curve from low..high to 0..1; see the module."""
+    """A curve from low..high to 0..1; see the module's docstring."""
 
     kind: Kind = "none"
     low: float = 0.0
@@ -51,8 +51,8 @@ class Shaper:
         Raises
         ------
         Palette4dError
-            low is not below high, a limit is not finite, or there is no shaper for a domain that
-            is not 0..1.
+            low is not below high, a limit is not finite, or kind is "none" and the domain is not
+            0..1.
         """
         if not (-LARGEST <= self.low < self.high <= LARGEST):
             raise Palette4dError(
@@ -114,17 +114,17 @@ class Shaper:
         """
         if self.kind != "log":
             return 1024
-        # The largest second derivative of u is that at 0.
+        # The second derivative of u is largest at 0.
         bend = 1 / (math.log(2) * OFFSET**2 * self._span)
         steps = (self.high - self.low) * math.sqrt(bend / 8 / 1e-5)
         return int(np.clip(2 ** math.ceil(math.log2(max(steps, 1))), 1024, 65536))
 
     def text(self) -> str:
-        """Return a phrase: "none, input 0 to 1"."""
+        """Return a phrase such as "none, input 0 to 1"."""
         return f"{self.kind}, input {self.low:g} to {self.high:g}"
 
 
-#: Code values within 0..1, as they are.
+#: No shaper: code values within 0..1, unchanged.
 UNSHAPED = Shaper()
 
 
@@ -145,8 +145,8 @@ def choose(kind: str, low: float, high: float) -> Shaper:
     Parameters
     ----------
     kind : {"auto", "none", "linear", "log"}
-        "auto" is none where low..high lies within 0..1, linear where it is little more
-        (`LINEAR_WIDTH`) and log otherwise; "none" ignores low and high.
+        "auto" is none if low..high lies within 0..1, linear if its width is at most
+        `LINEAR_WIDTH`, else log. "none" ignores low and high.
     low, high : float
         The smallest and largest code value to cover. 0..1 is always covered, and the limits are
         rounded outwards to two digits.
@@ -165,7 +165,7 @@ def choose(kind: str, low: float, high: float) -> Shaper:
 
 
 def _outwards(value: float) -> float:
-    """Round up to two significant digits: 50.3 -> 51, 1.004 -> 1.1; what is not above 0 stays."""
+    """Round up to two significant digits: 50.3 -> 51, 1.004 -> 1.1; values up to 0 stay."""
     if value <= 0:
         return value
     step = 10.0 ** (math.floor(math.log10(value)) - 1)

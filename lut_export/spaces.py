@@ -1,9 +1,8 @@
-"""In which colour space a baked file takes and returns colours.
+"""The colour space of a baked file's input and output.
 
-A sidecar's palette has one colour space, its clip another or the same, and a file may take and
-return a third. In formats that hold a list of transforms (CLF, CTF) the 3D LUT takes and returns
-the palette's code values, with the conversion before and after it as transforms of their own. In
-all others one 3D LUT contains the conversion.
+The palette, the clip and the file may each have a different colour space. CLF and CTF hold a list
+of transforms: there the 3D LUT is in the palette's colour space, with conversions before and after
+it. In all other formats the 3D LUT contains the conversions.
 """
 
 import json
@@ -26,7 +25,7 @@ from palette4d.common.errors import Palette4dError
 
 F32 = NDArray[np.float32]
 
-#: The words for the spaces that every sidecar has.
+#: Names of the two spaces that every sidecar has.
 INPUT, PALETTE = "input", "palette"
 
 
@@ -37,13 +36,13 @@ class BakeSpace:
     Attributes
     ----------
     name : str
-        For its metadata.
+        The name for the file's metadata.
     steps : tuple of dict
-        The conversion to the palette's colour space; empty where they are the same.
+        The conversion to the palette's colour space; empty if they are the same.
     chain : ColourConversion or None
-        What applies the steps; None for no steps.
+        Applies the steps; None without steps.
     clip : ColourConversion or None
-        From the clip's colour space to the palette's; None where they are the same.
+        From the clip's colour space to the palette's; None if they are the same.
     """
 
     name: str
@@ -70,7 +69,7 @@ class BakeSpace:
 def space_of(
     data: bytes, sidecar: _core.Sidecar, wanted: str, config_name: str | None
 ) -> BakeSpace:
-    """Return the space of a name.
+    """Return the space with this name.
 
     Parameters
     ----------
@@ -79,13 +78,13 @@ def space_of(
     wanted : str
         "input" (the clip's code values), "palette", or a colour space of the config.
     config_name : str or None
-        None: the config that the sidecar names, else ``$OCIO``, else the built-in one.
+        None: the config that the sidecar names, else ``$OCIO``, else the built-in config.
 
     Raises
     ------
     Palette4dError
-        The config cannot be used or lacks one of the spaces, or the conversion between them is
-        more than matrices and curves.
+        The config is unusable or lacks one of the spaces, or the conversion is more than matrices
+        and curves.
     """
     encoding = str(sidecar.clip["encoding"])
     own = sidecar.conversion

@@ -1,8 +1,8 @@
-"""The text of LUT files, written by OpenColorIO, so that others get what its own tools write.
+"""The text of LUT files. OpenColorIO writes it, as its own tools do.
 
-CLF and CTF are written as a list of transforms; the other formats by OpenColorIO's baker, which
-samples a conversion between two colour spaces. Here that conversion is the shaper and the 3D LUT,
-sampled at the LUT's own nodes, where interpolation returns the node's value.
+CLF and CTF are lists of transforms. OpenColorIO's baker writes the other formats: it samples a
+conversion between two colour spaces. Here that conversion is the shaper and the 3D LUT. The baker
+samples it at the LUT's own nodes, where interpolation is exact.
 """
 
 from collections.abc import Callable
@@ -18,20 +18,20 @@ from palette4d.common.errors import Palette4dError
 
 @dataclass(frozen=True)
 class Description:
-    """What a file says about itself.
+    """A file's description of itself.
 
     Attributes
     ----------
     identifier : str
         A URN that is the same for the same content.
     name : str
-        One line: what it is.
+        A title of one line.
     lines : tuple of str
-        Sentences for a reader, a line each.
+        Sentences for a reader, one per line.
     input_space, output_space : str
-        The encoding of the colours that go in and come out.
+        The encodings of the input and output colours.
     info : dict
-        Nested names and values for programs; where the format allows them.
+        Nested names and values for programs, if the format allows them.
     """
 
     identifier: str
@@ -63,7 +63,7 @@ def lut3d(values: Any) -> Any:
 
 
 def nodes(lut: Lut3D) -> list[Any]:
-    """Return OpenColorIO's transforms of a 3D LUT, from its conversion to the inverse of that."""
+    """Return OpenColorIO's transforms of a 3D LUT: conversion, shaper, LUT, inverse conversion."""
     before, after = transforms(lut.steps)
     return [*before, *_shaped(lut), *after]
 
@@ -71,8 +71,8 @@ def nodes(lut: Lut3D) -> list[Any]:
 def _shaped(lut: Lut3D) -> list[Any]:
     """Return the shaper, the 3D LUT and, with a log shaper, the inverse shaper.
 
-    With a log shaper the LUT holds shaped colours: an unedited colour stays the same between nodes,
-    too, however steep the curve.
+    With a log shaper the LUT holds shaped colours. So unedited colours also stay the same between
+    nodes, however steep the curve is.
     """
     import PyOpenColorIO as ocio
 
@@ -136,7 +136,7 @@ def by_baker(format_name: str) -> Writer:
         import PyOpenColorIO as ocio
 
         config = ocio.Config.CreateRaw()
-        # Not "raw": OpenColorIO does not convert data, and the 3D LUT would be the identity.
+        # Not "raw": OpenColorIO does not convert data, so the 3D LUT would be the identity.
         config.addColorSpace(ocio.ColorSpace(name="before"))
         after = ocio.ColorSpace(name="after")
         steps = [*lut.shaper.transforms(), lut3d(lut.values)]

@@ -1,1 +1,1 @@
-"""The methods that section 6.2 of the paper compares with."""
+"""The comparison methods of section 6.2 of the paper."""

@@ -1,8 +1,8 @@
 """The paper's own rules for merging, removal and refinement: `--method paper`.
 
-Merging stops above eta1 times the first block loss (section 5.3.3), removal above eta2 times the
-loss after merging (section 5.4.2). Refinement moves one vertex at a time, and after each cycle all
-of them together (section 5.5), by NLopt with the core's exact gradient.
+Merging stops above eta1 times the first block loss (section 5.3.3). Removal stops above eta2 times
+the loss after merging (section 5.4.2). Refinement moves one vertex at a time, and all vertices
+together after each cycle (section 5.5). It uses NLopt with the core's exact gradient.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def remove_vertices(
     options: AnalysisOptions,
     progress: Counter | None = None,
 ) -> None:
-    """Remove vertices, in place: of the candidates nearest to their ghosts the cheapest first."""
+    """Remove vertices, in place. The candidates are nearest to their ghosts; the cheapest goes."""
     trials = RemovalTrials(dense, frames, options)
     threshold = options.eta2 * float(trials.losses.sum()) + NEGLIGIBLE * len(frames)
     pool = [v for v in range(len(dense.at)) if dense.removable(v)]
@@ -58,7 +58,7 @@ def remove_vertices(
     distance: dict[int, tuple[tuple[int, int], float]] = {}
 
     def ghost_distance(vertex: int) -> float:
-        """Return the distance to the position of the ghost, at the same time."""
+        """Return the distance between the vertex and its ghost at the same time."""
         ends = dense.before[vertex][0], dense.after[vertex][0]
         known = distance.get(vertex)
         if known is None or known[0] != ends:
@@ -92,7 +92,7 @@ def refine_vertices(
     start[:, :3] = gamut.clip(start[:, :3])
     vertices = start
     for cycle in range(options.refinement_cycles):
-        # The first cycles use coarse colours, three times as fast; the last one uses all.
+        # Coarse colours are three times as fast; only the last cycle uses all colours.
         evaluate = fine if cycle == options.refinement_cycles - 1 else coarse
         for v in range(len(vertices)):
             which = evaluate.touched(vertices, [v])

@@ -1,38 +1,34 @@
-"""The convex hull in RGB and time, simplified: what section 6.2 compares with.
+"""The simplified convex hull in RGB and time: a comparison method of section 6.2.
 
-Input: the frames' colours. Output: a `SkewPolytope` whose slices are those of a convex polytope in
-four dimensions that encloses every colour of every frame, apart from the clipping below.
+Input: the frames' colours. Output: a `SkewPolytope` whose slices are the slices of a convex 4D
+polytope. It encloses every colour of every frame, apart from the clipping in step 3.
 
-1. Each frame is reduced to the vertices of its hull, and the hull of all of them in RGB and time is
-   taken (qhull). The clip's length is one unit of time, as everywhere in the paper; neither the
-   hull nor the order in which its edges are contracted depends on that unit.
-2. It is simplified as Tan et al. (2016) do in three dimensions: the edge whose contraction adds the
-   least volume goes, its new vertex minimises that volume under the constraint that everything
-   stays enclosed. New vertices keep to the clip's range of time, so that nothing has to be cut off
-   there: every frame's colours lie in the hull, those of the first and the last in facets of it.
-   While it is possible they also keep near the gamut, since a vertex that is clipped from afar lets
-   many colours out (`OVERSHOOT`).
-   The convex hull is taken again whenever a fifth of the vertices are gone; without that, concave
-   places keep most edges from being contracted.
-3. The vertices are clipped to the gamut, as in Tan et al., and their times moved to the nearest
-   frame, so that every change of topology falls on a frame. Both may let colours of the clip out;
-   on SEASONS no loss changes by more than 0.002 through the times. The convex hull is taken once
-   more.
+1. qhull computes the hull of the vertices of all frame hulls in RGB and time. The clip's length is
+   one unit of time, as in the paper. The result does not depend on that unit.
+2. The hull is simplified as by Tan et al. (2016), but in 4D. Each step contracts the edge that adds
+   the least volume. The new vertex minimises that volume and keeps all colours enclosed.
+   New vertices stay inside the clip's time range, so nothing is cut off at its ends. Where possible
+   they also stay near the gamut: clipping a far vertex leaves many colours outside (`OVERSHOOT`).
+   After each loss of a fifth of the vertices the convex hull is computed again. Otherwise
+   concavities would block most contractions.
+3. The vertices are clipped to the gamut, as by Tan et al., and moved to the nearest frame. So the
+   topology changes only at frames. Both moves may leave colours of the clip outside. On SEASONS the
+   move in time changes no loss by more than 0.002. Then the convex hull is computed once more.
 
-In terms of the sidecar: the slice of a convex polytope changes its topology at every vertex, and
-nowhere else. Each vertex time is a block of one frame, the frames between two vertex times are a
-block, and the transitions between these blocks have the tracks and faces of the longer one. Where
-all colours pass a vertex time one to one (always in the plane, and in a clip that does not change)
-the block runs through it. Tracks are the hull's edges; faces are the slices of its facets, polygons
-that stay flat and convex between two vertex times, each cut into triangles in one way. All slices
-are closed, convex and oriented outwards.
+In the sidecar: the slice of a convex polytope changes its topology exactly at the vertices. Each
+vertex time is a block of one frame, and the frames between two vertex times are a block. A
+transition between two blocks has the tracks and faces of the longer block. If all colours pass a
+vertex time one to one, the block continues through it. This always holds in a plane and in a clip
+that does not change. Tracks are the hull's edges. Faces are slices of its facets: polygons that
+stay flat and convex between two vertex times, with one fixed triangulation. All slices are closed,
+convex and oriented outwards.
 
-A slice that fills no volume, which the first and last may be (a fade from black) or all are (grey
-or two-coloured clips), has one colour, two colours or a two-sided polygon, as other palettes do.
-Colours within half an 8-bit step of a flat space over time (a colour, line or plane that may move
-at constant speed) are moved into it, which may take them out of the gamut by as much.
+A slice without volume has one colour, two colours or a two-sided polygon, as in other palettes.
+The first or last slice may be flat (a fade from black), or all slices (grey or two-coloured clips).
+Colours within half an 8-bit step of a flat space over time are moved into that space. The space is
+a colour, line or plane that may move at constant speed. The move may leave the gamut by as much.
 
-A solid clip needs four vertices at either end: fewer than eight are not reached.
+A solid clip needs four vertices at either end, so it never has fewer than eight.
 """
 
 from __future__ import annotations
@@ -56,21 +52,21 @@ F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
 I64 = NDArray[np.int64]
 Cut = tuple[int, ...]
-"""What a slice passes: a vertex (v,), or an edge (u, w), u earlier than w."""
+"""A part of the hull that a slice cuts: a vertex (v,), or an edge (u, w), u earlier than w."""
 
 VERTICES = 20
 LEAST_VERTICES = 8
-# The convex hull is taken anew when this share of the vertices is left.
+# The convex hull is recomputed when this share of the vertices is left.
 ROUND = 0.8
 # How far beyond the gamut a new vertex may lie, in units of the gamut, before it is clipped.
 OVERSHOOT = 0.3
 EXACTLY_FLAT = 1e-9
-# Hulls whose facets qhull could not tell apart are told apart by moving colours this little.
+# If qhull cannot separate the facets of a hull, its colours are moved by this much.
 JITTERS = (0.0, 1e-9, 1e-7, 1e-5)
 
 
 class _IllFormedError(Palette4dError):
-    """A hull whose facets, by rounding, do not fit together."""
+    """Rounding has left a hull whose facets do not fit together."""
 
     def __init__(self) -> None:
         super().__init__(
@@ -91,8 +87,9 @@ def rgbt_polytope(
     Parameters
     ----------
     frames : at least one frame, in order of time.
-    gamut : vertices are clipped to it.
-    vertices : the most 4D vertices wanted, at least `LEAST_VERTICES`. Clipping may leave fewer.
+    gamut : the box that vertices are clipped to.
+    vertices : the largest number of 4D vertices, at least `LEAST_VERTICES`. Clipping may leave
+        fewer.
     progress : called as progress(done, total) while vertices are removed.
 
     Raises
@@ -138,8 +135,8 @@ def simplified(
     """Return at most `vertices` points, between the frames `first` and `last`, around the (n, 4)
     points.
 
-    More are left only where the hull of the points cannot be simplified so far. Points that fill
-    nothing (see `THIN`) come back moved into the flat space around them.
+    More points are left only if the hull cannot be simplified further. Points without volume (see
+    `THIN`) are moved into the flat space around them.
     """
     flat = _Flat.around(_normalised(points, first, last, gamut), THIN)
     hull = _hull(flat.coordinates)
@@ -147,7 +144,7 @@ def simplified(
     if hull.points.shape[1] > 1:
         limits = flat.limits((gamut.high - low) / scale)
         hull = _simplify(hull, vertices, limits, progress)
-        hull = _simplify(hull, vertices, limits[:2])  # time alone, where that was not enough
+        hull = _simplify(hull, vertices, limits[:2])  # limits in time alone, if too many are left
     unit = flat.back(hull.points)
     return np.column_stack([low + scale * unit[:, :3], first + (last - first) * unit[:, 3]])
 
@@ -155,13 +152,13 @@ def simplified(
 def convex_polytope(points: F64, frames: F64, scale: float = 1.0) -> SkewPolytope:
     """Return the 4D convex hull of (n, 4) points (r, g, b, frame) as a skew polytope.
 
-    Points that fill nothing are moved into the flat space that they nearly fill (see `THIN`).
+    Points without volume are moved into the flat space that they nearly fill (see `THIN`).
 
     Parameters
     ----------
-    points : their times are all among `frames`, and the first and last frame are among the times.
-    frames : (m,) frame numbers, increasing, at least two; each will lie in a block.
-    scale : the size of the colours; what is flat is told by it.
+    points : every time is one of `frames`; the first and the last frame both occur.
+    frames : (m,) frame numbers, increasing, at least two; each lies in a block of the result.
+    scale : the size of the colours; the tolerance for flat points is relative to it.
 
     Raises
     ------
@@ -194,8 +191,8 @@ def convex_polytope(points: F64, frames: F64, scale: float = 1.0) -> SkewPolytop
 class _Hull:
     """A convex hull in d dimensions.
 
-    `points` (n, d) are its vertices, rows `used` of what it was made from; `simplices` (m, d) its
-    triangulated facets; `facets` (m,) says which facet each simplex is a part of.
+    `points` (n, d) are its vertices, rows `used` of the input points. `simplices` (m, d) are its
+    triangulated facets. `facets` (m,) is the facet that each simplex belongs to.
     """
 
     points: F64
@@ -217,7 +214,7 @@ def _hull(points: F64) -> _Hull:
     if points.shape[1] == 1:
         ends = np.array([np.argmin(points[:, 0]), np.argmax(points[:, 0])])
         return _Hull(points[ends], ends, np.array([[0], [1]]), np.array([0, 1]))
-    # Nearly flat or nearly equal points may have facets that do not close; joggled, they do.
+    # Facets of nearly flat or nearly equal points may not close; qhull's joggling closes them.
     for settings in ("Qt", "QJ"):
         try:
             hull = ConvexHull(points, qhull_options=settings)
@@ -259,7 +256,7 @@ def _simplify(
 
 
 def _normalised(points: F64, first: float, last: float, gamut: Gamut) -> F64:
-    """Colours with the gamut as one unit, and times with the clip as one."""
+    """Colours in units of the gamut, and times in units of the clip's length."""
     colours = (points[:, :3] - gamut.low) / gamut.scale
     return np.column_stack([colours, (points[:, 3] - first) / (last - first)])
 
@@ -283,7 +280,7 @@ class _Flat:
         with_time = np.column_stack([np.ones_like(t), t])
         (origin, drift), *_ = np.linalg.lstsq(with_time, points[:, :3], rcond=None)
         axes = _axes(points[:, :3] - origin - t * drift, tolerance)
-        if len(axes) == 3:  # nothing to leave out: the colours are their own coordinates
+        if len(axes) == 3:  # a solid clip: the colours are their own coordinates
             origin, drift, axes = np.zeros(3), np.zeros(3), np.eye(3)
         along = (points[:, :3] - origin - t * drift) @ axes.T
         return cls(np.column_stack([along, t]), origin, drift, axes)
@@ -325,7 +322,7 @@ def _extremes(rgb: F64, scale: float) -> F64:
         return rgb[:1]
     try:
         return rgb[_hull(rgb @ axes.T if len(axes) < 3 else rgb).used]
-    except _IllFormedError:  # too thin for a hull: the clip's own may still tell them apart
+    except _IllFormedError:  # too thin for a hull; the clip's own hull may still separate them
         return rgb
 
 
@@ -368,7 +365,7 @@ def _nearest(numbers: F64, times: F64) -> F64:
 class _Lattice:
     """The vertices, edges and facets of a hull in d dimensions, the last of which is time.
 
-    `shape` are the vertices as the hull sees them, told apart and normalised.
+    `shape` are the normalised vertices without duplicates, as the hull uses them.
     """
 
     def __init__(self, vertices: F64, hull: _Hull, shape: F64) -> None:
@@ -383,7 +380,7 @@ class _Lattice:
                 around.setdefault((u, w), set()).add(facet)
         if self.dimensions == 1:
             around[tuple(sorted((0, 1), key=self._place))] = set()
-        # Fewer facets meet in what only triangulation put there: diagonals of flat facets.
+        # Fewer facets meet in the diagonals that triangulation adds to flat facets.
         self.facets = {
             cut: facets
             for cut, facets in sorted(around.items())
@@ -394,7 +391,7 @@ class _Lattice:
         return int(self.level[v]), v
 
     def at_level(self, i: int) -> list[Cut]:
-        """What the slice at the i-th vertex time passes."""
+        """Return the vertices and edges that the slice at the i-th vertex time cuts."""
         level = self.level
         return [
             c
@@ -403,7 +400,7 @@ class _Lattice:
         ]
 
     def after_level(self, i: int) -> list[Cut]:
-        """What slices between the i-th vertex time and the next pass."""
+        """Return the edges that slices between the i-th vertex time and the next one cut."""
         level = self.level
         return [c for c in self.facets if len(c) == 2 and level[c[0]] <= i < level[c[1]]]
 
@@ -445,7 +442,7 @@ class _Lattice:
 class _Run:
     """Slices of one topology: from the vertex time `start` to the vertex time `end` (indices).
 
-    Tracks are chains of vertices; `opens` and `closes` say whether the ends belong to it.
+    Tracks are chains of vertices. `opens` and `closes`: whether the start and the end belong to it.
     """
 
     start: int
@@ -488,7 +485,7 @@ def _sections(lattice: _Lattice, frames: F64) -> SkewPolytope:
 
 
 def _passing(lattice: _Lattice, run: _Run, cuts: list[Cut], i: int) -> list[int]:
-    """Return which of the cuts at the i-th vertex time each track of a run beside it passes."""
+    """Return, for each track of a neighbouring run, its cut at the i-th vertex time."""
     place = {cut: n for n, cut in enumerate(cuts)}
     end = -1 if run.end == i else 0
     out = []
@@ -501,8 +498,8 @@ def _passing(lattice: _Lattice, run: _Run, cuts: list[Cut], i: int) -> list[int]
 
 
 def _join(before: _Run, after: _Run, ends: list[int], starts: list[int]) -> bool:
-    """Let `before` go on through `after` where every colour does, and the faces stay."""
-    follower = [starts.index(n) for n in ends]  # the track of `after` that each goes on in
+    """Join `after` to `before` if every colour continues and the faces stay the same."""
+    follower = [starts.index(n) for n in ends]  # the track of `after` that continues each track
     place = {track: n for n, track in enumerate(follower)}
     renamed = {_rotated([place[n] for n in face]) for face in after.faces.tolist()}
     if renamed != {_rotated(face) for face in before.faces.tolist()}:
@@ -524,7 +521,7 @@ def _assembled(lattice: _Lattice, sequence: list[_Run], frames: F64) -> SkewPoly
     times = lattice.times
     blocks: list[Section] = []
     transitions: list[Section] = []
-    pending: _Run | None = None  # the run that the next block is entered through
+    pending: _Run | None = None  # the run just before the next block
     for run in sequence:
         first, last = times[run.start], times[run.end]
         covered = frames[(frames > first) & (frames < last)]
@@ -532,7 +529,7 @@ def _assembled(lattice: _Lattice, sequence: list[_Run], frames: F64) -> SkewPoly
         ends = [last] if run.closes else covered[-1:].tolist()
         whole = sorted([*begins, *ends])
         if not whole:
-            pending = run  # no frame of its own: a transition alone
+            pending = run  # without frames of its own the run is only a transition
             continue
         if blocks:
             inner = run if not run.opens else pending

@@ -1,8 +1,8 @@
-"""One palette for the whole clip, as section 6.2 compares with: a static, refined RGB hull.
+"""One palette for the whole clip: the static, refined RGB hull of section 6.2.
 
-Input: the colours of all frames. Output: `SkewPolytope`s of one block whose colours do not change;
-each colour has a vertex at the first and one at the last frame, the two keyframes of section 6.2.
-They are refined by the loss of every frame (eq. 8).
+Input: the colours of all frames. Output: `SkewPolytope`s of one block whose colours do not change.
+Each colour has one vertex at the first and one at the last frame, the keyframes of section 6.2.
+Refinement uses the loss of every frame (eq. 8).
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from palette4d.analysis.polytope import Palette, Section, SkewPolytope
 F64 = NDArray[np.float64]
 
 EVALUATIONS = 100
-# All frames together keep so many times as many coarse colours as one frame.
+# All frames together keep this many times the coarse colours of one frame.
 POOLED = 2
 # Static hulls start from all of these colours, a half, a quarter.
 STARTS = 3
-# In clips of fewer frames little moves, and a static hull is hard to beat: all starts are tried.
+# In shorter clips little moves and a static hull is hard to beat, so all starts are tried.
 SHORT = 48
 
 
@@ -51,8 +51,10 @@ def plain_hulls(
 
 
 def plain_options(options: AnalysisOptions) -> Iterator[AnalysisOptions]:
-    """Yield options without terms for shape, with wide boxes: one, one that keeps `convexity`, and
-    one that starts farther from the simplified hull. Each is the best by far on some clips."""
+    """Yield options with wide boxes and without shape terms. Each is by far the best on some clips.
+
+    The second keeps `convexity`; the third starts farther from the simplified hull.
+    """
     for convexity, start in ((0.0, 1.0), (options.convexity, 1.0), (0.0, 2.0)):
         yield dataclasses.replace(
             options,
@@ -76,7 +78,7 @@ def static_polytope(
         return SkewPolytope(vertices, (Section(first, last, tuple(tracks), faces),), ())
 
     faces = palette.faces
-    # A track of one vertex is a colour that stays.
+    # A track of one vertex is a constant colour.
     still = polytope(
         np.column_stack([palette.rgb, np.full(count, first)]), [(i,) for i in range(count)]
     )
@@ -90,9 +92,9 @@ def static_polytope(
 
 
 def _unfolded(rgb: F64, faces: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return the faces of the convex hull of the colours, if all of them are its corners.
+    """Return the faces of the colours' convex hull, if every colour is a corner of it.
 
-    The losses see the convex hull only: without `convexity` the mesh may fold as its colours move.
+    The losses measure the convex hull only: without `convexity` the mesh may fold.
     """
     spread = np.linalg.svd(rgb - rgb.mean(axis=0), compute_uv=False)
     if len(rgb) < 4 or spread[2] < THIN:

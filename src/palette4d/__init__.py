@@ -5,8 +5,8 @@
 >>> doc.set_near((0.9, 0.5, 0.2), frame=30, rgb=(0.7, 0.2, 0.9))  # doctest: +SKIP
 >>> doc.save()                                                # doctest: +SKIP
 
-What `__all__` names is public, and documented in docs/python.md; everything else may change.
-Importing this module is quick: each name loads what it needs when it is first used.
+The names in `__all__` are public and documented in docs/python.md; all others may change. Importing
+this module is quick: each name loads its modules at its first use.
 """
 
 import importlib
@@ -62,7 +62,7 @@ def load(path: str | os.PathLike[str]) -> "Document":
     Raises
     ------
     SidecarError
-        There is no such file, or it is unusable.
+        The file is missing or unusable.
     """
     from palette4d.grade.document import Document
 
@@ -88,15 +88,15 @@ def analyze(
     Parameters
     ----------
     clip : str, path, clip or array
-        What `open_clip` opens, or what it has opened, or an array (frames, height, width, 3) of
-        float code values, 0..1 as a rule. The frame numbers of an array are its indices. The next
+        A path or pattern for `open_clip`, an opened clip, or an array (frames, height, width, 3) of
+        float code values, usually 0..1. The frame numbers of an array are its indices. The next
         three parameters are for files.
     frames : str, optional
         Only these frames of a file or folder, evenly spaced: "1001-1100x2".
     rate : Fraction, optional
-        Frames a second; by default what the files say, or 24.
+        Frames per second; by default the files' rate, or 24.
     skip_bad_frames : bool
-        Pass over missing and unreadable frames instead of stopping at the first.
+        Skip missing and unreadable frames instead of stopping at the first.
     allow_cuts : bool
         Analyse a clip with sudden cuts as one shot instead of refusing it.
     input_space, palette_space, ocio_config : str, optional
@@ -104,17 +104,17 @@ def analyze(
         (docs/colour_spaces.md). Without them, and without ``$OCIO``, the palette has the clip's
         code values.
     progress : callable, optional
-        Called as ``progress(stage, done, total)``; `print` will do.
+        Called as ``progress(stage, done, total)``, for example `print`.
     method : {"skew", "paper", "static", "rgbt"}
-        The default is the one to use; the others are for comparison.
+        Use the default; the others are for comparison.
     **settings
-        Numbers that `palette4d analyze --help-all` lists, such as ``vertices=16``; "lambda" is
+        The settings of `palette4d analyze --help-all`, such as ``vertices=16``; write "lambda" as
         ``lambda_``.
 
     Returns
     -------
     Document
-        Not yet saved; its ``notes`` say what the analysis noticed.
+        Not yet saved; its ``notes`` are the notes of the analysis.
 
     Raises
     ------

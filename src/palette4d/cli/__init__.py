@@ -1,1 +1,1 @@
-"""The command `palette4d`: one module a verb."""
+"""The command `palette4d`. Each verb is one module."""

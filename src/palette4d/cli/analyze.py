@@ -85,7 +85,7 @@ def _settings_help() -> list[str]:
     """Return the lines that explain `--set`, from the table of options."""
     lines = []
     for name, option in OPTIONS.items():
-        if name == "vertices":  # an option of its own
+        if name == "vertices":  # it has its own option
             continue
         of = "" if len(option.methods) == len(METHODS) else f"; {', '.join(option.methods)}"
         lines.append(f"  {name:<19} {option.text}")
@@ -232,7 +232,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _options(args: argparse.Namespace) -> AnalysisOptions:
-    """Return the options; one without effect on the method is wrong usage."""
+    """Return the options; an option without effect on the method is wrong usage."""
     given: dict[str, Any] = dict(map(parse_setting, args.settings))
     if args.vertices is not None:
         given["vertices"] = args.vertices
@@ -244,7 +244,7 @@ def _options(args: argparse.Namespace) -> AnalysisOptions:
 
 
 class _Bars:
-    """A progress bar a stage, and the seconds that each took."""
+    """One progress bar per stage, and the seconds of each stage."""
 
     def __init__(self, hidden: bool) -> None:
         self.hidden = hidden

@@ -1,4 +1,4 @@
-"""The part of `analyze` that takes many shots: an edit, or a movie with cuts."""
+"""The verb `analyze` for many shots: an edit, or a movie with cuts."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def _names(text: str) -> tuple[str, ...]:
 
 
 def is_show(args: argparse.Namespace) -> bool:
-    """Whether many shots are asked for; options that do not go together are wrong usage."""
+    """Whether to analyse many shots; options that conflict are wrong usage."""
     edit = is_timeline(args.clip)
     for_edits = {"--media": args.media is not None, "--handles": args.handles is not None}
     for_shows = {
@@ -108,7 +108,7 @@ def _refuse(args: argparse.Namespace, given: dict[str, bool], needs: str) -> Non
 
 
 def run(args: argparse.Namespace, options: AnalysisOptions) -> int:
-    """Analyse many shots; print what was written, and raise what failed."""
+    """Analyse many shots; print the written files, and raise an error for failed shots."""
     from palette4d.jobs.workers import Workers
     from palette4d.shows import batch
 
@@ -143,7 +143,7 @@ def run(args: argparse.Namespace, options: AnalysisOptions) -> int:
 
 
 def _spaces(args: argparse.Namespace) -> SpaceOptions:
-    """Return the colour spaces with the config by name: workers may run elsewhere."""
+    """Return the colour spaces with the config's name: workers may run on other machines."""
     from palette4d.media.colour_space import SpaceOptions
 
     config = args.ocio_config or os.environ.get("OCIO") or None
@@ -187,7 +187,7 @@ def _of_movie(args: argparse.Namespace, hidden: bool) -> tuple[Source, list[Shot
 
 
 def report(done: Show) -> list[str]:
-    """Return the lines that say what was written."""
+    """Return the report on the written files."""
     from palette4d.shows.manifest import DONE
 
     entries = [entry for entry in done.manifest.entries if entry.status == DONE]
@@ -211,7 +211,7 @@ def report(done: Show) -> list[str]:
 
 
 def failures(done: Show) -> str:
-    """Return what failed, a line a shot; "" when nothing did."""
+    """Return the failures, one line per shot, or ""."""
     from palette4d.shows.manifest import FAILED
 
     failed = [entry for entry in done.manifest.entries if entry.status == FAILED]

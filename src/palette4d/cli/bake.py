@@ -59,7 +59,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Bake; print what was written and its error."""
+    """Bake; print the written file and its error."""
     from palette4d.lut_export.bake import bake
     from palette4d.lut_export.formats import format_named, format_of
 
@@ -93,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _to_stdout(data: bytes, format_: LutFormat) -> None:
-    """Write everything or raise; past Python's buffer, which would fail again at exit."""
+    """Write everything or raise; bypass Python's buffer, which would fail again at exit."""
     rest = memoryview(data)
     try:
         sys.stdout.flush()
@@ -110,7 +110,7 @@ def _to_stdout(data: bytes, format_: LutFormat) -> None:
 
 
 def report(result: BakeResult) -> Iterator[str]:
-    """Yield the lines that say what was written and its error."""
+    """Yield the report on the written file and its error."""
     from palette4d.lut_export.bake_error import table
     from palette4d.lut_export.frame_edit import frame_text
 
@@ -139,7 +139,7 @@ def report(result: BakeResult) -> Iterator[str]:
 
 
 def warnings(result: BakeResult, format_: LutFormat) -> Iterator[str]:
-    """Yield what a user should know beside the figures."""
+    """Yield the notes and warnings for the user."""
     from palette4d.lut_export.bake import nearer
     from palette4d.lut_export.bake_error import stated
     from palette4d.lut_export.formats import shaper_warning, with_shaper

@@ -59,14 +59,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the config; print what is in it."""
+    """Write the config; print its content."""
     from palette4d.lut_export.bake_job import BakeSettings
     from palette4d.lut_export.config import write_config
     from palette4d.lut_export.formats import format_named
     from palette4d.shows import export_luts
 
     sidecars, notes = export_luts.sidecars(args.sidecars)
-    # A manifest is a show, also one of a single shot.
+    # A manifest with a single shot is a show, too.
     show = len(sidecars) > 1 or sidecars != args.sidecars
     if args.clip is not None and len(sidecars) > 1:
         args.usage_error("--clip names one clip; with several sidecars each must name its own")
@@ -93,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def as_json(done: WrittenConfig) -> dict[str, object]:
-    """Return what was written as plain JSON values."""
+    """Return the result as plain JSON values."""
     shots = [
         {
             "look": shot.name,
@@ -116,7 +116,7 @@ def as_json(done: WrittenConfig) -> dict[str, object]:
 
 
 def report(done: WrittenConfig) -> list[str]:
-    """Return the lines that say what was written."""
+    """Return the report on the config."""
     from palette4d.common.text import counted
     from palette4d.lut_export.bake_error import stated
 

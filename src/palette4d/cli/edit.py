@@ -136,7 +136,7 @@ def _add_reset(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
 
 
 def run_set(args: argparse.Namespace) -> int:
-    """Give a vertex, a stop, or an edge at a frame a colour."""
+    """Set the colour of a vertex, a stop, or an edge at a frame."""
     document = _load(args)
     if (args.near is None) == (args.id is None):
         raise Palette4dError(

@@ -80,9 +80,9 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
 def chosen_frames(
     args: argparse.Namespace, sidecar: _core.Sidecar, *, show: bool = False
 ) -> tuple[int, ...]:
-    """Return the frames that --every, --stops or --frames name; all without any of them.
+    """Return the frames of --every, --stops or --frames; without these options, all frames.
 
-    In a show, --stops of a shot that is not edited is its first frame.
+    In a show, --stops of an unedited shot gives its first frame.
     """
     from palette4d.lut_export import series
 
@@ -96,7 +96,7 @@ def chosen_frames(
 
 
 def run(args: argparse.Namespace) -> int:
-    """Export; print what was written."""
+    """Export; print the written files."""
     from palette4d import _core
     from palette4d.lut_export import series
     from palette4d.lut_export.bake_job import BakeSettings
@@ -132,7 +132,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _check_show(args: argparse.Namespace, show: bool) -> None:
-    """Refuse options that do not go with a manifest, or only with one, as wrong usage."""
+    """Refuse options that conflict with a manifest, or that need one, as wrong usage."""
     if not show:
         if args.otio is not None:
             args.usage_error("--otio needs the manifest of a show (.shots.json)")
@@ -176,7 +176,7 @@ def _run_show(args: argparse.Namespace, request: Request) -> int:
 
 
 def report(done: Series) -> list[str]:
-    """Return the lines that say what was written."""
+    """Return the report on the written files."""
     from palette4d.lut_export.bake_error import stated
 
     listed = {entry["frame"]: entry for entry in done.document["frames"]}
@@ -202,7 +202,7 @@ def report(done: Series) -> list[str]:
 
 
 def warn(done: list[Series]) -> None:
-    """Say what a user should know beside the figures."""
+    """Print the notes and warnings for the user."""
     from palette4d.colour.difference import VISIBLE
     from palette4d.lut_export.bake import nearer
     from palette4d.lut_export.bake_error import stated

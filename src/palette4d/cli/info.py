@@ -1,4 +1,4 @@
-"""The verb `info`: what a sidecar holds."""
+"""The verb `info`: the content of a sidecar."""
 
 import argparse
 import json
@@ -33,7 +33,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print what a sidecar holds."""
+    """Print the content of a sidecar."""
     from palette4d.grade.document import Document
 
     info = info_of(Document.load(args.sidecar).fields())
@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def info_of(fields: dict[str, Any]) -> dict[str, Any]:
-    """Return what ``palette4d info --json`` prints; docs/sidecar.md explains the words."""
+    """Return the output of ``palette4d info --json``; docs/sidecar.md explains the names."""
     clip, polytope = fields["clip"], fields["polytope"]
     frames = clip["frames"]
     edited = {entry["vertex"]: entry["rgb"] for entry in fields["edits"]["vertices"]}
@@ -108,7 +108,7 @@ def _print_head(info: dict[str, Any]) -> None:
 
 
 def _print_stages(stages: list[dict[str, Any]]) -> None:
-    """Print the figures that stages share as a table, and those of one stage alone below it."""
+    """Print a table of the figures that stages share; below it, figures of single stages."""
     if not stages:
         return
     every = dict.fromkeys(name for stage in stages for name in stage if name != "stage")

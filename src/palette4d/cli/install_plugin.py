@@ -1,4 +1,4 @@
-"""The verb `install-plugin`: the OpenFX node, and what Kdenlive and Shotcut need to show it."""
+"""The verb `install-plugin`: the OpenFX node, and its files for Kdenlive and Shotcut."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Install, and say what to do in the host."""
+    """Install, and print the next steps in the host."""
     if args.dest or not (args.kdenlive or args.shotcut):
         _install_node(args)
     elif args.link:

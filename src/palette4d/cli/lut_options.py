@@ -10,7 +10,7 @@ from palette4d.lut_export.formats import format_named
 
 
 def wide_help(prog: str) -> argparse.HelpFormatter:
-    """Return the formatter of the exports' help, as wide as their epilogs."""
+    """Return the help formatter of the exports, with the width of their epilogs."""
     return argparse.RawDescriptionHelpFormatter(prog, max_help_position=26, width=100)
 
 

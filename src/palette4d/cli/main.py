@@ -1,4 +1,4 @@
-"""The command ``palette4d``: one parser, one verb a module.
+"""The command ``palette4d``: one parser; each verb is one module.
 
 A verb's module has ``add_parser(subparsers)``, which sets ``run`` as the parser's default; ``run``
 takes the parsed arguments and returns the exit status.
@@ -14,7 +14,7 @@ from palette4d._core import __version__
 from palette4d.common.arguments import Parser, accept_negative_values
 from palette4d.common.errors import Palette4dError, SidecarError, in_words
 
-#: The modules of the verbs, in the order of a day's work (and of ``palette4d --help``).
+#: The modules of the verbs, in the usual order of work (and of ``palette4d --help``).
 VERB_MODULES = (
     "palette4d.cli.sample_clip",
     "palette4d.cli.analyze",
@@ -61,7 +61,7 @@ def build_parser() -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status.
 
-    0 done, 1 an error that was reported on stderr, 2 wrong usage, 130 interrupted.
+    0: done; 1: an error, reported on stderr; 2: wrong usage; 130: interrupted.
 
     Raises
     ------
@@ -74,8 +74,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         status = run(args)
         sys.stdout.flush()
     except BrokenPipeError:
-        # The reader of our output went away (`palette4d info … | head`): not our error, but
-        # Python would complain when it flushes stdout at exit.
+        # The reader of our output has ended (`palette4d info … | head`). This is no error, but
+        # Python would report one when it flushes stdout at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except (Palette4dError, OSError) as error:

@@ -50,7 +50,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 
 def run(args: argparse.Namespace) -> int:
-    """Draw the picture, and print where it is."""
+    """Draw the picture, and print its path."""
     from palette4d.common.errors import Palette4dError
     from palette4d.plotting import plot
 

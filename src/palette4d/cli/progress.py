@@ -10,21 +10,21 @@ from collections.abc import Callable, Iterator
 def frames_bar(
     what: str, *, hidden: bool, total: int | None = None
 ) -> Iterator[Callable[..., None]]:
-    """Show a tqdm bar on standard error; after an error, nothing is left of it.
+    """Show a tqdm bar on standard error; after an error the bar disappears.
 
     Parameters
     ----------
     what : str
-        Stands before the bar.
+        The text before the bar.
     hidden : bool
-        No bar at all; there is none either where standard error is no terminal.
+        Show no bar. There is also no bar if standard error is not a terminal.
     total : int, optional
-        Frames in all, where they are known from the start.
+        Number of frames, if known from the start.
 
     Yields
     ------
     callable
-        To be called with (frames done, frames in all) and, optionally, words instead of `what`.
+        Call it with (frames done, frames in all) and, optionally, a text instead of `what`.
     """
     from tqdm import tqdm
 
@@ -32,7 +32,7 @@ def frames_bar(
 
         def progress(done: int, total: int, words: str = what) -> None:
             if bar.total != total:
-                # Frames that are there already cost no time: the bar starts after them.
+                # Frames that were done before cost no time: the bar starts after them.
                 bar.total, bar.initial, bar.n = total, done, done
             bar.set_description(words, refresh=False)
             bar.update(done - bar.n)
@@ -41,5 +41,5 @@ def frames_bar(
         try:
             yield progress
         except Exception:
-            bar.leave = False  # the error is what remains
+            bar.leave = False  # only the error message remains
             raise

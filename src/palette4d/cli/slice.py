@@ -82,8 +82,8 @@ def _frames(text: str, document: Document) -> list[int]:
 
 
 def _as_json(palette: Palette) -> dict[str, Any]:
-    """``tracks`` says where each colour lies: ``edge`` is None on a vertex, ``weight`` is that of
-    ``to`` (eq. 6)."""
+    """Return the slice as JSON values. ``tracks``: the place of each colour; ``edge`` is None on
+    a vertex, ``weight`` is the weight of ``to`` (eq. 6)."""
     return {
         "frame": palette.frame,
         "vertices": palette.rgb.tolist(),

@@ -1,4 +1,4 @@
-"""Colours as the command line prints them: numbers, #rrggbb, and a patch on terminals."""
+"""Colours in the output of the command line: code values, #rrggbb, and a patch on terminals."""
 
 import os
 import sys
@@ -6,14 +6,14 @@ from collections.abc import Sequence
 
 
 def hex_of(rgb: Sequence[float]) -> str:
-    """Return #rrggbb of a colour; "*" marks a colour outside 0..1, which #rrggbb cannot hold."""
+    """Return #rrggbb of a colour, with "*" for a colour outside 0..1, which #rrggbb cannot hold."""
     outside = any(not 0 <= value <= 1 for value in rgb)
     digits = "".join(f"{round(min(max(value, 0.0), 1.0) * 255):02x}" for value in rgb)
     return f"#{digits}{'*' if outside else ''}"
 
 
 def swatch(rgb: Sequence[float] | None) -> str:
-    """Return a patch of the colour for terminals (None: its width), nothing for files and pipes."""
+    """Return a patch of the colour for terminals (None: blanks), "" for files and pipes."""
     if not sys.stdout.isatty() or os.environ.get("NO_COLOR"):
         return ""
     if rgb is None:
@@ -23,11 +23,11 @@ def swatch(rgb: Sequence[float] | None) -> str:
 
 
 def row(rgb: Sequence[float]) -> str:
-    """Return a colour for a table: patch, #rrggbb and three numbers, in columns."""
+    """Return a colour for a table: patch, #rrggbb and three code values, in columns."""
     return f"{swatch(rgb)}{hex_of(rgb):8} " + " ".join(f"{value:8.5g}" for value in rgb)
 
 
 def shown(rgb: Sequence[float]) -> str:
-    """Return a colour for a sentence: patch, #rrggbb and three numbers."""
+    """Return a colour for a sentence: patch, #rrggbb and three code values."""
     numbers = " ".join(f"{value:.6g}" for value in rgb)
     return f"{swatch(rgb)}{hex_of(rgb)} ({numbers})"

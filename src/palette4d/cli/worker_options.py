@@ -1,4 +1,4 @@
-"""The options of verbs that work on many shots or frames at a time: --jobs and --cluster."""
+"""The options --jobs and --cluster of verbs with many shots or frames."""
 
 import argparse
 

@@ -1,8 +1,8 @@
 """Conversions between colour spaces without OpenColorIO, and their distance from OpenColorIO's.
 
 Input: an OpenColorIO config and the names of two of its colour spaces. Output: the chain of
-matrices and curves from one to the other and back (`conversion_steps`). It is compared with
-OpenColorIO: on probes of all kinds here, on a clip's own colours by `Comparison`.
+matrices and curves from one to the other and back (`conversion_steps`). This module compares the
+chain with OpenColorIO on probe colours. `Comparison` does so on a clip's own colours.
 """
 
 import json
@@ -21,12 +21,11 @@ from palette4d.colour.ocio_processor import ExactProcessor
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-#: The largest difference from OpenColorIO, relative to 1 or to the code value, whichever is larger,
-#: beyond its single precision: two bits of its input, which a gamma enlarges near 0.
+#: The largest difference from OpenColorIO, relative to the larger of 1 and the code value. Rounding
+#: in single precision is allowed on top: two bits of the input, which a gamma enlarges near 0.
 TOLERANCE = 1e-5
 
-#: Where OpenColorIO's conversion and its inverse differ from the input by more than this, the
-#: encoding has ended.
+#: A colour is beyond the encoding if OpenColorIO's round trip changes it by more than this.
 _COMES_BACK = 2e-6
 
 
@@ -37,12 +36,12 @@ class Conversion:
     Attributes
     ----------
     steps : list of dict
-        As a sidecar holds them.
+        The steps in a sidecar's form.
     chain : ColourConversion
         Applies the steps.
     error : float
-        The largest |a - b| / max(|b|, 1) between the chain and OpenColorIO in both directions,
-        beyond its single precision, wherever OpenColorIO itself inverts its conversion.
+        The largest |a - b| / max(|b|, 1) between the chain and OpenColorIO in both directions, less
+        the error of single precision. Colours that OpenColorIO cannot invert do not count.
     """
 
     steps: list[Step]
@@ -56,8 +55,8 @@ def conversion(config: Any, source: str, target: str) -> Conversion:
     Raises
     ------
     ConversionError
-        The conversion is more than matrices and curves, or the chain is further than `TOLERANCE`
-        from OpenColorIO.
+        The conversion is more than matrices and curves, or the chain differs from OpenColorIO by
+        more than `TOLERANCE`.
     """
     try:
         forward = ExactProcessor(config.getProcessor(source, target))
@@ -101,9 +100,9 @@ class Comparison:
         self._backward = ExactProcessor(config.getProcessor(target, source))
         self._there = _Way(chain.to_palette, _is_scene_linear(config, source))
         self._back = _Way(chain.to_clip, _is_scene_linear(config, target))
-        self.colours = 0  #: compared so far
-        self.beyond = 0  #: of them, beyond the encoding: OpenColorIO does not invert them
-        self.error = 0.0  #: the largest error of the others, in both directions
+        self.colours = 0  #: number of compared colours
+        self.beyond = 0  #: number of colours beyond the encoding, which OpenColorIO does not invert
+        self.error = 0.0  #: the largest error of the other colours, in both directions
 
     def add(self, colours: F32) -> None:
         """Compare (n, 3) finite colours of the clip."""
@@ -111,7 +110,7 @@ class Comparison:
         back = self._backward(there)
         inside = _comes_back(back, colours)
         self.colours += len(colours)
-        # Colours that only rounding keeps from the inverse are not beyond the encoding.
+        # Colours whose round trip fails only by rounding are inside the encoding.
         lost, reached = colours[~inside], there[~inside]
         self.beyond += int((~_comes_back(back[~inside], lost, self._back.rounding(reached))).sum())
         if inside.any():
@@ -147,14 +146,14 @@ class _Way:
 
     def __init__(self, apply: Callable[[ArrayLike], F64], scene_linear: bool) -> None:
         self.apply = apply
-        # The constants of an encoding are about 1: its code values near 0 are no finer.
+        # The constants of an encoding are about 1, so code values near 0 have the same precision.
         self._least = 0.0 if scene_linear else 1.0
 
     def rounding(self, colours: F32) -> F64:
         """Return how far two bits in each channel move the result, (n, 3) -> (n, 3).
 
-        They are the last bits of a colour's largest channel, because matrices mix the channels; in
-        an encoding of 1 at least.
+        These are the last bits of the colour's largest channel, because matrices mix the channels.
+        In an encoding they are at least the last bits of 1.
         """
         exact = self.apply(colours)
         moved = np.zeros_like(exact)

@@ -3,8 +3,8 @@
 Input: one of OpenColorIO's transforms, or a list of steps. Output: the steps that
 `palette4d._core.ColourConversion` applies, in either direction; docs/sidecar.md explains them.
 
-A chain does not clamp where OpenColorIO does: its curves go on below black and above the largest
-code value of an encoding, so that every code value has an inverse.
+A chain never clamps, unlike OpenColorIO. Its curves continue below black and above the largest code
+value of an encoding, so that every code value has an inverse.
 """
 
 from collections.abc import Iterator
@@ -19,18 +19,18 @@ from palette4d.common.errors import Palette4dError
 F64 = NDArray[np.float64]
 Step = dict[str, Any]
 
-#: Where a logarithm without a straight part of its own is continued straight: 2^-24.
+#: Below 2^-24 a logarithm without a straight part is continued by a straight line.
 _DARKEST = 2.0**-24
 
-#: Samples of a curve are left out where the line through the others is within this.
+#: A sample of a curve is left out if the line through the others differs by at most this.
 _STRAIGHT = 3e-7
 
-#: Curves end where their values are beyond this: no picture has them.
+#: Curves end at this value, which no picture reaches.
 _LARGEST = 1e9
 
 
 class ConversionError(Palette4dError):
-    """A conversion that is no chain of matrices and curves: what it contains, what to do."""
+    """A conversion is not a chain of matrices and curves; the message says why, and the remedy."""
 
 
 def steps_of(transform: Any) -> list[Step]:
@@ -80,11 +80,11 @@ def _matrix(transform: Any) -> list[Step]:
 
 
 def _range(transform: Any) -> list[Step]:
-    """Return the straight line of a range; where it clamps, an encoding ends."""
+    """Return the straight line of a range; the encoding ends where the range clamps."""
     ends = ("MinIn", "MaxIn", "MinOut", "MaxOut")
     has = [getattr(transform, f"has{end}Value")() for end in ends]
     if not all(has):
-        return []  # clamps, and nothing else
+        return []  # it only clamps
     low, high, to_low, to_high = (getattr(transform, f"get{end}Value")() for end in ends)
     if not (high > low and to_high > to_low):
         raise ConversionError(f"found a range from {low:g} to {high:g}, which has no inverse")
@@ -160,7 +160,7 @@ def _gamma_step(transform: Any, gamma: list[float], offset: list[float], mirrore
 def _exponent(transform: Any) -> list[Step]:
     import PyOpenColorIO as ocio
 
-    # Where OpenColorIO clamps at 0 the curve goes on as its mirror image.
+    # If OpenColorIO clamps at 0, the curve continues as its mirror image.
     line = transform.getNegativeStyle() == ocio.NEGATIVE_PASS_THRU
     return [_gamma_step(transform, list(transform.getValue()), [0.0] * 3, not line)]
 
@@ -208,7 +208,7 @@ def _sampled(transform: Any) -> list[Step]:
 
 
 def _curve_step(at: F64, values: F64, direction: str) -> Step:
-    """Return a curve for each channel, or one where all three are the same."""
+    """Return a curve for each channel, or one curve if all three are the same."""
     curves = []
     red, *others = values.T
     for y in [red] if all(np.array_equal(red, other) for other in others) else values.T:
@@ -219,7 +219,7 @@ def _curve_step(at: F64, values: F64, direction: str) -> Step:
 
 
 def _rising(at: F64, values: F64) -> tuple[F64, F64]:
-    """Return the samples of a curve where it rises; where it is level, an encoding has ended."""
+    """Return the rising part of a curve's samples; the encoding ends where the curve is level."""
     good = np.isfinite(at) & np.isfinite(values) & (np.abs(values) <= _LARGEST)
     x, first = np.unique(at[good], return_index=True)
     y = values[good][first]
@@ -237,7 +237,7 @@ def _rising(at: F64, values: F64) -> tuple[F64, F64]:
 
 
 def _bends(x: F64, y: F64) -> NDArray[np.intp]:
-    """Return which samples are kept: straight lines between them are near all others.
+    """Return which samples to keep: straight lines between them are near all other samples.
 
     Distances are measured along y and along x (Douglas and Peucker 1973).
     """
@@ -264,7 +264,7 @@ def _bends(x: F64, y: F64) -> NDArray[np.intp]:
 
 
 def joined(steps: list[Step]) -> Iterator[Step]:
-    """Yield the steps with neighbouring matrices made one, and none that changes nothing."""
+    """Yield the steps; join neighbouring matrices and drop steps that change nothing."""
     held: tuple[F64, F64] | None = None
     for step in [*steps, None]:
         if step is not None and step["kind"] == "matrix":

@@ -1,7 +1,7 @@
-"""How different two colours look: CIE L*a*b* of an encoding, and CIEDE2000 between two colours.
+"""Visible colour differences: CIE L*a*b* of code values, and CIEDE2000 between two colours.
 
-OpenColorIO converts an encoding to sRGB; scikit-image makes L*a*b* (white point D65) of that and
-compares (CIEDE2000: Sharma, Wu and Dalal 2005).
+OpenColorIO converts an encoding to sRGB. scikit-image converts sRGB to L*a*b* (white point D65) and
+computes CIEDE2000 (Sharma, Wu and Dalal 2005).
 """
 
 from dataclasses import dataclass
@@ -14,22 +14,22 @@ from palette4d.colour.ocio_processor import ExactProcessor
 
 F64 = NDArray[np.float64]
 
-#: A deltaE 2000 that an eye can just tell in a direct comparison.
+#: The deltaE 2000 that is just visible in a direct comparison.
 VISIBLE = 1.0
 
 
 @dataclass(frozen=True)
 class Viewing:
-    """How the code values of an encoding are seen.
+    """How code values are converted for viewing.
 
     Attributes
     ----------
     assumption : str
-        One phrase that says so, to be stated beside every deltaE.
+        One phrase about the encoding, to print beside every deltaE.
     to_srgb : ExactProcessor or None
-        From the encoding to sRGB; None where it is sRGB, or is taken as sRGB.
+        From the encoding to sRGB; None if it is sRGB or assumed to be sRGB.
     encoding : str
-        OpenColorIO's kind of the encoding: "log", "scene-linear", …; "" where it is unknown.
+        OpenColorIO's kind of the encoding: "log", "scene-linear", …; "" if unknown.
     """
 
     assumption: str
@@ -45,9 +45,9 @@ class Viewing:
 
 
 def viewing_of(encoding: str) -> Viewing:
-    """Return how colours of an encoding are seen.
+    """Return the viewing conversion for an encoding.
 
-    OpenColorIO's built-in studio config knows the encoding, or it is taken as sRGB and
+    If OpenColorIO's built-in studio config does not know the encoding, sRGB is assumed, and
     `Viewing.assumption` says so.
     """
     import PyOpenColorIO as ocio

@@ -1,4 +1,4 @@
-"""OpenColorIO configs and the names in them, with errors that name what is near."""
+"""OpenColorIO configs and the names in them; errors suggest similar names."""
 
 import difflib
 import os
@@ -7,7 +7,7 @@ from typing import Any
 
 from palette4d.common.errors import Palette4dError
 
-#: The oldest of OpenColorIO's configs with camera encodings: read by every host with 2.1 or later.
+#: OpenColorIO's oldest config with camera encodings: every host with 2.1 or later reads it.
 BUILT_IN = "ocio://studio-config-v1.0.0_aces-v1.3_ocio-v2.1"
 
 #: The names of one encoding in files and in OpenColorIO configs of different years.
@@ -48,26 +48,26 @@ SAME_ENCODINGS = (
 
 
 def failures() -> tuple[type[Exception], ...]:
-    """Return what OpenColorIO raises: that for a missing file is no kind of its Exception."""
+    """Return OpenColorIO's exceptions: the one for a missing file is not a subclass."""
     import PyOpenColorIO as ocio
 
     return ocio.Exception, ocio.ExceptionMissingFile
 
 
 def load_config(name: str, option: str) -> Any:
-    """Return the config of a name.
+    """Return the config with this name.
 
     Parameters
     ----------
     name : str
         A config.ocio, an .ocioz archive, or a built-in ``ocio://`` name.
     option : str
-        How the user said it ("--ocio-config", "$OCIO"), for errors.
+        The option or variable that named it ("--ocio-config", "$OCIO"), for errors.
 
     Raises
     ------
     Palette4dError
-        There is none, or OpenColorIO cannot use it.
+        There is no such config, or OpenColorIO cannot use it.
     """
     import PyOpenColorIO as ocio
 
@@ -97,19 +97,19 @@ def load_config(name: str, option: str) -> Any:
 
 
 def from_anywhere(name: str | None) -> str | None:
-    """Return a config's name as it holds in every folder; None, "" and names of no file stay."""
+    """Return a config's absolute path; None, "" and names that are not files stay the same."""
     return str(Path(name).absolute()) if name and Path(name).is_file() else name
 
 
 def chosen_config(given: str | None) -> tuple[Any, str]:
-    """Return the config that was given, else that of ``$OCIO``, else `BUILT_IN`; and its name.
+    """Return the given config, else the config of ``$OCIO``, else `BUILT_IN`; and its name.
 
     The name of a file is absolute.
 
     Raises
     ------
     Palette4dError
-        It cannot be used.
+        The config is unusable.
     """
     for name, option in ((given, "--ocio-config"), (os.environ.get("OCIO") or None, "$OCIO")):
         if name is not None:
@@ -118,12 +118,12 @@ def chosen_config(given: str | None) -> tuple[Any, str]:
 
 
 def colour_space(config: Any, config_name: str, name: str, option: str) -> Any:
-    """Return the colour space of a name, an alias or a role.
+    """Return the colour space with this name, alias or role.
 
     Raises
     ------
     Palette4dError
-        There is none, with the names that are near; or it holds data and no colours.
+        There is none (the message suggests similar names), or it holds data, not colours.
     """
     found = config.getColorSpace(name)
     if found is None:
@@ -140,7 +140,7 @@ def colour_space(config: Any, config_name: str, name: str, option: str) -> Any:
 
 
 def near_spaces(config: Any, name: str) -> str:
-    """Return the config's spaces of colours whose name, alias or role is near, for an error."""
+    """Return the config's colour spaces with a similar name, alias or role, for an error."""
     known: dict[str, str] = {}
     for space in config.getColorSpaces():
         if not space.isData():
@@ -155,7 +155,7 @@ def near_spaces(config: Any, name: str) -> str:
 
 
 def same_encodings(encoding: str) -> list[str]:
-    """Return the names under which files and configs know an encoding, its own first.
+    """Return all names of an encoding in files and configs, the given name first.
 
     >>> same_encodings("lin_ap1")[:2]
     ['lin_ap1', 'ACEScg']
@@ -167,13 +167,13 @@ def same_encodings(encoding: str) -> list[str]:
 
 
 def space_of_encoding(config: Any, encoding: str) -> Any | None:
-    """Return the config's space of colours for an encoding, under any of its names; None: none."""
+    """Return the config's colour space for an encoding, under any of its names, or None."""
     spaces = (config.getColorSpace(name) for name in same_encodings(encoding))
     return next((found for found in spaces if found is not None and not found.isData()), None)
 
 
 def near(name: str, known: list[str], most: int = 3) -> list[str]:
-    """Return the known names nearest to one, the first few of them all when none is near.
+    """Return the known names most similar to a name; the first few names if none is similar.
 
     >>> near("acesct", ["ACEScg", "ACEScct", "Raw"], 1)
     ['ACEScct']

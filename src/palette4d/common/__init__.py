@@ -1,1 +1,1 @@
-"""What every part uses: errors, arguments, text, atomic files."""
+"""Code for all parts: errors, arguments, text, atomic files."""

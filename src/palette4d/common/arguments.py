@@ -1,6 +1,6 @@
-"""What several verbs read from the command line alike: frames, times, numbers, colours.
+"""Command line values of several verbs: frames, times, numbers, colours.
 
-Values that no file can make right are refused here, as wrong usage: exit status 2.
+Values that are wrong for every file are refused here as wrong usage (exit status 2).
 """
 
 import argparse
@@ -11,10 +11,10 @@ from typing import Any, NoReturn
 
 from palette4d.common.errors import Palette4dError
 
-#: Longer than any clip: dates and ids are not taken for frames.
+#: Longer than any clip, so that dates and ids are not read as frames.
 MAX_FRAMES = 1_000_000
 
-# argparse takes "-3", "-5--4" and "-0.1,0.2,0.3" for options unless told that they are values.
+# Without this pattern argparse reads "-3", "-5--4" and "-0.1,0.2,0.3" as options.
 _NEGATIVE = re.compile(r"-(?:\.?[0-9][0-9.,eEx+-]*|inf|nan)$")
 _RANGE = re.compile(r"(-?[0-9]{1,12})(?:-(-?[0-9]{1,12})(?:x([0-9]{1,12}))?)?")
 
@@ -24,7 +24,7 @@ _FRAMES_ARE = "expected A, A-B or A-BxN with A <= B, or several with commas, suc
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose errors are two lines: argparse would print the whole usage of a verb first.
+    """A parser with errors of two lines; argparse would print a verb's whole usage first.
 
     Verbs and their actions inherit it.
     """
@@ -48,7 +48,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def accept_negative_values(subparsers: "argparse._SubParsersAction[Any]") -> None:
-    """Let the values of these parsers' options begin with a minus."""
+    """Allow option values that begin with a minus in these parsers."""
     for parser in subparsers.choices.values():
         parser._negative_number_matcher = _NEGATIVE
 
@@ -59,7 +59,7 @@ def parse_frames(text: str) -> list[int]:
     Raises
     ------
     Palette4dError
-        The text is no such list, a range falls, or it holds more than `MAX_FRAMES`.
+        The text is not such a list, a range descends, or it has more than `MAX_FRAMES` frames.
 
     >>> parse_frames("1001-1007x2,1003-1004")
     [1001, 1003, 1004, 1005, 1007]
@@ -88,7 +88,7 @@ def _range(part: str) -> range | None:
 
 
 def frame_range(text: str) -> str:
-    """Argparse type of --frames: the text itself, once `parse_frames` has understood it."""
+    """Argparse type of --frames: the text itself, after `parse_frames` has checked it."""
     try:
         parse_frames(text)
     except Palette4dError as error:
@@ -102,7 +102,7 @@ def frame_range_or_all(text: str) -> str:
 
 
 def times(text: str) -> list[float]:
-    """Argparse type: rising times, written as a frame range whose single numbers may be fractions.
+    """Argparse type: times in rising order, from a frame range; single numbers may be fractions.
 
     >>> times("12.5,0-4x2")
     [0.0, 2.0, 4.0, 12.5]
@@ -160,7 +160,7 @@ class ColourAction(argparse.Action):
         values: Any,
         option_string: str | None = None,
     ) -> None:
-        """Keep the colour; refuse words that are none, with 2."""
+        """Store the colour; exit with status 2 if the words are not a colour."""
         colour = parse_colour(values)
         if colour is None:
             raise argparse.ArgumentError(
@@ -172,7 +172,7 @@ class ColourAction(argparse.Action):
 
 
 def parse_colour(words: Sequence[str]) -> tuple[float, float, float] | None:
-    """Return the colour written as R G B, R,G,B or #rrggbb; None when it is none.
+    """Return the colour written as R G B, R,G,B or #rrggbb; None if it is not a colour.
 
     >>> parse_colour(["0.5", "-0.1", "1e0"])
     (0.5, -0.1, 1.0)
@@ -191,7 +191,7 @@ def parse_colour(words: Sequence[str]) -> tuple[float, float, float] | None:
 
 
 def checked(parse: Callable[[str], Any], check: Callable[[Any], object]) -> Callable[[str], Any]:
-    """Return an argparse type that parses, and refuses what `check` raises a Palette4dError for."""
+    """Return an argparse type that parses; a Palette4dError of `check` becomes wrong usage."""
 
     def both(text: str) -> Any:
         try:

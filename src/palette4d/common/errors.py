@@ -1,18 +1,18 @@
-"""The errors of palette4d: each says what was found, what was expected and what to do."""
+"""The errors of palette4d. Each says what was found, what was expected, and the remedy."""
 
 import errno
 import os
 
 
 class Palette4dError(Exception):
-    """Something in the input or the environment that the user can mend.
+    """An error in the input or the environment that the user can fix.
 
     The command line prints it as ``palette4d: error: …`` and exits with 1.
     """
 
 
 class WriteError(Palette4dError):
-    """A file that cannot be written where it should be: no permission, or no room."""
+    """A file cannot be written: no permission, or no space."""
 
 
 class SidecarError(Palette4dError):
@@ -21,15 +21,15 @@ class SidecarError(Palette4dError):
     Attributes
     ----------
     file : str
-        The file, or the name that stands for it.
+        The file, or a name for the document.
     pointer : str
         JSON pointer (RFC 6901) of the offending value; "" is the whole document.
     found, expected : str
-        What is there, and what should be.
+        The actual and the expected value.
     """
 
     def __init__(self, file: str, pointer: str, found: str, expected: str) -> None:
-        """Keep the four parts, also as `args`: that makes the error picklable."""
+        """Store the four parts, also as `args`, so that the error can be pickled."""
         super().__init__(file, pointer, found, expected)
         self.file = file
         self.pointer = pointer
@@ -56,7 +56,7 @@ _REMEDIES = {
 
 
 def in_words(error: Exception) -> str:
-    """Return an error as a sentence: the operating system's say the file and what to do.
+    """Return an error as a sentence; for errors of the system it adds the file and the remedy.
 
     >>> in_words(FileNotFoundError(errno.ENOENT, "No such file or directory", "a.exr"))
     'a.exr: found no such file or folder; check the path'

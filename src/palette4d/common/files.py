@@ -1,4 +1,4 @@
-"""The one atomic writer: readers see the old file or the new one, never a part of one."""
+"""The only atomic writer: readers see the old file or the new file, never a part."""
 
 import contextlib
 import os
@@ -12,13 +12,13 @@ from palette4d.common.errors import Palette4dError, WriteError
 
 
 def refuse_existing(path: Path, force: bool) -> None:
-    """Refuse a target that exists, unless forced, and one that is not a file in a folder.
+    """Check that a file may be written to `path`.
 
     Raises
     ------
     Palette4dError
         `path` is a folder, lies in a folder that does not exist, or exists and `force` is false;
-        `WriteError` where its folder may not be written to.
+        `WriteError` if its folder is not writable.
     """
     if path.is_dir():
         raise Palette4dError(f"{path}: found a folder, expected a file name for the output")
@@ -36,7 +36,7 @@ def make_folder(folder: Path) -> None:
     Raises
     ------
     Palette4dError
-        It cannot be made.
+        The folder cannot be created.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -47,7 +47,7 @@ def make_folder(folder: Path) -> None:
 
 
 def link_target(path: str | os.PathLike[str]) -> Path:
-    """Return the file that a link leads to, or the path itself where there is none."""
+    """Return the target of a symbolic link, or the path itself."""
     path = Path(path)
     return Path(os.path.realpath(path)) if path.is_symlink() and path.exists() else path
 
@@ -58,29 +58,28 @@ def replacing(
 ) -> Generator[Path]:
     """Yield a temporary file beside `path`; rename it to `path` when the body succeeds.
 
-    The temporary file is new (O_EXCL), has an unpredictable name and the suffix of `path`, so that
-    libraries which take a path can write it. File and folder are synced. A file that is replaced
-    keeps its permissions. Whatever ends the body otherwise (an error, Ctrl-C) removes the temporary
-    file and leaves `path` as it was.
+    The temporary file is new (O_EXCL) and has an unpredictable name. It has the suffix of `path`,
+    because libraries choose the format by it. File and folder are synced. A replaced file keeps its
+    permissions. An error or Ctrl-C in the body removes the temporary file and leaves `path`
+    unchanged.
 
     Parameters
     ----------
     path : Path
-        The file to write; a symbolic link to a file stays and is followed.
+        The file to write; a symbolic link is kept and its target is written.
     force : bool
         Replace a file that exists.
     check : callable, optional
-        Called last, immediately before the rename; what it raises leaves `path` as it was.
+        Called immediately before the rename; if it raises, `path` is unchanged.
 
     Raises
     ------
     Palette4dError
-        As `refuse_existing`; `WriteError` where the folder cannot be written to, or the disk is
-        full.
+        As `refuse_existing`; `WriteError` if the folder is not writable or the disk is full.
     """
     path = link_target(path)
     refuse_existing(path, force)
-    # At most 250 bytes: 40 characters of the name are enough to recognise it by.
+    # File names have at most 250 bytes; 40 characters are enough to recognise the file.
     temporary = path.with_name(f".{path.stem[:40]}.{secrets.token_hex(8)}.tmp{path.suffix}")
     try:
         # 0o666 less the umask, as for any new file.
@@ -109,7 +108,7 @@ def replacing(
 
 
 def _sync_folder(folder: Path) -> None:
-    """Make the rename itself durable, where folders can be opened and synced."""
+    """Sync the folder, so that the rename is durable, where the system allows it."""
     with contextlib.suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
         try:

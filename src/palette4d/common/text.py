@@ -1,4 +1,4 @@
-"""Counts in messages, and names that are fit for files."""
+"""Counts in messages, and safe file names."""
 
 import re
 
@@ -6,7 +6,7 @@ from palette4d.common.errors import Palette4dError
 
 
 def counted(count: int, one: str, several: str | None = None) -> str:
-    """Return "1 frame", "2 frames"; `several` is the plural where it is not made by an s.
+    """Return "1 frame", "2 frames"; `several` is the plural if it is not regular.
 
     >>> counted(1, "bad frame"), counted(0, "vertex", "vertices")
     ('1 bad frame', '0 vertices')
@@ -15,7 +15,7 @@ def counted(count: int, one: str, several: str | None = None) -> str:
 
 
 def file_safe(name: str) -> str:
-    """Return a name that is fit for files and for OpenColorIO: letters, digits, . _ -.
+    """Return a name that is safe in files and in OpenColorIO: letters, digits, . _ -.
 
     >>> file_safe("shot 010/a+b"), file_safe("-x")
     ('shot_010_a_b', 'x')
@@ -24,12 +24,12 @@ def file_safe(name: str) -> str:
 
 
 def checked_name(name: str) -> str:
-    """Return the name, if it is fit for files.
+    """Return the name if it is safe in files.
 
     Raises
     ------
     Palette4dError
-        It is not; the error suggests one that is.
+        It is not safe; the message suggests a safe name.
     """
     if file_safe(name) != name:
         raise Palette4dError(

@@ -1,7 +1,7 @@
 """The built-in sample clip's pictures: a lake in the hills, from a summer day to an autumn dusk.
 
-Drawn in NumPy with the project's own value noise; the same size and time give the same picture on
-every machine of one kind. What happens to the colours, by time u in 0..1:
+NumPy draws it with the project's own value noise. The same size and time give the same picture on
+all machines of one kind. The colours change with the time u in 0..1:
 
 - two kinds of trees share one green and split into yellow and red (u 0.12 to 0.58);
 - the meadow turns from green to straw;
@@ -84,7 +84,7 @@ _LAMP = np.array((1.0, 0.82, 0.38), np.float32)
 
 
 def value_noise(x: Real, y: Real, seed: int) -> F32:
-    """Smooth noise in 0..1 with one random value a unit square's corner; x, y broadcast."""
+    """Smooth noise in 0..1 with one random value per corner of a unit square; x, y broadcast."""
     left, top = np.floor(x), np.floor(y)
     first_column, first_row = int(left.min()), int(top.min())
     columns = np.arange(first_column, int(left.max()) + 2, dtype=np.int64)
@@ -114,7 +114,7 @@ def fractal_noise(x: Real, y: Real, seed: int, octaves: int = 4) -> F32:
 
 
 def _random(column: NDArray[np.int64], row: NDArray[np.int64], seed: int) -> F32:
-    """One number in 0..1 for each lattice point: an integer hash, not a generator's stream."""
+    """One number in 0..1 for each lattice point, from an integer hash."""
     mixed = (column * 374761393 + row * 668265263 + seed * 974634777) & 0xFFFFFFFF
     mixed = ((mixed ^ (mixed >> 15)) * 2246822519) & 0xFFFFFFFF
     mixed = ((mixed ^ (mixed >> 13)) * 3266489917) & 0xFFFFFFFF
@@ -178,10 +178,10 @@ class Scene:
     """The landscape at one size; `picture(u)` draws it at a time u in 0..1."""
 
     def __init__(self, width: int, height: int) -> None:
-        """Prepare what does not change with time, for pictures of width x height pixels."""
+        """Prepare the parts that do not change with time, for width x height pixels."""
         self.width, self.height = width, height
         rows, columns = height * _SUPERSAMPLING, width * _SUPERSAMPLING
-        # x runs to 16/9 whatever the shape, so that every size shows the whole scene.
+        # x always ends at 16/9, so that every size shows the whole scene.
         x = (np.arange(columns, dtype=np.float32) + 0.5) / np.float32(columns) * np.float32(16 / 9)
         y = (np.arange(rows, dtype=np.float32) + 0.5) / np.float32(rows)
         self._x, self._y = (
@@ -223,7 +223,7 @@ class Scene:
         return np.asarray(np.clip(fine.mean(axis=(1, 3)), 0, 1), np.float32)
 
     def _lit(self, colour: F32, shade: Real, u: float) -> F32:
-        """A matt surface of a colour: ambient light, and the sun's where shade (h, w) lets it."""
+        """A matt surface of a colour: ambient light, and sunlight scaled by shade (h, w)."""
         return np.asarray(
             colour * (keyed(_AMBIENT, u) + keyed(_LIGHT, u) * shade[..., None]), np.float32
         )
@@ -234,7 +234,7 @@ class Scene:
         upper, lower = _step(0.0, 0.62, down), _step(0.45, 1.0, down)
         sky = (zenith * (1 - upper) + middle * upper) * (1 - lower) + horizon * lower
 
-        # The stars come out; they stand where the noise has its rare peaks.
+        # Stars are at the rare peaks of the noise.
         night = float(_step(0.86, 1.0, u))
         if night > 0:
             cell = _random(
@@ -335,7 +335,7 @@ class Scene:
             picture += (0.30 * glow * halo)[..., None] * _LAMP * (1 - picture)
 
     def _tree(self, tree: _Tree, index: int) -> tuple[tuple[slice, slice], F32, F32]:
-        """(window, cover, shade) of a crown: where it is in the picture, and how it is lit."""
+        """(window, cover, shade) of a crown: its place in the picture, and its lighting."""
         rows, columns = self._y.shape
         wide = 0.40 if tree.kind == "pine" else 0.62
         box = (tree.x - wide * tree.height, tree.x + wide * tree.height)
@@ -372,7 +372,7 @@ class Scene:
             dx, dy = (x - across - sway) / radius, (y - up) / radius
             inside = 1 + 0.55 * rough - np.hypot(dx, dy)
             ball = _step(-0.06, 0.06, inside)
-            # The sun stands high on the right by day and in the west at dusk: one light for both.
+            # One light serves for the high sun on the right by day and for the low sun at dusk.
             light = 0.46 + 0.26 * dx + 0.34 * dy + 0.75 * (leaf - 0.5)
             shade = shade * (1 - ball) + light * ball
             cover = np.maximum(cover, ball)
@@ -432,7 +432,7 @@ def write_clip(
     output : str
         `OUT.####.png`, `.tif` (16 bits) or `.exr` (32-bit float, or `half`).
     frames : int
-        How many; a single frame shows the middle of the story.
+        Number of frames; a single frame shows the middle of the time-lapse.
     size : (int, int)
         Width and height in pixels.
     first : int

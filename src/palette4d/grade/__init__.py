@@ -1,1 +1,1 @@
-"""The document: palette and edits, and the one place that writes sidecars."""
+"""The document (palette and edits), and the only code that writes sidecars."""

@@ -1,7 +1,7 @@
-"""The document: a palette and the user's edits, loaded from a sidecar, edited, applied and saved.
+"""The document: a palette and the user's edits. It is loaded, edited, applied and saved.
 
-Everything that changes a grade goes through `Document.apply`: it takes one `Edit`, and `undo` takes
-it back. The core is asked for every colour, so that a recolouring has the node's bits.
+Every change of a grade goes through `Document.apply`, which takes one `Edit`; `undo` reverts it.
+The core computes every colour, so that results equal the node's bit by bit.
 """
 
 import copy
@@ -42,15 +42,15 @@ class Document:
 
     Get one with `palette4d.load` or `palette4d.analyze`. Colours are code values of the palette
     (``encoding`` says which); 0..1 is the usual range, and any finite value is allowed. Frames are
-    the clip's frame numbers; fractions are times between frames. Every method that cannot do what
-    it is asked for raises `Palette4dError` and changes nothing.
+    the clip's frame numbers; fractions are times between frames. A method that fails raises
+    `Palette4dError` and changes nothing.
 
     Parameters
     ----------
     fields : mapping
         The members of a sidecar (docs/sidecar.md).
     notes : iterable of str
-        What the analysis has to say about the palette.
+        Notes of the analysis about the palette.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ class Document:
 
     def _start(self, data: bytes, core: _core.Sidecar) -> None:
         self._fields: Fields = json.loads(data)
-        self._core: _core.Sidecar | None = core  # of `_settings`; None: to be parsed when needed
+        self._core: _core.Sidecar | None = core  # of `_settings`; None: parse it on demand
         self._handles = Handles(self._fields["polytope"])
         self._settings = edits.from_fields(self._fields["edits"])
         self._saved = self._settings
@@ -92,7 +92,7 @@ class Document:
         self._undone: list[Edit] = []
 
     def __repr__(self) -> str:
-        """Return the clip, its frames and how much is edited, on one line."""
+        """Return one line: the clip, its frames, and the numbers of edits."""
         first, last, _ = self.frames
         return (
             f"<Document {self._fields['clip']['name']!r}: frames {first} to {last}, "
@@ -115,7 +115,7 @@ class Document:
         return "<document>" if self.path is None else str(self.path)
 
     def fields(self) -> Fields:
-        """Return the members of the sidecar as it would be saved (docs/sidecar.md)."""
+        """Return the members of the sidecar that `save` would write (docs/sidecar.md)."""
         return copy.deepcopy(_with_edits(self._fields, self._settings))
 
     @property
@@ -131,7 +131,7 @@ class Document:
 
     @property
     def scene_linear(self) -> bool:
-        """Whether the clip is scene-linear, or its palette reaches far above 1 all the same."""
+        """Whether the clip is scene-linear, or its palette reaches far above 1."""
         clip = self._fields["clip"]
         names = (clip["encoding"], clip.get("conversion", {}).get("input_space", ""))
         brightest = max(max(v["rgb"]) for v in self._handles.vertices.values())
@@ -139,7 +139,7 @@ class Document:
 
     @property
     def settings(self) -> Settings:
-        """What the user gave each edited vertex, and each stop, by id."""
+        """The settings of the edited vertices and of the stops, by id."""
         return MappingProxyType(self._settings)
 
     @property
@@ -149,12 +149,12 @@ class Document:
 
     @property
     def changed(self) -> bool:
-        """Whether `save` has something to write."""
+        """Whether there are unsaved changes."""
         return self._disk is None or self._settings != self._saved
 
     @property
     def history(self) -> tuple[Edit, ...]:
-        """The edits since the document was loaded, in order, without those taken back."""
+        """The edits since the document was loaded, in order, without undone edits."""
         return tuple(self._done)
 
     def check_frame(self, frame: float) -> None:
@@ -168,7 +168,7 @@ class Document:
     def check_code_values(self, rgb: Iterable[float]) -> None:
         """Refuse a colour that looks like integers of 8 bits or more, such as 255 128 0.
 
-        Colours of scene-linear clips pass: theirs may be large.
+        Scene-linear clips accept all colours: their code values may be large.
         """
         values = as_colour(rgb)
         largest = max(values)
@@ -211,10 +211,10 @@ class Document:
         return id
 
     def near(self, rgb: Iterable[float], *, frame: float) -> Near:
-        """Return the palette colour that is nearest to one seen at a frame.
+        """Return the palette colour nearest to a given colour at a frame.
 
-        The palette is compared as it is edited. The handle is the stop at that time, or the vertex
-        of the colour's edge within half a frame step of it.
+        The edited palette is compared. The handle is the stop at that time, or the vertex of the
+        colour's edge within half a frame step of that time.
         """
         wanted = as_colour(rgb)
         self.check_frame(frame)
@@ -242,7 +242,7 @@ class Document:
     # ------------------------------------------------------------------------------------ editing
 
     def set(self, id: str, *, rgb: Iterable[float]) -> None:
-        """Give a vertex or a stop a colour."""
+        """Set the colour of a vertex or a stop."""
         new = as_colour(rgb)
         before = self._settings.get(id)
         if before is not None:
@@ -253,9 +253,9 @@ class Document:
         self.apply(Edit((Change(id, before, after),)))
 
     def stop(self, edge: str, *, frame: float, rgb: Iterable[float]) -> str:
-        """Give an edge a colour at a time, by a colour stop; returns the stop's id.
+        """Set the colour of an edge at a time by a colour stop; return the stop's id.
 
-        A stop that is there already gets the colour.
+        An existing stop at that time gets the colour.
         """
         new = as_colour(rgb)
         self.check_frame(frame)
@@ -276,33 +276,33 @@ class Document:
         rgb: Iterable[float],
         anyway: bool = False,
     ) -> Near:
-        """Give the palette colour nearest to one that is seen at a frame a new colour there.
+        """Set a new colour for the palette colour nearest to a given colour at a frame.
 
-        It moves the vertex if there is one within half a frame step, so far that the colour at the
-        frame is `rgb`; else the stop at that time; else it adds a stop.
+        A vertex within half a frame step moves, so that the colour at the frame is exactly `rgb`.
+        Otherwise the stop at that time gets the colour, or a new stop.
 
         Parameters
         ----------
         near : 3 floats
-            The colour as it is seen, edited.
+            The visible colour, after the edits so far.
         frame : float
-            When it is seen; within the clip.
+            The time; within the clip.
         rgb : 3 floats
             The new colour.
         anyway : bool
-            Edit the palette colour even when it is further than 0.25 away.
+            Edit the palette colour even if it is more than 0.25 away.
 
         Returns
         -------
         Near
-            What was found and how far away it is; its `handle` is the vertex or stop that has the
-            colour now.
+            The palette colour and its distance; `handle` is the vertex or stop that now has the
+            colour.
 
         Raises
         ------
         Palette4dError
-            The nearest palette colour is further than 0.25 away; the error names what `near` is
-            made of.
+            The nearest palette colour is more than 0.25 away; the message names the palette colours
+            that `near` is mixed from.
         """
         new, wanted = as_colour(rgb), as_colour(near)
         found = self.near(wanted, frame=frame)
@@ -361,7 +361,7 @@ class Document:
         self.apply(Edit((Change(stop, before, Setting(before.rgb, before.edge, frame)),)))
 
     def reset(self, id: str | None = None) -> None:
-        """Give a vertex its own colour back, remove a stop, or (None) reset everything."""
+        """Reset a vertex to its original colour, remove a stop, or (None) reset everything."""
         if id is not None and id not in self._settings:
             self._handles.vertex(id, self._settings)
             return
@@ -370,13 +370,13 @@ class Document:
             self.apply(Edit(tuple(Change(id_, self._settings[id_], None) for id_ in ids)))
 
     def apply(self, edit: Edit) -> None:
-        """Apply an edit; `undo` takes it back."""
+        """Apply an edit; `undo` reverts it."""
         self._change(edit)
         self._done.append(edit)
         self._undone.clear()
 
     def undo(self) -> Edit:
-        """Take the last edit back, and return it."""
+        """Revert the last edit, and return it."""
         if not self._done:
             raise Palette4dError("there is nothing to undo: no edit since the document was loaded")
         self._change(self._done[-1].inverse())
@@ -384,7 +384,7 @@ class Document:
         return self._undone[-1]
 
     def redo(self) -> Edit:
-        """Apply the edit that was taken back last, and return it."""
+        """Apply the last undone edit again, and return it."""
         if not self._undone:
             raise Palette4dError("there is nothing to redo: no edit was taken back")
         self._change(self._undone[-1])
@@ -414,7 +414,7 @@ class Document:
         image : (h, w, 3 or 4) float32
             Code values of the clip, 0..1 as a rule; alpha passes unchanged.
         frame : float
-            The time; frames outside the clip take its first or last.
+            The time; frames outside the clip use its first or last frame.
         strength : float
             0 is the original, 1 the edit.
         premultiplied : bool
@@ -422,12 +422,12 @@ class Document:
         space : {"input", "palette"}
             "palette": the image is in the palette's own colour space, not in the clip's.
         threads : int
-            0: one a processor. The result does not depend on it.
+            0: one per processor. The result does not depend on it.
 
         Returns
         -------
         (h, w, 3 or 4) float32
-            A new array. Where nothing is edited it has the bits of `image`.
+            A new array. Without edits it equals `image` bit by bit.
         """
         pixels = _checked_image(image)
         palette = self.palette(frame)
@@ -447,7 +447,7 @@ class Document:
     def weights(
         self, image: F32, frame: float, *, space: Literal["input", "palette"] = "input"
     ) -> F32:
-        """Return how much of each palette colour a pixel is made of (mean value coordinates).
+        """Return the weight of each palette colour in each pixel (mean value coordinates).
 
         Parameters
         ----------
@@ -459,8 +459,8 @@ class Document:
         Returns
         -------
         (h, w, n) float32
-            In the order of ``palette(frame).ids``. They sum to 1 and reproduce the pixel, or, for a
-            pixel outside the palette, the nearest point of it. NaN where a pixel is not finite.
+            Weights in the order of ``palette(frame).ids``; they sum to 1. They reproduce the pixel,
+            or, outside the palette, its nearest point. NaN for pixels that are not finite.
         """
         colours = _checked_image(image)[..., :3]
         palette = self.palette(frame)
@@ -488,19 +488,19 @@ class Document:
     def save(
         self, path: str | os.PathLike[str] | None = None, *, on_edits: OnEdits = "refuse"
     ) -> None:
-        """Write the sidecar: readers see the old file or the new one, never a part of one.
+        """Write the sidecar atomically: readers see the old file or the new file.
 
-        Another program may have edited the file since it was loaded. What both changed differently
-        is an error, and nothing is written; all other edits of both are kept, and the document
-        then holds them.
+        Another program may have edited the file since it was loaded. Then `save` merges the edits
+        of both into the file and the document. If both changed one handle differently, it raises an
+        error and writes nothing.
 
         Parameters
         ----------
         path : path, optional
-            Another file than the one that was loaded.
+            A file other than the loaded file.
         on_edits : {"refuse", "keep", "drop"}
-            What to do with edits in another file, which this would lose; "keep" takes them over,
-            which needs the same palette.
+            What to do with edits in that file, which would be lost. "keep" takes them over; this
+            needs the same palette.
 
         Raises
         ------
@@ -620,7 +620,7 @@ def _same(a: Path, b: Path) -> bool:
 
 
 def _beside(source: str, output: Path) -> str:
-    """Return a relative source as seen from the sidecar's folder: both may then move together."""
+    """Return the source relative to the sidecar's folder, so that both may move together."""
     if not source or Path(source).is_absolute():
         return source
     try:

@@ -1,8 +1,8 @@
-"""Edits: what the user gave each handle, and steps between two such states that can be taken back.
+"""Edits: the settings of handles, and undoable steps between two states of them.
 
-A handle is a palette vertex or a colour stop; an id names it. The state is a mapping from ids to
-`Setting`: a vertex that is not in it keeps its own colour, a stop that is not in it does not exist.
-Input and output are plain values: this module knows neither files nor palettes.
+A handle is a palette vertex or a colour stop; an id names it. The state maps ids to `Setting`s. A
+vertex without a setting keeps its own colour; a stop without a setting does not exist. Input and
+output are plain values: this module knows neither files nor palettes.
 """
 
 from collections.abc import Collection, Iterable, Mapping
@@ -13,7 +13,7 @@ from palette4d.common.errors import Palette4dError
 
 Colour = tuple[float, float, float]
 
-#: Code values further from 0 are refused by the format (docs/sidecar.md).
+#: The largest absolute code value that the file format allows (docs/sidecar.md).
 LARGEST_COLOUR = 1e6
 
 
@@ -38,14 +38,14 @@ def as_colour(values: Iterable[float], what: str = "colour") -> Colour:
 
 @dataclass(frozen=True)
 class Setting:
-    """What the user gave a handle.
+    """The user's setting for a handle.
 
     Attributes
     ----------
     rgb : tuple of float
         The colour, in the palette's code values.
     edge, frame : str and float, or None
-        Where a stop is; None for a vertex, which stays where the analysis found it.
+        The place of a stop; None for a vertex, which never moves in time.
     """
 
     rgb: Colour
@@ -58,7 +58,7 @@ Settings = Mapping[str, Setting]
 
 @dataclass(frozen=True)
 class Change:
-    """One handle's setting before and after an edit; None: not edited, no such stop."""
+    """One handle's setting before and after an edit; None: unedited vertex, or no stop."""
 
     id: str
     before: Setting | None
@@ -67,12 +67,12 @@ class Change:
 
 @dataclass(frozen=True)
 class Edit:
-    """One step of the user's work: the changes that belong together."""
+    """One undoable step: changes that belong together."""
 
     changes: tuple[Change, ...]
 
     def inverse(self) -> "Edit":
-        """Return the edit that takes this one back."""
+        """Return the edit that reverts this edit."""
         return Edit(tuple(Change(c.id, c.after, c.before) for c in reversed(self.changes)))
 
     def apply(self, settings: Settings) -> dict[str, Setting]:
@@ -81,7 +81,7 @@ class Edit:
         Raises
         ------
         Palette4dError
-            A handle is not as this edit expects it: somebody else has changed it.
+            A handle has changed since this edit was made.
         """
         result = dict(settings)
         for change in self.changes:
@@ -97,12 +97,12 @@ class Edit:
         return result
 
     def renamed(self, names: Mapping[str, str]) -> "Edit":
-        """Return the same edit of handles that have other ids now."""
+        """Return the same edit with new ids of its handles."""
         return Edit(tuple(replace(c, id=names.get(c.id, c.id)) for c in self.changes))
 
 
 def difference(before: Settings, after: Settings) -> Edit:
-    """Return the edit that leads from one state to another."""
+    """Return the edit from one state to another."""
     ids = [*before, *(id_ for id_ in after if id_ not in before)]
     return Edit(
         tuple(
@@ -116,19 +116,19 @@ def difference(before: Settings, after: Settings) -> Edit:
 def merged(
     base: Settings, mine: Settings, theirs: Settings, taken: Collection[str]
 ) -> tuple[dict[str, Setting], dict[str, str]]:
-    """Return the state that holds the changes of two writers, and the new ids of stops of mine.
+    """Merge the changes of two writers; return the state and the new ids of my stops.
 
     Parameters
     ----------
     base, mine, theirs : mapping of str to Setting
-        What both started from, and what each has made of it.
+        The common start, and the two changed states.
     taken : collection of str
-        Ids of the palette, which no stop may have.
+        Ids of the palette, which stops must not use.
 
     Raises
     ------
     Palette4dError
-        Both have changed the same handle, or put a stop at the same place, in different ways.
+        Both changed one handle, or set a stop at one place, in different ways.
     """
     renamed: dict[str, str] = {}
     result = dict(theirs)
@@ -137,7 +137,7 @@ def merged(
         if there == change.after:
             continue
         if there != change.before:
-            # Two new stops that happen to have one id are two stops.
+            # Two new stops with the same id by chance are two stops.
             if change.before is not None or there is None or _place(there) == _place(change.after):
                 raise _conflict(id_)
             renamed[id_] = id_ = new_stop_id({*taken, *result, *mine})
@@ -166,7 +166,7 @@ def _conflict(where: str) -> Palette4dError:
 
 
 def new_stop_id(taken: Collection[str]) -> str:
-    """Return s1, s2, …: one more than the largest in use, so that gaps are not filled again.
+    """Return s1, s2, …: one more than the largest in use; ids of removed stops are not reused.
 
     >>> new_stop_id({"s1", "s7", "v9"})
     's8'
@@ -180,7 +180,7 @@ def _is_number(text: str) -> bool:
 
 
 def from_fields(fields: Mapping[str, Any]) -> dict[str, Setting]:
-    """Return the state that a sidecar's member "edits" holds."""
+    """Return the state for a sidecar's member "edits"."""
     settings = {entry["vertex"]: Setting(as_colour(entry["rgb"])) for entry in fields["vertices"]}
     for stop in fields["stops"]:
         settings[stop["id"]] = Setting(as_colour(stop["rgb"]), stop["edge"], stop["frame"])
@@ -188,7 +188,7 @@ def from_fields(fields: Mapping[str, Any]) -> dict[str, Setting]:
 
 
 def to_fields(settings: Settings, vertex_ids: Iterable[str]) -> dict[str, Any]:
-    """Return a sidecar's member "edits": vertices in the palette's order, stops as they came."""
+    """Return a sidecar's member "edits": vertices in the palette's order, stops as in the state."""
     return {
         "vertices": [
             {"vertex": id_, "rgb": list(settings[id_].rgb)} for id_ in vertex_ids if id_ in settings

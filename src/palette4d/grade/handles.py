@@ -26,7 +26,7 @@ class Handles:
         Raises
         ------
         Palette4dError
-            There is none of this id; the error names ids that are similar, `others` among them.
+            No vertex has this id; the message names similar ids, also from `others`.
         """
         if id_ in self.vertices:
             return self.vertices[id_]
@@ -38,7 +38,7 @@ class Handles:
         raise unknown(id_, "vertex or stop", [*self.vertices, *others])
 
     def check_inside(self, edge: str, frame: float) -> None:
-        """Refuse a place for a stop that is not between the ends of an edge.
+        """Check that a stop's place is between the ends of an edge.
 
         Raises
         ------
@@ -62,7 +62,7 @@ class Handles:
 
 
 def unknown(id_: str, kind: str, ids: Iterable[str]) -> Palette4dError:
-    """Return the error that names ids like one that does not exist."""
+    """Return the error for an unknown id; it names similar ids."""
     known = list(ids)
     near = difflib.get_close_matches(id_, known, n=5, cutoff=0.5) or known[:5]
     if not near:

@@ -1,4 +1,4 @@
-"""A palette at one time, and which of its colours is nearest to one that the user sees there."""
+"""A palette at one time, and its colour nearest to a colour that the user sees."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.grade.edits import Colour
 
-#: Palette colours further from the colour that was asked for hardly change it.
+#: Edits of a palette colour farther away than this hardly change the given colour.
 FAR = 0.25
 
 
@@ -19,15 +19,15 @@ class Palette:
     Attributes
     ----------
     frame : float
-        The time; frames outside the clip take its first or last.
+        The time; frames outside the clip use its first or last frame.
     ids : tuple of str
-        What to edit for each colour: a vertex where it lies on one, else the edge that it is on.
+        The id to edit for each colour: its vertex if it lies on one, else its edge.
     rgb, edited : (n, 3) float64
         The colours as analysed and as edited, in the palette's code values.
     faces : (m, 3) int32
         Triangles of indices into `rgb`, anticlockwise from outside; none for one or two colours.
     ends : tuple of (str, str)
-        The vertices before and after each colour in time; twice the same where it lies on one.
+        The vertices before and after each colour in time; the same twice if it lies on a vertex.
     weights : (n,) float64
         The share of the vertex after it, 0..1 (eq. 6).
     """
@@ -41,13 +41,13 @@ class Palette:
     weights: NDArray[np.float64]
 
     def nearest(self, colour: Colour) -> tuple[int, float]:
-        """Return the index of the edited colour nearest to this one, and their distance in RGB."""
+        """Return the index of the edited colour nearest to a colour, and their RGB distance."""
         distances = np.linalg.norm(self.edited - np.asarray(colour), axis=1)
         index = int(np.argmin(distances))
         return index, float(distances[index])
 
     def shares(self, colour: Colour) -> list[tuple[str, float]]:
-        """Return which edited colours make up this one, by mean value weights, largest first."""
+        """Return the mean value weights of the edited colours in a colour, largest first."""
         weights, _ = _core.palette_weights([colour], self.edited, self.faces)
         found = zip(self.ids, weights[0].tolist(), strict=True)
         return sorted(found, key=lambda share: -share[1])
@@ -55,22 +55,22 @@ class Palette:
 
 @dataclass(frozen=True)
 class Near:
-    """The palette colour nearest to one that the user sees, and how to change it there.
+    """The palette colour nearest to a colour that the user sees, and the handle to edit.
 
     Attributes
     ----------
     frame : float
-        The time asked for.
+        The given time.
     id : str
         The vertex or edge that the palette colour lies on.
     handle : str or None
-        The vertex or stop that is there already; None: a new stop on edge `id` is needed.
+        The existing vertex or stop; None: the edit needs a new stop on edge `id`.
     rgb : tuple of float
-        The palette colour, edited, as the user sees it.
+        The edited palette colour.
     distance : float
-        Euclidean, in RGB code values, to the colour asked for.
+        Euclidean distance to the given colour, in RGB code values.
     shares : list of (str, float)
-        `Palette.shares` of the colour asked for.
+        `Palette.shares` of the given colour.
     """
 
     frame: float
@@ -81,7 +81,7 @@ class Near:
     shares: list[tuple[str, float]]
 
     def refusal(self, wanted: Colour) -> str:
-        """Return why this palette colour is too far from the one that was asked for."""
+        """Return the error message if this palette colour is too far from the given colour."""
         shown = ", ".join(f"{value:.4g}" for value in wanted)
         there = ", ".join(f"{value:.4g}" for value in self.rgb)
         made_of = ", ".join(f"{id_} {part:.0%}" for id_, part in self.shares[:5] if part >= 0.005)

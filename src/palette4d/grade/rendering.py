@@ -27,7 +27,7 @@ from palette4d.media.movie_writer import is_movie, movie_writer
 
 @dataclass(frozen=True)
 class RenderOptions:
-    """How to recolour and what to write.
+    """Options of recolouring and output.
 
     Attributes
     ----------
@@ -36,12 +36,12 @@ class RenderOptions:
     threads : int
         0: one per processor.
     space : {"input", "palette"}
-        "palette": the clip's code values are in the palette's colour space already.
+        "palette": the clip's code values are already in the palette's colour space.
     compare : {"wipe", "side"} or None
-        The source beside the edit: "wipe" shows the left half of the source and the right half of
-        the edit, "side" both whole, the source on the left.
+        Show source and edit: "wipe" shows the left half of the source and the right half of the
+        edit; "side" shows both whole, the source on the left.
     half, bits
-        The stored samples of frames, see `sample_type`; no use for movies.
+        The sample type of frames (`sample_type`); not for movies.
     """
 
     strength: float = 1.0
@@ -53,7 +53,7 @@ class RenderOptions:
 
 
 def compared(source: F32, edited: F32, how: Literal["wipe", "side"]) -> F32:
-    """Return the source and the edit in one picture, see `RenderOptions.compare`."""
+    """Return the source and the edit in one picture (`RenderOptions.compare`)."""
     if how == "side":
         return np.concatenate([source, edited], axis=1)
     middle = source.shape[1] // 2
@@ -61,9 +61,9 @@ def compared(source: F32, edited: F32, how: Literal["wipe", "side"]) -> F32:
 
 
 def mismatches(document: Document, clip: Clip, whole: bool) -> list[str]:
-    """Return what in a clip differs from the one that a sidecar was made from, and what happens.
+    """Return notes on differences between a clip and the sidecar's clip, and their effect.
 
-    `whole`: the clip was opened with all its frames, not with a range of them.
+    `whole`: the clip was opened with all its frames, not with a range.
     """
     sidecar = document.core
     found = []
@@ -90,7 +90,7 @@ def mismatches(document: Document, clip: Clip, whole: bool) -> list[str]:
 
 
 def movie_notes(clip: Clip, options: RenderOptions) -> list[str]:
-    """Return what a movie of the clip cannot show as the clip's frames do."""
+    """Return notes on the limits of a movie of this clip: size, alpha, encoding."""
     found = []
     width = clip.width * (2 if options.compare == "side" else 1)
     if width % 2 or clip.height % 2:
@@ -117,19 +117,19 @@ def render(
     force: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Path]:
-    """Recolour every frame of a clip and write them; memory holds three at most.
+    """Recolour every frame of a clip and write it; memory holds at most three frames.
 
     Parameters
     ----------
     document : Document
         The palette and its edits.
     clip : Clip
-        The frames; one that `Clip.skipped` lists in the end is left out.
+        The frames; bad frames, which `Clip.skipped` lists afterwards, are left out.
     output : str
         `OUT.####.exr` (`.png`, `.tif`) for frames, which keep their numbers, or `OUT.mp4`,
         `OUT.mov` for a movie at the clip's rate.
     options : RenderOptions
-        How.
+        The options of recolouring and output.
     force : bool
         Replace files that exist. A clip's own files are never replaced.
     progress : callable, optional
@@ -138,7 +138,8 @@ def render(
     Returns
     -------
     list of Path
-        What was written. Ctrl-C or an error leaves whole frames, and no part of a movie.
+        The written files. After Ctrl-C or an error, written frames are complete, and there is no
+        movie.
 
     Raises
     ------
@@ -192,7 +193,7 @@ _Write = Callable[[Image, F32], Path]
 
 @contextlib.contextmanager
 def _frames(clip: Clip, pattern: FramePattern, samples: str) -> Generator[_Write]:
-    """Yield what writes a frame to its file, with the metadata of the source's."""
+    """Yield a function that writes a frame to its file, with the source frame's metadata."""
     import OpenImageIO as oiio
 
     def write(image: Image, pixels: F32) -> Path:
@@ -210,8 +211,8 @@ def _frames(clip: Clip, pattern: FramePattern, samples: str) -> Generator[_Write
 
 @contextlib.contextmanager
 def _movie(clip: Clip, document: Document, path: Path, options: RenderOptions) -> Generator[_Write]:
-    """Yield what appends a frame to a movie."""
-    # Files of frames seldom say their rate: the sidecar knows what the user said.
+    """Yield a function that appends a frame to a movie."""
+    # Image files rarely state a rate, so the sidecar's rate is used.
     rate = clip.rate if clip.is_movie else Fraction(*document.core.clip["rate"])
     width = clip.width * (2 if options.compare == "side" else 1)
     with movie_writer(path, (width, clip.height), rate, clip.encoding) as append:

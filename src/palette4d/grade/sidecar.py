@@ -1,7 +1,7 @@
-"""The sidecar's text and files: what is read from them, and the only writer.
+"""The sidecar's text and files: the reader and the only writer.
 
 Input and output are a sidecar's members as plain dicts and lists; `docs/sidecar.md` explains them.
-The core (`palette4d._core`) judges every text: nothing is written that it would refuse.
+The core (`palette4d._core`) validates every text before it is written.
 """
 
 import contextlib
@@ -30,13 +30,13 @@ OnEdits = Literal["refuse", "keep", "drop"]
 
 SCHEMA = "palette4d.sidecar"
 
-#: Seconds to wait for another palette4d that writes in the same folder.
+#: Seconds to wait for the folder's lock while another palette4d writes.
 LOCK_SECONDS = 10.0
 
-#: The core refuses a longer text.
+#: The longest text that the core accepts.
 _LARGEST_FILE = 64 << 20
 
-# Member order in the file; what is not named here keeps the document's order.
+# Member order in the file; other members keep the document's order.
 _ORDER: dict[str, tuple[str, ...]] = {
     "": ("schema", "version", "generator", "clip", "polytope", "quality", "edits", "extra"),
     "/clip": ("name", "source", "frames", "rate", "size", "encoding", "conversion"),
@@ -55,8 +55,8 @@ _ORDER: dict[str, tuple[str, ...]] = {
     "/edits/stops/*": ("id", "edge", "frame", "rgb"),
 }
 
-# Containers that are spread over lines; everything else stands on one line, so that a difference
-# between two files shows one vertex, edge, track or edit a line.
+# Containers that take several lines. All others take one line, so that a diff of two files has one
+# line per vertex, edge, track or edit.
 _SPREAD = {
     "",
     "/clip",
@@ -105,7 +105,7 @@ def new_document(
     clip : mapping
         ``name``, ``source``, ``frames`` (``first``, ``last``, ``step``, ``skipped``), ``rate``
         (numerator, denominator), ``size`` (width, height in pixels), ``encoding``, and
-        ``conversion`` where the palette is in another space than the clip.
+        ``conversion`` if the palette's colour space differs from the clip's.
     polytope : mapping
         ``vertices``, ``edges``, ``blocks``, ``transitions`` as in `docs/sidecar.md`.
     quality : mapping, optional
@@ -133,9 +133,9 @@ def new_document(
 
 
 def dumps(document: Mapping[str, Any]) -> str:
-    """Return the document's text: the same text for equal documents, one row a line.
+    """Return the document's text: equal documents give equal text, one row per line.
 
-    Floats are written with the fewest digits that read back to the same double.
+    Floats have the fewest digits that read back to the same double.
     """
     return _text(_canonical(document, ""), "", 0) + "\n"
 
@@ -152,20 +152,20 @@ def validate(document: Mapping[str, Any], name: str = "<document>") -> _core.Sid
 
 
 def encoded(document: Mapping[str, Any]) -> bytes:
-    """Return the bytes of `dumps`; a name that is not Unicode passes, for the core to refuse."""
+    """Return the bytes of `dumps`; names that are not Unicode pass, and the core refuses them."""
     return dumps(document).encode("utf-8", "surrogatepass")
 
 
 def read_bytes(path: str | os.PathLike[str]) -> bytes:
-    """Return what a file holds, not yet judged.
+    """Return a file's bytes without validation.
 
     Raises
     ------
     SidecarError
-        There is no file, or it cannot be read.
+        The file is missing or cannot be read.
     """
     try:
-        # Opening a pipe would wait for somebody to write into it.
+        # Opening a pipe would block until a program writes into it.
         if stat.S_ISREG(Path(path).stat().st_mode):
             with Path(path).open("rb") as stream:
                 return stream.read(_LARGEST_FILE + 1)
@@ -173,7 +173,7 @@ def read_bytes(path: str | os.PathLike[str]) -> bytes:
         reason = error.strerror
     else:
         reason = "it is not a regular file"
-    _core.read_sidecar(path)  # says what is there instead
+    _core.read_sidecar(path)  # raises the error that names the kind of file
     raise SidecarError(os.fspath(path), "", f"an unreadable file ({reason})", "a sidecar file")
 
 
@@ -197,7 +197,7 @@ def has_edits(document: Mapping[str, Any]) -> bool:
 
 
 def check_target(path: str | os.PathLike[str], *, on_edits: OnEdits = "refuse") -> None:
-    """Refuse early, before an analysis, what `save` would certainly refuse after it.
+    """Raise the errors of `save` before a long analysis, where they are certain.
 
     Raises
     ------
@@ -220,8 +220,8 @@ def save(
 ) -> Fields:
     """Write a sidecar and return the document as written.
 
-    The core validates the text before it replaces the file. Whatever fails, Ctrl-C included, leaves
-    the old file as it was and no temporary file.
+    The core validates the text before it replaces the file. After any failure, also Ctrl-C, the old
+    file is unchanged and no temporary file remains.
 
     Parameters
     ----------
@@ -230,9 +230,8 @@ def save(
     path : path
         A symbolic link is followed; permissions of an existing file are kept.
     on_edits : {"refuse", "keep", "drop"}
-        What to do when the file exists and holds edits that `document` lacks. "keep" carries them
-        (and ``extra``) over, which needs the same polytope: an edit means nothing without the
-        vertices and edges that it names.
+        What to do if the file exists and holds edits that `document` lacks. "keep" copies the edits
+        (and ``extra``). It needs the same polytope, because edits refer to its vertices and edges.
 
     Raises
     ------
@@ -257,16 +256,16 @@ def save(
 
 
 def write(target: Path, data: bytes, *, replaces: bytes | None = None) -> None:
-    """Replace a file by the bytes of a document that the core accepts.
+    """Replace a file's content by the bytes of a validated document.
 
     Parameters
     ----------
     target : Path
-        The file; hold its lock (`locked`).
+        The file; the caller holds its lock (`locked`).
     data : bytes
-        What to write.
+        The new content.
     replaces : bytes, optional
-        What the file must hold until the end: programs that do not know the lock may write, too.
+        The expected old content, checked just before the rename: other programs ignore the lock.
 
     Raises
     ------
@@ -288,7 +287,7 @@ def write(target: Path, data: bytes, *, replaces: bytes | None = None) -> None:
 
 
 def _canonical(value: Any, where: str) -> Any:
-    """Return plain JSON values in the file's member order and number forms."""
+    """Return plain JSON values, with the file's member order and number formats."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, Mapping):
@@ -329,7 +328,7 @@ def _text(value: Any, where: str, depth: int) -> str:
 
 
 def _existing(target: Path, on_edits: OnEdits) -> Fields | None:
-    """Return the document that a save would replace, None when there is nothing to lose."""
+    """Return the document that a save would replace; None if no edits would be lost."""
     if on_edits not in ("refuse", "keep", "drop"):
         raise ValueError(f"on_edits: found {on_edits!r}, expected 'refuse', 'keep' or 'drop'")
     try:
@@ -388,11 +387,11 @@ def _bytes_or_none(path: Path) -> bytes | None:
 
 @contextlib.contextmanager
 def locked(target: Path) -> Iterator[None]:
-    """Hold the folder's advisory lock, which leaves no file behind and ends with the process."""
+    """Hold the folder's advisory lock. It creates no file and ends with the process."""
     try:
         handle = os.open(target.parent, os.O_RDONLY)
     except OSError:
-        yield  # no such folder, or folders cannot be opened here: writing will tell
+        yield  # the folder is missing or cannot be opened: the write reports the error
         return
     try:
         _lock(handle, target)

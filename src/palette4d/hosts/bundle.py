@@ -1,7 +1,7 @@
-"""The OpenFX bundle: where it lies in the package, where hosts look for it, and the way there.
+"""The OpenFX bundle: its place in the package, the folders of hosts, and its installation.
 
-It is copied beside its destination first and then renamed into place, so that a host never scans
-half a bundle.
+The bundle is first copied beside its destination and then renamed. So a host never scans an
+incomplete bundle.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ BUNDLE = "Palette4D.ofx.bundle"
 
 
 def default_destination(platform: str = sys.platform) -> Path:
-    """The folder in which the OpenFX standard lets hosts look on a platform (`sys.platform`)."""
+    """The plugin folder of the OpenFX standard on a platform (`sys.platform`)."""
     if platform == "win32":
         return Path("C:/Program Files/Common Files/OFX/Plugins")
     if platform == "darwin":
@@ -35,7 +35,7 @@ def find_bundle() -> Path:
     Palette4dError
         When this installation holds no bundle.
     """
-    # Beside the compiled module: in an editable installation that is not the sources' folder.
+    # It lies beside the compiled module, which in an editable installation is not in the sources.
     bundle = Path(_core.__file__).parent / "_ofx" / BUNDLE
     if any(bundle.glob("Contents/*/*.ofx")):
         return bundle
@@ -55,7 +55,7 @@ def install_bundle(
     bundle : Path
         The bundle to install.
     destination : Path
-        The folder of plugins; made when it is missing.
+        The folder of plugins; created if it is missing.
     link : bool
         Make a symbolic link instead of a copy.
     force : bool
@@ -69,7 +69,7 @@ def install_bundle(
     Raises
     ------
     Palette4dError
-        When the destination is occupied, may not be written to or is no folder.
+        When the destination is occupied, not writable, or not a folder.
     """
     bundle = bundle.resolve()
     target = destination / BUNDLE
@@ -104,14 +104,14 @@ def install_bundle(
 
 
 def _is_ours(target: Path) -> bool:
-    """Tell a Palette4D bundle, or a link that leads nowhere any more, from anything else."""
+    """Return whether a path is a Palette4D bundle or a broken link."""
     if target.is_symlink() and not target.exists():
         return True
     return target.is_dir() and any(target.glob("Contents/*/Palette4D.ofx"))
 
 
 def _replace(fresh: Path, target: Path, aside: Path) -> None:
-    """Rename `fresh` to `target`; what was there is put aside, and back when the rename fails."""
+    """Rename `fresh` to `target`; if that fails, restore the old target."""
     occupied = os.path.lexists(target)
     if occupied:
         target.rename(aside)

@@ -11,7 +11,7 @@ from palette4d.hosts import MARK, kdenlive, shotcut
 
 
 def data_folder(program: str, platform: str = sys.platform) -> Path:
-    """Return the folder of the user's that a program reads its additions from.
+    """Return the user's folder from which a program loads additional effects or filters.
 
     Parameters
     ----------
@@ -23,7 +23,7 @@ def data_folder(program: str, platform: str = sys.platform) -> Path:
     Raises
     ------
     Palette4dError
-        On platforms other than Linux, where nobody has tried it: the user has to name the folder.
+        On platforms other than Linux, which are untested: the user has to name the folder.
     """
     below = {
         "kdenlive": "kdenlive/effects",
@@ -34,7 +34,7 @@ def data_folder(program: str, platform: str = sys.platform) -> Path:
             f"found the platform {platform}, expected linux: the folder {below} of the program's "
             f"data is not known here; name it, --{program} DIR"
         )
-    # The standard of the XDG folders has relative ones ignored.
+    # The XDG standard requires programs to ignore relative folders.
     home = Path(os.environ.get("XDG_DATA_HOME", ""))
     return (home if home.is_absolute() else Path.home() / ".local/share") / below
 
@@ -45,19 +45,19 @@ def install_kdenlive(folder: Path, *, force: bool = False) -> list[Path]:
     Parameters
     ----------
     folder : Path
-        The folder; made when it is missing.
+        The folder; created if it is missing.
     force : bool
         Replace a file of that name that palette4d has not written.
 
     Returns
     -------
     list of Path
-        What was written.
+        The written files.
 
     Raises
     ------
     Palette4dError
-        A file of somebody else's is there, or the folder may not be written to.
+        Another program's file is in the way, or the folder is not writable.
     """
     return _write(folder, {kdenlive.FILE: kdenlive.effect_file(__version__)}, force)
 
@@ -71,7 +71,7 @@ def install_shotcut(folder: Path, *, force: bool = False) -> list[Path]:
 
 
 def _write(folder: Path, texts: dict[str, str], force: bool) -> list[Path]:
-    """Write all files, or none where one of them is somebody else's."""
+    """Write all files, or none if one of them would replace another program's file."""
     make_folder(folder)
     paths = [folder / name for name in texts]
     for path in paths:
@@ -87,7 +87,7 @@ def _write(folder: Path, texts: dict[str, str], force: bool) -> list[Path]:
 
 
 def _is_ours(path: Path) -> bool:
-    """Whether a file says in its first lines that palette4d wrote it."""
+    """Whether the first lines of a file say that palette4d wrote it."""
     try:
         with path.open("rb") as file:
             return MARK.encode() in file.read(500)

@@ -1,8 +1,8 @@
-"""Kdenlive's effect file: rows for the parameters that its own list leaves out or gets wrong.
+"""Kdenlive's effect file: rows for parameters that Kdenlive's own list omits or gets wrong.
 
-Kdenlive (26.08) lists an OpenFX effect's parameters by itself, but without texts (so without the
-sidecar), and it stores choices as numbers, which MLT does not take. An effect file whose id is the
-service's name replaces that list.
+Kdenlive (26.08) lists an OpenFX effect's parameters itself, but without texts, so without the
+sidecar. It stores choices as numbers, which MLT rejects. An effect file replaces that list if its
+id is the service's name.
 """
 
 from xml.etree import ElementTree
@@ -24,7 +24,7 @@ def effect_file(version: str) -> str:
     Parameters
     ----------
     version : str
-        The version of palette4d, which the file names.
+        The version of palette4d, for the comment in the file.
     """
     effect = ElementTree.Element(
         "effect",
@@ -49,7 +49,7 @@ def _row(parameter: Parameter) -> ElementTree.Element:
         case File():
             row.attrib |= {"type": "url", "filter": "Palette4D sidecars (*.json)"}
         case Choice():
-            # The first list is what is stored, the second what is shown.
+            # The first list holds the stored values, the second the displayed names.
             row.attrib |= {"type": "list", "default": parameter.initial}
             row.attrib["paramlist"] = ";".join(parameter.options)
             ElementTree.SubElement(row, "paramlistdisplay").text = ",".join(parameter.options)
@@ -64,7 +64,7 @@ def _row(parameter: Parameter) -> ElementTree.Element:
         case Switch():
             row.attrib |= {"type": "bool", "default": "0"}
         case Colour():
-            # MLT and Kdenlive read 0xRRGGBBAA alike; they disagree where '#' has eight digits.
+            # MLT and Kdenlive agree on 0xRRGGBBAA, but not on '#' with eight digits.
             row.attrib |= {"type": "color", "default": "0x808080ff"}
     ElementTree.SubElement(row, "name").text = parameter.label
     return row

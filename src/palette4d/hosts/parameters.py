@@ -1,9 +1,8 @@
 """The node's parameters as the hosts' files show them: names, labels, ranges and defaults.
 
-The node describes them (`ofx_plugin/plugin`), and the files must not say anything else:
-`tests/host/test_host_ui.py` compares them with what the node tells a host. What a file cannot
-set in these hosts (buttons, the embedded copy, the status) is left out, and so are the handles'
-ids.
+The node describes its parameters (`ofx_plugin/plugin`), and the files must agree with it:
+`tests/host/test_host_ui.py` compares them. The files leave out parameters that they cannot set in
+these hosts: buttons, the embedded copy and the status. They also leave out the handles' ids.
 """
 
 from dataclasses import dataclass
@@ -11,20 +10,20 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Parameter:
-    """What parameters of all kinds have."""
+    """The members that parameters of all kinds have."""
 
-    name: str  #: the node's, which projects store
+    name: str  #: the name in the node, which projects store
     label: str
 
 
 @dataclass(frozen=True)
 class File(Parameter):
-    """A path; none is chosen by default."""
+    """A path; empty by default."""
 
 
 @dataclass(frozen=True)
 class Choice(Parameter):
-    """One of several options, which MLT takes and stores by their labels."""
+    """One of several options; MLT stores the option's label."""
 
     options: tuple[str, ...]
     initial: str
@@ -32,12 +31,12 @@ class Choice(Parameter):
 
 @dataclass(frozen=True)
 class Number(Parameter):
-    """A number from `low` to `high`: the node's own range, or a part of it that a slider serves."""
+    """A number from `low` to `high`: the node's range, or the useful part of it for a slider."""
 
     initial: float
     low: float
     high: float
-    decimals: int = 0  #: 0: whole numbers
+    decimals: int = 0  #: decimal places; 0: whole numbers
     animates: bool = False
 
 
@@ -53,7 +52,7 @@ class Colour(Parameter):
 
 HANDLES = 32
 
-#: Frames in either direction: as far as a slider is of any use.
+#: Largest offset in frames in either direction: a longer slider is of no use.
 _FAR = 100_000
 
 SIDECAR = File("sidecar", "Sidecar")
@@ -89,7 +88,7 @@ def _handles() -> tuple[Parameter, ...]:
     return tuple(slots)
 
 
-#: All that a host with room for it shows, from what is needed first to what is seldom needed.
+#: All parameters, for hosts with room for them; the most important first.
 ALL: tuple[Parameter, ...] = (
     SIDECAR,
     OUTPUT,
@@ -117,7 +116,7 @@ ALL: tuple[Parameter, ...] = (
     *_handles(),
 )
 
-#: What suffices where the host's own list of parameters is to be had as well.
+#: The main parameters, for hosts that also show their own list of all parameters.
 MAIN: tuple[Parameter, ...] = (
     SIDECAR,
     OUTPUT,

@@ -1,8 +1,8 @@
 """Shotcut's filter folder: the main parameters, with a button to choose the sidecar.
 
-Shotcut (26.9) lists all parameters by itself, but only with `--experimental` and without such a
-button. Its filters are QML files; these use the controls of that version's own filters. Numbers
-with keyframes from elsewhere keep them until their slider is moved.
+Shotcut (26.9) lists all parameters itself, but only with `--experimental` and without such a
+button. Its filters are QML files. These files use the controls of that version's own filters.
+Keyframes from other programs stay until the user moves the slider.
 """
 
 from palette4d.hosts import SERVICE, origin
@@ -34,11 +34,10 @@ import QtQuick.Layouts
 import Shotcut.Controls as Shotcut
 
 Item {
-    // What is filled in here is no edit of the user's.
+    // False while the rows are filled: these changes are not the user's edits.
     property bool ready: false
 
-    // What a project does not hold has the node's default, and so has a choice of an option that
-    // the node does not know.
+    // A missing value or an unknown option gets the node's default.
     function choose(box, name, initial) {
         var index = box.model.indexOf(filter.get(name));
         box.currentIndex = index < 0 ? box.model.indexOf(initial) : index;
@@ -48,7 +47,7 @@ Item {
         return filter.get(name) === '' ? initial : filter.getDouble(name);
     }
 
-    // With a second slash in front, a project keeps a path that lies below its own folder whole.
+    // With a second slash in front, a project does not shorten paths below its own folder.
     function take(path) {
         filter.set('sidecar', path.replace(/^\\/+/, '//'));
     }
@@ -102,7 +101,7 @@ _CHOICE_ROW = """\
             onActivated: filter.set('@NAME@', currentText)
         }"""
 
-# Shares, as per cent.
+# Values from 0 to 1, shown in per cent.
 _SHARE_ROW = """\
         Shotcut.SliderSpinner {
             id: @NAME@
@@ -113,7 +112,7 @@ _SHARE_ROW = """\
             onValueChanged: if (ready) filter.set('@NAME@', value / 100)
         }"""
 
-# What is no number within the range is put back.
+# Text that is no number within the range is reset.
 _NUMBER_ROW = """\
         TextField {
             id: @NAME@
@@ -128,14 +127,14 @@ _NUMBER_ROW = """\
 
 
 def filter_files(version: str) -> dict[str, str]:
-    """Return the texts of the folder's files by their names, in the order of their writing.
+    """Return the texts of the folder's files by name, in the order in which to write them.
 
-    The file that makes Shotcut look at the folder comes last.
+    The last file makes Shotcut load the folder.
 
     Parameters
     ----------
     version : str
-        The version of palette4d, which the files name.
+        The version of palette4d, for the first line of the files.
     """
     by = origin(version)
     rows = "\n".join(
@@ -172,7 +171,7 @@ def _control(parameter: Parameter) -> str:
 
 
 def _fill(parameter: Parameter) -> str:
-    """The statement that shows what the project holds."""
+    """Return the statement that shows the project's value."""
     name = parameter.name
     match parameter:
         case File():
@@ -195,7 +194,7 @@ def _words(options: tuple[str, ...]) -> str:
 
 
 def _put(template: str, **texts: str) -> str:
-    """Put texts in the place of a template's @NAMES@."""
+    """Replace a template's @NAMES@ by texts."""
     for name, text in texts.items():
         template = template.replace(f"@{name}@", text)
     return template

@@ -1,1 +1,1 @@
-"""Many pieces of work at a time: processes on this machine, or a Dask farm."""
+"""Many tasks at a time, in processes on this machine or on a Dask farm."""

@@ -1,8 +1,7 @@
-"""Many pieces of work on a Dask farm: a scheduler, and workers on any machines.
+"""Many tasks on a Dask farm: a scheduler, and workers on any machines.
 
-A worker that dies costs its pieces another try elsewhere, and nothing else: results come back to
-this process, which alone writes files. Scheduler and workers need the same palette4d, and the
-workers see the clips and sidecars under the same paths.
+If a worker dies, other workers repeat its tasks. Only this process writes files. Scheduler and
+workers need the same palette4d. The workers must see the clips and sidecars under the same paths.
 """
 
 from __future__ import annotations
@@ -32,22 +31,22 @@ from palette4d.jobs.pool import (
     outcome,
 )
 
-#: Seconds to wait for a scheduler to answer, and for the first worker to come.
+#: Seconds to wait for the scheduler's answer, and for the first worker.
 ANSWERS_WITHIN = 15
 WORKERS_WITHIN = 120
 
-#: Seconds until a note says that there is no worker, and between checks for one.
+#: Seconds until a note says that there is no worker, and seconds between checks.
 TOLD_AFTER = 3
 ASKED_EVERY = 0.2
 
 
 def check_address(text: str) -> str:
-    """Return a scheduler's address as --cluster takes it.
+    """Return the value of --cluster if it is a scheduler's address.
 
     Raises
     ------
     Palette4dError
-        It is none.
+        It is not an address.
     """
     if re.fullmatch(r"([a-z]+://)?[^/:\s]+:[0-9]+", text):
         return text
@@ -62,20 +61,20 @@ def run(
     tasks: Mapping[Key, Task],
     take: Callable[[Key, Result | Failed], None],
 ) -> None:
-    """Work on each task on a farm, and call `take` with each outcome as it is done.
+    """Run each task on a farm; call `take` with each result as soon as it arrives.
 
     Parameters
     ----------
     address : str
-        As `check_address` takes it.
+        A scheduler's address (`check_address`).
     work, tasks, take
-        As in `pool.run`; a worker works at one piece at a time, with all threads it has.
+        As in `pool.run`; a worker runs one task at a time, with all its threads.
 
     Raises
     ------
     Palette4dError
-        Dask is not installed, no scheduler answers, it has no worker, or one with another
-        palette4d.
+        Dask is not installed, no scheduler answers, there is no worker, or a worker has another
+        version of palette4d.
     """
     if not tasks:
         return
@@ -102,12 +101,12 @@ def run(
                 client.cancel(futures)
 
 
-# One piece at a time in a process: all threads of a worker serve that piece.
+# One task at a time in a process: the task uses all threads of the worker.
 _at_work = threading.Lock()
 
 
 def _piece(work: Callable[[Task, int], Result], task: Task, config: str | None) -> Result:
-    """Do one piece of work on a worker, with $OCIO as it is where the command runs."""
+    """Run one task on a worker, with the $OCIO of the machine where the command runs."""
     from distributed import get_worker
 
     with _at_work:
@@ -123,7 +122,7 @@ def _piece(work: Callable[[Task, int], Result], task: Task, config: str | None) 
 
 
 def _version() -> str:
-    """Return the version of palette4d where this is run."""
+    """Return the version of palette4d on the machine that runs this function."""
     return _core.__version__
 
 
@@ -163,7 +162,7 @@ def _connected(address: str) -> Iterator[Any]:
 
 @contextlib.contextmanager
 def _without_log() -> Iterator[None]:
-    """Keep Dask's log from standard error: each failure is reported with its piece of work."""
+    """Keep Dask's log off standard error: each failure is reported with its task."""
     loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
     before = [logger.level for logger in loggers]
     for logger in loggers:
@@ -183,7 +182,7 @@ def _check_workers(client: Any, address: str) -> None:
     told = False
     while (waited := time.monotonic() - started) < WORKERS_WITHIN:
         found = client.run(_version, on_error="return")
-        # A worker that died or lost its connection does not lack palette4d; Dask drops it.
+        # The worker died or lost its connection: Dask drops it, so it needs no error here.
         there = {who: it for who, it in found.items() if not isinstance(it, OSError)}
         for worker, version in sorted(there.items()):
             _check_version(f"the worker {worker}", version)
@@ -204,10 +203,10 @@ def _check_workers(client: Any, address: str) -> None:
 
 
 def _check_scheduler(client: Any, address: str) -> None:
-    """Refuse a scheduler with another palette4d: it must import what is sent, too."""
+    """Refuse a scheduler with another palette4d: it also imports the tasks."""
     try:
         found: object = client.run_on_scheduler(_version)
-    except Exception as error:  # whatever the scheduler's import raised
+    except Exception as error:  # any error of the import on the scheduler
         found = error
     _check_version(f"the scheduler at {address}", found)
 

@@ -1,4 +1,4 @@
-"""Many pieces of work on this machine, in processes of their own."""
+"""Many tasks on this machine, in separate processes."""
 
 import contextlib
 import itertools
@@ -21,7 +21,7 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class Failed:
-    """What kept a piece of work from its result, in words for the user."""
+    """The reason why a task failed, in words for the user."""
 
     text: str
 
@@ -34,21 +34,21 @@ def run(
     *,
     patient: bool = True,
 ) -> None:
-    """Work on each task, several at a time, and call `take` with each outcome as it is done.
+    """Run the tasks, several at a time; call `take` with each result as soon as it is done.
 
     Parameters
     ----------
     work : callable
-        (task, threads to use) -> result; a function of a module, so that it can be sent.
+        (task, threads to use) -> result; a module's function, so that it can be pickled.
     tasks : mapping
-        What to do, by any key.
+        The tasks, by any key.
     take : callable
         Called in this process with a key and the result, or `Failed` for a `Palette4dError`, an
-        `OSError`, or a process that was ended from outside.
+        `OSError`, or a process that was killed.
     jobs : int
-        Processes; 0: one a processor; with 1 all is done in this process.
+        Processes; 0: one per processor; 1: run all tasks in this process.
     patient : bool
-        After Ctrl-C, let the pieces that are worked on be done and told; else they are dropped.
+        After Ctrl-C, finish and report the running tasks; otherwise they are dropped.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def run(
         for key, task in tasks.items():
             told(key, outcome(work, task, threads))
         return
-    # Spawned, not forked: the libraries here have threads of their own.
+    # Spawned, not forked: the libraries run threads, which a fork would break.
     pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"))
     left = iter(tasks.items())
     order = {key: i for i, key in enumerate(tasks)}
@@ -75,8 +75,8 @@ def run(
     others = set(multiprocessing.active_children())
     try:
         while True:
-            # No more than are worked on, so that Ctrl-C waits for those alone. It goes to all
-            # processes: the workers, who inherit this, finish the piece they are at.
+            # Submit only as many tasks as can run: Ctrl-C waits for these. It reaches all
+            # processes, but the workers inherit the block and finish their task.
             with without_interrupts():
                 for key, task in itertools.islice(left, jobs - len(running)):
                     running[_submitted(pool, work, task, threads)] = key
@@ -92,7 +92,7 @@ def run(
         raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
-        # After Ctrl-C: what was finished meanwhile.
+        # After Ctrl-C: the tasks that have finished meanwhile.
         for future, key in running.items():
             if not future.cancelled() and (patient or not future.exception()):
                 told(key, outcome(future.result))
@@ -110,7 +110,7 @@ def _submitted(
 
 
 def outcome(call: Callable[..., Result], *arguments: object) -> Result | Failed:
-    """Return what a call returns, or why it cannot."""
+    """Return a call's result, or `Failed` with the reason."""
     try:
         return call(*arguments)
     except (Palette4dError, OSError) as error:
@@ -124,7 +124,7 @@ def outcome(call: Callable[..., Result], *arguments: object) -> Result | Failed:
 
 @contextlib.contextmanager
 def later_interrupts() -> Iterator[None]:
-    """Let Ctrl-C wait for the body's end: what is being written is written and noted."""
+    """Delay Ctrl-C to the body's end, so that a file is written and recorded completely."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -140,7 +140,7 @@ def later_interrupts() -> Iterator[None]:
 
 @contextlib.contextmanager
 def without_interrupts() -> Iterator[None]:
-    """Keep Ctrl-C from this thread and from processes that are started meanwhile."""
+    """Block Ctrl-C for this thread and for processes that start meanwhile."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return

@@ -1,4 +1,4 @@
-"""Where many pieces of work are done: in processes here, or on a farm."""
+"""The workers for many tasks: processes on this machine, or a farm."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -11,14 +11,14 @@ __all__ = ["Failed", "Workers"]
 
 @dataclass(frozen=True)
 class Workers:
-    """Who does the work.
+    """The choice of workers.
 
     Attributes
     ----------
     jobs : int
-        Processes on this machine; 0: one a processor.
+        Processes on this machine; 0: one per processor.
     cluster : str or None
-        A farm instead: its Dask scheduler's address.
+        The Dask scheduler's address of a farm, to use instead.
     """
 
     jobs: int = 0
@@ -32,7 +32,7 @@ class Workers:
         *,
         patient: bool = True,
     ) -> None:
-        """Work on each task and call `take` with each outcome (`pool.run`, `dask_farm.run`)."""
+        """Run the tasks and call `take` with each result (`pool.run`, `dask_farm.run`)."""
         if self.cluster is not None:
             dask_farm.run(self.cluster, work, tasks, take)
         else:

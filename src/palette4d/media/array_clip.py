@@ -1,4 +1,4 @@
-"""Frames in memory as a clip: what notebooks and other programs analyse without files."""
+"""Frames in memory as a clip, for notebooks and other programs without files."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class ArrayClip(Clip):
         return Path(self.name)
 
     def fills(self, frames: Sequence[int]) -> Iterator[tuple[int, Fill]]:
-        """Yield for each frame its number and what bins it."""
+        """Yield for each frame its number and the function that bins it."""
         for frame in frames:
             yield frame, functools.partial(self._fill, frame)
 

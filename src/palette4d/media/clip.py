@@ -1,8 +1,8 @@
 """Clip reading, the first stage: image sequences and movies as numbered float32 frames.
 
 Input: a pattern, a folder, an image or a movie file. Output: a `Clip`, which yields one frame at a
-time, (h, w, 3 or 4) float32 with frame numbers that rise. Colours keep the file's own
-encoding: nothing is converted, and alpha is left as it is stored (`Clip.premultiplied`).
+time, (h, w, 3 or 4) float32, in rising order of frame numbers. Colours and alpha are not converted
+(`Clip.encoding`, `Clip.premultiplied`).
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ def open_clip(
         `A-B`, `A-BxN`, single numbers or comma lists (`common.arguments.parse_frames`); the
         whole clip by default.
     rate : Fraction, optional
-        Frames a second; the file's own by default, 24 where it has none.
+        Frames per second; by default the file's rate, or 24 if it has none.
     skip_bad_frames : bool
-        Pass over missing, unreadable or odd-sized frames and list them in `Clip.skipped`.
+        Skip frames that are missing, unreadable or of another size; list them in `Clip.skipped`.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""What a clip is: frame numbers, a rate, a size, and pixels that are read one frame at a time.
+"""The base class of clips: frame numbers, a rate, a size, and pixels, read frame by frame.
 
-`clip.py` opens one, `clip_images.py` and `clip_movie.py` implement it. Memory holds one frame,
-however long the clip. The analysis only counts pixels (`Clip.fills`).
+`clip.py` opens clips; `clip_images.py` and `clip_movie.py` implement them. Memory holds one frame
+for clips of any length. The analysis only counts pixels (`Clip.fills`).
 """
 
 from __future__ import annotations
@@ -24,39 +24,39 @@ from palette4d.common.errors import Palette4dError
 F32 = NDArray[np.float32]
 
 Fill = Callable[[_core.ColourBinner], bool]
-"""Adds a frame's pixels to a binner; FrameError when the frame is bad. Returns whether the frame is
-`hidden`: its colours were then added as if it had no alpha."""
+"""Adds a frame's pixels to a binner; FrameError if the frame is bad. Returns whether the frame is
+`hidden`; then its colours were added without regard to alpha."""
 
 LEAST_ALPHA = np.float32(1 / 255)
-"""Below it a pixel does not show in 8 bit."""
+"""A pixel with less alpha is invisible in 8 bits."""
 
 DEFAULT_RATE = Fraction(24)
 
 COUNTED_PIXELS = 4_000_000
-"""Of larger frames the analysis counts every n-th row, so that about as many pixels are left."""
+"""In larger frames the analysis counts only every n-th row, so about this many pixels."""
 
 LEAVE_OUT = (
     "Bring a good copy, choose a range with --frames, or leave such frames out with "
     "--skip-bad-frames."
 )
-"""The remedy for a bad frame."""
+"""The advice for a bad frame."""
 
 
 class ClipError(Palette4dError):
-    """A clip that cannot be opened: what was found, what was expected, what to do."""
+    """A clip cannot be opened; the message says what was found and expected, and the remedy."""
 
 
 class FrameError(ClipError):
-    """One frame is missing, unreadable or unlike the others; `--skip-bad-frames` skips it."""
+    """One frame is missing, unreadable or of another size; `--skip-bad-frames` skips it."""
 
 
 @dataclass(frozen=True)
 class Image:
-    """One frame as it is stored, upright.
+    """One frame with its stored code values, upright.
 
-    pixels is (h, w, 3 or 4) float32, integer formats scaled to 0..1 by their largest value, float
-    formats untouched (negative, above 1, NaN and infinities included). metadata holds
-    (name, OpenImageIO type, value) of what is worth carrying into a recoloured file.
+    pixels is (h, w, 3 or 4) float32. Integer formats are divided by their largest value; float
+    formats are unchanged, also negatives, values above 1, NaNs and infinities. metadata holds
+    (name, OpenImageIO type, value) for a recoloured copy of the file.
     """
 
     frame: int
@@ -75,27 +75,26 @@ class Clip(abc.ABC):
     source : str
         The sequence with one `#` for each digit, the movie, or the single image.
     frames : list of int
-        Frame numbers in rising order; includes the bad frames that `skip_bad_frames` will pass
-        over.
+        Frame numbers in rising order, with the bad frames that `skip_bad_frames` will skip.
     rate : Fraction
-        Frames a second.
+        Frames per second.
     width, height : int
-        Pixels, after the orientation that the file states has been applied.
+        Pixels, after the file's orientation is applied.
     encoding : str
-        Colour encoding as the file states it ("sRGB", "Rec.709", …), or "unknown".
+        The colour encoding that the file states ("sRGB", "Rec.709", …), or "unknown".
     has_alpha : bool
         The pixels have four channels, the last is alpha.
     premultiplied : bool
-        Colours are multiplied by alpha (EXR and DPX by convention, TIFF if it says so). PNG and
-        movies hold them straight. Nothing is converted on reading: see `straight_colours`.
+        Colours are multiplied by alpha: in EXR and DPX by convention, in TIFF if the file says so.
+        PNG and movies hold straight colours. Reading converts nothing; see `straight_colours`.
     depth : str
-        Stored sample: "uint8", "uint10", "uint12", "uint16", "half", "float", …
+        The stored sample type: "uint8", "uint10", "uint12", "uint16", "half", "float", …
     is_movie : bool
         The clip is a movie file: its frame numbers start at 0.
     notes : list of str
         Notes for the user, such as a variable frame rate.
     skipped : list of int
-        Frames passed over so far, in rising order.
+        Frames skipped so far, in rising order.
     """
 
     name: str
@@ -124,19 +123,19 @@ class Clip(abc.ABC):
 
     @abc.abstractmethod
     def file(self, frame: int) -> Path:
-        """File that holds a frame, whether it exists or not."""
+        """The file of a frame, whether it exists or not."""
 
     @abc.abstractmethod
     def fills(self, frames: Sequence[int]) -> Iterator[tuple[int, Fill]]:
-        """For each of the frames, in order: its number and what fills a binner with its colours.
+        """Yield for each frame, in order, its number and the function that fills a binner.
 
-        They are the colours that a recolouring sees (`straight_colours`), and may be binned in any
-        thread, each with a binner of its own. What is iterated over must be consumed in order.
+        It adds the colours for recolouring (`straight_colours`). Each function may run in any
+        thread, with a separate binner. The caller must consume the iterator in order.
         """
 
     @property
     def row_step(self) -> int:
-        """Every how many rows are counted: 1 up to 6 million pixels, 8 for 8K."""
+        """The analysis counts every n-th row: n is 1 up to 6 million pixels, 8 for 8K."""
         return max(1, round(self.width * self.height / COUNTED_PIXELS))
 
     def iter_images(self) -> Iterator[Image]:
@@ -180,12 +179,12 @@ class Clip(abc.ABC):
         return self.load(frame).pixels
 
     def straight_colours(self, pixels: F32) -> F32:
-        """(h, w, 3) float32 colours that a recolouring sees.
+        """(h, w, 3) float32 straight colours, the input of a recolouring.
 
-        Premultiplied colours are divided by alpha, as the node does. Pixels with an alpha below
-        1/255 have no colour that shows, and dividing by it would magnify noise into colours far
-        outside the clip's: they become NaN, which the analysis leaves out. A frame with nothing
-        else (`hidden`) keeps its colours as they are: if all frames are like it, alpha is not used.
+        Premultiplied colours are divided by alpha, as in the node. Pixels with an alpha below 1/255
+        are invisible, and the division would turn their noise into extreme colours. They become
+        NaN, which the analysis leaves out. If a frame has no other pixels (`hidden`), its colours
+        stay unchanged: if all frames are hidden, alpha is not used.
         """
         if pixels.shape[2] == 3:
             return pixels
@@ -206,7 +205,7 @@ class Clip(abc.ABC):
             self.skipped.sort()
 
     def none_readable(self) -> FrameError:
-        """Return the error that says that no frame is good."""
+        """Return the error for a clip without a good frame."""
         return FrameError(
             f"{self.source}: found none readable of {named(self.frames)}; "
             "expected at least one good frame. Run without --skip-bad-frames to see the cause."
@@ -214,12 +213,12 @@ class Clip(abc.ABC):
 
 
 def hidden(pixels: F32) -> bool:
-    """Whether no pixel of (h, w, 3 or 4) shows: alpha is below 1/255 everywhere."""
+    """Whether all pixels (h, w, 3 or 4) are invisible: alpha is below 1/255 everywhere."""
     return pixels.shape[2] == 4 and not (pixels[..., 3] >= LEAST_ALPHA).any()
 
 
 def all_hidden(binner: _core.ColourBinner) -> bool:
-    """Whether no pixel of what was binned, with its alpha, shows: as `hidden`."""
+    """Whether all pixels that were binned with alpha are invisible, as `hidden`."""
     return 0 < binner.transparent == binner.pixels + binner.ignored
 
 
@@ -230,7 +229,7 @@ def even_step(numbers: Sequence[int]) -> int:
 
 
 def progression_step(numbers: Sequence[int]) -> int:
-    """Largest step with which a range holds all of the (rising) numbers; 1 for one number."""
+    """Largest step of a range that holds all of the (rising) numbers; 1 for one number."""
     step = 0
     for before, after in itertools.pairwise(numbers):
         step = math.gcd(step, after - before)
@@ -256,7 +255,7 @@ def named(frames: Sequence[int]) -> str:
 
 
 def as_rate(value: float) -> Fraction | None:
-    """Nearest usual rate of a floating-point one: 23.976 -> 24000/1001; None if it is no rate."""
+    """Usual rate nearest to a floating-point rate: 23.976 -> 24000/1001; None if it is no rate."""
     if not math.isfinite(value) or value <= 0:
         return None
     for whole in range(1, 241):

@@ -52,7 +52,7 @@ CARRIED = (
 )
 _RATE_NAMES = ("FramesPerSecond", "dpx:FrameRate", "dpx:TemporalFrameRate")
 _DEPTHS = {"uint": "uint32", "int": "int32"}
-# OpenImageIO's names for what people call sRGB and so on; other names pass as they are.
+# Common names for OpenImageIO's colour space names; other names stay the same.
 _ENCODINGS = {
     "srgb_rec709_scene": "sRGB",
     "srgb_rec709_display": "sRGB",
@@ -73,7 +73,7 @@ class ImageClip(Clip):
     sequence: ImageSequence = field(kw_only=True)
 
     def file(self, frame: int) -> Path:
-        """File that holds a frame, whether it exists or not."""
+        """The file of a frame, whether it exists or not."""
         return self.sequence.path(frame)
 
     def load(self, frame: int) -> Image:
@@ -83,7 +83,7 @@ class ImageClip(Clip):
         return Image(frame, np.ascontiguousarray(pixels), header.metadata)
 
     def fills(self, frames: Sequence[int]) -> Iterator[tuple[int, Fill]]:
-        """For each frame its number and what reads and bins it."""
+        """Yield for each frame its number and the function that reads and bins it."""
         for frame in frames:
             yield frame, functools.partial(self._fill, frame)
 
@@ -96,13 +96,13 @@ class ImageClip(Clip):
         binner.add(rows, bits=bits, premultiplied=self.premultiplied)
         if not self.has_alpha or not all_hidden(binner):
             return False
-        # Nothing shows: see `straight_colours`.
+        # No pixel is visible: see `straight_colours`.
         binner.clear()
         binner.add(rows[..., :3], bits=bits)
         return True
 
     def _read(self, frame: int) -> tuple[Header, NDArray[Any], int]:
-        """Header, (h, w, 3 or 4) samples as they are stored, and Exif's orientation."""
+        """Header, (h, w, 3 or 4) stored samples, and the Exif orientation."""
         path, what = self._path(frame), f"frame {frame}"
         source, spec = _open(path, what)
         chosen = _channel_choice(spec)
@@ -112,7 +112,7 @@ class ImageClip(Clip):
         stored = source.read_image(source.current_subimage(), 0, first, last, spec.format)
         problem = source.geterror()
         source.close()
-        # JPEG returns grey pixels together with an error: both count.
+        # A damaged JPEG returns grey pixels together with an error.
         if stored is None or problem:
             raise _unreadable(path, what, problem)
         samples = np.asarray(stored)[..., [channel - first for channel in chosen]]
@@ -124,7 +124,7 @@ class ImageClip(Clip):
         return self.sequence.path(frame)
 
     def _check(self, header: Header, frame: int) -> None:
-        """Refuse a frame unlike the first."""
+        """Raise an error if a frame's size or channels differ from the first frame's."""
         for found, expected in (
             (_size_of(header), _size_of(self)),
             (_alpha_of(header), _alpha_of(self)),
@@ -138,9 +138,9 @@ class ImageClip(Clip):
 
 @dataclass(frozen=True)
 class Header:
-    """What an image file says about itself.
+    """The properties that an image file states.
 
-    Width and height are upright. bits: of a sample where they are fewer than its memory type's,
+    Width and height are upright. bits: the bits of a sample if fewer than its memory type has,
     else 0.
     """
 
@@ -163,7 +163,7 @@ def open_images(
     skip_bad_frames: bool,
     single: bool = False,
 ) -> ImageClip:
-    """Open a sequence over the asked range; ClipError or FrameError as `open_clip` says."""
+    """Open a sequence over the given range; raises ClipError or FrameError as `open_clip`."""
     wanted = _wanted_frames(sequence, frames, embedded)
     missing = [frame for frame in wanted if frame not in sequence.files]
     if missing and not skip_bad_frames:
@@ -255,7 +255,7 @@ def _alpha_of(what: Header | Clip) -> str:
 
 
 def read_header(path: Path, what: str) -> Header:
-    """Open an image for its header alone; FrameError names `what` and the file."""
+    """Open an image to read its header; FrameError names `what` and the file."""
     source, spec = _open(path, what)
     source.close()
     return _header(spec, _channel_choice(spec))
@@ -300,7 +300,7 @@ def _open(path: Path, what: str) -> tuple[Any, Any]:
 
 
 def _channel_choice(spec: Any) -> list[int]:
-    """Channels to read as R, G, B and perhaps A; a grey one stands for all three."""
+    """Channels to read as R, G, B and perhaps A; a grey channel is read three times."""
     names = list(spec.channelnames)
     alpha = [spec.alpha_channel] if 0 <= spec.alpha_channel < len(names) else []
     if {"R", "G", "B"} <= set(names):
@@ -317,13 +317,13 @@ def _channel_choice(spec: Any) -> list[int]:
 
 
 def _bits(spec: Any) -> int:
-    """Bits a sample where they are fewer than its memory type's, else 0."""
+    """Bits per sample if fewer than its memory type has, else 0."""
     bits = int(spec.get_int_attribute("oiio:BitsPerSample", 0))
     return bits if str(spec.format) == "uint16" and 8 < bits < 16 else 0
 
 
 def _scaled(stored: NDArray[Any], bits: int) -> F32:
-    """Integers over their largest value, floats as they are, as (h, w, c) float32."""
+    """(h, w, c) float32: integers divided by their largest value, floats unchanged."""
     if stored.dtype.kind == "f":
         with np.errstate(over="ignore"):
             return stored.astype(np.float32, copy=False)
@@ -337,7 +337,7 @@ def _scaled(stored: NDArray[Any], bits: int) -> F32:
 
 
 def _in_display_window(samples: NDArray[Any], spec: Any) -> NDArray[Any]:
-    """An EXR's data window laid into its display window: black outside, overscan cut off."""
+    """An EXR's display window: black outside the data window, without overscan."""
     left, top = spec.x - spec.full_x, spec.y - spec.full_y
     size = spec.full_height, spec.full_width
     if (left, top) == (0, 0) and samples.shape[:2] == size:

@@ -1,9 +1,9 @@
 """Clips of movie files, decoded in order through PyAV (FFmpeg's libraries).
 
 Frame numbers start at 0 and count pictures in presentation order. A first pass reads the packets'
-time stamps without decoding, so that a picture which cannot be decoded later is named by its own
-number and moves no other. Damage is named where the decoder reports it (H.264, ProRes and most
-others do); FFV1 and VP9 conceal it, and FFmpeg passes no word of it on.
+time stamps without decoding. So a picture that cannot be decoded keeps its number and shifts no
+other picture. Damage is reported if the decoder reports it, as H.264, ProRes and most others do.
+FFV1 and VP9 conceal damage.
 """
 
 from __future__ import annotations
@@ -64,17 +64,17 @@ LUMA_WEIGHTS = {
 _LIMITED_RANGE, _FULL_RANGE = 1, 2
 _GREYS = ("gray", "gray10le", "gray12le", "gray16le")
 _PLANAR_DEPTHS = (8, 9, 10, 12, 14, 16)
-#: How the names of Y'CbCr layouts start.
+#: Prefixes of the names of Y'CbCr layouts.
 _LUMA_CHROMA = ("yuv", "nv", "p0", "p2", "p4", "yuyv", "uyvy", "yvyu", "y2", "xv", "v")
 
 
 @dataclass
 class MovieClip(Clip):
-    """A movie file. Reading in order decodes each picture once; going back seeks."""
+    """A movie file. Reading in order decodes each picture once; reading backwards seeks."""
 
     path: Path = field(kw_only=True)
     count: int = field(kw_only=True)
-    #: Presentation time stamps in order; None where the file has none, and pictures are counted.
+    #: Presentation time stamps in order; None if the file has none and pictures are counted.
     stamps: list[int] | None = field(kw_only=True, default=None)
     _decoder: Iterator[tuple[int, av.VideoFrame]] | None = field(default=None, init=False)
     _next: int = field(default=0, init=False)
@@ -86,12 +86,12 @@ class MovieClip(Clip):
         return self.path
 
     def load(self, frame: int) -> Image:
-        """Decode one picture; FrameError when it is damaged, missing or of another size."""
+        """Decode one picture; FrameError if it is damaged, missing or of another size."""
         picture = self._picture(frame)
         return Image(frame, _upright(picture_pixels(picture), picture))
 
     def fills(self, frames: Sequence[int]) -> Iterator[tuple[int, Fill]]:
-        """Decode the frames in order; binning one may go on while the next is decoded."""
+        """Decode the frames in order; one frame may be binned while the next is decoded."""
         for frame in frames:
             try:
                 fill: Fill = functools.partial(_bin_picture, self._picture(frame), self.row_step)
@@ -124,7 +124,7 @@ class MovieClip(Clip):
             picture = self._advance(frame)
             if picture is not None or not seek:
                 return picture
-            # Some containers seek past their mark: only the way from the start is sure.
+            # Some containers seek too far: then only decoding from the start is safe.
             self._start(0)
         return self._advance(frame)
 
@@ -133,7 +133,7 @@ class MovieClip(Clip):
         self._next, self._held, self._problem = 0, None, ""
 
     def _advance(self, frame: int) -> av.VideoFrame | None:
-        """Decode up to a picture; one that comes too early is kept for the next call."""
+        """Decode up to a picture; a later picture is kept for the next call."""
         assert self._decoder is not None
         self._next = frame + 1
         if self._held is None:
@@ -155,7 +155,7 @@ class MovieClip(Clip):
         counted = 0
         with _open(self.path) as container:
             stream = _video_stream(container, self.path)
-            # Say so when a picture is damaged, instead of painting over it.
+            # Report a damaged picture instead of concealing the damage.
             stream.codec_context.options = {"err_detect": "crccheck+explode"}
             stream.thread_type = "AUTO"
             if start and self.stamps:
@@ -172,7 +172,7 @@ class MovieClip(Clip):
                         yield numbers[picture.pts], picture
 
     def _packets(self, container: Any, stream: Any) -> Iterator[list[av.VideoFrame]]:
-        """Decoded pictures of each packet; a damaged one is noted and passed over."""
+        """Decoded pictures of each packet; damaged pictures are recorded and skipped."""
         packets = container.demux(stream)
         while True:
             try:
@@ -191,7 +191,7 @@ class MovieClip(Clip):
 def open_movie(
     path: Path, frames: str | None, rate: Fraction | None, skip_bad_frames: bool
 ) -> MovieClip:
-    """Open a movie file over the asked range; ClipError or FrameError as `open_clip` says."""
+    """Open a movie file over the given range; raises ClipError or FrameError as `open_clip`."""
     with _open(path) as container:
         stream = _video_stream(container, path)
         first, promised, stamps, packets = _index(container, stream, path)
@@ -238,7 +238,7 @@ def open_movie(
 
 def _open(path: Path) -> Any:
     try:
-        # Without the protocol a name such as "cam:01.mov" would be taken for an address.
+        # Without the protocol FFmpeg would read a name such as "cam:01.mov" as an address.
         return av.open(f"file:{path}", mode="r")
     except (FFmpegError, OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
@@ -264,7 +264,7 @@ def _index(
     first: av.VideoFrame | None = None
     stamps: list[int | None] = []
     discarded = 0
-    # Old VP8 files have packets without a picture: only decoding tells.
+    # Old VP8 files have packets without a picture; only decoding shows this.
     by_decoding = stream.codec_context.name == "vp8"
     try:
         for packet in container.demux(stream):
@@ -284,7 +284,7 @@ def _index(
             elif not packet.is_corrupt or packet.pts is not None:
                 stamps.append(packet.pts)
     except FFmpegError:
-        pass  # the file ends in the middle; what came before counts
+        pass  # the file ends in the middle; the earlier packets count
     if first is None:
         raise ClipError(
             f"{path}: no frame can be decoded (codec {stream.codec_context.name}); expected a "
@@ -298,7 +298,7 @@ def _index(
 
 
 def _varies(stamps: list[int], base: Fraction, rate: Fraction | None) -> bool:
-    """Whether the time between frames changes by more than the rounding of time stamps."""
+    """Whether the time between frames varies by more than the rounding of time stamps."""
     if len(stamps) < 3 or not rate:
         return False
     gaps = np.diff(np.asarray(stamps, dtype=np.int64))
@@ -320,7 +320,7 @@ def _upright(pixels: F32, picture: av.VideoFrame) -> F32:
 
 
 def _fail(error: FrameError, binner: _core.ColourBinner) -> bool:
-    """Stand in for the filling of a bad frame."""
+    """Return a function that raises a bad frame's error instead of filling."""
     raise error
 
 
@@ -341,7 +341,7 @@ def _bits(picture: av.VideoFrame) -> int:
 
 
 def _bin_picture(picture: av.VideoFrame, row_step: int, binner: _core.ColourBinner) -> bool:
-    """Bin every `row_step`-th row of a picture; returns whether none of them shows (`Fill`)."""
+    """Bin every `row_step`-th row of a picture; return whether all are invisible (`Fill`)."""
     if _is_luma_chroma(picture) and not _has_alpha(picture):
         bits, matrix = _bits(picture), _matrix(picture)
         red_weight, blue_weight = LUMA_WEIGHTS[matrix]
@@ -358,7 +358,7 @@ def _bin_picture(picture: av.VideoFrame, row_step: int, binner: _core.ColourBinn
     binner.add(pixels)
     if not all_hidden(binner):
         return False
-    # Nothing shows: see `Clip.straight_colours`.
+    # No pixel is visible: see `Clip.straight_colours`.
     binner.clear()
     binner.add(pixels[..., :3])
     return True
@@ -367,7 +367,7 @@ def _bin_picture(picture: av.VideoFrame, row_step: int, binner: _core.ColourBinn
 def _thinned(picture: av.VideoFrame, step: int) -> list[NDArray[Any]]:
     """Every `step`-th row of Y', Cb and Cr, each as wide as the picture.
 
-    Of a large picture chroma is taken from the nearest sample, as filtering would cost more than
+    In a large picture chroma comes from the nearest sample, because filtering would cost more than
     decoding.
     """
     samples = np.uint8 if _bits(picture) == 8 else np.uint16
@@ -385,9 +385,9 @@ def _thinned(picture: av.VideoFrame, step: int) -> list[NDArray[Any]]:
 def picture_pixels(picture: av.VideoFrame) -> F32:
     """(h, w, 3 or 4) float32 R'G'B'(A) in 0..1 of a decoded picture, alpha straight.
 
-    Y'CbCr is converted here in floating point with the stream's own matrix and range (Rec.709 above
-    576 lines and Rec.601 below where it states none, limited range likewise); libswscale, which
-    rounds on the way, only brings chroma to full size.
+    Y'CbCr is converted here in floating point with the stream's own matrix and range. Defaults are
+    Rec.709 above 576 lines, else Rec.601, and limited range. libswscale only scales chroma to full
+    size, because its conversion rounds.
     """
     packed = _packed(picture)
     if packed is not None:
@@ -423,7 +423,7 @@ def _to(picture: av.VideoFrame, layout: str) -> av.VideoFrame:
     if picture.format.name == layout:
         return picture
     matrix = int(picture.colorspace) if int(picture.colorspace) in (1, 4, 5, 7, 9) else 5
-    # libswscale supposes limited range for Y'CbCr and full range for R'G'B' where none is stated.
+    # Without a stated range libswscale assumes limited range for Y'CbCr, full range for R'G'B'.
     full = int(picture.color_range) == _FULL_RANGE or picture.format.is_rgb
     return picture.reformat(
         format=layout,
@@ -454,14 +454,14 @@ def _is_luma_chroma(picture: av.VideoFrame) -> bool:
 
 
 def _full_chroma(picture: av.VideoFrame) -> av.VideoFrame:
-    """Y'CbCr(A) with as many chroma samples as luma samples, a plane each."""
+    """Planar Y'CbCr(A) with as many chroma samples as luma samples."""
     bits = _bits(picture)
     depth = "" if bits == 8 else f"{bits}le"
     return _to(picture, f"yuv{'a' if _has_alpha(picture) else ''}444p{depth}")
 
 
 def _matrix(picture: av.VideoFrame) -> int:
-    """Matrix coefficients; where none are stated, by the number of lines."""
+    """Matrix coefficients; if the file states none, by the number of lines."""
     stated = int(picture.colorspace)
     return (1 if picture.height > 576 else 5) if stated == _UNSPECIFIED else stated
 

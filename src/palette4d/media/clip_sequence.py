@@ -1,4 +1,4 @@
-"""Which files make up an image sequence: patterns, folders and single files, by name only."""
+"""Finds the files of image sequences by name only: patterns, folders and single files."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ MOVIE_EXTENSIONS = frozenset({
 # The last number of a stem. A minus is a sign only at the start or after another separator:
 # "shot-0010" is frame 10 of "shot-", "shot.-0010" is frame -10 of "shot.".
 _NUMBER = re.compile(r"((?:(?<=[._ ])|\A)-)?[0-9]+\Z")
-# Names that say what a file is, not what it shows; one letter, or a letter and a digit, say nothing
-# anyway. Two letters (cg, bg) do.
+# Names for the kind of file, not for the shot. Names of one letter, or of a letter and a digit, do
+# not count either. Names of two letters (cg, bg) do.
 _ANONYMOUS = re.compile(
     r".?|.?[\W\d_].?|(frame|image|img|out|output|pic|picture|plate|render|still)s?|seq(uence)?"
     r"|dpx|exr|jpe?g|png|tiff?",
@@ -60,10 +60,10 @@ class ImageSequence:
 
     @property
     def name(self) -> str:
-        """The prefix without its separator; the nearest folder's whose name tells more, of files
-        such as f.0001.png."""
+        """The prefix without its separator; for files such as f.0001.png, the name of the nearest
+        folder that names the shot."""
         own = self.prefix.rstrip("._- ")
-        if not self.width:  # an image of its own, not one of a sequence
+        if not self.width:  # a single image, not a sequence
             return own or "clip"
         folder = self.folder.resolve()
         above = [folder, *folder.parents][:_FOLDERS_TO_NAME_BY]
@@ -99,7 +99,7 @@ def frame_number(stem: str) -> tuple[str, str] | None:
 
 
 def _digits_fit(number: str, width: int) -> bool:
-    """Whether a number as written is one of a sequence padded to `width` digits."""
+    """Whether a written number fits a sequence padded to `width` digits."""
     digits = number.lstrip("-")
     return (
         len(digits) == width or len(number) == width or (len(digits) > width and digits[0] != "0")
@@ -155,12 +155,12 @@ def _by_width(
 
 
 def in_folder(folder: Path) -> ImageSequence | Path:
-    """The one image sequence of a folder, or its one image when that has no number."""
+    """The only image sequence of a folder, or its only image if that has no number."""
     found = sequences_in(folder)
     names = _file_names(folder)
     images = [name for name in names if extension(name) in IMAGE_EXTENSIONS]
     movies = [name for name in names if extension(name) in MOVIE_EXTENSIONS]
-    # One numbered image among others (beach.png, sky2.png) is no sequence, but one of them.
+    # One numbered image among other images (beach.png, sky2.png) is not a sequence.
     if len(found) == 1 and (len(found[0].files) > 1 or len(images) == 1):
         return found[0]
     if not found and len(images) == 1:
@@ -193,7 +193,7 @@ def of_pattern(spec: str) -> tuple[ImageSequence, str | None]:
     path = Path(spec)
     folder = path.parent
     try:
-        # One `#` stands for one digit, as in the sidecar's source.
+        # One `#` means one digit, as in the sidecar's source.
         parsed = FileSequence(path.name, pad_style=PAD_STYLE_HASH1)
     except FileSeqException as error:
         raise ClipError(
@@ -215,7 +215,7 @@ def of_pattern(spec: str) -> tuple[ImageSequence, str | None]:
     names = _file_names(folder)
     matches = [(match[1], name) for name in names if (match := number.fullmatch(name))]
 
-    # A lone `#` means any number in some programs and four digits in others: what lies there tells.
+    # A single `#` means any number in some programs, four digits in others: the files decide.
     if str(parsed.padding()) == "#" and matches:
         found = list(_by_width(folder, prefix, suffix, matches))
         sequence = max(found, key=lambda one: len(one.files))
@@ -228,7 +228,7 @@ def of_pattern(spec: str) -> tuple[ImageSequence, str | None]:
 
 
 def _near(spec: str, folder: Path) -> str:
-    """What lies in the folder instead, the most similar first."""
+    """The folder's sequences for the error message, the most similar first."""
     patterns = {Path(one.pattern).name: str(one) for one in sequences_in(folder)}
     if not patterns:
         return f"{folder} holds no image sequence"

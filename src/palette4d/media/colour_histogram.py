@@ -1,9 +1,9 @@
-"""A frame's colours as shares of pixels in the cells of a coarse grid, to tell frames apart by.
+"""A frame's colour histogram on a coarse grid, for comparing frames.
 
-Input: weighted colours. Output: a histogram of `CELLS` cells a channel. Each pixel is shared out
-among the eight cells around it, so that a small shift of all colours (exposure, fading, grain) is a
-small difference. The grid is even in the square root of a colour, which serves encoded pictures and
-linear light alike, and widens above 1.
+Input: weighted colours. Output: a histogram of `CELLS` cells per channel. Each pixel is distributed
+to the eight cells around it. So a small shift of all colours (exposure, fading, grain) is a small
+difference. The grid is even in the square root of a code value, which suits encoded and
+scene-linear pictures; above 1 its cells are wider.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 F64 = NDArray[np.float64]
 
-#: So many of a frame's colours must be looked at: with 1024 noise comes near to what a cut is. All
-#: that are kept are looked at where they are more, since drawing fewer of them costs more.
+#: The histogram needs at least this many colours of a frame: with 1024, noise looks nearly like a
+#: cut. If more colours are kept, all are used, because drawing a sample costs more.
 LEAST_COLOURS = 2048
 
 CELLS = 12
-# Cells from 0 to 1; those above reach to about 60.
+# Cells from 0 to 1; the cells above reach to about 60.
 CELLS_TO_ONE = 7
 ABOVE_ONE = 0.15
 
@@ -41,7 +41,7 @@ def histogram(rgb: F64, counts: F64) -> F64:
 
 
 def _eased(colours: F64) -> F64:
-    """Square roots up to 1, where a difference shows alike in darks and lights; logarithms above.
+    """Square roots up to 1, where equal steps look alike in darks and lights; logarithms above.
 
     Colours below 0 count as 0.
     """

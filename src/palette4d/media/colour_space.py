@@ -1,9 +1,9 @@
 """The colour space of a clip's palette, through OpenColorIO.
 
-Input: a clip, and what the user said about colour spaces. Output: the same clip with code values in
-the palette's colour space, and the conversion that the sidecar records. The paper's palettes are
-hulls of display-referred colours, which stay as they are. Scene-linear code values are converted to
-a log encoding, where a photographic stop has the same length everywhere.
+Input: a clip, and the user's colour space options. Output: the same clip with code values in the
+palette's colour space, and the conversion for the sidecar. Display-referred colours, as in the
+paper, are not converted. Scene-linear code values are converted to a log encoding, where a
+photographic stop has the same length everywhere.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ from palette4d.media.clip_base import Clip, Fill, FrameError, Image, hidden
 
 F32 = NDArray[np.float32]
 
-#: Colours of each frame that the conversion is compared with OpenColorIO's on.
+#: Colours per frame for the comparison of the conversion with OpenColorIO's.
 COMPARED = 4096
 
 #: Sample types that may be scene-linear.
 FLOATS = ("half", "float", "double")
 
-#: The log encoding of scene-linear clips: these roles where they are logs, else this space.
+#: The log encoding for scene-linear clips: one of these roles if it is a log, else this space.
 LOG_ROLES = ("color_timing", "compositing_log")
 LOG_SPACE = "ACEScct"
 
 
 @dataclasses.dataclass(frozen=True)
 class SpaceOptions:
-    """What the user said: names of colour spaces and of the config that has them."""
+    """The user's options: names of colour spaces, and of their config."""
 
     input_space: str | None = None
     palette_space: str | None = None
@@ -48,13 +48,13 @@ class SpaceOptions:
 
     @property
     def asked(self) -> bool:
-        """Whether colour spaces play a part at all: an option was given, or ``$OCIO`` is set."""
+        """Whether colour spaces are in use: an option was given, or ``$OCIO`` is set."""
         return any(dataclasses.astuple(self)) or bool(os.environ.get("OCIO"))
 
 
 @dataclasses.dataclass(frozen=True)
 class Spaces:
-    """The colour spaces of a clip; `conversion` is None where they are one and the same."""
+    """The colour spaces of a clip and its palette; `conversion` is None if they are the same."""
 
     config: Any
     config_name: str
@@ -66,21 +66,21 @@ class Spaces:
 def spaces_of(clip: Clip, options: SpaceOptions) -> Spaces | None:
     """Return the colour spaces of a clip and its palette.
 
-    The input space is, in this order: what the user said; what a rule of the config says of the
-    file's name; what the file says of itself; the config's default rule, for float files only. The
-    palette space is what the user said; for scene-linear clips a log encoding; else the input
-    space: camera logs and display-referred encodings are fit for palettes as they are.
+    The input space is the first of: the user's option; the config's rule for the file name; the
+    file's own statement; the config's default rule, for float files only. The palette space is the
+    user's option; else a log encoding for scene-linear clips; else the input space, because camera
+    logs and display-referred encodings suit palettes.
 
     Returns
     -------
     Spaces or None
-        None when nothing is said and nothing known: then the clip's code values stay as they are.
+        None if no colour space is given or known: then the code values are not converted.
 
     Raises
     ------
     Palette4dError
-        A config that cannot be used, a name that it lacks, a conversion that is no chain of
-        matrices and curves.
+        The config is unusable, it lacks a name, or the conversion is not a chain of matrices and
+        curves.
     """
     if not options.asked:
         return None
@@ -140,10 +140,10 @@ def _is_the_role(config: Any, space: Any, role: str) -> bool:
 
 
 class ConvertedClip(Clip):
-    """A clip whose colours, for the analysis, are converted to the palette's colour space.
+    """A clip whose colours are converted to the palette's colour space for the analysis.
 
-    Images stay as they are stored. `comparison` says how far the converted colours are from
-    OpenColorIO's.
+    `frames` and images are not converted. `comparison` holds the error of the converted colours
+    against OpenColorIO.
     """
 
     def __init__(self, clip: Clip, spaces: Spaces) -> None:
@@ -171,7 +171,10 @@ class ConvertedClip(Clip):
         return self._clip.iter_images()
 
     def fills(self, frames: Sequence[int]) -> Iterator[tuple[int, Fill]]:
-        """For each frame its number and what bins it; movies are decoded in order, images there."""
+        """Yield for each frame its number and the function that bins it.
+
+        Movies are decoded here in order, images in that function.
+        """
         for frame in frames:
             fill: Fill = functools.partial(self._fill, frame)
             if self.is_movie:
@@ -200,7 +203,7 @@ class ConvertedClip(Clip):
 
 
 def _fail(error: FrameError, binner: _core.ColourBinner) -> bool:
-    """Stand in for the filling of a bad frame."""
+    """Return a function that raises a bad frame's error instead of filling."""
     raise error
 
 
@@ -223,8 +226,8 @@ def record(document: dict[str, Any], clip: Clip, spaces: Spaces | None) -> list[
     Raises
     ------
     Palette4dError
-        On the clip's own colours the conversion is further than 1e-5 from OpenColorIO's, beyond
-        what its single precision explains.
+        On the clip's own colours the conversion differs from OpenColorIO's by more than 1e-5,
+        beyond the error of single precision.
     """
     if not isinstance(clip, ConvertedClip):
         return []
@@ -253,7 +256,7 @@ def record(document: dict[str, Any], clip: Clip, spaces: Spaces | None) -> list[
 
 
 def described(spaces: Spaces | None) -> str | None:
-    """Return one line for the report, None when there is nothing to say."""
+    """Return one line for the report, or None."""
     if spaces is None:
         return None
     if spaces.conversion is None:

@@ -1,22 +1,23 @@
 """Detection of sudden cuts from the colours of frames: a palette must not span one (section 7.1).
 
-Input: the histograms of frames (`colour_histogram`). Output: the numbers of the frames with which
-new shots begin.
+Input: the histograms of frames (`colour_histogram`). Output: the numbers of the first frames of new
+shots.
 
-Two frames differ by the share of pixels whose colour has no counterpart in the other frame, one
-minus the intersection of their histograms. A small shift of all colours (exposure, fading, grain)
-is a small difference. The difference of a frame from the one before is a cut when
+The difference of two frames is one minus the intersection of their histograms: the share of pixels
+whose colour has no counterpart in the other frame. A small shift of all colours (exposure, fading,
+grain) is a small difference. A frame begins a new shot if its difference from the frame before
+meets all of these conditions:
 
-- it is at least `LEAST_DIFFERENCE`: a title or a banner changes less,
-- it is `LEAST_RATIO` times the differences around it, the second largest of the `AROUND` before or
-  after (twice that with fewer than `SURE` on a side, near the ends of the clip): a pan, a fade, a
-  time lapse or flicker change all the time,
-- and no frames around it agree over a gap of one or two frames, as they do around a flash.
+- It is at least `LEAST_DIFFERENCE`; a title or a banner changes less.
+- It is `LEAST_RATIO` times the differences around it: the second largest of the `AROUND` before or
+  after. The factor is doubled near the ends of the clip, with fewer than `SURE` on a side. A pan, a
+  fade, a time lapse or flicker change all the time.
+- No frames around it agree over a gap of one or two frames, as they do around a flash.
 
-A dissolve is a change in time that a palette follows: it is no cut. A cut between pictures of equal
-colours is not detected, and does no harm. Two frames alone show no cut, since the speed of the clip
-is unknown. A lasting change of light, such as a lamp switched on, is a cut to a palette too.
-docs/lab/clips.md has the figures behind the limits.
+A dissolve is not a cut: a palette follows it in time. A cut between pictures of equal colours is
+not detected and does no harm. Two frames alone show no cut, because the speed of the clip is
+unknown. A lasting change of lighting, such as a lamp switched on, counts as a cut.
+docs/lab/clips.md has the measurements behind the limits.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ F64 = NDArray[np.float64]
 
 LEAST_DIFFERENCE = 0.15
 LEAST_RATIO = 3.0
-# Differences below this are noise: beside a still picture any change would look large.
+# Smaller differences count as this: after a still picture any change would look large.
 NOISE = 0.01
 # Around a flash the frames agree again: they differ by at most this share of the jump.
 AGREEMENT = 0.5
@@ -47,7 +48,7 @@ MOST_SHOWN = 8
 def find_cuts(histograms: Iterable[tuple[int, F64]]) -> list[int]:
     """Return the numbers of the frames that begin a new shot, rising; none for a single shot.
 
-    Takes (frame number, histogram) pairs in order of time, and holds few of them at a time.
+    The input is (frame number, histogram) pairs in order of time; memory holds few of them.
     """
     numbers, gaps = _gaps(histograms)
     return [numbers[i] for i in range(1, len(numbers)) if _is_cut(gaps, i)]
@@ -93,8 +94,8 @@ def _activity(jumps: list[float], start: int, end: int) -> float:
 def _usual(jumps: list[float]) -> float:
     """Return the second largest of several jumps.
 
-    The largest may be another cut, and repeated frames (pulldown, animation on twos) leave two of
-    five jumps that tell the speed of the clip.
+    The largest may be another cut. With repeated frames (pulldown, animation on twos) only two of
+    five jumps show the speed of the clip.
     """
     ordered = sorted(jumps)
     return ordered[-2] if len(ordered) > 2 else ordered[-1]
@@ -106,7 +107,7 @@ def difference(one: F64, other: F64) -> float:
 
 
 def refusal(frames: Sequence[int], cuts: Sequence[int]) -> str:
-    """Say that the clip of evenly spaced `frames` has `cuts`, and which frames to analyse."""
+    """Return the message that the clip has `cuts`, with the frame ranges to analyse."""
     shots = [f"--frames {shot}" for shot in _shots(frames, cuts)]
     return (
         f"found {counted(len(cuts), 'sudden cut')}: a new shot begins at {_places(cuts)}; expected "
@@ -117,7 +118,7 @@ def refusal(frames: Sequence[int], cuts: Sequence[int]) -> str:
 
 
 def _flash(frames: Sequence[int], cuts: Sequence[int]) -> str:
-    """Say what to do if the shot at the end of the clip is a flash."""
+    """Return the advice for a flash at the end of the clip."""
     step = frames[1] - frames[0]
     bounds = [frames[0], *cuts, frames[-1] + step]
     lasting = [
@@ -131,7 +132,7 @@ def _flash(frames: Sequence[int], cuts: Sequence[int]) -> str:
 
 
 def refusal_inside(cuts: Sequence[int]) -> str:
-    """Say that there are `cuts` inside one clip of an edit."""
+    """Return the message that one clip of an edit has `cuts`."""
     return (
         f"found {counted(len(cuts), 'sudden cut')} inside one clip of the edit: a new shot begins "
         f"at {_places(cuts)}; expected one shot. Blade the edit there, or give --allow-cuts"
@@ -139,7 +140,7 @@ def refusal_inside(cuts: Sequence[int]) -> str:
 
 
 def note(cuts: Sequence[int]) -> str:
-    """Say that the palette spans `cuts` that the user allowed."""
+    """Return the note that the palette spans `cuts` that the user allowed."""
     what = counted(len(cuts), "sudden cut", "sudden cuts")
     return f"the palette spans {what}, at {_places(cuts)}: expect a loose fit beside them"
 
@@ -153,7 +154,7 @@ def _some(texts: Sequence[str]) -> str:
 
 
 def _shots(frames: Sequence[int], cuts: Sequence[int]) -> list[str]:
-    """Return the range of frames of each shot, as `--frames` reads it."""
+    """Return the frame range of each shot in the form of `--frames`."""
     step = frames[1] - frames[0]
     bounds = [frames[0], *cuts, frames[-1] + step]
     out = []

@@ -1,7 +1,7 @@
 """Writing frames: EXR, PNG and TIFF through OpenImageIO, to a temporary name and then renamed.
 
-Colours are written as they are: no encoding is changed. Alpha follows each format's convention:
-premultiplied in EXR, straight in PNG, and in TIFF whichever the frame has (and the file says so).
+Code values are written without conversion. Alpha follows each format's convention: premultiplied in
+EXR, straight in PNG. TIFF keeps the frame's kind of alpha and states it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _HALF_MAX = float(np.finfo(np.float16).max)
 
 
 class OutputError(Palette4dError):
-    """Frames that cannot be written: what was found, what was expected, what to do."""
+    """Frames cannot be written; the message says what was found and expected, and the remedy."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class FramePattern:
         return self.folder / f"{self.prefix}{number}{self.suffix}"
 
     def paths(self, frames: Sequence[int]) -> list[Path]:
-        """Files of several frames; OutputError when they would all go into one."""
+        """The files of several frames; OutputError if they would all have one name."""
         if self.width is None and len(frames) > 1:
             raise OutputError(
                 f"output {self.path(0)}: {len(frames)} frames would go into one file; expected a "
@@ -100,12 +100,12 @@ class FramePattern:
 def check_targets(
     targets: Sequence[Path], inputs: Iterable[Path] = (), force: bool = False
 ) -> None:
-    """Refuse outputs before the first is written.
+    """Check all outputs before the first is written.
 
     Raises
     ------
     OutputError
-        One is a folder or one of the `inputs`, or exists and `force` is false.
+        An output is a folder or one of the `inputs`, or exists and `force` is false.
     """
     existing = [target for target in targets if os.path.lexists(target)]
     own = {_identity(path) for path in inputs} if existing else set()
@@ -125,7 +125,7 @@ def check_targets(
 
 
 def _identity(path: Path) -> tuple[int, int] | str:
-    """Device and inode of a file, links followed; its name where there is none."""
+    """Device and inode of a file, after links; its name if it does not exist."""
     try:
         status = path.stat()
     except OSError:
@@ -145,8 +145,8 @@ def sample_type(extension: str, depth: str, *, half: bool = False, bits: int | N
     half : bool
         16-bit float, EXR only.
     bits : int, optional
-        8 or 16 for PNG, 8, 16 or 32 for TIFF; by default what holds the source: 8 bits for an
-        8-bit one, else 16, or 32 (float) in a TIFF of a float source.
+        8 or 16 for PNG, 8, 16 or 32 for TIFF. By default 8 for an 8-bit source, else 16; 32 (float)
+        for a TIFF of a float source.
 
     Raises
     ------
@@ -178,7 +178,7 @@ def quantised(pixels: NDArray[np.float32], samples: str) -> NDArray[Any]:
     if samples == "float":
         return pixels.astype(np.float32, copy=False)
     if samples == "half":
-        # Finite values stay finite; NaN and infinities stay what they are.
+        # Finite values stay finite; NaN and infinities are unchanged.
         finite = np.clip(pixels, -_HALF_MAX, _HALF_MAX)
         return np.where(np.isinf(pixels), pixels, finite).astype(np.float16)
     kind = np.dtype(samples)
@@ -190,7 +190,7 @@ def quantised(pixels: NDArray[np.float32], samples: str) -> NDArray[Any]:
 def with_alpha_of(
     extension: str, pixels: NDArray[np.float32], premultiplied: bool
 ) -> tuple[NDArray[np.float32], bool]:
-    """(pixels, premultiplied) as the format expects alpha; unchanged where it already fits."""
+    """(pixels, premultiplied) in the format's kind of alpha; unchanged if it already fits."""
     if pixels.shape[2] != 4 or extension == "tif" or premultiplied == (extension == "exr"):
         return pixels, premultiplied
     alpha = pixels[..., 3:]
@@ -224,12 +224,12 @@ def write_frame(
     premultiplied : bool
         Whether the colours of RGBA pixels are multiplied by alpha.
     metadata : iterable of (name, OpenImageIO type, value)
-        What the format cannot hold is left out.
+        Members that the format cannot hold are left out.
 
     Raises
     ------
     WriteError
-        When the folder cannot be written to or the disk is full; nothing half written remains.
+        The folder is not writable or the disk is full; no partial file remains.
     """
     import OpenImageIO as oiio
 
@@ -244,7 +244,7 @@ def write_frame(
             spec.attribute(name, kind, value)
     spec.attribute("compression", "zip")
     if extension == "png":
-        # Fast: level 9 takes many times longer for a few per cent.
+        # A fast level: level 9 takes many times longer and saves a few per cent.
         spec.attribute("png:compressionLevel", 4)
     if channels == 4:
         spec.alpha_channel = 3

@@ -1,7 +1,7 @@
 """Writing movies: H.264 in .mp4 and ProRes 422 HQ in .mov, through PyAV (FFmpeg's libraries).
 
-Code values stay what they are: R'G'B' becomes Y'CbCr, and no transfer curve is applied. Movies of
-these formats have no alpha: the picture is laid over black. Sound is not copied.
+R'G'B' becomes Y'CbCr without any transfer curve. Movies of these formats have no alpha: the picture
+is composited over black. Sound is not copied.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class _Format(NamedTuple):
     encoder: str
     layout: str
     bits: int
-    rows: int  # a chroma sample stands for so many rows of the picture, and for two columns
+    rows: int  # rows of the picture per chroma sample; the columns are always two
     options: dict[str, str]
 
 
@@ -36,7 +36,7 @@ _FORMATS = {
     "mov": _Format("prores_ks", "yuv422p10le", 10, 1, {"profile": "hq", "vendor": "apl0"}),
 }
 
-#: Primaries, transfer and matrix (ITU-T H.273) that say a clip's encoding (`Clip.encoding`).
+#: Primaries, transfer and matrix (ITU-T H.273) for a clip's encoding (`Clip.encoding`).
 _TAGS = {
     "sRGB": (1, 13, 1),
     "gamma 2.2": (1, 4, 1),
@@ -51,7 +51,7 @@ _LIMITED = 1
 
 
 def is_movie(path: Path) -> bool:
-    """Tell whether a name is that of a movie that can be written, by its extension."""
+    """Return whether a name has the extension of a movie that can be written."""
     return path.suffix.lower().lstrip(".") in _FORMATS
 
 
@@ -61,19 +61,19 @@ def movie_writer(
 ) -> Generator[Callable[[F32, bool], None]]:
     """Yield a function that appends a frame; the file appears when the body succeeds.
 
-    Whatever ends the body otherwise (an error, Ctrl-C) leaves the file that was there before.
+    After an error or Ctrl-C in the body, the old file is unchanged.
 
     Parameters
     ----------
     path : Path
         `.mp4` or `.mov`; a file that is there is replaced.
     size : (int, int)
-        Width and height in pixels. Chroma is stored for two columns (and, in .mp4, two rows)
-        together: an odd size grows by one, a repetition of the last column or row.
+        Width and height in pixels. Two columns (in .mp4 also two rows) share a chroma sample, so an
+        odd size grows by one: the last column or row is repeated.
     rate : Fraction
-        Frames a second.
+        Frames per second.
     encoding : str
-        `Clip.encoding`, for the movie's colour tags; Rec.709 where it has none.
+        `Clip.encoding`, for the movie's colour tags; Rec.709 if it is unknown.
 
     Yields
     ------
@@ -105,7 +105,7 @@ def movie_writer(
                         alpha = np.float32(1) if premultiplied else pixels[..., 3:]
                         pixels = pixels[..., :3] * alpha
                     picture = _picture(pixels, form, matrix)
-                    # ProRes takes its tags from the picture, H.264 from the stream.
+                    # ProRes reads its tags from the picture, H.264 from the stream.
                     picture.color_primaries, picture.color_trc = primaries, transfer
                     movie.mux(stream.encode(picture))
 
@@ -122,7 +122,7 @@ def movie_writer(
 def _picture(pixels: F32, form: _Format, matrix: int) -> av.VideoFrame:
     """R'G'B' (h, w, 3) as limited-range Y'CbCr (ITU-T H.273, section 8.3), rounded once.
 
-    libswscale would do it with errors of up to one 8-bit step, on average half a step too bright.
+    libswscale has errors of up to one 8-bit step, and is on average half a step too bright.
     """
     height, width = pixels.shape[:2]
     pixels = np.pad(pixels, ((0, height % form.rows), (0, width % 2), (0, 0)), "edge")
@@ -135,7 +135,7 @@ def _picture(pixels: F32, form: _Format, matrix: int) -> av.VideoFrame:
     _fill(picture.planes[0], (16 + 219 * luma) * unit)
     for plane, channel, weight in ((1, 2, blue), (2, 0, red)):
         chroma = (pixels[..., channel] - luma) * np.float32(224 / (2 * (1 - weight)))
-        # Chroma lies on the even columns and, where rows are halved, between two rows.
+        # Chroma lies on the even columns and, if rows are halved, between two rows.
         before = np.concatenate([chroma[:, :1], chroma[:, 1:-1:2]], axis=1)
         chroma = (before + 2 * chroma[:, ::2] + chroma[:, 1::2]) / 4
         chroma = chroma.reshape(-1, form.rows, chroma.shape[1]).mean(axis=1)

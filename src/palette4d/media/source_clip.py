@@ -1,4 +1,4 @@
-"""The clip that a sidecar was made from: given by the user, or found where the sidecar says."""
+"""The clip of a sidecar: given by the user, or found at the path in the sidecar."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,7 +12,7 @@ from palette4d.media.clip import Clip, open_clip
 
 
 def candidates(sidecar_path: Path, source: str) -> list[str]:
-    """Where the stored source may lie: as it is when absolute, else beside the sidecar or here."""
+    """Possible paths of the stored source: absolute, beside the sidecar, in the working folder."""
     if not source:
         return []
     if Path(source).is_absolute():
@@ -32,12 +32,12 @@ def find_clip(sidecar_path: Path, clip: Mapping[str, Any], given: str | None) ->
     clip : mapping
         `Sidecar.clip`: ``source`` and the size.
     given : str or None
-        What the user said instead; then it must open.
+        The user's clip, to use instead; then it must open.
 
     Returns
     -------
     Clip or None
-        None when nothing was given and the stored source is not to be found.
+        None if no clip was given and the stored source is missing.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def find_clip(sidecar_path: Path, clip: Mapping[str, Any], given: str | None) ->
         return open_clip(given, skip_bad_frames=True)
     for spec in candidates(sidecar_path, str(clip["source"])):
         try:
-            # A frame that is missing elsewhere does not matter to who needs one or a few.
+            # Callers need only a few frames: missing frames elsewhere do not matter.
             return open_clip(spec, skip_bad_frames=True)
         except (Palette4dError, OSError):
             continue
@@ -68,8 +68,8 @@ def frame_colours(
     Returns
     -------
     colours : (h, w, 3) float32 or None
-        As a recolouring sees them (`Clip.straight_colours`): NaN where alpha is 0. None when no
-        clip was given and the stored one cannot be found or read.
+        Straight colours (`Clip.straight_colours`): NaN where alpha is 0. None if no clip was given
+        and the stored clip cannot be found or read.
     number : int or None
         The frame that was read.
 

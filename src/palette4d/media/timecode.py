@@ -1,7 +1,7 @@
-"""The timecode with which a clip's files say that they begin, as a camera writes it.
+"""The start timecode that a camera writes into a clip's files.
 
-Movies state one for the file, for its picture or in a stream of its own; DPX and OpenEXR in each
-frame (SMPTE ST 268, `smpte:TimeCode`).
+Movies state it for the file, for the video stream or in a separate stream. DPX and OpenEXR state it
+in each frame (SMPTE ST 268, `smpte:TimeCode`).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ _TIMECODE = re.compile(r"([0-9]{2}:[0-9]{2}:[0-9]{2}[:;.][0-9]{2,3})")
 
 
 def start_timecode(clip: Clip) -> str | None:
-    """Return the timecode of a clip's first frame, `HH:MM:SS:FF`; None when the files say none."""
+    """Return the timecode of a clip's first frame, `HH:MM:SS:FF`; None if the files have none."""
     try:
         return _of_movie(clip) if clip.is_movie else _of_image(clip)
     except (Palette4dError, OSError):
@@ -42,7 +42,7 @@ def _of_image(clip: Clip) -> str | None:
 
 
 def _decoded(word: int) -> str:
-    """Return the text of SMPTE ST 12's 32 bits: two decimal digits a byte, with flags between.
+    """Return the text of SMPTE ST 12's 32 bits: two decimal digits per byte, and flags.
 
     >>> _decoded(0x10215203), _decoded(0x00000043)
     ('10:21:52:03', '00:00:00;03')

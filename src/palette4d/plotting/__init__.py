@@ -1,8 +1,8 @@
 """The picture of a palette: its timeline, frames and polyhedra (figures 1 and 8 of the paper).
 
-`rows` has the palette as arrays and its layout in rows and chains, free of any drawing library.
-`timeline` and `polyhedron` draw, `page` joins them, `style` holds colours and text. matplotlib is
-imported inside functions only, and its global state stays untouched.
+`rows` has the palette as arrays and its layout in rows and chains, without a drawing library.
+`timeline` and `polyhedron` draw, `page` combines them, `style` holds colours and text. matplotlib
+is imported inside functions only, and its global state is never changed.
 """
 
 from pathlib import Path
@@ -24,9 +24,9 @@ def plot(
     sidecar_path, output : Path
         The sidecar and the picture.
     frames : list of float, optional
-        Times to show; by default four or five over the clip, edited ones among them.
+        Times to show; by default four or five over the clip, with edited frames.
     clip : str, optional
-        The clip; by default where the sidecar says.
+        The clip; by default the clip that the sidecar names.
     width : int
         Pixels, for .png.
     force : bool
@@ -35,12 +35,12 @@ def plot(
     Returns
     -------
     list of float
-        The frames whose pixels could not be read: the picture shows only the palette there.
+        The frames whose pixels could not be read; there the picture shows only the palette.
 
     Raises
     ------
     Palette4dError
-        The sidecar, a frame, the clip or the output cannot be used; nothing was written.
+        The sidecar, a frame, the clip or the output is unusable; nothing was written.
     """
     import matplotlib.style
 

@@ -16,20 +16,20 @@ from palette4d.plotting.rows import Palette, arrange
 F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
 
-#: The page's width in points; --width scales a PNG, a page keeps its proportions.
+#: The page's width in points; --width scales a PNG with the same proportions.
 WIDTH = 1200.0
 MARGIN = 28.0
 GUTTER = 14.0
 HEADER = 76.0
-#: Room for the lines between the timeline and the frames above and below it.
+#: Space for the lines between the timeline and the frames above and below it.
 LEADER = 30.0
-#: Room between the pictures before and after.
+#: Space between the pictures before and after the edits.
 GAP = 4.0
 
 
 @dataclass(frozen=True)
 class Column:
-    """What the page shows of one frame.
+    """The page's content for one frame.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class Column:
     shape : polyhedron.Shape
         The sliced palette; with the clip, also pixels.
     pictures : tuple of (h, w, 3) float32
-        The clip's frame, reduced in size, and its recolouring where the sidecar has edits. Empty
+        The clip's frame at reduced size, and its recolouring if the sidecar has edits. Empty
         without the clip.
     """
 
@@ -50,7 +50,7 @@ class Column:
 def default_frames(
     first: float, last: float, edited: Sequence[float] = (), count: int = 4, most: int = 5
 ) -> list[float]:
-    """Choose what to show: whole frame numbers spread over the clip, edited ones among them.
+    """Choose the frames to show: whole frame numbers spread over the clip, with edited frames.
 
     Parameters
     ----------
@@ -59,8 +59,8 @@ def default_frames(
     edited : sequence of float
         Times of edited vertices and stops.
     count, most : int
-        How many frames to show, and how many when edits ask for more. They are a tenth of the clip
-        apart at least, unless the clip has fewer frames.
+        Number of frames to show, and the largest number if edits need more. Their distance is at
+        least a tenth of the clip, unless the clip has fewer frames.
     """
     if last <= first:
         return [first]
@@ -99,9 +99,9 @@ def column(
     image : (h, w, 3) float32 or None
         Straight colours of the clip's frame, in the palette's colour space.
     width : int
-        Pictures are at least this wide, or as wide as the clip, and less than twice as wide.
+        Pictures are at least this wide, or as wide as a smaller clip, and less than twice as wide.
     pixels : int
-        At most about this many pixels, evenly picked, are shown with the polyhedron.
+        The polyhedron shows at most about this many pixels, evenly chosen.
     """
     palette = _core.slice_at(sidecar.polytope, frame)
     edited = _core.edited_colours(sidecar.polytope, sidecar.edits, palette)
@@ -196,7 +196,7 @@ def _draw_heading(axes: Any, sidecar: _core.Sidecar, palette: Palette, height: f
         ("edited", 7.5, grey, "edited: before above, after below"),
         ("stop", 6.0, grey, "stop: a colour added between vertices"),
     )
-    # Discs off the page: the legend copies them.
+    # Discs outside the page, which the legend copies.
     handles = [
         timeline.disc(axes, np.nan, np.nan, radius, np.stack([before, light]), kind, 5)
         for kind, radius, before, _ in entries
@@ -223,7 +223,7 @@ def _draw_heading(axes: Any, sidecar: _core.Sidecar, palette: Palette, height: f
 def _draw_leaders(
     axes: Any, panel: timeline.Panel, frame: float, centre: float, *, above: bool
 ) -> None:
-    """Mark a frame on the timeline and lead from its pictures to it and on to its polyhedron."""
+    """Mark a frame on the timeline, with lines to its pictures and its polyhedron."""
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path as Line
 
@@ -246,7 +246,7 @@ def _draw_leaders(
 
 def save(figure: Any, path: Path, kind: str, width: int) -> None:
     """Write the figure as "png" (`width` pixels wide), "svg" or "pdf", without dates in it."""
-    # A fraction of a pixel more, so that rounding does not lose the last column.
+    # Add a fraction of a pixel, so that rounding does not lose the last column.
     dpi = (width + 0.01) / (WIDTH / 72)
     creator = f"palette4d {_core.__version__}"
     metadata: dict[str, dict[str, Any]] = {

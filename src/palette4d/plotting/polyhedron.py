@@ -1,8 +1,8 @@
 """A sliced polyhedral palette in the RGB cube, with the frame's pixels inside it.
 
-A parallel projection of the cube on its black corner: light colours are above dark ones, warm hues
-to the right, cold ones to the left, green in front. Drawn from far to near: cube, far faces and
-edges, pixels, near faces and edges, palette colours.
+A parallel projection of the cube on its black corner. Bright colours are above dark colours, warm
+hues to the right, cold hues to the left, green in front. The drawing order is from far to near:
+cube, far faces and edges, pixels, near faces and edges, palette colours.
 """
 
 from dataclasses import dataclass
@@ -21,8 +21,8 @@ CORNERS = np.array([[i >> 0 & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)], dty
 
 
 def _axes() -> F64:
-    """Return the (3, 3) matrix from RGB to across, up and towards us."""
-    # Right-handed: from blue to red and yellow, from magenta to green (towards us), grey up.
+    """Return the (3, 3) matrix from RGB to right, up and towards the viewer."""
+    # Right-handed: blue to red and yellow, magenta to green (towards the viewer), grey up.
     warm, front, grey = np.array([[1, 0, -1], [-1, 2, -1], [1, 1, 1]]) / np.sqrt([[2], [6], [3]])
     azimuth, elevation = np.radians([-14.0, 9.0])
     across = warm * np.cos(azimuth) + front * np.sin(azimuth)
@@ -43,7 +43,7 @@ class View:
 
     @classmethod
     def fit(cls, colours: F64, centre: tuple[float, float], size: float) -> "View":
-        """Return the view in which (k, 3) colours just fit a square of `size` points."""
+        """Return the largest view in which (k, 3) colours fit a square of `size` points."""
         points = cls(np.zeros(2), 1.0).project(colours)[:, :2]
         low, high = points.min(axis=0), points.max(axis=0)
         scale = size / float((high - low).max())
@@ -79,7 +79,7 @@ def draw(axes: Any, shape: Shape, view: View, encoding: str) -> None:
     _draw_cube(axes, view)
     seen = view.project(shape.rgb)
     points, faces = seen[:, :2], shape.faces
-    # A face looks at us when it is anticlockwise on the page.
+    # A face is a near face if it is anticlockwise on the page.
     u, v = (points[faces[:, k]] - points[faces[:, 0]] for k in (1, 2))
     towards = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0] > 0
     colours = style.shown(shape.rgb, encoding)
@@ -107,7 +107,7 @@ def draw(axes: Any, shape: Shape, view: View, encoding: str) -> None:
         at, seen_as = cloud[order], style.shown(shape.pixels[order], encoding)
         axes.scatter(*at[:, :2].T, s=1.6, c=seen_as, linewidths=0, zorder=5, rasterized=True)
 
-    # Where edited colours went: an arrow to each, and dashed edges.
+    # Edited colours: an arrow to each, and dashed edges.
     after = view.project(shape.edited)[:, :2]
     moved = np.flatnonzero((shape.rgb != shape.edited).any(axis=1)).tolist()
     dashed = [after[list(edge)] for edge in edges if set(edge) & set(moved)]

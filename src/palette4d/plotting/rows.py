@@ -1,10 +1,10 @@
-"""The timeline's content and its layout, free of any drawing library: vertices, times, rows.
+"""The timeline's content and layout, without a drawing library: vertices, times, rows.
 
-`Palette` holds a sidecar's palette and edits as arrays. `arrange` finds the rows: a chain follows
-one palette colour through its vertices. At a split or a merge one edge carries the chain on; every
-other edge begins or ends a chain of its own, which forks from or joins the chain of that vertex.
-Chains that never meet in time share a row. Rows are ordered so that forks are short and cross
-little, and otherwise from light to dark.
+`Palette` holds a sidecar's palette and edits as arrays. `arrange` finds the rows. A chain follows
+one palette colour through its vertices. At a split or a merge one edge continues the chain. Every
+other edge begins or ends another chain, which forks from or joins the chain of that vertex. Chains
+that never overlap in time share a row. Rows are ordered for short forks with few crossings, and
+otherwise from bright to dark.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,14 +20,14 @@ F64 = NDArray[np.float64]
 Row = list[int]
 Cost = Callable[[F64], float]
 
-#: Rec. 709 luma, to order rows from light to dark.
+#: Rec. 709 luma, to order rows from bright to dark.
 LUMA = np.array([0.2126, 0.7152, 0.0722])
 #: The cost of a fork per row that it spans and per chain that it crosses. One place off the luma
 #: order costs ORDER_COST over the number of chains.
 SPAN_COST, CROSSING_COST, ORDER_COST = 1.0, 2.5, 0.35
-#: One row less is worth this cost. Above MANY_ROWS rows only neighbours are joined.
+#: The gain of one row less. Above MANY_ROWS rows only neighbours are joined.
 ROW_SAVING, MANY_ROWS = 1.5, 24
-#: Largest number of moves tried: bounds the search on palettes of hundreds of vertices.
+#: Largest number of tried moves: it limits the search on palettes of hundreds of vertices.
 MAX_TRIALS = 20_000
 
 
@@ -38,7 +38,7 @@ class Palette:
     Attributes
     ----------
     ids, edge_ids : list of str
-        Of the vertices and edges.
+        The ids of the vertices and edges.
     frames, rgb, edited : (n,), (n, 3), (n, 3) float64
         Times of the vertices, and their colours before and after the edit.
     changed : (n,) bool array
@@ -125,7 +125,7 @@ class Chain:
     edges : tuple of int
         Its edges, in order of time; the outer ones may end on another chain's vertex.
     first, last : float
-        The frames it spans, forks included.
+        The first and last frame, with forks.
     """
 
     vertices: tuple[int, ...]
@@ -162,11 +162,11 @@ class Rows:
 def _continuations(
     frames: F64, rgb: F64, edges: Sequence[tuple[int, int]]
 ) -> tuple[dict[int, int], list[int]]:
-    """Return which edge carries on into which, and the edge of each vertex (-1: none)."""
+    """Return the next edge of each edge's chain, and the edge of each vertex (-1: none)."""
 
     def change(edge: int) -> tuple[float, float, int]:
         start, end = edges[edge]
-        # The colour that changes least carries on; of equals the longer edge.
+        # The edge with the least change of colour continues; the longer edge breaks ties.
         length = float(frames[end] - frames[start])
         return float(np.linalg.norm(rgb[end] - rgb[start])), -length, edge
 
@@ -225,7 +225,7 @@ def _fork_cost(
     vertex_chain: NDArray[np.int64],
     target: F64,
 ) -> Cost:
-    """Return the function from (c,) places of the chains to the cost of that arrangement."""
+    """Return the function from the chains' places, (c,), to the cost of the arrangement."""
     forks = []
     for index, chain in enumerate(chains):
         # The outer ends of a chain may be on another chain's vertex.
@@ -274,7 +274,7 @@ def _order(cost: Cost, order: list[int]) -> list[int]:
 
 
 def _share_rows(chains: Sequence[Chain], order: Sequence[int], cost: Cost, gap: float) -> list[Row]:
-    """Put chains that never meet in time (with a gap) into one row, where the cost allows it."""
+    """Put chains that never overlap in time (with a gap) into one row, if the cost allows it."""
 
     def apart(some: Row, others: Row) -> bool:
         return all(

@@ -1,6 +1,6 @@
 """Colours, sizes and text of the picture: neutral greys, as in grading software.
 
-Nothing around a colour may tint it: every surface, line and letter is grey.
+Every surface, line and letter is grey, so that it does not change how colours look.
 """
 
 from functools import cache
@@ -42,10 +42,10 @@ CENTRED: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8, "color
 
 
 def shown(rgb: NDArray[np.floating], encoding: str) -> F64:
-    """Return colours as a screen shows them: (…, 3) in the clip's encoding -> (…, 3) in 0..1.
+    """Return display colours: (…, 3) in the clip's encoding -> (…, 3) in 0..1.
 
-    Scene-linear and log encodings that OpenColorIO knows are converted to sRGB; all others are
-    display encodings, and stay. All are clamped.
+    Scene-linear and log encodings that OpenColorIO knows are converted to sRGB. All others count as
+    display encodings and are not converted. All values are clamped.
     """
     values = np.nan_to_num(np.asarray(rgb, dtype=np.float64), nan=0.0)
     if (to_srgb := _to_srgb(encoding)) is not None:
@@ -70,7 +70,7 @@ def _has_glyph(character: str) -> bool:
 
 
 def printable(text: str, longest: int = 60) -> str:
-    """Return `text` as the font can draw it, on one line, shortened in the middle if need be."""
+    """Return `text` in drawable characters, on one line, shortened in the middle if too long."""
     drawn = "".join(c if c.isprintable() and _has_glyph(c) else "\N{WHITE SQUARE}" for c in text)
     if len(drawn) > longest:
         drawn = drawn[: longest // 2] + "…" + drawn[-(longest - longest // 2 - 1) :]

@@ -1,6 +1,6 @@
 """The timeline: bands, forks, blocks, discs and the frame axis.
 
-Everything is drawn on one Axes whose unit is the point (1/72 inch), y upwards.
+Everything is on one matplotlib Axes; its unit is the point (1/72 inch), y upwards.
 """
 
 from dataclasses import dataclass
@@ -18,17 +18,17 @@ Box = tuple[float, float, float, float]
 
 #: Length of the pieces of a band, in points: short enough for a smooth gradient.
 PIECE = 2.5
-#: Room that a disc takes beyond its radius: the dark rim, or a stop's second ring.
+#: Space around a disc beyond its radius, for the dark rim or a stop's second ring.
 COLLAR = 2.6
-#: Half the width of a band, and the radius of a vertex with room enough, in rows.
+#: Half the width of a band, and the largest radius of a vertex, in rows.
 BAND, RADIUS = 0.17, 0.33
-#: Room for the block names above the rows, for the axis below them, and at the sides.
+#: Space for the block names above the rows, for the axis below them, and at the sides.
 HEAD, FOOT, SIDE = 34.0, 34.0, 46.0
 
 
 @dataclass
 class Panel:
-    """Where the timeline is on the page, in points, and how rows and times map onto it."""
+    """The timeline's place on the page, in points, and the mapping of rows and times to it."""
 
     palette: Palette
     rows: Rows
@@ -219,7 +219,7 @@ def _draw_band(
         n, m = normal[:-1], normal[1:]
         quads = np.stack([a + n * upper, b + m * upper, b + m * lower, a + n * lower], axis=1)
         colours = style.shown(panel.palette.colours(edge, middle, edited=edited), encoding)
-        # Not antialiased: pieces would show their seams. The rims smooth the sides.
+        # Antialiasing would show seams between the pieces. The rims smooth the sides.
         band = PolyCollection(
             list(quads), facecolors=colours, linewidths=0, antialiaseds=False, zorder=zorder
         )
@@ -255,7 +255,7 @@ def _draw_discs(
         halves.append(np.stack([palette.colours(edge, np.array([when]), edited=False)[0], colour]))
     for k, name in enumerate(names):
         if abs(x[k] - home[k]) > 2.5:
-            # A line from the disc to the time at which it belongs.
+            # A line from a moved disc to its time.
             foot = y[k] - BAND * panel.row_height - 3.5
             bent = [home[k], home[k], x[k]], [y[k], foot, y[k] - radius[k]]
             axes.plot(*bent, color=style.RING, linewidth=0.8, zorder=9)
@@ -267,14 +267,14 @@ def _draw_discs(
 
 
 def _place(largest: F64, x: F64, y: F64, low: float, high: float) -> tuple[F64, F64]:
-    """Make discs that are close in a row smaller; where that is not enough, push them apart.
+    """Shrink discs that are close in a row; if that is not enough, move them apart.
 
     Parameters
     ----------
     largest : (n,) float64
-        The radius of each with room enough.
+        The largest radius of each disc.
     x, y : (n,) float64
-        Where they belong; discs of equal y are in one row.
+        Their ideal places; discs of equal y are in one row.
     low, high : float
         The ends of a row, in x.
 
@@ -300,14 +300,14 @@ def _place(largest: F64, x: F64, y: F64, low: float, high: float) -> tuple[F64, 
         reach = radius[row] + COLLAR
         apart = np.concatenate([[0.0], np.cumsum(reach[:-1] + reach[1:])])
         apart *= min(1.0, (high - low - reach[0] - reach[-1]) / max(apart[-1], 1e-9))
-        # The nearest places at these distances: least squares under an order.
+        # The nearest places with these distances: least squares with a fixed order.
         free = isotonic_regression(x[row] - apart).x
         placed[row] = np.clip(free, low + reach[0], high - reach[-1] - apart[-1]) + apart
     return placed, radius
 
 
 def _draw_ids(axes: Any, panel: Panel, names: list[str], kinds: list[str], discs: F64) -> None:
-    """Write the ids above or below their discs, edited ones first; without room an id is left out.
+    """Write the ids above or below their discs, edited ids first; leave out ids without space.
 
     `discs` is (n, 3): x, y, radius.
     """

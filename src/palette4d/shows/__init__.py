@@ -1,1 +1,1 @@
-"""Many shots: edits, manifests, and what is done for all shots of a show."""
+"""Many shots: edits, manifests, and the analysis and export of all shots of a show."""

@@ -1,8 +1,8 @@
-"""A batch: many shots analysed, a sidecar each, with a manifest beside them.
+"""A batch: the analysis of many shots into one sidecar per shot and a manifest.
 
-Shots are analysed in other processes or on other machines; this process alone writes files. A
-sidecar that was made from the same frames with the same options is kept, so that the same command
-again does only what is missing or failed.
+Other processes or machines analyse the shots. Only this process writes files. A sidecar is kept if
+it was made from the same frames with the same options. So a repeated command analyses only shots
+that are missing or failed.
 """
 
 from __future__ import annotations
@@ -31,26 +31,26 @@ from palette4d.shows.shots import Shot, trimmed
 
 @dataclasses.dataclass(frozen=True)
 class ShowOptions:
-    """How a show is analysed.
+    """The options for the analysis of a show.
 
     Attributes
     ----------
     analysis : AnalysisOptions
         For every shot.
     spaces : SpaceOptions
-        What the clips' numbers are, and what the palettes are found in.
+        The colour spaces of the clips' code values and of the palettes.
     rate : Fraction or None
-        Frames a second of image sequences.
+        Frames per second of image sequences.
     skip_bad_frames, allow_cuts : bool
         As for one clip.
     on_edits : {"refuse", "keep", "drop"}
-        What to do with edits of sidecars that are analysed again.
+        What to do with the edits of existing sidecars that are replaced.
     force : bool
-        Analyse also shots that are there already.
+        Also analyse shots that have a sidecar already.
     only : tuple of str
         The names of the shots to analyse; empty: all.
     workers : Workers
-        Who analyses.
+        The processes or the farm that analyse.
     """
 
     analysis: AnalysisOptions
@@ -66,7 +66,7 @@ class ShowOptions:
 
 @dataclasses.dataclass(frozen=True)
 class Source:
-    """What the shots come from: a timeline (with its hash) or a movie, and its rate."""
+    """The source of the shots: a timeline (with its hash) or a movie, and its rate."""
 
     name: str
     file: str
@@ -103,13 +103,13 @@ def analyse(
     Parameters
     ----------
     source : Source
-        What they come from.
+        The source of the shots.
     shots : list of Shot
-        With names unlike each other's.
+        The shots; their names differ.
     folder : Path
-        For sidecars and the manifest; made when it is missing.
+        The folder for sidecars and the manifest; created if it is missing.
     options : ShowOptions
-        How.
+        The options of the analysis.
     progress : callable, optional
         Called with (frames done, frames in all, words on the shots), the first time before any
         shot is analysed.
@@ -117,15 +117,14 @@ def analyse(
     Returns
     -------
     Show
-        Also when shots failed: the others are there.
+        Also if shots failed: the other shots are complete.
 
     Raises
     ------
     Palette4dError
-        The folder cannot be written, its manifest is not one, or there is no shot of a name in
-        `only`.
+        The folder is not writable, its manifest is invalid, or no shot has a name in `only`.
     KeyboardInterrupt
-        Ctrl-C; the sidecars that are there are whole, and the manifest lists them.
+        Ctrl-C; all written sidecars are complete, and the manifest lists them.
     """
     if unknown := [name for name in options.only if name not in {shot.name for shot in shots}]:
         some = ", ".join(sorted(shot.name for shot in shots)[:8]) + (", …" if shots[8:] else "")
@@ -134,7 +133,7 @@ def analyse(
         )
     make_folder(folder)
     show = Show(source, shots, folder, options)
-    show.save()  # early: what cannot be written is refused before hours of work
+    show.save()  # write early: an unwritable folder must fail before hours of work
     tell = progress or (lambda done, total, words: None)
 
     def take(name: str, outcome: Analysed | Failed) -> None:
@@ -151,14 +150,14 @@ def analyse(
 
 
 class Show:
-    """The shots of a source: which are there, which are to be analysed, and what became of them.
+    """The shots of a source: kept shots, shots to analyse, and their results.
 
     Attributes
     ----------
     path : Path
         The manifest.
     analysed, kept : list of str
-        Names of the shots analysed now, and of those that were there already.
+        Names of the shots that were analysed, and of the shots whose sidecars were kept.
     notes : dict of str to tuple of str
         Notes of the analysis, by shot.
     """
@@ -194,11 +193,11 @@ class Show:
 
     @property
     def manifest(self) -> Manifest:
-        """The manifest as it stands."""
+        """The manifest in its present state."""
         return dataclasses.replace(self._head, entries=tuple(self.entries.values()))
 
     def plan(self, shot: Shot, before: Entry | None) -> None:
-        """Decide what to do with a shot."""
+        """Decide whether to keep or to analyse a shot."""
         own = dataclasses.replace(shot, clip=self.beside(shot.clip), problem="")
         entry = Entry(own)
         chosen = not self.options.only or shot.name in self.options.only
@@ -224,16 +223,16 @@ class Show:
         """Whether the manifest's entry still holds for a shot that `--only` leaves out."""
         own = before.shot
         if before.status != DONE:
-            # The cause of a failure may be mended, and a sidecar there although it is not noted.
+            # The sidecar may exist although the manifest says otherwise.
             return self.same_edit and own.clip == shot.clip and self.there(shot, before) is None
         if self.same_edit:
-            return True  # whatever its head and tail frames are now, and wherever its media is
+            return True  # head and tail frames and the media's place may differ
         first, last = before.frames or (0, -1)
         shown = first <= shot.used[0] and shot.used[1] <= last
         return (own.clip, own.step) == (shot.clip, shot.step) and shown
 
     def check_target(self, entry: Entry, before: Entry | None) -> None:
-        """Refuse a sidecar that may not be replaced."""
+        """Raise an error if the sidecar must not be replaced."""
         target = self.folder / entry.sidecar
         sidecar.check_target(target, on_edits=self.options.on_edits)
         if before is not None or self.options.force or not target.exists():
@@ -267,13 +266,13 @@ class Show:
         return found if same else None
 
     def beside(self, clip: str) -> str:
-        """Return a relative path as seen from the folder: both may then move together."""
+        """Return a path relative to the folder, so that both may move together."""
         if not clip or Path(clip).is_absolute():
             return clip
         return Path(os.path.relpath(clip, self.folder.absolute())).as_posix()
 
     def take(self, name: str, outcome: Analysed | Failed) -> None:
-        """Write a sidecar, or note why there is none."""
+        """Write a sidecar, or record the failure."""
         entry = self.entries[name]
         try:
             if isinstance(outcome, Failed):
@@ -309,13 +308,13 @@ def analyse_shot(task: ShotTask, threads: int) -> Analysed:
     Raises
     ------
     Palette4dError
-        Its frames cannot be read, there is a cut inside of what the edit shows, or the analysis
-        failed.
+        Its frames cannot be read, there is a cut inside the frames that the edit shows, or the
+        analysis failed.
     """
     options = task.options
     shot = task.shot
     notes: list[str] = []
-    # A shot of a movie is what lies between its cuts: there is nothing to look for again.
+    # A movie was split at its cuts: there is no need to search for cuts again.
     if shot.place is not None and not options.allow_cuts:
         shot = trimmed(shot, _open(task, shot))
         if shot != task.shot:

@@ -1,4 +1,4 @@
-"""The part of `export` that takes a whole show: a series for each shot of a manifest."""
+"""Export of a whole show: one series for each shot of a manifest."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from palette4d.shows import timeline_references
 
 @dataclass(frozen=True)
 class Exported:
-    """A series a shot, in the manifest's order; notes; how many clips of the timeline name one."""
+    """One series per shot, in the manifest's order; notes; the number of clips with references."""
 
     series: list[Series]
     notes: list[str]
@@ -27,7 +27,7 @@ class Exported:
 
 
 def sidecars(paths: list[Path]) -> tuple[list[Path], list[str]]:
-    """Return sidecars, those of manifests among them, and notes on shots that have none."""
+    """Return the given sidecars and the manifests' sidecars, and notes on shots without one."""
     found: list[Path] = []
     notes = []
     for path in paths:
@@ -54,7 +54,7 @@ def export(
     *,
     otio: Path | None = None,
 ) -> Exported:
-    """Export every shot of a manifest; note it in a copy of the timeline.
+    """Export every shot of a manifest; add references to a copy of the timeline.
 
     Parameters
     ----------
@@ -63,20 +63,20 @@ def export(
     output : Path
         The folder that gets a folder for each shot.
     request : Request
-        How; sidecar, folder, frames and name are each shot's own.
+        The options. Sidecar, folder, frames and name are replaced for each shot.
     choose : callable
         Sidecar -> the frames to export.
     workers : Workers
-        Who bakes.
+        The processes or the farm that bake.
     progress : callable, optional
         Called with (files done, files in all).
     otio : Path, optional
-        The copy of the timeline; replaced where `request.force` says so.
+        The copy of the timeline; an existing file is replaced only with `request.force`.
 
     Raises
     ------
     Palette4dError
-        Nothing can be exported; or, after what could be was, the timeline cannot be written.
+        Nothing can be exported; or, after the export, the timeline cannot be written.
     """
     manifest = manifests.read(path)
     source = None
@@ -106,7 +106,7 @@ def as_json(done: list[Series]) -> str:
 
 
 def failures(done: list[Series]) -> Palette4dError | None:
-    """Return the error that lists what could not be baked; None when all was."""
+    """Return the error that lists the frames that could not be baked; None without failures."""
     failed = [one for one in done if one.failed]
     if not failed:
         return None

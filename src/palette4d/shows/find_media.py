@@ -1,7 +1,7 @@
-"""Where an edit's media lies: the file that a timeline names, or one of that name in a folder.
+"""Finds an edit's media: the file that a timeline names, or a file of that name in a folder.
 
-A folder is searched once, with all folders in it, by name alone. What a timeline names may have
-another extension there (a proxy), or be a sequence whose first file or pattern it names.
+A folder is listed once, with all its subfolders; only names count. The extension may differ (a
+proxy). For a sequence the timeline may name the first file or the pattern.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ _NUMBERS = re.compile(r"(%0?[0-9]*d|#+|@+|\[[0-9]+-[0-9]+\]|(?<![0-9])[0-9]+)(?=
 
 
 def local_path(url: str) -> Path:
-    """Return the path of a media reference's URL, or of what is a path already.
+    """Return the path for a media reference's URL or path.
 
     Raises
     ------
     Palette4dError
-        It is not a file's.
+        The URL does not name a file.
     """
     parts = urllib.parse.urlsplit(url)
     if parts.scheme in ("", "file") or len(parts.scheme) == 1:  # a drive's letter
@@ -46,7 +46,7 @@ class Folder:
     """
 
     def __init__(self, path: Path) -> None:
-        """List it; `Palette4dError` when it is no folder."""
+        """List the folder; `Palette4dError` if it is not a folder."""
         if not path.is_dir():
             raise Palette4dError(
                 f"{path}: there is no such folder; --media expects one with media in it"
@@ -59,15 +59,15 @@ class Folder:
                 self._by_name.setdefault(_plain(found.name), []).append(found)
 
     def find(self, names: Iterable[str]) -> Path | None:
-        """Return the media of the first of several names that is there.
+        """Return the media for the first of the names that exists.
 
-        With its own extension before others; of several in different folders the one whose
-        folders are most like the name's.
+        The name's own extension comes before others. If several folders hold the name, the folder
+        path most like the name's path wins.
 
         Raises
         ------
         Palette4dError
-            There are several, and nothing tells them apart.
+            Several media match equally well.
         """
         for name in names:
             path = Path(name)
@@ -98,7 +98,7 @@ def _in_folder(folder: Path, files: list[str]) -> Iterator[Path]:
 
 
 def _plain(name: str) -> str:
-    """Return a file's name without extension and frame number, to compare names by.
+    """Return a file's name without extension and frame number, for comparison.
 
     >>> _plain("A001C003.mov"), _plain("sh010.1001.exr"), _plain("sh010.####.exr"), _plain("v2.mov")
     ('a001c003', 'sh010', 'sh010', 'v2')
@@ -106,7 +106,7 @@ def _plain(name: str) -> str:
     path = Path(name)
     suffix = path.suffix.lower().lstrip(".")
     known = clip_sequence.MOVIE_EXTENSIONS | clip_sequence.IMAGE_EXTENSIONS
-    # What follows the last dot of a clip's name need not be an extension.
+    # The text after the last dot of a clip's name need not be an extension.
     stem = path.stem if suffix in known | {"mxf", "r3d", "braw", "ari", "arx"} else name
     if suffix in clip_sequence.IMAGE_EXTENSIONS:
         stem = re.sub(r"[._ -]?(%0?[0-9]*d|#+|@+|\[[0-9]+-[0-9]+\])$", "", stem)
@@ -116,7 +116,7 @@ def _plain(name: str) -> str:
 
 
 def _most_alike(found: list[Path], path: Path) -> list[Path]:
-    """Return those whose folders agree longest with a path's, from the file upwards."""
+    """Return the media whose folders agree longest with a path's folders, from the file upwards."""
     if len(found) < 2:
         return found
 
@@ -133,9 +133,9 @@ def _most_alike(found: list[Path], path: Path) -> list[Path]:
 
 
 def as_clip(path: Path) -> str | None:
-    """Return what `open_clip` takes for a path that a timeline names; None when it is not there.
+    """Return the `open_clip` name for a path in a timeline; None if the media does not exist.
 
-    The first file of a sequence, or a pattern with a range, stands for the whole of it.
+    The first file of a sequence, or a pattern with a range, means the whole sequence.
     """
     match = _NUMBERS.search(path.name)
     image = clip_sequence.extension(path) in clip_sequence.IMAGE_EXTENSIONS

@@ -1,7 +1,7 @@
 """A show's manifest, ``NAME.shots.json``: its shots, their sidecars, and what failed.
 
-`docs/files.md` explains the format, `shots_v1.schema.json` is its JSON Schema. It is replaced whole
-whenever a shot is done, so that a run that ends early leaves what it reached.
+`docs/files.md` explains the format; `shots_v1.schema.json` is its JSON Schema. The file is replaced
+after each shot, so that an interrupted run keeps its results.
 """
 
 from __future__ import annotations
@@ -25,18 +25,19 @@ DONE, FAILED, TO_DO = "done", "failed", "to do"
 
 @dataclasses.dataclass(frozen=True)
 class Entry:
-    """A shot and what became of it.
+    """A shot and its result.
 
     Attributes
     ----------
     shot : Shot
-        As it was asked for.
+        The shot before the analysis.
     status : str
         `DONE`, `FAILED` or `TO_DO`.
     frames : (int, int) or None
-        The first and last frame of the sidecar: fewer head or tail frames where the media cuts.
+        The first and last frame of the sidecar. At cuts of the media there are fewer head or tail
+        frames.
     error : str
-        Why it failed.
+        The reason of a failure.
     """
 
     shot: Shot
@@ -57,13 +58,13 @@ class Manifest:
     Attributes
     ----------
     source : str
-        The timeline or the movie, as seen from the manifest's folder.
+        The timeline or the movie, relative to the manifest's folder.
     source_sha256 : str
-        Of a timeline's file; "" for a movie.
+        The hash of the timeline's file; "" for a movie.
     rate : Fraction
-        Frames a second of the timeline, or of the movie.
+        Frames per second of the timeline, or of the movie.
     options : dict
-        Those of the analysis, as sidecars record them.
+        The options of the analysis, as sidecars record them.
     entries : tuple of Entry
         In the order of the edit.
     """
@@ -76,22 +77,22 @@ class Manifest:
 
     @property
     def is_timeline(self) -> bool:
-        """Whether the shots are those of an edit, not of a movie."""
+        """Whether the shots come from an edit, not from a movie."""
         return bool(self.source_sha256)
 
 
 def path_of(folder: Path, name: str) -> Path:
-    """Return the manifest's file for a show of a name."""
+    """Return the path of the manifest for a show with this name."""
     return folder / f"{name}{ENDING}"
 
 
 def is_manifest(path: Path) -> bool:
-    """Whether a file is a manifest, by its name."""
+    """Whether a file's name is a manifest's name."""
     return path.name.endswith(ENDING)
 
 
 def write(manifest: Manifest, path: Path) -> None:
-    """Replace a manifest, whole; a line a shot.
+    """Replace a manifest atomically; one line per shot.
 
     Raises
     ------
@@ -138,7 +139,7 @@ def read(path: Path) -> Manifest:
     Raises
     ------
     Palette4dError
-        There is none, or it is of another kind, newer, or broken.
+        The file is missing, is not a manifest, is newer, or is broken.
     """
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
@@ -200,12 +201,12 @@ def _entry(row: dict[str, Any]) -> Entry:
 
 
 def sidecars(path: Path) -> tuple[list[Path], list[str]]:
-    """Return the sidecars of a show's shots that are done, and the names of the other shots.
+    """Return the sidecars of a show's finished shots, and the names of the other shots.
 
     Raises
     ------
     Palette4dError
-        The manifest cannot be read, no shot of it is done, or the sidecar of one is gone.
+        The manifest cannot be read, none of its shots is finished, or a sidecar is missing.
     """
     manifest = read(path)
     done = [path.parent / e.sidecar for e in manifest.entries if e.status == DONE]

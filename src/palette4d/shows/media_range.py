@@ -1,4 +1,4 @@
-"""The range of a clip's media that an edit shows: transitions, speed and enclosing stacks counted.
+"""The range of a clip's media that an edit shows, with transitions, speed and compounds.
 
 Input: a clip of an OpenTimelineIO timeline. Output: ranges of time, in the edit and in the media.
 """
@@ -16,18 +16,18 @@ ROUNDING = 1e-3
 
 
 def shown(clip: Any) -> tuple[Any, Any] | None:
-    """Return where in the edit a clip begins, and the range of media that the edit shows.
+    """Return a clip's start in the edit, and the range of its media that the edit shows.
 
-    None when nothing of it is left. The first is in time of the timeline's stack, the second
-    in the media's.
+    None if the edit shows nothing of the clip. The start is in the time of the timeline's stack,
+    the range in the media's time.
 
     Raises
     ------
     Palette4dError
-        The clip or a compound that holds it plays at a speed that is not followed.
+        The clip or a compound around it plays at a speed that is not supported.
     """
     schema = library().schema
-    whole = clip.visible_range()  # with what the transitions beside it take of its media
+    whole = clip.visible_range()  # with the media that the neighbouring transitions show
     window, item = whole, clip
     while item.parent() is not None:
         parent = item.parent()
@@ -67,7 +67,7 @@ def _with_speed(clip: Any, shown: Any) -> Any:
             f"the clip {clip.name!r} plays at {speed:g} times its speed, which is not followed; "
             "expected 0 (a freeze frame) or more. Render it, or analyse its media on its own"
         )
-    # The in-point stays what it is; time counts from there, in whole frames.
+    # The in-point stays the same; time counts from there, in whole frames.
     origin = clip.trimmed_range().start_time
     rate = shown.duration.rate
     begin = origin.value_rescaled_to(rate)
@@ -80,7 +80,7 @@ def _with_speed(clip: Any, shown: Any) -> Any:
 
 
 def _common(one: Any, other: Any) -> Any:
-    """Return what two time ranges have in common; None when that is nothing."""
+    """Return the intersection of two time ranges; None if it is empty."""
     start = max(one.start_time, other.start_time)
     end = min(one.end_time_exclusive(), other.end_time_exclusive())
     if end <= start:

@@ -1,6 +1,6 @@
-"""Shots: ranges of media that get a palette each, with a name and the frames to analyse.
+"""Shots: ranges of media with a name and the frames to analyse. Each shot gets one palette.
 
-Input: a clip with cuts, here, or an edit (`timeline`). Output: `Shot`s, which `batch` analyses.
+Input: a clip with cuts; for edits see `timeline`. Output: `Shot`s, which `batch` analyses.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ from palette4d.common.text import file_safe
 from palette4d.media import cuts
 from palette4d.media.clip_base import Clip, even_step, hidden
 
-#: Colour bins of a frame that the search for cuts looks at.
+#: Largest number of colours per frame in the search for cuts.
 BINS = 4096
 
 
 @dataclasses.dataclass(frozen=True)
 class Place:
-    """Where an edit shows a shot.
+    """The place of a shot in an edit.
 
     Attributes
     ----------
     track : str
         The name of the video track.
     record : str
-        The timecode, or the frame number, at which it begins in the edit.
+        Its start in the edit: a timecode or a frame number.
     path : tuple of int
         The clip's place in the timeline: indices of children, from the timeline's stack down.
     """
@@ -46,19 +46,19 @@ class Shot:
     Attributes
     ----------
     name : str
-        Of the sidecar, the look and the files; unlike any other's, upper and lower case alike.
+        The name of the sidecar, the look and the files; unique, also without regard to case.
     clip : str
-        What `open_clip` reads; "" where the media is missing.
+        The name for `open_clip`; "" if the media is missing.
     first, last : int
-        The frames that are analysed, head and tail frames included; the clip's own numbers.
+        The first and last frame of the analysis, with head and tail frames; the clip's own numbers.
     used : (int, int)
         The first and the last frame that the edit shows.
     step : int
         The distance between frames.
     place : Place or None
-        Where in the edit.
+        The place in the edit.
     problem : str
-        Why it cannot be analysed; "" when it can.
+        The reason why it cannot be analysed, or "".
     """
 
     name: str
@@ -72,20 +72,20 @@ class Shot:
 
     @property
     def frames(self) -> str:
-        """The frames as `open_clip` takes them."""
+        """The frame range for `open_clip`."""
         return f"{self.first}-{self.last}" + (f"x{self.step}" if self.step != 1 else "")
 
     @property
     def count(self) -> int:
-        """How many frames are analysed."""
+        """The number of analysed frames."""
         return (self.last - self.first) // self.step + 1
 
 
 def numbered(shots: Iterable[Shot]) -> tuple[list[Shot], list[str]]:
-    """Return the shots with names unlike each other's, and the names that had to change.
+    """Return the shots with unique names, and the names that changed.
 
-    Of several shots of one name the first keeps it, the others get their first frame: `A`,
-    `A_f120`. So a name stays when another shot is cut in before or after it.
+    If several shots have one name, the first keeps it. The others get their first frame as a
+    suffix: `A`, `A_f120`. So names stay the same when the editor inserts other shots.
     """
     taken: set[str] = set()
     out, changed = [], []
@@ -109,7 +109,8 @@ def detect(clip: Clip, progress: Callable[[int, int], None] | None = None) -> li
     Returns
     -------
     list of Shot
-        Rising, without gaps; one for a clip without cuts. Named NAME_s001 and so on.
+        In order of time, without gaps; one shot for a clip without cuts. The names are NAME_s001
+        and so on.
 
     Raises
     ------
@@ -141,7 +142,7 @@ def detect(clip: Clip, progress: Callable[[int, int], None] | None = None) -> li
 
 
 def cuts_of(clip: Clip, progress: Callable[[int, int], None] | None = None) -> list[int]:
-    """Return the frames that begin a new shot; memory holds a histogram a frame."""
+    """Return the frames that begin a new shot; memory holds one histogram per frame."""
     tell = progress or (lambda done, total: None)
     options = AnalysisOptions(colours=BINS, coarse_colours=BINS)
 
@@ -155,7 +156,7 @@ def cuts_of(clip: Clip, progress: Callable[[int, int], None] | None = None) -> l
                 yield image.frame, found.histogram, hidden(image.pixels)
 
     frames = histograms()
-    shown: list[tuple[int, cuts.F64]] = []  # the first frame of which anything shows
+    shown: list[tuple[int, cuts.F64]] = []  # the first frame with a visible pixel
 
     def before() -> Iterator[tuple[int, cuts.F64]]:
         for number, histogram, is_hidden in frames:
@@ -172,7 +173,7 @@ def cuts_of(clip: Clip, progress: Callable[[int, int], None] | None = None) -> l
 
 
 def trimmed(shot: Shot, clip: Clip) -> Shot:
-    """Return a shot of an edit whose head and tail frames end at the media's cuts.
+    """Return a shot of an edit with its head and tail frames cut off at the media's cuts.
 
     Parameters
     ----------
@@ -184,7 +185,7 @@ def trimmed(shot: Shot, clip: Clip) -> Shot:
     Raises
     ------
     Palette4dError
-        There is a cut inside of what the edit shows.
+        There is a cut inside the frames that the edit shows.
     """
     starts = cuts_of(clip)
     first, last = shot.used

@@ -1,9 +1,8 @@
-"""The shots of an edit: a timeline of OpenTimelineIO, or an EDL, in; `Shot`s out.
+"""The shots of an edit. Input: an OpenTimelineIO timeline or an EDL. Output: `Shot`s.
 
-Each clip of each enabled video track is a shot, nested clips too, with the media that the edit
-shows of it (`media_range`). Gaps and generators are no shots. Times become the frame numbers of the
-media's files, as `media.clip` counts them: the numbers in an image sequence's names, and from 0 in
-a movie.
+Each clip of each enabled video track is a shot, also nested clips, with the range of its media that
+the edit shows (`media_range`). Gaps and generators are no shots. Times become frame numbers as in
+`media.clip`: the numbers in the names of an image sequence, and numbers from 0 in a movie.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from palette4d.shows.timeline_files import Document, library
 
 @dataclasses.dataclass(frozen=True)
 class Edit:
-    """What a timeline shows: its shots in the order of the tracks, and what is no shot."""
+    """A timeline's content: its shots in the order of the tracks, and notes on other items."""
 
     name: str
     rate: Fraction
@@ -40,16 +39,16 @@ def shots_of(document: Document, folder: find_media.Folder | None = None, handle
     Parameters
     ----------
     document : Document
-        As `read` returns it; relative media lie beside its file.
+        The result of `read`; relative media paths start from its folder.
     folder : find_media.Folder, optional
-        Where to look for media first.
+        The folder to search for media first.
     handles : int
-        Head and tail frames, as far as the media goes.
+        Number of head frames and of tail frames; fewer where the media ends.
 
     Returns
     -------
     Edit
-        Shots whose media is missing or cannot be used say so in `Shot.problem`.
+        `Shot.problem` says if a shot's media is missing or unusable.
 
     Raises
     ------
@@ -138,7 +137,7 @@ class _Reader:
             self.shots.append(Shot(name, "", 0, 0, (0, 0), place=place, problem=str(error)))
 
     def shot(self, clip: Any, place: Place, used: Any) -> Shot:
-        """Return the shot of a clip, of whose media the edit shows a range of time."""
+        """Return the shot for a clip and the time range of its media that the edit shows."""
         spec = self.found(clip)
         if spec not in self.clips:
             self.clips[spec] = open_clip(spec, skip_bad_frames=True)
@@ -160,7 +159,7 @@ class _Reader:
         )
 
     def record_of(self, time: Any) -> str:
-        """Return a time of the timeline as a timecode, or a number where there is none."""
+        """Return a time of the timeline as a timecode, else as a frame number."""
         opentime = self.otio.opentime
         start = self.timeline.global_start_time
         rate = float(self.rate)
@@ -173,7 +172,7 @@ class _Reader:
             return f"{at.value:g}"
 
     def found(self, clip: Any) -> str:
-        """Find a clip's media: in the folder by name, else where the timeline says."""
+        """Find a clip's media: by name in the folder, else at the timeline's path."""
         schema, reference = self.otio.schema, clip.media_reference
         names: list[str] = []
         named = ""
@@ -203,9 +202,9 @@ class _Reader:
         raise Palette4dError(f"the media is missing: {what}; {help_}")
 
     def frames(self, clip: Any, used: Any, opened: Clip) -> tuple[int, int]:
-        """Return the first and the last of the media's frame numbers in a range of its time."""
+        """Return the media's first and last frame number in a range of its time."""
         if len(opened.frames) == 1 and not opened.is_movie:
-            return opened.frames[0], opened.frames[0]  # a still, however long it is shown
+            return opened.frames[0], opened.frames[0]  # a still has only one frame
         reference = clip.media_reference
         rate = self.media_rate(reference, used)
         start = Fraction(used.start_time.value).limit_denominator(10**6)
@@ -219,7 +218,7 @@ class _Reader:
         return first + offset, last + offset
 
     def media_rate(self, reference: Any, used: Any) -> Fraction:
-        """Return the media's frames a second, by which its frames are counted."""
+        """Return the media's frames per second, which convert its times to frames."""
         if isinstance(reference, self.otio.schema.ImageSequenceReference) and reference.rate > 0:
             return Fraction(reference.rate).limit_denominator(1001)
         known = getattr(reference, "available_range", None)
@@ -227,7 +226,7 @@ class _Reader:
         return Fraction(time.rate).limit_denominator(1001)
 
     def offset(self, reference: Any, opened: Clip, first: int, last: int, rate: Fraction) -> int:
-        """Return what to add to a frame of the media's time to get the file's number of it."""
+        """Return the offset from a frame of the media's time to the file's frame number."""
         known = getattr(reference, "available_range", None)
         begins = None
         if known is not None:
@@ -242,7 +241,7 @@ class _Reader:
         return 0 if begins is None else low - begins
 
     def stated(self, opened: Clip, rate: Fraction) -> int | None:
-        """Return the frame count of the timecode with which a clip's files say that they begin."""
+        """Return the start timecode in a clip's files as a frame count."""
         text = start_timecode(opened)
         if text is None:
             return None
@@ -253,7 +252,7 @@ class _Reader:
 
 
 def _rate(timeline: Any) -> float:
-    """Return the rate of a timeline that states no start: that of its first clip."""
+    """Return the rate of a timeline without a start time: the rate of its first clip."""
     for clip in timeline.find_clips():
         try:
             return float(clip.trimmed_range().duration.rate)

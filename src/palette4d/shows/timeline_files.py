@@ -1,4 +1,4 @@
-"""Timelines as files: what OpenTimelineIO and its adapter for EDLs read."""
+"""Timeline files, read through OpenTimelineIO and its EDL adapter."""
 
 from __future__ import annotations
 
@@ -53,12 +53,12 @@ def read(path: Path, rate: Fraction | None = None) -> Document:
     path : Path
         .otio, .otioz, .otiod or .edl.
     rate : Fraction, optional
-        Of an EDL's timecodes, 24 by default; the others say theirs.
+        The rate of an EDL's timecodes, by default 24; other files state their rate.
 
     Raises
     ------
     Palette4dError
-        No such file, or nothing in it that can be read as one timeline.
+        The file is missing, or does not hold exactly one timeline.
     """
     otio = library()
     if not path.exists():
@@ -102,16 +102,16 @@ def _first_line(error: Exception) -> str:
 
 
 def _rebase(timeline: Any) -> None:
-    """Let an EDL's tracks begin with the first of them, those that start later with a gap.
+    """Let all tracks of an EDL begin with the first track; later tracks get a leading gap.
 
-    The EDL adapter notes a track's first record timecode as a start before the track's own; taken
-    as a range, as OpenTimelineIO does, it shows nothing of the track.
+    The EDL adapter stores a track's first record timecode as a negative start. OpenTimelineIO would
+    take it as a range and show nothing of the track.
     """
     otio = library()
     starts = [t.source_range.start_time for t in timeline.tracks if t.source_range is not None]
     if not starts:
         return
-    first = max(starts)  # the least record timecode: they are its negative
+    first = max(starts)  # the least record timecode: the starts are its negative
     for track in timeline.tracks:
         if track.source_range is not None:
             late = first - track.source_range.start_time
@@ -122,6 +122,6 @@ def _rebase(timeline: Any) -> None:
 
 
 def sha256(path: Path) -> str:
-    """Return the hash of a timeline's file; of a folder (.otiod) that of the timeline in it."""
+    """Return the hash of a timeline's file; for a folder (.otiod), of the timeline file in it."""
     file = path / "content.otio" if path.is_dir() else path
     return hashlib.sha256(file.read_bytes()).hexdigest()

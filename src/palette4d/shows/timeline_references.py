@@ -1,7 +1,7 @@
-"""What was exported for the shots of an edit, noted in the edit: metadata of a timeline's clips.
+"""References from a timeline's clips to the files that were exported for its shots.
 
-Only the member `palette4d` of `metadata` is written, of each clip that has a sidecar and of the
-timeline; all else stays as it is in the file. The notes are in docs/files.md.
+They are written to the member `palette4d` of `metadata`, in the timeline and in each clip with a
+sidecar. The rest of the file does not change. docs/files.md explains the members.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ def check(manifest: Manifest, manifest_path: Path, target: Path, force: bool) ->
     Raises
     ------
     Palette4dError
-        The show is no edit's, its timeline is not there or is another than the one that was
-        analysed, or `target` cannot be written.
+        The show does not come from an edit, its timeline is missing or has changed since the
+        analysis, or `target` cannot be written.
     """
     if not manifest.is_timeline:
         raise Palette4dError(
@@ -63,18 +63,18 @@ def write(
     *,
     force: bool = False,
 ) -> int:
-    """Write a copy of a timeline with references to what was exported.
+    """Write a copy of a timeline with references to the exported files.
 
     Parameters
     ----------
     source : Path
-        The timeline, as `check` returns it.
+        The timeline, from `check`.
     manifest, manifest_path : Manifest, Path
         The show.
     exported : mapping
         The series of each shot, by its name.
     target : Path
-        The new timeline, an .otio file; files are named as seen from its folder.
+        The new timeline, an .otio file; file names are relative to its folder.
     force : bool
         Replace an existing file.
 
@@ -86,7 +86,7 @@ def write(
     Raises
     ------
     Palette4dError
-        A shot is not where the manifest says, or the file cannot be written.
+        A shot is not at the place in the manifest, or the file cannot be written.
     """
     document = _document(source)
     timeline = _timeline(document, source)
@@ -109,12 +109,12 @@ def write(
     otio = timeline_files.library()
     with replacing(target, force=force) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
-        otio.adapters.read_from_string(text, "otio_json")  # what is written can be read
+        otio.adapters.read_from_string(text, "otio_json")  # the result must be a readable timeline
     return count
 
 
 def _document(source: Path) -> Any:
-    """Return a timeline's JSON: the file's own, or what OpenTimelineIO makes of another kind."""
+    """Return a timeline's JSON: from an .otio file, else converted by OpenTimelineIO."""
     if source.suffix.lower() == ".otio":
         return json.loads(source.read_text(encoding="utf-8"))
     otio = timeline_files.library()
@@ -123,7 +123,7 @@ def _document(source: Path) -> Any:
 
 
 def _timeline(document: Any, source: Path) -> Any:
-    """Return the timeline in a document: itself, or the one in a collection."""
+    """Return the timeline of a document: the document itself, or the only one in a collection."""
     found = [document]
     if str(document.get("OTIO_SCHEMA", "")).startswith("SerializableCollection."):
         found = document["children"]
