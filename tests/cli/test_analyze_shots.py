@@ -414,10 +414,10 @@ class TestColourSpaces:
     ) -> None:
         out = tmp_path / "shots"
         for words, done in (
-            (("--input-space", "ACEScg"), "2 analysed, 0 there"),
-            (("--input-space", "ACEScg"), "0 analysed, 2 there"),
-            ((), "2 analysed, 0 there"),
-            ((), "0 analysed, 2 there"),
+            (("--input-space", "ACEScg"), "2 analysed, 0 kept"),
+            (("--input-space", "ACEScg"), "0 analysed, 2 kept"),
+            ((), "2 analysed, 0 kept"),
+            ((), "0 analysed, 2 kept"),
         ):
             assert analyze(cut_movie, out, "--detect-shots", *words) == 0
             assert done in capsys.readouterr().out
