@@ -13,7 +13,7 @@ from typing import Any
 from palette4d.common.errors import Palette4dError
 
 METHODS = {
-    "skew": "handles that are worth their cost (default)",
+    "skew": "only handles that are worth their cost (default)",
     "paper": "the paper's thresholds",
     "static": "one palette for the whole clip",
     "rgbt": "a convex hull in RGB and time",
@@ -45,10 +45,10 @@ class AnalysisOptions:
     handle_cost: float = _option(
         0.0025, 0, 1e6, "least gain in L' that justifies a handle; fewer handles if higher", _SKEW
     )
-    blocks: int = _option(3, 1, 1e6, "most stretches of time with a topology of their own", _SKEW)
+    blocks: int = _option(3, 1, 1e6, "most blocks (ranges of frames with one topology)", _SKEW)
     palette_size: int = _option(8, 4, 24, "most colours of one frame's palette", _HULLS)
     merge_distance: float = _option(
-        0.1, 0, 1, "colours of a frame's hull closer than this become one", _HULLS
+        0.1, 0, 1, "colours of a frame's hull closer than this are merged", _HULLS
     )
     separation: float = _option(
         0.15, 0, 1, "palette colours closer than this repel each other; 0: the paper", _HULLS
@@ -57,11 +57,11 @@ class AnalysisOptions:
     reach: float = _option(
         0.1, 0, 10, "pixels this far outside count twice; 0: once, as in the paper", _HULLS
     )
-    colours: int = _option(32768, 64, 1e8, "most colours kept of a frame, for the losses")
+    colours: int = _option(32768, 64, 1e8, "most colours kept per frame, for the losses")
     coarse_colours: int = _option(
-        2048, 64, 1e8, "the same for hulls, merging and removal; of short clips up to twice as many"
+        2048, 64, 1e8, "the same for hulls, merging and removal; up to twice as many in short clips"
     )
-    threads: int = _option(0, 0, 1024, "threads; 0: one a processor; never changes the result")
+    threads: int = _option(0, 0, 1024, "threads; 0: one per processor; never changes the result")
     lambda_: float = _option(50.0, 0, 1e6, "weight of the reconstruction loss, eq. 4")
     k: float = _option(50.0, 1, 1e9, "pixels that a palette colour is compared with, eq. 3")
     gamma: float = _option(

@@ -160,7 +160,7 @@ def check_same(
     for name, reader in written.items():
         if not np.array_equal(reader(colours), measured[name](colours)):
             raise Palette4dError(
-                f"{output}: read back, the file differs from what was measured; "
+                f"{output}: the file read back differs from the measured file; "
                 "nothing was written, please report this"
             )
 

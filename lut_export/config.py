@@ -184,7 +184,7 @@ def write_config(
         except failures() as error:
             raise Palette4dError(
                 f"{path}: OpenColorIO refuses the config: {error}; only the LUTs were written. "
-                f"Mend {base}, or choose another with --base"
+                f"Fix {base}, or choose another with --base"
             ) from error
     return WrittenConfig(path, base, shots, views, notes)
 

@@ -159,7 +159,7 @@ class TestEdits:
         before = state(out)
         movie(tmp_path / "media" / "gone.mov", 6)
         assert analyze(edit, out) == 0
-        assert "1 analysed, 2 there already" in capsys.readouterr().out
+        assert "1 analysed, 2 kept" in capsys.readouterr().out
         after = state(out)
         assert {name: after[name] for name in before} == before
         assert [status for _, status, _ in shots(out)] == ["done"] * 3
@@ -192,7 +192,7 @@ class TestEdits:
         (land, _) = manifest(out)["shots"]
         assert (land["asked"], land["used"]) == ([0, 7], [3, 4])
         assert analyze(path, out, "--handles", "3") == 0
-        assert "0 analysed, 2 there already" in capsys.readouterr().out
+        assert "0 analysed, 2 kept" in capsys.readouterr().out
 
     def test_a_cut_inside_of_what_is_shown_fails_alone(
         self, cut_movie: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -230,7 +230,7 @@ class TestEdits:
             "* FROM CLIP NAME: take\n"
         )
         assert analyze(path, tmp_path / "out", "--media", str(tmp_path)) == 0
-        assert "24 frames a second were taken" in capsys.readouterr().err
+        assert "24 frames per second are assumed" in capsys.readouterr().err
         assert (tmp_path / "out" / "reel_2.shots.json").is_file()
 
     def test_relative_names_stay_relative(
@@ -293,7 +293,7 @@ class TestAgain:
         assert analyze(path, out, "--handles", "1") == 0
         before, files = manifest(out)["shots"], state(out)
         assert analyze(path, out, "--handles", "2", "--only", "B") == 0
-        assert "1 analysed, 2 there already" in capsys.readouterr().out
+        assert "1 analysed, 2 kept" in capsys.readouterr().out
         assert [shot["frames"] for shot in manifest(out)["shots"]] == [[1, 6], [10, 17], [21, 26]]
         assert manifest(out)["shots"][::2] == before[::2]
         assert {n: s for n, s in state(out).items() if n[0] in "AC"} == {
@@ -348,7 +348,7 @@ class TestAgain:
             ("v2", (clip("A", take, 0, 5), clip("C", take, 20, 5), clip("B", take, 12, 5))),
         ):
             assert analyze(save(timeline(*items), tmp_path / f"{name}.otio"), out) == 0
-        assert "1 analysed, 2 there already" in capsys.readouterr().out.partition("wrote")[2]
+        assert "1 analysed, 2 kept" in capsys.readouterr().out.partition("wrote")[2]
         document = json.loads((out / "v2.shots.json").read_text("utf-8"))
         assert [shot["frames"] for shot in document["shots"]] == [[0, 4], [20, 24], [12, 16]]
 
@@ -414,10 +414,10 @@ class TestColourSpaces:
     ) -> None:
         out = tmp_path / "shots"
         for words, done in (
-            (("--input-space", "ACEScg"), "2 analysed, 0 there"),
-            (("--input-space", "ACEScg"), "0 analysed, 2 there"),
-            ((), "2 analysed, 0 there"),
-            ((), "0 analysed, 2 there"),
+            (("--input-space", "ACEScg"), "2 analysed, 0 kept"),
+            (("--input-space", "ACEScg"), "0 analysed, 2 kept"),
+            ((), "2 analysed, 0 kept"),
+            ((), "0 analysed, 2 kept"),
         ):
             assert analyze(cut_movie, out, "--detect-shots", *words) == 0
             assert done in capsys.readouterr().out

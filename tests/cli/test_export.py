@@ -44,7 +44,7 @@ class TestExport:
         assert "--clip" in printed.err
         assert export("--every", "10", "-o", tmp_path, "--name", "shot", "--quiet") == 0
         printed = capsys.readouterr()
-        assert "0 baked, 3 there already" in printed.out
+        assert "0 baked, 3 kept" in printed.out
         assert "%" not in printed.err.replace("--clip", "")
 
     def test_a_cube_with_a_shaper_is_warned_of(

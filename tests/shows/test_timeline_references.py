@@ -224,7 +224,7 @@ class TestSeries:
         times = {p: p.stat().st_mtime_ns for p in Path("luts").rglob("*.cube")}
         capsys.readouterr()
         assert export(show, "-o", "luts") == 0
-        assert "0 baked, 3 there already" in capsys.readouterr().out
+        assert "0 baked, 3 kept" in capsys.readouterr().out
         assert {p: p.stat().st_mtime_ns for p in Path("luts").rglob("*.cube")} == times
 
     def test_stops_of_unedited_shots_are_their_first_frame(

@@ -49,21 +49,21 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="FOLDER",
         type=Path,
         help="where an edit's media lies, found by name in all folders below "
-        "(default: where the edit says)",
+        "(default: the edit's paths)",
     )
     group.add_argument(
         "--handles",
         metavar="N",
         type=whole(0, 100_000),
         default=None,
-        help="head and tail frames around what the edit shows, up to the end of the media or its "
+        help="head and tail frames around each shot, up to the end of the media or its "
         "next cut (default 0)",
     )
     group.add_argument(
         "--only", metavar="A,B", type=_names, default=(), help="only the shots of these names"
     )
     group.add_argument(
-        "--force", action="store_true", help="analyse the shots that are there already, too"
+        "--force", action="store_true", help="also analyse shots that have a sidecar"
     )
     add_worker_options(group, "shots")
 
@@ -71,7 +71,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def _names(text: str) -> tuple[str, ...]:
     names = tuple(name.strip() for name in text.split(","))
     if not all(names):
-        raise argparse.ArgumentTypeError(f"found {text!r}, expected names with commas between")
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected names separated by commas")
     return names
 
 
@@ -91,11 +91,9 @@ def is_show(args: argparse.Namespace) -> bool:
         _refuse(args, for_shows, "needs an edit (.otio, .edl) as CLIP, or --detect-shots")
         return False
     if edit and args.detect_shots:
-        args.usage_error(
-            "--detect-shots splits a movie; an edit says itself where its shots begin and end"
-        )
+        args.usage_error("--detect-shots splits a movie; an edit already has its shots")
     if edit and args.frames is not None:
-        args.usage_error("--frames names frames of one clip; an edit says which it shows of each")
+        args.usage_error("--frames is for one clip; an edit defines the frames of each clip")
     if args.output.name.endswith(".json"):
         args.usage_error(f"-o {args.output}: expected a folder, for a sidecar a shot")
     return True
@@ -162,7 +160,7 @@ def _of_edit(args: argparse.Namespace) -> tuple[Source, list[Shot], list[str]]:
     shots, renamed = numbered(edit.shots)
     notes = [f"not analysed: {note}" for note in edit.notes]
     if path.suffix.lower() == ".edl" and args.rate is None:
-        notes.append("an EDL does not say its rate: 24 frames a second were taken (--rate)")
+        notes.append("an EDL does not state its rate: 24 frames per second are assumed (--rate)")
     if renamed:
         some = ", ".join(renamed[:8]) + (", …" if len(renamed) > 8 else "")
         notes.append(
@@ -193,7 +191,7 @@ def report(done: Show) -> list[str]:
     entries = [entry for entry in done.manifest.entries if entry.status == DONE]
     lines = [
         f"{counted(len(entries), 'shot')} of {len(done.manifest.entries)}: "
-        f"{len(done.analysed)} analysed, {len(done.kept)} there already"
+        f"{len(done.analysed)} analysed, {len(done.kept)} kept"
     ]
     width = max((len(entry.shot.name) for entry in entries), default=0)
     for entry in entries[:MOST_LISTED]:

@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
     # A manifest with a single shot is a show, too.
     show = len(sidecars) > 1 or sidecars != args.sidecars
     if args.clip is not None and len(sidecars) > 1:
-        args.usage_error("--clip names one clip; with several sidecars each must name its own")
+        args.usage_error("--clip is for one sidecar; several sidecars must each name their clip")
     settings = BakeSettings(**lut_settings(args, format_named(args.format).name))
     with frames_bar("config", hidden=args.quiet) as progress:
         done = write_config(

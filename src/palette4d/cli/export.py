@@ -73,7 +73,7 @@ def add_frame_choice(parser: argparse.ArgumentParser, *, required: bool) -> None
 def add_run_options(parser: argparse.ArgumentParser) -> None:
     """Add --jobs, --cluster, --force and --quiet."""
     add_worker_options(parser, "frames")
-    parser.add_argument("--force", action="store_true", help="replace files that are there")
+    parser.add_argument("--force", action="store_true", help="replace existing files")
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
 
 
@@ -186,7 +186,7 @@ def report(done: Series) -> list[str]:
     folder = done.index.parent
     lines = [
         f"{counted(len(frames), 'file')}, {folder / frames[0]['file']} to {frames[-1]['file']}: "
-        f"{len(done.baked)} baked, {len(done.kept)} there already",
+        f"{len(done.baked)} baked, {len(done.kept)} kept",
     ]
     worst = max(frames, key=lambda entry: entry["error"])
     where = "the clip's colours" if worst["clip"] is not None else "the dense grid"

@@ -87,7 +87,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("--force", action="store_true", help="replace files that exist already")
     parser.add_argument(
-        "--skip-bad-frames", action="store_true", help="leave out missing or unreadable frames"
+        "--skip-bad-frames", action="store_true", help="skip missing or unreadable frames"
     )
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
     parser.set_defaults(run=run)

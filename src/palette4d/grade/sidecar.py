@@ -355,7 +355,7 @@ def _summary(document: Fields) -> str:
 def _would_lose(target: Path, old: Fields) -> Palette4dError:
     return Palette4dError(
         f"{target} holds edits ({_summary(old)}) that this would lose. "
-        "Keep them with --keep-edits (works when the palette comes out unchanged), "
+        "Keep them with --keep-edits (works if the palette is unchanged), "
         "discard them with --drop-edits, or choose another output"
     )
 
@@ -368,7 +368,7 @@ def _with_edits_of(old: Fields, new: Fields, target: Path) -> Fields:
         )
     if _canonical(old, "")["polytope"] != new["polytope"]:
         raise Palette4dError(
-            f"{target} holds edits ({_summary(old)}) that belong to a palette which differs from "
+            f"{target} holds edits ({_summary(old)}) for a palette that differs from "
             "the new one, so they cannot be kept. Discard them with --drop-edits, or choose "
             "another output"
         )

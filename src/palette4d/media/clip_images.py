@@ -211,7 +211,7 @@ def _wanted_frames(sequence: ImageSequence, frames: str | None, embedded: str | 
             wanted = parse_frames(frames)
             if outside := sorted(set(wanted) - set(inside)):
                 raise ClipError(
-                    f"{sequence.pattern}: --frames {frames} asks for {describe(outside)}, which "
+                    f"{sequence.pattern}: --frames {frames} includes {describe(outside)}, which "
                     f"the pattern's own range {embedded} leaves out. Give one of the two."
                 )
     elif frames is not None:
