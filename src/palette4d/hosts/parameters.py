@@ -1,6 +1,6 @@
 """The node's parameters as the hosts' files show them: names, labels, ranges and defaults.
 
-The node describes its parameters (`ofx_plugin/plugin`), and the files must agree with it:
+The node describes its parameters (`ofx_plugin/node`), and the files must agree with it:
 `tests/host/test_host_ui.py` compares them. The files leave out parameters that they cannot set in
 these hosts: buttons, the embedded copy and the status. They also leave out the handles' ids.
 """
