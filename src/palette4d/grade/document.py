@@ -51,6 +51,8 @@ class Document:
         The members of a sidecar (docs/sidecar.md).
     notes : iterable of str
         Notes of the analysis about the palette.
+    report : mapping, optional
+        Figures of the analysis, as `palette4d analyze --json` prints them.
 
     Attributes
     ----------
@@ -58,14 +60,22 @@ class Document:
         The sidecar; None until it is saved.
     notes : tuple of str
         As above.
+    report : dict
+        As above; empty for a loaded sidecar.
     """
 
-    def __init__(self, fields: Mapping[str, Any], notes: Iterable[str] = ()) -> None:
+    def __init__(
+        self,
+        fields: Mapping[str, Any],
+        notes: Iterable[str] = (),
+        report: Mapping[str, Any] | None = None,
+    ) -> None:
         data = sidecar.encoded(fields)
         self._start(data, _core.parse_sidecar(data, "<document>"))
         self._disk: bytes | None = None
         self.path: Path | None = None
         self.notes = tuple(notes)
+        self.report = dict(report or {})
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> "Document":
@@ -80,6 +90,7 @@ class Document:
         data = sidecar.read_bytes(path)
         document._start(data, _core.parse_sidecar(data, os.fspath(path)))
         document._disk, document.path, document.notes = data, Path(path), ()
+        document.report = {}
         return document
 
     def _start(self, data: bytes, core: _core.Sidecar) -> None:
