@@ -61,6 +61,20 @@ class Scale:
         """The distance of two frames in x."""
         return (self.right - self.left) / max(self.last - self.first, 1e-9)
 
+    def ticks(self, low: float, high: float, apart: float = 70.0) -> list[float]:
+        """Return the frames to name between two x: the clip's ends, and round numbers."""
+        first, last = self.first, self.last
+        start, end = (float(self.frame(x)) for x in (low, high))
+        if last <= first or end <= start:
+            return [first]
+        least = (end - start) / max(2, int((high - low) / apart))
+        step = next(n * 10**k for k in range(9) for n in (1, 2, 5) if n * 10**k >= least)
+        inner = np.arange(np.ceil(start / step) * step, end + step / 2, step)
+        # No round number close to the clip's ends, which are always named.
+        near = 0.55 * apart / self.per_frame
+        kept = inner[(inner - first > near) & (last - inner > near)].tolist()
+        return sorted(t for t in {first, *kept, last} if start <= t <= end)
+
 
 @dataclass(frozen=True)
 class Disc:
@@ -271,20 +285,6 @@ class Timeline:
                     taken = middle + half
                     break
         return labels
-
-    def ticks(self, low: float, high: float, apart: float = 70.0) -> list[float]:
-        """Return the frames to name between two x: the clip's ends, and round numbers."""
-        first, last = self.palette.first, self.palette.last
-        start, end = (float(self.scale.frame(x)) for x in (low, high))
-        if last <= first or end <= start:
-            return [first]
-        least = (end - start) / max(2, int((high - low) / apart))
-        step = next(n * 10**k for k in range(9) for n in (1, 2, 5) if n * 10**k >= least)
-        inner = np.arange(np.ceil(start / step) * step, end + step / 2, step)
-        # No round number close to the clip's ends, which are always named.
-        near = 0.55 * apart / self.scale.per_frame
-        kept = inner[(inner - first > near) & (last - inner > near)].tolist()
-        return sorted(t for t in {first, *kept, last} if start <= t <= end)
 
 
 def half_bands(points: F64, half: float) -> tuple[F64, F64]:
