@@ -132,6 +132,14 @@ class Document:
             f"{counted(sum(kind in _ACTIVE for kind, _ in self._state), 'edit')}>"
         )
 
+    def trial(self) -> "Document":
+        """Return a copy to try edits on, without the history and without a file."""
+        new = copy.copy(self)
+        new._done, new._undone = [], []
+        new.path, new._disk = None, None
+        new._mark_saved()
+        return new
+
     # ------------------------------------------------------------------------------ what it holds
 
     @property

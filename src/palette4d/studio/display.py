@@ -6,6 +6,7 @@ move; `Painter.error` says how far these are from the view itself. Exposure and 
 looking only.
 """
 
+import itertools
 import os
 import time
 from collections import OrderedDict
@@ -101,7 +102,7 @@ class Painter:
             return self._run(cpu, colours)
         result = np.empty((*colours.shape[:2], 4), np.uint8)
         rows = np.linspace(0, len(colours), (os.cpu_count() or 1) + 1).astype(int)
-        parts = list(zip(rows[:-1], rows[1:], strict=True))
+        parts = list(itertools.pairwise(rows))
         list(_THREADS.map(lambda part: self._run(cpu, colours[slice(*part)], part, result), parts))
         return result
 
@@ -142,11 +143,13 @@ class Display:
     known : bool
         Whether the encoding is known; if not, code values are shown as they are.
     name : str
-        The config, the display and the view are of.
+        The config that the displays and views are of.
+    problem : str
+        Why a config could not be used.
     """
 
     def __init__(self, space: str, config: str | None = None) -> None:
-        self.space, self.known, self.name = space, False, ""
+        self.space, self.asked, self.known, self.name = space, config, False, ""
         self._config: Any = None
         self._space: Any = None
         self._painters: OrderedDict[Look, Painter] = OrderedDict()
@@ -168,15 +171,16 @@ class Display:
             if found is not None:
                 self._space, self.known = found, True
 
-    @classmethod
-    def of(cls, document: Document | None, encoding: str) -> "Display":
-        """Return the display of a document's clip, or of a clip with this encoding."""
-        if document is None:
-            return cls(encoding)
-        conversion = document.core.conversion
-        if conversion is not None:
-            return cls(conversion.input_space, conversion.config)
-        return cls(document.encoding if document.encoding != "unknown" else encoding)
+    @staticmethod
+    def wanted(document: Document | None, encoding: str) -> tuple[str, str | None]:
+        """Return the space and the config for a document's clip, or a clip with this encoding."""
+        if document is not None:
+            conversion = document.core.conversion
+            if conversion is not None:
+                return conversion.input_space, conversion.config or None
+            if document.encoding != "unknown":
+                return document.encoding, None
+        return encoding, None
 
     @property
     def scene_linear(self) -> bool:

@@ -6,8 +6,10 @@ nothing moves, the frame is recoloured exactly, as `palette4d render` does, and 
 Of waiting requests only the newest is kept, and exact work stops for a new request.
 """
 
+import contextlib
 import threading
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,39 +21,19 @@ from palette4d.common.errors import in_words
 from palette4d.grade.document import Document
 from palette4d.grade.palette import Palette
 from palette4d.studio.display import Display, Look
-from palette4d.studio.player import ByteCache
+from palette4d.studio.player import ByteCache, Region, resampled
 
 F32 = NDArray[np.float32]
 U8 = NDArray[np.uint8]
 
-#: Bytes of scaled frames, and of pictures of 8 bits, that are kept.
-SMALL_BYTES, REEL_BYTES = 300 << 20, 400 << 20
+#: Bytes of scaled frames, of pictures before the edits, and of pictures to play, that are kept.
+SMALL_BYTES, BEFORE_BYTES, REEL_BYTES = 100 << 20, 50 << 20, 400 << 20
 #: Pixels that are recoloured between two looks for a newer request.
 STRIP = 300_000
 #: Pixels in which colours outside of the palette are looked for.
 OUTSIDE_POINTS = 60_000
 #: The grey of a matte's other pixels, and how much of the picture shows through.
 MATTE_GREY, MATTE_SHOWS = 58, 0.12
-
-
-@dataclass(frozen=True)
-class Region:
-    """A part of a frame, in pixels of the frame, and the size that it is shown at.
-
-    The size is never larger than the part: what is larger on screen is scaled up by the screen.
-    """
-
-    left: int
-    top: int
-    right: int
-    bottom: int
-    width: int
-    height: int
-
-    @property
-    def whole(self) -> bool:
-        """Whether its pixels are the frame's, not scaled."""
-        return (self.width, self.height) == (self.right - self.left, self.bottom - self.top)
 
 
 @dataclass(frozen=True)
@@ -68,7 +50,8 @@ class Grade:
         core = document.core
         own = core.conversion
         steps = None if own is None else own.steps
-        return cls(document.palette(frame), steps, bumps_at(document, frame))
+        bumps = core.bumps_at(frame)
+        return cls(document.palette(frame), steps, bumps if len(bumps) else None)
 
     def recolourer(self) -> _core.Recolourer:
         """Return the exact recolouring."""
@@ -92,10 +75,12 @@ class Request:
         The edits after, and before (None: the source).
     region : Region
         The part and its size.
-    look : Look
-        The display.
+    display, look
+        How code values become colours on the screen.
     key : hashable
-        Changes with everything that changes the pictures but is named above.
+        Changes with what `before` is.
+    revision : int
+        Changes with the grade.
     sides : frozenset of str
         "before", "after", or both.
     settled : bool
@@ -104,6 +89,8 @@ class Request:
         A palette colour or handle whose weight is shown.
     outside : bool
         Mark colours outside of the palette.
+    scaled : bool
+        The pixels are the region's at its size, not the frame's.
     """
 
     frame: int
@@ -112,12 +99,20 @@ class Request:
     grade: Grade | None
     before: Grade | None
     region: Region
+    display: Display
     look: Look
     key: Any
+    revision: int
     sides: frozenset[str] = frozenset({"after"})
     settled: bool = True
     matte: str | None = None
     outside: bool = False
+    scaled: bool = False
+
+    @property
+    def film_key(self) -> tuple[Any, ...]:
+        """What a picture to play depends on."""
+        return self.frame, self.region, self.look, self.sides, self.key, self.revision
 
 
 @dataclass(frozen=True)
@@ -159,10 +154,11 @@ class Preview:
     """
 
     def __init__(self, ready: Callable[[Picture], object]) -> None:
-        self.display: Display | None = None
         self._ready = ready
-        self._small = ByteCache[tuple[int, Region]](SMALL_BYTES)
-        self._befores = ByteCache[tuple[Any, ...]](REEL_BYTES // 4)
+        self._small = ByteCache[tuple[int, Region], F32](SMALL_BYTES)
+        self._befores = ByteCache[tuple[Any, ...], U8](BEFORE_BYTES)
+        self._reel = ByteCache[tuple[Any, ...], Picture](REEL_BYTES)
+        self._film: deque[Callable[[], Request | None]] = deque()
         self._wake = threading.Condition()
         self._waiting: Request | None = None
         self._closed = False
@@ -175,15 +171,24 @@ class Preview:
             self._waiting = request
             self._wake.notify()
 
-    def use(self, display: Display) -> None:
-        """Show another clip, or the same in another way."""
-        self.display = display
-        self.forget()
+    def roll(self, film: Iterable[Callable[[], Request | None]]) -> None:
+        """Make these pictures to play, in this order, where no other picture is asked for.
+
+        Each is a function that returns the request, called in the preview's thread.
+        """
+        with self._wake:
+            self._film = deque(film)
+            self._wake.notify()
+
+    def played(self, key: tuple[Any, ...]) -> Picture | None:
+        """Return a picture that was made to play (`Request.film_key`), or None."""
+        return self._reel.get(key)
 
     def forget(self) -> None:
         """Forget the pixels that were kept."""
         self._small.clear()
         self._befores.clear()
+        self._reel.clear()
 
     def close(self) -> None:
         """End the thread."""
@@ -194,13 +199,16 @@ class Preview:
     def _run(self) -> None:
         while True:
             with self._wake:
-                while self._waiting is None and not self._closed:
+                while self._waiting is None and not self._film and not self._closed:
                     self._wake.wait()
                 if self._closed:
                     return
-                request = self._waiting
-                assert request is not None
-                self._waiting = None
+                request, self._waiting = self._waiting, None
+                scene = self._film.popleft() if request is None else None
+            if request is None:
+                assert scene is not None
+                self._develop(scene)
+                continue
             try:
                 # A quick picture first, unless the exact one takes no longer.
                 if not request.settled or request.pixels.size > 4 * STRIP:
@@ -212,6 +220,18 @@ class Preview:
             except Exception as error:  # whatever fails, the window stays and says it
                 text = in_words(error) or type(error).__name__
                 self._ready(Picture(request, None, None, False, error=text))
+
+    def _develop(self, scene: Callable[[], Request | None]) -> None:
+        """Make a picture to play; one that fails is dropped."""
+        with contextlib.suppress(Exception):
+            request = scene()
+            if request is None:
+                return
+            picture = self.make(request, exact=False)
+            sides = (picture.before, picture.after)
+            size = sum(side.nbytes for side in sides if side is not None)
+            self._reel.put(request.film_key, picture, size)
+            self._ready(picture)
 
     def _check(self) -> None:
         if self._waiting is not None or self._closed:
@@ -231,8 +251,7 @@ class Preview:
         check : callable
             Called now and then; may raise to stop.
         """
-        assert self.display is not None
-        painter = self.display.painter(request.look)
+        painter = request.display.painter(request.look)
         region = request.region
         before = after = None
         result = None
@@ -282,12 +301,14 @@ class Preview:
         return result
 
     def _source(self, request: Request) -> F32:
+        if request.scaled:
+            return request.pixels
         key = (request.frame, request.region)
         found = self._small.get(key)
         if found is None:
             found = resampled(request.pixels, request.region)
-            self._small.put(key, found)
-        return found  # type: ignore[return-value]
+            self._small.put(key, found, found.nbytes)
+        return found
 
     def _before(self, request: Request, painter: Any, exact: bool, check: Callable[[], None]) -> U8:
         key = (request.frame, request.region, request.look, exact, request.key)
@@ -297,17 +318,8 @@ class Preview:
             if request.before is not None:
                 colours = _quick(colours, request.before, request.premultiplied)
             found = _painted(painter, colours, request.premultiplied, exact, check)
-            self._befores.put(key, found)
-        return found  # type: ignore[return-value]
-
-
-def bumps_at(document: Document, frame: float) -> Any:
-    """Return the local remainders of the picks at a time, as the core takes them, or None."""
-    found = getattr(document.core, "bumps_at", None)
-    if found is None:
-        return None
-    bumps = found(frame)
-    return bumps if len(bumps) else None
+            self._befores.put(key, found, found.nbytes)
+        return found
 
 
 def _quick(colours: F32, grade: Grade, premultiplied: bool) -> F32:
@@ -346,43 +358,6 @@ def _painted(
     if alpha is not None:
         result[..., :3] = np.rint(result[..., :3] * alpha).astype(np.uint8)
     return result
-
-
-def resampled(pixels: F32, region: Region) -> F32:
-    """Return a part of a frame at a smaller size: whole pixels are averaged, then interpolated."""
-    part = pixels[region.top : region.bottom, region.left : region.right]
-    if region.whole:
-        return np.ascontiguousarray(part)
-    height, width = part.shape[:2]
-    step = max(1, min(width // region.width, height // region.height))
-    if step > 1:
-        # Beyond 4 the mean of every second pixel is near enough.
-        rows, columns = height // step, width // step
-        stride = max(1, step // 4)
-        cut = part[: rows * step, : columns * step]
-        total = np.zeros((rows, columns, part.shape[2]), np.float32)
-        count = 0
-        for y in range(0, step, stride):
-            for x in range(0, step, stride):
-                total += cut[y::step, x::step]
-                count += 1
-        part = total * np.float32(1 / count)
-        height, width = rows, columns
-    if (height, width) == (region.height, region.width):
-        return np.ascontiguousarray(part)
-    down, up, share = _taps(height, region.height)
-    part = part[down] * (1 - share)[:, None, None] + part[up] * share[:, None, None]
-    left, right, share = _taps(width, region.width)
-    return np.ascontiguousarray(
-        part[:, left] * (1 - share)[None, :, None] + part[:, right] * share[None, :, None]
-    )
-
-
-def _taps(size: int, wanted: int) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float32]]:
-    """Return the two neighbours of each new pixel, and the share of the second."""
-    at = np.clip((np.arange(wanted) + 0.5) * size / wanted - 0.5, 0, size - 1)
-    first = np.floor(at).astype(np.intp)
-    return first, np.minimum(first + 1, size - 1), (at - first).astype(np.float32)
 
 
 def straight(pixels: F32, premultiplied: bool) -> F32:

@@ -24,10 +24,10 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QWidget
 
 from palette4d import _core
-from palette4d.common.errors import Palette4dError
 from palette4d.studio import texts, theme
-from palette4d.studio.display import Display, Look
-from palette4d.studio.preview import Grade, Picture, Preview, Region, Request, straight
+from palette4d.studio.player import Region
+from palette4d.studio.preview import Grade, Picture, Preview, Request, straight
+from palette4d.studio.screen_colours import on_screen
 from palette4d.studio.session import Probe, Session
 
 #: Pixels of the screen within which the pointer takes the wipe's line, and a press is a click.
@@ -35,8 +35,12 @@ NEAR_WIPE, CLICK = 6, 4
 ZOOM_STEP, LEAST_ZOOM, MOST_ZOOM = 1.25, 0.02, 64.0
 #: From this zoom on pixels are squares.
 SQUARES = 2.0
+#: The pixels of a request that has none yet.
+NO_PIXELS = np.zeros((0, 0, 3), np.float32)
 #: Frames that are read around the playhead.
 AHEAD, BEHIND = 6, 2
+
+F32 = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -74,7 +78,6 @@ class Viewer(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setAccessibleName(texts.VIEWER)
         self.preview = Preview(lambda picture: session.post(lambda: self._arrived(picture)))
-        self.display: Display | None = None
         self.zoom: float | None = None  #: pixels of the screen for one of the frame; None: fitted
         self.centre = QPointF()  #: the frame's point in the middle
         self.picture: Picture | None = None
@@ -90,7 +93,8 @@ class Viewer(QWidget):
         self.on_pick: Any = None  #: called with a Place for a click or a box
         self.on_hold: Any = None  #: the same with Alt
         session.on("clip", self._clip_changed)
-        session.on("document", self._document_changed)
+        session.on("document", self.refresh)
+        session.on("playing", self.refresh)
         session.on("frame", self._frame_changed)
         session.on("pixels", self.refresh)
         session.on("view", self.refresh)
@@ -107,82 +111,86 @@ class Viewer(QWidget):
     def _clip_changed(self) -> None:
         self.picture, self.images, self.shown_frame, self.problem = None, {}, None, ""
         self.zoom = None
-        self._new_display()
+        self.preview.forget()
         self._frame_changed()
-
-    def _new_display(self) -> None:
-        clip = self.session.clip
-        if clip is not None:
-            self.display = Display.of(self.session.document, clip.encoding)
-            self.preview.use(self.display)
-
-    def _document_changed(self) -> None:
-        document, clip = self.session.document, self.session.clip
-        if clip is not None and self.display is not None and not self.session.dragging:
-            wanted = clip.encoding
-            if document is not None:
-                own = document.core.conversion
-                wanted = own.input_space if own is not None else document.encoding
-                wanted = clip.encoding if wanted == "unknown" else wanted
-            if wanted != self.display.space:
-                self._new_display()
-        self.refresh()
 
     def _frame_changed(self) -> None:
         session = self.session
         if session.player is None:
             self.update()
             return
-        session.player.want(frames_around(session))
-        self.refresh()
-
-    def look(self) -> Look:
-        """Return the look of the session's view."""
-        view = self.session.view
-        return Look(view.display, view.view, view.exposure, view.gamma)
+        if not session.playing:
+            session.player.want(frames_around(session))
+            self.refresh()
 
     def refresh(self) -> None:
-        """Ask for the picture of now."""
+        """Ask for the picture of now; while playing, the playback chooses the pictures."""
+        if self.session.playing:
+            self.update()
+            return
         request = self.request()
         if request is not None:
             self.problem = ""
             self.preview.ask(request)
         elif self.session.player is not None:
-            self.problem = self.session.player.errors.get(self.session.frame, "")
+            player, frame = self.session.player, self.session.frame
+            missing = texts.NO_FRAME.format(frame=frame)
+            self.problem = player.errors.get(frame, "" if frame in player.numbers else missing)
         self.update()
 
     def request(self) -> Request | None:
         """Return what is to be shown now; None while the frame is not read."""
         session, region = self.session, self.region()
-        if session.player is None or session.clip is None or region is None:
+        if session.player is None or region is None:
             return None
         pixels = session.player.frame(session.frame)
         if pixels is None:
             return None
-        document, view = session.document, session.view
-        grade = None if document is None else Grade.of(document, session.frame)
-        before = None
-        version = ""
-        if view.version and document is not None:
-            before = version_grade(document, view.version, session.frame)
-            version = f"{view.version} {session.revision}"
-        settled = (
-            not session.dragging and not session.playing and self._doing not in ("pan", "zoom")
+        moving = session.dragging or self._doing in ("pan", "wipe")
+        return self._request_of(
+            session.frame,
+            region,
+            pixels,
+            settled=not moving,
+            matte=session.hover,
+            outside=session.view.outside,
         )
+
+    def film(self, frame: int) -> Request | None:
+        """Return the request for a frame to play; its pixels are taken when it is developed."""
+        region = self.region()
+        if region is None:
+            return None
+        return self._request_of(frame, region, NO_PIXELS, settled=False, scaled=True)
+
+    def _request_of(self, frame: int, region: Region, pixels: F32, **more: Any) -> Request:
+        session, view = self.session, self.session.view
+        document = session.document
+        assert session.clip is not None
+        assert session.display is not None
+        grade = None if document is None else Grade.of(document, frame)
+        before, key = None, ""
+        if view.version and document is not None:
+            before = version_grade(document, view.version, frame)
+            key = f"{view.version} {session.revision}"
         return Request(
-            frame=session.frame,
+            frame=frame,
             pixels=pixels,
             premultiplied=session.clip.premultiplied,
             grade=grade,
             before=before,
             region=region,
-            look=self.look(),
-            key=version,
+            display=session.display,
+            look=session.looked,
+            key=key,
+            revision=session.revision,
             sides=frozenset(self.sides),
-            settled=settled,
-            matte=session.hover,
-            outside=view.outside,
+            **more,
         )
+
+    def show_picture(self, picture: Picture) -> None:
+        """Show a picture that was made to play."""
+        self._take(picture)
 
     def _arrived(self, picture: Picture) -> None:
         if picture.error:
@@ -190,8 +198,10 @@ class Viewer(QWidget):
             self.session.say(picture.error, "error")
             self.update()
             return
-        if self.session.clip is None:
-            return
+        if self.session.clip is not None and not self.session.playing:
+            self._take(picture)
+
+    def _take(self, picture: Picture) -> None:
         self.picture, self.shown_frame = picture, picture.request.frame
         for side in ("before", "after"):
             pixels = getattr(picture, side)
@@ -232,10 +242,7 @@ class Viewer(QWidget):
         """Return where the frame's upper left corner lies in the widget."""
         clip, scale = self.session.clip, self.scale()
         assert clip is not None
-        if self.zoom is None:
-            centre = QPointF(clip.width / 2, clip.height / 2)
-        else:
-            centre = self.centre
+        centre = QPointF(clip.width / 2, clip.height / 2) if self.zoom is None else self.centre
         return pane.center() - centre * scale
 
     def region(self) -> Region | None:
@@ -404,10 +411,10 @@ class Viewer(QWidget):
             half = max(6.0, (getattr(pick, "box", None) or 1) * self.scale() / 2)
             box = QRectF(point.x() - half, point.y() - half, 2 * half, 2 * half)
             if pick.kind == "hold":
-                _ring(painter, lambda box=box: painter.drawRect(box))  # type: ignore[misc]
-                _ring(painter, lambda p=point: painter.drawPoint(p))  # type: ignore[misc]
+                _ring(painter, lambda box=box: painter.drawRect(box))
+                _ring(painter, lambda p=point: painter.drawPoint(p))
             else:
-                _ring(painter, lambda box=box: painter.drawEllipse(box))  # type: ignore[misc]
+                _ring(painter, lambda box=box: painter.drawEllipse(box))
             chosen = pick.id in self.session.selection
             _note(painter, pick.id, box.topRight() + QPointF(3, 2), bright=chosen)
 
@@ -454,21 +461,11 @@ class Viewer(QWidget):
 
     def _palette_colours(self) -> dict[str, QColor]:
         """Return the frame's palette colours as displayed, by id."""
-        document, display = self.session.document, self.display
-        if document is None or display is None:
+        if self.session.document is None:
             return {}
-        palette = document.palette(self.session.frame)
-        colours: NDArray[Any] = np.asarray(palette.edited)
-        own = document.core.conversion
-        if own is not None:
-            colours = own.steps.to_clip(colours)
-        shown = display.painter(self.look()).paint(
-            np.ascontiguousarray(colours, np.float32)[None], exact=False, threads=False
-        )[0]
-        return {
-            id_: QColor(int(r), int(g), int(b))
-            for id_, (r, g, b, _) in zip(palette.ids, shown, strict=True)
-        }
+        palette = self.session.document.palette(self.session.frame)
+        shown = on_screen(self.session, palette.edited)
+        return {id_: QColor(*rgb) for id_, rgb in zip(palette.ids, shown.tolist(), strict=True)}
 
     def _say(self, painter: QPainter, text: str, colour: QColor | None = None) -> None:
         painter.setPen(colour or QColor(theme.FAINT))
@@ -615,7 +612,7 @@ def frames_around(session: Session) -> list[int]:
     offsets = [0]
     for k in range(1, AHEAD + 1):
         offsets += [k * way] + ([-k * way] if k <= BEHIND else [])
-    known = session.player._known if session.player is not None else frozenset()
+    known = frozenset() if session.player is None else session.player.numbers
     frames = [session.frame + offset * step for offset in offsets]
     return [frame for frame in frames if frame in known]
 
