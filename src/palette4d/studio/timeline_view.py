@@ -750,9 +750,7 @@ class TimelineView(QWidget):
             painter.setPen(Qt.PenStyle.NoPen)
             for above, below, colours in parts:
                 seen = on_screen(self.session, colours[edge, inside])
-                painter.setBrush(
-                    paint.texture(seen, float(columns[inside[0]]), float(COLUMN))
-                )
+                painter.setBrush(paint.texture(seen, float(columns[inside[0]]), float(COLUMN)))
                 painter.drawPolygon(paint.polygon(np.concatenate([above, below[::-1]])))
             painter.setBrush(Qt.BrushStyle.NoBrush)
             chosen = palette.edge_ids[edge] in selected
@@ -765,9 +763,7 @@ class TimelineView(QWidget):
                 self._paint_ramp(painter, line, lower, columns[inside], moved[edge, inside])
 
     @staticmethod
-    def _paint_ramp(
-        painter: QPainter, line: F64, lower: F64, columns: F64, moved: F64
-    ) -> None:
+    def _paint_ramp(painter: QPainter, line: F64, lower: F64, columns: F64, moved: F64) -> None:
         """Draw how much an edit acts through time: at the seam nothing, at the rim the most."""
         most = float(moved.max())
         if most <= 1e-6:
@@ -807,7 +803,10 @@ class TimelineView(QWidget):
         painter.setFont(font)
         metrics = painter.fontMetrics()
         names = disc_names(
-            shown, metrics.ascent(), lambda text: metrics.horizontalAdvance(text) + 4.0, layout.height
+            shown,
+            metrics.ascent(),
+            lambda text: metrics.horizontalAdvance(text) + 4.0,
+            layout.height,
         )
         for name in names:
             painter.setFont(paint.small_font(self, -1.5, bold=name.bright))
@@ -953,7 +952,9 @@ class TimelineView(QWidget):
         bar = QRectF(28, y + 3, (GUTTER - 36), 3)
         painter.fillRect(bar, QColor(theme.LINE))
         share = float(np.clip(weight, 0, 1))
-        painter.fillRect(QRectF(bar.left(), bar.top(), bar.width() * share, 3), QColor(style.BRIGHT))
+        painter.fillRect(
+            QRectF(bar.left(), bar.top(), bar.width() * share, 3), QColor(style.BRIGHT)
+        )
         painter.setPen(QColor(style.BRIGHT if weight >= 0.005 else theme.FAINT))
         at = QRectF(26, y - 13, GUTTER - 34, 15)
         right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
@@ -964,12 +965,16 @@ class TimelineView(QWidget):
         found, top = self.timeline, self._top
         if found is not None and self.session.hover is not None:
             painter.setBrush(Qt.BrushStyle.NoBrush)
-            painter.setClipRect(QRectF(GUTTER, RULER + STRIP, self.width() - GUTTER, self._room + HEAD))
+            painter.setClipRect(
+                QRectF(GUTTER, RULER + STRIP, self.width() - GUTTER, self._room + HEAD)
+            )
             layout, discs = found
             for disc in discs:
                 if disc.id == self.session.hover:
                     painter.setPen(paint.pen(style.BRIGHT, 1.4))
-                    painter.drawEllipse(QPointF(disc.x, disc.y + top), disc.radius + 4, disc.radius + 4)
+                    painter.drawEllipse(
+                        QPointF(disc.x, disc.y + top), disc.radius + 4, disc.radius + 4
+                    )
             if self.session.hover in layout.palette.edge_ids:
                 edge = layout.palette.edge_ids.index(self.session.hover)
                 painter.setPen(paint.pen(style.RING, 1.4))
