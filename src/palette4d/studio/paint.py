@@ -1,4 +1,4 @@
-"""What the window's views draw in common: discs as in `palette4d plot`, and colours as displayed."""
+"""What the views draw in common: discs as in `palette4d plot`, and colours as displayed."""
 
 from typing import Literal
 

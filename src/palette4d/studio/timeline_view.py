@@ -7,7 +7,7 @@ playhead, and the weights of the pixel under the pointer.
 """
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,8 +51,8 @@ F64 = NDArray[np.float64]
 GUTTER, RULER, STRIP, FOOT = 84, 24, 46, 12
 #: Space for the block names above the rows, below them, and beside the first and last frame.
 HEAD, TAIL, SIDE = 22.0, 10.0, 26.0
-#: The heights of a row.
-LOWEST, HIGHEST = 24.0, 46.0
+#: The heights of a row, and the largest radius of a disc, in rows.
+LOWEST, HIGHEST, RADIUS = 24.0, 46.0, 0.27
 #: Pixels between two sampled colours of a band.
 COLUMN = 2
 #: The fewest frames that fill the width.
@@ -103,7 +103,7 @@ class TimelineView(QWidget):
         self._scroll = 0.0
         self._palette: tuple[object, Palette, Rows] | None = None
         self._layout: tuple[object, Timeline, list[Disc]] | None = None
-        self._picture: tuple[object, QPixmap] | None = None
+        self._picture: tuple[object, tuple[QPixmap, QPixmap]] | None = None
         self._thumbs: dict[int, tuple[int, QPixmap]] = {}
         self._press: Press | None = None
         self._band: QRectF | None = None
@@ -203,7 +203,7 @@ class TimelineView(QWidget):
         scale = self.scale
         key = (self._palette[0], scale, height)
         if self._layout is None or self._layout[0] != key:
-            layout = Timeline(palette, rows, scale, height)
+            layout = Timeline(palette, rows, scale, height, RADIUS)
             discs = layout.discs(scale.left - SIDE + 4, scale.right + SIDE - 4)
             self._layout = key, layout, discs
         return self._layout[1], self._layout[2]
@@ -665,18 +665,20 @@ class TimelineView(QWidget):
             painter.setPen(QColor(theme.FAINT))
             painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, texts.NOTHING_OPEN)
             return
-        painter.drawPixmap(0, 0, self._rows_picture())
+        bands, discs = self._pictures()
+        painter.drawPixmap(0, 0, bands)
         self._paint_strip(painter)
         self._paint_ruler(painter)
-        self._paint_gutter(painter)
-        self._paint_pointer(painter)
         self._paint_playhead(painter)
+        painter.drawPixmap(0, 0, discs)
+        self._paint_pointer(painter)
+        self._paint_gutter(painter)
         self._paint_zoom_bar(painter)
         paint.focus_frame(painter, self)
         painter.end()
 
-    def _rows_picture(self) -> QPixmap:
-        """Return the rows; they are drawn again only when something in them changed."""
+    def _pictures(self) -> tuple[QPixmap, QPixmap]:
+        """Return the rows, and their discs; drawn again only when something in them changed."""
         ratio = self.devicePixelRatioF()
         found = self.timeline
         key = (
@@ -685,19 +687,22 @@ class TimelineView(QWidget):
             ratio,
             self._top,
             self.session.selection,
-            self.session.view,
+            self.session.looked,
         )
         if self._picture is None or self._picture[0] != key:
-            pixmap = QPixmap(self.size() * ratio)
-            pixmap.setDevicePixelRatio(ratio)
-            pixmap.fill(QColor(style.PANEL))
-            if found is not None:
-                painter = QPainter(pixmap)
-                painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-                painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
-                self._paint_rows(painter, *found)
-                painter.end()
-            self._picture = key, pixmap
+            pictures = []
+            for draw, ground in ((self._paint_rows, style.PANEL), (self._paint_discs, "#00000000")):
+                picture = QPixmap(self.size() * ratio)
+                picture.setDevicePixelRatio(ratio)
+                picture.fill(QColor(ground))
+                if found is not None:
+                    painter = QPainter(picture)
+                    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+                    painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
+                    draw(painter, *found)
+                    painter.end()
+                pictures.append(picture)
+            self._picture = key, (pictures[0], pictures[1])
         return self._picture[1]
 
     def _paint_rows(self, painter: QPainter, layout: Timeline, discs: list[Disc]) -> None:
@@ -719,16 +724,18 @@ class TimelineView(QWidget):
         for name in layout.block_names(11 - HEAD + self._scroll, metrics.horizontalAdvance):
             if GUTTER < name.x < self.width():
                 paint.label(painter, name.x, name.y + y0, name.text, style.FAINT)
-        painter.setClipRect(
-            QRectF(GUTTER, top + HEAD - 6, self.width() - GUTTER, floor - top - HEAD + 6)
-        )
-        painter.translate(0, y0)
+        self._into_rows(painter)
         painter.setPen(paint.pen(style.LINE, 0.7, [1, 4]))
         for disc in discs:
             if disc.kind != "plain":
                 painter.drawLine(QPointF(disc.home, 0), QPointF(disc.home, layout.height))
         self._paint_bands(painter, layout)
-        self._paint_discs(painter, layout, discs)
+
+    def _into_rows(self, painter: QPainter) -> None:
+        """Clip to the rows, and put the first row's top at y = 0."""
+        top = RULER + STRIP + HEAD - 6
+        painter.setClipRect(QRectF(GUTTER, top, self.width() - GUTTER, self._room + TAIL + 6))
+        painter.translate(0, self._top)
 
     def _paint_bands(self, painter: QPainter, layout: Timeline) -> None:
         palette, scale = layout.palette, layout.scale
@@ -779,6 +786,7 @@ class TimelineView(QWidget):
         painter.drawPolyline(shape)
 
     def _paint_discs(self, painter: QPainter, layout: Timeline, discs: list[Disc]) -> None:
+        self._into_rows(painter)
         shown = [d for d in discs if GUTTER - 30 < d.x < self.width() + 30]
         selected = set(self.session.selection)
         for each in sorted(shown, key=lambda disc: disc.kind == "stop"):
@@ -806,7 +814,8 @@ class TimelineView(QWidget):
             shown,
             metrics.ascent(),
             lambda text: metrics.horizontalAdvance(text) + 4.0,
-            layout.height,
+            layout.height + TAIL,
+            collar=3.0,
         )
         for name in names:
             painter.setFont(paint.small_font(self, -1.5, bold=name.bright))
