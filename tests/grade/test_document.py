@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from palette4d import _core
+from palette4d.common import locking
 from palette4d.common.errors import Palette4dError, SidecarError
 from palette4d.grade import sidecar
 from palette4d.grade.document import Document
@@ -475,7 +476,7 @@ def test_editors_at_the_same_time_lose_nothing(edited: Path) -> None:
 
 def test_a_lock_that_stays_is_reported(edited: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     fcntl = pytest.importorskip("fcntl")
-    monkeypatch.setattr(sidecar, "LOCK_SECONDS", 0.2)
+    monkeypatch.setattr(locking, "LOCK_SECONDS", 0.2)
     document = Document.load(edited)
     document.set("v1", rgb=WHITE)
     handle = os.open(edited.parent, os.O_RDONLY)

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
 from palette4d.common.files import link_target
+from palette4d.common.locking import locked
 from palette4d.common.text import counted
 from palette4d.grade import edits, sidecar
 from palette4d.grade.edits import (
@@ -669,7 +670,7 @@ class Document:
         self._start(self._disk, _core.parse_sidecar(self._disk, str(target)))
 
     def _save_again(self, target: Path, loaded: bytes) -> None:
-        with sidecar.locked(target):
+        with locked(target) as held:
             found = sidecar.read_bytes(target)
             if found == loaded and not self.changed:
                 return
@@ -678,7 +679,7 @@ class Document:
             data = sidecar.encoded(new._members())
             if found != loaded or new._core is None:
                 new._core = _core.parse_sidecar(data, str(target))
-            sidecar.write(target, data, replaces=found)
+            sidecar.write(target, data, held, replaces=found)
         new._disk = data
         new._mark_saved()
         self.__dict__ = new.__dict__
