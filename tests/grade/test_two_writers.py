@@ -79,7 +79,7 @@ def test_no_acknowledged_edit_is_lost(tmp_path: Path, error: str, count: int) ->
     path.write_bytes((GOLDEN / "v1_split.p4d.json").read_bytes())
     acknowledged, refused = children(path, count, error)
     document = Document.load(path)
-    found = {(s.edge, s.frame): s.rgb[0] for s in document.settings.values()}
+    found: dict[object, float] = {(s.edge, s.frame): s.rgb[0] for s in document.settings.values()}
     for edge, frame, red in acknowledged:
         assert found.pop((edge, frame)) == red
     assert not found

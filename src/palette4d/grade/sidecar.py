@@ -251,7 +251,7 @@ def with_history(
     history = {
         n: [edits.step_to_fields(step) for step in part] for n, part in parts.items() if part
     }
-    if history and hasattr(_core.Sidecar, "versions"):
+    if history:
         return {**document, "history": history}
     return {name: value for name, value in document.items() if name != "history"}
 
@@ -437,7 +437,9 @@ def _with_edits_of(old: Fields, new: Fields, target: Path) -> Fields:
             "the new one, so they cannot be kept. Discard them with --drop-edits, or choose "
             "another output"
         )
-    return {**new, "edits": old["edits"], "extra": new.get("extra") or old["extra"]}
+    users = {name: old[name] for name in ("edits", "versions", "history") if name in old}
+    kept: Fields = _canonical({**new, **users, "extra": new.get("extra") or old["extra"]}, "")
+    return kept
 
 
 # ------------------------------------------------------------------------------------------- files
