@@ -26,6 +26,7 @@ VERBS = (
     "export",
     "config",
     "plot",
+    "studio",
     "install-plugin",
     "sample-clip",
 )

@@ -192,7 +192,7 @@ def test_stop_again_recolours(plain: str) -> None:
 def test_stop_ids_are_stable_and_new(edited: str) -> None:
     assert main.main(["edit", edited, "reset", "s1"]) == 0
     assert main.main(["edit", edited, "set", "e1", "--frame", "3", "--rgb", "1,1,1"]) == 0
-    assert [stop["id"] for stop in edits_of(edited)["stops"]] == ["s3", "s2", "s4"]
+    assert [stop["id"] for stop in edits_of(edited)["stops"]] == ["s2", "s3", "s4"]
 
 
 def test_move(edited: str) -> None:

@@ -1,17 +1,31 @@
 """Edits as values: applied, taken back, and merged with another writer's."""
 
+import json
+
 import pytest
 
 from palette4d.common.errors import Palette4dError
 from palette4d.grade.edits import (
+    MOST_STEPS,
+    RAMP,
     Change,
     Edit,
     Setting,
+    State,
     as_colour,
+    bounded,
     difference,
+    folded,
     merged,
-    new_stop_id,
+    new_id,
+    step_from_fields,
+    step_to_fields,
 )
+
+
+def state(handles: dict[str, Setting]) -> State:
+    return {("handle", id_): setting for id_, setting in handles.items()}
+
 
 RED, GREEN, BLUE = (Setting((1.0, 0, 0)), Setting((0, 1.0, 0)), Setting((0, 0, 1.0)))
 
@@ -20,68 +34,125 @@ def stop(frame: float, edge: str = "e1", red: float = 0.0) -> Setting:
     return Setting((red, 0.0, 0.0), edge, frame)
 
 
+def changed(id_: str, before: Setting | None, after: Setting | None) -> Change:
+    return Change("handle", id_, before, after)
+
+
 def test_an_edit_and_its_inverse_cancel_out() -> None:
-    before = {"v1": RED, "s1": stop(3), "v2": GREEN}
-    after = {"v1": BLUE, "s2": stop(4), "v2": GREEN}
+    before = {**state({"v1": RED, "s1": stop(3), "v2": GREEN}), ("lock", "v2"): True}
+    after = {**state({"v1": BLUE, "s2": stop(4), "v2": GREEN}), RAMP: "smooth"}
     edit = difference(before, after)
     assert edit.apply(before) == after
     assert edit.inverse().apply(after) == before
-    assert before == {"v1": RED, "s1": stop(3), "v2": GREEN}
+    assert before == {**state({"v1": RED, "s1": stop(3), "v2": GREEN}), ("lock", "v2"): True}
 
 
 @pytest.mark.parametrize(
-    "change", [Change("v1", None, BLUE), Change("v1", GREEN, BLUE), Change("v9", RED, None)]
+    "change", [changed("v1", None, BLUE), changed("v1", GREEN, BLUE), changed("v9", RED, None)]
 )
 def test_an_edit_of_something_else_is_refused(change: Change) -> None:
     with pytest.raises(Palette4dError):
-        Edit((change,)).apply({"v1": RED})
+        Edit((change,)).apply(state({"v1": RED}))
 
 
-def test_two_writers_of_different_handles_lose_nothing() -> None:
-    base = {"v1": RED, "v2": RED, "s1": stop(3)}
-    mine = {"v1": GREEN, "v2": RED, "s1": stop(3), "v3": BLUE}
-    theirs = {"v1": RED, "v2": BLUE, "v4": RED}  # s1 removed
+def test_two_writers_of_different_things_lose_nothing() -> None:
+    base = state({"v1": RED, "v2": RED, "s1": stop(3)})
+    mine = {**state({"v1": GREEN, "v2": RED, "s1": stop(3), "v3": BLUE}), ("lock", "v3"): True}
+    theirs = {**state({"v1": RED, "v2": BLUE, "v4": RED}), RAMP: "hold"}  # s1 removed
     assert merged(base, mine, theirs, ()) == (
-        {"v1": GREEN, "v2": BLUE, "v3": BLUE, "v4": RED},
+        {
+            **state({"v1": GREEN, "v2": BLUE, "v3": BLUE, "v4": RED}),
+            ("lock", "v3"): True,
+            RAMP: "hold",
+        },
         {},
     )
 
 
 def test_the_same_change_by_both_is_one() -> None:
-    assert merged({"v1": RED}, {"v1": BLUE}, {"v1": BLUE}, ()) == ({"v1": BLUE}, {})
-    assert merged({"v1": RED}, {}, {}, ()) == ({}, {})
+    red, blue = state({"v1": RED}), state({"v1": BLUE})
+    assert merged(red, blue, blue, ()) == (blue, {})
+    assert merged(red, {}, {}, ()) == ({}, {})
 
 
 @pytest.mark.parametrize(
     ("mine", "theirs"),
     [
-        ({"v1": GREEN}, {"v1": BLUE}),
-        ({}, {"v1": BLUE}),
-        ({"v1": BLUE}, {}),
-        ({"v1": RED, "s1": stop(3)}, {"v1": RED, "s1": stop(3, red=1)}),
-        ({"v1": RED, "s1": stop(3)}, {"v1": RED, "s2": stop(3)}),
+        (state({"v1": GREEN}), state({"v1": BLUE})),
+        ({}, state({"v1": BLUE})),
+        (state({"v1": BLUE}), {}),
+        (state({"v1": RED, "s1": stop(3)}), state({"v1": RED, "s1": stop(3, red=1)})),
+        (state({"v1": RED, "s1": stop(3)}), state({"v1": RED, "s2": stop(3)})),
+        (state({"v1": RED}) | {RAMP: "hold"}, state({"v1": RED}) | {RAMP: "smooth"}),
+        (
+            state({"v1": RED}) | {("version", "a"): {"vertices": [1]}},
+            state({"v1": RED}) | {("version", "a"): {"vertices": []}},
+        ),
     ],
 )
-def test_different_changes_of_one_handle_are_a_conflict(
-    mine: dict[str, Setting], theirs: dict[str, Setting]
-) -> None:
+def test_different_changes_of_one_thing_are_a_conflict(mine: State, theirs: State) -> None:
     with pytest.raises(Palette4dError):
-        merged({"v1": RED}, mine, theirs, ())
+        merged(state({"v1": RED}), mine, theirs, ())
 
 
 def test_two_new_stops_of_one_id_are_two_stops() -> None:
-    mine, theirs = {"s1": stop(3), "s2": stop(4)}, {"s1": stop(5)}
-    assert merged({}, mine, theirs, {"s8"}) == (
-        {"s1": stop(5), "s9": stop(3), "s2": stop(4)},
-        {"s1": "s9"},
-    )
-    edit = difference({}, mine).renamed({"s1": "s9"})
-    assert edit.apply({}) == {"s9": stop(3), "s2": stop(4)}
+    mine = {**state({"s1": stop(3), "s2": stop(4)}), ("lock", "s1"): True}
+    theirs = state({"s1": stop(5)})
+    both, names = merged({}, mine, theirs, {"s8"})
+    assert both == {
+        **state({"s1": stop(5), "s9": stop(3), "s2": stop(4)}),
+        ("lock", "s9"): True,
+    }
+    edit = difference({}, mine).renamed(names)
+    assert edit.apply({}) == {**state({"s9": stop(3), "s2": stop(4)}), ("lock", "s9"): True}
+
+
+def test_two_new_picks_of_one_id_are_two_picks() -> None:
+    mine, theirs = {("pick", "p1"): {"frame": 1}}, {("pick", "p1"): {"frame": 2}}
+    assert merged({}, mine, theirs, ())[0] == {
+        ("pick", "p1"): {"frame": 2},
+        ("pick", "p2"): {"frame": 1},
+    }
+
+
+def test_steps_are_the_same_after_their_json() -> None:
+    before: State = {}
+    after = {
+        **state({"v1": Setting((0.1, 2, -3), ramp="hold"), "s1": stop(3), "s2": stop(4.5)}),
+        RAMP: "smooth",
+        ("pick", "p1"): {"id": "p1", "rgb": [0.5, 0.5, 0.5]},
+        ("lock", "v1"): True,
+        ("version", "warm"): {"vertices": [], "stops": []},
+    }
+    for edit in (difference(before, after, "all"), difference(after, before, "nothing")):
+        text = json.dumps(step_to_fields(edit))
+        assert step_from_fields(json.loads(text)) == edit
+
+
+def test_old_steps_are_folded() -> None:
+    steps, now = [], {}
+    for i in range(500):
+        new = {**now, **state({f"v{i % 7}": stop(i)})}
+        steps.append(difference(now, new, f"step {i}"))
+        now = new
+    kept = bounded(steps)
+    assert len(kept) == MOST_STEPS
+    assert (kept[0].steps, kept[1:]) == (500 - MOST_STEPS + 1, steps[-MOST_STEPS + 1 :])
+    assert bounded(kept) == kept
+    assert bounded([*kept, steps[0]])[0].steps == kept[0].steps + 1
+    found: State = {}
+    for step in kept:
+        found = step.apply(found)
+    assert found == now
+    big = {("pick", f"p{i}"): {"text": "x" * 1000} for i in range(1000)}
+    kept = bounded([difference({}, {key: pick}) for key, pick in big.items()])
+    assert len(json.dumps([step_to_fields(step) for step in kept[1:]])) < 300_000
+    assert folded(kept).apply({}) == big
 
 
 def test_new_ids_are_never_those_of_old_stops() -> None:
-    assert new_stop_id(()) == "s1"
-    assert new_stop_id(("s1", "s3", "v9", "s", "sx", "s007", "s٣")) == "s8"
+    assert new_id("s", ()) == "s1"
+    assert new_id("s", ("s1", "s3", "v9", "s", "sx", "s007", "s٣")) == "s8"
 
 
 @pytest.mark.parametrize("wrong", [(1, 2), (1, 2, float("nan")), (1, 2, 2e6), "red", 3, None])

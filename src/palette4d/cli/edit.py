@@ -145,13 +145,12 @@ def run_set(args: argparse.Namespace) -> int:
         )
     if args.near is not None and args.frame is None:
         raise Palette4dError("found --near without --frame, expected the frame where it is seen")
-    for rgb in (args.rgb, args.near):
-        if rgb is not None and not args.float:
-            document.check_code_values(rgb)
     lines = []
     if args.near is not None:
-        found = document.set_near(args.near, frame=args.frame, rgb=args.rgb, anyway=args.anyway)
-        before = found.rgb
+        found = document.set_near(
+            args.near, frame=args.frame, rgb=args.rgb, anyway=args.anyway, any_value=args.float
+        )
+        before, handle = found.rgb, found.handle or found.id
         lines.append(
             f"the palette colour nearest to {shown(args.near)} at frame {args.frame:g} is "
             f"{shown(before)} of {found.id}, {found.distance:.3g} away"
@@ -159,11 +158,11 @@ def run_set(args: argparse.Namespace) -> int:
     else:
         before = document.colour(args.id, frame=args.frame)
         if args.frame is None:
-            document.set(args.id, rgb=args.rgb)
+            document.set(args.id, rgb=args.rgb, any_value=args.float)
+            handle = args.id
         else:
-            document.stop(args.id, frame=args.frame, rgb=args.rgb)
+            handle = document.stop(args.id, frame=args.frame, rgb=args.rgb, any_value=args.float)
     document.save()
-    handle = document.history[-1].changes[0].id
     at = f" at frame {args.frame:g}" if args.frame is not None else ""
     lines.append(f"{document.named(handle)}: {shown(before)} -> {shown(args.rgb)}{at}")
     print("\n".join(lines))
@@ -192,13 +191,14 @@ def run_move(args: argparse.Namespace) -> int:
 def run_reset(args: argparse.Namespace) -> int:
     """Reset a vertex, remove a stop, or reset everything."""
     document = _load(args)
-    names = {id_: document.named(id_) for id_ in document.settings}
+    before = dict(document.settings)
+    names = {id_: document.named(id_) for id_ in before}
     document.reset(args.id)
     document.save()
-    for edit in document.history:
-        for change in edit.changes:
-            print(f"{names[change.id]}: {_after_reset(document, change.id, change.before)}")
-    if not document.history:
+    gone = [id_ for id_ in before if id_ not in document.settings]
+    for id_ in gone:
+        print(f"{names[id_]}: {_after_reset(document, id_, before[id_])}")
+    if not gone:
         print("nothing to reset")
     return 0
 

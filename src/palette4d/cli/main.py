@@ -26,6 +26,7 @@ VERB_MODULES = (
     "palette4d.cli.export",
     "palette4d.cli.config",
     "palette4d.cli.plot",
+    "palette4d.cli.studio",
     "palette4d.cli.install_plugin",
 )
 

@@ -1,16 +1,20 @@
 """The document: a palette and the user's edits. It is loaded, edited, applied and saved.
 
 Every change of a grade goes through `Document.apply`, which takes one `Edit`; `undo` reverts it.
-The core computes every colour, so that results equal the node's bit by bit.
+The steps are part of the document and are saved with it. The core computes every colour, so that
+results equal the node's bit by bit.
 """
 
+import contextlib
 import copy
+import itertools
 import json
 import math
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Generator, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
@@ -23,7 +27,20 @@ from palette4d.common.errors import Palette4dError
 from palette4d.common.files import link_target
 from palette4d.common.text import counted
 from palette4d.grade import edits, sidecar
-from palette4d.grade.edits import Change, Colour, Edit, Setting, Settings, as_colour
+from palette4d.grade.edits import (
+    RAMP,
+    Change,
+    Colour,
+    Edit,
+    Key,
+    Kind,
+    Ramp,
+    Setting,
+    Settings,
+    State,
+    as_colour,
+    as_ramp,
+)
 from palette4d.grade.handles import Handles, unknown
 from palette4d.grade.palette import FAR, Near, Palette, palette_at
 from palette4d.grade.sidecar import Fields, OnEdits
@@ -32,6 +49,12 @@ F32 = NDArray[np.float32]
 
 #: A vertex that has less of the colour at a frame than this is left alone: it would move too far.
 LEAST_SHARE = 0.5
+
+#: A member `edits.solution`, and the measured members of each pick by its id.
+Solved = tuple[Fields, dict[str, Fields]]
+
+#: The kinds that recolouring uses; versions wait.
+_ACTIVE: tuple[Kind, ...] = ("handle", "ramp", "pick", "lock")
 
 #: Names of scene-linear colour spaces: "Linear", "lin_rec709", "ACEScg", "ACES2065-1", ...
 _LINEAR = re.compile(r"\blin(ear)?(\b|_)|scene.linear|acescg|aces2065", re.IGNORECASE)
@@ -62,9 +85,9 @@ class Document:
 
     def __init__(self, fields: Mapping[str, Any], notes: Iterable[str] = ()) -> None:
         data = sidecar.encoded(fields)
-        self._start(data, _core.parse_sidecar(data, "<document>"))
-        self._disk: bytes | None = None
         self.path: Path | None = None
+        self._start(data, _core.parse_sidecar(data, self._name))
+        self._disk: bytes | None = None
         self.notes = tuple(notes)
 
     @classmethod
@@ -78,18 +101,27 @@ class Document:
         """
         document = cls.__new__(cls)
         data = sidecar.read_bytes(path)
-        document._start(data, _core.parse_sidecar(data, os.fspath(path)))
         document._disk, document.path, document.notes = data, Path(path), ()
+        document._start(data, _core.parse_sidecar(data, os.fspath(path)))
         return document
 
     def _start(self, data: bytes, core: _core.Sidecar) -> None:
         self._fields: Fields = json.loads(data)
-        self._core: _core.Sidecar | None = core  # of `_settings`; None: parse it on demand
+        self._core: _core.Sidecar | None = core  # of `_state`; None: parse it on demand
         self._handles = Handles(self._fields["polytope"])
-        self._settings = edits.from_fields(self._fields["edits"])
-        self._saved = self._settings
-        self._done: list[Edit] = []
-        self._undone: list[Edit] = []
+        self._become(sidecar.state_of(self._fields))
+        self._solved: Solved | None = _stored_solution(self._fields["edits"])
+        self._done, self._undone = sidecar.history_of(self._fields, self._name)
+        self._mark_saved()
+
+    def _become(self, state: State) -> None:
+        self._state = state
+        self._settings: dict[str, Setting] = {
+            id_: value for (kind, id_), value in state.items() if kind == "handle"
+        }
+
+    def _mark_saved(self) -> None:
+        self._saved = (self._state, list(self._done), list(self._undone))
 
     def __repr__(self) -> str:
         """Return one line: the clip, its frames, and the numbers of edits."""
@@ -97,7 +129,7 @@ class Document:
         return (
             f"<Document {self._fields['clip']['name']!r}: frames {first} to {last}, "
             f"{counted(len(self._handles.vertices), 'vertex', 'vertices')}, "
-            f"{counted(len(self._settings), 'edit')}>"
+            f"{counted(sum(kind in _ACTIVE for kind, _ in self._state), 'edit')}>"
         )
 
     # ------------------------------------------------------------------------------ what it holds
@@ -106,8 +138,9 @@ class Document:
     def core(self) -> _core.Sidecar:
         """The core's view of the document, for this package."""
         if self._core is None:
-            data = sidecar.encoded(_with_edits(self._fields, self._settings))
-            self._core = _core.parse_sidecar(data, self._name)
+            fields = self._members()
+            fields.pop("history", None)  # the core does not read it
+            self._core = _core.parse_sidecar(sidecar.encoded(fields), self._name)
         return self._core
 
     @property
@@ -116,7 +149,21 @@ class Document:
 
     def fields(self) -> Fields:
         """Return the members of the sidecar that `save` would write (docs/sidecar.md)."""
-        return copy.deepcopy(_with_edits(self._fields, self._settings))
+        return copy.deepcopy(self._members())
+
+    def _members(self) -> Fields:
+        """Return the sidecar's members; they share values with the document."""
+        ids = (vertex["id"] for vertex in self._fields["polytope"]["vertices"])
+        fields = sidecar.with_state(self._fields, self._state, ids)
+        if self._solved is None:
+            self._solved = _solve(fields)
+        solution, measured = self._solved
+        found = fields["edits"]
+        if measured:
+            found["picks"] = [{**p, **measured.get(p["id"], {})} for p in found["picks"]]
+        if solution:
+            found["solution"] = solution
+        return sidecar.with_history(fields, self._done, self._undone)
 
     @property
     def frames(self) -> tuple[int, int, int]:
@@ -143,19 +190,35 @@ class Document:
         return MappingProxyType(self._settings)
 
     @property
+    def state(self) -> State:
+        """Everything that the user set, by kind and id (`palette4d.grade.edits`)."""
+        return MappingProxyType(dict(self._state))
+
+    @property
     def edited(self) -> bool:
-        """Whether any handle is edited."""
-        return bool(self._settings)
+        """Whether any handle is edited or any colour is picked."""
+        return any(kind in ("handle", "pick") for kind, _ in self._state)
 
     @property
     def changed(self) -> bool:
         """Whether there are unsaved changes."""
-        return self._disk is None or self._settings != self._saved
+        return self._disk is None or self._saved != (self._state, self._done, self._undone)
 
     @property
     def history(self) -> tuple[Edit, ...]:
-        """The edits since the document was loaded, in order, without undone edits."""
+        """The steps that `undo` reverts, oldest first; also those of earlier sessions."""
         return tuple(self._done)
+
+    @property
+    def undone(self) -> tuple[Edit, ...]:
+        """The steps that `redo` applies again, the next one last."""
+        return tuple(self._undone)
+
+    @property
+    def ramp(self) -> Ramp:
+        """The clip's ramp between handles: "linear", "smooth" or "hold"."""
+        found: Ramp = self._state.get(RAMP, "linear")
+        return found
 
     def check_frame(self, frame: float) -> None:
         """Refuse a time outside the clip."""
@@ -180,7 +243,8 @@ class Document:
         scaled = " ".join(f"{value / (2**bits - 1):.4g}" for value in values)
         raise Palette4dError(
             f"found the colour {shown}, expected code values where 1 is display white; "
-            f"{shown} in {bits} bits is {scaled}. Give that, or add --float if {shown} is meant"
+            f"{shown} in {bits} bits is {scaled}. Give that, or add --float (any_value=True) if "
+            f"{shown} is meant"
         )
 
     def palette(self, frame: float) -> Palette:
@@ -192,8 +256,8 @@ class Document:
 
     def colour(self, id: str, *, frame: float | None = None) -> Colour:
         """Return the edited colour of a vertex or stop, or of an edge at a frame."""
-        if id in self._settings:
-            return self._settings[id].rgb
+        if (setting := self._settings.get(id)) is not None:
+            return setting.rgb
         if frame is None or id in self._handles.vertices:
             return as_colour(self._handles.vertex(id, self._settings)["rgb"])
         self.check_frame(frame)
@@ -241,40 +305,60 @@ class Document:
 
     # ------------------------------------------------------------------------------------ editing
 
-    def set(self, id: str, *, rgb: Iterable[float]) -> None:
-        """Set the colour of a vertex or a stop."""
-        new = as_colour(rgb)
-        before = self._settings.get(id)
-        if before is not None:
-            after = Setting(new, before.edge, before.frame)
-        else:
-            self._handles.vertex(id, self._settings)
-            after = Setting(new)
-        self.apply(Edit((Change(id, before, after),)))
+    def set(self, id: str, *, rgb: Iterable[float] | str, any_value: bool = False) -> None:
+        """Set the colour of a vertex or a stop.
 
-    def stop(self, edge: str, *, frame: float, rgb: Iterable[float]) -> str:
+        Colours are three code values or "#rrggbb". Integers of 8 bits or more, such as 255 128 0,
+        are refused unless `any_value` is true (`check_code_values`); this holds for all methods.
+        """
+        self._set(id, self._checked(rgb, any_value))
+
+    def _checked(self, rgb: Iterable[float] | str, any_value: bool) -> Colour:
+        colour = as_colour(rgb)
+        if not any_value:
+            self.check_code_values(colour)
+        return colour
+
+    def _set(self, id: str, new: Colour) -> None:
+        before = self._settings.get(id)
+        if before is None:
+            self._handles.vertex(id, self._settings)
+        after = Setting(new) if before is None else replace(before, rgb=new)
+        self._put("handle", id, after, f"set {id} to {_text(new)}")
+
+    def _put(self, kind: Kind, id: str, value: Any, label: str) -> None:
+        """Set one value of the state (None: remove it) as one step."""
+        self.apply(Edit((Change(kind, id, self._state.get((kind, id)), value),), label))
+
+    def stop(
+        self, edge: str, *, frame: float, rgb: Iterable[float] | str, any_value: bool = False
+    ) -> str:
         """Set the colour of an edge at a time by a colour stop; return the stop's id.
 
         An existing stop at that time gets the colour.
         """
-        new = as_colour(rgb)
+        return self._stop(edge, frame, self._checked(rgb, any_value))
+
+    def _stop(self, edge: str, frame: float, new: Colour, ramp: Ramp | None = None) -> str:
         self.check_frame(frame)
         self._check_inside(edge, frame)
         there = self._stop_at(edge, frame)
         if there is not None:
-            self.set(there, rgb=new)
+            self._set(there, new)
             return there
-        id_ = edits.new_stop_id(self._taken() | self._settings.keys())
-        self.apply(Edit((Change(id_, None, Setting(new, edge, frame)),)))
+        id_ = edits.new_id("s", self._taken() | self._settings.keys())
+        setting = Setting(new, edge, float(frame), ramp)
+        self._put("handle", id_, setting, f"set {edge} at frame {frame:g} to {_text(new)}")
         return id_
 
     def set_near(
         self,
-        near: Iterable[float],
+        near: Iterable[float] | str,
         *,
         frame: float,
-        rgb: Iterable[float],
+        rgb: Iterable[float] | str,
         anyway: bool = False,
+        any_value: bool = False,
     ) -> Near:
         """Set a new colour for the palette colour nearest to a given colour at a frame.
 
@@ -291,6 +375,8 @@ class Document:
             The new colour.
         anyway : bool
             Edit the palette colour even if it is more than 0.25 away.
+        any_value : bool
+            Take colours such as 255 128 0 as they are.
 
         Returns
         -------
@@ -304,7 +390,7 @@ class Document:
             The nearest palette colour is more than 0.25 away; the message names the palette colours
             that `near` is mixed from.
         """
-        new, wanted = as_colour(rgb), as_colour(near)
+        new, wanted = self._checked(rgb, any_value), self._checked(near, any_value)
         found = self.near(wanted, frame=frame)
         if found.distance > FAR and not anyway:
             raise Palette4dError(found.refusal(wanted))
@@ -319,9 +405,9 @@ class Document:
                     [o + (n - f) / share for o, n, f in zip(own, new, found.rgb, strict=True)]
                 )
         if handle is not None:
-            self.set(handle, rgb=moved)
+            self._set(handle, moved)
         else:
-            handle = self.stop(found.id, frame=frame, rgb=new)
+            handle = self._stop(found.id, frame, new)
         return Near(frame, found.id, handle, found.rgb, found.distance, found.shares)
 
     def _share(self, vertex: str, edge: str, frame: float) -> float:
@@ -337,7 +423,9 @@ class Document:
     def shift(self, id: str, *, by: Iterable[float]) -> None:
         """Add three offsets to the colour of a vertex or a stop."""
         offset = as_colour(by, "offset")
-        self.set(id, rgb=[a + b for a, b in zip(self.colour(id), offset, strict=True)])
+        new = as_colour([a + b for a, b in zip(self.colour(id), offset, strict=True)])
+        with self.one_step(f"move {id} by {_text(offset)}"):
+            self._set(id, new)
 
     def move(self, stop: str, *, frame: float) -> None:
         """Move a stop in time, within its edge."""
@@ -358,42 +446,94 @@ class Document:
                 f"edge {before.edge} already has the stop {there} at frame {frame:g}; choose "
                 "another frame, or reset that stop first"
             )
-        self.apply(Edit((Change(stop, before, Setting(before.rgb, before.edge, frame)),)))
+        after = replace(before, frame=float(frame))
+        self._put("handle", stop, after, f"move {stop} to frame {frame:g}")
 
     def reset(self, id: str | None = None) -> None:
-        """Reset a vertex to its original colour, remove a stop, or (None) reset everything."""
-        if id is not None and id not in self._settings:
+        """Reset a vertex to its original colour, remove a stop, or (None) reset everything.
+
+        Everything: handles, picks, locks and the clip's ramp. Versions stay.
+        """
+        if id is None:
+            keys = [key for key in self._state if key[0] in _ACTIVE]
+            self._remove(keys, "reset everything")
+        elif id in self._settings:
+            gone = self._settings[id].edge is not None
+            keys = [("handle", id), ("lock", id)] if gone else [("handle", id)]
+            self._remove([key for key in keys if key in self._state], f"reset {id}")
+        else:
             self._handles.vertex(id, self._settings)
+
+    def _remove(self, keys: Iterable[Key], label: str) -> None:
+        changes = tuple(Change(*key, self._state[key], None) for key in keys)
+        self.apply(Edit(changes, label))
+
+    def set_ramp(self, ramp: str, id: str | None = None) -> None:
+        """Set the ramp from a vertex or stop to the next handle in time, or the clip's ramp.
+
+        Parameters
+        ----------
+        ramp : {"linear", "smooth", "hold"}
+            Linear; the monotone cubic without overshoot; the handle's edit up to the next handle.
+        id : str, optional
+            The vertex or stop; None: all handles without a ramp of their own.
+        """
+        known = as_ramp(ramp)
+        if id is None:
+            self._put(*RAMP, None if known == "linear" else known, f"ramp {known}")
             return
-        ids = list(self._settings) if id is None else [id]
-        if ids:
-            self.apply(Edit(tuple(Change(id_, self._settings[id_], None) for id_ in ids)))
+        setting = self._settings.get(id) or Setting(self.colour(id))
+        self._put("handle", id, replace(setting, ramp=known), f"ramp {known} from {id}")
 
     def apply(self, edit: Edit) -> None:
-        """Apply an edit; `undo` reverts it."""
+        """Apply an edit as one step, which `undo` reverts; an edit without change is no step."""
+        edit = replace(edit, changes=tuple(c for c in edit.changes if c.before != c.after))
+        if not edit.changes:
+            return
         self._change(edit)
         self._done.append(edit)
         self._undone.clear()
 
+    @contextlib.contextmanager
+    def one_step(self, label: str) -> Generator[None]:
+        """Make all edits in a ``with`` block one step; an error in it reverts them all."""
+        state, done, undone = self._state, list(self._done), list(self._undone)
+        try:
+            yield
+        except BaseException:
+            self._become(state)
+            self._done, self._undone, self._core, self._solved = done, undone, None, None
+            raise
+        edit = edits.difference(state, self._state, label)
+        self._done, self._undone = done, undone
+        if edit.changes:
+            self._done.append(edit)
+            self._undone = []
+
     def undo(self) -> Edit:
-        """Revert the last edit, and return it."""
+        """Revert the last step, and return it. Steps of earlier sessions can be reverted too."""
         if not self._done:
-            raise Palette4dError("there is nothing to undo: no edit since the document was loaded")
+            raise Palette4dError("there is nothing to undo: the palette has no earlier step")
         self._change(self._done[-1].inverse())
         self._undone.append(self._done.pop())
         return self._undone[-1]
 
     def redo(self) -> Edit:
-        """Apply the last undone edit again, and return it."""
+        """Apply the last undone step again, and return it."""
         if not self._undone:
-            raise Palette4dError("there is nothing to redo: no edit was taken back")
+            raise Palette4dError("there is nothing to redo: no step was undone since the last edit")
         self._change(self._undone[-1])
         self._done.append(self._undone.pop())
         return self._done[-1]
 
+    def forget_history(self) -> None:
+        """Drop all steps, done and undone; the edits stay."""
+        self._done, self._undone = [], []
+
     def _change(self, edit: Edit) -> None:
-        self._settings = edit.apply(self._settings)
+        self._become(edit.apply(self._state))
         self._core = None
+        self._solved = None
 
     # ----------------------------------------------------------------------------------- applying
 
@@ -515,55 +655,67 @@ class Document:
         if self._disk is not None and self.path is not None and _same(target, self.path):
             self._save_again(link_target(target), self._disk)
             return
+        self._done = edits.bounded(self._done)
         fields = self.fields()
         if self.path is None:
             fields["clip"]["source"] = _beside(fields["clip"]["source"], target)
-        self._fields = sidecar.save(fields, target, on_edits=on_edits)
-        self._written(edits.from_fields(self._fields["edits"]), sidecar.encoded(self._fields))
-        self.path = target
+        path, self.path = self.path, target
+        try:
+            fields = sidecar.save(fields, target, on_edits=on_edits)
+        except BaseException:
+            self.path = path
+            raise
+        self._disk = sidecar.encoded(fields)
+        self._start(self._disk, _core.parse_sidecar(self._disk, str(target)))
 
     def _save_again(self, target: Path, loaded: bytes) -> None:
         with sidecar.locked(target):
             found = sidecar.read_bytes(target)
-            fields, settings = self._fields, self._settings
-            names: dict[str, str] = {}
-            if found != loaded:
-                fields, settings, names = self._merged(found)
-            elif settings == self._saved:
+            if found == loaded and not self.changed:
                 return
-            data = sidecar.encoded(_with_edits(fields, settings))
-            if found != loaded or self._core is None:
-                core = _core.parse_sidecar(data, str(target))
-            else:
-                core = self._core
+            new = self._merged(found) if found != loaded else copy.copy(self)
+            new._done = edits.bounded(new._done)
+            data = sidecar.encoded(new._members())
+            if found != loaded or new._core is None:
+                new._core = _core.parse_sidecar(data, str(target))
             sidecar.write(target, data, replaces=found)
-        self._fields = fields
-        self._done = [edit.renamed(names) for edit in self._done]
-        self._undone = [edit.renamed(names) for edit in self._undone]
-        self._written(settings, data)
-        self._core = core
+        new._disk = data
+        new._mark_saved()
+        self.__dict__ = new.__dict__
 
-    def _merged(self, found: bytes) -> tuple[Fields, dict[str, Setting], dict[str, str]]:
-        _core.parse_sidecar(found, self._name)
-        fields: Fields = json.loads(found)
-        if fields["polytope"] != self._fields["polytope"]:
+    def _merged(self, found: bytes) -> "Document":
+        """Return the document in the file with this document's changes since it was loaded."""
+        new = Document.__new__(Document)
+        new.path, new.notes = self.path, self.notes
+        new._start(found, _core.parse_sidecar(found, self._name))
+        if new._fields["polytope"] != self._fields["polytope"]:
             raise Palette4dError(
                 f"{self._name}: the clip was analysed again since this palette was loaded, and the "
                 "edits belong to the old palette; nothing was written. Load the file again, or "
                 "save under another name"
             )
-        theirs = edits.from_fields(fields["edits"])
+        loaded, before, _ = self._saved
         try:
-            settings, names = edits.merged(self._saved, self._settings, theirs, self._taken())
+            state, names = edits.merged(loaded, self._state, new._state, self._taken())
         except Palette4dError as error:
             raise Palette4dError(f"{self._name}: {error}") from None
-        return fields, settings, names
-
-    def _written(self, settings: dict[str, Setting], data: bytes) -> None:
-        if settings != self._settings:
-            self._core = None
-        self._settings = self._saved = settings
-        self._disk = data
+        both = zip(before, self._done, strict=False)
+        shared = sum(1 for _ in itertools.takewhile(lambda pair: pair[0] == pair[1], both))
+        steps = [
+            replace(step.inverse(), label=f"undo: {step.label}")
+            for step in reversed(before[shared:])
+        ]
+        steps += self._done[shared:]
+        mine = edits.rebased([step.renamed(names) for step in steps], new._state)
+        for step in mine:
+            new._change(step)
+        if new._state != state:  # the steps on the way there met theirs
+            mine = [edits.difference(sidecar.state_of(new._fields), state, "edits of two programs")]
+            new._become(state)
+        if mine:
+            new._done += mine
+            new._undone = [step.renamed(names) for step in self._undone]
+        return new
 
     # ------------------------------------------------------------------------------------ details
 
@@ -585,9 +737,26 @@ class Document:
         self._handles.check_inside(edge, frame)
 
 
-def _with_edits(fields: Fields, settings: Settings) -> Fields:
-    ids = (vertex["id"] for vertex in fields["polytope"]["vertices"])
-    return {**fields, "edits": edits.to_fields(settings, ids)}
+def _stored_solution(found: Fields) -> Solved:
+    measured = {
+        pick["id"]: {name: pick[name] for name in edits.MEASURED if name in pick}
+        for pick in found.get("picks", ())
+    }
+    return found.get("solution", {}), measured
+
+
+def _solve(fields: Fields) -> Solved:
+    """Return the solution of the picks in a sidecar's members, and what it measured of each."""
+    if not any(pick.get("enabled", True) for pick in fields["edits"].get("picks", ())):
+        return {}, {}
+    from palette4d.grade import solve  # type: ignore[attr-defined]
+
+    found: Solved = solve.solve(fields)
+    return found
+
+
+def _text(colour: Colour) -> str:
+    return " ".join(f"{value:.4g}" for value in colour)
 
 
 def _finite(frame: float) -> float:

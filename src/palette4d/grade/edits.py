@@ -1,39 +1,87 @@
-"""Edits: the settings of handles, and undoable steps between two states of them.
+"""Edits: the state that the user makes, and undoable steps between two states of it.
 
-A handle is a palette vertex or a colour stop; an id names it. The state maps ids to `Setting`s. A
-vertex without a setting keeps its own colour; a stop without a setting does not exist. Input and
-output are plain values: this module knows neither files nor palettes.
+A state maps keys to values. A key is a kind and an id:
+
+- ``("handle", id)``: a `Setting` of a palette vertex or of a colour stop. A vertex without one
+  keeps its own colour; a stop without one does not exist.
+- ``("ramp", "")``: the clip's ramp between handles, one of `RAMPS`; absent: "linear".
+- ``("pick", id)``: a pick or a hold, as the sidecar's JSON object without its measured members.
+- ``("lock", id)``: True for a handle that does not move.
+- ``("version", name)``: the sidecar's member "edits" of a named version.
+
+Input and output are plain values: this module knows neither files nor palettes.
 """
 
-from collections.abc import Collection, Iterable, Mapping
+import json
+import re
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal, get_args
 
 from palette4d.common.errors import Palette4dError
 
 Colour = tuple[float, float, float]
+Ramp = Literal["linear", "smooth", "hold"]
+RAMPS: tuple[Ramp, ...] = get_args(Ramp)
+
+Kind = Literal["handle", "ramp", "pick", "lock", "version"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+Key = tuple[Kind, str]
+State = Mapping[Key, Any]
+
+#: The key of the clip's ramp.
+RAMP: Key = ("ramp", "")
 
 #: The largest absolute code value that the file format allows (docs/sidecar.md).
 LARGEST_COLOUR = 1e6
 
+#: Members of a pick that solving measures; they are no part of the state.
+MEASURED = ("residual", "global")
 
-def as_colour(values: Iterable[float], what: str = "colour") -> Colour:
-    """Return three finite code values.
+#: Limits of the history in a file: its steps, and their characters as JSON.
+MOST_STEPS, MOST_TEXT = 200, 256_000
+
+_HEX = re.compile(r"#([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})")
+
+
+def as_colour(values: Iterable[float] | str, what: str = "colour") -> Colour:
+    """Return three finite code values, also from #rrggbb.
 
     Raises
     ------
     Palette4dError
         `values` are not three numbers of at most `LARGEST_COLOUR`.
+
+    >>> as_colour("#ff0033")
+    (1.0, 0.0, 0.2)
     """
+    if isinstance(values, str) and (match := _HEX.fullmatch(values)):
+        r, g, b = (int(digits, 16) / 255 for digits in match.groups())
+        return (r, g, b)
     try:
-        listed = [float(value) for value in values]
+        listed = [] if isinstance(values, str) else [float(value) for value in values]
     except (TypeError, ValueError):
         listed = []
     if len(listed) != 3 or not all(abs(value) <= LARGEST_COLOUR for value in listed):
         raise Palette4dError(
-            f"found the {what} {values!r}, expected 3 finite numbers of at most {LARGEST_COLOUR:g}"
+            f"found the {what} {values!r}, expected #rrggbb or 3 finite numbers of at most "
+            f"{LARGEST_COLOUR:g}"
         )
     return (listed[0], listed[1], listed[2])
+
+
+def as_ramp(ramp: str) -> Ramp:
+    """Return a ramp's name.
+
+    Raises
+    ------
+    Palette4dError
+        It is not one of `RAMPS`.
+    """
+    for known in RAMPS:
+        if ramp == known:
+            return known
+    raise Palette4dError(f"found the ramp {ramp!r}, expected {', '.join(RAMPS)}")
 
 
 @dataclass(frozen=True)
@@ -46,11 +94,14 @@ class Setting:
         The colour, in the palette's code values.
     edge, frame : str and float, or None
         The place of a stop; None for a vertex, which never moves in time.
+    ramp : str or None
+        One of `RAMPS`: the way to the next handle in time; None: the clip's ramp.
     """
 
     rgb: Colour
     edge: str | None = None
     frame: float | None = None
+    ramp: Ramp | None = None
 
 
 Settings = Mapping[str, Setting]
@@ -58,69 +109,132 @@ Settings = Mapping[str, Setting]
 
 @dataclass(frozen=True)
 class Change:
-    """One handle's setting before and after an edit; None: unedited vertex, or no stop."""
+    """One value before and after an edit; None: there is none."""
 
+    kind: Kind
     id: str
-    before: Setting | None
-    after: Setting | None
+    before: Any
+    after: Any
+
+    @property
+    def key(self) -> Key:
+        """The value's key in the state."""
+        return self.kind, self.id
 
 
 @dataclass(frozen=True)
 class Edit:
-    """One undoable step: changes that belong together."""
+    """One undoable step: changes that belong together.
+
+    Attributes
+    ----------
+    changes : tuple of Change
+        At most one for each key.
+    label : str
+        What the step does, for people: "set v14 to #e66b9e".
+    steps : int
+        The number of steps that this one stands for; more than 1 after `folded`.
+    """
 
     changes: tuple[Change, ...]
+    label: str = ""
+    steps: int = 1
 
     def inverse(self) -> "Edit":
         """Return the edit that reverts this edit."""
-        return Edit(tuple(Change(c.id, c.after, c.before) for c in reversed(self.changes)))
+        back = tuple(Change(c.kind, c.id, c.after, c.before) for c in reversed(self.changes))
+        return replace(self, changes=back)
 
-    def apply(self, settings: Settings) -> dict[str, Setting]:
-        """Return the settings after this edit.
+    def apply(self, state: State) -> dict[Key, Any]:
+        """Return the state after this edit.
 
         Raises
         ------
         Palette4dError
-            A handle has changed since this edit was made.
+            A value has changed since this edit was made.
         """
-        result = dict(settings)
+        result = dict(state)
         for change in self.changes:
-            if result.get(change.id) != change.before:
+            if result.get(change.key) != change.before:
+                what = _named(change.key)
                 raise Palette4dError(
-                    f"{change.id} was changed meanwhile, so that this edit no longer fits; give "
-                    f"{change.id} a colour again instead"
+                    f"{what} was changed meanwhile, so that the step "
+                    f"{self.label or 'of it'!r} no longer fits; edit {what} again instead"
                 )
-            if change.after is None:
-                result.pop(change.id, None)
-            else:
-                result[change.id] = change.after
+            _put(result, change.key, change.after)
         return result
 
-    def renamed(self, names: Mapping[str, str]) -> "Edit":
-        """Return the same edit with new ids of its handles."""
-        return Edit(tuple(replace(c, id=names.get(c.id, c.id)) for c in self.changes))
+    def renamed(self, names: Mapping[Key, str]) -> "Edit":
+        """Return the same edit with new ids."""
+        return replace(
+            self, changes=tuple(replace(c, id=names.get(c.key, c.id)) for c in self.changes)
+        )
 
 
-def difference(before: Settings, after: Settings) -> Edit:
+def difference(before: State, after: State, label: str = "") -> Edit:
     """Return the edit from one state to another."""
-    ids = [*before, *(id_ for id_ in after if id_ not in before)]
+    keys = [*before, *(key for key in after if key not in before)]
     return Edit(
         tuple(
-            Change(id_, before.get(id_), after.get(id_))
-            for id_ in ids
-            if before.get(id_) != after.get(id_)
-        )
+            Change(*key, before.get(key), after.get(key))
+            for key in keys
+            if before.get(key) != after.get(key)
+        ),
+        label,
     )
 
 
+def folded(steps: Sequence[Edit]) -> Edit:
+    """Return one edit that does what the steps do one after another."""
+    found: dict[Key, Change] = {}
+    for change in (change for step in steps for change in step.changes):
+        first = found.get(change.key, change)
+        found[change.key] = replace(first, after=change.after)
+    count = sum(step.steps for step in steps)
+    changes = tuple(change for change in found.values() if change.before != change.after)
+    return Edit(changes, f"{count} earlier steps", count)
+
+
+def bounded(steps: list[Edit]) -> list[Edit]:
+    """Return the steps with the oldest folded into one, so that the file stays small.
+
+    At most `MOST_STEPS` steps remain, with at most `MOST_TEXT` characters beside the newest.
+    """
+    sizes = [len(json.dumps(step_to_fields(step))) for step in steps]
+    kept, total = 0, 0
+    while kept < min(len(steps), MOST_STEPS) and (not kept or total + sizes[-1 - kept] < MOST_TEXT):
+        total += sizes[-1 - kept]
+        kept += 1
+    if kept == len(steps):
+        return steps
+    kept = min(kept, MOST_STEPS - 1)
+    old = folded(steps[: len(steps) - kept])
+    return [old] * bool(old.changes) + steps[len(steps) - kept :]
+
+
+def rebased(steps: Iterable[Edit], state: State) -> list[Edit]:
+    """Return the steps as they are after another start; steps that change nothing drop out."""
+    result = []
+    for step in steps:
+        changes = tuple(
+            replace(change, before=state.get(change.key))
+            for change in step.changes
+            if state.get(change.key) != change.after
+        )
+        if changes:
+            result.append(replace(step, changes=changes))
+            state = result[-1].apply(state)
+    return result
+
+
 def merged(
-    base: Settings, mine: Settings, theirs: Settings, taken: Collection[str]
-) -> tuple[dict[str, Setting], dict[str, str]]:
-    """Merge the changes of two writers; return the state and the new ids of my stops.
+    base: State, mine: State, theirs: State, taken: Collection[str]
+) -> tuple[dict[Key, Any], dict[Key, str]]:
+    """Merge the changes of two writers; return the state and the new ids of my stops and picks.
 
     Parameters
     ----------
-    base, mine, theirs : mapping of str to Setting
+    base, mine, theirs : mapping
         The common start, and the two changed states.
     taken : collection of str
         Ids of the palette, which stops must not use.
@@ -128,34 +242,54 @@ def merged(
     Raises
     ------
     Palette4dError
-        Both changed one handle, or set a stop at one place, in different ways.
+        Both changed one value, or set a stop at one place, in different ways.
     """
-    renamed: dict[str, str] = {}
+    renamed: dict[Key, str] = {}
     result = dict(theirs)
     for change in difference(base, mine).changes:
-        id_, there = change.id, theirs.get(change.id)
+        key, there = change.key, theirs.get(change.key)
         if there == change.after:
             continue
         if there != change.before:
-            # Two new stops with the same id by chance are two stops.
-            if change.before is not None or there is None or _place(there) == _place(change.after):
-                raise _conflict(id_)
-            renamed[id_] = id_ = new_stop_id({*taken, *result, *mine})
-        if change.after is None:
-            result.pop(id_, None)
-        else:
-            result[id_] = change.after
+            # Two new stops or picks with the same id by chance are two.
+            if change.before is not None or there is None or not _are_two(change, there):
+                raise _conflict(_named(key))
+            used = [id_ for kind, id_ in (*result, *mine) if kind == change.kind]
+            renamed[key] = new_id(change.id[0], {*taken, *used})
+            if change.kind == "handle":
+                renamed["lock", change.id] = renamed[key]
+        _put(result, (change.kind, renamed.get(key, change.id)), change.after)
     places: dict[tuple[str, float], str] = {}
-    for id_, setting in result.items():
-        if (place := _place(setting)) and places.setdefault(place, id_) != id_:
+    for (kind, id_), value in result.items():
+        place = _place(value) if kind == "handle" else None
+        if place and places.setdefault(place, id_) != id_:
             raise _conflict(f"edge {place[0]} at frame {place[1]:g}")
     return result, renamed
+
+
+def _put(state: dict[Key, Any], key: Key, value: Any) -> None:
+    if value is None:
+        state.pop(key, None)
+    else:
+        state[key] = value
+
+
+def _are_two(mine: Change, theirs: Any) -> bool:
+    if mine.kind == "handle":
+        return _place(mine.after) is not None and _place(theirs) != _place(mine.after)
+    return mine.kind == "pick"
 
 
 def _place(setting: Setting | None) -> tuple[str, float] | None:
     if setting is None or setting.edge is None or setting.frame is None:
         return None
     return setting.edge, setting.frame
+
+
+def _named(key: Key) -> str:
+    kind, id_ = key
+    names = {"handle": id_, "ramp": "the clip's ramp", "version": f"the version {id_!r}"}
+    return names.get(kind, f"the {kind} {id_}")
 
 
 def _conflict(where: str) -> Palette4dError:
@@ -165,37 +299,141 @@ def _conflict(where: str) -> Palette4dError:
     )
 
 
-def new_stop_id(taken: Collection[str]) -> str:
-    """Return s1, s2, …: one more than the largest in use; ids of removed stops are not reused.
+def new_id(letter: str, taken: Iterable[str]) -> str:
+    """Return s1, s2, …: one more than the largest in use; removed ids are not reused at once.
 
-    >>> new_stop_id({"s1", "s7", "v9"})
+    >>> new_id("s", {"s1", "s7", "v9"})
     's8'
     """
-    numbers = [int(id_[1:]) for id_ in taken if id_[0] == "s" and _is_number(id_[1:])]
-    return f"s{max(numbers, default=0) + 1}"
+    numbers = [int(id_[1:]) for id_ in taken if id_[:1] == letter and _is_number(id_[1:])]
+    return f"{letter}{max(numbers, default=0) + 1}"
 
 
 def _is_number(text: str) -> bool:
     return text.isascii() and text.isdigit() and len(text) <= 9
 
 
-def from_fields(fields: Mapping[str, Any]) -> dict[str, Setting]:
+def _in_order(key: Key) -> tuple[int, int, str]:
+    """Sort s2 before s10, so that equal states give equal bytes."""
+    id_ = key[1]
+    number = int(id_[1:]) if _is_number(id_[1:]) else -1
+    return KINDS.index(key[0]), number, id_
+
+
+# -------------------------------------------------------------------------------- as JSON values
+
+
+def from_fields(fields: Mapping[str, Any]) -> dict[Key, Any]:
     """Return the state for a sidecar's member "edits"."""
-    settings = {entry["vertex"]: Setting(as_colour(entry["rgb"])) for entry in fields["vertices"]}
+    state: dict[Key, Any] = {}
+    for entry in fields["vertices"]:
+        state["handle", entry["vertex"]] = _setting(entry)
     for stop in fields["stops"]:
-        settings[stop["id"]] = Setting(as_colour(stop["rgb"]), stop["edge"], stop["frame"])
-    return settings
+        state["handle", stop["id"]] = _setting(stop)
+    if fields.get("ramp", "linear") != "linear":
+        state[RAMP] = as_ramp(fields["ramp"])
+    for pick in fields.get("picks", ()):
+        state["pick", pick["id"]] = {n: v for n, v in pick.items() if n not in MEASURED}
+    for id_ in fields.get("locks", ()):
+        state["lock", id_] = True
+    return state
 
 
-def to_fields(settings: Settings, vertex_ids: Iterable[str]) -> dict[str, Any]:
-    """Return a sidecar's member "edits": vertices in the palette's order, stops as in the state."""
-    return {
+def to_fields(state: State, vertex_ids: Iterable[str]) -> dict[str, Any]:
+    """Return a sidecar's member "edits", without its solution.
+
+    Vertices have the palette's order; stops, picks and locks have the order of their ids.
+    """
+    handles = {
+        id_: state[kind, id_] for kind, id_ in sorted(state, key=_in_order) if kind == "handle"
+    }
+    fields: dict[str, Any] = {
+        "ramp": state.get(RAMP, "linear"),
         "vertices": [
-            {"vertex": id_, "rgb": list(settings[id_].rgb)} for id_ in vertex_ids if id_ in settings
+            {"vertex": id_, **_of_setting(handles[id_])} for id_ in vertex_ids if id_ in handles
         ],
         "stops": [
-            {"id": id_, "edge": setting.edge, "frame": setting.frame, "rgb": list(setting.rgb)}
-            for id_, setting in settings.items()
+            {"id": id_, **_of_setting(setting)}
+            for id_, setting in handles.items()
             if setting.edge is not None
         ],
+        "picks": [dict(state[key]) for key in sorted(state, key=_in_order) if key[0] == "pick"],
+        "locks": [key[1] for key in sorted(state, key=_in_order) if key[0] == "lock"],
     }
+    if fields["ramp"] == "linear":
+        del fields["ramp"]
+    return {n: v for n, v in fields.items() if v or n in ("vertices", "stops")}
+
+
+def _setting(entry: Mapping[str, Any]) -> Setting:
+    ramp = entry.get("ramp")
+    return Setting(
+        as_colour(entry["rgb"]),
+        entry.get("edge"),
+        entry.get("frame"),
+        None if ramp is None else as_ramp(ramp),
+    )
+
+
+def _of_setting(setting: Setting) -> dict[str, Any]:
+    fields: dict[str, Any] = {}
+    if setting.edge is not None and setting.frame is not None:
+        whole = float(setting.frame).is_integer()
+        fields = {"edge": setting.edge, "frame": int(setting.frame) if whole else setting.frame}
+    fields["rgb"] = list(setting.rgb)
+    if setting.ramp is not None:
+        fields["ramp"] = setting.ramp
+    return fields
+
+
+def _object(value: Any) -> dict[str, Any]:
+    return dict(value.items())
+
+
+def _true(value: Any) -> bool:
+    if value is not True:
+        raise ValueError(f"found {value!r}, expected true")
+    return True
+
+
+#: How each kind's values are read from JSON.
+_READ: dict[Kind, Callable[[Any], Any]] = {
+    "handle": _setting,
+    "ramp": as_ramp,
+    "pick": _object,
+    "lock": _true,
+    "version": _object,
+}
+
+
+def step_to_fields(step: Edit) -> dict[str, Any]:
+    """Return a step of a sidecar's member "history"."""
+    fields: dict[str, Any] = {"step": step.label}
+    if step.steps != 1:
+        fields["steps"] = step.steps
+    changes = []
+    for change in step.changes:
+        values = (change.before, change.after)
+        listed = [_of_setting(v) if isinstance(v, Setting) else v for v in values]
+        changes.append([change.kind, change.id, *listed])
+    return {**fields, "changes": changes}
+
+
+def step_from_fields(fields: Any) -> Edit:
+    """Return the step of an entry of a sidecar's member "history".
+
+    Raises
+    ------
+    Palette4dError, TypeError, ValueError, LookupError, AttributeError
+        It is not a step.
+    """
+    changes = []
+    for kind, id_, *values in fields["changes"]:
+        before, after = (None if v is None else _READ[kind](v) for v in values)
+        if not isinstance(id_, str) or before == after:
+            raise ValueError(f"the change {kind!r} of {id_!r}")
+        changes.append(Change(kind, id_, before, after))
+    label, steps = fields["step"], fields.get("steps", 1)
+    if not isinstance(label, str) or type(steps) is not int or steps < 1 or not changes:
+        raise ValueError(f"the step {label!r}")
+    return Edit(tuple(changes), label, steps)

@@ -11,7 +11,7 @@ import os
 import stat
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -21,6 +21,7 @@ from palette4d import _core
 from palette4d.common.errors import Palette4dError, SidecarError
 from palette4d.common.files import link_target, refuse_existing, replacing
 from palette4d.common.text import counted
+from palette4d.grade import edits
 
 if sys.platform != "win32":
     import fcntl
@@ -38,7 +39,10 @@ _LARGEST_FILE = 64 << 20
 
 # Member order in the file; other members keep the document's order.
 _ORDER: dict[str, tuple[str, ...]] = {
-    "": ("schema", "version", "generator", "clip", "polytope", "quality", "edits", "extra"),
+    "": (
+        *("schema", "version", "generator", "clip", "polytope", "colours", "quality"),
+        *("edits", "versions", "history", "extra"),
+    ),
     "/clip": ("name", "source", "frames", "rate", "size", "encoding", "conversion"),
     "/clip/conversion": ("input_space", "config", "error", "steps"),
     "/clip/conversion/steps/*": ("kind", "direction"),
@@ -50,9 +54,12 @@ _ORDER: dict[str, tuple[str, ...]] = {
     "/polytope/transitions/*": ("tracks", "faces"),
     "/quality": ("stages", "options", "versions"),
     "/quality/stages/*": ("stage",),
-    "/edits": ("vertices", "stops"),
-    "/edits/vertices/*": ("vertex", "rgb"),
-    "/edits/stops/*": ("id", "edge", "frame", "rgb"),
+    "/edits": ("ramp", "vertices", "stops", "picks", "locks", "solution"),
+    "/edits/vertices/*": ("vertex", "rgb", "ramp"),
+    "/edits/stops/*": ("id", "edge", "frame", "rgb", "ramp"),
+    "/edits/solution": ("vertices", "keys", "bumps"),
+    "/versions/*": ("name", "edits"),
+    "/history": ("done", "undone"),
 }
 
 # Containers that take several lines. All others take one line, so that a diff of two files has one
@@ -78,6 +85,16 @@ _SPREAD = {
     "/edits",
     "/edits/vertices",
     "/edits/stops",
+    "/edits/picks",
+    "/edits/solution",
+    "/edits/solution/vertices",
+    "/edits/solution/keys",
+    "/edits/solution/bumps",
+    "/colours",
+    "/versions",
+    "/history",
+    "/history/done",
+    "/history/undone",
     "/extra",
 }
 
@@ -192,8 +209,60 @@ def load(path: str | os.PathLike[str]) -> Fields:
 
 
 def has_edits(document: Mapping[str, Any]) -> bool:
-    """Return whether a document holds edited vertices or stops."""
-    return bool(document["edits"]["vertices"] or document["edits"]["stops"])
+    """Return whether a document holds edits or versions."""
+    return bool(any(document["edits"].values()) or document.get("versions"))
+
+
+def state_of(document: Mapping[str, Any]) -> dict[edits.Key, Any]:
+    """Return what the user set: the state of `edits` and `versions`."""
+    state = edits.from_fields(document["edits"])
+    for version in document.get("versions", ()):
+        state["version", version["name"]] = version["edits"]
+    return state
+
+
+def with_state(document: Fields, state: edits.State, vertex_ids: Iterable[str]) -> Fields:
+    """Return a document with the `edits` (without a solution) and `versions` of a state."""
+    found = {**document, "edits": edits.to_fields(state, vertex_ids)}
+    names = sorted(name for kind, name in state if kind == "version")
+    found["versions"] = [{"name": name, "edits": state["version", name]} for name in names]
+    return found if names else {n: v for n, v in found.items() if n != "versions"}
+
+
+def history_of(document: Mapping[str, Any], name: str) -> tuple[list[edits.Edit], list[edits.Edit]]:
+    """Return the done and the undone steps of a document.
+
+    Raises
+    ------
+    SidecarError
+        The member "history" is unusable.
+    """
+    history = document.get("history", {})
+    found = []
+    for part in ("done", "undone"):
+        try:
+            found.append([edits.step_from_fields(step) for step in history.get(part, [])])
+        except (Palette4dError, TypeError, ValueError, LookupError, AttributeError) as error:
+            raise SidecarError(
+                name,
+                f"/history/{part}",
+                f"an unusable list of steps ({error})",
+                "the steps that palette4d wrote; remove the member `history` to go on without them",
+            ) from None
+    return found[0], found[1]
+
+
+def with_history(
+    document: Fields, done: Sequence[edits.Edit], undone: Sequence[edits.Edit]
+) -> Fields:
+    """Return a document with these steps; without steps it has no member "history"."""
+    parts = {"done": done, "undone": undone}
+    history = {
+        n: [edits.step_to_fields(step) for step in part] for n, part in parts.items() if part
+    }
+    if history and hasattr(_core.Sidecar, "versions"):
+        return {**document, "history": history}
+    return {name: value for name, value in document.items() if name != "history"}
 
 
 def check_target(path: str | os.PathLike[str], *, on_edits: OnEdits = "refuse") -> None:

@@ -1,8 +1,9 @@
 """The picture of a palette: its timeline, frames and polyhedra (figures 1 and 8 of the paper).
 
-`rows` has the palette as arrays and its layout in rows and chains, without a drawing library.
-`timeline` and `polyhedron` draw, `page` combines them, `style` holds colours and text. matplotlib
-is imported inside functions only, and its global state is never changed.
+Without a drawing library: `rows` has the palette as arrays and its rows, `layout` the places of the
+timeline, `solid` the polyhedron's projection. The window draws these, too. `timeline` and
+`polyhedron` draw them with matplotlib, `page` combines them, `style` holds colours and text.
+matplotlib is imported inside functions only, and its global state is never changed.
 """
 
 from pathlib import Path

@@ -12,6 +12,7 @@ from palette4d import _core
 from palette4d.common.text import counted
 from palette4d.plotting import polyhedron, style, timeline
 from palette4d.plotting.rows import Palette, arrange
+from palette4d.plotting.solid import Shape, View, even_sample, extent_of
 
 F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
@@ -35,7 +36,7 @@ class Column:
     ----------
     frame : float
         The time of the palette.
-    shape : polyhedron.Shape
+    shape : Shape
         The sliced palette; with the clip, also pixels.
     pictures : tuple of (h, w, 3) float32
         The clip's frame at reduced size, and its recolouring if the sidecar has edits. Empty
@@ -43,7 +44,7 @@ class Column:
     """
 
     frame: float
-    shape: polyhedron.Shape
+    shape: Shape
     pictures: tuple[F32, ...] = ()
 
 
@@ -107,12 +108,8 @@ def column(
     edited = _core.edited_colours(sidecar.polytope, sidecar.edits, palette)
     rgb, faces = np.asarray(palette.rgb), np.asarray(palette.faces)
     if image is None:
-        return Column(frame, polyhedron.Shape(rgb, np.asarray(edited), faces))
-    flat = image.reshape(-1, 3)
-    # A golden-ratio sequence picks evenly without following rows or columns.
-    picked = np.arange(min(pixels, len(flat))) * 0.6180339887498949 % 1 * len(flat)
-    cloud = flat[picked.astype(np.int64)].astype(np.float64)
-    shape = polyhedron.Shape(rgb, np.asarray(edited), faces, cloud[np.isfinite(cloud).all(axis=1)])
+        return Column(frame, Shape(rgb, np.asarray(edited), faces))
+    shape = Shape(rgb, np.asarray(edited), faces, even_sample(image, pixels))
     step = max(1, image.shape[1] // width)
     small = np.ascontiguousarray(image[::step, ::step], dtype=np.float32)
     if not (sidecar.edits.vertex_rgb or sidecar.edits.stops):
@@ -154,7 +151,7 @@ def build(sidecar: _core.Sidecar, columns: Sequence[Column]) -> Any:
         for k, name in enumerate(names):
             y = top - (k + 0.5) * picture_height - GAP * k
             axes.text(MARGIN / 2 + 2, y, name, rotation=90, **style.CENTRED)
-    extent = polyhedron.extent_of([c.shape for c in columns])
+    extent = extent_of([c.shape for c in columns])
     for k, shown in enumerate(columns):
         centre = MARGIN + wide / 2 + k * (wide + GUTTER)
         _draw_leaders(axes, panel, shown.frame, centre, above=bool(shapes))
@@ -164,7 +161,7 @@ def build(sidecar: _core.Sidecar, columns: Sequence[Column]) -> Any:
             ends = (centre - picture_width / 2, centre + picture_width / 2, lower, upper)
             axes.imshow(style.shown(picture, encoding), extent=ends, aspect="auto", zorder=4)
         middle = panel.bottom - LEADER - 30 - cube / 2
-        view = polyhedron.View.fit(extent, (centre, middle), cube)
+        view = View.fit(extent, (centre, middle), cube)
         polyhedron.draw(axes, shown.shape, view, encoding)
     return figure
 

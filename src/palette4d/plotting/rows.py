@@ -42,7 +42,7 @@ class Palette:
     frames, rgb, edited : (n,), (n, 3), (n, 3) float64
         Times of the vertices, and their colours before and after the edit.
     changed : (n,) bool array
-        The vertex has an edited colour.
+        The vertex has an edited colour, or picks move it.
     edges : list of (int, int)
         Vertex indices, the earlier end first.
     stops : list of (str, int, float, (3,) float64)
@@ -51,6 +51,8 @@ class Palette:
         Blocks and transitions: ``first``, ``last``, ``transition``.
     first, last : float
         The first and last frame.
+    sidecar : Sidecar
+        Where all this is from.
     """
 
     ids: list[str]
@@ -64,6 +66,7 @@ class Palette:
     sections: list[dict[str, Any]]
     first: float
     last: float
+    sidecar: _core.Sidecar
 
     @classmethod
     def of(cls, sidecar: _core.Sidecar) -> "Palette":
@@ -71,36 +74,59 @@ class Palette:
         polytope, edits = sidecar.polytope, sidecar.edits
         vertices = np.asarray(polytope.vertices, dtype=np.float64).reshape(-1, 4)
         ids, edge_ids = list(polytope.vertex_ids), list(polytope.edge_ids)
-        edited, new_colours = vertices[:, :3].copy(), edits.vertex_rgb
-        changed = np.array([name in new_colours for name in ids], dtype=bool)
-        for index in np.flatnonzero(changed):
-            edited[index] = new_colours[ids[index]]
-        stops = [
-            (s["id"], edge_ids.index(s["edge"]), float(s["frame"]), np.array(s["rgb"], np.float64))
-            for s in edits.stops
-        ]
-        return cls(
+        edited = vertices[:, :3].copy()
+        for frame in np.unique(vertices[:, 3]):
+            cut = _core.slice_at(polytope, float(frame))
+            at_vertex = cut.edges < 0
+            after = _core.edited_colours(polytope, edits, cut)
+            edited[cut.ends[at_vertex, 0]] = after[at_vertex]
+        result = cls(
             ids=ids,
             frames=vertices[:, 3].copy(),
             rgb=vertices[:, :3].copy(),
             edited=edited,
-            changed=changed,
+            changed=np.array([name in edits.vertex_rgb for name in ids], dtype=bool)
+            | (edited != vertices[:, :3]).any(axis=1),
             edges=[(int(a), int(b)) for a, b in np.asarray(polytope.edges).reshape(-1, 2)],
             edge_ids=edge_ids,
-            stops=sorted(stops, key=lambda stop: stop[1:3]),
+            stops=[],
             sections=list(polytope.sections),
             first=float(polytope.first_frame),
             last=float(polytope.last_frame),
+            sidecar=sidecar,
         )
+        for stop in edits.stops:
+            edge, frame = edge_ids.index(stop["edge"]), float(stop["frame"])
+            colour = result.colours(edge, np.array([frame]), edited=True)[0]
+            result.stops.append((stop["id"], edge, frame, colour))
+        result.stops.sort(key=lambda stop: stop[1:3])
+        return result
+
+    def sampled(self, frames: F64) -> tuple[F64, F64]:
+        """Return the colours of all edges at (k,) times, before and after, (m, k, 3).
+
+        The core computes them, so that ramps and picks count. An edge is NaN where it is not; at an
+        end it has the vertex's colour.
+        """
+        polytope, edits = self.sidecar.polytope, self.sidecar.edits
+        before = np.full((len(self.edges), len(frames), 3), np.nan)
+        after = before.copy()
+        for k, frame in enumerate(np.asarray(frames, dtype=np.float64).tolist()):
+            cut = _core.slice_at(polytope, frame)
+            inside = cut.edges >= 0
+            before[cut.edges[inside], k] = cut.rgb[inside]
+            after[cut.edges[inside], k] = _core.edited_colours(polytope, edits, cut)[inside]
+        for end in (0, 1):
+            vertices = np.array([edge[end] for edge in self.edges], dtype=np.int64)
+            which, at = np.nonzero(self.frames[vertices][:, None] == np.asarray(frames)[None])
+            before[which, at] = self.rgb[vertices[which]]
+            after[which, at] = self.edited[vertices[which]]
+        return before, after
 
     def colours(self, edge: int, frames: F64, *, edited: bool) -> F64:
-        """Return the colours on an edge at (k,) times, (k, 3); edited: linear between stops."""
-        start, end = self.edges[edge]
-        stops = [stop for stop in self.stops if stop[1] == edge] if edited else []
-        knots = [self.frames[start], *(stop[2] for stop in stops), self.frames[end]]
-        rgb = self.edited if edited else self.rgb
-        values = np.stack([rgb[start], *(stop[3] for stop in stops), rgb[end]])
-        return np.stack([np.interp(frames, knots, values[:, c]) for c in range(3)], axis=-1)
+        """Return the colours on an edge at (k,) times, (k, 3)."""
+        colours: F64 = self.sampled(frames)[int(edited)][edge]
+        return colours
 
     def touched(self, edge: int) -> bool:
         """Whether anything on this edge is edited."""

@@ -1,46 +1,45 @@
-"""The timeline: bands, forks, blocks, discs and the frame axis.
+"""The timeline, drawn by matplotlib: bands, forks, blocks, discs and the frame axis.
 
 Everything is on one matplotlib Axes; its unit is the point (1/72 inch), y upwards.
 """
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from palette4d.plotting import style
+from palette4d.plotting.layout import (
+    BAND,
+    COLLAR,
+    Disc,
+    Scale,
+    Timeline,
+    disc_names,
+    half_bands,
+)
 from palette4d.plotting.rows import Palette, Rows
 
 F64 = NDArray[np.float64]
-#: x0, y0, x1, y1 in points.
-Box = tuple[float, float, float, float]
 
-#: Length of the pieces of a band, in points: short enough for a smooth gradient.
-PIECE = 2.5
-#: Space around a disc beyond its radius, for the dark rim or a stop's second ring.
-COLLAR = 2.6
-#: Half the width of a band, and the largest radius of a vertex, in rows.
-BAND, RADIUS = 0.17, 0.33
 #: Space for the block names above the rows, for the axis below them, and at the sides.
 HEAD, FOOT, SIDE = 34.0, 34.0, 46.0
 
 
-@dataclass
 class Panel:
-    """The timeline's place on the page, in points, and the mapping of rows and times to it."""
+    """The timeline's place on the page, in points."""
 
-    palette: Palette
-    rows: Rows
-    left: float
-    right: float
-    row_height: float
-    top: float = 0.0
+    def __init__(
+        self, palette: Palette, rows: Rows, left: float, right: float, row_height: float
+    ) -> None:
+        scale = Scale(palette.first, palette.last, left + SIDE, right - SIDE)
+        self.layout = Timeline(palette, rows, scale, row_height)
+        self.left, self.right, self.top = left, right, 0.0
 
     @property
     def height(self) -> float:
         """The height of the panel."""
-        return HEAD + self.rows.count * self.row_height + FOOT
+        return HEAD + self.layout.height + FOOT
 
     @property
     def bottom(self) -> float:
@@ -53,17 +52,12 @@ class Panel:
         return self.bottom + FOOT
 
     def x(self, frame: ArrayLike) -> Any:
-        """Return the x of frame numbers; a clip of one frame is in the middle."""
-        first, last = self.palette.first, self.palette.last
-        ends = [self.left + SIDE, self.right - SIDE]
-        if last <= first:
-            return np.full(np.shape(frame), sum(ends) / 2)
-        share = (np.asarray(frame, dtype=np.float64) - first) / (last - first)
-        return ends[0] + share * (ends[1] - ends[0])
+        """Return the x of frame numbers."""
+        return self.layout.scale.x(frame)
 
-    def y(self, row: ArrayLike) -> F64:
-        """Return the y of a row's middle."""
-        return self.top - HEAD - (np.asarray(row, dtype=np.float64) + 0.5) * self.row_height
+    def y(self, y: ArrayLike) -> Any:
+        """Return the page's y of the layout's y."""
+        return self.top - HEAD - np.asarray(y, dtype=np.float64)
 
 
 def disc(
@@ -100,18 +94,12 @@ def draw(axes: Any, panel: Panel, encoding: str) -> None:
     """Draw the timeline."""
     _draw_ground(axes, panel)
     _draw_axis(axes, panel)
-    palette, rows = panel.palette, panel.rows
-    vertex_y = panel.y(rows.row[rows.vertex_chain])
-    edge_y = panel.y(rows.row[rows.edge_chain])
-    # Forks first: a row's own band covers the bands that leave and join it.
-    forks = [
-        (vertex_y[list(ends)] != y).any() for ends, y in zip(palette.edges, edge_y, strict=True)
-    ]
-    order = sorted(range(len(palette.edges)), key=lambda edge: not forks[edge])
-    paths = {edge: _path(panel, edge, vertex_y, float(edge_y[edge])) for edge in order}
-    for rank, edge in enumerate(order):
-        _draw_band(axes, panel, edge, paths[edge], encoding, 4 + rank / len(order))
-    _draw_discs(axes, panel, vertex_y, paths, encoding)
+    for rank, edge in enumerate(panel.layout.paths):
+        _draw_band(axes, panel, edge, encoding, 4 + rank / len(panel.layout.paths))
+    discs = panel.layout.discs(panel.left + 4, panel.right - 4)
+    for each in discs:
+        _draw_disc(axes, panel, each, encoding)
+    _draw_ids(axes, panel, discs)
 
 
 def _draw_ground(axes: Any, panel: Panel) -> None:
@@ -128,51 +116,29 @@ def _draw_ground(axes: Any, panel: Panel) -> None:
     rounded = "round,pad=0,rounding_size=8"
     axes.add_patch(FancyBboxPatch(corner, width, panel.height, boxstyle=rounded, **box))
     tall = panel.top - 1 - panel.floor
-    number, named = 0, -np.inf
-    for section in panel.palette.sections:
-        x0, x1 = panel.x([section["first"], section["last"]])
-        if section["transition"]:
-            ground = Rectangle((x0, panel.floor), x1 - x0, tall, linewidth=0, zorder=1.3)
-            ground.set_facecolor(style.TRANSITION)
-            axes.add_patch(ground)
-            axes.vlines(
-                [x0, x1], panel.floor, panel.top - 1, colors=style.LINE, linewidth=0.8, zorder=1.5
-            )
+    for section in panel.layout.sections():
+        x0, x1 = section.left, section.right
+        if section.number % 2:
             continue
-        number += 1
-        if number % 2 == 0:
-            ground = Rectangle((x0, panel.floor), x1 - x0, tall, linewidth=0, zorder=1.2)
-            ground.set_facecolor(style.PANEL_ALTERNATE)
-            axes.add_patch(ground)
-        ends = dict.fromkeys((style.number(section["first"]), style.number(section["last"])))
-        long = f"block {number}   {'–'.join(ends)}"
-        for text in (long, f"block {number}", f"{number}"):
-            half = _width(text, 8) / 2 + 4
-            fits = 2 * half <= x1 - x0 or x0 == x1 or text == f"{number}"
-            if fits and (x0 + x1) / 2 - half >= named:
-                axes.text((x0 + x1) / 2, panel.top - 15, text, zorder=3, **style.CENTRED)
-                named = (x0 + x1) / 2 + half
-                break
+        ground = Rectangle((x0, panel.floor), x1 - x0, tall, linewidth=0, zorder=1.2)
+        ground.set_facecolor(style.PANEL_ALTERNATE if section.number else style.TRANSITION)
+        axes.add_patch(ground)
+        if not section.number:
+            line = {"colors": style.LINE, "linewidth": 0.8, "zorder": 1.5}
+            axes.vlines([x0, x1], panel.floor, panel.top - 1, **line)
+    for name in panel.layout.block_names(15 - HEAD, lambda text: _width(text, 8)):
+        axes.text(name.x, panel.y(name.y), name.text, zorder=3, **style.CENTRED)
 
 
 def _draw_axis(axes: Any, panel: Panel) -> None:
-    from matplotlib.ticker import MaxNLocator
-
-    first, last = panel.palette.first, panel.palette.last
-    low, high = (float(x) for x in panel.x([first, last]))
-    most = max(2, int((high - low) / 70))
-    inner = (
-        MaxNLocator(most, integer=True, steps=[1, 2, 5, 10]).tick_values(first, last)
-        if last > first
-        else []
-    )
-    room = (high - low) / most * 0.55
-    ticks = [v for v in inner if min(panel.x(v) - low, high - panel.x(v)) > room]
-    ends = [min(low, panel.left + 12), max(high, panel.right - 12)]
+    scale = panel.layout.scale
+    ends = [scale.left, scale.right]
+    if scale.last <= scale.first:
+        ends = [sum(ends) / 2] * 2
     line = {"colors": style.GUIDE, "linewidth": 0.8, "zorder": 2}
-    axes.hlines(panel.floor, *ends, **line)
+    axes.hlines(panel.floor, min(ends[0], panel.left + 12), max(ends[1], panel.right - 12), **line)
     label = {**style.CENTRED, "zorder": 3, "fontsize": 8.5, "color": style.TEXT}
-    for value in sorted({first, *ticks, last}):
+    for value in panel.layout.ticks(*ends):
         x = float(panel.x(value))
         axes.vlines(x, panel.floor - 4, panel.floor, **line)
         axes.text(x, panel.floor - 12, style.number(value), **label)
@@ -180,158 +146,67 @@ def _draw_axis(axes: Any, panel: Panel) -> None:
     axes.text(panel.left + 14, panel.floor - 12, "frame", **faint)
 
 
-def _path(panel: Panel, edge: int, vertex_y: F64, row_y: float) -> tuple[F64, F64]:
-    """Return the (k,) times and (k, 2) points of an edge's middle line."""
-    start, end = panel.palette.edges[edge]
-    times = panel.palette.frames[[start, end]]
-    x0, x1 = (float(x) for x in panel.x(times))
-    rise, fall = float(vertex_y[start]) - row_y, float(vertex_y[end]) - row_y
-    length = x1 - x0
-    x = np.linspace(x0, x1, 4 * int(np.clip((length + abs(rise) + abs(fall)) / PIECE, 2, 600)) + 1)
-    y = np.full_like(x, row_y)
-    for height, away in ((rise, x - x0), (fall, x1 - x)):
-        if height:
-            reach = min(length / 2 if rise and fall else length, max(1.3 * abs(height), 36.0))
-            u = np.clip(1 - away / max(reach, 1e-9), 0, 1)
-            y += height * u * u * (3 - 2 * u)
-    # Equal steps along the line, not along time: finer where the line is steep.
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
-    at = np.linspace(0, along[-1], len(x) // 4 + 1)
-    points = np.stack([np.interp(at, along, x), np.interp(at, along, y)], axis=-1)
-    return np.interp(at, along, np.linspace(times[0], times[1], len(x))), points
-
-
-def _draw_band(
-    axes: Any, panel: Panel, edge: int, path: tuple[F64, F64], encoding: str, zorder: float
-) -> None:
+def _draw_band(axes: Any, panel: Panel, edge: int, encoding: str, zorder: float) -> None:
     from matplotlib.collections import LineCollection, PolyCollection
 
-    times, points = path
-    tangent = np.gradient(points, axis=0)
-    tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-9)
-    normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=-1) * BAND * panel.row_height
-    middle = (times[1:] + times[:-1]) / 2
-    touched = panel.palette.touched(edge)
-    parts = [(1.0, 0.0, False), (0.0, -1.0, True)] if touched else [(1.0, -1.0, False)]
-    for upper, lower, edited in parts:
+    palette, (times, line) = panel.layout.palette, panel.layout.paths[edge]
+    sides = half_bands(line, BAND * panel.layout.row_height)
+    upper, middle, lower = (
+        np.stack([side[:, 0], panel.y(side[:, 1])], axis=-1) for side in (sides[0], line, sides[1])
+    )
+    touched = palette.touched(edge)
+    parts = [(upper, middle, False), (middle, lower, True)] if touched else [(upper, lower, False)]
+    for above, below, edited in parts:
         # Pieces overlap a little: no seams.
-        a, b = points[:-1], points[1:] + 0.35 * tangent[1:]
-        n, m = normal[:-1], normal[1:]
-        quads = np.stack([a + n * upper, b + m * upper, b + m * lower, a + n * lower], axis=1)
-        colours = style.shown(panel.palette.colours(edge, middle, edited=edited), encoding)
+        more = 0.35 * np.diff(middle, axis=0)
+        more /= np.maximum(np.linalg.norm(more, axis=1, keepdims=True) / 0.35, 1e-9)
+        quads = [above[:-1], above[1:] + more, below[1:] + more, below[:-1]]
+        seen = palette.colours(edge, (times[1:] + times[:-1]) / 2, edited=edited)
         # Antialiasing would show seams between the pieces. The rims smooth the sides.
         band = PolyCollection(
-            list(quads), facecolors=colours, linewidths=0, antialiaseds=False, zorder=zorder
+            list(np.stack(quads, axis=1)),
+            facecolors=style.shown(seen, encoding),
+            linewidths=0,
+            antialiaseds=False,
+            zorder=zorder,
         )
-        band.set_gid(f"band-{panel.palette.edge_ids[edge]}")
+        band.set_gid(f"band-{palette.edge_ids[edge]}")
         axes.add_collection(band, autolim=False)
-    rims = [(points + normal, style.RIM), (points - normal, style.RIM)]
-    rims += [(points, style.INK)] if touched else []
-    lines = LineCollection([line for line, _ in rims], colors=[grey for _, grey in rims])
+    rims = [(upper, style.RIM), (lower, style.RIM)]
+    rims += [(middle, style.INK)] if touched else []
+    lines = LineCollection([rim for rim, _ in rims], colors=[grey for _, grey in rims])
     lines.set(linewidths=0.8, zorder=zorder + 0.001)
     axes.add_collection(lines, autolim=False)
 
 
-def _draw_discs(
-    axes: Any, panel: Panel, vertex_y: F64, paths: dict[int, tuple[F64, F64]], encoding: str
-) -> None:
-    """Draw vertices and stops, and their ids."""
-    palette = panel.palette
-    on_edges = [
-        [np.interp(when, paths[edge][0], paths[edge][1][:, k]) for k in range(2)]
-        for _, edge, when, _ in palette.stops
-    ]
-    stop_xy = np.array(on_edges).reshape(-1, 2)
-    home = np.concatenate([panel.x(palette.frames), stop_xy[:, 0]])
-    y = np.concatenate([vertex_y, stop_xy[:, 1]])
-    largest = RADIUS * panel.row_height
-    wanted = np.repeat([largest, 0.66 * largest], [len(palette.ids), len(palette.stops)])
-    x, radius = _place(wanted, home, y, panel.left + 4, panel.right - 4)
-    names = [*palette.ids, *(stop[0] for stop in palette.stops)]
-    kinds = ["edited" if changed else "plain" for changed in palette.changed]
-    kinds += ["stop"] * len(palette.stops)
-    halves = [*np.stack([palette.rgb, palette.edited], axis=1)]
-    for _, edge, when, colour in palette.stops:
-        halves.append(np.stack([palette.colours(edge, np.array([when]), edited=False)[0], colour]))
-    for k, name in enumerate(names):
-        if abs(x[k] - home[k]) > 2.5:
-            # A line from a moved disc to its time.
-            foot = y[k] - BAND * panel.row_height - 3.5
-            bent = [home[k], home[k], x[k]], [y[k], foot, y[k] - radius[k]]
-            axes.plot(*bent, color=style.RING, linewidth=0.8, zorder=9)
-        zorder = 11 if kinds[k] == "stop" else 10
-        colours = style.shown(halves[k], encoding)
-        rim = disc(axes, x[k], y[k], radius[k], colours, kinds[k], zorder)[-1]
-        rim.set_gid(f"{'stop' if kinds[k] == 'stop' else 'vertex'}-{name}")
-    _draw_ids(axes, panel, names, kinds, np.stack([x, y, radius + COLLAR], axis=-1))
+def _draw_disc(axes: Any, panel: Panel, shown: Disc, encoding: str) -> None:
+    y = float(panel.y(shown.y))
+    if abs(shown.x - shown.home) > 2.5:
+        # A line from a moved disc to its time.
+        foot = y - BAND * panel.layout.row_height - 3.5
+        bent = [shown.home, shown.home, shown.x], [y, foot, y - shown.radius]
+        axes.plot(*bent, color=style.RING, linewidth=0.8, zorder=9)
+    zorder = 11 if shown.kind == "stop" else 10
+    halves = style.shown(np.stack([shown.before, shown.after]), encoding)
+    rim = disc(axes, shown.x, y, shown.radius, halves, shown.kind, zorder)[-1]
+    rim.set_gid(f"{'stop' if shown.kind == 'stop' else 'vertex'}-{shown.id}")
 
 
-def _place(largest: F64, x: F64, y: F64, low: float, high: float) -> tuple[F64, F64]:
-    """Shrink discs that are close in a row; if that is not enough, move them apart.
-
-    Parameters
-    ----------
-    largest : (n,) float64
-        The largest radius of each disc.
-    x, y : (n,) float64
-        Their ideal places; discs of equal y are in one row.
-    low, high : float
-        The ends of a row, in x.
-
-    Returns
-    -------
-    x, radius : (n,) float64
-        Discs of a row keep their order and do not overlap, up to about a hundred of them.
-    """
-    from scipy.optimize import isotonic_regression
-
-    order = np.lexsort((x, y))
-    in_rows = np.split(order, np.flatnonzero(np.diff(y[order])) + 1)
-    radius, placed = largest.copy(), x.copy()
-    for row in in_rows:
-        each = (high - low) / len(row)
-        least = np.minimum(0.5 * largest[row], max(1.6, each / 2 - COLLAR))
-        room = np.diff(x[row]) / 2 - COLLAR
-        for side, bound in ((row[:-1], least[:-1]), (row[1:], least[1:])):
-            radius[side] = np.minimum(radius[side], np.maximum(room, bound))
-    # Similar sizes: size has no meaning here.
-    radius = np.minimum(radius, 1.5 * np.median(radius))
-    for row in in_rows:
-        reach = radius[row] + COLLAR
-        apart = np.concatenate([[0.0], np.cumsum(reach[:-1] + reach[1:])])
-        apart *= min(1.0, (high - low - reach[0] - reach[-1]) / max(apart[-1], 1e-9))
-        # The nearest places with these distances: least squares with a fixed order.
-        free = isotonic_regression(x[row] - apart).x
-        placed[row] = np.clip(free, low + reach[0], high - reach[-1] - apart[-1]) + apart
-    return placed, radius
-
-
-def _draw_ids(axes: Any, panel: Panel, names: list[str], kinds: list[str], discs: F64) -> None:
-    """Write the ids above or below their discs, edited ids first; leave out ids without space.
-
-    `discs` is (n, 3): x, y, radius.
-    """
-    size = float(np.clip(0.18 * panel.row_height, 6.0, 8.0))
-    taken: list[Box] = [(x - r, y - r, x + r, y + r) for x, y, r in discs.tolist()]
-    for k in sorted(range(len(names)), key=lambda k: kinds[k] == "plain"):
-        (x, y, radius), bright = discs[k].tolist(), kinds[k] != "plain"
-        text = style.printable(names[k], 14)
-        half, tall = _width(text, size) / 2, 0.95 * size
-        for bottom in (y + radius + 0.5, y - radius - 0.5 - tall):
-            box = (x - half, bottom, x + half, bottom + tall)
-            if bottom <= panel.floor + 1 or any(_meet(box, other) for other in taken):
-                continue
-            taken.append(box)
-            label = {**style.CENTRED, "fontsize": size, "va": "center_baseline", "zorder": 20}
-            label["color"] = style.BRIGHT if bright else style.TEXT
-            label["fontweight"] = "bold" if bright else "normal"
-            label["bbox"] = {"facecolor": style.PANEL, "alpha": 0.85, "linewidth": 0, "pad": 0.8}
-            axes.text(x, bottom + tall / 2, text, **label)
-            break
-
-
-def _meet(one: Box, two: Box) -> bool:
-    return one[0] < two[2] and two[0] < one[2] and one[1] < two[3] and two[1] < one[3]
+def _draw_ids(axes: Any, panel: Panel, discs: list[Disc]) -> None:
+    size = float(np.clip(0.18 * panel.layout.row_height, 6.0, 8.0))
+    names = disc_names(
+        discs,
+        size,
+        lambda text: _width(text, size),
+        panel.layout.height - 1,
+        lambda text: style.printable(text, 14),
+    )
+    for name in names:
+        label = {**style.CENTRED, "fontsize": size, "va": "center_baseline", "zorder": 20}
+        label["color"] = style.BRIGHT if name.bright else style.TEXT
+        label["fontweight"] = "bold" if name.bright else "normal"
+        label["bbox"] = {"facecolor": style.PANEL, "alpha": 0.85, "linewidth": 0, "pad": 0.8}
+        axes.text(name.x, panel.y(name.y), name.text, **label)
 
 
 def _width(text: str, size: float) -> float:

@@ -1,0 +1,391 @@
+"""The timeline as plain numbers: rows, bands, forks, discs, block names and ticks.
+
+`palette4d plot` and the window draw the same layout. The unit is the drawing's own (points or
+pixels). x is right. y is down; 0 is the top of the first row.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from palette4d.plotting.rows import Palette, Rows
+from palette4d.plotting.style import number
+
+F64 = NDArray[np.float64]
+#: left, top, right, bottom.
+Box = tuple[float, float, float, float]
+Kind = Literal["plain", "edited", "stop"]
+
+#: Length of the pieces of a band: short enough for a smooth gradient.
+PIECE = 2.5
+#: Space around a disc beyond its radius, for the dark rim or a stop's second ring.
+COLLAR = 2.6
+#: Half the width of a band, and the largest radius of a vertex, in rows.
+BAND, RADIUS = 0.17, 0.33
+#: The radius of a stop, in radii of a vertex.
+STOP = 0.66
+
+
+@dataclass(frozen=True)
+class Scale:
+    """The x of frames: `first` is at `left`, `last` at `right`; one frame alone is in the middle.
+
+    The window's scale may reach beyond what is seen: `left` is then negative.
+    """
+
+    first: float
+    last: float
+    left: float
+    right: float
+
+    def x(self, frame: ArrayLike) -> Any:
+        """Return the x of frame numbers."""
+        if self.last <= self.first:
+            return np.full(np.shape(frame), (self.left + self.right) / 2)
+        share = (np.asarray(frame, dtype=np.float64) - self.first) / (self.last - self.first)
+        return self.left + share * (self.right - self.left)
+
+    def frame(self, x: ArrayLike) -> Any:
+        """Return the frame numbers at x, within the clip."""
+        if self.last <= self.first:
+            return np.full(np.shape(x), self.first)
+        share = (np.asarray(x, dtype=np.float64) - self.left) / (self.right - self.left)
+        return self.first + np.clip(share, 0, 1) * (self.last - self.first)
+
+    @property
+    def per_frame(self) -> float:
+        """The distance of two frames in x."""
+        return (self.right - self.left) / max(self.last - self.first, 1e-9)
+
+
+@dataclass(frozen=True)
+class Disc:
+    """A vertex or a stop.
+
+    Attributes
+    ----------
+    id, kind, frame
+        The handle; "edited" is a vertex with a new colour.
+    edge : int
+        The edge of a stop; -1 for a vertex.
+    x, y, radius : float
+        Its place; discs of a row do not overlap.
+    home : float
+        The x of its frame; `x` differs where discs are too close.
+    before, after : (3,) float64
+        Colours without and with the edits.
+    """
+
+    id: str
+    kind: Kind
+    frame: float
+    edge: int
+    x: float
+    y: float
+    radius: float
+    home: float
+    before: F64
+    after: F64
+
+
+@dataclass(frozen=True)
+class Label:
+    """Text centred at a point."""
+
+    text: str
+    x: float
+    y: float
+    bright: bool = False
+
+
+@dataclass(frozen=True)
+class Section:
+    """A block (numbered from 1) or a transition (0), from `left` to `right`."""
+
+    left: float
+    right: float
+    number: int
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """The places of a palette's rows, bands and discs.
+
+    Attributes
+    ----------
+    palette, rows, scale
+        The content, its rows and its times.
+    row_height : float
+        The height of a row.
+    """
+
+    palette: Palette
+    rows: Rows
+    scale: Scale
+    row_height: float
+
+    @property
+    def height(self) -> float:
+        """The height of all rows."""
+        return self.rows.count * self.row_height
+
+    @cached_property
+    def vertex_y(self) -> F64:
+        """The y of each vertex, (n,)."""
+        return self._middle(self.rows.row[self.rows.vertex_chain])
+
+    @cached_property
+    def edge_y(self) -> F64:
+        """The y of the row of each edge, (m,)."""
+        return self._middle(self.rows.row[self.rows.edge_chain])
+
+    def _middle(self, row: NDArray[np.int64]) -> F64:
+        return (row.astype(np.float64) + 0.5) * self.row_height
+
+    @cached_property
+    def paths(self) -> dict[int, tuple[F64, F64]]:
+        """The (k,) times and (k, 2) points of the middle line of every edge, in drawing order.
+
+        Forks come first: a row's own band covers the bands that leave and join it.
+        """
+        forks = [
+            bool((self.vertex_y[list(ends)] != y).any())
+            for ends, y in zip(self.palette.edges, self.edge_y, strict=True)
+        ]
+        order = sorted(range(len(forks)), key=lambda edge: not forks[edge])
+        return {edge: self._path(edge) for edge in order}
+
+    def _path(self, edge: int) -> tuple[F64, F64]:
+        start, end = self.palette.edges[edge]
+        times = self.palette.frames[[start, end]]
+        row_y = float(self.edge_y[edge])
+        x0, x1 = (float(x) for x in self.scale.x(times))
+        rise, fall = float(self.vertex_y[start]) - row_y, float(self.vertex_y[end]) - row_y
+        length = x1 - x0
+        pieces = int(np.clip((length + abs(rise) + abs(fall)) / PIECE, 2, 600))
+        x = np.linspace(x0, x1, 4 * pieces + 1)
+        y = np.full_like(x, row_y)
+        for height, away in ((rise, x - x0), (fall, x1 - x)):
+            if height:
+                reach = min(length / 2 if rise and fall else length, max(1.3 * abs(height), 36.0))
+                u = np.clip(1 - away / max(reach, 1e-9), 0, 1)
+                y += height * u * u * (3 - 2 * u)
+        # Equal steps along the line, not along time: finer where the line is steep.
+        along = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
+        at = np.linspace(0, along[-1], len(x) // 4 + 1)
+        points = np.stack([np.interp(at, along, x), np.interp(at, along, y)], axis=-1)
+        return np.interp(at, along, np.linspace(times[0], times[1], len(x))), points
+
+    def at(self, edge: int, frame: float) -> tuple[float, float]:
+        """Return the point of an edge at a time."""
+        times, points = self.paths[edge]
+        return float(np.interp(frame, times, points[:, 0])), float(
+            np.interp(frame, times, points[:, 1])
+        )
+
+    def edge_near(self, x: float, y: float, reach: float) -> int | None:
+        """Return the edge whose band is nearest to a point, within `reach` up and down."""
+        found, least = None, reach
+        for edge, (_, points) in self.paths.items():
+            if points[0, 0] <= x <= points[-1, 0]:
+                away = abs(float(np.interp(x, points[:, 0], points[:, 1])) - y)
+                if away <= least:
+                    found, least = edge, away
+        return found
+
+    def discs(self, low: float, high: float) -> list[Disc]:
+        """Return the vertices and then the stops.
+
+        Parameters
+        ----------
+        low, high : float
+            The smallest and largest x that discs may cover.
+        """
+        palette = self.palette
+        stops = [self.at(edge, when) for _, edge, when, _ in palette.stops]
+        stop_xy = np.array(stops).reshape(-1, 2)
+        home = np.concatenate([self.scale.x(palette.frames), stop_xy[:, 0]])
+        y = np.concatenate([self.vertex_y, stop_xy[:, 1]])
+        largest = RADIUS * self.row_height
+        counts = [len(palette.ids), len(palette.stops)]
+        x, radius = place(np.repeat([largest, STOP * largest], counts), home, y, low, high)
+        kinds: list[Kind] = ["edited" if changed else "plain" for changed in palette.changed]
+        kinds += ["stop"] * len(palette.stops)
+        before = [*palette.rgb]
+        for _, edge, when, _ in palette.stops:
+            before.append(palette.colours(edge, np.array([when]), edited=False)[0])
+        after = [*palette.edited, *(stop[3] for stop in palette.stops)]
+        ids = [*palette.ids, *(stop[0] for stop in palette.stops)]
+        frames = [*palette.frames, *(stop[2] for stop in palette.stops)]
+        edges = [-1] * counts[0] + [stop[1] for stop in palette.stops]
+        return [
+            Disc(
+                ids[k],
+                kinds[k],
+                float(frames[k]),
+                edges[k],
+                x=float(x[k]),
+                y=float(y[k]),
+                radius=float(radius[k]),
+                home=float(home[k]),
+                before=before[k],
+                after=after[k],
+            )
+            for k in range(len(ids))
+        ]
+
+    def sections(self) -> list[Section]:
+        """Return the blocks and transitions."""
+        result, count = [], 0
+        for section in self.palette.sections:
+            left, right = (float(x) for x in self.scale.x([section["first"], section["last"]]))
+            count += not section["transition"]
+            result.append(Section(left, right, 0 if section["transition"] else count))
+        return result
+
+    def block_names(self, y: float, width: Callable[[str], float]) -> list[Label]:
+        """Return the longest name of each block that fits; blocks without space have none.
+
+        Parameters
+        ----------
+        y : float
+            The middle of the text.
+        width : callable
+            The width of a text.
+        """
+        blocks = [section for section in self.palette.sections if not section["transition"]]
+        places = [section for section in self.sections() if section.number]
+        labels, taken = [], -np.inf
+        for block, there in zip(blocks, places, strict=True):
+            ends = dict.fromkeys((number(block["first"]), number(block["last"])))
+            name, middle = f"block {there.number}", (there.left + there.right) / 2
+            for text in (f"{name}   {'–'.join(ends)}", name, f"{there.number}"):
+                half = width(text) / 2 + 4
+                alone = there.left == there.right or text == f"{there.number}"
+                if (2 * half <= there.right - there.left or alone) and middle - half >= taken:
+                    labels.append(Label(text, middle, y))
+                    taken = middle + half
+                    break
+        return labels
+
+    def ticks(self, low: float, high: float, apart: float = 70.0) -> list[float]:
+        """Return the frames to name between two x: the clip's ends, and round numbers."""
+        first, last = self.palette.first, self.palette.last
+        start, end = (float(self.scale.frame(x)) for x in (low, high))
+        if last <= first or end <= start:
+            return [first]
+        least = (end - start) / max(2, int((high - low) / apart))
+        step = next(n * 10**k for k in range(9) for n in (1, 2, 5) if n * 10**k >= least)
+        inner = np.arange(np.ceil(start / step) * step, end + step / 2, step)
+        # No round number close to the clip's ends, which are always named.
+        near = 0.55 * apart / self.scale.per_frame
+        kept = inner[(inner - first > near) & (last - inner > near)].tolist()
+        return sorted(t for t in {first, *kept, last} if start <= t <= end)
+
+
+def half_bands(points: F64, half: float) -> tuple[F64, F64]:
+    """Return the (k, 2) upper and lower side of a band around a middle line."""
+    tangent = np.gradient(points, axis=0)
+    tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-9)
+    across = np.stack([tangent[:, 1], -tangent[:, 0]], axis=-1) * half
+    return points + across, points - across
+
+
+def place(largest: F64, x: F64, y: F64, low: float, high: float) -> tuple[F64, F64]:
+    """Shrink discs that are close in a row; if that is not enough, move them apart.
+
+    Parameters
+    ----------
+    largest : (n,) float64
+        The largest radius of each disc.
+    x, y : (n,) float64
+        Their ideal places; discs of equal y are in one row.
+    low, high : float
+        The ends of a row, in x.
+
+    Returns
+    -------
+    x, radius : (n,) float64
+        Discs of a row keep their order and do not overlap, up to about a hundred of them.
+    """
+    order = np.lexsort((x, y))
+    in_rows = np.split(order, np.flatnonzero(np.diff(y[order])) + 1)
+    radius, placed = largest.copy(), x.copy()
+    for row in in_rows:
+        each = (high - low) / max(len(row), 1)
+        least = np.minimum(0.5 * largest[row], max(1.6, each / 2 - COLLAR))
+        room = np.diff(x[row]) / 2 - COLLAR
+        for side, bound in ((row[:-1], least[:-1]), (row[1:], least[1:])):
+            radius[side] = np.minimum(radius[side], np.maximum(room, bound))
+    # Similar sizes: size has no meaning here.
+    if radius.size:
+        radius = np.minimum(radius, 1.5 * np.median(radius))
+    for row in in_rows:
+        reach = radius[row] + COLLAR
+        gaps = reach[:-1] + reach[1:]
+        inside = row.size and low + reach[0] <= x[row[0]] and x[row[-1]] <= high - reach[-1]
+        if inside and (np.diff(x[row]) >= gaps).all():
+            continue
+        placed[row] = _apart(x[row], reach, gaps, low, high)
+    return placed, radius
+
+
+def _apart(x: F64, reach: F64, gaps: F64, low: float, high: float) -> F64:
+    """Return the nearest places with these distances: least squares with a fixed order."""
+    from scipy.optimize import isotonic_regression
+
+    if not x.size:
+        return x
+    apart = np.concatenate([[0.0], np.cumsum(gaps)])
+    apart *= min(1.0, (high - low - reach[0] - reach[-1]) / max(apart[-1], 1e-9))
+    free: F64 = isotonic_regression(x - apart).x
+    kept: F64 = np.clip(free, low + reach[0], high - reach[-1] - apart[-1]) + apart
+    return kept
+
+
+def disc_names(
+    discs: Sequence[Disc],
+    size: float,
+    width: Callable[[str], float],
+    bottom: float,
+    shorten: Callable[[str], str] = str,
+) -> list[Label]:
+    """Return the ids above or below their discs, edited ids first; ids without space are left out.
+
+    Parameters
+    ----------
+    discs : sequence of Disc
+        What is drawn; names do not cover any of them.
+    size : float
+        The height of the text.
+    width : callable
+        The width of a text.
+    bottom : float
+        No name reaches below this y.
+    shorten : callable
+        Returns the text to draw for an id.
+    """
+    taken: list[Box] = []
+    for disc in discs:
+        reach = disc.radius + COLLAR
+        taken.append((disc.x - reach, disc.y - reach, disc.x + reach, disc.y + reach))
+    labels, tall = [], 0.95 * size
+    for disc in sorted(discs, key=lambda disc: disc.kind == "plain"):
+        text, reach = shorten(disc.id), disc.radius + COLLAR + 0.5
+        half = width(text) / 2
+        for top in (disc.y - reach - tall, disc.y + reach):
+            box = (disc.x - half, top, disc.x + half, top + tall)
+            if top + tall >= bottom or any(_meet(box, other) for other in taken):
+                continue
+            taken.append(box)
+            labels.append(Label(text, disc.x, top + tall / 2, disc.kind != "plain"))
+            break
+    return labels
+
+
+def _meet(one: Box, two: Box) -> bool:
+    return one[0] < two[2] and two[0] < one[2] and one[1] < two[3] and two[1] < one[3]

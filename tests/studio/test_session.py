@@ -1,0 +1,113 @@
+"""The session: edits as the verbs do them, saved by themselves, with other programs' edits."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Generator
+from pathlib import Path
+
+import pytest
+
+import palette4d
+from palette4d.cli.main import main
+from palette4d.studio.session import TRY_AGAIN, Session, recovery_file
+
+GOLDEN = Path(__file__).resolve().parent.parent / "golden" / "sidecars"
+LATER = 1e9
+
+
+@pytest.fixture
+def sidecar(tmp_path: Path) -> Path:
+    return Path(shutil.copy(GOLDEN / "v1_tetrahedron.p4d.json", tmp_path / "a.p4d.json"))
+
+
+@pytest.fixture
+def session(sidecar: Path) -> Generator[Session]:
+    made = Session()
+    made.open_sidecar(sidecar)
+    yield made
+    made.close()
+
+
+def vertex(sidecar: Path) -> str:
+    return str(json.loads(sidecar.read_text())["polytope"]["vertices"][0]["id"])
+
+
+def test_an_edit_leaves_the_bytes_of_the_verb(
+    session: Session, sidecar: Path, tmp_path: Path
+) -> None:
+    twin = Path(shutil.copy(sidecar, tmp_path / "b.p4d.json"))
+    id_ = vertex(sidecar)
+    session.edit(lambda document: document.set(id_, rgb=(0.5, 0.25, 0.125)))
+    session.tick(LATER)
+    assert main(["edit", str(twin), "set", id_, "--rgb", "0.5", "0.25", "0.125"]) == 0
+    assert sidecar.read_bytes() == twin.read_bytes()
+
+
+def test_a_drag_writes_only_what_is_dropped(session: Session, sidecar: Path) -> None:
+    before, id_ = sidecar.read_bytes(), vertex(sidecar)
+    for k in range(5):
+        session.drag(lambda document, k=k: document.set(id_, rgb=(k / 8, 0, 0)))
+        assert session.document is not None
+        assert session.document.colour(id_) == (k / 8, 0, 0)
+        session.tick(LATER)
+    assert sidecar.read_bytes() == before
+    session.drop()
+    session.tick(LATER)
+    loaded = palette4d.load(sidecar)
+    assert loaded.colour(id_) == (0.5, 0, 0)
+    session.undo()
+    session.tick(2 * LATER)
+    assert palette4d.load(sidecar).colour(id_) == palette4d.load(
+        GOLDEN / "v1_tetrahedron.p4d.json"
+    ).colour(id_)
+
+
+def test_a_cancelled_drag_leaves_nothing(session: Session, sidecar: Path) -> None:
+    before, id_ = sidecar.read_bytes(), vertex(sidecar)
+    session.drag(lambda document: document.set(id_, rgb=(0, 0, 1)))
+    session.cancel()
+    session.drop()
+    session.tick(LATER)
+    assert sidecar.read_bytes() == before
+
+
+def test_other_programs_edits_are_shown_and_merged(session: Session, sidecar: Path) -> None:
+    ids = [each["id"] for each in json.loads(sidecar.read_text())["polytope"]["vertices"]]
+    heard = []
+    session.on("document", lambda: heard.append(session.revision))
+    assert main(["edit", str(sidecar), "set", ids[1], "--rgb", "1", "0", "0"]) == 0
+    session.tick(LATER)
+    assert session.document is not None
+    assert session.document.colour(ids[1]) == (1, 0, 0)
+    assert heard
+    session.edit(lambda document: document.set(ids[0], rgb=(0, 1, 0)))
+    assert main(["edit", str(sidecar), "set", ids[2], "--rgb", "0", "0", "1"]) == 0
+    session.tick(2 * LATER)
+    both = palette4d.load(sidecar)
+    assert [both.colour(id_) for id_ in ids[:3]] == [(0, 1, 0), (1, 0, 0), (0, 0, 1)]
+
+
+def test_a_file_that_another_program_broke_is_not_overwritten(
+    session: Session, sidecar: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    id_ = vertex(sidecar)
+    sidecar.write_text('{"schema": ')
+    session.tick(LATER)
+    assert session.status.level == "error"
+    session.edit(lambda document: document.set(id_, rgb=(0, 1, 0)))
+    session.tick(LATER + TRY_AGAIN)
+    assert sidecar.read_text() == '{"schema": '
+    assert session.status.level == "error"
+    assert palette4d.load(recovery_file(sidecar)).colour(id_) == (0, 1, 0)
+    assert session.save_as(tmp_path / "mine.p4d.json")
+    assert palette4d.load(tmp_path / "mine.p4d.json").colour(id_) == (0, 1, 0)
+
+
+def test_edits_that_fail_become_the_status(session: Session) -> None:
+    assert session.edit(lambda document: document.set("nowhere", rgb=(0, 0, 0))) is None
+    assert session.status.level == "error"
+    assert "nowhere" in session.status.text
+    assert session.saved
