@@ -32,8 +32,7 @@ py::array draw(const py::array& image, const std::string& output,
                const std::shared_ptr<const Recolourer>& map, const py::object& original,
                const py::object& edited, double strength, double keep_lightness,
                const Vec3& lightness, double mix, bool matte_in_alpha, double outside_at,
-               bool premultiplied, int threads,
-               const std::shared_ptr<const ColourConversion>& conversion) {
+               bool premultiplied, int threads, const ColourConversion* conversion) {
     require_image(image, "image");
     if (threads < 0) throw py::value_error("threads: found less than 0, expected 0 or more");
     if (!(outside_at > 0)) throw py::value_error("outside_at: expected a number above 0");
@@ -52,7 +51,9 @@ py::array draw(const py::array& image, const std::string& output,
             throw py::value_error("edited: expected as many colours as in original");
         }
     }
-    if (conversion && !conversion->identity()) drawing.conversion = conversion;
+    if (conversion && !conversion->identity()) {
+        drawing.conversion = {std::shared_ptr<void>(), conversion};  // Python owns it
+    }
     py::array result = py::array_t<float>({image.shape(0), image.shape(1), image.shape(2)});
     const auto in_view = view_of<ConstImageView>(image, static_cast<const float*>(image.data()));
     const auto out_view = view_of<ImageView>(result, static_cast<float*>(result.mutable_data()));
