@@ -55,13 +55,17 @@ def _walk(schema: Node, node: Node, path: str, found: list[tuple[str, str, str, 
         while inner.get("type") == "array" and isinstance(inner.get("items"), dict):
             inner = _resolved(schema, inner["items"])
             here += "[]"
-        _walk(schema, inner, here, found)
+        # A version's edits are explained where the file's edits are.
+        if (path, name) != ("versions[]", "edits"):
+            _walk(schema, inner, here, found)
 
 
 def _type(schema: Node, node: Node) -> str:
     node = _resolved(schema, node)
     if "const" in node:
         return "text" if isinstance(node["const"], str) else "integer"
+    if "enum" in node:
+        return "text"
     if "anyOf" in node:
         return "object"
     kind = node["type"]
@@ -73,7 +77,11 @@ def _type(schema: Node, node: Node) -> str:
             count, item = str(node["maxItems"]) if fixed else "", node["items"]
         of = _type(schema, item)
         return f"{count} × {of}" if count else f"list of {of}"
-    names = {"string": "id" if "pattern" in node else "text", "object": "object"}
+    names = {
+        "string": "id" if "pattern" in node else "text",
+        "object": "object",
+        "boolean": "true or false",
+    }
     return names.get(kind, kind) if isinstance(kind, str) else "number, text, true, false or null"
 
 

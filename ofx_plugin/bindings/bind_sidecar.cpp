@@ -2,15 +2,20 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "arrays.hpp"
 #include "binders.hpp"
+#include "model/slice.hpp"
 #include "sidecar/sidecar.hpp"
 
 using palette4d::Edits;
+using palette4d::Ramp;
 using palette4d::Sidecar;
 using palette4d::Vec3;
 
@@ -24,17 +29,25 @@ struct NamedEdits : Edits {
 struct BoundSidecar {
     Sidecar sidecar;
     NamedEdits edits;
+    std::vector<NamedEdits> versions;
 };
 
 py::tuple as_tuple(const Vec3& rgb) { return py::make_tuple(rgb[0], rgb[1], rgb[2]); }
 
+NamedEdits named(const Edits& edits, const palette4d::Polytope& polytope) {
+    NamedEdits result;
+    static_cast<Edits&>(result) = edits;
+    for (const auto& vertex : polytope.vertices()) result.vertex_ids.push_back(vertex.id);
+    for (const auto& edge : polytope.edges()) result.edge_ids.push_back(edge.id);
+    return result;
+}
+
 std::unique_ptr<BoundSidecar> bound(Sidecar sidecar) {
     auto result = std::make_unique<BoundSidecar>();
-    static_cast<Edits&>(result->edits) = sidecar.edits;
-    for (const auto& vertex : sidecar.polytope.vertices()) {
-        result->edits.vertex_ids.push_back(vertex.id);
+    result->edits = named(sidecar.edits, sidecar.polytope);
+    for (const auto& version : sidecar.versions) {
+        result->versions.push_back(named(version.edits, sidecar.polytope));
     }
-    for (const auto& edge : sidecar.polytope.edges()) result->edits.edge_ids.push_back(edge.id);
     result->sidecar = std::move(sidecar);
     return result;
 }
@@ -72,6 +85,27 @@ py::dict clip_of(const BoundSidecar& self) {
     return result;
 }
 
+const char* name_of(Ramp ramp) {
+    switch (ramp) {
+        case Ramp::kSmooth:
+            return "smooth";
+        case Ramp::kHold:
+            return "hold";
+        default:
+            return "linear";
+    }
+}
+
+py::dict vertex_ramp_of(const NamedEdits& self) {
+    py::dict result;
+    for (std::size_t i = 0; i < self.vertex_ramp.size(); ++i) {
+        if (self.vertex_ramp[i]) {
+            result[py::str(self.vertex_ids[i])] = name_of(*self.vertex_ramp[i]);
+        }
+    }
+    return result;
+}
+
 py::dict vertex_rgb_of(const NamedEdits& self) {
     py::dict result;
     for (std::size_t i = 0; i < self.vertex_rgb.size(); ++i) {
@@ -88,7 +122,72 @@ py::list stops_of(const NamedEdits& self) {
         entry["edge"] = self.edge_ids[static_cast<std::size_t>(stop.edge)];
         entry["frame"] = stop.frame;
         entry["rgb"] = as_tuple(stop.rgb);
+        if (stop.ramp) entry["ramp"] = name_of(*stop.ramp);
         result.append(entry);
+    }
+    return result;
+}
+
+py::dict solution_of(const NamedEdits& self) {
+    const palette4d::Solution& solution = self.solution;
+    py::list vertices, keys, bumps;
+    for (std::size_t i = 0; i < solution.vertex_by.size(); ++i) {
+        if (solution.vertex_by[i] == Vec3{0, 0, 0}) continue;
+        py::dict entry;
+        entry["vertex"] = self.vertex_ids[i];
+        entry["by"] = as_tuple(solution.vertex_by[i]);
+        vertices.append(entry);
+    }
+    for (const auto& key : solution.keys) {
+        py::dict entry;
+        entry["edge"] = self.edge_ids[static_cast<std::size_t>(key.edge)];
+        entry["frame"] = key.frame;
+        entry["by"] = as_tuple(key.by);
+        keys.append(entry);
+    }
+    for (const auto& bump : solution.bumps) {
+        py::list steps;
+        for (const auto& key : bump.keys) {
+            py::dict step;
+            step["frame"] = key.frame;
+            step["rgb"] = as_tuple(key.centre);
+            step["by"] = as_tuple(key.by);
+            steps.append(step);
+        }
+        py::dict entry;
+        entry["radius"] = bump.radius;
+        entry["keys"] = steps;
+        bumps.append(entry);
+    }
+    py::dict result;
+    result["vertices"] = vertices;
+    result["keys"] = keys;
+    result["bumps"] = bumps;
+    return result;
+}
+
+/// Seven columns, as palette4d::bindings::bumps_from() takes them.
+py::array bumps_of(const Edits& self, double frame) {
+    if (std::isnan(frame)) throw py::value_error("bumps_at: frame is not a number");
+    const std::vector<palette4d::Bump> bumps = palette4d::bumps_at(self, frame);
+    py::array_t<double> array({static_cast<py::ssize_t>(bumps.size()), py::ssize_t{7}});
+    double* out = array.mutable_data();
+    for (const palette4d::Bump& bump : bumps) {
+        out = std::copy(bump.centre.begin(), bump.centre.end(), out);
+        *out++ = bump.radius;
+        out = std::copy(bump.by.begin(), bump.by.end(), out);
+    }
+    return array;
+}
+
+/// (name, edits) of each version.
+py::list versions_of(const py::object& bound) {
+    const auto& self = bound.cast<const BoundSidecar&>();
+    py::list result;
+    for (std::size_t i = 0; i < self.versions.size(); ++i) {
+        result.append(py::make_tuple(
+            self.sidecar.versions[i].name,
+            py::cast(&self.versions[i], py::return_value_policy::reference_internal, bound)));
     }
     return result;
 }
@@ -99,10 +198,17 @@ void bind_sidecar(py::module_& module) {
     module.attr("SIDECAR_VERSION") = palette4d::kSidecarVersion;
 
     py::class_<Edits>(module, "_Edits");
-    py::class_<NamedEdits, Edits>(module, "Edits",
-                                  "Edited colours of vertices and colour stops on edges.")
+    py::class_<NamedEdits, Edits>(
+        module, "Edits",
+        "Edited colours of vertices, colour stops on edges, and the solution of the picks.")
         .def_property_readonly("vertex_rgb", &vertex_rgb_of)
-        .def_property_readonly("stops", &stops_of);
+        .def_property_readonly("vertex_ramp", &vertex_ramp_of)
+        .def_property_readonly("stops", &stops_of)
+        .def_property_readonly("ramp",
+                               [](const NamedEdits& self) { return name_of(self.default_ramp); })
+        .def_property_readonly("solution", &solution_of)
+        .def("bumps_at", &bumps_of, py::arg("frame"),
+             "(n, 7) float64: centre, radius and displacement of the bumps at a frame.");
 
     py::class_<BoundSidecar>(module, "Sidecar", "A validated sidecar file.")
         .def_property_readonly("clip", &clip_of)
@@ -112,6 +218,11 @@ void bind_sidecar(py::module_& module) {
         .def_property_readonly(
             "edits", [](const BoundSidecar& self) { return &self.edits; },
             py::return_value_policy::reference_internal)
+        .def_property_readonly("versions", &versions_of)
+        .def(
+            "bumps_at",
+            [](const BoundSidecar& self, double frame) { return bumps_of(self.edits, frame); },
+            py::arg("frame"), "edits.bumps_at(frame).")
         .def_property_readonly("conversion", [](const BoundSidecar& self) {
             // Shared with the sidecar; Python cannot modify it.
             return std::const_pointer_cast<palette4d::ClipConversion>(self.sidecar.conversion);

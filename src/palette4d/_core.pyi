@@ -38,13 +38,24 @@ class Polytope:
     def last_frame(self) -> float: ...
 
 class Edits:
-    """Edited colours of vertices and colour stops on edges."""
+    """Edited colours of vertices, colour stops on edges, and the solution of the picks."""
 
     @property
     def vertex_rgb(self) -> dict[str, tuple[float, float, float]]: ...
     @property
+    def vertex_ramp(self) -> dict[str, str]:
+        """The ramps of edited vertices that have their own."""
+    @property
     def stops(self) -> list[dict[str, Any]]:
-        """id, edge (its id), frame, rgb."""
+        """id, edge (its id), frame, rgb; and ramp where the stop has its own."""
+    @property
+    def ramp(self) -> str:
+        """The ramp of all other handles: "linear", "smooth" or "hold"."""
+    @property
+    def solution(self) -> dict[str, Any]:
+        """vertices, keys and bumps as in the file; vertices that do not move are left out."""
+    def bumps_at(self, frame: float) -> F64:
+        """(n, 7) float64: centre (3), radius and displacement (3) of the bumps at a frame."""
 
 class ColourConversion:
     """A chain of matrices and curves; see docs/sidecar.md."""
@@ -81,6 +92,11 @@ class Sidecar:
     def polytope(self) -> Polytope: ...
     @property
     def edits(self) -> Edits: ...
+    @property
+    def versions(self) -> list[tuple[str, Edits]]:
+        """Names and edits of the kept versions, in the file's order."""
+    def bumps_at(self, frame: float) -> F64:
+        """``edits.bumps_at(frame)``."""
     @property
     def conversion(self) -> ClipConversion | None:
         """None where the palette is in the clip's own numbers."""

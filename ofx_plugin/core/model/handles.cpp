@@ -37,7 +37,10 @@ Edits with_colours(const Polytope& polytope, const Edits& edits, bool keep,
                    const std::vector<HandleColour>& colours) {
     const std::size_t vertices = polytope.vertices().size();
     Edits result;
-    if (keep) result.vertex_rgb = edits.vertex_rgb;
+    if (keep) {
+        result = edits;
+        result.stops.clear();
+    }
     result.vertex_rgb.resize(vertices);
     std::vector<std::optional<Vec3>> stops(edits.stops.size());
     for (const HandleColour& colour : colours) {

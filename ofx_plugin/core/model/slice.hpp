@@ -31,8 +31,12 @@ struct Slice {
 /// for NaN.
 Slice slice_at(const Polytope& polytope, double frame);
 
-/// The edited colours of a slice's n vertices: linear in time between edited vertices and stops.
-/// Bit-identical to slice.rgb[i] where neither end vertex nor a stop of the edge is edited.
+/// The edited colours of a slice's n vertices: displacements go from handle to handle along a ramp,
+/// and the solution is added. Bit-identical to slice.rgb[i] where nothing on the edge moves. Throws
+/// std::invalid_argument for edits of another number of vertices.
 std::vector<Vec3> edited_colours(const Polytope& polytope, const Edits& edits, const Slice& slice);
+
+/// The bumps that move colours at a frame. Bumps are not bound to the clip: pass slice.frame.
+std::vector<Bump> bumps_at(const Edits& edits, double frame);
 
 }  // namespace palette4d

@@ -10,7 +10,9 @@
 #include <initializer_list>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
+#include <tuple>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -36,6 +38,9 @@ constexpr std::size_t kMaxSteps = 64;
 constexpr std::size_t kMaxSamples = 100'000;
 /// Limit for a conversion's numbers: above the range of half floats.
 constexpr double kMaxConversion = 1e9;
+/// Smallest radius of a bump, so that its square stays a normal float.
+constexpr double kMinRadius = 1e-4;
+constexpr std::size_t kMaxNameLength = 100;
 
 /// Describes a value for the "found" part of an error.
 std::string described(const Json& value) {
@@ -257,17 +262,21 @@ public:
     void require_object() const {
         if (!value_->is_object()) wrong("an object");
     }
-    /// Requires an object with exactly the members `names`; `optional` may be missing.
+    /// Requires an object with exactly the members `names`; those in `optional` may be missing.
     void require_members(std::initializer_list<const char*> names,
-                         const char* optional = nullptr) const {
+                         std::initializer_list<const char*> optional = {}) const {
         require_object();
         for (const auto& [name, unused] : value_->items()) {
-            bool known = optional && name == optional;
-            for (const char* candidate : names) known = known || name == candidate;
+            bool known = false;
+            for (const auto& some : {names, optional}) {
+                for (const char* candidate : some) known = known || name == candidate;
+            }
             if (!known) {
                 std::string list;
-                for (const char* candidate : names) {
-                    list += (list.empty() ? "" : ", ") + std::string(candidate);
+                for (const auto& some : {names, optional}) {
+                    for (const char* candidate : some) {
+                        list += (list.empty() ? "" : ", ") + std::string(candidate);
+                    }
                 }
                 throw SidecarError(*file_, pointer() + token(name),
                                    "the unknown member " + in_quotes(name), "only " + list);
@@ -295,6 +304,38 @@ public:
     std::string text() const {
         if (!value_->is_string()) wrong("a text");
         return value_->get<std::string>();
+    }
+
+    /// One of a few texts; its position among them.
+    std::size_t choice(std::initializer_list<const char*> texts) const {
+        std::size_t at = 0;
+        std::string list;
+        for (const char* text : texts) {
+            if (value_->is_string() && *value_ == text) return at;
+            ++at;
+            list += (list.empty() ? "" : at == texts.size() ? " or " : ", ") + in_quotes(text);
+        }
+        wrong(list);
+    }
+
+    bool flag() const {
+        if (!value_->is_boolean()) wrong("true or false");
+        return value_->get<bool>();
+    }
+
+    /// What a user calls something.
+    std::string name() const {
+        const std::string rule = "a name of 1 to " + std::to_string(kMaxNameLength) +
+                                 " characters, none of them a control character";
+        if (!value_->is_string()) wrong(rule);
+        const auto& name = value_->get_ref<const std::string&>();
+        std::size_t length = 0;
+        for (const char c : name) {
+            if ((c >= 0 && c < 0x20) || c == 0x7f) wrong(rule);
+            length += (static_cast<unsigned char>(c) & 0xc0) != 0x80;  // UTF-8: not a tail
+        }
+        if (length == 0 || length > kMaxNameLength) wrong(rule);
+        return name;
     }
 
     std::string id() const {
@@ -330,6 +371,13 @@ public:
         const bool fits = value_->is_number() && std::fabs(value_->get<double>()) <= limit;
         if (!fits) wrong(std::string(what) + " within +-" + Json(limit).dump());
         return value_->get<double>();
+    }
+    double number(double lowest, double highest) const {
+        const double found = value_->is_number() ? value_->get<double>() : lowest - 1;
+        if (!(found >= lowest && found <= highest)) {
+            wrong("a number from " + Json(lowest).dump() + " to " + Json(highest).dump());
+        }
+        return found;
     }
     double frame() const { return number(static_cast<double>(kMaxFrame), "a frame number"); }
 
@@ -385,7 +433,8 @@ void read_head(const Cursor& root) {
             "version " + std::to_string(kSidecarVersion) + "; update palette4d to read this file");
     }
     root.require_members(
-        {"schema", "version", "generator", "clip", "polytope", "quality", "edits", "extra"});
+        {"schema", "version", "generator", "clip", "polytope", "quality", "edits", "extra"},
+        {"colours", "versions", "history"});
     root.member("generator").text();
     root.member("extra").require_object();
 }
@@ -501,7 +550,7 @@ std::shared_ptr<const ClipConversion> read_conversion(const Cursor& where,
 }
 
 ClipInfo read_clip(const Cursor& clip) {
-    clip.require_members({"name", "source", "frames", "rate", "size", "encoding"}, "conversion");
+    clip.require_members({"name", "source", "frames", "rate", "size", "encoding"}, {"conversion"});
     ClipInfo info;
     info.name = clip.member("name").text();
     info.source = clip.member("source").text();
@@ -646,49 +695,215 @@ void read_quality(const Cursor& quality) {
     quality.member("versions").require_scalars();
 }
 
-Edits read_edits(const Cursor& where, const Polytope& polytope, const Index& vertex_index,
-                 const Index& edge_index, std::set<std::string>& taken) {
-    where.require_members({"vertices", "stops"});
+std::optional<Ramp> read_ramp(const Cursor& entry) {
+    if (!entry.has("ramp")) return std::nullopt;
+    constexpr Ramp kRamps[] = {Ramp::kLinear, Ramp::kSmooth, Ramp::kHold};
+    return kRamps[entry.member("ramp").choice({"linear", "smooth", "hold"})];
+}
+
+/// The ids that edits refer to.
+struct Names {
+    const Polytope& polytope;
+    const Index& vertices;
+    const Index& edges;
+    const std::set<std::string>& taken;  ///< by vertices and edges
+};
+
+/// Reads the members `edge` and `frame`: a place strictly inside an edge, `occupied` by nothing.
+std::pair<int, double> read_place(const Cursor& entry, const Names& names, const char* what,
+                                  std::set<std::pair<int, double>>& occupied) {
+    const int at = known(names.edges, entry.member("edge"), "edge");
+    const Cursor frame = entry.member("frame");
+    const double number = frame.frame();
+    const Edge& edge = names.polytope.edges()[static_cast<std::size_t>(at)];
+    const double from = names.polytope.vertices()[static_cast<std::size_t>(edge.from)].frame;
+    const double to = names.polytope.vertices()[static_cast<std::size_t>(edge.to)].frame;
+    if (!(number > from && number < to)) {
+        frame.wrong("a frame inside the edge " + in_quotes(edge.id) + ", between " +
+                    Json(from).dump() + " and " + Json(to).dump());
+    }
+    if (!occupied.emplace(at, number).second) {
+        frame.fail("a second " + std::string(what) + " of the edge " + in_quotes(edge.id) +
+                       " at this frame",
+                   "at most one " + std::string(what) + " of an edge at a frame");
+    }
+    return {at, number};
+}
+
+/// The frame of a list's entry, later than the `previous` one.
+double read_later(const Cursor& entry, std::optional<double>& previous) {
+    const Cursor frame = entry.member("frame");
+    const double number = frame.frame();
+    if (previous && !(number > *previous)) frame.wrong("frames in increasing order, each once");
+    previous = number;
+    return number;
+}
+
+Solution read_solution(const Cursor& where, const Names& names) {
+    where.require_members({"vertices", "keys", "bumps"});
+    Solution solution;
+    const Cursor vertices = where.member("vertices");
+    const std::size_t moved = vertices.list("vertices that move");
+    if (moved > 0) solution.vertex_by.resize(names.polytope.vertices().size());
+    std::set<int> seen;
+    for (std::size_t i = 0; i < moved; ++i) {
+        const Cursor entry = vertices.element(i);
+        entry.require_members({"vertex", "by"});
+        const Cursor vertex = entry.member("vertex");
+        const int at = known(names.vertices, vertex, "vertex");
+        if (!seen.insert(at).second) {
+            vertex.fail("the vertex " + in_quotes(vertex.text()) + " a second time",
+                        "each vertex at most once");
+        }
+        solution.vertex_by[static_cast<std::size_t>(at)] = entry.member("by").rgb();
+    }
+
+    std::set<std::pair<int, double>> occupied;
+    const Cursor keys = where.member("keys");
+    for (std::size_t i = 0, n = keys.list("keys"); i < n; ++i) {
+        const Cursor entry = keys.element(i);
+        entry.require_members({"edge", "frame", "by"});
+        const auto [edge, frame] = read_place(entry, names, "key", occupied);
+        solution.keys.push_back({edge, frame, entry.member("by").rgb()});
+    }
+
+    const Cursor bumps = where.member("bumps");
+    for (std::size_t i = 0, n = bumps.list("bumps"); i < n; ++i) {
+        const Cursor entry = bumps.element(i);
+        entry.require_members({"radius", "keys"});
+        Solution::MovingBump bump{entry.member("radius").number(kMinRadius, kMaxColour), {}};
+        const Cursor steps = entry.member("keys");
+        std::optional<double> previous;
+        const std::size_t count = steps.list("keys");
+        if (count == 0) steps.wrong("at least one key");
+        for (std::size_t j = 0; j < count; ++j) {
+            const Cursor step = steps.element(j);
+            step.require_members({"frame", "rgb", "by"});
+            bump.keys.push_back(
+                {read_later(step, previous), step.member("rgb").rgb(), step.member("by").rgb()});
+        }
+        solution.bumps.push_back(std::move(bump));
+    }
+    return solution;
+}
+
+/// Checks what only the solver reads.
+void check_pick(const Cursor& pick, std::set<std::string>& taken) {
+    pick.require_members({"id", "kind", "frame", "rgb"},
+                         {"to", "toward", "from", "until", "fade", "radius", "global_only",
+                          "enabled", "path", "pixel", "box", "residual", "global"});
+    claim(taken, pick.member("id"), pick.member("id").id());
+    pick.member("kind").choice({"pick", "hold"});
+    pick.member("frame").frame();
+    pick.member("rgb").rgb();
+    if (pick.has("to")) pick.member("to").rgb();
+    if (pick.has("toward")) pick.member("toward").choice({"shift", "colour"});
+    if (pick.has("from")) pick.member("from").frame();
+    if (pick.has("until")) pick.member("until").frame();
+    if (pick.has("fade")) pick.member("fade").number(0, static_cast<double>(kMaxFrame));
+    if (pick.has("radius")) pick.member("radius").number(kMinRadius, kMaxColour);
+    if (pick.has("global_only")) pick.member("global_only").flag();
+    if (pick.has("enabled")) pick.member("enabled").flag();
+    if (pick.has("path")) {
+        const Cursor path = pick.member("path");
+        std::optional<double> previous;
+        for (std::size_t i = 0, n = path.list("colours over time"); i < n; ++i) {
+            const Cursor step = path.element(i);
+            step.require_members({"frame", "rgb"});
+            read_later(step, previous);
+            step.member("rgb").rgb();
+        }
+    }
+    if (pick.has("pixel")) {
+        const Cursor pixel = pick.member("pixel");
+        if (pixel.list("2 numbers, x and y") != 2) pixel.wrong("a list of 2 numbers, x and y");
+        for (std::size_t i = 0; i < 2; ++i) pixel.element(i).number(0.0, double{kMaxSize});
+    }
+    if (pick.has("box")) pick.member("box").integer(1, kMaxSize);
+    if (pick.has("residual")) pick.member("residual").number(0, kMaxColour);
+    if (pick.has("global")) pick.member("global").number(0, 1);
+}
+
+/// Checks the clip's weighted colours, which only the solver reads.
+void check_colours(const Cursor& colours) {
+    std::optional<double> previous;
+    for (std::size_t i = 0, n = colours.list("frames with colours"); i < n; ++i) {
+        const Cursor entry = colours.element(i);
+        entry.require_members({"frame", "rgbw"});
+        read_later(entry, previous);
+        const Cursor rows = entry.member("rgbw");
+        for (std::size_t j = 0, m = rows.list("colours"); j < m; ++j) {
+            const Cursor row = rows.element(j);
+            if (row.list("4 numbers") != 4) row.wrong("a list of 4 numbers: r, g, b and weight");
+            for (std::size_t c = 0; c < 3; ++c) row.element(c).number(kMaxColour, "a number");
+            row.element(3).number(0, 1);
+        }
+    }
+}
+
+Edits read_edits(const Cursor& where, const Names& names) {
+    where.require_members({"vertices", "stops"}, {"ramp", "picks", "locks", "solution"});
     Edits edits;
-    edits.vertex_rgb.resize(polytope.vertices().size());
+    edits.vertex_rgb.resize(names.polytope.vertices().size());
+    edits.vertex_ramp.resize(edits.vertex_rgb.size());
+    edits.default_ramp = read_ramp(where).value_or(Ramp::kLinear);
     const Cursor vertices = where.member("vertices");
     for (std::size_t i = 0, n = vertices.list("vertex edits"); i < n; ++i) {
         const Cursor entry = vertices.element(i);
-        entry.require_members({"vertex", "rgb"});
+        entry.require_members({"vertex", "rgb"}, {"ramp"});
         const Cursor vertex = entry.member("vertex");
-        auto& slot =
-            edits.vertex_rgb[static_cast<std::size_t>(known(vertex_index, vertex, "vertex"))];
-        if (slot) {
+        const auto at = static_cast<std::size_t>(known(names.vertices, vertex, "vertex"));
+        if (edits.vertex_rgb[at]) {
             vertex.fail("a second edit of the vertex " + in_quotes(vertex.text()),
                         "at most one edit of each vertex");
         }
-        slot = entry.member("rgb").rgb();
+        edits.vertex_rgb[at] = entry.member("rgb").rgb();
+        edits.vertex_ramp[at] = read_ramp(entry);
     }
 
+    std::set<std::string> taken = names.taken;
     std::set<std::pair<int, double>> occupied;
     const Cursor stops = where.member("stops");
     for (std::size_t i = 0, n = stops.list("stops"); i < n; ++i) {
         const Cursor entry = stops.element(i);
-        entry.require_members({"id", "edge", "frame", "rgb"});
+        entry.require_members({"id", "edge", "frame", "rgb"}, {"ramp"});
         const Cursor id = entry.member("id");
-        const Cursor frame = entry.member("frame");
-        Stop stop{id.id(), known(edge_index, entry.member("edge"), "edge"), frame.frame(),
-                  entry.member("rgb").rgb()};
+        Stop stop{id.id(), 0, 0, entry.member("rgb").rgb(), read_ramp(entry)};
+        std::tie(stop.edge, stop.frame) = read_place(entry, names, "stop", occupied);
         claim(taken, id, stop.id);
-        const Edge& edge = polytope.edges()[static_cast<std::size_t>(stop.edge)];
-        const double from = polytope.vertices()[static_cast<std::size_t>(edge.from)].frame;
-        const double to = polytope.vertices()[static_cast<std::size_t>(edge.to)].frame;
-        if (!(stop.frame > from && stop.frame < to)) {
-            frame.wrong("a frame inside the edge " + in_quotes(edge.id) + ", between " +
-                        Json(from).dump() + " and " + Json(to).dump());
-        }
-        if (!occupied.emplace(stop.edge, stop.frame).second) {
-            frame.fail("a second stop of the edge " + in_quotes(edge.id) + " at this frame",
-                       "at most one stop of an edge at a frame");
-        }
         edits.stops.push_back(std::move(stop));
     }
+
+    if (where.has("picks")) {
+        const Cursor picks = where.member("picks");
+        std::set<std::string> ids;
+        for (std::size_t i = 0, n = picks.list("picks"); i < n; ++i) {
+            check_pick(picks.element(i), ids);
+        }
+    }
+    if (where.has("locks")) {
+        const Cursor locks = where.member("locks");
+        for (std::size_t i = 0, n = locks.list("ids"); i < n; ++i) locks.element(i).id();
+    }
+    if (where.has("solution")) {
+        edits.solution = read_solution(where.member("solution"), names);
+    }
     return edits;
+}
+
+std::vector<NamedVersion> read_versions(const Cursor& where, const Names& names) {
+    std::vector<NamedVersion> versions;
+    std::set<std::string> taken;
+    for (std::size_t i = 0, n = where.list("versions"); i < n; ++i) {
+        const Cursor entry = where.element(i);
+        entry.require_members({"name", "edits"});
+        const Cursor name = entry.member("name");
+        versions.push_back({name.name(), read_edits(entry.member("edits"), names)});
+        if (!taken.insert(versions.back().name).second) {
+            name.fail("a second version " + in_quotes(name.text()), "each name only once");
+        }
+    }
+    return versions;
 }
 
 }  // namespace
@@ -709,8 +924,11 @@ Sidecar parse_sidecar(const std::string& text, const std::string& name) {
     sidecar.polytope =
         read_polytope(root.member("polytope"), sidecar.clip, name, vertex_index, edge_index, taken);
     read_quality(root.member("quality"));
-    sidecar.edits =
-        read_edits(root.member("edits"), sidecar.polytope, vertex_index, edge_index, taken);
+    const Names names{sidecar.polytope, vertex_index, edge_index, taken};
+    sidecar.edits = read_edits(root.member("edits"), names);
+    if (root.has("versions")) sidecar.versions = read_versions(root.member("versions"), names);
+    if (root.has("colours")) check_colours(root.member("colours"));
+    if (root.has("history")) root.member("history").require_object();
     return sidecar;
 }
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "convert/colour_conversion.hpp"
 #include "model/edits.hpp"
@@ -29,10 +30,17 @@ struct ClipConversion {
     ColourConversion steps;
 };
 
+/// Edits that the user keeps under a name.
+struct NamedVersion {
+    std::string name;
+    Edits edits;
+};
+
 struct Sidecar {
     ClipInfo clip;
     Polytope polytope;
-    Edits edits;
+    Edits edits;  ///< the active ones
+    std::vector<NamedVersion> versions;
     /// Null where the palette is in the clip's own code values.
     std::shared_ptr<const ClipConversion> conversion;
 };
