@@ -6,15 +6,16 @@ import contextlib
 import os
 from collections.abc import Callable, Generator
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from palette4d.common.files import make_folder
 from palette4d.grade.document import Document
+from palette4d.grade.output import Output
 from palette4d.media.clip import Clip, Image, open_clip
 from palette4d.media.clip_base import F32, describe
 from palette4d.media.frame_writer import (
@@ -64,6 +65,13 @@ def compared(source: F32, edited: F32, how: Compare) -> F32:
     return picture
 
 
+def with_alpha(pixels: F32) -> F32:
+    """Return RGBA pixels; alpha is 1 where there was none."""
+    if pixels.shape[2] == 4:
+        return pixels
+    return np.concatenate([pixels, np.ones_like(pixels[..., :1])], axis=2)
+
+
 def mismatches(document: Document, clip: Clip, whole: bool) -> list[str]:
     """Return notes on differences between a clip and the sidecar's clip, and their effect.
 
@@ -93,7 +101,7 @@ def mismatches(document: Document, clip: Clip, whole: bool) -> list[str]:
     return found
 
 
-def movie_notes(clip: Clip, width: int) -> list[str]:
+def movie_notes(clip: Clip, width: int, alpha: bool) -> list[str]:
     """Return notes on the limits of a movie of this clip: size, alpha, encoding."""
     found = []
     if width % 2 or clip.height % 2:
@@ -101,7 +109,7 @@ def movie_notes(clip: Clip, width: int) -> list[str]:
             f"the picture is {width}x{clip.height} pixels; where the movie's encoder needs an "
             "even size, the last column or row is repeated"
         )
-    if clip.has_alpha:
+    if alpha:
         found.append("the movie has no alpha, the picture is laid over black; frames keep it")
     if "linear" in clip.encoding:
         found.append(
@@ -118,7 +126,6 @@ def render(
     *,
     frames: str | None = None,
     compare: Compare | None = None,
-    strength: float = 1.0,
     space: Literal["input", "palette"] = "input",
     half: bool = False,
     bits: int | None = None,
@@ -126,7 +133,8 @@ def render(
     skip_bad_frames: bool = False,
     force: bool = False,
     progress: Callable[[int, int], object] | None = None,
-    tell: Callable[[str], object] | None = None,
+    tell: Callable[[str, str], object] | None = None,
+    **picture: Any,
 ) -> Rendered:
     """Recolour every frame of a clip and write it; memory holds at most three frames.
 
@@ -143,8 +151,6 @@ def render(
         Only these frames: "1001-1100x2".
     compare : {"wipe", "side"}, optional
         Show the source, too: "side" to the left of the edit, "wipe" as the left half.
-    strength : float
-        0 the original, 1 the edit.
     space : {"input", "palette"}
         "palette": the clip's code values are already in the palette's colour space.
     half : bool
@@ -160,7 +166,11 @@ def render(
     progress : callable, optional
         Called with (frames written, frames in all).
     tell : callable, optional
-        Called with each note before the first frame is rendered.
+        Called as ``tell(kind, text)`` before the first frame is rendered: "warning" where clip and
+        sidecar differ, else "note".
+    **picture
+        What to draw: ``strength``, ``show``, ``keep_lightness`` and so on, as for
+        `Document.recolour`.
 
     Returns
     -------
@@ -174,6 +184,7 @@ def render(
     """
     if not isinstance(document, Document):
         document = Document.load(document)
+    drawn = Output(**picture)
     whole = frames is None
     if not isinstance(clip, Clip):
         clip = open_clip(os.fspath(clip), frames=frames, skip_bad_frames=skip_bad_frames)
@@ -195,11 +206,12 @@ def render(
         check_targets(pattern.paths(clip.frames), inputs, force)
         make_folder(pattern.folder)
         opened = _frames(clip, pattern, samples)
-    notes = mismatches(document, clip, whole)
-    notes += [*clip.notes, *(movie_notes(clip, width) if movie else ())]
-    if tell is not None:
-        for note in notes:
-            tell(note)
+    warnings = mismatches(document, clip, whole)
+    alpha = clip.has_alpha or drawn.in_alpha
+    notes = [*clip.notes, *(movie_notes(clip, width, alpha) if movie else ())]
+    for kind, texts in (("warning", warnings), ("note", notes)) if tell else ():
+        for text in texts:
+            tell(kind, text)
     written: list[Path] = []
     rendered: list[int] = []
     pending: Future[Path] | None = None
@@ -213,21 +225,24 @@ def render(
     # One frame is written while the next is read and recoloured.
     with opened as write, ThreadPoolExecutor(1) as writer:
         for image in clip.iter_images():
+            source = with_alpha(image.pixels) if drawn.in_alpha else image.pixels
             pixels = document.recolour(
-                image.pixels,
+                source,
                 image.frame,
-                strength=strength,
+                **asdict(drawn),
                 premultiplied=clip.premultiplied,
                 space=space,
                 threads=threads,
             )
             if compare is not None:
-                pixels = compared(image.pixels, pixels, compare)
+                pixels = compared(source, pixels, compare)
             finish()
             rendered.append(image.frame)
             pending = writer.submit(write, image, pixels)
         finish()
-    return Rendered(written[:1] if movie else written, rendered, list(clip.skipped), notes)
+    return Rendered(
+        written[:1] if movie else written, rendered, list(clip.skipped), [*warnings, *notes]
+    )
 
 
 _Write = Callable[[Image, F32], Path]
