@@ -389,7 +389,7 @@ class TestRefusals:
             ("raw", "holds data, not colours"),
         ):
             found = options(base=str(base), process_space=near)
-            self.refused([shot], tmp_path, f"--process-space '{near}': .*{expected}", found)
+            self.refused([shot], tmp_path, f'process_space="{near}": .*{expected}', found)
         chosen = options(10, base=str(base), process_space="film log")
         assert write_config([shot], tmp_path / "s", **chosen).shots[0].process_space == "film log"
 

@@ -201,7 +201,7 @@ def render(
         make_folder(Path(output).parent)
         opened = _movie(clip, document, Path(output), width)
     else:
-        pattern = FramePattern.parse(output)
+        pattern = FramePattern.parse(output, ", or a movie OUT.mp4 or OUT.mov")
         samples = sample_type(pattern.extension, clip.depth, half=half, bits=bits)
         check_targets(pattern.paths(clip.frames), inputs, force)
         make_folder(pattern.folder)
@@ -209,9 +209,10 @@ def render(
     warnings = mismatches(document, clip, whole)
     alpha = clip.has_alpha or drawn.in_alpha
     notes = [*clip.notes, *(movie_notes(clip, width, alpha) if movie else ())]
-    for kind, texts in (("warning", warnings), ("note", notes)) if tell else ():
-        for text in texts:
-            tell(kind, text)
+    if tell is not None:
+        for kind, texts in (("warning", warnings), ("note", notes)):
+            for text in texts:
+                tell(kind, text)
     written: list[Path] = []
     rendered: list[int] = []
     pending: Future[Path] | None = None

@@ -39,8 +39,10 @@ class FramePattern:
     width: int | None
 
     @classmethod
-    def parse(cls, text: str) -> FramePattern:
+    def parse(cls, text: str, also: str = "") -> FramePattern:
         """Read `name.####.exr` (one # a digit), `name.%04d.exr`, `name.@@@@.exr` or `name.exr`.
+
+        `also` is what errors offer besides frames.
 
         Raises
         ------
@@ -55,7 +57,7 @@ class FramePattern:
         if path.suffix.lower().lstrip(".") not in FORMATS:
             raise OutputError(
                 f'output {text}: found the extension "{path.suffix}", expected .exr, .png or .tif; '
-                "name the frames as in OUT.####.exr"
+                f"name the frames as in OUT.####.exr{also}"
             )
         if not any(mark in path.name for mark in "#@%$"):
             return cls(path.parent, path.stem, path.suffix, None)
