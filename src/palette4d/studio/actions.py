@@ -60,9 +60,7 @@ ACTIONS = (
     Action("undo", EDIT, "Undo", ("Ctrl+Z",)),
     Action("redo", EDIT, "Redo", ("Ctrl+Shift+Z", "Ctrl+Y")),
     Action("cancel", EDIT, "Cancel, select nothing", ("Esc",), group=1),
-    Action(
-        "reset_selected", EDIT, "Reset or remove the selected", ("Delete", "Backspace"), group=1
-    ),
+    Action("reset_selected", EDIT, "Reset the selected handles", ("Delete", "Backspace"), group=1),
     Action("reset_all", EDIT, "Reset everything", (), group=1),
     Action("add_stop", PALETTE, "Add a stop at the playhead", ("S",)),
     Action("lock", PALETTE, "Lock or unlock the selected", ("Ctrl+L",)),
@@ -95,8 +93,8 @@ ACTIONS = (
     Action("previous_frame", PLAYBACK, "Previous frame", ("Left",), group=1),
     Action("ten_on", PLAYBACK, "Ten frames on", ("Shift+Right",), group=1),
     Action("ten_back", PLAYBACK, "Ten frames back", ("Shift+Left",), group=1),
-    Action("next_handle", PLAYBACK, "Next handle", ("Down",), group=1),
-    Action("previous_handle", PLAYBACK, "Previous handle", ("Up",), group=1),
+    Action("next_handle", PLAYBACK, "Next frame with a handle", ("Ctrl+Right",), group=1),
+    Action("previous_handle", PLAYBACK, "Previous frame with a handle", ("Ctrl+Left",), group=1),
     Action("first_frame", PLAYBACK, "First frame", ("Home",), group=1),
     Action("last_frame", PLAYBACK, "Last frame", ("End",), group=1),
     Action("mark_in", PLAYBACK, "In point here", ("I",), group=2),

@@ -122,6 +122,7 @@ class Player:
         self._small = ByteCache[tuple[int, Region], F16](small_limit)
         self._ready = ready
         self._wanted: list[tuple[int, Region | None]] = []
+        self._later: list[tuple[int, Region | None]] = []
         self._reading: set[int] = set()
         self._wake = threading.Condition()
         self._closed = False
@@ -152,6 +153,14 @@ class Player:
             self._wanted = [(n, region) for n in frames if n in self.numbers]
             self._wanted = [each for each in self._wanted if not self._have(*each)]
             self._wake.notify_all()
+
+    def want_later(self, frames: Sequence[int], region: Region) -> None:
+        """Read these parts of frames when nothing else is wanted; replaces what was asked so."""
+        with self._wake:
+            self._later = [(n, region) for n in frames if n in self.numbers]
+            self._later = [each for each in self._later if not self._have(*each)]
+            if self._later:
+                self._wake.notify()
 
     def _have(self, number: int, region: Region | None) -> bool:
         if number in self.errors or number in self._reading:
@@ -186,11 +195,11 @@ class Player:
     def _run(self) -> None:
         while True:
             with self._wake:
-                while not self._wanted and not self._closed:
+                while not self._wanted and not self._later and not self._closed:
                     self._wake.wait()
                 if self._closed:
                     return
-                number, region = self._wanted.pop(0)
+                number, region = (self._wanted or self._later).pop(0)
                 if self._have(number, region):
                     continue
                 self._reading.add(number)

@@ -188,7 +188,7 @@ class Transport(QWidget):
         self.frame.setButtonSymbols(QSpinBox.ButtonSymbols.NoButtons)
         self.frame.setAlignment(Qt.AlignmentFlag.AlignRight)
         self.frame.setKeyboardTracking(False)
-        self.frame.setAccessibleName(texts.FRAME)
+        self.frame.setAccessibleName(texts.FRAME_FIELD)
         self.frame.setFixedWidth(64)
         self.frame.valueChanged.connect(self._typed)
         row.addWidget(self.frame)

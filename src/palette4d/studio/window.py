@@ -179,6 +179,15 @@ class Window(QMainWindow):
             if action.name == "open":
                 self.recent = menu.addMenu(texts.RECENT)
                 self.recent.aboutToShow.connect(self._fill_recent)
+        # The timeline's own keys work while it has the keyboard.
+        known = {action.text for action in ACTIONS}
+        for title, more in self.timeline.menu_actions.items():
+            self.menus[title].addSeparator()
+            for entry in more:
+                if entry.text() in known:
+                    self.timeline.removeAction(entry)
+                else:
+                    self.menus[title].addAction(entry)
         palette = self.menus[actions.PALETTE]
         self.versions = palette.addMenu(texts.VERSIONS)
         self.versions.aboutToShow.connect(self._fill_versions)
@@ -433,30 +442,15 @@ class Window(QMainWindow):
                 else:
                     document.reset(id_)
 
-        self.session.edit(lambda document: _as_one(document, texts.RESET, ids, reset))
+        self.session.edit(lambda document: _as_one(document, "reset", ids, reset))
 
     def do_reset_all(self) -> None:
         """Reset everything."""
         self.session.edit(lambda document: document.reset(), texts.RESET_ALL)
 
     def do_add_stop(self) -> None:
-        """Add a stop with the colour of now on the selected edge, or the selected handle's edge."""
-        document, frame = self.session.document, self.session.frame
-        if document is None or not self.session.selection:
-            return
-        palette = document.palette(frame)
-        wanted = self.session.selection[0]
-        for id_, ends, rgb in zip(palette.ids, palette.ends, palette.edited, strict=True):
-            if wanted in (id_, *ends) and id_ not in ends:
-                edge, colour = id_, rgb.tolist()
-                made = self.session.edit(
-                    lambda document: document.stop(edge, frame=frame, rgb=colour)
-                )
-                if made is not None:
-                    self.session.say(texts.STOP_ADDED.format(id=made, frame=frame))
-                    self.session.select(made)
-                return
-        self.session.say(texts.NO_EDGE, "warning")
+        """Add a stop to the selected row at the playhead."""
+        self.timeline.add_stop_at_playhead()
 
     def do_lock(self) -> None:
         """Lock or unlock the selected handles."""
@@ -796,7 +790,7 @@ class Window(QMainWindow):
             "bake",
             [
                 Field("", texts.SIDECAR, "open", str(path)),
-                Field("--frame", texts.FRAME, value=str(frame)),
+                Field("--frame", texts.FRAME_FIELD, value=str(frame)),
                 Field("-o", texts.OUTPUT, "save", beside(path, f"_{frame}.cube")),
                 Field("--size", texts.GRID, hint="33"),
                 Field("--force", texts.FORCE, "check"),

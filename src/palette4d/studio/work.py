@@ -218,7 +218,7 @@ class WorkDialog(QDialog):
             widget.show()
         self.stage.setText(texts.RUNNING)
         self.go.setEnabled(False)
-        self.stop.setText(texts.STOP)
+        self.stop.setText(texts.STOP_JOB)
         for widget in self.inputs:
             widget.setEnabled(False)
         self.job = Job(self.words(), lambda job: self._post(lambda: self._changed(job)))
