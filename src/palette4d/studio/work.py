@@ -219,8 +219,8 @@ class WorkDialog(QDialog):
         self.stage.setText(texts.RUNNING)
         self.go.setEnabled(False)
         self.stop.setText(texts.STOP_JOB)
-        for widget in self.inputs:
-            widget.setEnabled(False)
+        for entry in self.inputs:
+            entry.setEnabled(False)
         self.job = Job(self.words(), lambda job: self._post(lambda: self._changed(job)))
 
     def _changed(self, job: Job) -> None:
@@ -242,8 +242,8 @@ class WorkDialog(QDialog):
                 self.stage.setText(texts.DONE if job.status == 0 else texts.FAILED)
             self.go.setEnabled(True)
             self.stop.setText(texts.CLOSE)
-            for widget in self.inputs:
-                widget.setEnabled(True)
+            for entry in self.inputs:
+                entry.setEnabled(True)
         except RuntimeError:  # the dialog was closed
             return
         self.job = None
