@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "colour_spaces.hpp"
+#include "convert/colour_spaces.hpp"
 #include "outputs.hpp"
 #include "sidecar_choice.hpp"
 
