@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Generator
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from fractions import Fraction
 from pathlib import Path
 from typing import Literal
@@ -14,6 +14,7 @@ import numpy as np
 
 from palette4d.common.files import make_folder
 from palette4d.grade.document import Document
+from palette4d.grade.output import Output
 from palette4d.media.clip_base import F32, Clip, Image, describe
 from palette4d.media.frame_writer import (
     FramePattern,
@@ -31,8 +32,8 @@ class RenderOptions:
 
     Attributes
     ----------
-    strength : float
-        0 the original, 1 the edit.
+    output : Output
+        What to draw.
     threads : int
         0: one per processor.
     space : {"input", "palette"}
@@ -44,7 +45,7 @@ class RenderOptions:
         The sample type of frames (`sample_type`); not for movies.
     """
 
-    strength: float = 1.0
+    output: Output = field(default_factory=Output)
     threads: int = 0
     space: Literal["input", "palette"] = "input"
     compare: Literal["wipe", "side"] | None = None
@@ -58,6 +59,13 @@ def compared(source: F32, edited: F32, how: Literal["wipe", "side"]) -> F32:
         return np.concatenate([source, edited], axis=1)
     middle = source.shape[1] // 2
     return np.concatenate([source[:, :middle], edited[:, middle:]], axis=1)
+
+
+def with_alpha(pixels: F32) -> F32:
+    """Return RGBA pixels; alpha is 1 where there was none."""
+    if pixels.shape[2] == 4:
+        return pixels
+    return np.concatenate([pixels, np.ones_like(pixels[..., :1])], axis=2)
 
 
 def mismatches(document: Document, clip: Clip, whole: bool) -> list[str]:
@@ -98,7 +106,7 @@ def movie_notes(clip: Clip, options: RenderOptions) -> list[str]:
             f"the picture is {width}x{clip.height} pixels; where the movie's encoder needs an "
             "even size, the last column or row is repeated"
         )
-    if clip.has_alpha:
+    if clip.has_alpha or options.output.in_alpha:
         found.append("the movie has no alpha, the picture is laid over black; frames keep it")
     if "linear" in clip.encoding:
         found.append(
@@ -172,16 +180,17 @@ def render(
     # One frame is written while the next is read and recoloured.
     with opened as write, ThreadPoolExecutor(1) as writer:
         for image in clip.iter_images():
+            source = with_alpha(image.pixels) if options.output.in_alpha else image.pixels
             pixels = document.recolour(
-                image.pixels,
+                source,
                 image.frame,
-                strength=options.strength,
+                **asdict(options.output),
                 premultiplied=clip.premultiplied,
                 space=options.space,
                 threads=options.threads,
             )
             if options.compare is not None:
-                pixels = compared(image.pixels, pixels, options.compare)
+                pixels = compared(source, pixels, options.compare)
             finish()
             pending = writer.submit(write, image, pixels)
         finish()
