@@ -2,7 +2,6 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
-#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <string>
@@ -18,6 +17,8 @@ using palette4d::Edits;
 using palette4d::Ramp;
 using palette4d::Sidecar;
 using palette4d::Vec3;
+using palette4d::bindings::DoubleArray;
+using palette4d::bindings::to_array;
 
 namespace {
 
@@ -166,18 +167,9 @@ py::dict solution_of(const NamedEdits& self) {
     return result;
 }
 
-/// Seven columns, as palette4d::bindings::bumps_from() takes them.
-py::array bumps_of(const Edits& self, double frame) {
+DoubleArray bumps_of(const Edits& self, double frame) {
     if (std::isnan(frame)) throw py::value_error("bumps_at: frame is not a number");
-    const std::vector<palette4d::Bump> bumps = palette4d::bumps_at(self, frame);
-    py::array_t<double> array({static_cast<py::ssize_t>(bumps.size()), py::ssize_t{7}});
-    double* out = array.mutable_data();
-    for (const palette4d::Bump& bump : bumps) {
-        out = std::copy(bump.centre.begin(), bump.centre.end(), out);
-        *out++ = bump.radius;
-        out = std::copy(bump.by.begin(), bump.by.end(), out);
-    }
-    return array;
+    return to_array(palette4d::bumps_at(self, frame));
 }
 
 /// (name, edits) of each version.

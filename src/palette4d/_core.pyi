@@ -143,9 +143,20 @@ def polytope_weights(points: ArrayLike, polytope: Polytope, frame: float) -> F64
     """Eq. 7: (m, 3) colours at one time -> (m, N) weights of the N polytope vertices."""
 
 class Recolourer:
-    """One frame's recolouring: p' = p + strength * sum_i w_i(q) (v'_i - v_i)."""
+    """One frame's recolouring: p' = p + strength * (sum_i w_i(q) (v'_i - v_i) + bumps at p).
 
-    def __init__(self, original: ArrayLike, edited: ArrayLike, faces: ArrayLike) -> None: ...
+    `bumps` is (n, 7), as `Edits.bumps_at` gives it. A bump at `centre` with a `radius` moves p by
+    max(0, 1 - |p - centre|^2 / radius^2)^3 times its displacement.
+    """
+
+    def __init__(
+        self,
+        original: ArrayLike,
+        edited: ArrayLike,
+        faces: ArrayLike,
+        *,
+        bumps: ArrayLike | None = ...,
+    ) -> None: ...
     @property
     def identity(self) -> bool: ...
     def apply(
