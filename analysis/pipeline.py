@@ -194,7 +194,7 @@ def analyze(
         {stage.stage: stage.losses.max_distance for stage in found.stages},
         brightest=float(finished.vertices[:, :3].max()),
     )
-    notes = []
+    notes = [*clip.notes]
     if skipped:
         notes.append(f"{counted(len(skipped), 'bad frame')} skipped: {describe(skipped)}")
     notes += colour_space.record(document, clip, used)

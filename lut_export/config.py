@@ -34,7 +34,7 @@ from palette4d.lut_export.spaces import PALETTE
 from palette4d import _core
 from palette4d.colour.ocio_config import BUILT_IN, failures
 from palette4d.common.errors import Palette4dError
-from palette4d.common.files import make_folder, refuse_existing, replacing
+from palette4d.common.files import make_folder, refuse_existing, replace_by_link, replacing
 from palette4d.common.text import checked_name, counted, file_safe
 from palette4d.jobs.workers import Workers
 
@@ -272,12 +272,12 @@ def _link(
     links = {file(f): file(nearest(baked, f)) for f in every if nearest(baked, f) != f}
     for link, target in {file(NO_FRAME): file(middle), **links}.items():
         place = luts / link
-        place.unlink(missing_ok=True)
         try:
-            place.symlink_to(target)
+            replace_by_link(place, target)
         except OSError:
             # The file system has no links: copy.
-            shutil.copyfile(luts / target, place)
+            with replacing(place, force=True) as temporary:
+                shutil.copyfile(luts / target, temporary)
 
 
 # --------------------------------------------------------------------------------- looks and views

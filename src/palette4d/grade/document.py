@@ -12,7 +12,7 @@ import json
 import math
 import os
 import re
-from collections.abc import Generator, Iterable, Mapping
+from collections.abc import Generator, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
 from palette4d.common.files import link_target
+from palette4d.common.locking import locked
 from palette4d.common.text import counted
 from palette4d.grade import edits, sidecar
 from palette4d.grade.edits import (
@@ -49,6 +50,9 @@ F32 = NDArray[np.float32]
 
 #: A vertex that has less of the colour at a frame than this is left alone: it would move too far.
 LEAST_SHARE = 0.5
+
+#: The most characters of a version's name.
+LONGEST_NAME = 100
 
 #: A member `edits.solution`, and the measured members of each pick by its id.
 Solved = tuple[Fields, dict[str, Fields]]
@@ -121,7 +125,7 @@ class Document:
         }
 
     def _mark_saved(self) -> None:
-        self._saved = (self._state, list(self._done), list(self._undone))
+        self._saved = (self._state, self._done, self._undone)
 
     def __repr__(self) -> str:
         """Return one line: the clip, its frames, and the numbers of edits."""
@@ -131,6 +135,14 @@ class Document:
             f"{counted(len(self._handles.vertices), 'vertex', 'vertices')}, "
             f"{counted(sum(kind in _ACTIVE for kind, _ in self._state), 'edit')}>"
         )
+
+    def trial(self) -> "Document":
+        """Return a copy to try edits on, without the history and without a file."""
+        new = copy.copy(self)
+        new._done, new._undone = [], []
+        new.path, new._disk = None, None
+        new._mark_saved()
+        return new
 
     # ------------------------------------------------------------------------------ what it holds
 
@@ -455,11 +467,10 @@ class Document:
         Everything: handles, picks, locks and the clip's ramp. Versions stay.
         """
         if id is None:
-            keys = [key for key in self._state if key[0] in _ACTIVE]
-            self._remove(keys, "reset everything")
+            self._remove(self._active(), "reset everything")
         elif id in self._settings:
             gone = self._settings[id].edge is not None
-            keys = [("handle", id), ("lock", id)] if gone else [("handle", id)]
+            keys: list[Key] = [("handle", id), ("lock", id)] if gone else [("handle", id)]
             self._remove([key for key in keys if key in self._state], f"reset {id}")
         else:
             self._handles.vertex(id, self._settings)
@@ -491,13 +502,13 @@ class Document:
         if not edit.changes:
             return
         self._change(edit)
-        self._done.append(edit)
-        self._undone.clear()
+        self._done = [*self._done, edit]
+        self._undone = []
 
     @contextlib.contextmanager
     def one_step(self, label: str) -> Generator[None]:
         """Make all edits in a ``with`` block one step; an error in it reverts them all."""
-        state, done, undone = self._state, list(self._done), list(self._undone)
+        state, done, undone = self._state, self._done, self._undone
         try:
             yield
         except BaseException:
@@ -505,26 +516,25 @@ class Document:
             self._done, self._undone, self._core, self._solved = done, undone, None, None
             raise
         edit = edits.difference(state, self._state, label)
-        self._done, self._undone = done, undone
-        if edit.changes:
-            self._done.append(edit)
-            self._undone = []
+        self._done, self._undone = ([*done, edit], []) if edit.changes else (done, undone)
 
     def undo(self) -> Edit:
         """Revert the last step, and return it. Steps of earlier sessions can be reverted too."""
         if not self._done:
             raise Palette4dError("there is nothing to undo: the palette has no earlier step")
-        self._change(self._done[-1].inverse())
-        self._undone.append(self._done.pop())
-        return self._undone[-1]
+        step = self._done[-1]
+        self._change(step.inverse())
+        self._done, self._undone = self._done[:-1], [*self._undone, step]
+        return step
 
     def redo(self) -> Edit:
         """Apply the last undone step again, and return it."""
         if not self._undone:
             raise Palette4dError("there is nothing to redo: no step was undone since the last edit")
-        self._change(self._undone[-1])
-        self._done.append(self._undone.pop())
-        return self._done[-1]
+        step = self._undone[-1]
+        self._change(step)
+        self._done, self._undone = [*self._done, step], self._undone[:-1]
+        return step
 
     def forget_history(self) -> None:
         """Drop all steps, done and undone; the edits stay."""
@@ -534,6 +544,76 @@ class Document:
         self._become(edit.apply(self._state))
         self._core = None
         self._solved = None
+
+    # ----------------------------------------------------------------------------------- versions
+
+    @property
+    def versions(self) -> tuple[str, ...]:
+        """The names of the versions, sorted."""
+        return tuple(sorted(name for kind, name in self._state if kind == "version"))
+
+    def save_version(self, name: str) -> None:
+        """Keep the active edits as a version; a version with this name is replaced."""
+        if not 1 <= len(name.strip()) <= LONGEST_NAME or not name.isprintable():
+            raise Palette4dError(
+                f"found the version name {name!r}, expected 1 to {LONGEST_NAME} printable "
+                "characters"
+            )
+        self._put("version", name, self.fields()["edits"], f"save version {name}")
+
+    def use_version(self, name: str) -> str | None:
+        """Make the edits of a version the active edits, as one step.
+
+        Active edits that no version holds are kept as a new version.
+
+        Returns
+        -------
+        str or None
+            The name of the new version, such as "before NAME".
+        """
+        wanted = edits.from_fields(self._version(name))
+        versions = {key: value for key, value in self._state.items() if key[0] == "version"}
+        kept = None
+        if self._active() and not any(map(self.same_edits, self.versions)):
+            names = (f"before {name}"[: LONGEST_NAME - 4] + more for more in _suffixes())
+            kept = next(each for each in names if ("version", each) not in versions)
+            versions["version", kept] = self.fields()["edits"]
+        self.apply(edits.difference(self._state, {**wanted, **versions}, f"use version {name}"))
+        return kept
+
+    def same_edits(self, name: str) -> bool:
+        """Whether a version holds the active edits."""
+        return edits.from_fields(self._version(name)) == self._active()
+
+    def _active(self) -> dict[Key, Any]:
+        return {key: value for key, value in self._state.items() if key[0] in _ACTIVE}
+
+    def remove_version(self, name: str) -> None:
+        """Remove a version."""
+        self._version(name)
+        self._put("version", name, None, f"remove version {name}")
+
+    def version(self, name: str) -> "Document":
+        """Return a document with the edits of a version as the active edits; "" returns this one.
+
+        It is not bound to the file: `save` needs a name.
+        """
+        if not name:
+            return self
+        found = copy.copy(self)
+        fields = self._version(name)
+        others = {key: value for key, value in self._state.items() if key[0] == "version"}
+        found._become({**edits.from_fields(fields), **others})
+        found._disk, found._core, found._solved = None, None, _stored_solution(fields)
+        found.forget_history()
+        return found
+
+    def _version(self, name: str) -> Fields:
+        found: Fields | None = self._state.get(("version", name))
+        if found is None:
+            there = ", ".join(map(repr, self.versions)) or "none"
+            raise Palette4dError(f"there is no version {name!r}; the palette has {there}")
+        return found
 
     # ----------------------------------------------------------------------------------- applying
 
@@ -652,6 +732,10 @@ class Document:
                 "this palette has no file yet; expected a name: save('clip.p4d.json')"
             )
         target = Path(path if path is not None else self.path or "")
+        if path is None and self._disk is None:
+            raise Palette4dError(
+                f"this is not the document in {self.path}; expected another name to save it under"
+            )
         if self._disk is not None and self.path is not None and _same(target, self.path):
             self._save_again(link_target(target), self._disk)
             return
@@ -669,7 +753,7 @@ class Document:
         self._start(self._disk, _core.parse_sidecar(self._disk, str(target)))
 
     def _save_again(self, target: Path, loaded: bytes) -> None:
-        with sidecar.locked(target):
+        with locked(target) as held:
             found = sidecar.read_bytes(target)
             if found == loaded and not self.changed:
                 return
@@ -678,7 +762,7 @@ class Document:
             data = sidecar.encoded(new._members())
             if found != loaded or new._core is None:
                 new._core = _core.parse_sidecar(data, str(target))
-            sidecar.write(target, data, replaces=found)
+            sidecar.write(target, data, held, replaces=found)
         new._disk = data
         new._mark_saved()
         self.__dict__ = new.__dict__
@@ -707,13 +791,14 @@ class Document:
         ]
         steps += self._done[shared:]
         mine = edits.rebased([step.renamed(names) for step in steps], new._state)
+        theirs = new._state
         for step in mine:
             new._change(step)
         if new._state != state:  # the steps on the way there met theirs
-            mine = [edits.difference(sidecar.state_of(new._fields), state, "edits of two programs")]
+            mine = [edits.difference(theirs, state, "edits of two programs")]
             new._become(state)
         if mine:
-            new._done += mine
+            new._done = new._done + mine
             new._undone = [step.renamed(names) for step in self._undone]
         return new
 
@@ -753,6 +838,11 @@ def _solve(fields: Fields) -> Solved:
 
     found: Solved = solve.solve(fields)
     return found
+
+
+def _suffixes() -> Iterator[str]:
+    yield ""
+    yield from (f" {number}" for number in itertools.count(2))
 
 
 def _text(colour: Colour) -> str:

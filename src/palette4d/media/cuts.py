@@ -9,6 +9,8 @@ grain) is a small difference. A frame begins a new shot if its difference from t
 meets all of these conditions:
 
 - It is at least `LEAST_DIFFERENCE`; a title or a banner changes less.
+- The code values change by `LEAST_SHIFT` on average in some channel: near black one step of 8 bits
+  moves every pixel to another cell of the histogram.
 - It is `LEAST_RATIO` times the differences around it: the second largest of the `AROUND` before or
   after. The factor is doubled near the ends of the clip, with fewer than `SURE` on a side. A pan, a
   fade, a time lapse or flicker change all the time.
@@ -30,11 +32,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palette4d.common.text import counted
+from palette4d.media.colour_histogram import mean_shift
 
 F64 = NDArray[np.float64]
 
 LEAST_DIFFERENCE = 0.15
 LEAST_RATIO = 3.0
+LEAST_SHIFT = 0.012  # three steps of 8 bits
 # Smaller differences count as this: after a still picture any change would look large.
 NOISE = 0.01
 # Around a flash the frames agree again: they differ by at most this share of the jump.
@@ -50,21 +54,27 @@ def find_cuts(histograms: Iterable[tuple[int, F64]]) -> list[int]:
 
     The input is (frame number, histogram) pairs in order of time; memory holds few of them.
     """
-    numbers, gaps = _gaps(histograms)
-    return [numbers[i] for i in range(1, len(numbers)) if _is_cut(gaps, i)]
+    numbers, gaps, moved = _gaps(histograms)
+    return [numbers[i] for i in range(1, len(numbers)) if moved[i - 1] and _is_cut(gaps, i)]
 
 
-def _gaps(histograms: Iterable[tuple[int, F64]]) -> tuple[list[int], dict[int, list[float]]]:
-    """Return the numbers of the frames, and `gaps[d][i]`, how frame i + d differs from frame i."""
-    numbers = []
+def _gaps(
+    histograms: Iterable[tuple[int, F64]],
+) -> tuple[list[int], dict[int, list[float]], list[bool]]:
+    """Return the numbers of the frames, `gaps[d][i]`, how frame i + d differs from frame i, and
+    `moved[i]`, whether code values differ by `LEAST_SHIFT` between frames i and i + 1."""
+    numbers: list[int] = []
+    moved: list[bool] = []
     gaps: dict[int, list[float]] = {d: [] for d in range(1, LONGEST_FLASH + 2)}
     recent: deque[F64] = deque(maxlen=LONGEST_FLASH + 1)
     for number, here in histograms:
         for d, before in enumerate(reversed(recent), start=1):
             gaps[d].append(difference(before, here))
+        if recent:
+            moved.append(mean_shift(recent[-1], here) >= LEAST_SHIFT)
         recent.append(here)
         numbers.append(number)
-    return numbers, gaps
+    return numbers, gaps, moved
 
 
 def _is_cut(gaps: dict[int, list[float]], at: int) -> bool:

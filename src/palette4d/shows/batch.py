@@ -333,7 +333,9 @@ def analyse_shot(task: ShotTask, threads: int) -> Analysed:
             f"the analysis ended with {type(error).__name__}: {error}; please report this"
         ) from error
     analysis.document["clip"]["name"] = shot.name
-    return Analysed(analysis.document, (*notes, *analysis.notes))
+    # The notes on a movie are told once, not for each of its shots.
+    told = clip.notes if shot.place is None else []
+    return Analysed(analysis.document, (*notes, *(n for n in analysis.notes if n not in told)))
 
 
 def _open(task: ShotTask, shot: Shot) -> Any:
