@@ -2,6 +2,7 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <string>
@@ -167,6 +168,14 @@ py::dict solution_of(const NamedEdits& self) {
     return result;
 }
 
+bool empty(const NamedEdits& self) {
+    const palette4d::Solution& solution = self.solution;
+    return std::none_of(self.vertex_rgb.begin(), self.vertex_rgb.end(),
+                        [](const auto& rgb) { return rgb.has_value(); }) &&
+           self.stops.empty() && solution.vertex_by.empty() && solution.keys.empty() &&
+           solution.bumps.empty();
+}
+
 DoubleArray bumps_of(const Edits& self, double frame) {
     if (std::isnan(frame)) throw py::value_error("bumps_at: frame is not a number");
     return to_array(palette4d::bumps_at(self, frame));
@@ -199,6 +208,7 @@ void bind_sidecar(py::module_& module) {
         .def_property_readonly("ramp",
                                [](const NamedEdits& self) { return name_of(self.default_ramp); })
         .def_property_readonly("solution", &solution_of)
+        .def_property_readonly("empty", &empty)
         .def("bumps_at", &bumps_of, py::arg("frame"),
              "(n, 7) float64: centre, radius and displacement of the bumps at a frame.");
 
@@ -213,8 +223,12 @@ void bind_sidecar(py::module_& module) {
         .def_property_readonly("versions", &versions_of)
         .def(
             "bumps_at",
-            [](const BoundSidecar& self, double frame) { return bumps_of(self.edits, frame); },
-            py::arg("frame"), "edits.bumps_at(frame).")
+            [](const BoundSidecar& self, double frame) {
+                const palette4d::Polytope& polytope = self.sidecar.polytope;
+                return bumps_of(self.edits,
+                                std::clamp(frame, polytope.first_frame(), polytope.last_frame()));
+            },
+            py::arg("frame"), "The bumps of the active edits; outside the clip, at its ends.")
         .def_property_readonly("conversion", [](const BoundSidecar& self) {
             // Shared with the sidecar; Python cannot modify it.
             return std::const_pointer_cast<palette4d::ClipConversion>(self.sidecar.conversion);

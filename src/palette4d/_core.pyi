@@ -54,6 +54,9 @@ class Edits:
     @property
     def solution(self) -> dict[str, Any]:
         """vertices, keys and bumps as in the file; vertices that do not move are left out."""
+    @property
+    def empty(self) -> bool:
+        """Whether nothing is edited: no vertex, no stop and no solution."""
     def bumps_at(self, frame: float) -> F64:
         """(n, 7) float64: centre (3), radius and displacement (3) of the bumps at a frame."""
 
@@ -96,7 +99,7 @@ class Sidecar:
     def versions(self) -> list[tuple[str, Edits]]:
         """Names and edits of the kept versions, in the file's order."""
     def bumps_at(self, frame: float) -> F64:
-        """``edits.bumps_at(frame)``."""
+        """The bumps of the active edits; outside the clip, those at its ends."""
     @property
     def conversion(self) -> ClipConversion | None:
         """None where the palette is in the clip's own numbers."""

@@ -86,7 +86,7 @@ def chosen_frames(
     """
     from palette4d.lut_export import series
 
-    if args.stops and show and not (sidecar.edits.vertex_rgb or sidecar.edits.stops):
+    if args.stops and show and sidecar.edits.empty:
         return series.every(sidecar, 1)[:1]
     if args.stops:
         return series.stops(sidecar)

@@ -654,7 +654,9 @@ class Document:
         conversion = self._conversion(space)
         if not 0 <= strength <= 1:
             raise Palette4dError(f"found the strength {strength}, expected 0 to 1")
-        recolourer = _core.Recolourer(palette.rgb, palette.edited, palette.faces)
+        recolourer = _core.Recolourer(
+            palette.rgb, palette.edited, palette.faces, bumps=palette.bumps
+        )
         return recolourer.apply(
             pixels,
             strength=strength,
