@@ -22,16 +22,11 @@ class Description:
 
     Attributes
     ----------
-    identifier : str
-        A URN that is the same for the same content.
-    name : str
-        A title of one line.
-    lines : tuple of str
-        Sentences for a reader, one per line.
-    input_space, output_space : str
-        The encodings of the input and output colours.
-    info : dict
-        Nested names and values for programs, if the format allows them.
+    identifier : a URN that is the same for the same content.
+    name : a title of one line.
+    lines : sentences for a reader, one per line.
+    input_space, output_space : the encodings of the input and output colours.
+    info : nested names and values for programs, if the format allows them.
     """
 
     identifier: str
