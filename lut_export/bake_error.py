@@ -247,16 +247,6 @@ def figures_text(figures: Figures) -> str:
     )
 
 
-def figures_info(figures: Figures) -> dict[str, str]:
-    """Return errors under their names in the Info of a CLF."""
-    return {
-        "RelativeMean": stated(figures.relative_mean),
-        "RelativeLargest": stated(figures.relative_largest),
-        "DeltaE2000Mean": stated(figures.delta_e_mean),
-        "DeltaE2000Largest": stated(figures.delta_e_largest),
-    }
-
-
 def table(rows: Iterable[tuple[str, Figures]]) -> list[str]:
     """Return the lines of a printed table of errors, a row for each (name, figures)."""
     listed = list(rows)

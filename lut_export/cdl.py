@@ -109,7 +109,7 @@ def write(cdl: Cdl, format_name: str, shot: str, description: Description) -> st
     transform.setSat(cdl.saturation)
     transform.setID(_unescaped(shot))
     metadata = transform.getFormatMetadata()
-    metadata.addChildElement("InputDescription", _unescaped(description.input_space))
+    metadata.addChildElement("InputDescription", _unescaped(description.space))
     for line in (description.name, *description.lines, f"id {description.identifier}"):
         metadata.addChildElement(ocio.METADATA_DESCRIPTION, _unescaped(line))
     group = ocio.GroupTransform([transform])
