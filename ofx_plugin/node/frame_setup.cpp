@@ -89,7 +89,7 @@ FrameSetup frame_setup_at(const Suites& suites, OfxImageEffectHandle effect, Ofx
                           Interpolation interpolation, std::optional<double> source_frame) {
     FrameSetup setup;
     const Params params(suites, effect);
-    const Chosen chosen = chosen_sidecar(params, time);
+    const Chosen chosen = chosen_sidecar(params);
     if (!chosen.any) return setup;
     const SidecarResult& result = chosen.result;
     const std::string& path = chosen.path;

@@ -122,8 +122,9 @@ const std::string& encoding_of(const Sidecar& sidecar, bool in_palette_space) {
 void prefer_alpha(const Suites& suites, OfxImageEffectHandle effect, const Properties& out_args) {
     const Params params(suites, effect);
     OutputSettings settings;
-    settings.output = output_of(params.int_now(kParamOutput));
-    if (!settings.is_matte() || params.int_now(kParamMatteIn).value_or(0) != 1) return;
+    settings.output = output_of(params.int_at(kParamOutput, Params::kAnyTime));
+    if (!settings.is_matte() || params.int_at(kParamMatteIn, Params::kAnyTime).value_or(0) != 1)
+        return;
     OfxImageClipHandle clip = nullptr;
     OfxPropertySetHandle handle = nullptr;
     if (!suites.effect->clipGetHandle ||

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import argparse
 import re
-import sys
-from pathlib import Path
 
+from palette4d.cli.messages import tell
 from palette4d.common.arguments import frame_range, number, whole
 from palette4d.common.text import counted
 
@@ -29,6 +28,10 @@ examples:
   palette4d render clip.p4d.json beach.%04d.dpx -o graded/beach.####.png --frames 1001-1100x2
   palette4d render clip.p4d.json clip/ -o still.png --frames 24 --strength 0.5
   palette4d render clip.p4d.json clip/ -o key/sky.####.exr --show weight:v5"""
+
+
+# What `Document.recolour` draws.
+DRAWN = ("show", "strength", "keep_lightness", "lightness_of", "mix", "matte_in", "outside_at")
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -63,8 +66,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--compare",
         choices=("wipe", "side"),
-        help="with the source: wipe has the source's left half and the edit's right half, side "
-        "puts the source to the left of the edit",
+        help="with the source: wipe has the source's left half, a line and the edit's right half, "
+        "side puts the source to the left of the edit",
     )
     parser.add_argument(
         "--strength",
@@ -135,7 +138,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--skip-bad-frames", action="store_true", help="skip missing or unreadable frames"
     )
-    parser.add_argument("--quiet", action="store_true", help="no progress bar")
+    parser.add_argument("--quiet", action="store_true", help="no progress bar, no report")
     parser.set_defaults(run=run)
 
 
@@ -151,46 +154,30 @@ def _show(text: str) -> str:
 def run(args: argparse.Namespace) -> int:
     """Render; returns the exit status."""
     from palette4d.cli.progress import frames_bar
-    from palette4d.grade import rendering
-    from palette4d.grade.document import Document
-    from palette4d.grade.output import Output
-    from palette4d.media.clip import open_clip
+    from palette4d.grade.rendering import render
     from palette4d.media.clip_base import named
-    from palette4d.media.movie_writer import is_movie
 
-    document = Document.load(args.sidecar)
-    clip = open_clip(args.clip, frames=args.frames, skip_bad_frames=args.skip_bad_frames)
-    output = Output(
-        args.show,
-        args.strength,
-        args.keep_lightness,
-        args.lightness_of,
-        args.mix,
-        args.matte_in,
-        args.outside_at,
-    )
-    options = rendering.RenderOptions(
-        output, args.threads, args.space, args.compare, args.half, args.bits
-    )
-    for warning in rendering.mismatches(document, clip, whole=args.frames is None):
-        print(f"palette4d: warning: {warning}", file=sys.stderr)
-    movie = is_movie(Path(args.output))
-    for note in (*clip.notes, *(rendering.movie_notes(clip, options) if movie else ())):
-        print(f"palette4d: note: {note}", file=sys.stderr)
-    with frames_bar("render", hidden=args.quiet, total=len(clip.frames)) as progress:
-        written = rendering.render(
-            document,
-            clip,
+    with frames_bar("render", hidden=args.quiet) as progress:
+        done = render(
+            args.sidecar,
+            args.clip,
             args.output,
-            options,
+            frames=args.frames,
+            compare=args.compare,
+            space=args.space,
+            half=args.half,
+            bits=args.bits,
+            threads=args.threads,
+            skip_bad_frames=args.skip_bad_frames,
             force=args.force,
             progress=progress,
+            tell=tell,
+            **{name: vars(args)[name] for name in DRAWN},
         )
-    if movie or len(written) == 1:
-        frames = f", {counted(len(clip.frames) - len(clip.skipped), 'frame')}" if movie else ""
-        print(f"rendered {written[0]}{frames}")
-    else:
-        print(f"rendered {counted(len(written), 'frame')}, {written[0]} to {written[-1].name}")
-    if clip.skipped:
-        print(f"palette4d: skipped bad {named(clip.skipped)}", file=sys.stderr)
+    if done.skipped:
+        tell("note", f"skipped bad {named(done.skipped)}")
+    if not args.quiet:
+        first, last = done.files[0], done.files[-1].name
+        to = "" if len(done.files) == 1 else f" to {last}"
+        print(f"rendered {first}{to}, {counted(len(done.frames), 'frame')}")
     return 0

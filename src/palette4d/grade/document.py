@@ -79,6 +79,8 @@ class Document:
         The members of a sidecar (docs/sidecar.md).
     notes : iterable of str
         Notes of the analysis about the palette.
+    report : mapping, optional
+        Figures of the analysis, as `palette4d analyze --json` prints them.
 
     Attributes
     ----------
@@ -86,14 +88,22 @@ class Document:
         The sidecar; None until it is saved.
     notes : tuple of str
         As above.
+    report : dict
+        As above; empty for a loaded sidecar.
     """
 
-    def __init__(self, fields: Mapping[str, Any], notes: Iterable[str] = ()) -> None:
+    def __init__(
+        self,
+        fields: Mapping[str, Any],
+        notes: Iterable[str] = (),
+        report: Mapping[str, Any] | None = None,
+    ) -> None:
         data = sidecar.encoded(fields)
         self.path: Path | None = None
         self._start(data, _core.parse_sidecar(data, self._name))
         self._disk: bytes | None = None
         self.notes = tuple(notes)
+        self.report = dict(report or {})
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> "Document":
@@ -107,6 +117,7 @@ class Document:
         document = cls.__new__(cls)
         data = sidecar.read_bytes(path)
         document._disk, document.path, document.notes = data, Path(path), ()
+        document.report = {}
         document._start(data, _core.parse_sidecar(data, os.fspath(path)))
         return document
 

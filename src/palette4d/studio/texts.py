@@ -178,3 +178,11 @@ STOP_MOVED = "moved {id} to frame {frame}"
 NO_STOP_HERE = "no room for a stop on {edge} here: choose a frame between two handles"
 SELECT_A_ROW = "select a row or a handle first; then S adds a stop at the playhead"
 WAS_RESET = "reset {ids}"
+
+# --------------------------------------------------------------------------------------- the solid
+RESET_SOLID = "Look at the solid from the front"
+SOLID_HINT = "drag turns · drag a colour moves it · with X, Y, Z along red, green, blue"
+SOLID_AXIS = "along {axis} alone"
+COLOUR_MOVED = "moved a colour"
+CONCAVE_EDGE, CONCAVE_EDGES = "concave edge", "concave edges"
+FLIPPED_FACE, FLIPPED_FACES = "face turned inside out", "faces turned inside out"
