@@ -60,7 +60,7 @@ def stretched(sidecar: Path, clip: str, out: Path) -> Path:
     scale = (opened.frames[-1] - opened.frames[0]) / (was["last"] - was["first"])
 
     def moved(frame: float) -> float:
-        return opened.frames[0] + (frame - was["first"]) * scale
+        return round(opened.frames[0] + (frame - was["first"]) * scale, 6)
 
     for vertex in fields["polytope"]["vertices"]:
         vertex["frame"] = moved(vertex["frame"])
@@ -69,8 +69,7 @@ def stretched(sidecar: Path, clip: str, out: Path) -> Path:
     fields["clip"] |= {
         "source": str(Path(clip).absolute()),
         "name": Path(clip).stem,
-        "width": opened.width,
-        "height": opened.height,
+        "size": [opened.width, opened.height],
         "frames": {
             "first": opened.frames[0],
             "last": opened.frames[-1],
