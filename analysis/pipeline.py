@@ -116,6 +116,17 @@ class Analysis(Found):
     report: Report
     colours: str | None
 
+    def figures(self) -> dict[str, Any]:
+        """Return what `analyze --json` prints; docs/palettes.md explains the names."""
+        return {
+            "stages": [stage.row() for stage in self.stages],
+            "held_to_L_prime": self.bound,
+            "palette": self.report.figures(),
+            "frames": [dataclasses.asdict(fit) for fit in self.report.fits],
+            "colour_spaces": self.colours,
+            "notes": list(self.notes),
+        }
+
 
 def analyze(
     clip: Clip | NDArray[np.floating[Any]],
@@ -311,7 +322,7 @@ def _skew(run: _Run) -> SkewPolytope:
         if not _is_concave(again.polytope, run):
             found = again
             run.notes.append(
-                "the palette was not convex: it was searched again with --set "
+                "the palette was not convex: it was searched again with "
                 f"convexity={stiffer.convexity:g}"
             )
     polytope = found.polytope
@@ -406,8 +417,8 @@ def _glued(
         )
     if partial := sum(not g.complete for g in glued):
         notes.append(
-            f"at {partial} of {boundaries} the search for edges ended early; with a smaller --set "
-            "palette_size=N it sees every solution"
+            f"at {partial} of {boundaries} the search for edges ended early; with a smaller "
+            "palette_size=… it sees every solution"
         )
     return dense, tuple(notes)
 

@@ -44,6 +44,7 @@ from palette4d.grade.edits import (
     as_ramp,
 )
 from palette4d.grade.handles import Handles, unknown
+from palette4d.grade.output import Output
 from palette4d.grade.palette import FAR, Near, Palette, palette_at
 from palette4d.grade.sidecar import Fields, OnEdits
 from palette4d.grade.tracks import Track, tracks_of, way_of
@@ -94,6 +95,8 @@ class Document:
         The members of a sidecar (docs/sidecar.md).
     notes : iterable of str
         Notes of the analysis about the palette.
+    report : mapping, optional
+        Figures of the analysis, as `palette4d analyze --json` prints them.
 
     Attributes
     ----------
@@ -101,14 +104,22 @@ class Document:
         The sidecar; None until it is saved.
     notes : tuple of str
         As above.
+    report : dict
+        As above; empty for a loaded sidecar.
     """
 
-    def __init__(self, fields: Mapping[str, Any], notes: Iterable[str] = ()) -> None:
+    def __init__(
+        self,
+        fields: Mapping[str, Any],
+        notes: Iterable[str] = (),
+        report: Mapping[str, Any] | None = None,
+    ) -> None:
         data = sidecar.encoded(fields)
         self.path: Path | None = None
         self._start(data, _core.parse_sidecar(data, self._name))
         self._disk: bytes | None = None
         self.notes = tuple(notes)
+        self.report = dict(report or {})
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> "Document":
@@ -122,6 +133,7 @@ class Document:
         document = cls.__new__(cls)
         data = sidecar.read_bytes(path)
         document._disk, document.path, document.notes = data, Path(path), ()
+        document.report = {}
         document._start(data, _core.parse_sidecar(data, os.fspath(path)))
         return document
 
@@ -792,6 +804,12 @@ class Document:
         frame: float,
         *,
         strength: float = 1.0,
+        keep_lightness: float = 0.0,
+        lightness_of: str = "auto",
+        mix: float = 1.0,
+        show: str = "recoloured",
+        matte_in: Literal["picture", "alpha"] = "picture",
+        outside_at: float = 0.05,
         premultiplied: bool = False,
         space: Literal["input", "palette"] = "input",
         threads: int = 0,
@@ -801,11 +819,24 @@ class Document:
         Parameters
         ----------
         image : (h, w, 3 or 4) float32
-            Code values of the clip, 0..1 as a rule; alpha passes unchanged.
+            Code values of the clip, 0..1 as a rule; a grade never changes alpha.
         frame : float
             The time; frames outside the clip use its first or last frame.
         strength : float
             0 is the original, 1 the edit.
+        keep_lightness : float
+            The share of the source's lightness to keep: 0 none, 1 all.
+        lightness_of : {"auto", "rec709", "rec2020", "p3", "ap1", "rec601"}
+            Whose luminance weights define lightness; "auto": the image's colour space.
+        mix : float
+            0 is the image, 1 the output.
+        show : str
+            "recoloured"; "weight:ID", a soft key of a vertex or stop; "outside", a matte of the
+            colours outside the palette; "palette", the recoloured picture above its palette.
+        matte_in : {"picture", "alpha"}
+            A key or matte as a grey picture, or multiplied into alpha.
+        outside_at : float
+            The distance from the palette, in its code values, at which "outside" is 1.
         premultiplied : bool
             Colours are multiplied by alpha.
         space : {"input", "palette"}
@@ -818,20 +849,57 @@ class Document:
         (h, w, 3 or 4) float32
             A new array. Without edits it equals `image` bit by bit.
         """
+        output = Output(show, strength, keep_lightness, lightness_of, mix, matte_in, outside_at)
         pixels = _checked_image(image)
         palette = self.palette(frame)
-        conversion = self._conversion(space)
-        if not 0 <= strength <= 1:
-            raise Palette4dError(f"found the strength {strength}, expected 0 to 1")
-        recolourer = _core.Recolourer(palette.rgb, palette.edited, palette.faces)
-        return recolourer.apply(
-            pixels,
-            strength=strength,
-            premultiplied=premultiplied and pixels.shape[2] == 4,
-            threads=threads,
-            precision="single",
-            conversion=conversion,
+        self._conversion(space)
+        recolourer = _core.Recolourer(
+            palette.rgb, palette.edited, palette.faces, bumps=palette.bumps
         )
+        return output.draw(
+            pixels,
+            self.core,
+            palette,
+            recolourer,
+            premultiplied=premultiplied,
+            space=space,
+            threads=threads,
+        )
+
+    def matte(
+        self,
+        image: F32,
+        frame: float,
+        show: str,
+        *,
+        outside_at: float = 0.05,
+        space: Literal["input", "palette"] = "input",
+        threads: int = 0,
+    ) -> F32:
+        """Return a matte of an image: the same values as the node's.
+
+        Parameters
+        ----------
+        image : (h, w, 3 or 4) float32
+            As in `recolour`; colours are not multiplied by alpha, and alpha is ignored.
+        show : str
+            "weight:ID", a soft key of a vertex or stop, which follows its colour through time, or
+            "outside", the colours outside the palette.
+        frame, outside_at, space, threads
+            As in `recolour`.
+
+        Returns
+        -------
+        (h, w) float32
+            0..1.
+        """
+        if show == "palette" or show == "recoloured":
+            raise Palette4dError(f"found {show!r}, expected a matte: 'weight:ID' or 'outside'")
+        colours = np.ascontiguousarray(_checked_image(image)[..., :3])
+        drawn = self.recolour(
+            colours, frame, show=show, outside_at=outside_at, space=space, threads=threads
+        )
+        return np.ascontiguousarray(drawn[..., 0])
 
     def weights(
         self, image: F32, frame: float, *, space: Literal["input", "palette"] = "input"

@@ -408,7 +408,7 @@ def _existing(target: Path, on_edits: OnEdits) -> Fields | None:
     except Palette4dError as error:
         raise Palette4dError(
             f"{target} exists and cannot be read as a sidecar ({error}); it may hold edits. "
-            "Move it away, choose another output, or replace it with --drop-edits"
+            'Move it away, choose another output, or replace it with on_edits="drop"'
         ) from error
 
 
@@ -420,8 +420,8 @@ def _summary(document: Fields) -> str:
 def _would_lose(target: Path, old: Fields) -> Palette4dError:
     return Palette4dError(
         f"{target} holds edits ({_summary(old)}) that this would lose. "
-        "Keep them with --keep-edits (works if the palette is unchanged), "
-        "discard them with --drop-edits, or choose another output"
+        'Keep them with on_edits="keep" (works if the palette is unchanged), '
+        'discard them with on_edits="drop", or choose another output'
     )
 
 
@@ -434,7 +434,7 @@ def _with_edits_of(old: Fields, new: Fields, target: Path) -> Fields:
     if _canonical(old, "")["polytope"] != new["polytope"]:
         raise Palette4dError(
             f"{target} holds edits ({_summary(old)}) for a palette that differs from "
-            "the new one, so they cannot be kept. Discard them with --drop-edits, or choose "
+            'the new one, so they cannot be kept. Discard them with on_edits="drop", or choose '
             "another output"
         )
     users = {name: old[name] for name in ("edits", "versions", "history") if name in old}
