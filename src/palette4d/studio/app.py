@@ -76,6 +76,8 @@ def run(
     if not hidden and path is not None and bring_forward(path, frame):
         return 0
     theme.dress(app)
+    # The picture's thread waits for the window's at most this long.
+    sys.setswitchinterval(0.001)
     session = Session()
     settings = QSettings("palette4d", "studio")
     if hidden:  # a picture does not depend on who draws it
