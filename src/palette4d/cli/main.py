@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable, Sequence
 
 from palette4d._core import __version__
+from palette4d.cli.terminal import printable_output
 from palette4d.common.arguments import Parser, accept_negative_values
 from palette4d.common.errors import Palette4dError, SidecarError, in_words
 
@@ -69,7 +70,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     SystemExit
         From argparse: wrong usage (2), ``--help`` and ``--version`` (0).
     """
-    args = build_parser().parse_args(argv)
+    with printable_output():
+        return _run(build_parser().parse_args(argv))
+
+
+def _run(args: argparse.Namespace) -> int:
     run: Callable[[argparse.Namespace], int] = args.run
     try:
         status = run(args)
@@ -88,7 +93,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _report(error: Exception) -> int:
-    text = in_words(error).encode("utf-8", "backslashreplace").decode("utf-8")
+    text = in_words(error)
     broken = isinstance(error, SidecarError) and (error.pointer or "JSON" in error.expected)
     if isinstance(error, SidecarError) and '"palette4d.shots"' in error.found:
         text += (
