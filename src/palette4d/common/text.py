@@ -54,7 +54,7 @@ def checked_name(name: str) -> str:
     """
     if file_safe(name) != name:
         raise Palette4dError(
-            f"found the name {name!r}, expected at most {LONGEST_NAME} letters, digits, '.', '_' "
-            f"and '-', as in {file_safe(name)!r}"
+            f"found the name {name!r}, expected letters, digits, '.', '_' and '-' only, at most "
+            f"{LONGEST_NAME}, as in {file_safe(name)!r}"
         )
     return name
