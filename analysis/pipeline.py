@@ -116,6 +116,17 @@ class Analysis(Found):
     report: Report
     colours: str | None
 
+    def figures(self) -> dict[str, Any]:
+        """Return what `analyze --json` prints; docs/palettes.md explains the names."""
+        return {
+            "stages": [stage.row() for stage in self.stages],
+            "held_to_L_prime": self.bound,
+            "palette": self.report.figures(),
+            "frames": [dataclasses.asdict(fit) for fit in self.report.fits],
+            "colour_spaces": self.colours,
+            "notes": list(self.notes),
+        }
+
 
 def analyze(
     clip: Clip | NDArray[np.floating[Any]],
@@ -300,7 +311,6 @@ def _skew(run: _Run) -> SkewPolytope:
         size = min(options.palette_size, max(LEAST_COLOURS, most // 2))
         run.options = options = dataclasses.replace(options, palette_size=size)
     hulls = [_static(run), *static_hull.plain_hulls(run.frames, run.gamut, options)]
-    run.report("static_hull", static_hull.STARTS, static_hull.STARTS)
     convex = [h for h in hulls if h is hulls[0] or not _is_concave(h, run)]
     simple = min(convex, key=lambda hull: run.losses(hull).L_prime)
     bound = run.bound = run.losses(simple).L_prime
@@ -311,7 +321,7 @@ def _skew(run: _Run) -> SkewPolytope:
         if not _is_concave(again.polytope, run):
             found = again
             run.notes.append(
-                "the palette was not convex: it was searched again with --set "
+                "the palette was not convex: it was searched again with "
                 f"convexity={stiffer.convexity:g}"
             )
     polytope = found.polytope
@@ -406,8 +416,8 @@ def _glued(
         )
     if partial := sum(not g.complete for g in glued):
         notes.append(
-            f"at {partial} of {boundaries} the search for edges ended early; with a smaller --set "
-            "palette_size=N it sees every solution"
+            f"at {partial} of {boundaries} the search for edges ended early; with a smaller "
+            "palette_size=… it sees every solution"
         )
     return dense, tuple(notes)
 

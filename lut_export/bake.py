@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from palette4d.lut_export import cdl as cdls
 from palette4d.lut_export import lut3d
 from palette4d.lut_export import shaper as shapers
-from palette4d.lut_export.bake_error import Measure, load
+from palette4d.lut_export.bake_error import SEEN, Measure, load
 from palette4d.lut_export.bake_job import BakeSettings, Job, check_same, describe, grow, judged
 from palette4d.lut_export.formats import LutFormat, format_of, with_shaper
 from palette4d.lut_export.frame_edit import frame_edit
@@ -25,7 +25,7 @@ from palette4d.lut_export.shaper import UNSHAPED, Choice, Kind, Shaper
 from palette4d.lut_export.spaces import INPUT, space_of
 
 from palette4d import _core
-from palette4d.colour.difference import VISIBLE, viewing_of
+from palette4d.colour.difference import viewing_of
 from palette4d.common.errors import Palette4dError
 from palette4d.common.files import refuse_existing, replacing
 from palette4d.grade import sidecar as sidecars
@@ -104,8 +104,8 @@ class BakeResult:
 
     @property
     def visible(self) -> bool:
-        """Whether the error is visible on the clip's own colours: deltaE 2000 above 1."""
-        return self.clip is not None and self.clip.worst.delta_e_largest > VISIBLE
+        """Whether more than 1 % of the frame's pixels have a deltaE 2000 above 1."""
+        return self.clip is not None and self.clip.visible > SEEN
 
 
 def bake(
@@ -263,8 +263,8 @@ def check_target(path: Path, force: bool) -> None:
     """
     if path.exists() and not path.is_file() and not path.is_dir():
         raise Palette4dError(
-            f"{path}: found a device or a pipe, expected a file name; use `-o - --format …` and "
-            "redirect the output in the shell"
+            f"{path}: found a device or a pipe, expected a file name; for standard output run "
+            "`palette4d bake -o - --format …`"
         )
     refuse_existing(path, force)
 
@@ -291,7 +291,7 @@ def check_settings(
         Shaper(kind, *settings.domain)
     if kind in ("linear", "log") and not format_.shaper:
         raise Palette4dError(
-            f"{format_.title} cannot hold a shaper; choose one of {with_shaper()}, or --shaper none"
+            f'{format_.title} cannot hold a shaper; choose one of {with_shaper()}, or shaper="none"'
         )
 
 
@@ -336,4 +336,4 @@ def nearer(size: int | None) -> str:
     if size is None:
         return "a 3D LUT (.clf, .cube) is nearer"
     exact = "the node and `palette4d render` are exact"
-    return f"a larger --size is nearer; {exact}" if size < lut3d.LARGEST else exact
+    return f"a larger size=… is nearer; {exact}" if size < lut3d.LARGEST else exact

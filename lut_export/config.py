@@ -98,7 +98,7 @@ def write_config(
     workers: Workers | None = None,
     force: bool = False,
     anyway: bool = False,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], object] | None = None,
 ) -> WrittenConfig:
     """Write a config with a look for each sidecar.
 
@@ -184,7 +184,7 @@ def write_config(
         except failures() as error:
             raise Palette4dError(
                 f"{path}: OpenColorIO refuses the config: {error}; only the LUTs were written. "
-                f"Fix {base}, or choose another with --base"
+                f"Fix {base}, or choose another with base=…"
             ) from error
     return WrittenConfig(path, base, shots, views, notes)
 
@@ -210,12 +210,12 @@ def _shot_names(
         if same:
             raise Palette4dError(
                 f"two shots have the name {name!r}: {sidecars[same[0]]} and {sidecars[i]}; "
-                "expected one of its own for each look, give them with --names"
+                "expected one of its own for each look, give them with names=…"
             )
         if name.lower() == ANY_SHOT:
             raise Palette4dError(
                 f"{sidecars[i]}: found the shot name {name!r}, the name of the look for all shots; "
-                "give another with --names"
+                "give another with names=…"
             )
     return names
 
@@ -235,7 +235,7 @@ def _refuse_failed(names: list[str], baked: list[series.Series]) -> None:
 
 def _refuse_far(names: list[str], between: list[BetweenError | None]) -> None:
     far = [
-        f"shot {name}, frame {found.frame}: deltaE 2000 of {stated(found.delta_e)} from the look "
+        f"shot {name!r}, frame {found.frame}: deltaE 2000 of {stated(found.delta_e)} from the look "
         f"of frame {found.look}"
         for name, found in zip(names, between, strict=True)
         if found is not None and found.delta_e > LARGEST_DELTA_E
@@ -243,8 +243,8 @@ def _refuse_far(names: list[str], between: list[BetweenError | None]) -> None:
     if far:
         raise Palette4dError(
             f"the edit changes too much between the baked frames: found {'; '.join(far)}; "
-            f"expected at most {LARGEST_DELTA_E:g}. Choose more frames (a smaller --every), or "
-            "write the config with --anyway; nothing was written"
+            f"expected at most {LARGEST_DELTA_E:g}. Choose more frames (a smaller every=…), or "
+            "write the config with anyway=True; nothing was written"
         )
 
 

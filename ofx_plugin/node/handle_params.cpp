@@ -171,9 +171,9 @@ void notice_undone(const Params& params, ShownHandles& shown) {
     for (std::size_t i = 0; i < shown.size(); ++i) {
         ShownHandle& slot = shown[i];
         if (all_are_back && slot.before) {
-            slot = {slot.before, std::nullopt, slot.given, false};
+            slot = {slot.before, std::nullopt, slot.given, false, false};
         } else if (holds(params, slots()[i], slot.declined)) {  // redone
-            slot = {slot.declined, slot.given, std::nullopt, false};
+            slot = {slot.declined, slot.given, std::nullopt, false, false};
         }
     }
 }
@@ -185,12 +185,12 @@ void label_handles(const Params& params, const Chosen& chosen) {
     if (sidecar) handles = handles_of(sidecar->polytope, sidecar->edits);
     for (std::size_t i = 0; i < slots().size(); ++i) {
         const Slot& slot = slots()[i];
-        const std::string id = params.string_now(slot.id.c_str()).value_or("");
+        const std::string id = params.string_at(slot.id.c_str(), Params::kAnyTime).value_or("");
         const int at = sidecar ? handle_of(*sidecar, i, id) : -1;
         set_text(params.properties(slot.colour.c_str()), kOfxPropLabel,
                  at < 0 ? slot.colour_label : label_of(handles[static_cast<std::size_t>(at)]));
         // A slot in use stays visible, so that the user can switch it off.
-        const bool in_use = params.int_now(slot.use.c_str()).value_or(0) != 0;
+        const bool in_use = params.int_at(slot.use.c_str(), Params::kAnyTime).value_or(0) != 0;
         for (const char* name : {slot.colour.c_str(), slot.use.c_str(), slot.id.c_str()}) {
             set_secret(params.properties(name), sidecar && at < 0 && !in_use);
         }
@@ -226,7 +226,10 @@ void show_handles(const Params& params, const Chosen& chosen, ShownHandles& show
             for (ShownHandle& other : shown) other.before.reset();
         }
         given_one = true;
-        if (params.set_rgb(slot.colour.c_str(), rgb)) shown[i] = {rgb, now, std::nullopt, false};
+        if (!params.set_rgb(slot.colour.c_str(), rgb)) continue;
+        // The colour of a slot that was in use may be typed again after a reset.
+        const std::optional<Vec3> before = shown[i].was_used ? std::nullopt : now;
+        shown[i] = {rgb, before, std::nullopt, false, false};
     }
 }
 
@@ -235,11 +238,12 @@ namespace {
 /// Restores the slot's defaults; show_handles() then sets its handle's colour.
 void reset(const Params& params, const Slot& slot, ShownHandle& shown) {
     if (params.animated(slot.colour.c_str())) params.remove_keys(slot.colour.c_str());
-    if (params.int_now(slot.use.c_str()).value_or(0) != 0) params.set_int(slot.use.c_str(), 0);
+    const bool in_use = params.int_now(slot.use.c_str()).value_or(0) != 0;
+    if (in_use) params.set_int(slot.use.c_str(), 0);
     if (!params.string_now(slot.id.c_str()).value_or("").empty()) {
         params.set_string(slot.id.c_str(), "");
     }
-    shown = {params.rgb_now(slot.colour.c_str()), std::nullopt, shown.declined, false};
+    shown = {params.rgb_now(slot.colour.c_str()), std::nullopt, shown.declined, false, in_use};
 }
 
 void colour_changed(const Params& params, const Chosen& chosen, const Slot& slot,

@@ -1,6 +1,11 @@
 #include "sidecar_cache.hpp"
 
-#if !defined(_WIN32)
+#if defined(_WIN32)
+#if !defined(NOMINMAX)
+#define NOMINMAX
+#endif
+#include <windows.h>
+#else
 #include <sys/stat.h>
 #endif
 
@@ -37,8 +42,8 @@ constexpr auto kSettled = std::chrono::seconds(3);
 struct Stamp {
     fs::file_time_type modified{};
     std::uintmax_t bytes = 0;
-    std::uintmax_t device = 0, inode = 0;               ///< 0 where the system has none
-    std::int64_t change_seconds = 0, change_nanos = 0;  ///< likewise 0 where the system has none
+    std::uintmax_t device = 0, inode = 0;               ///< 0 where the file system has none
+    std::int64_t change_seconds = 0, change_nanos = 0;  ///< likewise; since 1970
     bool operator==(const Stamp& other) const {
         const auto all = [](const Stamp& s) {
             return std::tie(s.modified, s.bytes, s.device, s.inode, s.change_seconds,
@@ -51,7 +56,23 @@ struct Stamp {
 /// Adds what the standard library does not report.
 void identify(Stamp& stamp, const fs::path& path) {
 #if defined(_WIN32)
-    static_cast<void>(stamp), static_cast<void>(path);
+    const HANDLE file =
+        CreateFileW(path.c_str(), 0, FILE_SHARE_READ | FILE_SHARE_WRITE | FILE_SHARE_DELETE,
+                    nullptr, OPEN_EXISTING, FILE_ATTRIBUTE_NORMAL, nullptr);
+    if (file == INVALID_HANDLE_VALUE) return;
+    BY_HANDLE_FILE_INFORMATION about{};
+    if (GetFileInformationByHandle(file, &about)) {
+        stamp.device = about.dwVolumeSerialNumber;
+        stamp.inode = std::uintmax_t{about.nFileIndexHigh} << 32 | about.nFileIndexLow;
+    }
+    FILE_BASIC_INFO times{};
+    if (GetFileInformationByHandleEx(file, FileBasicInfo, &times, sizeof times)) {
+        // In units of 100 ns since 1601.
+        const std::int64_t changed = times.ChangeTime.QuadPart - 116444736000000000;
+        stamp.change_seconds = changed / 10000000;
+        stamp.change_nanos = changed % 10000000 * 100;
+    }
+    CloseHandle(file);
 #else
     struct stat about{};
     if (::stat(path.c_str(), &about) != 0) return;
@@ -182,13 +203,8 @@ void refresh(Entry& entry, const fs::path& path, const std::string& name) {
     entry.result = {nullptr, name + ": " + problem};
 }
 
-std::vector<Vec3> edited_at(const Sidecar& sidecar, const Slice& slice, const AppliedEdits& edits) {
-    const Polytope& polytope = sidecar.polytope;
-    if (edits.sidecar && edits.host.empty()) {
-        return edited_colours(polytope, sidecar.edits, slice);
-    }
-    return edited_colours(polytope,
-                          with_colours(polytope, sidecar.edits, edits.sidecar, edits.host), slice);
+Edits all_of(const Sidecar& sidecar, const AppliedEdits& edits) {
+    return with_colours(sidecar.polytope, sidecar.edits, edits.sidecar, edits.host);
 }
 
 std::shared_ptr<Entry> entry_of(const std::string& key) {
@@ -247,7 +263,7 @@ std::shared_ptr<const Recolourer> LoadedSidecar::surface_at(double frame) {
 std::pair<std::vector<Vec3>, std::vector<Vec3>> LoadedSidecar::palette_at(
     double frame, const AppliedEdits& edits) const {
     Slice slice = slice_at(sidecar_.polytope, frame);
-    return {slice.rgb, edited_at(sidecar_, slice, edits)};
+    return {slice.rgb, edited_colours(sidecar_.polytope, all_of(sidecar_, edits), slice)};
 }
 
 LoadedSidecar::Key LoadedSidecar::clamped(const Key& wanted) const {
@@ -340,10 +356,14 @@ std::shared_ptr<const Recolourer> LoadedSidecar::prepare(const Key& key) const {
     const auto& [frame, purpose, handle, edits] = key;
     Slice slice = slice_at(sidecar_.polytope, frame);
     std::vector<Vec3> edited;
+    std::vector<Bump> bumps;
     switch (purpose) {
-        case Purpose::kEdit:
-            edited = edited_at(sidecar_, slice, edits);
+        case Purpose::kEdit: {
+            const Edits all = all_of(sidecar_, edits);
+            edited = edited_colours(sidecar_.polytope, all, slice);
+            bumps = bumps_at(all, slice.frame);
             break;
+        }
         case Purpose::kWeight:
             edited = weight_reader(slice, Lineage(sidecar_.polytope, sidecar_.edits, handle));
             break;
@@ -351,7 +371,8 @@ std::shared_ptr<const Recolourer> LoadedSidecar::prepare(const Key& key) const {
             edited = surface_reader(slice);
             break;
     }
-    return std::make_shared<const Recolourer>(std::move(slice.rgb), edited, std::move(slice.faces));
+    return std::make_shared<const Recolourer>(std::move(slice.rgb), edited, std::move(slice.faces),
+                                              std::move(bumps));
 }
 
 SidecarResult load_sidecar(const std::string& path) {

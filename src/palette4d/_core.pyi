@@ -54,6 +54,9 @@ class Edits:
     @property
     def solution(self) -> dict[str, Any]:
         """vertices, keys and bumps as in the file; vertices that do not move are left out."""
+    @property
+    def empty(self) -> bool:
+        """Whether nothing is edited: no vertex, no stop and no solution."""
     def bumps_at(self, frame: float) -> F64:
         """(n, 7) float64: centre (3), radius and displacement (3) of the bumps at a frame."""
 
@@ -96,7 +99,7 @@ class Sidecar:
     def versions(self) -> list[tuple[str, Edits]]:
         """Names and edits of the kept versions, in the file's order."""
     def bumps_at(self, frame: float) -> F64:
-        """``edits.bumps_at(frame)``."""
+        """The bumps of the active edits; outside the clip, those at its ends."""
     @property
     def conversion(self) -> ClipConversion | None:
         """None where the palette is in the clip's own numbers."""
@@ -143,9 +146,20 @@ def polytope_weights(points: ArrayLike, polytope: Polytope, frame: float) -> F64
     """Eq. 7: (m, 3) colours at one time -> (m, N) weights of the N polytope vertices."""
 
 class Recolourer:
-    """One frame's recolouring: p' = p + strength * sum_i w_i(q) (v'_i - v_i)."""
+    """One frame's recolouring: p' = p + strength * (sum_i w_i(q) (v'_i - v_i) + bumps at p).
 
-    def __init__(self, original: ArrayLike, edited: ArrayLike, faces: ArrayLike) -> None: ...
+    `bumps` is (n, 7), as `Edits.bumps_at` gives it. A bump at `centre` with a `radius` moves p by
+    max(0, 1 - |p - centre|^2 / radius^2)^3 times its displacement.
+    """
+
+    def __init__(
+        self,
+        original: ArrayLike,
+        edited: ArrayLike,
+        faces: ArrayLike,
+        *,
+        bumps: ArrayLike | None = ...,
+    ) -> None: ...
     @property
     def identity(self) -> bool: ...
     def apply(
@@ -199,6 +213,38 @@ class Lattice:
     @property
     def size(self) -> dict[str, int]:
         """Cells made, cut, their parts, exact parts in use, colours evaluated exactly."""
+
+def draw(
+    image: NDArray[np.float32],
+    output: Literal["recoloured", "weight", "palette", "outside"],
+    map: Recolourer,
+    *,
+    original: ArrayLike | None = ...,
+    edited: ArrayLike | None = ...,
+    strength: float = ...,
+    keep_lightness: float = ...,
+    lightness: Sequence[float] = ...,
+    mix: float = ...,
+    matte_in_alpha: bool = ...,
+    outside_at: float = ...,
+    premultiplied: bool = ...,
+    threads: int = ...,
+    conversion: ColourConversion | None = ...,
+) -> F32:
+    """Return what the node draws for a frame, (h, w, 3 or 4) float32 as the image.
+
+    `map` holds the edit, or for a matte what `weight_reader` or `surface_reader` returns.
+    `original` and `edited` are the (n, 3) colours of "palette". `lightness` are three weights.
+    """
+
+def weight_reader(polytope: Polytope, edits: Edits, slice: Slice, id: str) -> F64:
+    """(n, 3) float64 edited colours whose Recolourer draws the matte of a vertex or stop."""
+
+def surface_reader(slice: Slice) -> F64:
+    """(n, 3) float64 edited colours whose Recolourer draws the matte of "outside"."""
+
+def luminance_weights(encoding: str) -> list[float]:
+    """Return the weights of red, green and blue by an encoding's name; Rec.709's if unknown."""
 
 LATTICE_TOLERANCE: float
 """What `Lattice.largest_error` is held against."""

@@ -39,7 +39,8 @@ def exact(sidecar: Path, frame: float, colours: F32, strength: float = 1.0) -> F
     read = _core.read_sidecar(str(sidecar))
     palette = _core.slice_at(read.polytope, frame)
     edited = _core.edited_colours(read.polytope, read.edits, palette)
-    recolourer = _core.Recolourer(palette.rgb, edited, palette.faces)
+    bumps = read.edits.bumps_at(palette.frame)
+    recolourer = _core.Recolourer(palette.rgb, edited, palette.faces, bumps=bumps)
     return recolourer.apply(colours, strength=strength)
 
 
@@ -321,7 +322,7 @@ def test_refusals_write_nothing(
 def test_existing_output_needs_force(warm_sidecar: Path, tmp_path: Path) -> None:
     out = tmp_path / "there.cube"
     out.write_text("mine", encoding="utf-8")
-    with pytest.raises(Palette4dError, match="--force"):
+    with pytest.raises(Palette4dError, match="force=True"):
         bake(warm_sidecar, 0.0, out, size=5)
     assert out.read_text(encoding="utf-8") == "mine"
     bake(warm_sidecar, 0.0, out, size=5, force=True)

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable, Sequence
 
 from palette4d._core import __version__
+from palette4d.cli.messages import tell
 from palette4d.cli.terminal import printable_output
 from palette4d.common.arguments import Parser, accept_negative_values
 from palette4d.common.errors import Palette4dError, SidecarError, in_words
@@ -101,6 +102,6 @@ def _report(error: Exception) -> int:
             "export` or `palette4d config`, which take them all"
         )
     elif broken and "update palette4d" not in text:
-        text += "; mend it there, take an earlier copy of the file, or analyse the clip again"
-    print(f"palette4d: error: {text}", file=sys.stderr)
+        text += "; correct it there, take an earlier copy of the file, or analyse the clip again"
+    tell("error", text)
     return 1

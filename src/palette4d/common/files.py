@@ -16,6 +16,8 @@ from palette4d.common.errors import Palette4dError, WriteError
 if sys.platform != "win32":
     import fcntl
 
+#: What is said of an output file that exists.
+EXISTS = "found a file there already; choose another name, or replace it with force=True"
 _TEMPORARY = re.compile(r"\..*\.[0-9a-f]{16}\.p4d-tmp(\.[^.]*)?", re.DOTALL)
 #: Seconds after which a temporary file counts as left over where files cannot be locked.
 _LEFT_OVER_AFTER = 86400.0
@@ -36,7 +38,7 @@ def refuse_existing(path: Path, force: bool) -> None:
     if not path.parent.is_dir():
         raise Palette4dError(f"{path}: there is no folder {path.parent}; create it first")
     if path.exists() and not force:
-        raise Palette4dError(f"{path}: the file exists already; use --force to replace it")
+        raise Palette4dError(f"{path}: {EXISTS}")
     if not os.access(path.parent, os.W_OK):
         raise _closed(path)
 
@@ -203,5 +205,6 @@ def _sync_folder(folder: Path) -> None:
 
 def _closed(path: Path, why: str = "") -> WriteError:
     return WriteError(
-        f"{path}: cannot write in {path.parent}{why}; choose another folder or mend its permissions"
+        f"{path}: cannot write in {path.parent}{why}; choose another folder, or change its "
+        "permissions"
     )

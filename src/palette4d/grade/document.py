@@ -16,17 +16,18 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any, Literal, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from palette4d import _core
+from palette4d.colour.oklch import Adjustment, adjuster
 from palette4d.common.errors import Palette4dError
 from palette4d.common.files import link_target
 from palette4d.common.locking import locked
 from palette4d.common.text import counted
-from palette4d.grade import edits, sidecar
+from palette4d.grade import edits, moves, sidecar
 from palette4d.grade.edits import (
     RAMP,
     Change,
@@ -42,8 +43,10 @@ from palette4d.grade.edits import (
     as_ramp,
 )
 from palette4d.grade.handles import Handles, unknown
+from palette4d.grade.output import Output
 from palette4d.grade.palette import FAR, Near, Palette, palette_at
 from palette4d.grade.sidecar import Fields, OnEdits
+from palette4d.grade.tracks import Track, tracks_of, way_of
 
 F32 = NDArray[np.float32]
 
@@ -63,6 +66,20 @@ _ACTIVE: tuple[Kind, ...] = ("handle", "ramp", "pick", "lock")
 _LINEAR = re.compile(r"\blin(ear)?(\b|_)|scene.linear|acescg|aces2065", re.IGNORECASE)
 
 
+class How(TypedDict, total=False):
+    """A change of colours, and when: the keywords of `Document.adjust`."""
+
+    rgb: Iterable[float] | str | None
+    by: Iterable[float] | None
+    hue: float
+    chroma: float
+    lightness: float
+    start: float | None
+    until: float | None
+    fade: float | None
+    ramp: str | None
+
+
 class Document:
     """A clip's palette with its edits.
 
@@ -77,6 +94,8 @@ class Document:
         The members of a sidecar (docs/sidecar.md).
     notes : iterable of str
         Notes of the analysis about the palette.
+    report : mapping, optional
+        Figures of the analysis, as `palette4d analyze --json` prints them.
 
     Attributes
     ----------
@@ -84,14 +103,22 @@ class Document:
         The sidecar; None until it is saved.
     notes : tuple of str
         As above.
+    report : dict
+        As above; empty for a loaded sidecar.
     """
 
-    def __init__(self, fields: Mapping[str, Any], notes: Iterable[str] = ()) -> None:
+    def __init__(
+        self,
+        fields: Mapping[str, Any],
+        notes: Iterable[str] = (),
+        report: Mapping[str, Any] | None = None,
+    ) -> None:
         data = sidecar.encoded(fields)
         self.path: Path | None = None
         self._start(data, _core.parse_sidecar(data, self._name))
         self._disk: bytes | None = None
         self.notes = tuple(notes)
+        self.report = dict(report or {})
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> "Document":
@@ -105,6 +132,7 @@ class Document:
         document = cls.__new__(cls)
         data = sidecar.read_bytes(path)
         document._disk, document.path, document.notes = data, Path(path), ()
+        document.report = {}
         document._start(data, _core.parse_sidecar(data, os.fspath(path)))
         return document
 
@@ -119,6 +147,7 @@ class Document:
 
     def _become(self, state: State) -> None:
         self._state = state
+        self._own: _core.Sidecar | None = None  # without the picks; None: parse it on demand
         self._settings: dict[str, Setting] = {
             id_: value for (kind, id_), value in state.items() if kind == "handle"
         }
@@ -258,6 +287,11 @@ class Document:
             f"{shown} is meant"
         )
 
+    @property
+    def tracks(self) -> list[Track]:
+        """The palette's colours through time: the rows of `palette4d plot`."""
+        return tracks_of(self._handles)
+
     def palette(self, frame: float) -> Palette:
         """Return the palette at a time: ids, colours as analysed and as edited, faces.
 
@@ -367,33 +401,33 @@ class Document:
         near: Iterable[float] | str,
         *,
         frame: float,
-        rgb: Iterable[float] | str,
         anyway: bool = False,
         any_value: bool = False,
+        **how: Unpack[How],
     ) -> Near:
-        """Set a new colour for the palette colour nearest to a given colour at a frame.
+        """Change the palette colour nearest to a given colour at a frame.
 
-        A vertex within half a frame step moves, so that the colour at the frame is exactly `rgb`.
-        Otherwise the stop at that time gets the colour, or a new stop.
+        A vertex within half a frame step moves, so that the colour at the frame is exactly the new
+        one. Otherwise the stop at that time gets the colour, or a new stop.
 
         Parameters
         ----------
-        near : 3 floats
+        near : 3 floats or "#rrggbb"
             The visible colour, after the edits so far.
         frame : float
             The time; within the clip.
-        rgb : 3 floats
-            The new colour.
         anyway : bool
             Edit the palette colour even if it is more than 0.25 away.
         any_value : bool
             Take colours such as 255 128 0 as they are.
+        **how
+            The change, as in `adjust`: ``rgb=``, or others.
 
         Returns
         -------
         Near
             The palette colour and its distance; `handle` is the vertex or stop that now has the
-            colour.
+            colour, or None after the change of a range.
 
         Raises
         ------
@@ -401,10 +435,17 @@ class Document:
             The nearest palette colour is more than 0.25 away; the message names the palette colours
             that `near` is mixed from.
         """
-        new, wanted = self._checked(rgb, any_value), self._checked(near, any_value)
+        wanted = self._checked(near, any_value)
         found = self.near(wanted, frame=frame)
         if found.distance > FAR and not anyway:
             raise Palette4dError(found.refusal(wanted))
+        start, until, fade = how.get("start"), how.get("until"), how.get("fade")
+        if moves.range_of(start, until, fade, self.frames) is not None:
+            at = frame if found.id in self._handles.edges else None
+            self.adjust(found.id, frame=at, any_value=any_value, **how)
+            return replace(found, handle=None)
+        move, _ = self._move(found.id, frame, how, any_value)
+        new = as_colour(move(found.rgb))
         handle, moved = found.handle, new
         if handle in self._handles.vertices and handle != found.id:
             share = self._share(handle, found.id, frame)
@@ -415,10 +456,14 @@ class Document:
                 moved = as_colour(
                     [o + (n - f) / share for o, n, f in zip(own, new, found.rgb, strict=True)]
                 )
-        if handle is not None:
-            self._set(handle, moved)
-        else:
-            handle = self._stop(found.id, frame, new)
+        ramp = how.get("ramp")
+        with self.one_step(f"set {handle or found.id} at frame {frame:g} to {_text(new)}"):
+            if handle is not None:
+                self._set(handle, moved)
+            else:
+                handle = self._stop(found.id, frame, new)
+            if ramp is not None:
+                self.set_ramp(ramp, handle)
         return Near(frame, found.id, handle, found.rgb, found.distance, found.shares)
 
     def _share(self, vertex: str, edge: str, frame: float) -> float:
@@ -459,6 +504,136 @@ class Document:
             )
         after = replace(before, frame=float(frame))
         self._put("handle", stop, after, f"move {stop} to frame {frame:g}")
+
+    def adjust(
+        self,
+        id: str | None = None,
+        *,
+        track: bool = False,
+        frame: float | None = None,
+        any_value: bool = False,
+        **how: Unpack[How],
+    ) -> tuple[str, ...]:
+        """Move the colours of a handle, of a track or of the whole palette, as one step.
+
+        Give either `rgb`, or `by`, or some of `hue`, `chroma` and `lightness`.
+
+        Parameters
+        ----------
+        id : str, optional
+            A vertex, a stop, or an edge with its `frame`; None: the whole palette.
+        track : bool
+            Move every handle along the colour's way: back to all colours that it comes from, and on
+            to all that it becomes. A range implies it.
+        frame : float, optional
+            The frame at which an edge's colour is meant.
+        rgb : 3 floats or "#rrggbb", optional
+            The new colour; other handles of the track move by as much.
+        by : 3 floats, optional
+            Offsets in code values.
+        hue : float
+            Degrees added to the hue, in OKLCh of the displayed colour.
+        chroma, lightness : float
+            Factors of 0 or more, in OKLCh of the displayed colour.
+        start, until, fade : float, optional
+            Only from frame `start` to `until`, with ramps of `fade` frames (at least one frame
+            step) before and after, and nothing beyond. A range without one end goes on to that end
+            of the clip.
+        ramp : {"linear", "smooth", "hold"}, optional
+            The ramp of the handles that move, or of the fades of a range.
+        any_value : bool
+            Take colours such as 255 128 0 as they are.
+
+        Returns
+        -------
+        tuple of str
+            The vertices and stops that changed.
+        """
+        start, until, fade = how.get("start"), how.get("until"), how.get("fade")
+        if frame is not None and id is not None:
+            self.check_frame(frame)
+            self._check_inside(id, frame)
+        elif id is not None and id not in self._handles.edges:
+            self._frame_of(id, None)  # refuses unknown ids
+        within = moves.range_of(start, until, fade, self.frames)
+        ramp = how.get("ramp")
+        known = None if ramp is None else as_ramp(ramp)
+        move, what = self._move(id, frame, how, any_value)
+        rgb = how.get("rgb")
+        if rgb is not None and within is not None and within.weight(self._frame_of(id, frame)) < 1:
+            raise Palette4dError(
+                f"the colour is meant at frame {self._frame_of(id, frame):g}, outside of the "
+                f"range {moves.range_text(start, until)}; expected a range with this frame"
+            )
+        stop = self._settings.get(id or "")
+        if id is None:
+            name, way = "palette", (set(self._handles.vertices), set(self._handles.edges))
+        elif within is not None or track:
+            name, way = f"track {id}", way_of(self._handles, (stop and stop.edge) or id)
+        elif id in self._handles.edges:
+            new = as_colour(move(self._own_colour(id, self._frame_of(id, frame))))
+            return (self._stop(id, self._frame_of(id, frame), new, known),)
+        else:
+            name, way = id, ({id}, set())
+        changed = moves.moved(
+            *(self._handles, self._settings, way, move, self._own_colour),
+            within=within,
+            ramp=known,
+            clip_ramp=self.ramp,
+        )
+        if within is not None:
+            what += f" {moves.range_text(start, until)}"
+        changes = [Change("handle", n, self._settings.get(n), v) for n, v in changed.items()]
+        self.apply(Edit(tuple(changes), f"{'move' if rgb is None else 'set'} {name} {what}"))
+        return tuple(change.id for change in changes if change.before != change.after)
+
+    def _move(
+        self, id: str | None, frame: float | None, how: How, any_value: bool
+    ) -> tuple[moves.Move, str]:
+        """Return the move that the user asked for, and its text for people."""
+        rgb, by = how.get("rgb"), how.get("by")
+        change = Adjustment(how.get("hue", 0.0), how.get("chroma", 1.0), how.get("lightness", 1.0))
+        if [rgb is None, by is None, change == Adjustment()].count(False) != 1:
+            raise Palette4dError(
+                "expected one kind of change: a new colour (--rgb; rgb=), offsets (--by; by=), or "
+                "hue, chroma and lightness (--hue …; hue=…)"
+            )
+        if by is not None:
+            offset = as_colour(by, "offset")
+            return moves.shift(offset), f"by {_text(offset)}"
+        if rgb is None:
+            return adjuster(self.encoding, change), str(change)
+        if id is None:
+            raise Palette4dError(
+                "the whole palette cannot get one colour; expected offsets (by), or hue, chroma "
+                "and lightness"
+            )
+        new, at = self._checked(rgb, any_value), self._frame_of(id, frame)
+        before = self._own_colour(id, at) if id in self._handles.edges else self.colour(id)
+        return moves.shift_to(before, new), f"to {_text(new)}"
+
+    def _frame_of(self, id: str | None, frame: float | None) -> float:
+        """Return the frame of a handle, or of an edge's colour that the user means."""
+        if id in self._handles.edges:
+            if frame is None:
+                raise self._handles.needs_frame(id)
+            return frame
+        setting = self._settings.get(id or "")
+        if setting is not None and setting.frame is not None:
+            return setting.frame
+        found: float = self._handles.vertex(id or "", self._settings)["frame"]
+        return found
+
+    def _own_colour(self, edge: str, frame: float) -> Colour:
+        """Return the colour of an edge at a frame, without the solution of the picks."""
+        if self._own is None:
+            fields = self._members()
+            own = {n: v for n, v in fields["edits"].items() if n not in ("picks", "solution")}
+            if own != fields["edits"]:
+                data = sidecar.encoded({**fields, "edits": own})
+                self._own = _core.parse_sidecar(data, self._name)
+        palette = palette_at(self._own or self.core, frame)
+        return as_colour(palette.edited[palette.ids.index(edge)])
 
     def reset(self, id: str | None = None) -> None:
         """Reset a vertex to its original colour, remove a stop, or (None) reset everything.
@@ -592,6 +767,14 @@ class Document:
         self._version(name)
         self._put("version", name, None, f"remove version {name}")
 
+    def at(self, state: State) -> "Document":
+        """Return a document with another state of the user's edits, not bound to the file."""
+        found = copy.copy(self)
+        found._become(state)
+        found._disk, found._core, found._solved = None, None, None
+        found.forget_history()
+        return found
+
     def version(self, name: str) -> "Document":
         """Return a document with the edits of a version as the active edits; "" returns this one.
 
@@ -599,12 +782,10 @@ class Document:
         """
         if not name:
             return self
-        found = copy.copy(self)
         fields = self._version(name)
         others = {key: value for key, value in self._state.items() if key[0] == "version"}
-        found._become({**edits.from_fields(fields), **others})
-        found._disk, found._core, found._solved = None, None, _stored_solution(fields)
-        found.forget_history()
+        found = self.at({**edits.from_fields(fields), **others})
+        found._solved = _stored_solution(fields)
         return found
 
     def _version(self, name: str) -> Fields:
@@ -622,6 +803,12 @@ class Document:
         frame: float,
         *,
         strength: float = 1.0,
+        keep_lightness: float = 0.0,
+        lightness_of: str = "auto",
+        mix: float = 1.0,
+        show: str = "recoloured",
+        matte_in: Literal["picture", "alpha"] = "picture",
+        outside_at: float = 0.05,
         premultiplied: bool = False,
         space: Literal["input", "palette"] = "input",
         threads: int = 0,
@@ -631,11 +818,24 @@ class Document:
         Parameters
         ----------
         image : (h, w, 3 or 4) float32
-            Code values of the clip, 0..1 as a rule; alpha passes unchanged.
+            Code values of the clip, 0..1 as a rule; a grade never changes alpha.
         frame : float
             The time; frames outside the clip use its first or last frame.
         strength : float
             0 is the original, 1 the edit.
+        keep_lightness : float
+            The share of the source's lightness to keep: 0 none, 1 all.
+        lightness_of : {"auto", "rec709", "rec2020", "p3", "ap1", "rec601"}
+            Whose luminance weights define lightness; "auto": the image's colour space.
+        mix : float
+            0 is the image, 1 the output.
+        show : str
+            "recoloured"; "weight:ID", a soft key of a vertex or stop; "outside", a matte of the
+            colours outside the palette; "palette", the recoloured picture above its palette.
+        matte_in : {"picture", "alpha"}
+            A key or matte as a grey picture, or multiplied into alpha.
+        outside_at : float
+            The distance from the palette, in its code values, at which "outside" is 1.
         premultiplied : bool
             Colours are multiplied by alpha.
         space : {"input", "palette"}
@@ -648,20 +848,57 @@ class Document:
         (h, w, 3 or 4) float32
             A new array. Without edits it equals `image` bit by bit.
         """
+        output = Output(show, strength, keep_lightness, lightness_of, mix, matte_in, outside_at)
         pixels = _checked_image(image)
         palette = self.palette(frame)
-        conversion = self._conversion(space)
-        if not 0 <= strength <= 1:
-            raise Palette4dError(f"found the strength {strength}, expected 0 to 1")
-        recolourer = _core.Recolourer(palette.rgb, palette.edited, palette.faces)
-        return recolourer.apply(
-            pixels,
-            strength=strength,
-            premultiplied=premultiplied and pixels.shape[2] == 4,
-            threads=threads,
-            precision="single",
-            conversion=conversion,
+        self._conversion(space)
+        recolourer = _core.Recolourer(
+            palette.rgb, palette.edited, palette.faces, bumps=palette.bumps
         )
+        return output.draw(
+            pixels,
+            self.core,
+            palette,
+            recolourer,
+            premultiplied=premultiplied,
+            space=space,
+            threads=threads,
+        )
+
+    def matte(
+        self,
+        image: F32,
+        frame: float,
+        show: str,
+        *,
+        outside_at: float = 0.05,
+        space: Literal["input", "palette"] = "input",
+        threads: int = 0,
+    ) -> F32:
+        """Return a matte of an image: the same values as the node's.
+
+        Parameters
+        ----------
+        image : (h, w, 3 or 4) float32
+            As in `recolour`; colours are not multiplied by alpha, and alpha is ignored.
+        show : str
+            "weight:ID", a soft key of a vertex or stop, which follows its colour through time, or
+            "outside", the colours outside the palette.
+        frame, outside_at, space, threads
+            As in `recolour`.
+
+        Returns
+        -------
+        (h, w) float32
+            0..1.
+        """
+        if show == "palette" or show == "recoloured":
+            raise Palette4dError(f"found {show!r}, expected a matte: 'weight:ID' or 'outside'")
+        colours = np.ascontiguousarray(_checked_image(image)[..., :3])
+        drawn = self.recolour(
+            colours, frame, show=show, outside_at=outside_at, space=space, threads=threads
+        )
+        return np.ascontiguousarray(drawn[..., 0])
 
     def weights(
         self, image: F32, frame: float, *, space: Literal["input", "palette"] = "input"

@@ -30,6 +30,8 @@ class Palette:
         The vertices before and after each colour in time; the same twice if it lies on a vertex.
     weights : (n,) float64
         The share of the vertex after it, 0..1 (eq. 6).
+    bumps : (b, 7) float64
+        Centre, radius and displacement of what moves besides the palette.
     """
 
     frame: float
@@ -39,6 +41,7 @@ class Palette:
     faces: NDArray[np.int32]
     ends: tuple[tuple[str, str], ...]
     weights: NDArray[np.float64]
+    bumps: NDArray[np.float64]
 
     def nearest(self, colour: Colour) -> tuple[int, float]:
         """Return the index of the edited colour nearest to a colour, and their RGB distance."""
@@ -84,12 +87,11 @@ class Near:
         """Return the error message if this palette colour is too far from the given colour."""
         shown = ", ".join(f"{value:.4g}" for value in wanted)
         there = ", ".join(f"{value:.4g}" for value in self.rgb)
-        made_of = ", ".join(f"{id_} {part:.0%}" for id_, part in self.shares[:5] if part >= 0.005)
+        mixed = ", ".join(f"{part:.0%} {id_}" for id_, part in self.shares[:5] if part >= 0.005)
         return (
-            f"the palette colour nearest to ({shown}) at frame {self.frame:g} is ({there}) of "
-            f"{self.id}, {self.distance:.3g} away; expected one within {FAR:g}. A pixel of "
-            f"({shown}) is made of {made_of}. Edit one of these, or edit {self.id} anyway "
-            "(--anyway; anyway=True)"
+            f"found no palette colour within {FAR:g} of ({shown}) at frame {self.frame:g}: pixels "
+            f"of this colour are a mix of {mixed}. Edit one of these by its id, or pass "
+            f"anyway=True to edit the nearest, {self.id} at ({there}), {self.distance:.3g} away"
         )
 
 
@@ -110,4 +112,5 @@ def palette_at(sidecar: _core.Sidecar, frame: float) -> Palette:
         faces=cut.faces,
         ends=ends,
         weights=cut.weights,
+        bumps=sidecar.edits.bumps_at(cut.frame),
     )

@@ -19,6 +19,7 @@ from palette4d.common.files import link_target, refuse_existing, replacing
 from palette4d.common.locking import locked
 from palette4d.common.text import counted
 from palette4d.grade import edits
+from palette4d.media.clip_sequence import IMAGE_EXTENSIONS, MOVIE_EXTENSIONS
 
 Fields = dict[str, Any]
 OnEdits = Literal["refuse", "keep", "drop"]
@@ -170,8 +171,17 @@ def read_bytes(path: str | os.PathLike[str]) -> bytes:
     Raises
     ------
     SidecarError
-        The file is missing or cannot be read.
+        The file is missing or cannot be read, or is a picture or a movie.
     """
+    kind = Path(path).suffix.lower().lstrip(".")
+    if kind in IMAGE_EXTENSIONS | MOVIE_EXTENSIONS and Path(path).is_file():
+        what = "a picture" if kind in IMAGE_EXTENSIONS else "a movie"
+        raise SidecarError(
+            os.fspath(path),
+            "",
+            f"{what}, which is no sidecar",
+            "a .p4d.json file, which `palette4d analyze CLIP -o OUT.p4d.json` writes",
+        )
     try:
         # Opening a pipe would block until a program writes into it.
         if stat.S_ISREG(Path(path).stat().st_mode):
@@ -421,7 +431,7 @@ def _existing(target: Path, on_edits: OnEdits) -> Fields | None:
     except Palette4dError as error:
         raise Palette4dError(
             f"{target} exists and cannot be read as a sidecar ({error}); it may hold edits. "
-            "Move it away, choose another output, or replace it with --drop-edits"
+            'Move it away, choose another output, or replace it with on_edits="drop"'
         ) from error
 
 
@@ -433,8 +443,8 @@ def _summary(document: Fields) -> str:
 def _would_lose(target: Path, old: Fields) -> Palette4dError:
     return Palette4dError(
         f"{target} holds edits ({_summary(old)}) that this would lose. "
-        "Keep them with --keep-edits (works if the palette is unchanged), "
-        "discard them with --drop-edits, or choose another output"
+        'Keep them with on_edits="keep" (works if the palette is unchanged), '
+        'discard them with on_edits="drop", or choose another output'
     )
 
 
@@ -447,7 +457,7 @@ def _with_edits_of(old: Fields, new: Fields, target: Path) -> Fields:
     if _canonical(old, "")["polytope"] != new["polytope"]:
         raise Palette4dError(
             f"{target} holds edits ({_summary(old)}) for a palette that differs from "
-            "the new one, so they cannot be kept. Discard them with --drop-edits, or choose "
+            'the new one, so they cannot be kept. Discard them with on_edits="drop", or choose '
             "another output"
         )
     users = {name: old[name] for name in ("edits", "versions", "history") if name in old}

@@ -183,7 +183,7 @@ def open_images(
     if header is None:
         raise FrameError(
             f"{source}: found none readable of {named(wanted)}; expected at least one "
-            "good frame. Run without --skip-bad-frames to see the cause."
+            "good frame. Run without skip_bad_frames=True to see the cause."
         )
     return ImageClip(
         name=sequence.name,
@@ -213,7 +213,7 @@ def _wanted_frames(sequence: ImageSequence, frames: str | None, embedded: str | 
             wanted = parse_frames(frames)
             if outside := sorted(set(wanted) - set(inside)):
                 raise ClipError(
-                    f"{sequence.pattern}: --frames {frames} includes {describe(outside)}, which "
+                    f'{sequence.pattern}: frames="{frames}" includes {describe(outside)}, which '
                     f"the pattern's own range {embedded} leaves out. Give one of the two."
                 )
     elif frames is not None:
@@ -225,7 +225,7 @@ def _wanted_frames(sequence: ImageSequence, frames: str | None, embedded: str | 
             raise ClipError(
                 f"{sequence.pattern}: the {len(found)} files are numbered from {found[0]} to "
                 f"{found[-1]}, which looks like dates or ids; expected frame numbers. "
-                "Number the files, or choose a range with --frames."
+                "Number the files, or choose a range with frames=…."
             )
         return list(range(found[0], found[-1] + 1, step))
     if not set(wanted) & set(found):

@@ -118,12 +118,12 @@ def difference(one: F64, other: F64) -> float:
 
 def refusal(frames: Sequence[int], cuts: Sequence[int]) -> str:
     """Return the message that the clip has `cuts`, with the frame ranges to analyse."""
-    shots = [f"--frames {shot}" for shot in _shots(frames, cuts)]
+    shots = [f'frames="{shot}"' for shot in _shots(frames, cuts)]
     return (
         f"found {counted(len(cuts), 'sudden cut')}: a new shot begins at {_places(cuts)}; expected "
         "one shot, since a palette must not span a cut. Analyse each shot by itself "
-        f"({_some(shots)}; --detect-shots does all of them), or give --allow-cuts to analyse all "
-        f"frames as one shot.{_flash(frames, cuts)}"
+        f"({_some(shots)}; analyze_shots() does all of them), or give allow_cuts=True to analyse "
+        f"all frames as one shot.{_flash(frames, cuts)}"
     )
 
 
@@ -138,14 +138,14 @@ def _flash(frames: Sequence[int], cuts: Sequence[int]) -> str:
     ]
     if len(lasting) != 1:
         return ""
-    return f" If it is a flash at the end of the clip, leave it out: --frames {lasting[0]}."
+    return f' If it is a flash at the end of the clip, leave it out: frames="{lasting[0]}".'
 
 
 def refusal_inside(cuts: Sequence[int]) -> str:
     """Return the message that one clip of an edit has `cuts`."""
     return (
         f"found {counted(len(cuts), 'sudden cut')} inside one clip of the edit: a new shot begins "
-        f"at {_places(cuts)}; expected one shot. Blade the edit there, or give --allow-cuts"
+        f"at {_places(cuts)}; expected one shot. Blade the edit there, or give allow_cuts=True"
     )
 
 
@@ -164,7 +164,7 @@ def _some(texts: Sequence[str]) -> str:
 
 
 def _shots(frames: Sequence[int], cuts: Sequence[int]) -> list[str]:
-    """Return the frame range of each shot in the form of `--frames`."""
+    """Return the frame range of each shot in the form of `parse_frames`."""
     step = frames[1] - frames[0]
     bounds = [frames[0], *cuts, frames[-1] + step]
     out = []

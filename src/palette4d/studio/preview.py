@@ -56,9 +56,8 @@ class Grade:
     def recolourer(self) -> _core.Recolourer:
         """Return the exact recolouring."""
         palette = self.palette
-        if self.bumps is None:
-            return _core.Recolourer(palette.rgb, palette.edited, palette.faces)
-        return _core.Recolourer(palette.rgb, palette.edited, palette.faces, bumps=self.bumps)
+        options: Any = {} if self.bumps is None else {"bumps": self.bumps}
+        return _core.Recolourer(palette.rgb, palette.edited, palette.faces, **options)
 
 
 @dataclass(frozen=True)
@@ -400,7 +399,8 @@ def matte_of(colours: F32, grade: Grade, id_: str) -> F32 | None:
     done = _core.Lattice(_core.Recolourer(palette.rgb, moved, palette.faces)).apply(
         own, precision="single"
     )
-    return np.clip(np.nan_to_num(done[..., 0] - own[..., 0]), 0, 1)
+    matte: F32 = np.clip(np.nan_to_num(done[..., 0] - own[..., 0]), 0, 1)
+    return matte
 
 
 def _highlighted(picture: U8, matte: F32) -> U8:

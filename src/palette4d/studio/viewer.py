@@ -163,6 +163,12 @@ class Viewer(QWidget):
             return None
         return self._request_of(frame, region, NO_PIXELS, settled=False, scaled=True)
 
+    def with_pixels(self, request: Request) -> Request | None:
+        """Return a request to play with its pixels; None if they are gone."""
+        player = self.session.player
+        small = None if player is None else player.small(request.frame, request.region)
+        return None if small is None else dataclasses.replace(request, pixels=small)
+
     def _request_of(self, frame: int, region: Region, pixels: F32, **more: Any) -> Request:
         session, view = self.session, self.session.view
         document = session.document
