@@ -94,7 +94,7 @@ def frames_between(first: int, last: int, step: int = 1) -> range:
     if (last - first) // step >= MAX_FRAMES:
         raise Palette4dError(
             f"frames {first} to {last} hold more than {MAX_FRAMES} frames; choose fewer, with "
-            "--frames or a larger step"
+            "frames=… or a larger step"
         )
     return frames
 
