@@ -69,6 +69,8 @@ LUT_ERROR = "while moving within {error:.1f}/255 of the view"
 OUTSIDE = "{share:.1%} of the pixels outside"
 RECOVERY = "edits that could not be saved are in {copy}; File > Open loads them"
 
+UNEXPECTED = "something went wrong in the program: {error}. Your edits are kept"
+
 # -------------------------------------------------------------------------------------- the menus
 RECENT = "Recent"
 VERSIONS = "Versions"
