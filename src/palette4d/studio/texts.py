@@ -217,4 +217,8 @@ SHOWN_TIP = "What the screen shows, through the display and view"
 EYEDROPPER = "Pipette"
 EYEDROPPER_TIP = "Then click the picture: the selected colour becomes the colour there"
 RESET_SHORT = "Reset"
-COLOUR_SET = "set {id}"
+SET_BY_SCOPE = {
+    "handle": "set {id}",
+    "track": "moved the track of {id}",
+    "palette": "moved the palette",
+}
