@@ -8,7 +8,6 @@ results equal the node's bit by bit.
 import contextlib
 import copy
 import itertools
-import json
 import math
 import os
 import re
@@ -140,7 +139,7 @@ class Document:
         return document.version(version)
 
     def _start(self, data: bytes, core: _core.Sidecar) -> None:
-        self._fields: Fields = json.loads(data)
+        self._fields: Fields = sidecar.fields_of(data)
         self._core: _core.Sidecar | None = core  # of `_state`; None: parse it on demand
         self._handles = Handles(self._fields["polytope"])
         self._become(sidecar.state_of(self._fields))

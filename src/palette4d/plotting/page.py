@@ -72,7 +72,9 @@ def default_frames(
         min((t for t in wanted if t - first < gap), default=first),
         max((t for t in wanted if last - t < gap), default=last),
     ]
-    spread = np.linspace(first, last, count) if not wanted else np.arange(first, last)
+    spread = np.linspace(first, last, count)
+    if wanted:
+        spread = np.arange(first, last, max(1.0, (last - first) / 1000))
 
     def room(time: float) -> float:
         return min(abs(time - other) for other in chosen)

@@ -234,7 +234,7 @@ class TimelineView(QWidget):
         """Return the time at an x; snapped to the clip's frames."""
         first, last, step = self.session.frames
         time = float(self.scale.frame(x))
-        return min(first + round((time - first) / step) * step, last) if snap else time
+        return float(min(first + round((time - first) / step) * step, last)) if snap else time
 
     def x_of(self, frame: float) -> float:
         """Return the x of a time."""
@@ -433,13 +433,15 @@ class TimelineView(QWidget):
         stop = next((stop for stop in content.stops if stop[0] == id_), None)
         if stop is None:
             return None
-        step = self.session.frames[2]
+        first, _, step = self.session.frames
         start, end = (float(t) for t in content.frames[list(content.edges[stop[1]])])
-        low, high = np.floor(start / step) * step + step, np.ceil(end / step) * step - step
-        if frame.is_integer() and low <= high:
+        low = first + (np.floor((start - first) / step) + 1) * step
+        high = first + (np.ceil((end - first) / step) - 1) * step
+        if float(frame).is_integer() and low <= high:
             frame = float(min(max(frame, low), high))
         else:
-            frame = float(np.clip(frame, start + 1e-3 * (end - start), end - 1e-3 * (end - start)))
+            room = 1e-3 * (end - start)
+            frame = float(np.clip(frame, start + room, end - room))
         edge = stop[1]
         taken = [other[2] for other in content.stops if other[1] == edge and other[0] != id_]
         return None if frame in taken else frame

@@ -94,6 +94,7 @@ class Viewer(QWidget):
         self.on_hold: Any = None  #: the same with Alt
         session.on("clip", self._clip_changed)
         session.on("document", self.refresh)
+        session.on("trial", self.refresh)
         session.on("playing", self.refresh)
         session.on("frame", self._frame_changed)
         session.on("pixels", self.refresh)
