@@ -31,6 +31,7 @@ from palette4d.lut_export.series_index import (
 
 from palette4d import _core
 from palette4d.colour.ocio_config import from_anywhere
+from palette4d.common.arguments import frames_between
 from palette4d.common.errors import Palette4dError, WriteError
 from palette4d.common.files import make_folder, replacing
 from palette4d.common.text import checked_name, file_safe
@@ -100,9 +101,14 @@ class FrameTask:
 
 
 def every(sidecar: _core.Sidecar, step: int) -> tuple[int, ...]:
-    """Return every `step`-th frame of the clip, from its first."""
-    first, last = _limits(sidecar)
-    return tuple(range(first, last + 1, step))
+    """Return every `step`-th frame of the clip, from its first.
+
+    Raises
+    ------
+    Palette4dError
+        There are too many.
+    """
+    return tuple(frames_between(*_limits(sidecar), step))
 
 
 def stops(sidecar: _core.Sidecar) -> tuple[int, ...]:

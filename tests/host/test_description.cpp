@@ -44,9 +44,10 @@ TEST(node_describes_itself) {
         // Saved in projects: none of these names may ever go.
         const auto& order = effect->params.order;
         for (const char* name :
-             {"sidecar", "clipFolder", "reload", "embed", "embedded", "revision", "strength",
-              "frameOffset", "editsFrom", "resetHandles", "handle01", "handle01On", "handle01Id",
-              "handle32", "handle32On", "handle32Id", "mode", "status", "pictureIn"}) {
+             {"sidecar",      "version",    "clipFolder", "reload",      "embed",
+              "embedded",     "revision",   "strength",   "frameOffset", "editsFrom",
+              "resetHandles", "handle01",   "handle01On", "handle01Id",  "handle32",
+              "handle32On",   "handle32Id", "mode",       "status",      "pictureIn"}) {
             EXPECT(std::count(order.begin(), order.end(), name) == 1, std::string("no ") + name);
         }
         const auto& params = effect->params.params;
@@ -105,6 +106,24 @@ TEST(status_says_what_was_loaded) {
     instance->set("sidecar", std::string());
     CHECK(instance->changed("sidecar") == kOfxStatOK);
     CHECK(instance->text("status") == "No sidecar chosen");
+}
+
+TEST(names_from_a_sidecar_do_not_act_on_terminals) {
+    Plugin plugin(bundle());
+    const auto instance = plugin.create();
+    std::string text = sidecar_text();
+    const std::string name = "\"box\"";
+    const std::string hostile =
+        "\"\\u001b[2J\xc2\x9b"
+        "31m\xe2\x80\xae\xc3\xa9\"";
+    text.replace(text.find(name), name.size(), hostile);
+    instance->set("sidecar", write("hostile.p4d.json", text));
+    CHECK(instance->changed("sidecar") == kOfxStatOK);
+    CHECK(instance->text("status").find("\\u001b[2J\\u009b31m\\u202e\xc3\xa9: frames") == 0);
+    instance->set("sidecar", (folder() / "gone\x1b[2J.p4d.json").u8string());
+    CHECK(instance->changed("sidecar") == kOfxStatOK);
+    CHECK(instance->text("status").find('\x1b') == std::string::npos);
+    CHECK(instance->text("status").find("gone\\u001b[2J.p4d.json") != std::string::npos);
 }
 
 TEST(a_reopened_project_shows_its_handles) {

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palette4d import _core
+from palette4d.grade.tracks import Chain, find_chains
 
 F64 = NDArray[np.float64]
 Row = list[int]
@@ -53,6 +54,8 @@ class Palette:
         The first and last frame.
     sidecar : Sidecar
         Where all this is from.
+    against : Edits or None
+        The edits that make the colours before; None: the clip's colours.
     """
 
     ids: list[str]
@@ -67,26 +70,30 @@ class Palette:
     first: float
     last: float
     sidecar: _core.Sidecar
+    against: _core.Edits | None = None
 
     @classmethod
-    def of(cls, sidecar: _core.Sidecar) -> "Palette":
-        """Read the arrays from a sidecar."""
+    def of(cls, sidecar: _core.Sidecar, against: _core.Edits | None = None) -> "Palette":
+        """Read the arrays from a sidecar; `against`: other edits as the colours before."""
         polytope, edits = sidecar.polytope, sidecar.edits
         vertices = np.asarray(polytope.vertices, dtype=np.float64).reshape(-1, 4)
         ids, edge_ids = list(polytope.vertex_ids), list(polytope.edge_ids)
-        edited = vertices[:, :3].copy()
+        rgb, edited = vertices[:, :3].copy(), vertices[:, :3].copy()
         for frame in np.unique(vertices[:, 3]):
             cut = _core.slice_at(polytope, float(frame))
             at_vertex = cut.edges < 0
             after = _core.edited_colours(polytope, edits, cut)
             edited[cut.ends[at_vertex, 0]] = after[at_vertex]
+            if against is not None:
+                other = _core.edited_colours(polytope, against, cut)
+                rgb[cut.ends[at_vertex, 0]] = other[at_vertex]
+        given = [against is None and name in edits.vertex_rgb for name in ids]
         result = cls(
             ids=ids,
             frames=vertices[:, 3].copy(),
-            rgb=vertices[:, :3].copy(),
+            rgb=rgb,
             edited=edited,
-            changed=np.array([name in edits.vertex_rgb for name in ids], dtype=bool)
-            | (edited != vertices[:, :3]).any(axis=1),
+            changed=np.array(given, dtype=bool) | (edited != rgb).any(axis=1),
             edges=[(int(a), int(b)) for a, b in np.asarray(polytope.edges).reshape(-1, 2)],
             edge_ids=edge_ids,
             stops=[],
@@ -94,6 +101,7 @@ class Palette:
             first=float(polytope.first_frame),
             last=float(polytope.last_frame),
             sidecar=sidecar,
+            against=against,
         )
         for stop in edits.stops:
             edge, frame = edge_ids.index(stop["edge"]), float(stop["frame"])
@@ -114,7 +122,10 @@ class Palette:
         for k, frame in enumerate(np.asarray(frames, dtype=np.float64).tolist()):
             cut = _core.slice_at(polytope, frame)
             inside = cut.edges >= 0
-            before[cut.edges[inside], k] = cut.rgb[inside]
+            old = cut.rgb
+            if self.against is not None:
+                old = _core.edited_colours(polytope, self.against, cut)
+            before[cut.edges[inside], k] = old[inside]
             after[cut.edges[inside], k] = _core.edited_colours(polytope, edits, cut)[inside]
         for end in (0, 1):
             vertices = np.array([edge[end] for edge in self.edges], dtype=np.int64)
@@ -141,26 +152,6 @@ class Palette:
 
 
 @dataclass(frozen=True)
-class Chain:
-    """A palette colour through time.
-
-    Attributes
-    ----------
-    vertices : tuple of int
-        Vertices in this chain's row, in order of time.
-    edges : tuple of int
-        Its edges, in order of time; the outer ones may end on another chain's vertex.
-    first, last : float
-        The first and last frame, with forks.
-    """
-
-    vertices: tuple[int, ...]
-    edges: tuple[int, ...]
-    first: float
-    last: float
-
-
-@dataclass(frozen=True)
 class Rows:
     """Chains and their rows.
 
@@ -183,65 +174,6 @@ class Rows:
     def count(self) -> int:
         """The number of rows."""
         return int(self.row.max()) + 1 if self.row.size else 0
-
-
-def _continuations(
-    frames: F64, rgb: F64, edges: Sequence[tuple[int, int]]
-) -> tuple[dict[int, int], list[int]]:
-    """Return the next edge of each edge's chain, and the edge of each vertex (-1: none)."""
-
-    def change(edge: int) -> tuple[float, float, int]:
-        start, end = edges[edge]
-        # The edge with the least change of colour continues; the longer edge breaks ties.
-        length = float(frames[end] - frames[start])
-        return float(np.linalg.norm(rgb[end] - rgb[start])), -length, edge
-
-    follows: dict[int, int] = {}
-    home = []
-    for vertex in range(len(frames)):
-        arriving = [edge for edge, ends in enumerate(edges) if ends[1] == vertex]
-        leaving = [edge for edge, ends in enumerate(edges) if ends[0] == vertex]
-        home.append(min(arriving or leaving, key=change, default=-1))
-        if arriving and leaving:
-            follows[home[vertex]] = min(leaving, key=change)
-    return follows, home
-
-
-def find_chains(
-    frames: F64, rgb: F64, edges: Sequence[tuple[int, int]]
-) -> tuple[tuple[Chain, ...], NDArray[np.int64], NDArray[np.int64]]:
-    """Cut the edges into chains; return them with the chain of each vertex and of each edge."""
-    follows, home = _continuations(frames, rgb, edges)
-    edge_chain = np.full(len(edges), -1, dtype=np.int64)
-    members: list[list[int]] = []
-    carried_on = set(follows.values())
-    for first in range(len(edges)):
-        if first in carried_on:
-            continue
-        edge: int | None = first
-        chain: list[int] = []
-        while edge is not None:
-            edge_chain[edge] = len(members)
-            chain.append(edge)
-            edge = follows.get(edge)
-        members.append(chain)
-
-    vertex_chain = np.full(len(frames), -1, dtype=np.int64)
-    for vertex, edge_at in enumerate(home):
-        if edge_at >= 0:
-            vertex_chain[vertex] = edge_chain[edge_at]
-        else:  # no edge at all: a colour of one frame
-            vertex_chain[vertex] = len(members)
-            members.append([])
-
-    chains = []
-    for index, chain in enumerate(members):
-        standing = np.flatnonzero(vertex_chain == index)
-        standing = standing[np.argsort(frames[standing], kind="stable")]
-        times = [float(frames[v]) for v in standing]
-        times += [float(frames[v]) for e in chain for v in edges[e]]
-        chains.append(Chain(tuple(int(v) for v in standing), tuple(chain), min(times), max(times)))
-    return tuple(chains), vertex_chain, edge_chain
 
 
 def _fork_cost(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -15,10 +16,13 @@ from typing import Any
 from palette4d import _core
 from palette4d.common.errors import Palette4dError, in_words
 from palette4d.common.files import replacing
+from palette4d.common.json_files import UnusableFile, read_json
 from palette4d.shows.shots import Place, Shot
 
 SCHEMA, VERSION = "palette4d.shots", 1
 ENDING = ".shots.json"
+
+_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,199}")
 
 DONE, FAILED, TO_DO = "done", "failed", "to do"
 
@@ -121,13 +125,13 @@ def _row(entry: Entry) -> dict[str, Any]:
 def read(path: Path) -> Manifest:
     """Read a manifest."""
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = read_json(path)
     except FileNotFoundError as error:
         raise Palette4dError(f"{path}: there is no such manifest; check the path") from error
     except OSError as error:
         raise Palette4dError(in_words(error)) from error
-    except ValueError as error:
-        raise Palette4dError(f"{path}: the manifest cannot be read: {error}{_MEND}") from error
+    except UnusableFile as error:
+        raise Palette4dError(f"{error}{_MEND}") from error
     schema = document.get("schema") if isinstance(document, dict) else None
     if schema != SCHEMA:
         raise Palette4dError(
@@ -147,7 +151,7 @@ def read(path: Path) -> Manifest:
             options=dict(document["options"]),
             entries=tuple(_entry(row) for row in document["shots"]),
         )
-    except (AttributeError, KeyError, TypeError, ValueError, ZeroDivisionError) as error:
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise Palette4dError(
             f"{path}: the manifest is broken ({type(error).__name__}: {error}){_MEND}"
         ) from error
@@ -165,7 +169,7 @@ def _entry(row: dict[str, Any]) -> Entry:
     if row["status"] not in (DONE, FAILED, TO_DO) or (row["status"] == DONE) != ("frames" in row):
         raise ValueError(f"status {row['status']!r}")
     name = str(row["name"])
-    if row["sidecar"] != f"{name}.p4d.json" or "/" in name:
+    if row["sidecar"] != f"{name}.p4d.json" or not _NAME.fullmatch(name):
         raise ValueError(f"sidecar {row['sidecar']!r} of the shot {name!r}")
     shot = Shot(
         name, str(row["clip"]), first, last, (used_first, used_last), int(row["step"]), place

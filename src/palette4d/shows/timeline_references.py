@@ -15,6 +15,7 @@ from typing import Any
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
 from palette4d.common.files import refuse_existing, replacing
+from palette4d.common.json_files import read_regular
 from palette4d.lut_export.series import Series
 from palette4d.shows import timeline_files
 from palette4d.shows.manifest import DONE, Entry, Manifest
@@ -89,7 +90,8 @@ def write(
 def _document(source: Path) -> Any:
     """Return a timeline's JSON: from an .otio file, else converted by OpenTimelineIO."""
     if source.suffix.lower() == ".otio":
-        return json.loads(source.read_text(encoding="utf-8"))
+        timeline_files.read(source)  # a broken one is refused in a child process
+        return json.loads(read_regular(source, timeline_files.LARGEST_FILE))
     otio = timeline_files.library()
     timeline = timeline_files.read(source).timeline
     return json.loads(otio.adapters.write_to_string(timeline, "otio_json"))

@@ -182,6 +182,12 @@ class Player:
             self._frames.put(number, found, found.nbytes)
         return found
 
+    @property
+    def idle(self) -> bool:
+        """Whether everything that was wanted is read."""
+        with self._wake:
+            return not self._wanted and not self._reading
+
     def forget_errors(self) -> None:
         """Try frames again that could not be read."""
         self.errors.clear()
