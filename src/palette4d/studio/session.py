@@ -321,11 +321,14 @@ class Session:
         self.revision += 1
         self.emit("trial")
         self._untold = True
+        if not self._callbacks.get("trial"):  # no picture whose painting goes first
+            self.tell()
 
     def tell(self) -> None:
         """Tell the panels of a drag; the viewer calls it when it has painted the picture."""
         now = time.monotonic()
-        if self._untold and now - self._told >= PANELS_EVERY:
+        late = now - self._told >= PANELS_EVERY or not self._callbacks.get("trial")
+        if self._untold and late:
             self._told, self._untold = now, False
             self.emit("document")
 

@@ -617,10 +617,9 @@ def frames_around(session: Session) -> list[int]:
     """Return the frames to read, the playhead's first."""
     assert session.clip is not None
     _, _, step = session.frames
-    way = -1 if session.playing < 0 else 1
-    offsets = [0]
-    for k in range(1, AHEAD + 1):
-        offsets += [k * way] + ([-k * way] if k <= BEHIND else [])
+    # Movies are decoded forwards; going back takes long.
+    behind = 0 if session.clip.is_movie else BEHIND
+    offsets = [0, *range(1, AHEAD + 1), *range(-1, -behind - 1, -1)]
     known = frozenset() if session.player is None else session.player.numbers
     frames = [session.frame + offset * step for offset in offsets]
     return [frame for frame in frames if frame in known]
