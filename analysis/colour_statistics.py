@@ -196,7 +196,7 @@ def without_outliers(
     note = (
         f"{counted(max(1, round(pixels)), 'pixel lies', 'pixels lie')} far outside 0..1 and the "
         f"clip's other colours, by up to {farthest:.3g} ({named(list(kept))}): for the palette "
-        "they are clipped to the other colours; --set k=1 keeps them"
+        "they are clipped to the other colours; k=1 keeps them"
     )
     return dict(frames) | kept, (note,)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import math
+from collections.abc import Mapping
 from typing import Any
 
 from palette4d.common.errors import Palette4dError
@@ -95,6 +96,21 @@ class AnalysisOptions:
         for name, option in OPTIONS.items():
             option.check(name, getattr(self, option.field))
 
+    @classmethod
+    def of(cls, method: str, settings: Mapping[str, object]) -> AnalysisOptions:
+        """Return the options of a method with settings by their names in `OPTIONS`, or with "_".
+
+        Raises
+        ------
+        Palette4dError
+            A setting is unknown, out of range, or without effect on the method.
+        """
+        texts = (f"{name.rstrip('_')}={value}" for name, value in settings.items())
+        given: dict[str, Any] = dict(map(parse_setting, texts))
+        options = cls(method=method, **given)
+        check_methods(method, given)
+        return options
+
     def recorded(self) -> dict[str, float | int | str]:
         """Return what the sidecar records: everything that can change the result."""
         values: dict[str, float | int | str] = {"method": self.method}
@@ -173,6 +189,6 @@ def check_methods(method: str, given: dict[str, Any]) -> None:
     for name, option in OPTIONS.items():
         if option.field in given and method not in option.methods:
             raise Palette4dError(
-                f"{name} has no effect with --method {method}; expected "
+                f'{name} has no effect with method="{method}"; expected '
                 f"{' or '.join(option.methods)}"
             )

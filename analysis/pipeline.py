@@ -117,6 +117,17 @@ class Analysis(Found):
     report: Report
     colours: str | None
 
+    def figures(self) -> dict[str, Any]:
+        """Return what `analyze --json` prints; docs/palettes.md explains the names."""
+        return {
+            "stages": [stage.row() for stage in self.stages],
+            "held_to_L_prime": self.bound,
+            "palette": self.report.figures(),
+            "frames": [dataclasses.asdict(fit) for fit in self.report.fits],
+            "colour_spaces": self.colours,
+            "notes": list(self.notes),
+        }
+
 
 def analyze(
     clip: Clip | NDArray[np.floating[Any]],
@@ -195,7 +206,7 @@ def analyze(
         {stage.stage: stage.losses.max_distance for stage in found.stages},
         brightest=float(finished.vertices[:, :3].max()),
     )
-    notes = []
+    notes = [*clip.notes]
     if skipped:
         notes.append(f"{counted(len(skipped), 'bad frame')} skipped: {describe(skipped)}")
     document["colours"] = clip_colours.clip_colours(usable)
@@ -313,7 +324,7 @@ def _skew(run: _Run) -> SkewPolytope:
         if not _is_concave(again.polytope, run):
             found = again
             run.notes.append(
-                "the palette was not convex: it was searched again with --set "
+                "the palette was not convex: it was searched again with "
                 f"convexity={stiffer.convexity:g}"
             )
     polytope = found.polytope
@@ -408,8 +419,8 @@ def _glued(
         )
     if partial := sum(not g.complete for g in glued):
         notes.append(
-            f"at {partial} of {boundaries} the search for edges ended early; with a smaller --set "
-            "palette_size=N it sees every solution"
+            f"at {partial} of {boundaries} the search for edges ended early; with a smaller "
+            "palette_size=… it sees every solution"
         )
     return dense, tuple(notes)
 

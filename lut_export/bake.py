@@ -263,8 +263,8 @@ def check_target(path: Path, force: bool) -> None:
     """
     if path.exists() and not path.is_file() and not path.is_dir():
         raise Palette4dError(
-            f"{path}: found a device or a pipe, expected a file name; use `-o - --format …` and "
-            "redirect the output in the shell"
+            f"{path}: found a device or a pipe, expected a file name; for standard output run "
+            "`palette4d bake -o - --format …`"
         )
     refuse_existing(path, force)
 
@@ -291,7 +291,7 @@ def check_settings(
         Shaper(kind, *settings.domain)
     if kind in ("linear", "log") and not format_.shaper:
         raise Palette4dError(
-            f"{format_.title} cannot hold a shaper; choose one of {with_shaper()}, or --shaper none"
+            f'{format_.title} cannot hold a shaper; choose one of {with_shaper()}, or shaper="none"'
         )
 
 
@@ -336,4 +336,4 @@ def nearer(size: int | None) -> str:
     if size is None:
         return "a 3D LUT (.clf, .cube) is nearer"
     exact = "the node and `palette4d render` are exact"
-    return f"a larger --size is nearer; {exact}" if size < lut3d.LARGEST else exact
+    return f"a larger size=… is nearer; {exact}" if size < lut3d.LARGEST else exact

@@ -147,7 +147,7 @@ def _too_far(job: Job, size: int, grid: Measure, clip: Measure | None) -> str:
     if clip is not None and clip.outside_domain > 0:
         return text + (
             f"{clip.outside_domain:.3%} of the colours are clamped: choose a format with a shaper "
-            f"({with_shaper()}) or a wider --domain"
+            f"({with_shaper()}) or a wider domain=…"
         )
     return text + "Allow a larger error, or use the node or `palette4d render`, which are exact"
 

@@ -25,7 +25,7 @@ ANY_SHOT = "palette4d"
 
 def load_base(base: str) -> tuple[Any, bool]:
     """Return an editable copy of the base config, and whether it is an archive."""
-    return load_config(base, "--base"), base.lower().endswith(".ocioz")
+    return load_config(base, "base=…"), base.lower().endswith(".ocioz")
 
 
 def space_of_sidecar(config: Any, base: str, sidecar: _core.Sidecar, wanted: str | None) -> str:
@@ -42,12 +42,12 @@ def space_of_sidecar(config: Any, base: str, sidecar: _core.Sidecar, wanted: str
     import PyOpenColorIO as ocio
 
     if wanted is not None:
-        return str(colour_space(config, base, wanted, "--process-space").getName())
+        return str(colour_space(config, base, wanted, "process_space=").getName())
     encoding = str(sidecar.clip["encoding"])
     if encoding.strip().lower() in ("", "unknown"):
         raise Palette4dError(
             f"the sidecar of {sidecar.clip['name']!r} does not say in which encoding its colours "
-            "are; name a colour space of the config with --process-space"
+            "are; name a colour space of the config with process_space=…"
         )
     if (named := space_of_encoding(config, encoding)) is not None:
         return str(named.getName())
@@ -62,7 +62,7 @@ def space_of_sidecar(config: Any, base: str, sidecar: _core.Sidecar, wanted: str
             if missing:
                 lacking = f"; it lacks the role {missing[0]}, which could identify one"
     raise Palette4dError(
-        f"{base}: found no colour space for {encoding!r}{lacking}; name one with --process-space, "
+        f"{base}: found no colour space for {encoding!r}{lacking}; name one with process_space=…, "
         f"such as {near_spaces(config, encoding)}"
     )
 
@@ -78,10 +78,14 @@ def refuse_looks(config: Any, base: str, names: list[str]) -> None:
     there = {str(name).lower() for name in config.getLookNames()}
     for name in names:
         if name.lower() in there:
-            other = "give all shots in one command" if name == ANY_SHOT else "choose with --names"
+            other = (
+                "give all shots in one command"
+                if name == ANY_SHOT
+                else "choose others with names=…"
+            )
             raise Palette4dError(
                 f"{base}: it has a look {name!r} already, expected none; {other}, or replace it "
-                "with --force"
+                "with force=True"
             )
 
 

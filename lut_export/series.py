@@ -133,7 +133,7 @@ def stops(sidecar: _core.Sidecar) -> tuple[int, ...]:
     if not times:
         raise Palette4dError(
             "nothing is edited in this sidecar, so that there are no stops; edit it, or choose "
-            "--every or --frames"
+            "every=… or frames=…"
         )
     low, high = _limits(sidecar)
     return tuple(sorted({min(max(math.floor(t + 0.5), low), high) for t in times}))
@@ -175,7 +175,7 @@ def file_name(name: str, frame: int, padding: int, extension: str) -> str:
 def export(
     requests: Sequence[Request],
     workers: Workers | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], object] | None = None,
 ) -> list[Series]:
     """Bake the frames of one or several series together.
 
@@ -319,8 +319,6 @@ def _put(target: Path, data: bytes, force: bool) -> None:
     """Write a file atomically; one with the same bytes is kept."""
     if target.is_file() and target.read_bytes() == data:
         return
-    if target.exists() and not force:
-        raise Palette4dError(f"{target}: another file is there already; use --force to replace it")
     check_target(target, force)
     with replacing(target, force=force) as temporary:
         temporary.write_bytes(data)

@@ -97,7 +97,7 @@ def read_index(path: Path, header: dict[str, Any], force: bool) -> dict[int, Ent
             return {}
         raise Palette4dError(
             f"{path}: found no index of a series that can be read, expected the one that an "
-            "earlier export wrote; use --force to replace it, or another folder"
+            "earlier export wrote; replace it with force=True, or choose another folder"
         ) from error
     changed = [word for key, word in _CHANGED.items() if known[key] != header[key]]
     if known["sidecar"].get("sha256") != header["sidecar"]["sha256"]:
@@ -107,6 +107,6 @@ def read_index(path: Path, header: dict[str, Any], force: bool) -> dict[int, Ent
     if not force:
         raise Palette4dError(
             f"{path}: it lists a series of {counted(len(entries), 'file')} that was made with "
-            f"{' and '.join(changed)}; use --force to replace it, or choose another folder"
+            f"{' and '.join(changed)}; replace it with force=True, or choose another folder"
         )
     return {}

@@ -62,7 +62,7 @@ class Shaper:
         if self.kind == "none" and (self.low, self.high) != (0.0, 1.0):
             raise Palette4dError(
                 f"found the domain {self.low:g} to {self.high:g} without a shaper, which covers 0 "
-                "to 1; choose --shaper log or linear, or leave out --domain"
+                'to 1; choose shaper="log" or "linear", or leave out domain=…'
             )
 
     def forward(self, x: ArrayLike) -> F64:

@@ -15,8 +15,9 @@ ROOMS: dict[str, set[str]] = {
     "core/sidecar": {"model", "convert"},
     "core/recolour": {"simd", "model", "convert"},
     "core/lattice": {"simd", "model", "convert", "recolour"},
+    "core/output": {"model", "convert", "recolour"},
     "core/fit": {"simd", "model"},
-    "node": {"model", "convert", "sidecar", "recolour", "lattice"},
+    "node": {"model", "convert", "sidecar", "recolour", "lattice", "output"},
 }
 INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"', re.MULTILINE)
 

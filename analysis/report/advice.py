@@ -29,8 +29,8 @@ AT_ONCE = {"gamma": 0.0003, "handle_cost": 0.001, "blocks": 9}
 # No display-referred picture and no log encoding has larger code values.
 BRIGHT = 2.0
 
-DEFAULT = "the default --method skew"
-PARTS = "analyse parts of the clip by themselves with --frames"
+DEFAULT = 'the default method="skew"'
+PARTS = "analyse parts of the clip by themselves with frames=…"
 
 
 def warnings(
@@ -53,8 +53,8 @@ def warnings(
     if brightest > BRIGHT:
         return (
             f"the clip has code values up to {brightest:.3g}: if it is scene-linear, these figures "
-            "mean little; give its colour space with --input-space (such as ACEScg), and leave out "
-            "--palette-space: the palette is then found in a log encoding",
+            "mean little; give its colour space with input_space=… (such as ACEScg), and leave out "
+            "palette_space=…: the palette is then found in a log encoding",
         )
     found = (
         _fit(report, options),
@@ -82,15 +82,15 @@ def _fit(x: Report, options: AnalysisOptions) -> str:
     if options.method in ("static", "rgbt"):
         ways = f"{DEFAULT} follows the colours"
     elif options.method == "paper":
-        ways = "lower eta2 or eta1 with --set" + (", lower gamma for a flash" if bad else "")
+        ways = "lower the setting eta2 or eta1" + (", lower gamma for a flash" if bad else "")
     elif options.vertices:
-        ways = f"raise --vertices, or {PARTS}"
+        ways = f"raise vertices=…, or {PARTS}"
     elif bad:
         given = all(getattr(options, name) == value for name, value in AT_ONCE.items())
-        settings = " ".join(f"--set {name}={value}" for name, value in AT_ONCE.items())
+        settings = " ".join(f"{name}={value}" for name, value in AT_ONCE.items())
         ways = PARTS if given else f"{PARTS}, or, for a flash, try {settings}"
     else:
-        ways = f"lower handle_cost or raise blocks with --set, or {PARTS}"
+        ways = f"lower the setting handle_cost or raise blocks, or {PARTS}"
     return f"{what}; {ways}"
 
 
@@ -113,10 +113,10 @@ def _lost(x: Report, options: AnalysisOptions, farthest: Mapping[str, float]) ->
     if options.method in OPTIONS["reach"].methods:
         reach = options.reach / 2 or OPTIONS["reach"].default
         ways = (
-            f"try --set lambda={10 * options.lambda_:g} or --set reach={reach:.2g}, so that rare "
-            f"colours count more, or a lower --set k=N if they have fewer than {options.k:g} pixels"
+            f"try lambda_={10 * options.lambda_:g} or reach={reach:.2g}, so that rare "
+            f"colours count more, or a lower k=… if they have fewer than {options.k:g} pixels"
         )
-    static = ", or --method static" if "one static palette leaves" in nearer else ""
+    static = ', or method="static"' if "one static palette leaves" in nearer else ""
     return (
         f"in frame {frame.frame} colours of {frame.lost:.2%} of the picture lie up to "
         f"{frame.farthest:.2f} outside the palette, where {where}: if they are highlights rather "
@@ -128,11 +128,11 @@ def _lookalikes(x: Report, options: AnalysisOptions) -> str:
     if x.closest is None or x.closest[0] >= LOOKALIKE:
         return ""
     distance, frame, one, other = x.closest
-    ways = "with --set, lower palette_size, or raise separation or merge_distance"
+    ways = "lower the setting palette_size, or raise separation or merge_distance"
     if options.method == "rgbt":
         ways = f"{DEFAULT} keeps them apart"
     elif options.method == "skew":  # a short clip may have a static palette
-        ways += "; or, if little moves, take --method static"
+        ways += '; or, if little moves, take method="static"'
     return (
         f"near frame {frame} the handles {one} and {other} are hard to tell apart "
         f"({distance:.2f} apart): {ways}"
@@ -144,7 +144,7 @@ def _concave(x: Report) -> str:
         return ""
     return (
         f"at frame {x.concavity[1]} the palette is not convex (it lacks {x.concavity[0]:.0%} of "
-        "its convex hull), and recoloured gradients may step there: raise --set convexity=X"
+        "its convex hull), and recoloured gradients may step there: raise convexity=…"
     )
 
 
@@ -153,9 +153,9 @@ def _unused(x: Report, options: AnalysisOptions) -> str:
     if use >= UNUSED:
         return ""
     ways = {
-        "skew": "raise --set handle_cost=X, or ask for fewer --vertices",
-        "paper": "raise --set eta2=X",
-        "static": "with --set, raise merge_distance or lower palette_size",
-        "rgbt": "ask for fewer --vertices",
+        "skew": "raise handle_cost=…, or ask for fewer vertices=…",
+        "paper": "raise eta2=…",
+        "static": "raise the setting merge_distance or lower palette_size",
+        "rgbt": "ask for fewer vertices=…",
     }[options.method]
     return f"the handle {handle} weighs less than {UNUSED:.1%} in every frame: {ways}"

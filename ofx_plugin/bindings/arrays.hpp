@@ -35,5 +35,14 @@ DoubleArray to_array(const std::vector<Vec3>& colours);
 DoubleArray to_array(const std::vector<std::array<double, 4>>& vertices);
 /// (f, 3) int32.
 IntArray to_array(const std::vector<Face>& faces);
+/// Requires (h, w, 3 or 4) float32 with packed pixels in each row; rows may have any stride. `what`
+/// names the image in the ValueError.
+void require_image(const py::array& image, const char* what);
+/// A view of an image that require_image() accepts.
+template <class View, class Pixel>
+View view_of(const py::array& image, Pixel* data) {
+    return {data, static_cast<int>(image.shape(1)), static_cast<int>(image.shape(0)),
+            static_cast<int>(image.shape(2)), image.strides(0)};
+}
 
 }  // namespace palette4d::bindings

@@ -1,5 +1,4 @@
 // Recolouring of float32 images for Python.
-#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -15,46 +14,6 @@ using namespace palette4d;
 using namespace palette4d::bindings;
 
 namespace {
-
-/// Requires (h, w, 3 or 4) float32 with packed pixels in each row; rows may have any stride.
-void require_image(const py::array& image, const char* what) {
-    const std::string name(what);
-    if (!py::isinstance<py::array_t<float>>(image)) {
-        throw py::value_error(name + ": found dtype " + std::string(py::str(image.dtype())) +
-                              ", expected float32");
-    }
-    if (image.ndim() != 3 || (image.shape(2) != 3 && image.shape(2) != 4)) {
-        throw py::value_error(name + ": found shape " + shape_text(image) +
-                              ", expected (h, w, 3) or (h, w, 4)");
-    }
-    if (image.shape(0) > std::numeric_limits<int>::max() ||
-        image.shape(1) > std::numeric_limits<int>::max()) {
-        throw py::value_error(name + ": found shape " + shape_text(image) +
-                              ", expected less than 2^31 rows and columns");
-    }
-    if (image.size() == 0) return;
-    const py::ssize_t channel = sizeof(float), pixel = channel * image.shape(2);
-    if (image.strides(2) != channel || (image.shape(1) > 1 && image.strides(1) != pixel)) {
-        throw py::value_error(name + ": found strides of " + std::to_string(image.strides(1)) +
-                              " bytes per pixel and " + std::to_string(image.strides(2)) +
-                              " per channel, expected packed rows (" + std::to_string(pixel) +
-                              " and " + std::to_string(channel) + "); use numpy.ascontiguousarray");
-    }
-    if (image.shape(0) > 1 && std::abs(image.strides(0)) < pixel * image.shape(1)) {
-        throw py::value_error(name + ": found rows " + std::to_string(image.strides(0)) +
-                              " bytes apart, expected rows that do not overlap");
-    }
-    if (image.strides(0) % channel != 0 ||
-        reinterpret_cast<std::uintptr_t>(image.data()) % alignof(float) != 0) {
-        throw py::value_error(name + ": found unaligned memory, expected aligned float32");
-    }
-}
-
-template <class View, class Pixel>
-View view_of(const py::array& image, Pixel* data) {
-    return {data, static_cast<int>(image.shape(1)), static_cast<int>(image.shape(0)),
-            static_cast<int>(image.shape(2)), image.strides(0)};
-}
 
 /// Whether two images share memory without being exactly the same rows.
 bool overlap(const py::array& a, const py::array& b) {

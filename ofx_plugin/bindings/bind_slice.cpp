@@ -3,6 +3,8 @@
 
 #include "arrays.hpp"
 #include "binders.hpp"
+#include "model/handles.hpp"
+#include "model/lineage.hpp"
 #include "model/slice.hpp"
 
 using namespace palette4d;
@@ -42,7 +44,8 @@ void require_slice_of(const Polytope& polytope, const Slice& slice) {
         if (point.from >= vertices || point.to >= vertices || point.edge >= edges ||
             (point.edge >= 0 && (polytope.edges()[point.edge].from != point.from ||
                                  polytope.edges()[point.edge].to != point.to))) {
-            throw py::value_error("edited_colours: the slice is not one of this polytope");
+            throw py::value_error(
+                "the slice is not one of this polytope; expected one from slice_at");
         }
     }
 }
@@ -86,4 +89,18 @@ void bind_slice(py::module_& module) {
         },
         py::arg("polytope"), py::arg("edits"), py::arg("slice"),
         "(n, 3) float64 edited colours of the slice's vertices.");
+    module.def(
+        "weight_reader",
+        [](const Polytope& polytope, const Edits& edits, const Slice& slice,
+           const std::string& id) {
+            require_slice_of(polytope, slice);
+            const int handle = find_handle(polytope, edits, id);
+            if (handle < 0) throw py::value_error("id: found no vertex or stop '" + id + "'");
+            return to_array(weight_reader(slice, Lineage(polytope, edits, handle)));
+        },
+        py::arg("polytope"), py::arg("edits"), py::arg("slice"), py::arg("id"),
+        "(n, 3) float64 edited colours whose Recolourer draws a handle's matte.");
+    module.def(
+        "surface_reader", [](const Slice& slice) { return to_array(surface_reader(slice)); },
+        py::arg("slice"), "(n, 3) float64 edited colours whose Recolourer draws what is outside.");
 }

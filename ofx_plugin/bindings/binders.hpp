@@ -9,9 +9,10 @@ void bind_errors(py::module_& module);      ///< SidecarError, and the one excep
 void bind_polytope(py::module_& module);    ///< Polytope
 void bind_conversion(py::module_& module);  ///< ColourConversion, ClipConversion
 void bind_sidecar(py::module_& module);     ///< Edits, Sidecar, read_sidecar, parse_sidecar
-void bind_slice(py::module_& module);       ///< Slice, slice_at, edited_colours
+void bind_slice(py::module_& module);       ///< Slice, slice_at, edited_colours, readers
 void bind_mvc(py::module_& module);         ///< mean value coordinates and palette weights
 void bind_recolour(py::module_& module);    ///< Recolourer
+void bind_output(py::module_& module);      ///< draw, luminance_weights
 void bind_bins(py::module_& module);        ///< ColourBinner
 void bind_analysis(py::module_& module);    ///< the hot loops of palette4d.analysis
 void bind_rgbt(py::module_& module);        ///< progressive hulls in RGB and time

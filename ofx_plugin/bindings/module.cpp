@@ -13,6 +13,7 @@ PYBIND11_MODULE(_core, module) {
     bind_slice(module);
     bind_mvc(module);
     bind_recolour(module);
+    bind_output(module);
     bind_analysis(module);
     bind_bins(module);
     bind_rgbt(module);

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "colour_spaces.hpp"
+#include "convert/colour_spaces.hpp"
 #include "outputs.hpp"
 #include "sidecar_choice.hpp"
 
@@ -23,11 +23,11 @@ void prefer_colour(const Suites& suites, OfxImageEffectHandle effect, const Prop
         Properties(suites, handle).get_string(kOfxImageEffectPropColourManagementStyle);
     if (!style || style->empty() || *style == kOfxImageEffectColourManagementNone) return;
     const Params params(suites, effect);
-    const Chosen chosen = chosen_sidecar(params, std::nullopt);
+    const Chosen chosen = chosen_sidecar(params);
     if (!chosen.result.loaded) return;
     const Sidecar& sidecar = chosen.result.loaded->sidecar();
-    const bool in_palette_space = params.int_now(kParamPictureIn).value_or(0) == 1;
-    const bool linear = linear_picture(params, sidecar, 0) != nullptr;
+    const bool in_palette_space = params.int_at(kParamPictureIn, Params::kAnyTime).value_or(0) == 1;
+    const bool linear = linear_picture(params, sidecar, Params::kAnyTime) != nullptr;
     const std::vector<std::string> wanted =
         colourspaces_of(linear ? "scene_linear" : encoding_of(sidecar, in_palette_space),
                         *style == kOfxImageEffectColourManagementCore);

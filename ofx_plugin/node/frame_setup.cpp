@@ -6,7 +6,7 @@
 #include <tuple>
 #include <utility>
 
-#include "colour_spaces.hpp"
+#include "convert/colour_spaces.hpp"
 #include "handle_params.hpp"
 #include "host_time.hpp"
 #include "model/handles.hpp"
@@ -25,10 +25,10 @@ void add_note(FrameSetup& setup, const std::string& note) {
 }
 
 /// Prepares the chosen output. Throws what slicing throws.
-void prepare(FrameSetup& setup, const Params& params, LoadedSidecar& loaded, double frame,
-             OfxTime time, Interpolation interpolation) {
+void prepare(FrameSetup& setup, const Params& params, const OutputSettings& settings,
+             LoadedSidecar& loaded, double frame, OfxTime time, Interpolation interpolation) {
     Drawing& drawing = setup.drawing;
-    const OutputSettings& settings = drawing.settings;
+    drawing.options = settings;
     const Sidecar& sidecar = loaded.sidecar();
     setup.passes = false;
     if (sidecar.conversion && !settings.in_palette_space) {
@@ -89,7 +89,7 @@ FrameSetup frame_setup_at(const Suites& suites, OfxImageEffectHandle effect, Ofx
                           Interpolation interpolation, std::optional<double> source_frame) {
     FrameSetup setup;
     const Params params(suites, effect);
-    const Chosen chosen = chosen_sidecar(params, time);
+    const Chosen chosen = chosen_sidecar(params);
     if (!chosen.any) return setup;
     const SidecarResult& result = chosen.result;
     const std::string& path = chosen.path;
@@ -98,8 +98,7 @@ FrameSetup frame_setup_at(const Suites& suites, OfxImageEffectHandle effect, Ofx
         return setup;
     }
     setup.note = chosen.broken;
-    setup.drawing.settings = output_settings_at(params, time);
-    OutputSettings& settings = setup.drawing.settings;
+    OutputSettings settings = output_settings_at(params, time);
     if (settings.passes()) return setup;
     const Sidecar& sidecar = result.loaded->sidecar();
     if (settings.keep > 0 && settings.own_lightness) {
@@ -115,7 +114,7 @@ FrameSetup frame_setup_at(const Suites& suites, OfxImageEffectHandle effect, Ofx
     }
     if (at.passes) return setup;
     try {
-        prepare(setup, params, *result.loaded, at.frame, time, interpolation);
+        prepare(setup, params, settings, *result.loaded, at.frame, time, interpolation);
     } catch (const std::bad_alloc&) {
         throw;
     } catch (const std::exception& error) {

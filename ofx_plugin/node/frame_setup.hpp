@@ -16,7 +16,7 @@ enum class Interpolation { kNever, kWithoutConversion, kAlways };
 struct FrameSetup {
     /// The picture passes through unchanged.
     bool passes = true;
-    Drawing drawing;
+    NodeDrawing drawing;
     /// Why the picture passes through although a sidecar is chosen; empty without a problem.
     std::string problem;
     /// What else the user should know; empty for nothing.

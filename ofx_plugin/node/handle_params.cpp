@@ -185,12 +185,12 @@ void label_handles(const Params& params, const Chosen& chosen) {
     if (sidecar) handles = handles_of(sidecar->polytope, sidecar->edits);
     for (std::size_t i = 0; i < slots().size(); ++i) {
         const Slot& slot = slots()[i];
-        const std::string id = params.string_now(slot.id.c_str()).value_or("");
+        const std::string id = params.string_at(slot.id.c_str(), Params::kAnyTime).value_or("");
         const int at = sidecar ? handle_of(*sidecar, i, id) : -1;
         set_text(params.properties(slot.colour.c_str()), kOfxPropLabel,
                  at < 0 ? slot.colour_label : label_of(handles[static_cast<std::size_t>(at)]));
         // A slot in use stays visible, so that the user can switch it off.
-        const bool in_use = params.int_now(slot.use.c_str()).value_or(0) != 0;
+        const bool in_use = params.int_at(slot.use.c_str(), Params::kAnyTime).value_or(0) != 0;
         for (const char* name : {slot.colour.c_str(), slot.use.c_str(), slot.id.c_str()}) {
             set_secret(params.properties(name), sidecar && at < 0 && !in_use);
         }

@@ -74,7 +74,7 @@ void create_instance(const Suites& suites, OfxImageEffectHandle effect) {
         all.instances[effect] = std::make_shared<Instance>();
     }
     const Params params(suites, effect);
-    label_handles(params, chosen_sidecar(params, std::nullopt));
+    label_handles(params, chosen_sidecar(params));
 }
 
 void destroy_instance(OfxImageEffectHandle effect) {
@@ -102,7 +102,7 @@ void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const P
     Params params(suites, effect);
     // Natron holds a mutex while paramEditEnd calls the plugin back, which then deadlocks.
     if (!suites.is_natron) params.one_undo_step(step_after(param));
-    Chosen chosen = chosen_sidecar(params, std::nullopt);
+    Chosen chosen = chosen_sidecar(params);
     const std::string copy = keep_files(params, chosen, param);
     // Not under the instance's lock: setting a parameter may make the host wait for a render.
     const std::shared_ptr<Instance> instance = find(effect);

@@ -7,16 +7,15 @@
 #include <vector>
 
 #include "convert/colour_conversion.hpp"
+#include "output/drawing.hpp"
 #include "param_define.hpp"
 #include "params.hpp"
 #include "pixels.hpp"
-#include "recolour/recolour.hpp"
 #include "sidecar/sidecar.hpp"
 
 namespace palette4d::node {
 
-/// The options of kParamOutput, in order.
-enum class Output { kRecoloured, kWeight, kPalette, kOutside };
+/// Its options are those of Output, in order.
 inline constexpr const char* kParamOutput = "output";
 inline constexpr const char* kParamWeightOf = "weightOf";
 inline constexpr const char* kParamMatteIn = "matteIn";
@@ -28,22 +27,11 @@ inline constexpr const char* kParamPictureIn = "pictureIn";
 
 void define_output_params(ParamDefiner& define);
 
-struct OutputSettings {
-    Output output = Output::kRecoloured;
+struct OutputSettings : DrawingOptions {
     int weight_of = 1;          ///< a slot, counted from 1; beyond the last slot the nth handle
-    bool in_alpha = false;      ///< mattes multiply alpha; else they are grey pictures
-    double reach = 0.05;        ///< distance from the palette at which Outside is 1
-    double strength = 1;        ///< 0 to 1
-    double keep = 0;            ///< share of the source's lightness to keep, 0 to 1
     bool own_lightness = true;  ///< weights follow the sidecar's encoding, not the user's choice
-    Vec3 lightness{0, 0, 0};    ///< weights of red, green and blue; they sum to 1
-    double mix = 1;             ///< 0 the source, 1 the output
     bool in_palette_space = false;  ///< the picture is already in the palette's code values
     bool scene_linear = false;      ///< the picture and the host's colours are scene-linear
-
-    /// The output is the source, whatever the other settings are.
-    bool passes() const { return mix == 0 || (output == Output::kRecoloured && strength == 0); }
-    bool is_matte() const { return output == Output::kWeight || output == Output::kOutside; }
 };
 OutputSettings output_settings_at(const Params& params, OfxTime time);
 /// Clip preferences for a matte in alpha: an alpha channel, and an output that is not opaque even
@@ -58,24 +46,13 @@ std::shared_ptr<const ColourConversion> linear_picture(const Params& params, con
 const std::string& encoding_of(const Sidecar& sidecar, bool in_palette_space);
 
 /// What one render draws. Read-only, so that threads share it.
-struct Drawing {
-    OutputSettings settings;
-    /// The edit, exact or interpolated; null where colours do not change.
-    std::shared_ptr<const ColourMap> edit;
-    /// For mattes: weight_reader() or surface_reader().
-    std::shared_ptr<const Recolourer> reader;
-    /// From the picture's code values to the palette's; null where they are equal.
-    std::shared_ptr<const ColourConversion> conversion;
-    /// For Output::kPalette: the slice's colours before and after the edit, and the bounds of the
-    /// whole picture, which has the strip at its bottom.
-    std::vector<Vec3> original, edited;
-    OfxRectI picture{};
+struct NodeDrawing : Drawing {
     /// Limits the result by its alpha or only channel; null for no limit.
     const Image* mask = nullptr;
 };
 
 /// Draws the part of `area` that `in` covers; the rest becomes transparent black. Both images have
 /// the same format, with three or four channels.
-void draw(const Image& in, const Image& out, const OfxRectI& area, const Drawing& drawing);
+void draw(const Image& in, const Image& out, const OfxRectI& area, const NodeDrawing& drawing);
 
 }  // namespace palette4d::node

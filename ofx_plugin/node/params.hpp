@@ -20,18 +20,21 @@ void define_params(const Suites& suites, OfxParamSetHandle params);
 /// Reads and writes one instance's parameters. Results are empty where the host refuses.
 class Params {
 public:
+    /// A time for parameters that do not animate.
+    static constexpr OfxTime kAnyTime = 0;
+
     Params(const Suites& suites, OfxImageEffectHandle effect);
     ~Params();
     Params(const Params&) = delete;
     Params& operator=(const Params&) = delete;
 
-    /// With a time: the only way that is allowed while rendering.
+    /// With a time: allowed in every action.
     std::optional<std::string> string_at(const char* name, OfxTime time) const;
     std::optional<double> double_at(const char* name, OfxTime time) const;
     /// Integers, choices (the option's index) and booleans (0 or 1).
     std::optional<int> int_at(const char* name, OfxTime time) const;
     std::optional<std::array<double, 3>> rgb_at(const char* name, OfxTime time) const;
-    /// Without a time: for all actions except rendering.
+    /// Without a time: only in kOfxActionInstanceChanged, as ofxParam.h says.
     std::optional<std::string> string_now(const char* name) const;
     std::optional<double> double_now(const char* name) const;
     std::optional<int> int_now(const char* name) const;

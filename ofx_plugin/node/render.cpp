@@ -131,11 +131,12 @@ OfxStatus render(const Suites& suites, OfxImageEffectHandle effect, const Proper
         copy(in, out, window);
         return kOfxStatOK;
     }
-    setup.drawing.picture = out.definition;
+    const OfxRectI& whole = out.definition;
+    setup.drawing.picture = {whole.x1, whole.y1, whole.x2, whole.y2};
     // A host that bakes a LUT wants colours only, so no mattes and no strip.
     if (in_args.get_string(kOfxImageEffectPropNoSpatialAwareness) == "true" &&
-        setup.drawing.settings.output == Output::kPalette) {
-        setup.drawing.settings.output = Output::kRecoloured;
+        setup.drawing.options.output == Output::kPalette) {
+        setup.drawing.options.output = Output::kRecoloured;
         if (!setup.drawing.edit) {
             copy(in, out, window);
             return kOfxStatOK;

@@ -1,6 +1,11 @@
 #include "sidecar_cache.hpp"
 
-#if !defined(_WIN32)
+#if defined(_WIN32)
+#if !defined(NOMINMAX)
+#define NOMINMAX
+#endif
+#include <windows.h>
+#else
 #include <sys/stat.h>
 #endif
 
@@ -37,8 +42,8 @@ constexpr auto kSettled = std::chrono::seconds(3);
 struct Stamp {
     fs::file_time_type modified{};
     std::uintmax_t bytes = 0;
-    std::uintmax_t device = 0, inode = 0;               ///< 0 where the system has none
-    std::int64_t change_seconds = 0, change_nanos = 0;  ///< likewise 0 where the system has none
+    std::uintmax_t device = 0, inode = 0;               ///< 0 where the file system has none
+    std::int64_t change_seconds = 0, change_nanos = 0;  ///< likewise; since 1970
     bool operator==(const Stamp& other) const {
         const auto all = [](const Stamp& s) {
             return std::tie(s.modified, s.bytes, s.device, s.inode, s.change_seconds,
@@ -51,7 +56,23 @@ struct Stamp {
 /// Adds what the standard library does not report.
 void identify(Stamp& stamp, const fs::path& path) {
 #if defined(_WIN32)
-    static_cast<void>(stamp), static_cast<void>(path);
+    const HANDLE file =
+        CreateFileW(path.c_str(), 0, FILE_SHARE_READ | FILE_SHARE_WRITE | FILE_SHARE_DELETE,
+                    nullptr, OPEN_EXISTING, FILE_ATTRIBUTE_NORMAL, nullptr);
+    if (file == INVALID_HANDLE_VALUE) return;
+    BY_HANDLE_FILE_INFORMATION about{};
+    if (GetFileInformationByHandle(file, &about)) {
+        stamp.device = about.dwVolumeSerialNumber;
+        stamp.inode = std::uintmax_t{about.nFileIndexHigh} << 32 | about.nFileIndexLow;
+    }
+    FILE_BASIC_INFO times{};
+    if (GetFileInformationByHandleEx(file, FileBasicInfo, &times, sizeof times)) {
+        // In units of 100 ns since 1601.
+        const std::int64_t changed = times.ChangeTime.QuadPart - 116444736000000000;
+        stamp.change_seconds = changed / 10000000;
+        stamp.change_nanos = changed % 10000000 * 100;
+    }
+    CloseHandle(file);
 #else
     struct stat about{};
     if (::stat(path.c_str(), &about) != 0) return;

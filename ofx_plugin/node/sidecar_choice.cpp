@@ -93,17 +93,15 @@ void define_file_params(ParamDefiner& define) {
     }
 }
 
-Chosen chosen_sidecar(const Params& params, std::optional<OfxTime> time) {
+Chosen chosen_sidecar(const Params& params) {
     const auto text = [&](const char* name) {
-        return (time ? params.string_at(name, *time) : params.string_now(name)).value_or("");
+        return params.string_at(name, Params::kAnyTime).value_or("");
     };
     Chosen chosen;
     const std::string given = text(kParamSidecar), copy = text(kParamEmbedded);
     chosen.media = params.media();
     if (given.empty()) {
-        const int by_name =
-            (time ? params.int_at(kParamFindByName, *time) : params.int_now(kParamFindByName))
-                .value_or(1);
+        const int by_name = params.int_at(kParamFindByName, Params::kAnyTime).value_or(1);
         if (by_name == 0 || chosen.media.empty()) return chosen;
         find_by_name(chosen, text(kParamClipFolder), copy);
         return chosen;
@@ -139,7 +137,7 @@ Chosen chosen_sidecar(const Params& params, std::optional<OfxTime> time) {
 std::string keep_files(const Params& params, Chosen& chosen, const std::string& param) {
     if (param == kParamReload) {
         purge_sidecars();
-        chosen = chosen_sidecar(params, std::nullopt);
+        chosen = chosen_sidecar(params);
     }
     note_revision(params, chosen, param == kParamReload);
     const LoadedSidecar* loaded = chosen.result.loaded.get();
@@ -152,7 +150,7 @@ std::string keep_files(const Params& params, Chosen& chosen, const std::string& 
     if (params.int_now(kParamEmbed).value_or(0) == 0) {
         note_text(params, kParamEmbedded, "");
         if (chosen.embedded) {
-            chosen = chosen_sidecar(params, std::nullopt);
+            chosen = chosen_sidecar(params);
             note_revision(params, chosen, false);
         }
         return "";

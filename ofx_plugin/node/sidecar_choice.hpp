@@ -1,7 +1,6 @@
 // The parameters that select the sidecar, and the project's copy of it.
 #pragma once
 
-#include <optional>
 #include <string>
 
 #include "param_define.hpp"
@@ -30,8 +29,8 @@ struct Chosen {
     /// Null when there is none or it cannot be read.
     const Sidecar* sidecar() const { return result.loaded ? &result.loaded->sidecar() : nullptr; }
 };
-/// The sidecar that the parameters select. With a time, reads them as rendering allows.
-Chosen chosen_sidecar(const Params& params, std::optional<OfxTime> time);
+/// The sidecar that the parameters select, in any action.
+Chosen chosen_sidecar(const Params& params);
 
 /// For instance changes only. Updates the project's copy, the clip's folder and the revision, whose
 /// change tells the host to discard cached frames. `param` is what the user changed. Returns the

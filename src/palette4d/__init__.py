@@ -15,33 +15,54 @@ from collections.abc import Callable
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
-from palette4d.common.errors import Palette4dError, SidecarError
+from palette4d.common.errors import Palette4dError, SidecarError, UnfinishedError
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
     from palette4d._core import __version__
+    from palette4d.demo.scene import sample_clip
     from palette4d.grade.document import Document
+    from palette4d.grade.rendering import render
+    from palette4d.hosts.install import install_plugin
     from palette4d.lut_export.bake import bake
     from palette4d.media.clip import Clip, open_clip
+    from palette4d.plotting import plot
+    from palette4d.shows.analysis import analyze_shots
+    from palette4d.shows.exports import config, export
 
 __all__ = [
     "Document",
     "Palette4dError",
     "SidecarError",
+    "UnfinishedError",
     "__version__",
     "analyze",
+    "analyze_shots",
     "bake",
+    "config",
+    "export",
+    "install_plugin",
     "load",
     "open_clip",
+    "plot",
+    "render",
+    "sample_clip",
 ]
 
 _HOMES = {
     "Document": "palette4d.grade.document",
     "__version__": "palette4d._core",
+    "analyze_shots": "palette4d.shows.analysis",
     "bake": "palette4d.lut_export.bake",
+    "config": "palette4d.shows.exports",
+    "export": "palette4d.shows.exports",
+    "install_plugin": "palette4d.hosts.install",
     "open_clip": "palette4d.media.clip",
+    "plot": "palette4d.plotting",
+    "render": "palette4d.grade.rendering",
+    "sample_clip": "palette4d.demo.scene",
 }
 
 
@@ -114,7 +135,7 @@ def analyze(
     Returns
     -------
     Document
-        Not yet saved; its ``notes`` are the notes of the analysis.
+        Not yet saved; its ``notes`` and its ``report`` are those of the analysis.
 
     Raises
     ------
@@ -123,16 +144,13 @@ def analyze(
         is unknown or out of range.
     """
     from palette4d.analysis import pipeline
-    from palette4d.analysis.options import AnalysisOptions, check_methods, parse_setting
+    from palette4d.analysis.options import AnalysisOptions
     from palette4d.grade.document import Document
     from palette4d.media.array_clip import ArrayClip
     from palette4d.media.clip import Clip, open_clip
     from palette4d.media.colour_space import SpaceOptions
 
-    given: dict[str, Any] = dict(
-        parse_setting(f"{name.rstrip('_')}={value}") for name, value in settings.items()
-    )
-    check_methods(method, given)
+    options = AnalysisOptions.of(method, settings)
     if isinstance(clip, str | os.PathLike):
         opened: Clip = open_clip(
             os.fspath(clip), frames=frames, rate=rate, skip_bad_frames=skip_bad_frames
@@ -141,9 +159,9 @@ def analyze(
         opened = clip if isinstance(clip, Clip) else ArrayClip(clip, first=0)
     found = pipeline.analyze(
         opened,
-        AnalysisOptions(method=method, **given),
+        options,
         progress,
         spaces=SpaceOptions(input_space, palette_space, ocio_config),
         allow_cuts=allow_cuts,
     )
-    return Document(found.document, found.notes)
+    return Document(found.document, found.notes, found.figures())

@@ -200,6 +200,38 @@ class Lattice:
     def size(self) -> dict[str, int]:
         """Cells made, cut, their parts, exact parts in use, colours evaluated exactly."""
 
+def draw(
+    image: NDArray[np.float32],
+    output: Literal["recoloured", "weight", "palette", "outside"],
+    map: Recolourer,
+    *,
+    original: ArrayLike | None = ...,
+    edited: ArrayLike | None = ...,
+    strength: float = ...,
+    keep_lightness: float = ...,
+    lightness: Sequence[float] = ...,
+    mix: float = ...,
+    matte_in_alpha: bool = ...,
+    outside_at: float = ...,
+    premultiplied: bool = ...,
+    threads: int = ...,
+    conversion: ColourConversion | None = ...,
+) -> F32:
+    """Return what the node draws for a frame, (h, w, 3 or 4) float32 as the image.
+
+    `map` holds the edit, or for a matte what `weight_reader` or `surface_reader` returns.
+    `original` and `edited` are the (n, 3) colours of "palette". `lightness` are three weights.
+    """
+
+def weight_reader(polytope: Polytope, edits: Edits, slice: Slice, id: str) -> F64:
+    """(n, 3) float64 edited colours whose Recolourer draws the matte of a vertex or stop."""
+
+def surface_reader(slice: Slice) -> F64:
+    """(n, 3) float64 edited colours whose Recolourer draws the matte of "outside"."""
+
+def luminance_weights(encoding: str) -> list[float]:
+    """Return the weights of red, green and blue by an encoding's name; Rec.709's if unknown."""
+
 LATTICE_TOLERANCE: float
 """What `Lattice.largest_error` is held against."""
 

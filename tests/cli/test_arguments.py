@@ -108,7 +108,7 @@ def test_negative_frames_of_every_verb(tmp_path, capsys):
     assert (frames["first"], frames["last"]) == (-5, -4)
 
     graded = tmp_path / "graded"
-    render = ["render", str(out), str(folder), "-o", str(graded / "o.####.png"), "--quiet"]
+    render = ["render", str(out), str(folder), "-o", str(graded / "o.####.png")]
     assert main.main([*render, "--frames", "-5--4"]) == 0
     assert sorted(path.name for path in graded.iterdir()) == ["o.-004.png", "o.-005.png"]
 
@@ -125,7 +125,7 @@ def test_negative_frames_of_every_verb(tmp_path, capsys):
 def test_one_frame_is_not_1_frames(tmp_path, capsys):
     folder = grey_levels(tmp_path / "in", range(5, 6))
     sample = tmp_path / "sample"
-    words = ["sample-clip", "-o", str(sample / "o.##.png"), "--size", "32x32", "--quiet"]
+    words = ["sample-clip", "-o", str(sample / "o.##.png"), "--size", "32x32"]
     assert main.main([*words, "--frames", "1"]) == 0
     assert "wrote 1 frame, " in capsys.readouterr().out
     assert main.main(["analyze", str(sample), "-o", str(tmp_path / "a.p4d.json")]) == 0
@@ -134,7 +134,7 @@ def test_one_frame_is_not_1_frames(tmp_path, capsys):
     printed = capsys.readouterr().out
     assert ", 1 block: " in printed
     assert "0 vertices, 0 stops" in printed
-    render = ["render", EDITED, str(folder), "-o", str(tmp_path / "o.png"), "--quiet"]
+    render = ["render", EDITED, str(folder), "-o", str(tmp_path / "o.png")]
     assert main.main(render) == 0
     assert "1 frames" not in capsys.readouterr().out
 

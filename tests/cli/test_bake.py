@@ -157,7 +157,7 @@ class TestFiles:
     ) -> None:
         pipe = tmp_path / "a.cube"
         os.mkfifo(pipe)
-        assert "use `-o - --format" in error(capsys, "-o", pipe, "--force")
+        assert "-o - --format" in error(capsys, "-o", pipe, "--force")
         assert pipe.is_fifo()
 
     def test_overwriting_needs_force(
@@ -231,7 +231,7 @@ class TestErrors:
         [
             (lambda text: text[: len(text) // 2], "take an earlier copy"),
             (lambda text: text.replace('"version": 1', '"version": 999', 1), "update palette4d"),
-            (lambda text: "", "expected JSON text (RFC 8259); mend it there"),
+            (lambda text: "", "expected JSON text (RFC 8259); correct it there"),
             (lambda text: text.replace('"rgb": [', '"rgb": [7, ', 1), "or analyse the clip again"),
         ],
     )
@@ -249,7 +249,7 @@ class TestErrors:
             text = capsys.readouterr().err
             assert "bad.p4d.json" in text
             assert said in text
-            assert ("mend it there" in text) != ("update palette4d" in text)
+            assert ("correct it there" in text) != ("update palette4d" in text)
         assert [path.name for path in tmp_path.iterdir()] == ["bad.p4d.json"]
 
     def test_a_manifest(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -260,7 +260,7 @@ class TestErrors:
             text = capsys.readouterr().err
             assert "edit.shots.json: /schema: " in text
             assert "this is a manifest of shots: name the sidecar (.p4d.json) of one" in text
-            assert "mend it there" not in text
+            assert "correct it there" not in text
 
 
 class TestReport:

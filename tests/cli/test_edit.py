@@ -47,7 +47,7 @@ def test_set_a_vertex(plain: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main.main(["edit", plain, "set", "v4", "--rgb", "0.9", "0.1", "0.1"]) == 0
     after = sidecar.load(plain)
     assert after["edits"] == {"vertices": [{"vertex": "v4", "rgb": [0.9, 0.1, 0.1]}], "stops": []}
-    assert {**after, "edits": 0} == {**before, "edits": 0}
+    assert {**after, "edits": 0, "history": 0} == {**before, "edits": 0, "history": 0}
     out = capsys.readouterr().out
     assert "vertex v4 (frame 0): #1a1ae6" in out
     assert "-> #e61a1a" in out
@@ -59,6 +59,8 @@ def test_set_again_replaces_and_order_does_not_matter(plain: str, tmp_path: Path
     for path, ids in ((plain, ["v9", "v2", "v9"]), (other, ["v2", "v9"])):
         for name in ids:
             assert main.main(["edit", path, "set", name, "--rgb", "1,0,0.5"]) == 0
+    assert main.main(["edit", plain, "history", "--clear"]) == 0
+    assert main.main(["edit", other, "history", "--clear"]) == 0
     assert Path(plain).read_bytes() == Path(other).read_bytes()
     assert [entry["vertex"] for entry in edits_of(plain)["vertices"]] == ["v2", "v9"]
 
@@ -229,6 +231,8 @@ def test_reset_gives_the_file_back(plain: str) -> None:
     assert main.main(["edit", plain, "set", "v4", "--rgb", "1,1,1"]) == 0
     assert main.main(["edit", plain, "set", "e3", "--frame", "2.5", "--rgb", "1,1,1"]) == 0
     assert main.main(["edit", plain, "reset"]) == 0
+    assert Path(plain).read_bytes() != before
+    assert main.main(["edit", plain, "history", "--clear"]) == 0
     assert Path(plain).read_bytes() == before
 
 

@@ -30,7 +30,7 @@ def run(*words: object) -> int:
     """Run the verb alone, without the other verbs' modules."""
     parser = argparse.ArgumentParser()
     render.add_parser(parser.add_subparsers())
-    args = parser.parse_args(["render", *map(str, words), "--quiet"])
+    args = parser.parse_args(["render", *map(str, words)])
     return args.run(args)
 
 
@@ -181,7 +181,7 @@ def test_any_list_of_frames_is_rendered(tmp_path, capsys):
     assert run(PLAIN, tmp_path / "in", "-o", output, "--frames", "12,0,30") == 0
     assert sorted(p.name for p in output.parent.iterdir()) == ["o.00.png", "o.12.png", "o.30.png"]
     assert stored(output.parent / "o.12.png")[1][0, 0, 0] == 12
-    assert "rendered 3 frames" in capsys.readouterr().out
+    assert "3 frames" in capsys.readouterr().out
 
 
 def test_any_list_of_a_movies_frames_is_rendered(tmp_path):
@@ -234,7 +234,7 @@ def test_existing_frames_are_kept_unless_forced(tmp_path):
     grey_levels(tmp_path / "in", range(3))
     output = tmp_path / "o.#.png"
     (tmp_path / "o.1.png").write_bytes(b"precious")
-    with pytest.raises(Palette4dError, match=r"o\.1\.png: it exists already.*--force"):
+    with pytest.raises(Palette4dError, match=r"o\.1\.png: found a file there.*force=True"):
         run(PLAIN, tmp_path / "in", "-o", output)
     assert (tmp_path / "o.1.png").read_bytes() == b"precious"
     assert not (tmp_path / "o.0.png").exists()
@@ -258,9 +258,10 @@ def test_wrong_requests_are_refused_before_anything_is_written(tmp_path):
     for words, message in (
         (["-o", tmp_path / "x" / "o.png"], "3 frames would go into one file"),
         (["-o", tmp_path / "x" / "o.####.gif"], 'extension ".gif"'),
+        (["-o", tmp_path / "x" / "o.avi"], "OUT.mp4"),
         (["-o", tmp_path / "x" / "o.1-3#.png"], "found the range"),
-        (["-o", tmp_path / "x" / "o.#.png", "--half"], "--half"),
-        (["-o", tmp_path / "x" / "o.#.png", "--bits", 32], "--bits 32"),
+        (["-o", tmp_path / "x" / "o.#.png", "--half"], "half=True"),
+        (["-o", tmp_path / "x" / "o.#.png", "--bits", 32], "32 bits"),
     ):
         with pytest.raises(Palette4dError, match=message):
             run(PLAIN, folder, *words)
@@ -399,9 +400,10 @@ def test_the_source_beside_the_edit(tmp_path):
     pixels = colours(6, 10, 3)
     write_image(tmp_path / "c.0005.exr", pixels)
     edited = by_core(5, pixels)
+    white = np.ones((len(pixels), 2, pixels.shape[2]), np.float32)
     for how, expected in (
         ("side", np.concatenate([pixels, edited], axis=1)),
-        ("wipe", np.concatenate([pixels[:, :5], edited[:, 5:]], axis=1)),
+        ("wipe", np.concatenate([pixels[:, :4], white, edited[:, 6:]], axis=1)),
     ):
         output = tmp_path / f"{how}.exr"
         assert run(EDITED, tmp_path / "c.0005.exr", "-o", output, "--compare", how) == 0
@@ -415,8 +417,7 @@ def test_the_source_beside_the_edit(tmp_path):
 
 def rendered(output: Path, source: Path, progress: Callable[[int, int], None], force: bool) -> None:
     document, clip = Document.load(PLAIN), open_clip(str(source))
-    options = rendering.RenderOptions()
-    rendering.render(document, clip, str(output), options, force=force, progress=progress)
+    rendering.render(document, clip, output, force=force, progress=progress)
 
 
 @pytest.mark.parametrize("name", ["o.mp4", "o.mov"])
@@ -431,7 +432,7 @@ def test_ctrl_c_leaves_what_was_there_before(tmp_path, name):
         rendered(output, source, interrupted, force=False)
     assert list(output.parent.iterdir()) == []
     output.write_bytes(b"precious")
-    with pytest.raises(Palette4dError, match="--force"):
+    with pytest.raises(Palette4dError, match="force=True"):
         rendered(output, source, lambda done, total: None, force=False)
     with pytest.raises(KeyboardInterrupt):
         rendered(output, source, interrupted, force=True)
@@ -474,3 +475,56 @@ def test_a_clip_unlike_the_sidecars_is_told(tmp_path, capsys):
     (shorter,) = warnings_of(capsys, PLAIN, tmp_path / "like" / "c.2-9#.png", *like[2:])
     assert "frames 0 to 20" in shorter
     assert "2-9" in shorter
+
+
+def test_show_writes_a_matte_as_a_grey_picture(tmp_path):
+    pixels = colours(9, 13, 3)
+    source = write_image(tmp_path / "c.0005.exr", pixels)
+    document = Document.load(EDITED)
+    handle = document.core.polytope.vertex_ids[0]
+    for show in (f"weight:{handle}", "outside"):
+        words = ("--show", show, "--outside-at", 0.01, "--force")
+        assert run(EDITED, source, "-o", tmp_path / "o.exr", *words) == 0
+        _, written, _ = stored(tmp_path / "o.exr")
+        expected = document.matte(pixels, 5, show, outside_at=0.01)
+        np.testing.assert_array_equal(written, np.stack([expected] * 3, axis=2))
+        assert 0 < expected.max() <= 1
+
+
+def test_show_writes_a_matte_into_alpha(tmp_path):
+    pixels = colours(9, 13, 3)
+    source = write_image(tmp_path / "c.0005.tif", pixels)
+    words = ("--show", "outside", "--outside-at", 0.02, "--matte-in", "alpha")
+    assert run(EDITED, source, "-o", tmp_path / "o.tif", *words) == 0
+    _, written, _ = stored(tmp_path / "o.tif")
+    np.testing.assert_array_equal(written[..., :3], pixels)
+    matte = Document.load(EDITED).matte(pixels, 5, "outside", outside_at=0.02)
+    np.testing.assert_array_equal(written[..., 3], matte)
+    assert run(EDITED, source, "-o", tmp_path / "w.tif", *words, "--compare", "side") == 0
+    assert stored(tmp_path / "w.tif")[1].shape == (9, 26, 4)
+
+
+def test_the_palette_and_the_lightness_are_the_documents(tmp_path):
+    pixels = colours(32, 13, 3)
+    source = write_image(tmp_path / "c.0005.exr", pixels)
+    words = ("--show", "palette", "--keep-lightness", 1, "--lightness-of", "rec2020", "--mix", 0.5)
+    assert run(EDITED, source, "-o", tmp_path / "o.exr", *words, "--strength", 0.75) == 0
+    expected = Document.load(EDITED).recolour(
+        pixels, 5, show="palette", keep_lightness=1, lightness_of="rec2020", mix=0.5, strength=0.75
+    )
+    np.testing.assert_array_equal(stored(tmp_path / "o.exr")[1], expected)
+
+
+@pytest.mark.parametrize("show", ["weight", "weight:", "matte", "outside:v1"])
+def test_an_output_that_does_not_exist_is_wrong_usage(tmp_path, show, capsys):
+    with pytest.raises(SystemExit) as stopped:
+        run(EDITED, tmp_path, "-o", tmp_path / "o.exr", "--show", show)
+    assert stopped.value.code == 2
+    assert "weight:ID" in capsys.readouterr().err
+
+
+def test_a_handle_that_does_not_exist_is_an_error(tmp_path):
+    source = write_image(tmp_path / "c.0005.exr", colours(4, 4, 3))
+    with pytest.raises(Palette4dError, match="v99"):
+        run(EDITED, source, "-o", tmp_path / "o.exr", "--show", "weight:v99")
+    assert not (tmp_path / "o.exr").exists()

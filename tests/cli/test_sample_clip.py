@@ -18,7 +18,7 @@ def run(*words: object) -> int:
     """Run the verb alone, without the other verbs' modules."""
     parser = argparse.ArgumentParser()
     sample_clip.add_parser(parser.add_subparsers())
-    args = parser.parse_args(["sample-clip", *map(str, words), "--quiet"])
+    args = parser.parse_args(["sample-clip", *map(str, words)])
     return args.run(args)
 
 
@@ -47,7 +47,7 @@ def test_frames_are_written(tmp_path, name, depth, options):
     for frame, pixels in clip:
         drawn = Scene(64, 36).picture((frame - 1) / 2)
         np.testing.assert_allclose(pixels, drawn, atol=tolerance)
-    with pytest.raises(Palette4dError, match="exists already"):
+    with pytest.raises(Palette4dError, match="found a file there"):
         run("-o", output, "--frames", 1, "--size", "64x36")
     assert run("-o", output, "--frames", 1, "--size", "64x36", "--force", *options) == 0
 
@@ -57,7 +57,7 @@ def test_frames_are_written(tmp_path, name, depth, options):
     [
         (["-o", "o.png"], "one file"),
         (["-o", "o.#.gif"], "extension"),
-        (["-o", "o.#.png", "--half"], "--half"),
+        (["-o", "o.#.png", "--half"], "half=True"),
     ],
 )
 def test_wrong_requests_are_refused(tmp_path, monkeypatch, words, message):

@@ -1,13 +1,18 @@
 """The atomic writer: whatever happens, a reader finds the old file or the new one."""
 
 import errno
+import fcntl
 import os
+import secrets
 import stat
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from palette4d.common import files
 from palette4d.common.errors import Palette4dError, WriteError
 from palette4d.common.files import replacing
 
@@ -176,6 +181,75 @@ def test_the_longest_names(tmp_path: Path, name: str) -> None:
     with replacing(tmp_path / name) as temporary:
         temporary.write_bytes(b"new")
     assert names(tmp_path) == [name]
+
+
+KILLED = """
+import os, sys
+from pathlib import Path
+from palette4d.common.files import replacing
+with replacing(Path(sys.argv[1]), force=True) as temporary:
+    temporary.write_bytes(b"half")
+    os.kill(os.getpid(), 9)
+"""
+
+
+def test_the_next_process_removes_what_a_killed_one_left(
+    old: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    killed = subprocess.run([sys.executable, "-c", KILLED, old], check=False)
+    assert killed.returncode == -9
+    assert old.read_bytes() == b"old"
+    assert len(names(old.parent)) == 2
+    alike = old.with_name(".grade.tmp.cube")
+    alike.touch()
+    monkeypatch.setattr(files, "_swept", set())
+    replace(old, lambda: None)
+    assert names(old.parent) == [alike.name, old.name]
+
+
+def test_files_that_are_being_written_are_no_leftovers(
+    old: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = old.with_name("other.cube")
+    with replacing(other) as temporary:
+        temporary.write_bytes(b"slow")
+        monkeypatch.setattr(files, "_swept", set())  # as if another process began
+        replace(old, lambda: None)
+        assert temporary.exists()
+    assert other.read_bytes() == b"slow"
+
+
+def test_without_locks_only_old_files_are_leftovers(
+    old: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(fcntl, "flock", failing(OSError(errno.ENOLCK, "no locks")))
+    fresh, stale = (old.with_name(f".a.{digit * 16}.p4d-tmp.cube") for digit in "01")
+    fresh.touch()
+    stale.touch()
+    os.utime(stale, (0, 0))
+    monkeypatch.setattr(files, "_swept", set())
+    replace(old, lambda: None)
+    assert names(old.parent) == [fresh.name, old.name]
+
+
+def test_a_link_in_the_place_of_the_temporary_file_is_not_followed(
+    old: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Even if the name could be guessed."""
+    monkeypatch.setattr(secrets, "token_hex", lambda _: "0" * 16)
+    victim = old.with_name("victim")
+    victim.write_bytes(b"precious")
+    files._swept.add(old.parent)
+    files._temporary_name(old).symlink_to(victim)
+    with pytest.raises(WriteError):
+        replace(old, lambda: None)
+    assert (victim.read_bytes(), old.read_bytes()) == (b"precious", b"old")
+
+
+def test_a_link_replaces_a_file_at_once(old: Path) -> None:
+    files.replace_by_link(old, "other.cube")
+    assert old.readlink() == Path("other.cube")
+    assert names(old.parent) == [old.name]
 
 
 def test_targets_that_cannot_be_written(tmp_path: Path) -> None:

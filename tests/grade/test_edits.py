@@ -83,10 +83,10 @@ def test_the_same_change_by_both_is_one() -> None:
         (state({"v1": BLUE}), {}),
         (state({"v1": RED, "s1": stop(3)}), state({"v1": RED, "s1": stop(3, red=1)})),
         (state({"v1": RED, "s1": stop(3)}), state({"v1": RED, "s2": stop(3)})),
-        (state({"v1": RED}) | {RAMP: "hold"}, state({"v1": RED}) | {RAMP: "smooth"}),
+        ({**state({"v1": RED}), RAMP: "hold"}, {**state({"v1": RED}), RAMP: "smooth"}),
         (
-            state({"v1": RED}) | {("version", "a"): {"vertices": [1]}},
-            state({"v1": RED}) | {("version", "a"): {"vertices": []}},
+            {**state({"v1": RED}), ("version", "a"): {"vertices": [1]}},
+            {**state({"v1": RED}), ("version", "a"): {"vertices": []}},
         ),
     ],
 )
@@ -108,7 +108,8 @@ def test_two_new_stops_of_one_id_are_two_stops() -> None:
 
 
 def test_two_new_picks_of_one_id_are_two_picks() -> None:
-    mine, theirs = {("pick", "p1"): {"frame": 1}}, {("pick", "p1"): {"frame": 2}}
+    mine: State = {("pick", "p1"): {"frame": 1}}
+    theirs: State = {("pick", "p1"): {"frame": 2}}
     assert merged({}, mine, theirs, ())[0] == {
         ("pick", "p1"): {"frame": 2},
         ("pick", "p2"): {"frame": 1},
@@ -130,7 +131,8 @@ def test_steps_are_the_same_after_their_json() -> None:
 
 
 def test_old_steps_are_folded() -> None:
-    steps, now = [], {}
+    steps: list[Edit] = []
+    now: State = {}
     for i in range(500):
         new = {**now, **state({f"v{i % 7}": stop(i)})}
         steps.append(difference(now, new, f"step {i}"))
@@ -144,7 +146,7 @@ def test_old_steps_are_folded() -> None:
     for step in kept:
         found = step.apply(found)
     assert found == now
-    big = {("pick", f"p{i}"): {"text": "x" * 1000} for i in range(1000)}
+    big: State = {("pick", f"p{i}"): {"text": "x" * 1000} for i in range(1000)}
     kept = bounded([difference({}, {key: pick}) for key, pick in big.items()])
     assert len(json.dumps([step_to_fields(step) for step in kept[1:]])) < 300_000
     assert folded(kept).apply({}) == big

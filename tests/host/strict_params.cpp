@@ -1,4 +1,4 @@
-// The parameter suite: values with their exact types, by time only while rendering.
+// The parameter suite: values with their exact types, by time in most actions.
 #include <cstdarg>
 #include <iterator>
 #include <utility>
@@ -21,14 +21,9 @@ bool has_value(const OfxParamStruct& param) {
     return param.type != kOfxParamTypeGroup && param.type != kOfxParamTypePushButton;
 }
 
-/// Whether the action is about a frame, which need not be the one that the host shows.
-bool of_a_frame() {
-    const std::string& action = activity().action;
-    return action == kOfxImageEffectActionRender || action == kOfxImageEffectActionIsIdentity;
-}
-
-/// Values may be set "from within a kOfxActionInstanceChanged or interact action" (ofxParam.h).
-bool may_set(const char* function) {
+/// Values may be set, and read without a time, "from within a kOfxActionInstanceChanged or interact
+/// action" (ofxParam.h).
+bool allowed(const char* function) {
     const std::string& action = activity().action;
     if (action == kOfxActionInstanceChanged) return true;
     Host::get().fault(std::string(function) + ": not allowed in " + action);
@@ -152,7 +147,7 @@ OfxStatus read(OfxParamHandle param, double time, va_list arguments) {
 OfxStatus get_value(OfxParamHandle param, ...) {
     const Call call("paramGetValue");
     if (call.refused()) return kOfxStatFailed;
-    if (of_a_frame()) Host::get().fault("paramGetValue: while rendering; it has no time");
+    allowed("paramGetValue");
     va_list arguments;
     va_start(arguments, param);
     const OfxStatus status = read(param, 0, arguments);
@@ -173,7 +168,7 @@ OfxStatus get_value_at(OfxParamHandle param, OfxTime time, ...) {
 OfxStatus set_value(OfxParamHandle param, ...) {
     const Call call("paramSetValue");
     if (call.refused()) return kOfxStatFailed;
-    if (!may_set("paramSetValue")) return kOfxStatFailed;
+    if (!allowed("paramSetValue")) return kOfxStatFailed;
     if (!param || !has_value(*param)) {
         Host::get().fault("paramSetValue: no parameter, or one without a value");
         return kOfxStatErrBadHandle;
@@ -218,7 +213,7 @@ OfxStatus key_index(OfxParamHandle, OfxTime, int, int*) { return unexpected("par
 OfxStatus delete_key(OfxParamHandle, OfxTime) { return unexpected("paramDeleteKey"); }
 OfxStatus delete_keys(OfxParamHandle param) {
     const Call call("paramDeleteAllKeys");
-    if (call.refused() || !param || !may_set("paramDeleteAllKeys")) return kOfxStatFailed;
+    if (call.refused() || !param || !allowed("paramDeleteAllKeys")) return kOfxStatFailed;
     const Value before = param->value;
     const std::map<double, Value> keys = std::exchange(param->keys, {});
     if (!keys.empty()) param->value = keys.begin()->second;

@@ -134,3 +134,70 @@ def test_awkward_pixels_pass_the_node_bit_for_bit(node: Node) -> None:
     assert same_bits(result[odd], image[odd]).all()
     assert same_bits(result[:, :, 3], image[:, :, 3]).all()
     assert not same_bits(result[~odd][:, :3], image[~odd][:, :3]).all()
+
+
+#: `Document.recolour`'s arguments, and the node's parameters for the same.
+OUTPUTS: list[tuple[dict[str, Any], list[str]]] = [
+    ({"keep_lightness": 1.0}, ["keepLightness=1"]),
+    (
+        {"keep_lightness": 0.4, "lightness_of": "rec601", "strength": 0.7},
+        ["keepLightness=0.4", "lightnessOf=5", "strength=0.7"],
+    ),
+    (
+        {"keep_lightness": 0.9, "lightness_of": "ap1", "mix": 0.6},
+        ["keepLightness=0.9", "lightnessOf=4", "mix=0.6"],
+    ),
+    ({"mix": 0.3}, ["mix=0.3"]),
+    ({"show": "weight:{vertex}"}, ["output=1", "handle01Id={vertex}"]),
+    ({"show": "weight:{stop}", "mix": 0.5}, ["output=1", "handle01Id={stop}", "mix=0.5"]),
+    (
+        {"show": "weight:{vertex}", "matte_in": "alpha"},
+        ["output=1", "handle01Id={vertex}", "matteIn=1"],
+    ),
+    ({"show": "outside"}, ["output=3"]),
+    ({"show": "outside", "outside_at": 0.2}, ["output=3", "outsideReach=0.2"]),
+    ({"show": "palette"}, ["output=2"]),
+    (
+        {"show": "palette", "strength": 0.5, "keep_lightness": 0.8, "lightness_of": "p3"},
+        ["output=2", "strength=0.5", "keepLightness=0.8", "lightnessOf=3"],
+    ),
+    ({"show": "palette", "mix": 0.0}, ["output=2", "mix=0"]),
+    ({"show": "palette", "strength": 0.0}, ["output=2", "strength=0"]),
+]
+
+
+@pytest.mark.parametrize(("channels", "premultiplied"), SHAPES)
+@pytest.mark.parametrize("name", ["v1_edited", "v1_scene_linear"])
+@pytest.mark.parametrize(("given", "parameters"), OUTPUTS)
+def test_every_output_of_the_node_is_the_documents(
+    node: Node,
+    name: str,
+    channels: int,
+    premultiplied: bool,
+    given: dict[str, Any],
+    parameters: list[str],
+) -> None:
+    path = GOLDEN / f"{name}.p4d.json"
+    document = Document.load(path)
+    stops = [stop["id"] for stop in document.core.edits.stops]
+    ids = {"vertex": document.core.polytope.vertex_ids[1], "stop": stops[0] if stops else "v1"}
+    if given.get("matte_in") == "alpha" and channels == 3:
+        pytest.skip("the node asks its host for alpha")
+    image = picture(channels)
+    if premultiplied:
+        image[..., :3] *= image[..., 3:]
+    given = {key: v.format(**ids) if key == "show" else v for key, v in given.items()}
+    sets = [word for each in parameters for word in ("--set", each.format(**ids))]
+    changed = False
+    for frame in (3.0, 6.25):
+        # The driver's rows count upwards.
+        found = node.render(
+            path,
+            frame,
+            np.ascontiguousarray(image[::-1]),
+            *("--premultiplied", int(premultiplied), *sets),
+        )[::-1]
+        expected = document.recolour(image, frame, premultiplied=premultiplied, **given)
+        assert same_bits(found, expected).all(), f"frame {frame}"
+        changed |= not same_bits(found, image).all()
+    assert changed or 0 in given.values()

@@ -154,15 +154,15 @@ TEST(calls_in_the_wrong_place_are_noticed) {
          {"no clip Sauce", [](Now& n) { clip_of(n, "Sauce"); }},
          {"not a descriptor's parameters", [](Now& n) { define(n, kOfxParamTypeBoolean, "x"); }},
          {"of one that has none",
-          [&](Now& n) { g.param->paramGetValue(handle_of(n, "group"), &value); }},
+          [&](Now& n) { g.param->paramGetValueAtTime(handle_of(n, "group"), 0, &value); }},
          {"clipGetImage: not while rendering",
           [&](Now& n) { g.effect->clipGetImage(clip_of(n, "Source"), 0, nullptr, &image); }},
          {"an unknown type",
           [](Now& n) { g.message->message(n.effect, "OfxMessageSad", "", "words"); }},
          {"multiThread: no function", [](Now&) { g.thread->multiThread(nullptr, 2, nullptr); }}});
-    const Wrong no_time = {"paramGetValue: while rendering",
-                           [&](Now& n) { g.param->paramGetValue(handle_of(n, "number"), &value); }};
-    expect_each(kOfxImageEffectActionIsIdentity, {no_time});
+    const Breach get_number = [&](Now& n) {
+        g.param->paramGetValue(handle_of(n, "number"), &value);
+    };
     const Breach set_number = [](Now& n) { g.param->paramSetValue(handle_of(n, "number"), 0.5); };
     expect_each(
         kOfxActionInstanceChanged,
@@ -186,7 +186,8 @@ TEST(calls_in_the_wrong_place_are_noticed) {
     const Breach remove_keys = [](Now& n) { g.param->paramDeleteAllKeys(handle_of(n, "number")); };
     for (const char* action :
          {kCreate, kOfxActionBeginInstanceChanged, kOfxActionEndInstanceChanged, kRender,
-          kOfxImageEffectActionGetClipPreferences}) {
+          kOfxImageEffectActionIsIdentity, kOfxImageEffectActionGetClipPreferences}) {
+        expect("paramGetValue: not allowed", faults_of(action, get_number));
         expect("paramSetValue: not allowed", faults_of(action, set_number));
         expect("paramDeleteAllKeys: not allowed", faults_of(action, remove_keys));
     }
@@ -195,9 +196,7 @@ TEST(calls_in_the_wrong_place_are_noticed) {
                faults_of(action, [](Now& n) { g.param->paramEditBegin(n.params, "x"); }));
     }
     expect_each(kRender,
-                {{"paramGetValue: while rendering",
-                  [&](Now& n) { g.param->paramGetValue(handle_of(n, "number"), &value); }},
-                 {"paramGetDerivative: not expected",
+                {{"paramGetDerivative: not expected",
                   [&](Now& n) { g.param->paramGetDerivative(handle_of(n, "number"), 0, &value); }},
                  {"called in a spawned thread", [](Now& n) {
                       const auto ask = [](unsigned, unsigned, void* data) {
@@ -210,7 +209,7 @@ TEST(calls_in_the_wrong_place_are_noticed) {
 TEST(preferences_that_change_unasked_are_noticed) {
     const auto follow_the_number = [](Now& n) {
         double value = 0;
-        g.param->paramGetValue(handle_of(n, "number"), &value);
+        g.param->paramGetValueAtTime(handle_of(n, "number"), 0, &value);
         g.prop->propSetInt(n.answer, kOfxImageEffectFrameVarying, 0, value < 0.5);
     };
     const char* const kPreferences = kOfxImageEffectActionGetClipPreferences;

@@ -68,7 +68,7 @@ def test_folders_follow_the_environment(home: Path, monkeypatch: pytest.MonkeyPa
 
 
 def test_other_platforms_must_name_the_folder() -> None:
-    with pytest.raises(Palette4dError, match=r"darwin.*--kdenlive DIR"):
+    with pytest.raises(Palette4dError, match=r"darwin.*kdenlive=…"):
         data_folder("kdenlive", "darwin")
 
 
@@ -104,7 +104,7 @@ def test_refuses_to_replace_somebody_elses(tmp_path: Path, name: str, kind: str)
         path.write_text("precious")
     else:
         path.symlink_to("gone")
-    with pytest.raises(Palette4dError, match="--force"):
+    with pytest.raises(Palette4dError, match="force=True"):
         install(tmp_path)
     # Not even the other of the two files.
     assert names(tmp_path) == [name]
@@ -116,7 +116,7 @@ def test_refuses_to_replace_somebody_elses(tmp_path: Path, name: str, kind: str)
 
 def test_a_folder_in_a_files_place_is_never_replaced(tmp_path: Path) -> None:
     (tmp_path / "palette4d.xml").mkdir()
-    with pytest.raises(Palette4dError, match="--force"):
+    with pytest.raises(Palette4dError, match="force=True"):
         install_kdenlive(tmp_path)
     with pytest.raises(Palette4dError, match="found a folder"):
         install_kdenlive(tmp_path, force=True)

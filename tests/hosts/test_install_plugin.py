@@ -84,7 +84,7 @@ def test_refuses_to_replace_something_else(bundle: Path, tmp_path: Path, kind: s
     else:
         other.mkdir(parents=True)
         (other / "precious").write_text("precious")
-    with pytest.raises(Palette4dError, match="--force"):
+    with pytest.raises(Palette4dError, match="force=True"):
         install_bundle(bundle, destination)
     assert other.exists()
     assert [path.name for path in destination.iterdir()] == [BUNDLE]
@@ -106,7 +106,7 @@ def test_says_what_to_do_without_the_right_to_write(
         monkeypatch.setattr(shutil, "copytree", refuse)
     else:
         destination.chmod(0o555)
-    with pytest.raises(Palette4dError, match=r"sudo.*--dest.*OFX_PLUGIN_PATH"):
+    with pytest.raises(Palette4dError, match=r"sudo.*dest=….*OFX_PLUGIN_PATH"):
         install_bundle(bundle, destination)
     destination.chmod(0o755)
     assert files(old) == {"Contents/Linux-x86-64/Palette4D.ofx": b"old code"}

@@ -321,7 +321,7 @@ def test_refusals_write_nothing(
 def test_existing_output_needs_force(warm_sidecar: Path, tmp_path: Path) -> None:
     out = tmp_path / "there.cube"
     out.write_text("mine", encoding="utf-8")
-    with pytest.raises(Palette4dError, match="--force"):
+    with pytest.raises(Palette4dError, match="force=True"):
         bake(warm_sidecar, 0.0, out, size=5)
     assert out.read_text(encoding="utf-8") == "mine"
     bake(warm_sidecar, 0.0, out, size=5, force=True)

@@ -125,7 +125,7 @@ def test_frames_between_state_their_error(
     assert 0.3 * between.delta_e < found < 1.1 * between.delta_e
 
     monkeypatch.setattr("palette4d.lut_export.config.LARGEST_DELTA_E", 0.9 * between.delta_e)
-    with pytest.raises(Palette4dError, match=rf"frame {between.frame}.*--every.*--anyway"):
+    with pytest.raises(Palette4dError, match=rf"frame {between.frame}.*every=….*anyway=True"):
         write_config([shot], tmp_path / "no", **options(5, anyway=False))
     assert not (tmp_path / "no").exists()
     finer = write_config([shot], tmp_path / "finer", **options(2, anyway=False)).shots[0].between
@@ -256,7 +256,7 @@ class TestBase:
     def test_one_of_palette4d(self, two_shots: list[Path], tmp_path: Path) -> None:
         """A second shot is added, and the first one changed, from another folder."""
         first = write_config(two_shots[:1], tmp_path / "first", **options(10))
-        with pytest.raises(Palette4dError, match=r"has a look 'palette4d' already.*--force"):
+        with pytest.raises(Palette4dError, match=r"has a look 'palette4d' already.*force=True"):
             write_config(two_shots[1:], tmp_path / "show", **options(10, base=str(first.path)))
         names = [_core.read_sidecar(str(path)).clip["name"] for path in two_shots]
         found = options(10, base=str(first.path), force=True)
@@ -359,7 +359,7 @@ class TestRefusals:
     def test_two_shots_of_one_name(self, two_shots: list[Path], tmp_path: Path) -> None:
         copy = tmp_path / "copy.p4d.json"
         copy.write_bytes(two_shots[0].read_bytes())
-        self.refused([two_shots[0], copy], tmp_path, "two shots have the name 'shot010'.*--names")
+        self.refused([two_shots[0], copy], tmp_path, "two shots have the name 'shot010'.*names=…")
         self.refused(two_shots, tmp_path, "two shots", options(names=("a", "A")))
         self.refused(two_shots, tmp_path, "1 names for 2", options(names=("a",)))
         self.refused(two_shots, tmp_path, "expected letters", options(names=("a", "b/c")))
@@ -381,7 +381,7 @@ class TestRefusals:
         config.addColorSpace(ocio.ColorSpace(name="film log", aliases=["flog"]))
         base = tmp_path / "base.ocio"
         base.write_text(config.serialize(), "utf-8")
-        word = "no colour space for 'sRGB'; it lacks the role.*--process-space.*film log"
+        word = "no colour space for 'sRGB'; it lacks the role.*process_space=….*film log"
         self.refused([shot], tmp_path, word, options(base=str(base)))
         for near, expected in (
             ("film lgo", "no such colour space .* such as 'film log'$"),
@@ -389,7 +389,7 @@ class TestRefusals:
             ("raw", "holds data, not colours"),
         ):
             found = options(base=str(base), process_space=near)
-            self.refused([shot], tmp_path, f"--process-space '{near}': .*{expected}", found)
+            self.refused([shot], tmp_path, f'process_space="{near}": .*{expected}', found)
         chosen = options(10, base=str(base), process_space="film log")
         assert write_config([shot], tmp_path / "s", **chosen).shots[0].process_space == "film log"
 
@@ -400,7 +400,7 @@ class TestRefusals:
     def test_a_config_that_is_there(self, shot: Path, tmp_path: Path) -> None:
         (tmp_path / "show").mkdir()
         (tmp_path / "show" / "config.ocio").write_text("mine", "utf-8")
-        self.refused([shot], tmp_path, "--force")
+        self.refused([shot], tmp_path, "force=True")
 
     def test_a_look_that_is_there(self, shot: Path, tmp_path: Path) -> None:
         first = write_config([shot], tmp_path / "first", **options(10))

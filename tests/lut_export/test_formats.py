@@ -195,11 +195,11 @@ def test_a_given_domain(warm_sidecar: Path, tmp_path: Path) -> None:
             {"shaper": "log", "format": "iridas_cube"},
             "cannot hold a shaper",
         ),
-        ("a.itx", {"domain": (0, 2)}, "--shaper log or linear"),
+        ("a.itx", {"domain": (0, 2)}, 'shaper="log" or'),
         (
             "a.clf",
             {"shaper": "none", "domain": (0, 2)},
-            "--shaper log or linear",
+            'shaper="log" or',
         ),
         ("a.3dl", {"size": 16}, "expected 5, 9, 17, 33, 65, 129"),
         ("a.3dl", {"size": 3}, "expected 5, 9"),

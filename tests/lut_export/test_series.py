@@ -123,7 +123,7 @@ class TestResuming:
         mine = tmp_path / first.document["frames"][1]["file"]
         mine.write_text("mine", "utf-8")
         before = state(tmp_path)
-        with pytest.raises(Palette4dError, match="--force"):
+        with pytest.raises(Palette4dError, match="force=True"):
             export(EDITED, tmp_path, options(0, 4, 9))
         assert state(tmp_path) == before
         done = export(EDITED, tmp_path, replace(options(0, 4), force=True))
@@ -146,7 +146,7 @@ class TestResuming:
         done = export(EDITED, tmp_path, options(0, 4, 9))
         assert done.baked == [0, 9]
         assert list(done.failed) == [4]
-        assert "another file is there" in done.failed[4]
+        assert "found a file there" in done.failed[4]
         assert mine.read_text("utf-8") == "mine"
 
     @pytest.mark.parametrize(

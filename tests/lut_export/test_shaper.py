@@ -79,7 +79,7 @@ def test_no_domain(low_high: tuple[float, float]) -> None:
 
 
 def test_no_shaper_no_other_domain() -> None:
-    with pytest.raises(Palette4dError, match="--shaper log or linear"):
+    with pytest.raises(Palette4dError, match='shaper="log" or'):
         Shaper("none", 0.0, 2.0)
 
 

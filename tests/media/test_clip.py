@@ -407,6 +407,18 @@ def test_colours_are_found_among_many_channels(tmp_path):
     assert pixels.shape == (1, 1, 3)
 
 
+def test_channels_that_are_no_colours_are_noted(tmp_path):
+    values = np.ones((2, 2, 3), np.float32)
+    normals, _ = one(write_image(tmp_path / "n.exr", values, names=("N.x", "N.y", "N.z")))
+    (note,) = normals.notes
+    assert "N.x, N.y, N.z are used as red, green and blue" in note
+    for names in (("R", "G", "B"), ("diffuse.B", "diffuse.G", "diffuse.R")):
+        colours, _ = one(write_image(tmp_path / f"{names[0]}.exr", values, names=names))
+        assert colours.notes == []
+    grey, _ = one(write_image(tmp_path / "grey.exr", values[..., :1], names=("Y",)))
+    assert grey.notes == []
+
+
 def test_data_window_lies_in_the_display_window(tmp_path):
     values = np.arange(1, 25, dtype=np.float32).reshape(2, 4, 3)
     path = write_image(tmp_path / "a.exr", values, full=(0, 0, 5, 4), origin=(-1, 1))

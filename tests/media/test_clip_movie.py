@@ -54,6 +54,18 @@ def test_alpha_is_straight(tmp_path):
     np.testing.assert_array_equal(np.rint(clip.read(1) * 255), argb[..., [1, 2, 3, 0]])
 
 
+@pytest.mark.parametrize(
+    "playlist",
+    ["ffconcat version 1.0\nfile real.mkv\n", "#EXTM3U\n#EXTINF:1,\nreal.mkv\n#EXT-X-ENDLIST\n"],
+    ids=["ffconcat", "hls"],
+)
+def test_a_playlist_does_not_lead_to_other_files(tmp_path, playlist):
+    write_movie(tmp_path / "real.mkv", "ffv1", "gray", noise(2, channels=0), "gray")
+    (tmp_path / "a.mp4").write_text(playlist)
+    with pytest.raises(ClipError, match="its content is none of"):
+        open_clip(str(tmp_path / "a.mp4"))
+
+
 def test_grey(tmp_path):
     frames = noise(2, channels=0)
     clip = open_clip(str(write_movie(tmp_path / "a.mkv", "ffv1", "gray", frames, "gray")))

@@ -150,7 +150,20 @@ def exposure_step() -> list:
     return [p * (1 if i < 5 else 0.97) for i, p in enumerate(frames(10))]
 
 
+def slow_ramp(levels: int) -> list:
+    """A flat picture that brightens by one step of 8 bits every seven frames."""
+    return [np.full((4, 4, 3), (i // 7) / 255) for i in range(7 * levels)]
+
+
+def one_step(level: int) -> list:
+    """A still whose code values change once, by one step of 8 bits."""
+    return [np.full((4, 4, 3), (level + i // 6) / 255) for i in range(12)]
+
+
 SINGLE_SHOTS = {
+    "slow ramp from black": lambda: slow_ramp(24),
+    "one step from black": lambda: one_step(0),
+    "one step in the dark": lambda: one_step(5),
     "still": lambda: [landscape(0.5)] * 6,
     "moving": lambda: frames(10),
     "one flash frame": lambda: flashes(1),
@@ -175,6 +188,10 @@ SINGLE_SHOTS = {
 @pytest.mark.parametrize("name", SINGLE_SHOTS)
 def test_a_single_shot_has_no_cut(name):
     assert found(SINGLE_SHOTS[name]()) == []
+
+
+def test_cuts_between_dark_shots():
+    assert found([0.06 * p for p in frames(6) + night(6)]) == [6]
 
 
 def test_repeated_frames_are_no_stand_still():

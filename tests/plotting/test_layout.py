@@ -77,12 +77,12 @@ def test_names_do_not_cover_discs_or_each_other() -> None:
 def test_ticks_are_round_and_have_room() -> None:
     layout = timeline("v1_split", 800.0)
     first, last = layout.palette.first, layout.palette.last
-    ticks = layout.ticks(0.0, 800.0)
+    ticks = layout.scale.ticks(0.0, 800.0)
     assert ticks[0] == first
     assert ticks[-1] == last
     assert np.diff(layout.scale.x(ticks)).min() >= 35
-    near = Timeline(layout.palette, layout.rows, Scale(first, last, -4e5, 4e5), 40.0)
-    assert near.ticks(0.0, 300.0) == [10.0]  # between two frames there is nothing to name
+    # Between two frames there is nothing to name.
+    assert Scale(first, last, -4e5, 4e5).ticks(0.0, 300.0) == [10.0]
 
 
 def test_colours_between_handles_are_the_cores() -> None:

@@ -272,7 +272,7 @@ class TestMedia:
         )
         gone, web, none, take = edit(made, tmp_path, plates).shots
         assert "'/vol/gone.mov' is not there" in gone.problem
-        assert "--media" in gone.problem
+        assert "media=…" in gone.problem
         assert "expected a file" in web.problem
         assert "the edit names no file for it, and nothing under" in none.problem
         assert not take.problem
@@ -351,7 +351,7 @@ class TestFiles:
     def test_a_broken_edl(self, tmp_path: Path) -> None:
         path = tmp_path / "bad.edl"
         path.write_text("TITLE: x\n\n001 A V C 00:00:00:00\n")
-        with pytest.raises(Palette4dError, match=r"cannot be read as a timeline .*--rate"):
+        with pytest.raises(Palette4dError, match=r"cannot be read as a timeline .*rate=…"):
             timeline_files.read(path)
 
     def test_empty_timelines(self, tmp_path: Path) -> None:

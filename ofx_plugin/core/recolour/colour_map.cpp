@@ -1,27 +1,19 @@
 #include "recolour/colour_map.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstring>
-#include <exception>
-#include <functional>
 #include <limits>
 #include <mutex>
 #include <stdexcept>
 #include <string>
-#include <system_error>
-#include <thread>
 #include <vector>
 
 #include "model/vec3.hpp"
+#include "recolour/share_rows.hpp"
 
 namespace palette4d {
 namespace {
-
-/// Rows that a thread takes at once. Adjacent rows share colours: on neighbouring rows, threads
-/// would wait for each other's Lattice cells.
-constexpr int kMostRowsAtOnce = 16;
 
 template <class View>
 void check_view(const View& view, const char* name) {
@@ -79,49 +71,6 @@ void copy_rows(const ConstImageView& in, const ImageView& out) {
     for (int y = 0; y < in.height; ++y) {
         if (row_of(in, y) != row_of(out, y)) std::memmove(row_of(out, y), row_of(in, y), bytes);
     }
-}
-
-/// Returns the numbers 0 to count - 1, each once; then -1.
-using NextRow = std::function<int()>;
-
-/// Calls `work` in up to `threads` threads, this one included (0: one per processor). After an
-/// exception no more rows are handed out. The first exception is rethrown when all threads have
-/// returned.
-void share_rows(int count, int threads, const std::function<void(const NextRow&)>& work) {
-    if (threads == 0) threads = static_cast<int>(std::thread::hardware_concurrency());
-    threads = std::clamp(threads, 1, std::max(count, 1));
-    // Several rows at a time, but few enough to keep all threads busy to the end.
-    const int band = std::clamp(count / threads / 8, 1, kMostRowsAtOnce);
-    std::atomic<int> next{0};
-    std::exception_ptr problem;
-    std::mutex guard;
-    const auto guarded = [&] {
-        int row = 0, end = 0;
-        const NextRow next_row = [&] {
-            if (row == end) {
-                row = next.fetch_add(band);
-                end = row + band;
-            }
-            return row < count ? row++ : -1;
-        };
-        try {
-            work(next_row);
-        } catch (...) {
-            const std::lock_guard<std::mutex> lock(guard);
-            if (!problem) problem = std::current_exception();
-            next = count;
-        }
-    };
-    std::vector<std::thread> helpers;
-    helpers.reserve(static_cast<std::size_t>(threads - 1));
-    try {
-        for (int i = 1; i < threads; ++i) helpers.emplace_back(guarded);
-    } catch (const std::system_error&) {
-        // The system gives no more threads: those that run share the rows.
-    }
-    guarded();
-    for (std::thread& helper : helpers) helper.join();
-    if (problem) std::rethrow_exception(problem);
 }
 
 /// Rows whose code values differ from the palette's: pixels are collected, converted, and

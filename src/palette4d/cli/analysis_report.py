@@ -1,80 +1,68 @@
-"""The report of `analyze`: as lines for people, and as figures for machines (`--json`)."""
+"""The report of `analyze` for people: `Document.report` as lines."""
 
 from __future__ import annotations
 
-import dataclasses
-import time
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from palette4d.common.text import counted
 
 if TYPE_CHECKING:
-    from palette4d.analysis.pipeline import Analysis
-    from palette4d.analysis.report.quality import Report
+    from palette4d.grade.document import Document
 
 
-def figures(output: Path, analysis: Analysis, seconds: Mapping[str, float]) -> dict[str, Any]:
-    """Return what `--json` prints; docs/palettes.md explains the names."""
-    return {
-        "sidecar": str(output),
-        "stages": [stage.row() for stage in analysis.stages],
-        "held_to_L_prime": analysis.bound,
-        "palette": analysis.report.figures(),
-        "frames": [dataclasses.asdict(fit) for fit in analysis.report.fits],
-        "notes": list(analysis.notes),
-        "seconds": dict(seconds),
-        "cpu_seconds": round(time.process_time(), 3),
-    }
-
-
-def lines(analysis: Analysis, seconds: Mapping[str, float]) -> list[str]:
-    """Return the lines of the report."""
-    clip = analysis.document["clip"]
+def lines(document: Document, seconds: Mapping[str, float]) -> list[str]:
+    """Return the lines of the report; docs/palettes.md explains the figures."""
+    report = document.report
+    clip, frames = document.fields()["clip"], report["frames"]
     width, height = clip["size"]
-    out = [f"{clip['name']}: {counted(len(analysis.report.fits), 'frame')}, {width}x{height}"]
+    out = [f"{clip['name']}: {counted(len(frames), 'frame')}, {width}x{height}"]
     out.append(
         f"{'stage':<18} {'vertices':>8} {'blocks':>6} {'R':>8} {'C':>8} {'L':>8} {'K':>8} "
         f"{'L_prime':>8} {'farthest':>8} {'seconds':>8}"
     )
-    for stage in analysis.stages:
-        x = stage.losses
+    for x in report["stages"]:
         out.append(
-            f"{stage.stage:<18} {stage.vertices:>8} {stage.blocks:>6} {x.R:>8.5f} {x.C:>8.4f} "
-            f"{x.L:>8.4f} {x.K:>8.3f} {x.L_prime:>8.4f} {x.max_distance:>8.3f} "
-            f"{seconds.get(stage.stage, 0):>8.2f}"
+            f"{x['stage']:<18} {x['vertices']:>8} {x['blocks']:>6} {x['R']:>8.5f} {x['C']:>8.4f} "
+            f"{x['L']:>8.4f} {x['K']:>8.3f} {x['L_prime']:>8.4f} {x['max_distance']:>8.3f} "
+            f"{seconds.get(x['stage'], 0):>8.2f}"
         )
-    rows = {"outside": outside(analysis.report), **_palette(analysis.report)}
+    rows = {"outside": _outside(report), **_palette(report["palette"])}
     rows["seconds"] = ", ".join(f"{stage} {took:.2f}" for stage, took in seconds.items())
-    if analysis.colours:
-        rows["colours"] = analysis.colours
+    if report["colour_spaces"]:
+        rows["colours"] = report["colour_spaces"]
     return [*out, *(f"{name:<10} {text}" for name, text in rows.items())]
 
 
-def outside(report: Report) -> str:
+def _outside(report: Mapping[str, Any]) -> str:
     """Say how many pixels are outside the palette, and how far the farthest is."""
-    if not report.outside:
+    share = report["palette"]["outside_1_255"]
+    if not share:
         return "no pixel is more than 1/255 outside"
-    share = f"{report.outside:.1%}" if report.outside >= 0.001 else "less than 0.1%"
+    worst = max(report["frames"], key=lambda frame: frame["farthest"])
     return (
-        f"{share} of the pixels are more than 1/255 outside; the farthest "
-        f"{report.farthest.farthest:.3f}, in frame {report.farthest.frame}"
+        f"{f'{share:.1%}' if share >= 0.001 else 'less than 0.1%'} of the pixels are more than "
+        f"1/255 outside; the farthest {worst['farthest']:.3f}, in frame {worst['frame']}"
     )
 
 
-def _palette(x: Report) -> dict[str, str]:
-    fit = f"worst frame {x.worst.frame}: L {x.worst.L:.3f}, the median frame's {x.median_loss:.3f}"
-    handles = f"{x.colours:.1f} colours a frame, {counted(x.splits, 'split')}, "
-    handles += counted(x.merges, "merge")
-    if x.closest:
-        distance, frame, one, other = x.closest
-        handles += f"; nearest {one} and {other}, {distance:.2f} apart at frame {frame}"
-    concavity, frame = x.concavity
-    concave = f"deepest concavity {concavity:.1%} of the convex hull, at frame {frame}"
+def _palette(x: Mapping[str, Any]) -> dict[str, str]:
+    loss, concavity = x["worst_frame_L"], x["deepest_concavity"]
+    fit = f"worst frame {x['worst_frame']}: L {loss:.3f}, the median frame's "
+    handles = f"{x['colours_a_frame']:.1f} colours a frame, {counted(x['splits'], 'split')}, "
+    handles += counted(x["merges"], "merge")
+    if "closest_handles" in x:
+        one, other = x["closest_handle_ids"].split()
+        handles += f"; nearest {one} and {other}, {x['closest_handles']:.2f} apart at frame "
+        handles += f"{x['closest_handles_frame']}"
+    concave = f"deepest concavity {concavity:.1%} of the convex hull, at frame "
     return {
-        "fit": fit if x.worst.L >= 0.0005 else "every frame's L is below 0.001",
+        "fit": f"{fit}{x['median_frame_L']:.3f}"
+        if loss >= 0.0005
+        else "every frame's L is below 0.001",
         "handles": handles,
-        "use": f"least used {x.least_used[0]}, up to {x.least_used[1]:.1%} of the picture",
-        "shape": concave if concavity >= 0.0005 else "convex in every frame",
+        "use": f"least used {x['least_used']}, up to {x['least_use']:.1%} of the picture",
+        "shape": f"{concave}{x['deepest_concavity_frame']}"
+        if concavity >= 0.0005
+        else "convex in every frame",
     }

@@ -5,20 +5,15 @@ from __future__ import annotations
 import argparse
 import json
 import shlex
-import sys
 import time
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from palette4d.analysis.options import (
-    METHODS,
-    OPTIONS,
-    AnalysisOptions,
-    check_methods,
-    parse_setting,
-)
-from palette4d.cli import analyze_shots
+from palette4d import analyze
+from palette4d.analysis.options import METHODS, OPTIONS, check_methods, parse_setting
+from palette4d.cli import analysis_report, analyze_shots
+from palette4d.cli.messages import as_options, tell
 from palette4d.common.arguments import checked, frame_range, whole
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import counted
@@ -160,7 +155,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--method",
         choices=METHODS,
         metavar="NAME",
-        default=AnalysisOptions().method,
+        default=next(iter(METHODS)),
         help="; ".join(f"{name}: {text}" for name, text in METHODS.items()),
     )
     parser.add_argument(
@@ -197,50 +192,44 @@ def _rate(text: str) -> Fraction:
 
 def run(args: argparse.Namespace) -> int:
     """Run `palette4d analyze`."""
-    from palette4d.analysis import pipeline
-    from palette4d.cli import analysis_report
+    settings = _settings(args)
+    if analyze_shots.is_show(args):
+        return analyze_shots.run(args, settings)
     from palette4d.grade import sidecar
-    from palette4d.grade.document import Document
-    from palette4d.media.clip import open_clip
-    from palette4d.media.colour_space import SpaceOptions
 
-    many = analyze_shots.is_show(args)
-    options = _options(args)
-    if many:
-        return analyze_shots.run(args, options)
-    sidecar.check_target(args.output, on_edits=args.on_edits)
-    clip = open_clip(
-        args.clip, frames=args.frames, rate=args.rate, skip_bad_frames=args.skip_bad_frames
-    )
-    spaces = SpaceOptions(args.input_space, args.palette_space, args.ocio_config)
+    on_edits = settings.pop("on_edits")
+    sidecar.check_target(args.output, on_edits=on_edits)
     bars = _Bars(hidden=args.quiet or args.json)
     try:
-        analysis = pipeline.analyze(clip, options, bars, spaces=spaces, allow_cuts=args.allow_cuts)
+        document = analyze(args.clip, frames=args.frames, progress=bars, **settings)
     finally:
         bars.close()
-    Document(analysis.document).save(args.output, on_edits=args.on_edits)
-    for note in analysis.notes:
-        print(f"palette4d: note: {note}", file=sys.stderr)
+    document.save(args.output, on_edits=on_edits)
+    for note in document.notes:
+        tell("note", note)
     if args.json:
-        print(json.dumps(analysis_report.figures(args.output, analysis, bars.seconds), indent=2))
+        seconds = {"seconds": bars.seconds, "cpu_seconds": round(time.process_time(), 3)}
+        print(json.dumps({"sidecar": str(args.output)} | document.report | seconds, indent=2))
     elif not args.quiet:
-        print("\n".join(analysis_report.lines(analysis, bars.seconds)))
-        colours = counted(analysis.stages[-1].vertices, "palette colour")
+        print("\n".join(analysis_report.lines(document, bars.seconds)))
+        colours = counted(len(document.fields()["polytope"]["vertices"]), "palette colour")
         print(f"wrote {args.output}: {colours} to edit")
         print(f"next: palette4d plot {shlex.quote(str(args.output))} -o palette.png")
     return 0
 
 
-def _options(args: argparse.Namespace) -> AnalysisOptions:
-    """Return the options; an option without effect on the method is wrong usage."""
+def _settings(args: argparse.Namespace) -> dict[str, Any]:
+    """Return the arguments of the API; an option without effect on the method is wrong usage."""
     given: dict[str, Any] = dict(map(parse_setting, args.settings))
     if args.vertices is not None:
         given["vertices"] = args.vertices
     try:
         check_methods(args.method, given)
     except Palette4dError as error:
-        args.usage_error(str(error))
-    return AnalysisOptions(method=args.method, **given)
+        args.usage_error(as_options(str(error)))
+    spaces = ("input_space", "palette_space", "ocio_config")
+    names = ("rate", "skip_bad_frames", "allow_cuts", "method", "on_edits", *spaces)
+    return {name: vars(args)[name] for name in names} | given
 
 
 class _Bars:

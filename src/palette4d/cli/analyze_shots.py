@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 import argparse
-import os
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from palette4d.cli.messages import tell
 from palette4d.cli.progress import frames_bar
 from palette4d.cli.worker_options import add_worker_options
-from palette4d.colour.ocio_config import from_anywhere
 from palette4d.common.arguments import whole
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import UnfinishedError
 from palette4d.common.text import counted
 from palette4d.shows.timeline_files import is_timeline
 
 if TYPE_CHECKING:
-    from palette4d.analysis.options import AnalysisOptions
-    from palette4d.media.colour_space import SpaceOptions
-    from palette4d.shows.batch import Show, Source
-    from palette4d.shows.shots import Shot
+    from palette4d.shows.batch import Show
 
 DESCRIPTION = """\
 For many shots at once, CLIP is an edit (.otio, .otioz, .otiod, .edl) or, with --detect-shots, a
@@ -105,83 +100,38 @@ def _refuse(args: argparse.Namespace, given: dict[str, bool], needs: str) -> Non
             args.usage_error(f"{option} {needs}")
 
 
-def run(args: argparse.Namespace, options: AnalysisOptions) -> int:
+def run(args: argparse.Namespace, settings: dict[str, Any]) -> int:
     """Analyse many shots; print the written files, and raise an error for failed shots."""
-    from palette4d.jobs.workers import Workers
-    from palette4d.shows import batch
+    from palette4d.shows.analysis import analyze_shots
 
-    hidden = args.quiet or args.json
-    if is_timeline(args.clip):
-        source, shots, notes = _of_edit(args)
-    else:
-        source, shots, notes = _of_movie(args, hidden)
-    show_options = batch.ShowOptions(
-        analysis=options,
-        spaces=_spaces(args),
-        rate=None if is_timeline(args.clip) else args.rate,
-        skip_bad_frames=args.skip_bad_frames,
-        allow_cuts=args.allow_cuts,
-        on_edits=args.on_edits,
-        force=args.force,
-        only=args.only,
-        workers=Workers(args.jobs, args.cluster),
-    )
-    with frames_bar("shots", hidden=hidden) as progress:
-        done = batch.analyse(source, shots, args.output, show_options, progress)
-    notes += [f"{name}: {note}" for name, found in done.notes.items() for note in found]
-    for note in notes:
-        print(f"palette4d: note: {note}", file=sys.stderr)
+    failed: UnfinishedError | None = None
+    with frames_bar("shots", hidden=args.quiet or args.json) as show:
+        try:
+            done: Any = analyze_shots(
+                args.clip,
+                args.output,
+                frames=args.frames,
+                media=args.media,
+                handles=args.handles or 0,
+                only=args.only,
+                jobs=args.jobs,
+                cluster=args.cluster,
+                force=args.force,
+                progress=lambda words, done, total: show(done, total, words),
+                **settings,
+            )
+        except UnfinishedError as error:
+            done, failed = error.done, error
+    for name, notes in done.notes.items():
+        for note in notes:
+            tell("note", f"{name}: {note}" if name else note)
     if args.json:
         print(done.path.read_text(encoding="utf-8"), end="")
     elif not args.quiet:
         print("\n".join(report(done)))
-    if failed := failures(done):
-        raise Palette4dError(failed)
+    if failed:
+        raise failed
     return 0
-
-
-def _spaces(args: argparse.Namespace) -> SpaceOptions:
-    """Return the colour spaces with the config's name: workers may run on other machines."""
-    from palette4d.media.colour_space import SpaceOptions
-
-    config = args.ocio_config or os.environ.get("OCIO") or None
-    return SpaceOptions(args.input_space, args.palette_space, from_anywhere(config))
-
-
-def _of_edit(args: argparse.Namespace) -> tuple[Source, list[Shot], list[str]]:
-    from palette4d.shows import find_media, timeline, timeline_files
-    from palette4d.shows.batch import Source
-    from palette4d.shows.shots import numbered
-
-    path = Path(args.clip)
-    document = timeline_files.read(path, args.rate)
-    folder = None if args.media is None else find_media.Folder(args.media)
-    edit = timeline.shots_of(document, folder, args.handles or 0)
-    shots, renamed = numbered(edit.shots)
-    notes = [f"not analysed: {note}" for note in edit.notes]
-    if path.suffix.lower() == ".edl" and args.rate is None:
-        notes.append("an EDL does not state its rate: 24 frames per second are assumed (--rate)")
-    if renamed:
-        some = ", ".join(renamed[:8]) + (", …" if len(renamed) > 8 else "")
-        notes.append(
-            f"{counted(len(renamed), 'shot has the name', 'shots have the names')} of others and "
-            f"{'was' if len(renamed) == 1 else 'were'} renamed by the first frame: {some}"
-        )
-    return Source(edit.name, args.clip, timeline_files.sha256(path), edit.rate), shots, notes
-
-
-def _of_movie(args: argparse.Namespace, hidden: bool) -> tuple[Source, list[Shot], list[str]]:
-    from palette4d.common.text import file_safe
-    from palette4d.media.clip import open_clip
-    from palette4d.shows.batch import Source
-    from palette4d.shows.shots import detect
-
-    clip = open_clip(
-        args.clip, frames=args.frames, rate=args.rate, skip_bad_frames=args.skip_bad_frames
-    )
-    with frames_bar("cuts", hidden=hidden, total=len(clip.frames)) as progress:
-        shots = detect(clip, progress)
-    return Source(file_safe(clip.name), clip.source, "", clip.rate), shots, list(clip.notes)
 
 
 def report(done: Show) -> list[str]:
@@ -206,17 +156,3 @@ def report(done: Show) -> list[str]:
         lines.append(f"next: palette4d edit {done.path.parent / entries[0].sidecar} set …, then")
         lines.append(f"      palette4d export {done.path} --every 10 -o luts")
     return lines
-
-
-def failures(done: Show) -> str:
-    """Return the failures, one line per shot, or ""."""
-    from palette4d.shows.manifest import FAILED
-
-    failed = [entry for entry in done.manifest.entries if entry.status == FAILED]
-    if not failed:
-        return ""
-    lines = "\n".join(f"  {entry.shot.name}: {entry.error}" for entry in failed)
-    return (
-        f"{counted(len(failed), 'shot')} of {len(done.manifest.entries)} could not be analysed; "
-        f"the same command tries only {'it' if len(failed) == 1 else 'these'} again:\n{lines}"
-    )

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from palette4d.cli.lut_options import add_lut_options, lut_settings, wide_help
+from palette4d.cli.messages import tell
 from palette4d.common.arguments import number
 from palette4d.common.errors import WriteError
 
@@ -67,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
     if piped and args.format is None:
         args.usage_error("-o - has no extension; expected --format FORMAT with it")
     format_ = format_named(args.format) if piped else format_of(Path(args.output), args.format)
-    settings = {**lut_settings(args, format_.name), "clip": args.clip}
+    settings = {**lut_settings(args), "format": format_.name, "clip": args.clip}
     if piped:
         with tempfile.TemporaryDirectory(prefix="palette4d-") as folder:
             path = Path(folder) / f"baked{format_.extension}"
@@ -82,13 +83,13 @@ def run(args: argparse.Namespace) -> int:
     else:
         print("\n".join(report(result)), file=out)
     if result.clip is None:
-        print(
-            "palette4d: note: the clip's frame could not be read; the error is measured on the "
-            "dense grid only (name the clip with --clip)",
-            file=sys.stderr,
+        tell(
+            "note",
+            "the clip's frame could not be read; the error is measured on the dense grid only "
+            "(name the clip with --clip)",
         )
     for line in warnings(result, format_):
-        print(f"palette4d: warning: {line}", file=sys.stderr)
+        tell("warning", line)
     return 0
 
 
@@ -150,9 +151,9 @@ def warnings(result: BakeResult, format_: LutFormat) -> Iterator[str]:
     beyond = clip.outside_domain > 0 if clip else low < shaper.low or high > shaper.high
     if beyond and result.cdl is None:
         if shaper.kind != "none":
-            help_ = "widen --domain"
+            help_ = "widen it with domain=…"
         elif format_.shaper:
-            help_ = "--shaper auto covers them"
+            help_ = 'shaper="auto" covers them'
         else:
             help_ = f"{with_shaper()} can hold a shaper that covers them"
         what = f"the palette, from {low:g} to {high:g}, is partly"

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from palette4d.cli.export import add_frame_choice, add_run_options, chosen_frames
-from palette4d.cli.lut_options import add_lut_options, lut_settings, wide_help
+from palette4d.cli.export import add_frame_choice, add_run_options, export_settings
+from palette4d.cli.lut_options import add_lut_options, wide_help
+from palette4d.cli.messages import tell
 from palette4d.cli.progress import frames_bar
-from palette4d.jobs.workers import Workers
 
 if TYPE_CHECKING:
     from palette4d.lut_export.config import WrittenConfig
@@ -60,35 +59,26 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Write the config; print its content."""
-    from palette4d.lut_export.bake_job import BakeSettings
-    from palette4d.lut_export.config import write_config
-    from palette4d.lut_export.formats import format_named
-    from palette4d.shows import export_luts
+    from palette4d.shows.exports import config
 
-    sidecars, notes = export_luts.sidecars(args.sidecars)
-    # A manifest with a single shot is a show, too.
-    show = len(sidecars) > 1 or sidecars != args.sidecars
-    if args.clip is not None and len(sidecars) > 1:
-        args.usage_error("--clip is for one sidecar; several sidecars must each name their clip")
-    settings = BakeSettings(**lut_settings(args, format_named(args.format).name))
+    settings = export_settings(args)
     with frames_bar("config", hidden=args.quiet) as progress:
-        done = write_config(
-            sidecars,
+        done = config(
+            args.sidecars,
             args.output,
-            settings,
-            choose=lambda sidecar: chosen_frames(args, sidecar, show=show),
             base=args.base,
-            names=None if args.names is None else tuple(args.names.split(",")),
+            names=None if args.names is None else args.names.split(","),
             process_space=args.process_space,
-            clip=args.clip,
-            workers=Workers(args.jobs, args.cluster),
-            force=args.force,
             anyway=args.anyway,
             progress=progress,
+            **settings,
         )
-    print(json.dumps(as_json(done), indent=2) if args.json else "\n".join(report(done)))
-    for note in [*notes, *done.notes]:
-        print(f"palette4d: note: {note}", file=sys.stderr)
+    if args.json:
+        print(json.dumps(as_json(done), indent=2))
+    elif not args.quiet:
+        print("\n".join(report(done)))
+    for note in done.notes:
+        tell("note", note)
     return 0
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import functools
 import shlex
 import textwrap
 from typing import TYPE_CHECKING
 
+from palette4d.cli.edit_history import add_actions
 from palette4d.cli.swatches import shown
 from palette4d.common.arguments import ColourAction, accept_negative_values, number
 from palette4d.common.errors import Palette4dError
@@ -23,7 +25,8 @@ example:
   palette4d edit clip.p4d.json move s1 --frame 30
   palette4d edit clip.p4d.json move v12 --by -0.1 0 0.05
   palette4d edit clip.p4d.json reset v12
-  palette4d edit clip.p4d.json reset
+  palette4d edit clip.p4d.json undo
+  palette4d edit clip.p4d.json version save warm
 
 Colours are R G B, R,G,B or #rrggbb, in the palette's own code values; they may
 lie outside 0..1. `palette4d info` lists the ids.
@@ -45,6 +48,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     _add_set(actions)
     _add_move(actions)
     _add_reset(actions)
+    add_actions(functools.partial(_action, actions))
     accept_negative_values(actions)
 
 

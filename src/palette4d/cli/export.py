@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from palette4d.cli.lut_options import add_lut_options, lut_settings, wide_help
+from palette4d.cli.messages import tell
 from palette4d.cli.progress import frames_bar
 from palette4d.cli.worker_options import add_worker_options
-from palette4d.common.arguments import frame_range, parse_frames, whole
-from palette4d.common.errors import Palette4dError
+from palette4d.common.arguments import frame_range, whole
+from palette4d.common.errors import UnfinishedError
 from palette4d.common.text import counted
-from palette4d.jobs.workers import Workers
 
 if TYPE_CHECKING:
-    from palette4d import _core
-    from palette4d.lut_export.series import Request, Series
+    from palette4d.lut_export.series import Series
+    from palette4d.shows.exports import Exported
 
 EPILOG = """\
 Files are NAME.FRAME.EXTENSION; NAME.series.json lists them with hashes and errors. The same command
@@ -74,105 +72,56 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
     """Add --jobs, --cluster, --force and --quiet."""
     add_worker_options(parser, "frames")
     parser.add_argument("--force", action="store_true", help="replace existing files")
-    parser.add_argument("--quiet", action="store_true", help="no progress bar")
+    parser.add_argument("--quiet", action="store_true", help="no progress bar, no report")
 
 
-def chosen_frames(
-    args: argparse.Namespace, sidecar: _core.Sidecar, *, show: bool = False
-) -> tuple[int, ...]:
-    """Return the frames of --every, --stops or --frames; without these options, all frames.
-
-    In a show, --stops of an unedited shot gives its first frame.
-    """
-    from palette4d.lut_export import series
-
-    if args.stops and show and not (sidecar.edits.vertex_rgb or sidecar.edits.stops):
-        return series.every(sidecar, 1)[:1]
-    if args.stops:
-        return series.stops(sidecar)
-    if args.frames is not None:
-        return series.check_frames(sidecar, tuple(parse_frames(args.frames)))
-    return series.every(sidecar, args.every or 1)
+def export_settings(args: argparse.Namespace) -> dict[str, Any]:
+    """Return the arguments that `export` and `config` share."""
+    names = ("every", "stops", "frames", "clip", "format", "jobs", "cluster", "force")
+    return {name: vars(args)[name] for name in names} | lut_settings(args)
 
 
 def run(args: argparse.Namespace) -> int:
     """Export; print the written files."""
-    from palette4d import _core
-    from palette4d.lut_export import series
-    from palette4d.lut_export.bake_job import BakeSettings
-    from palette4d.lut_export.formats import format_named
+    from palette4d.shows.exports import export
+
+    failed: UnfinishedError | None = None
+    settings = export_settings(args)
+    with frames_bar("export", hidden=args.quiet) as progress:
+        try:
+            done: Any = export(
+                args.sidecar,
+                args.output,
+                name=args.name,
+                padding=args.padding,
+                otio=args.otio,
+                progress=progress,
+                **settings,
+            )
+        except UnfinishedError as error:
+            done, failed = error.done, error
+    for note in done.notes:
+        tell("note", note)
+    if args.json:
+        print(json.dumps(_index(done, args.sidecar), indent=2))
+    elif not args.quiet:
+        if args.otio is not None:
+            print(f"{args.otio}: references in {counted(done.references, 'clip')}")
+        for one in done.series:
+            print("\n".join(report(one)))
+    warn(done.series)
+    if failed:
+        raise failed
+    return 0
+
+
+def _index(done: Exported, source: Path) -> dict[str, Any]:
+    """Return the index, or the indexes of a show's shots by their names."""
     from palette4d.shows.manifest import is_manifest
 
-    show = is_manifest(args.sidecar)
-    _check_show(args, show)
-    request = series.Request(
-        sidecar=args.sidecar,
-        folder=args.output,
-        frames=(),
-        settings=BakeSettings(**lut_settings(args, format_named(args.format).name)),
-        name=args.name,
-        padding=args.padding,
-        clip=args.clip,
-        force=args.force,
-    )
-    if show:
-        return _run_show(args, request)
-    request = replace(request, frames=chosen_frames(args, _core.read_sidecar(str(args.sidecar))))
-    workers = Workers(args.jobs, args.cluster)
-    with frames_bar("export", hidden=args.quiet) as progress:
-        (done,) = series.export([request], workers, progress)
-    if args.json:
-        print(json.dumps(done.document, indent=2))
-    else:
-        print("\n".join(report(done)))
-    warn([done])
-    if done.failed:
-        raise failures(done)
-    return 0
-
-
-def _check_show(args: argparse.Namespace, show: bool) -> None:
-    """Refuse options that conflict with a manifest, or that need one, as wrong usage."""
-    if not show:
-        if args.otio is not None:
-            args.usage_error("--otio needs the manifest of a show (.shots.json)")
-        return
-    for option, value, why in (
-        ("--name", args.name, "each shot has its own"),
-        ("--clip", args.clip, "each shot has its own"),
-        ("--frames", args.frames, "each shot has its own; use --every or --stops"),
-    ):
-        if value is not None:
-            args.usage_error(f"{option} does not go with the manifest of a show: {why}")
-
-
-def _run_show(args: argparse.Namespace, request: Request) -> int:
-    from palette4d.shows import export_luts
-
-    with frames_bar("export", hidden=args.quiet) as progress:
-        exported = export_luts.export(
-            args.sidecar,
-            args.output,
-            request,
-            lambda sidecar: chosen_frames(args, sidecar, show=True),
-            Workers(args.jobs, args.cluster),
-            progress,
-            otio=args.otio,
-        )
-    done = exported.series
-    for note in exported.notes:
-        print(f"palette4d: note: {note}", file=sys.stderr)
-    if args.json:
-        print(export_luts.as_json(done))
-    else:
-        if args.otio is not None:
-            print(f"{args.otio}: references in {counted(exported.references, 'clip')}")
-        for one in done:
-            print("\n".join(report(one)))
-    warn(done)
-    if error := export_luts.failures(done):
-        raise error
-    return 0
+    if is_manifest(source):
+        return {one.document["clip"]["name"]: one.document for one in done.series}
+    return done.series[0].document
 
 
 def report(done: Series) -> list[str]:
@@ -217,29 +166,19 @@ def warn(done: list[Series]) -> None:
     }
     for name in shaped:
         if about := shaper_warning(name):
-            print(f"palette4d: warning: {about}", file=sys.stderr)
+            tell("warning", about)
     if any(entry["clip"] is None for entry in entries):
-        print(
-            "palette4d: note: not all of the clip's frames could be read; the errors of the others "
-            "are measured on the dense grid (name the clip with --clip)",
-            file=sys.stderr,
+        tell(
+            "note",
+            "not all of the clip's frames could be read; the errors of the others are measured on "
+            "the dense grid (name the clip with --clip)",
         )
     missed = [e for e in entries if e["clip"] and e["clip"]["delta_e_largest"] > VISIBLE]
     if missed:
         smallest = min((e["size"] for e in missed if e["size"] is not None), default=None)
         worst = stated(max(e["clip"]["delta_e_largest"] for e in missed))
-        print(
-            f"palette4d: warning: the error of {counted(len(missed), 'file')} of {len(entries)} "
-            f"can be seen: deltaE 2000 of up to {worst} on the clip's colours; {nearer(smallest)}",
-            file=sys.stderr,
+        tell(
+            "warning",
+            f"the error of {counted(len(missed), 'file')} of {len(entries)} can be seen: deltaE "
+            f"2000 of up to {worst} on the clip's colours; {nearer(smallest)}",
         )
-
-
-def failures(done: Series) -> Palette4dError:
-    """Return the error that lists the frames that could not be baked."""
-    from palette4d.lut_export.series import failures_text
-
-    return Palette4dError(
-        f"{counted(len(done.failed), 'frame')} could not be baked; the others are there, and the "
-        f"same command tries only these again:\n{failures_text(done.failed)}"
-    )

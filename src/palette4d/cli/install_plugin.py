@@ -5,9 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from palette4d.common.errors import Palette4dError
-from palette4d.hosts.bundle import default_destination, find_bundle, install_bundle
-from palette4d.hosts.editors import data_folder, install_kdenlive, install_shotcut
+from palette4d.hosts.bundle import default_destination
+from palette4d.hosts.install import install_plugin
 
 _EPILOG = """\
 examples:
@@ -37,7 +36,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument(
         "--dest",
-        type=Path,
+        type=lambda text: Path(text).expanduser(),
         metavar="DIR",
         help=f"folder of plugins (default here: {default_destination()})",
     )
@@ -48,6 +47,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
             nargs="?",
             type=Path,
             const=True,
+            default=False,
             metavar="DIR",
             help=f"write {program.capitalize()}'s {what}, into DIR or where the program looks for "
             "your own; without --dest, the node itself is not installed",
@@ -62,36 +62,21 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Install, and print the next steps in the host."""
-    if args.dest or not (args.kdenlive or args.shotcut):
-        _install_node(args)
-    elif args.link:
-        raise Palette4dError("--link is for the node; add --dest DIR, or leave it out")
-    for program, install, where in (
-        ("kdenlive", install_kdenlive, "; the effect is 'Palette4D', in the group Misc"),
-        (
-            "shotcut",
-            install_shotcut,
-            " with Settings > Allow External Plugins on; the filter is 'Palette4D'",
-        ),
+    for path in install_plugin(
+        args.dest, link=args.link, kdenlive=args.kdenlive, shotcut=args.shotcut, force=args.force
     ):
-        given: Path | bool | None = getattr(args, program)
-        if not given:
-            continue
-        folder = given.expanduser().absolute() if isinstance(given, Path) else data_folder(program)
-        for path in install(folder, force=args.force):
-            print(f"installed {path}")
-        print(f"Restart {program.capitalize()}{where}.")
+        print(f"installed {path}")
+    if args.dest or not (args.kdenlive or args.shotcut):
+        if args.dest:
+            print(f"Tell your host where it is: export OFX_PLUGIN_PATH={args.dest.absolute()}")
+        print(
+            "Restart the host (DaVinci Resolve, Nuke, Natron, Fusion, Kdenlive, …), add the node\n"
+            "'Palette4D' (group Color) and choose a sidecar made by 'palette4d analyze'."
+        )
+    if args.kdenlive:
+        print("Restart Kdenlive; the effect is 'Palette4D', in the group Misc.")
+    if args.shotcut:
+        print(
+            "Restart Shotcut with Settings > Allow External Plugins on; the filter is 'Palette4D'."
+        )
     return 0
-
-
-def _install_node(args: argparse.Namespace) -> None:
-    standard = default_destination()
-    destination = args.dest.expanduser().absolute() if args.dest else standard
-    target = install_bundle(find_bundle(), destination, link=args.link, force=args.force)
-    print(f"installed {target}")
-    if destination != standard:
-        print(f"Tell your host where it is: export OFX_PLUGIN_PATH={destination}")
-    print(
-        "Restart the host (DaVinci Resolve, Nuke, Natron, Fusion, Kdenlive, …), add the node\n"
-        "'Palette4D' (group Color) and choose a sidecar made by 'palette4d analyze'."
-    )

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable, Sequence
 
 from palette4d._core import __version__
+from palette4d.cli.messages import tell
 from palette4d.common.arguments import Parser, accept_negative_values
 from palette4d.common.errors import Palette4dError, SidecarError, in_words
 
@@ -88,7 +89,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _report(error: Exception) -> int:
-    text = in_words(error).encode("utf-8", "backslashreplace").decode("utf-8")
+    text = in_words(error)
     broken = isinstance(error, SidecarError) and (error.pointer or "JSON" in error.expected)
     if isinstance(error, SidecarError) and '"palette4d.shots"' in error.found:
         text += (
@@ -96,6 +97,6 @@ def _report(error: Exception) -> int:
             "export` or `palette4d config`, which take them all"
         )
     elif broken and "update palette4d" not in text:
-        text += "; mend it there, take an earlier copy of the file, or analyse the clip again"
-    print(f"palette4d: error: {text}", file=sys.stderr)
+        text += "; correct it there, take an earlier copy of the file, or analyse the clip again"
+    tell("error", text)
     return 1

@@ -1,13 +1,12 @@
 """The verb ``palette4d plot``: a picture of a palette and its edits."""
 
 import argparse
-import sys
 from pathlib import Path
 
 from palette4d.cli.lut_options import wide_help
+from palette4d.cli.messages import tell
 from palette4d.common.arguments import times, whole
-
-EXTENSIONS = (".png", ".svg", ".pdf")
+from palette4d.plotting import EXTENSIONS
 
 EPILOG = """\
 Each row is a palette colour through time, each disc a palette vertex. An edited disc or band shows
@@ -51,14 +50,8 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 def run(args: argparse.Namespace) -> int:
     """Draw the picture, and print its path."""
-    from palette4d.common.errors import Palette4dError
     from palette4d.plotting import plot
 
-    if args.output.suffix.lower() not in EXTENSIONS:
-        raise Palette4dError(
-            f"{args.output}: found the extension {args.output.suffix!r}; expected one of "
-            f"{', '.join(EXTENSIONS)}"
-        )
     missing = plot(
         args.sidecar,
         args.output,
@@ -69,10 +62,10 @@ def run(args: argparse.Namespace) -> int:
     )
     if missing:
         which = ", ".join(f"{frame:g}" for frame in missing)
-        print(
-            f"palette4d: note: the clip's pixels could not be read at frame {which}; only the "
-            "palette is drawn there (name the clip with --clip)",
-            file=sys.stderr,
+        tell(
+            "note",
+            f"the clip's pixels could not be read at frame {which}; only the palette is drawn "
+            "there (name the clip with --clip)",
         )
     print(args.output)
     return 0

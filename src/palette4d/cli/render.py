@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import sys
-from pathlib import Path
+import re
 
+from palette4d.cli.messages import tell
 from palette4d.common.arguments import frame_range, number, whole
 from palette4d.common.text import counted
 
 DESCRIPTION = """\
 Recolour the frames of a clip with the edits of a sidecar, by the same code as the OpenFX node.
-Colours that no edit touches keep their exact code values.
+Colours that no edit touches keep their exact code values. --show writes mattes instead.
 
 Frames keep their numbers: frame 1017 of the clip gets the palette at frame 1017 and is written as
 frame 1017. Movies count from 0. EXR is 32-bit float (half with --half). PNG has 8 bits for an 8-bit
@@ -26,7 +26,12 @@ examples:
   palette4d render clip.p4d.json clip/ -o graded.mov
   palette4d render clip.p4d.json clip/ -o review.mp4 --compare wipe
   palette4d render clip.p4d.json beach.%04d.dpx -o graded/beach.####.png --frames 1001-1100x2
-  palette4d render clip.p4d.json clip/ -o still.png --frames 24 --strength 0.5"""
+  palette4d render clip.p4d.json clip/ -o still.png --frames 24 --strength 0.5
+  palette4d render clip.p4d.json clip/ -o key/sky.####.exr --show weight:v5"""
+
+
+# What `Document.recolour` draws.
+DRAWN = ("show", "strength", "keep_lightness", "lightness_of", "mix", "matte_in", "outside_at")
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -61,8 +66,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--compare",
         choices=("wipe", "side"),
-        help="with the source: wipe has the source's left half and the edit's right half, side "
-        "puts the source to the left of the edit",
+        help="with the source: wipe has the source's left half, a line and the edit's right half, "
+        "side puts the source to the left of the edit",
     )
     parser.add_argument(
         "--strength",
@@ -70,6 +75,50 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         default=1.0,
         metavar="S",
         help="0 the original, 1 the edit (default 1)",
+    )
+    parser.add_argument(
+        "--show",
+        type=_show,
+        default="recoloured",
+        metavar="WHAT",
+        help="weight:ID, a soft key of a vertex or stop that follows its colour through time; "
+        "outside, a matte of the colours outside the palette; palette, the edit with the frame's "
+        "palette below, old colours above new (default: the edit)",
+    )
+    parser.add_argument(
+        "--matte-in",
+        choices=("picture", "alpha"),
+        default="picture",
+        help="a matte as a grey picture, or multiplied into alpha (default picture)",
+    )
+    parser.add_argument(
+        "--outside-at",
+        type=number(0.0001, 100),
+        default=0.05,
+        metavar="D",
+        help="distance from the palette at which the matte of --show outside is 1 (default 0.05)",
+    )
+    parser.add_argument(
+        "--keep-lightness",
+        type=number(0, 1),
+        default=0.0,
+        metavar="K",
+        help="how much of the source's lightness the edit keeps: 0 none (default), 1 all, so that "
+        "only hue and saturation change",
+    )
+    parser.add_argument(
+        "--lightness-of",
+        choices=("auto", "rec709", "rec2020", "p3", "ap1", "rec601"),
+        default="auto",
+        help="whose luminance weights define lightness (default auto: the clip's colour space, or "
+        "Rec.709 if it is unknown)",
+    )
+    parser.add_argument(
+        "--mix",
+        type=number(0, 1),
+        default=1.0,
+        metavar="M",
+        help="0 the source, 1 the output (default 1)",
     )
     parser.add_argument(
         "--space",
@@ -89,43 +138,46 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--skip-bad-frames", action="store_true", help="skip missing or unreadable frames"
     )
-    parser.add_argument("--quiet", action="store_true", help="no progress bar")
+    parser.add_argument("--quiet", action="store_true", help="no progress bar, no report")
     parser.set_defaults(run=run)
+
+
+def _show(text: str) -> str:
+    """Argparse type of --show; the sidecar decides whether it has the handle."""
+    if text in ("recoloured", "outside", "palette") or re.fullmatch("weight:.+", text):
+        return text
+    raise argparse.ArgumentTypeError(
+        f"found {text!r}, expected weight:ID with the id of a vertex or stop, outside or palette"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Render; returns the exit status."""
     from palette4d.cli.progress import frames_bar
-    from palette4d.grade import rendering
-    from palette4d.grade.document import Document
-    from palette4d.media.clip import open_clip
+    from palette4d.grade.rendering import render
     from palette4d.media.clip_base import named
-    from palette4d.media.movie_writer import is_movie
 
-    document = Document.load(args.sidecar)
-    clip = open_clip(args.clip, frames=args.frames, skip_bad_frames=args.skip_bad_frames)
-    options = rendering.RenderOptions(
-        args.strength, args.threads, args.space, args.compare, args.half, args.bits
-    )
-    for warning in rendering.mismatches(document, clip, whole=args.frames is None):
-        print(f"palette4d: warning: {warning}", file=sys.stderr)
-    movie = is_movie(Path(args.output))
-    for note in (*clip.notes, *(rendering.movie_notes(clip, options) if movie else ())):
-        print(f"palette4d: note: {note}", file=sys.stderr)
-    with frames_bar("render", hidden=args.quiet, total=len(clip.frames)) as progress:
-        written = rendering.render(
-            document,
-            clip,
+    with frames_bar("render", hidden=args.quiet) as progress:
+        done = render(
+            args.sidecar,
+            args.clip,
             args.output,
-            options,
+            frames=args.frames,
+            compare=args.compare,
+            space=args.space,
+            half=args.half,
+            bits=args.bits,
+            threads=args.threads,
+            skip_bad_frames=args.skip_bad_frames,
             force=args.force,
             progress=progress,
+            tell=tell,
+            **{name: vars(args)[name] for name in DRAWN},
         )
-    if movie or len(written) == 1:
-        frames = f", {counted(len(clip.frames) - len(clip.skipped), 'frame')}" if movie else ""
-        print(f"rendered {written[0]}{frames}")
-    else:
-        print(f"rendered {counted(len(written), 'frame')}, {written[0]} to {written[-1].name}")
-    if clip.skipped:
-        print(f"palette4d: skipped bad {named(clip.skipped)}", file=sys.stderr)
+    if done.skipped:
+        tell("note", f"skipped bad {named(done.skipped)}")
+    if not args.quiet:
+        first, last = done.files[0], done.files[-1].name
+        to = "" if len(done.files) == 1 else f" to {last}"
+        print(f"rendered {first}{to}, {counted(len(done.frames), 'frame')}")
     return 0

@@ -56,7 +56,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("--half", action="store_true", help="EXR with 16-bit float")
     parser.add_argument("--force", action="store_true", help="replace frames that exist already")
-    parser.add_argument("--quiet", action="store_true", help="no progress bar")
+    parser.add_argument("--quiet", action="store_true", help="no progress bar, no report")
     parser.set_defaults(run=run)
 
 
@@ -78,17 +78,18 @@ def parse_size(text: str) -> tuple[int, int]:
 def run(args: argparse.Namespace) -> int:
     """Write the clip; returns the exit status."""
     from palette4d.cli.progress import frames_bar
-    from palette4d.demo.scene import write_clip
+    from palette4d.demo.scene import sample_clip
 
     with frames_bar("sample clip", hidden=args.quiet, total=args.frames) as progress:
-        written = write_clip(
+        written = sample_clip(
             args.output,
-            args.frames,
-            args.size,
+            frames=args.frames,
+            size=args.size,
             first=args.first,
             half=args.half,
             force=args.force,
             progress=progress,
         )
-    print(f"wrote {counted(len(written), 'frame')}, {written[0]} to {written[-1].name}")
+    if not args.quiet:
+        print(f"wrote {counted(len(written), 'frame')}, {written[0]} to {written[-1].name}")
     return 0

@@ -2,11 +2,14 @@
 
 import argparse
 import re
+import sys
 from pathlib import Path
 
 from palette4d.common.arguments import number
 
 OLDEST_QT = (6, 5)
+#: It loses a reference of None in every call without a result: older Pythons abort soon.
+BROKEN_QT, OLDEST_PYTHON_FOR_IT = "6.12.0", (3, 12)
 
 EPILOG = """\
 Without a screen, --screenshot draws the whole window into a file.
@@ -62,6 +65,11 @@ def run(args: argparse.Namespace) -> int:
         raise Palette4dError(
             f"found PySide6 {PySide6.__version__}, expected 6.5 or later; update it with "
             "`pip install --upgrade palette4d[studio]`"
+        )
+    if PySide6.__version__ == BROKEN_QT and sys.version_info < OLDEST_PYTHON_FOR_IT:
+        raise Palette4dError(
+            f"found PySide6 {BROKEN_QT}, which ends with a crash on this Python (3.11); expected "
+            "another version; get one with `pip install 'palette4d[studio]'`"
         )
     from palette4d.studio import app
 

@@ -64,7 +64,7 @@ def conversion(config: Any, source: str, target: str) -> Conversion:
     except failures() as error:
         raise ConversionError(
             f"OpenColorIO cannot convert {source!r} to {target!r} and back: {error}; choose "
-            "another --palette-space"
+            "another palette_space=…"
         ) from error
     steps: list[Step] = []
     for transform in forward.transforms():
@@ -73,7 +73,7 @@ def conversion(config: Any, source: str, target: str) -> Conversion:
         except ConversionError as error:
             raise ConversionError(
                 f"from {source!r} to {target!r}: {error}; expected matrices and curves of one "
-                "channel only, which have an inverse. Choose another --palette-space, or convert "
+                "channel only, which have an inverse. Choose another palette_space=…, or convert "
                 "the clip first"
             ) from error
     steps = list(joined(steps))
@@ -87,7 +87,7 @@ def conversion(config: Any, source: str, target: str) -> Conversion:
         raise ConversionError(
             f"from {source!r} to {target!r}: found a difference of {worst:.2g} between matrices "
             f"and curves and OpenColorIO, expected at most {TOLERANCE:g}; choose another "
-            "--palette-space, or convert the clip first"
+            "palette_space=…, or convert the clip first"
         )
     return Conversion(steps, chain, worst)
 

@@ -62,7 +62,7 @@ def load_config(name: str, option: str) -> Any:
     name : str
         A config.ocio, an .ocioz archive, or a built-in ``ocio://`` name.
     option : str
-        The option or variable that named it ("--ocio-config", "$OCIO"), for errors.
+        The option or variable that named it ("ocio_config=…", "$OCIO"), for errors.
 
     Raises
     ------
@@ -90,8 +90,8 @@ def load_config(name: str, option: str) -> Any:
         config.validate()
     except failures() as error:
         raise Palette4dError(
-            f"{name}: OpenColorIO cannot use it as a config: {error}; mend it, or choose another "
-            f"with {option}"
+            f"{name}: OpenColorIO cannot use it as a config: {error}; correct it, or choose "
+            f"another with {option}"
         ) from error
     return config
 
@@ -111,14 +111,14 @@ def chosen_config(given: str | None) -> tuple[Any, str]:
     Palette4dError
         The config is unusable.
     """
-    for name, option in ((given, "--ocio-config"), (os.environ.get("OCIO") or None, "$OCIO")):
+    for name, option in ((given, "ocio_config=…"), (os.environ.get("OCIO") or None, "$OCIO")):
         if name is not None:
             return load_config(name, option), from_anywhere(name) or name
-    return load_config(BUILT_IN, "--ocio-config"), BUILT_IN
+    return load_config(BUILT_IN, "ocio_config=…"), BUILT_IN
 
 
-def colour_space(config: Any, config_name: str, name: str, option: str) -> Any:
-    """Return the colour space with this name, alias or role.
+def colour_space(config: Any, config_name: str, name: str, what: str) -> Any:
+    """Return the colour space with this name, alias or role; `what` names its source in errors.
 
     Raises
     ------
@@ -128,12 +128,12 @@ def colour_space(config: Any, config_name: str, name: str, option: str) -> Any:
     found = config.getColorSpace(name)
     if found is None:
         raise Palette4dError(
-            f"{option} {name!r}: found no such colour space in {config_name}; expected a name, "
+            f'{what}"{name}": found no such colour space in {config_name}; expected a name, '
             f"an alias or a role of it, such as {near_spaces(config, name)}"
         )
     if found.isData():
         raise Palette4dError(
-            f"{option} {name!r}: in {config_name} that holds data, not colours; expected a colour "
+            f'{what}"{name}": in {config_name} that holds data, not colours; expected a colour '
             "space"
         )
     return found

@@ -1,4 +1,8 @@
-"""The errors of palette4d. Each says what was found, what was expected, and the remedy."""
+"""The errors of palette4d. Each says what was found, what was expected, and the remedy.
+
+A remedy names an argument of the API as ``force=True`` or ``frames=…``; `palette4d.cli.messages`
+turns these into options.
+"""
 
 import errno
 import os
@@ -9,6 +13,21 @@ class Palette4dError(Exception):
 
     The command line prints it as ``palette4d: error: …`` and exits with 1.
     """
+
+
+class UnfinishedError(Palette4dError):
+    """Some frames or shots failed; the others are complete.
+
+    Attributes
+    ----------
+    done : object
+        What the function would have returned, with the failures.
+    """
+
+    def __init__(self, text: str, done: object) -> None:
+        """Store the message and the result."""
+        super().__init__(text)
+        self.done = done
 
 
 class WriteError(Palette4dError):

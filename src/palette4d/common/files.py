@@ -2,13 +2,26 @@
 
 import contextlib
 import os
+import re
 import secrets
 import stat
+import sys
+import time
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
 
 from palette4d.common.errors import Palette4dError, WriteError
+
+if sys.platform != "win32":
+    import fcntl
+
+#: What is said of an output file that exists.
+EXISTS = "found a file there already; choose another name, or replace it with force=True"
+_TEMPORARY = re.compile(r"\..*\.[0-9a-f]{16}\.p4d-tmp(\.[^.]*)?", re.DOTALL)
+#: Seconds after which a temporary file counts as left over where files cannot be locked.
+_LEFT_OVER_AFTER = 86400.0
+_swept: set[Path] = set()
 
 
 def refuse_existing(path: Path, force: bool) -> None:
@@ -25,7 +38,7 @@ def refuse_existing(path: Path, force: bool) -> None:
     if not path.parent.is_dir():
         raise Palette4dError(f"{path}: there is no folder {path.parent}; create it first")
     if path.exists() and not force:
-        raise Palette4dError(f"{path}: the file exists already; use --force to replace it")
+        raise Palette4dError(f"{path}: {EXISTS}")
     if not os.access(path.parent, os.W_OK):
         raise _closed(path)
 
@@ -61,7 +74,7 @@ def replacing(
     The temporary file is new (O_EXCL) and has an unpredictable name. It has the suffix of `path`,
     because libraries choose the format by it. File and folder are synced. A replaced file keeps its
     permissions. An error or Ctrl-C in the body removes the temporary file and leaves `path`
-    unchanged.
+    unchanged. The next process that writes in the folder removes what a killed process left there.
 
     Parameters
     ----------
@@ -79,11 +92,9 @@ def replacing(
     """
     path = link_target(path)
     refuse_existing(path, force)
-    # File names have at most 250 bytes; 40 characters are enough to recognise the file.
-    temporary = path.with_name(f".{path.stem[:40]}.{secrets.token_hex(8)}.tmp{path.suffix}")
+    _remove_leftovers(path.parent)
     try:
-        # 0o666 less the umask, as for any new file.
-        os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+        temporary, lock = _new_temporary(path)
     except OSError as error:
         raise _closed(path, f": {error.strerror}") from error
     try:
@@ -104,7 +115,82 @@ def replacing(
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
+        os.close(lock)
     _sync_folder(path.parent)
+
+
+def replace_by_link(path: Path, target: str) -> None:
+    """Replace a file atomically by a symbolic link.
+
+    Raises
+    ------
+    OSError
+        The link cannot be made; `path` is unchanged.
+    """
+    _remove_leftovers(path.parent)
+    temporary = _temporary_name(path)
+    temporary.symlink_to(target)
+    try:
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _temporary_name(path: Path) -> Path:
+    # File names have at most 250 bytes; 40 characters are enough to recognise the file.
+    return path.with_name(f".{path.stem[:40]}.{secrets.token_hex(8)}.p4d-tmp{path.suffix}")
+
+
+def _new_temporary(path: Path) -> tuple[Path, int]:
+    """Create a temporary file; return it with a handle that locks it until it is closed."""
+    while True:
+        temporary = _temporary_name(path)
+        # 0o666 less the umask, as for any new file.
+        handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+        _lock(handle, wait=True)
+        if os.fstat(handle).st_nlink:
+            return temporary, handle
+        os.close(handle)  # another process removed it before it was locked
+
+
+def _remove_leftovers(folder: Path) -> None:
+    """Remove the temporary files of killed processes, once for each folder."""
+    if folder in _swept:
+        return
+    _swept.add(folder)
+    with contextlib.suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            if _TEMPORARY.fullmatch(entry.name):
+                with contextlib.suppress(OSError):
+                    if _is_left_over(entry):
+                        Path(entry).unlink()
+
+
+def _is_left_over(entry: os.DirEntry[str]) -> bool:
+    """Whether no process writes a temporary file any more: its lock ends with the process."""
+    if entry.is_symlink():
+        return True
+    handle = os.open(entry.path, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0))
+    try:
+        locked = _lock(handle, wait=False)
+        if locked is None:
+            return time.time() - os.fstat(handle).st_mtime > _LEFT_OVER_AFTER
+        return locked
+    finally:
+        os.close(handle)
+
+
+def _lock(handle: int, *, wait: bool) -> bool | None:
+    """Lock a file; return whether that worked, None where files cannot be locked."""
+    if sys.platform == "win32":
+        return None
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+    except BlockingIOError:
+        return False
+    except OSError:
+        return None
+    return True
 
 
 def _sync_folder(folder: Path) -> None:
@@ -119,5 +205,6 @@ def _sync_folder(folder: Path) -> None:
 
 def _closed(path: Path, why: str = "") -> WriteError:
     return WriteError(
-        f"{path}: cannot write in {path.parent}{why}; choose another folder or mend its permissions"
+        f"{path}: cannot write in {path.parent}{why}; choose another folder, or change its "
+        "permissions"
     )

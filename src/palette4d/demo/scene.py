@@ -12,6 +12,7 @@ all machines of one kind. The colours change with the time u in 0..1:
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -415,21 +416,21 @@ class Scene:
         _over(picture, self._lit(keyed(_GRASS, u) * 0.85, shade, u), _step(-edge, edge, below))
 
 
-def write_clip(
-    output: str,
-    frames: int,
-    size: tuple[int, int],
+def sample_clip(
+    output: str | os.PathLike[str],
     *,
+    frames: int = 48,
+    size: tuple[int, int] = (320, 180),
     first: int = 1,
     half: bool = False,
     force: bool = False,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], object] | None = None,
 ) -> list[Path]:
     """Draw the scene from day to night and write it, 24 frames a second.
 
     Parameters
     ----------
-    output : str
+    output : str or path
         `OUT.####.png`, `.tif` (16 bits) or `.exr` (32-bit float, or `half`).
     frames : int
         Number of frames; a single frame shows the middle of the time-lapse.
@@ -454,7 +455,7 @@ def write_clip(
     """
     import OpenImageIO as oiio
 
-    pattern = FramePattern.parse(output)
+    pattern = FramePattern.parse(os.fspath(output))
     samples = sample_type(pattern.extension, "uint16", half=half)
     files = pattern.paths(range(first, first + frames))
     check_targets(files, force=force)

@@ -12,7 +12,7 @@ import json
 import math
 import os
 import re
-from collections.abc import Generator, Iterable, Mapping
+from collections.abc import Generator, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
 from palette4d.common.files import link_target
+from palette4d.common.locking import locked
 from palette4d.common.text import counted
 from palette4d.grade import edits, sidecar
 from palette4d.grade.edits import (
@@ -42,6 +43,7 @@ from palette4d.grade.edits import (
     as_ramp,
 )
 from palette4d.grade.handles import Handles, unknown
+from palette4d.grade.output import Output
 from palette4d.grade.palette import FAR, Near, Palette, palette_at
 from palette4d.grade.sidecar import Fields, OnEdits
 
@@ -49,6 +51,9 @@ F32 = NDArray[np.float32]
 
 #: A vertex that has less of the colour at a frame than this is left alone: it would move too far.
 LEAST_SHARE = 0.5
+
+#: The most characters of a version's name.
+LONGEST_NAME = 100
 
 #: A member `edits.solution`, and the measured members of each pick by its id.
 Solved = tuple[Fields, dict[str, Fields]]
@@ -74,6 +79,8 @@ class Document:
         The members of a sidecar (docs/sidecar.md).
     notes : iterable of str
         Notes of the analysis about the palette.
+    report : mapping, optional
+        Figures of the analysis, as `palette4d analyze --json` prints them.
 
     Attributes
     ----------
@@ -81,14 +88,22 @@ class Document:
         The sidecar; None until it is saved.
     notes : tuple of str
         As above.
+    report : dict
+        As above; empty for a loaded sidecar.
     """
 
-    def __init__(self, fields: Mapping[str, Any], notes: Iterable[str] = ()) -> None:
+    def __init__(
+        self,
+        fields: Mapping[str, Any],
+        notes: Iterable[str] = (),
+        report: Mapping[str, Any] | None = None,
+    ) -> None:
         data = sidecar.encoded(fields)
         self.path: Path | None = None
         self._start(data, _core.parse_sidecar(data, self._name))
         self._disk: bytes | None = None
         self.notes = tuple(notes)
+        self.report = dict(report or {})
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> "Document":
@@ -102,6 +117,7 @@ class Document:
         document = cls.__new__(cls)
         data = sidecar.read_bytes(path)
         document._disk, document.path, document.notes = data, Path(path), ()
+        document.report = {}
         document._start(data, _core.parse_sidecar(data, os.fspath(path)))
         return document
 
@@ -121,7 +137,7 @@ class Document:
         }
 
     def _mark_saved(self) -> None:
-        self._saved = (self._state, list(self._done), list(self._undone))
+        self._saved = (self._state, self._done, self._undone)
 
     def __repr__(self) -> str:
         """Return one line: the clip, its frames, and the numbers of edits."""
@@ -131,6 +147,14 @@ class Document:
             f"{counted(len(self._handles.vertices), 'vertex', 'vertices')}, "
             f"{counted(sum(kind in _ACTIVE for kind, _ in self._state), 'edit')}>"
         )
+
+    def trial(self) -> "Document":
+        """Return a copy to try edits on, without the history and without a file."""
+        new = copy.copy(self)
+        new._done, new._undone = [], []
+        new.path, new._disk = None, None
+        new._mark_saved()
+        return new
 
     # ------------------------------------------------------------------------------ what it holds
 
@@ -455,11 +479,10 @@ class Document:
         Everything: handles, picks, locks and the clip's ramp. Versions stay.
         """
         if id is None:
-            keys = [key for key in self._state if key[0] in _ACTIVE]
-            self._remove(keys, "reset everything")
+            self._remove(self._active(), "reset everything")
         elif id in self._settings:
             gone = self._settings[id].edge is not None
-            keys = [("handle", id), ("lock", id)] if gone else [("handle", id)]
+            keys: list[Key] = [("handle", id), ("lock", id)] if gone else [("handle", id)]
             self._remove([key for key in keys if key in self._state], f"reset {id}")
         else:
             self._handles.vertex(id, self._settings)
@@ -491,13 +514,13 @@ class Document:
         if not edit.changes:
             return
         self._change(edit)
-        self._done.append(edit)
-        self._undone.clear()
+        self._done = [*self._done, edit]
+        self._undone = []
 
     @contextlib.contextmanager
     def one_step(self, label: str) -> Generator[None]:
         """Make all edits in a ``with`` block one step; an error in it reverts them all."""
-        state, done, undone = self._state, list(self._done), list(self._undone)
+        state, done, undone = self._state, self._done, self._undone
         try:
             yield
         except BaseException:
@@ -505,26 +528,25 @@ class Document:
             self._done, self._undone, self._core, self._solved = done, undone, None, None
             raise
         edit = edits.difference(state, self._state, label)
-        self._done, self._undone = done, undone
-        if edit.changes:
-            self._done.append(edit)
-            self._undone = []
+        self._done, self._undone = ([*done, edit], []) if edit.changes else (done, undone)
 
     def undo(self) -> Edit:
         """Revert the last step, and return it. Steps of earlier sessions can be reverted too."""
         if not self._done:
             raise Palette4dError("there is nothing to undo: the palette has no earlier step")
-        self._change(self._done[-1].inverse())
-        self._undone.append(self._done.pop())
-        return self._undone[-1]
+        step = self._done[-1]
+        self._change(step.inverse())
+        self._done, self._undone = self._done[:-1], [*self._undone, step]
+        return step
 
     def redo(self) -> Edit:
         """Apply the last undone step again, and return it."""
         if not self._undone:
             raise Palette4dError("there is nothing to redo: no step was undone since the last edit")
-        self._change(self._undone[-1])
-        self._done.append(self._undone.pop())
-        return self._done[-1]
+        step = self._undone[-1]
+        self._change(step)
+        self._done, self._undone = [*self._done, step], self._undone[:-1]
+        return step
 
     def forget_history(self) -> None:
         """Drop all steps, done and undone; the edits stay."""
@@ -535,6 +557,76 @@ class Document:
         self._core = None
         self._solved = None
 
+    # ----------------------------------------------------------------------------------- versions
+
+    @property
+    def versions(self) -> tuple[str, ...]:
+        """The names of the versions, sorted."""
+        return tuple(sorted(name for kind, name in self._state if kind == "version"))
+
+    def save_version(self, name: str) -> None:
+        """Keep the active edits as a version; a version with this name is replaced."""
+        if not 1 <= len(name.strip()) <= LONGEST_NAME or not name.isprintable():
+            raise Palette4dError(
+                f"found the version name {name!r}, expected 1 to {LONGEST_NAME} printable "
+                "characters"
+            )
+        self._put("version", name, self.fields()["edits"], f"save version {name}")
+
+    def use_version(self, name: str) -> str | None:
+        """Make the edits of a version the active edits, as one step.
+
+        Active edits that no version holds are kept as a new version.
+
+        Returns
+        -------
+        str or None
+            The name of the new version, such as "before NAME".
+        """
+        wanted = edits.from_fields(self._version(name))
+        versions = {key: value for key, value in self._state.items() if key[0] == "version"}
+        kept = None
+        if self._active() and not any(map(self.same_edits, self.versions)):
+            names = (f"before {name}"[: LONGEST_NAME - 4] + more for more in _suffixes())
+            kept = next(each for each in names if ("version", each) not in versions)
+            versions["version", kept] = self.fields()["edits"]
+        self.apply(edits.difference(self._state, {**wanted, **versions}, f"use version {name}"))
+        return kept
+
+    def same_edits(self, name: str) -> bool:
+        """Whether a version holds the active edits."""
+        return edits.from_fields(self._version(name)) == self._active()
+
+    def _active(self) -> dict[Key, Any]:
+        return {key: value for key, value in self._state.items() if key[0] in _ACTIVE}
+
+    def remove_version(self, name: str) -> None:
+        """Remove a version."""
+        self._version(name)
+        self._put("version", name, None, f"remove version {name}")
+
+    def version(self, name: str) -> "Document":
+        """Return a document with the edits of a version as the active edits; "" returns this one.
+
+        It is not bound to the file: `save` needs a name.
+        """
+        if not name:
+            return self
+        found = copy.copy(self)
+        fields = self._version(name)
+        others = {key: value for key, value in self._state.items() if key[0] == "version"}
+        found._become({**edits.from_fields(fields), **others})
+        found._disk, found._core, found._solved = None, None, _stored_solution(fields)
+        found.forget_history()
+        return found
+
+    def _version(self, name: str) -> Fields:
+        found: Fields | None = self._state.get(("version", name))
+        if found is None:
+            there = ", ".join(map(repr, self.versions)) or "none"
+            raise Palette4dError(f"there is no version {name!r}; the palette has {there}")
+        return found
+
     # ----------------------------------------------------------------------------------- applying
 
     def recolour(
@@ -543,6 +635,12 @@ class Document:
         frame: float,
         *,
         strength: float = 1.0,
+        keep_lightness: float = 0.0,
+        lightness_of: str = "auto",
+        mix: float = 1.0,
+        show: str = "recoloured",
+        matte_in: Literal["picture", "alpha"] = "picture",
+        outside_at: float = 0.05,
         premultiplied: bool = False,
         space: Literal["input", "palette"] = "input",
         threads: int = 0,
@@ -552,11 +650,24 @@ class Document:
         Parameters
         ----------
         image : (h, w, 3 or 4) float32
-            Code values of the clip, 0..1 as a rule; alpha passes unchanged.
+            Code values of the clip, 0..1 as a rule; a grade never changes alpha.
         frame : float
             The time; frames outside the clip use its first or last frame.
         strength : float
             0 is the original, 1 the edit.
+        keep_lightness : float
+            The share of the source's lightness to keep: 0 none, 1 all.
+        lightness_of : {"auto", "rec709", "rec2020", "p3", "ap1", "rec601"}
+            Whose luminance weights define lightness; "auto": the image's colour space.
+        mix : float
+            0 is the image, 1 the output.
+        show : str
+            "recoloured"; "weight:ID", a soft key of a vertex or stop; "outside", a matte of the
+            colours outside the palette; "palette", the recoloured picture above its palette.
+        matte_in : {"picture", "alpha"}
+            A key or matte as a grey picture, or multiplied into alpha.
+        outside_at : float
+            The distance from the palette, in its code values, at which "outside" is 1.
         premultiplied : bool
             Colours are multiplied by alpha.
         space : {"input", "palette"}
@@ -569,20 +680,55 @@ class Document:
         (h, w, 3 or 4) float32
             A new array. Without edits it equals `image` bit by bit.
         """
+        output = Output(show, strength, keep_lightness, lightness_of, mix, matte_in, outside_at)
         pixels = _checked_image(image)
         palette = self.palette(frame)
-        conversion = self._conversion(space)
-        if not 0 <= strength <= 1:
-            raise Palette4dError(f"found the strength {strength}, expected 0 to 1")
+        self._conversion(space)
         recolourer = _core.Recolourer(palette.rgb, palette.edited, palette.faces)
-        return recolourer.apply(
+        return output.draw(
             pixels,
-            strength=strength,
-            premultiplied=premultiplied and pixels.shape[2] == 4,
+            self.core,
+            palette,
+            recolourer,
+            premultiplied=premultiplied,
+            space=space,
             threads=threads,
-            precision="single",
-            conversion=conversion,
         )
+
+    def matte(
+        self,
+        image: F32,
+        frame: float,
+        show: str,
+        *,
+        outside_at: float = 0.05,
+        space: Literal["input", "palette"] = "input",
+        threads: int = 0,
+    ) -> F32:
+        """Return a matte of an image: the same values as the node's.
+
+        Parameters
+        ----------
+        image : (h, w, 3 or 4) float32
+            As in `recolour`; colours are not multiplied by alpha, and alpha is ignored.
+        show : str
+            "weight:ID", a soft key of a vertex or stop, which follows its colour through time, or
+            "outside", the colours outside the palette.
+        frame, outside_at, space, threads
+            As in `recolour`.
+
+        Returns
+        -------
+        (h, w) float32
+            0..1.
+        """
+        if show == "palette" or show == "recoloured":
+            raise Palette4dError(f"found {show!r}, expected a matte: 'weight:ID' or 'outside'")
+        colours = np.ascontiguousarray(_checked_image(image)[..., :3])
+        drawn = self.recolour(
+            colours, frame, show=show, outside_at=outside_at, space=space, threads=threads
+        )
+        return np.ascontiguousarray(drawn[..., 0])
 
     def weights(
         self, image: F32, frame: float, *, space: Literal["input", "palette"] = "input"
@@ -652,6 +798,10 @@ class Document:
                 "this palette has no file yet; expected a name: save('clip.p4d.json')"
             )
         target = Path(path if path is not None else self.path or "")
+        if path is None and self._disk is None:
+            raise Palette4dError(
+                f"this is not the document in {self.path}; expected another name to save it under"
+            )
         if self._disk is not None and self.path is not None and _same(target, self.path):
             self._save_again(link_target(target), self._disk)
             return
@@ -669,7 +819,7 @@ class Document:
         self._start(self._disk, _core.parse_sidecar(self._disk, str(target)))
 
     def _save_again(self, target: Path, loaded: bytes) -> None:
-        with sidecar.locked(target):
+        with locked(target) as held:
             found = sidecar.read_bytes(target)
             if found == loaded and not self.changed:
                 return
@@ -678,7 +828,7 @@ class Document:
             data = sidecar.encoded(new._members())
             if found != loaded or new._core is None:
                 new._core = _core.parse_sidecar(data, str(target))
-            sidecar.write(target, data, replaces=found)
+            sidecar.write(target, data, held, replaces=found)
         new._disk = data
         new._mark_saved()
         self.__dict__ = new.__dict__
@@ -707,13 +857,14 @@ class Document:
         ]
         steps += self._done[shared:]
         mine = edits.rebased([step.renamed(names) for step in steps], new._state)
+        theirs = new._state
         for step in mine:
             new._change(step)
         if new._state != state:  # the steps on the way there met theirs
-            mine = [edits.difference(sidecar.state_of(new._fields), state, "edits of two programs")]
+            mine = [edits.difference(theirs, state, "edits of two programs")]
             new._become(state)
         if mine:
-            new._done += mine
+            new._done = new._done + mine
             new._undone = [step.renamed(names) for step in self._undone]
         return new
 
@@ -753,6 +904,11 @@ def _solve(fields: Fields) -> Solved:
 
     found: Solved = solve.solve(fields)
     return found
+
+
+def _suffixes() -> Iterator[str]:
+    yield ""
+    yield from (f" {number}" for number in itertools.count(2))
 
 
 def _text(colour: Colour) -> str:

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import Callable, Generator
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from palette4d.common.files import make_folder
 from palette4d.grade.document import Document
-from palette4d.media.clip_base import F32, Clip, Image, describe
+from palette4d.grade.output import Output
+from palette4d.media.clip import Clip, Image, open_clip
+from palette4d.media.clip_base import F32, describe
 from palette4d.media.frame_writer import (
     FramePattern,
     OutputError,
@@ -24,40 +27,49 @@ from palette4d.media.frame_writer import (
 )
 from palette4d.media.movie_writer import is_movie, movie_writer
 
+Compare = Literal["wipe", "side"]
+_LINE = np.float32(1.0)  # the line of a wipe, in code values: white
+
 
 @dataclass(frozen=True)
-class RenderOptions:
-    """Options of recolouring and output.
+class Rendered:
+    """What `render` wrote.
 
     Attributes
     ----------
-    strength : float
-        0 the original, 1 the edit.
-    threads : int
-        0: one per processor.
-    space : {"input", "palette"}
-        "palette": the clip's code values are already in the palette's colour space.
-    compare : {"wipe", "side"} or None
-        Show source and edit: "wipe" shows the left half of the source and the right half of the
-        edit; "side" shows both whole, the source on the left.
-    half, bits
-        The sample type of frames (`sample_type`); not for movies.
+    files : list of Path
+        The frames, or the movie.
+    frames, skipped : list of int
+        The frame numbers that were rendered, and those of bad frames that were left out.
+    notes : list of str
+        Notes for the user; the first say where clip and sidecar differ.
     """
 
-    strength: float = 1.0
-    threads: int = 0
-    space: Literal["input", "palette"] = "input"
-    compare: Literal["wipe", "side"] | None = None
-    half: bool = False
-    bits: int | None = None
+    files: list[Path]
+    frames: list[int]
+    skipped: list[int]
+    notes: list[str]
 
 
-def compared(source: F32, edited: F32, how: Literal["wipe", "side"]) -> F32:
-    """Return the source and the edit in one picture (`RenderOptions.compare`)."""
+def compared(source: F32, edited: F32, how: Compare) -> F32:
+    """Return the source and the edit in one picture.
+
+    "side" puts the source to the left of the edit. "wipe" has the source's left half and the edit's
+    right half, with a thin white line between them.
+    """
     if how == "side":
         return np.concatenate([source, edited], axis=1)
-    middle = source.shape[1] // 2
-    return np.concatenate([source[:, :middle], edited[:, middle:]], axis=1)
+    middle, half_line = source.shape[1] // 2, max(1, source.shape[1] // 960)
+    picture = np.concatenate([source[:, :middle], edited[:, middle:]], axis=1)
+    picture[:, middle - half_line : middle + half_line] = _LINE
+    return picture
+
+
+def with_alpha(pixels: F32) -> F32:
+    """Return RGBA pixels; alpha is 1 where there was none."""
+    if pixels.shape[2] == 4:
+        return pixels
+    return np.concatenate([pixels, np.ones_like(pixels[..., :1])], axis=2)
 
 
 def mismatches(document: Document, clip: Clip, whole: bool) -> list[str]:
@@ -89,16 +101,15 @@ def mismatches(document: Document, clip: Clip, whole: bool) -> list[str]:
     return found
 
 
-def movie_notes(clip: Clip, options: RenderOptions) -> list[str]:
+def movie_notes(clip: Clip, width: int, alpha: bool) -> list[str]:
     """Return notes on the limits of a movie of this clip: size, alpha, encoding."""
     found = []
-    width = clip.width * (2 if options.compare == "side" else 1)
     if width % 2 or clip.height % 2:
         found.append(
             f"the picture is {width}x{clip.height} pixels; where the movie's encoder needs an "
             "even size, the last column or row is repeated"
         )
-    if clip.has_alpha:
+    if alpha:
         found.append("the movie has no alpha, the picture is laid over black; frames keep it")
     if "linear" in clip.encoding:
         found.append(
@@ -109,58 +120,101 @@ def movie_notes(clip: Clip, options: RenderOptions) -> list[str]:
 
 
 def render(
-    document: Document,
-    clip: Clip,
-    output: str,
-    options: RenderOptions,
+    document: str | os.PathLike[str] | Document,
+    clip: str | os.PathLike[str] | Clip,
+    output: str | os.PathLike[str],
     *,
+    frames: str | None = None,
+    compare: Compare | None = None,
+    space: Literal["input", "palette"] = "input",
+    half: bool = False,
+    bits: int | None = None,
+    threads: int = 0,
+    skip_bad_frames: bool = False,
     force: bool = False,
-    progress: Callable[[int, int], None] | None = None,
-) -> list[Path]:
+    progress: Callable[[int, int], object] | None = None,
+    tell: Callable[[str, str], object] | None = None,
+    **picture: Any,
+) -> Rendered:
     """Recolour every frame of a clip and write it; memory holds at most three frames.
 
     Parameters
     ----------
-    document : Document
+    document : path or Document
         The palette and its edits.
-    clip : Clip
-        The frames; bad frames, which `Clip.skipped` lists afterwards, are left out.
-    output : str
-        `OUT.####.exr` (`.png`, `.tif`) for frames, which keep their numbers, or `OUT.mp4`,
-        `OUT.mov` for a movie at the clip's rate.
-    options : RenderOptions
-        The options of recolouring and output.
+    clip : str, path or Clip
+        A name for `open_clip`, or an opened clip; ``frames`` and ``skip_bad_frames`` are for names.
+    output : str or path
+        ``OUT.####.exr`` (``.png``, ``.tif``) for frames, which keep their numbers, or ``OUT.mp4``,
+        ``OUT.mov`` for a movie at the clip's rate.
+    frames : str, optional
+        Only these frames: "1001-1100x2".
+    compare : {"wipe", "side"}, optional
+        Show the source, too: "side" to the left of the edit, "wipe" as the left half.
+    space : {"input", "palette"}
+        "palette": the clip's code values are already in the palette's colour space.
+    half : bool
+        EXR in 16-bit float.
+    bits : int, optional
+        Bits a sample: 8 or 16 for PNG, 8, 16 or 32 for TIFF.
+    threads : int
+        0: one per processor.
+    skip_bad_frames : bool
+        Skip missing and unreadable frames.
     force : bool
         Replace files that exist. A clip's own files are never replaced.
     progress : callable, optional
         Called with (frames written, frames in all).
+    tell : callable, optional
+        Called as ``tell(kind, text)`` before the first frame is rendered: "warning" where clip and
+        sidecar differ, else "note".
+    **picture
+        What to draw: ``strength``, ``show``, ``keep_lightness`` and so on, as for
+        `Document.recolour`.
 
     Returns
     -------
-    list of Path
-        The written files. After Ctrl-C or an error, written frames are complete, and there is no
-        movie.
+    Rendered
+        After Ctrl-C or an error, written frames are complete, and there is no movie.
 
     Raises
     ------
     Palette4dError
         The output cannot be written, or a frame cannot be read.
     """
+    if not isinstance(document, Document):
+        document = Document.load(document)
+    drawn = Output(**picture)
+    whole = frames is None
+    if not isinstance(clip, Clip):
+        clip = open_clip(os.fspath(clip), frames=frames, skip_bad_frames=skip_bad_frames)
+    output = os.fspath(output)
+    width = clip.width * (2 if compare == "side" else 1)
     movie = is_movie(Path(output))
     inputs = {clip.file(frame) for frame in clip.frames}
     if movie:
-        if options.half or options.bits is not None:
-            raise OutputError(f"output {output}: --half and --bits are for frames, not for movies")
+        if half or bits is not None:
+            raise OutputError(
+                f"output {output}: half=True and bits=… are for frames, not for movies"
+            )
         check_targets([Path(output)], inputs, force)
         make_folder(Path(output).parent)
-        opened = _movie(clip, document, Path(output), options)
+        opened = _movie(clip, document, Path(output), width)
     else:
-        pattern = FramePattern.parse(output)
-        samples = sample_type(pattern.extension, clip.depth, half=options.half, bits=options.bits)
+        pattern = FramePattern.parse(output, ", or a movie OUT.mp4 or OUT.mov")
+        samples = sample_type(pattern.extension, clip.depth, half=half, bits=bits)
         check_targets(pattern.paths(clip.frames), inputs, force)
         make_folder(pattern.folder)
         opened = _frames(clip, pattern, samples)
+    warnings = mismatches(document, clip, whole)
+    alpha = clip.has_alpha or drawn.in_alpha
+    notes = [*clip.notes, *(movie_notes(clip, width, alpha) if movie else ())]
+    if tell is not None:
+        for kind, texts in (("warning", warnings), ("note", notes)):
+            for text in texts:
+                tell(kind, text)
     written: list[Path] = []
+    rendered: list[int] = []
     pending: Future[Path] | None = None
 
     def finish() -> None:
@@ -172,20 +226,24 @@ def render(
     # One frame is written while the next is read and recoloured.
     with opened as write, ThreadPoolExecutor(1) as writer:
         for image in clip.iter_images():
+            source = with_alpha(image.pixels) if drawn.in_alpha else image.pixels
             pixels = document.recolour(
-                image.pixels,
+                source,
                 image.frame,
-                strength=options.strength,
+                **asdict(drawn),
                 premultiplied=clip.premultiplied,
-                space=options.space,
-                threads=options.threads,
+                space=space,
+                threads=threads,
             )
-            if options.compare is not None:
-                pixels = compared(image.pixels, pixels, options.compare)
+            if compare is not None:
+                pixels = compared(source, pixels, compare)
             finish()
+            rendered.append(image.frame)
             pending = writer.submit(write, image, pixels)
         finish()
-    return written[:1] if movie else written
+    return Rendered(
+        written[:1] if movie else written, rendered, list(clip.skipped), [*warnings, *notes]
+    )
 
 
 _Write = Callable[[Image, F32], Path]
@@ -210,11 +268,10 @@ def _frames(clip: Clip, pattern: FramePattern, samples: str) -> Generator[_Write
 
 
 @contextlib.contextmanager
-def _movie(clip: Clip, document: Document, path: Path, options: RenderOptions) -> Generator[_Write]:
+def _movie(clip: Clip, document: Document, path: Path, width: int) -> Generator[_Write]:
     """Yield a function that appends a frame to a movie."""
     # Image files rarely state a rate, so the sidecar's rate is used.
     rate = clip.rate if clip.is_movie else Fraction(*document.core.clip["rate"])
-    width = clip.width * (2 if options.compare == "side" else 1)
     with movie_writer(path, (width, clip.height), rate, clip.encoding) as append:
 
         def write(image: Image, pixels: F32) -> Path:

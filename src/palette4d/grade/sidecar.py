@@ -4,14 +4,10 @@ Input and output are a sidecar's members as plain dicts and lists; `docs/sidecar
 The core (`palette4d._core`) validates every text before it is written.
 """
 
-import contextlib
-import errno
 import json
 import os
 import stat
-import sys
-import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,19 +16,14 @@ import numpy as np
 from palette4d import _core
 from palette4d.common.errors import Palette4dError, SidecarError
 from palette4d.common.files import link_target, refuse_existing, replacing
+from palette4d.common.locking import locked
 from palette4d.common.text import counted
 from palette4d.grade import edits
-
-if sys.platform != "win32":
-    import fcntl
 
 Fields = dict[str, Any]
 OnEdits = Literal["refuse", "keep", "drop"]
 
 SCHEMA = "palette4d.sidecar"
-
-#: Seconds to wait for the folder's lock while another palette4d writes.
-LOCK_SECONDS = 10.0
 
 #: The longest text that the core accepts.
 _LARGEST_FILE = 64 << 20
@@ -260,7 +251,7 @@ def with_history(
     history = {
         n: [edits.step_to_fields(step) for step in part] for n, part in parts.items() if part
     }
-    if history and hasattr(_core.Sidecar, "versions"):
+    if history:
         return {**document, "history": history}
     return {name: value for name, value in document.items() if name != "history"}
 
@@ -311,7 +302,7 @@ def save(
     """
     canonical: Fields = _canonical(document, "")
     target = link_target(path)
-    with locked(target):
+    with locked(target) as held:
         old = _existing(target, on_edits)
         if old is not None and has_edits(old) and old["edits"] != canonical.get("edits"):
             if on_edits == "refuse":
@@ -320,19 +311,23 @@ def save(
                 canonical = _with_edits_of(old, canonical, target)
         data = encoded(canonical)
         _core.parse_sidecar(data, os.fspath(target))
-        write(target, data)
+        write(target, data, held)
     return canonical
 
 
-def write(target: Path, data: bytes, *, replaces: bytes | None = None) -> None:
+def write(
+    target: Path, data: bytes, held: Callable[[], None], *, replaces: bytes | None = None
+) -> None:
     """Replace a file's content by the bytes of a validated document.
 
     Parameters
     ----------
     target : Path
-        The file; the caller holds its lock (`locked`).
+        The file; the caller holds its lock.
     data : bytes
         The new content.
+    held : callable
+        The check of the lock, from `locked`.
     replaces : bytes, optional
         The expected old content, checked just before the rename: other programs ignore the lock.
 
@@ -343,6 +338,7 @@ def write(target: Path, data: bytes, *, replaces: bytes | None = None) -> None:
     """
 
     def unchanged() -> None:
+        held()
         if replaces is not None and _bytes_or_none(target) != replaces:
             raise Palette4dError(
                 f"{target} was changed by another program meanwhile; nothing was written. Try again"
@@ -412,7 +408,7 @@ def _existing(target: Path, on_edits: OnEdits) -> Fields | None:
     except Palette4dError as error:
         raise Palette4dError(
             f"{target} exists and cannot be read as a sidecar ({error}); it may hold edits. "
-            "Move it away, choose another output, or replace it with --drop-edits"
+            'Move it away, choose another output, or replace it with on_edits="drop"'
         ) from error
 
 
@@ -424,8 +420,8 @@ def _summary(document: Fields) -> str:
 def _would_lose(target: Path, old: Fields) -> Palette4dError:
     return Palette4dError(
         f"{target} holds edits ({_summary(old)}) that this would lose. "
-        "Keep them with --keep-edits (works if the palette is unchanged), "
-        "discard them with --drop-edits, or choose another output"
+        'Keep them with on_edits="keep" (works if the palette is unchanged), '
+        'discard them with on_edits="drop", or choose another output'
     )
 
 
@@ -438,10 +434,12 @@ def _with_edits_of(old: Fields, new: Fields, target: Path) -> Fields:
     if _canonical(old, "")["polytope"] != new["polytope"]:
         raise Palette4dError(
             f"{target} holds edits ({_summary(old)}) for a palette that differs from "
-            "the new one, so they cannot be kept. Discard them with --drop-edits, or choose "
+            'the new one, so they cannot be kept. Discard them with on_edits="drop", or choose '
             "another output"
         )
-    return {**new, "edits": old["edits"], "extra": new.get("extra") or old["extra"]}
+    users = {name: old[name] for name in ("edits", "versions", "history") if name in old}
+    kept: Fields = _canonical({**new, **users, "extra": new.get("extra") or old["extra"]}, "")
+    return kept
 
 
 # ------------------------------------------------------------------------------------------- files
@@ -452,38 +450,3 @@ def _bytes_or_none(path: Path) -> bytes | None:
         return path.read_bytes()
     except FileNotFoundError:
         return None
-
-
-@contextlib.contextmanager
-def locked(target: Path) -> Iterator[None]:
-    """Hold the folder's advisory lock. It creates no file and ends with the process."""
-    try:
-        handle = os.open(target.parent, os.O_RDONLY)
-    except OSError:
-        yield  # the folder is missing or cannot be opened: the write reports the error
-        return
-    try:
-        _lock(handle, target)
-        yield
-    finally:
-        os.close(handle)  # releases the lock
-
-
-def _lock(handle: int, target: Path) -> None:
-    if sys.platform == "win32":
-        return
-    deadline = time.monotonic() + LOCK_SECONDS
-    while True:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            if error.errno not in (errno.EWOULDBLOCK, errno.EAGAIN):
-                return  # a file system without locks
-        else:
-            return
-        if time.monotonic() > deadline:
-            raise Palette4dError(
-                f"{target}: another program has kept the folder {target.parent} locked for "
-                f"{LOCK_SECONDS:g} seconds; wait for it to finish, or end it"
-            )
-        time.sleep(0.05)

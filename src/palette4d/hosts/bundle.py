@@ -80,7 +80,7 @@ def install_bundle(
         if os.path.lexists(target) and not force and not _is_ours(target):
             raise Palette4dError(
                 f"{target}: found something that is not an OpenFX bundle of Palette4D, "
-                "expected nothing or an earlier version; pass --force to replace it"
+                "expected nothing or an earlier version; replace it with force=True"
             )
         # Beside the target, so that the rename stays on one file system.
         with tempfile.TemporaryDirectory(prefix=".palette4d-", dir=destination) as temporary:
@@ -93,12 +93,12 @@ def install_bundle(
     except PermissionError as error:
         raise Palette4dError(
             f"{destination}: may not be written to; run the command as an administrator (sudo), or "
-            "give a folder of your own with --dest and name it in the environment variable "
+            "give a folder of your own with dest=… and name it in the environment variable "
             "OFX_PLUGIN_PATH"
         ) from error
     except OSError as error:
         raise Palette4dError(
-            f"{target}: cannot be installed ({error.strerror}); choose another folder with --dest"
+            f"{target}: cannot be installed ({error.strerror}); choose another folder with dest=…"
         ) from error
     return target
 

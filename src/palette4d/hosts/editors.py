@@ -32,7 +32,7 @@ def data_folder(program: str, platform: str = sys.platform) -> Path:
     if platform != "linux":
         raise Palette4dError(
             f"found the platform {platform}, expected linux: the folder {below} of the program's "
-            f"data is not known here; name it, --{program} DIR"
+            f"data is not known here; name it with {program}=…"
         )
     # The XDG standard requires programs to ignore relative folders.
     home = Path(os.environ.get("XDG_DATA_HOME", ""))
@@ -78,7 +78,7 @@ def _write(folder: Path, texts: dict[str, str], force: bool) -> list[Path]:
         if os.path.lexists(path) and not force and not _is_ours(path):
             raise Palette4dError(
                 f"{path}: found something that palette4d has not written, expected nothing or an "
-                "earlier version; pass --force to replace it"
+                "earlier version; replace it with force=True"
             )
     for path, text in zip(paths, texts.values(), strict=True):
         with replacing(path, force=True) as temporary:

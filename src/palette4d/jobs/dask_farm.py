@@ -147,14 +147,14 @@ def _connected(address: str) -> Iterator[Any]:
         import distributed
     except ImportError as error:
         raise Palette4dError(
-            "--cluster needs Dask, which is not installed; run: pip install 'palette4d[farm]'"
+            "cluster=… needs Dask, which is not installed; run: pip install 'palette4d[farm]'"
         ) from error
     try:
         client = distributed.Client(address, timeout=ANSWERS_WITHIN, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise Palette4dError(
             f"no Dask scheduler answers at {address} ({error}); start one with `dask scheduler`, "
-            "workers with `dask worker`, check the address, or use --jobs N"
+            "workers with `dask worker`, check the address, or use jobs=…"
         ) from error
     with _without_log(), client:
         yield client

@@ -118,7 +118,7 @@ def outcome(call: Callable[..., Result], *arguments: object) -> Result | Failed:
     except BrokenProcessPool:
         return Failed(
             "its process was ended from outside (too little memory?); run the same command again, "
-            "with fewer --jobs"
+            "with a smaller jobs=…"
         )
 
 

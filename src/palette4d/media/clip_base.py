@@ -36,8 +36,8 @@ COUNTED_PIXELS = 4_000_000
 """In larger frames the analysis counts only every n-th row, so about this many pixels."""
 
 LEAVE_OUT = (
-    "Bring a good copy, choose a range with --frames, or leave such frames out with "
-    "--skip-bad-frames."
+    "Bring a good copy, choose a range with frames=…, or leave such frames out with "
+    "skip_bad_frames=True."
 )
 """The advice for a bad frame."""
 
@@ -47,7 +47,7 @@ class ClipError(Palette4dError):
 
 
 class FrameError(ClipError):
-    """One frame is missing, unreadable or of another size; `--skip-bad-frames` skips it."""
+    """One frame is missing, unreadable or of another size; `skip_bad_frames` skips it."""
 
 
 @dataclass(frozen=True)
@@ -208,7 +208,7 @@ class Clip(abc.ABC):
         """Return the error for a clip without a good frame."""
         return FrameError(
             f"{self.source}: found none readable of {named(self.frames)}; "
-            "expected at least one good frame. Run without --skip-bad-frames to see the cause."
+            "expected at least one good frame. Run without skip_bad_frames=True to see the cause."
         )
 
 

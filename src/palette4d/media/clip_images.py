@@ -141,7 +141,7 @@ class Header:
     """The properties that an image file states.
 
     Width and height are upright. bits: the bits of a sample if fewer than its memory type has,
-    else 0.
+    else 0. note: for the user, or "".
     """
 
     width: int
@@ -153,6 +153,7 @@ class Header:
     encoding: str
     rate: Fraction | None
     metadata: tuple[tuple[str, Any, Any], ...]
+    note: str
 
 
 def open_images(
@@ -182,7 +183,7 @@ def open_images(
     if header is None:
         raise FrameError(
             f"{source}: found none readable of {named(wanted)}; expected at least one "
-            "good frame. Run without --skip-bad-frames to see the cause."
+            "good frame. Run without skip_bad_frames=True to see the cause."
         )
     return ImageClip(
         name=sequence.name,
@@ -196,6 +197,7 @@ def open_images(
         premultiplied=header.premultiplied,
         depth=header.depth,
         skip_bad_frames=skip_bad_frames,
+        notes=[f"{source}: {header.note}"] if header.note else [],
         skipped=missing,
         sequence=sequence,
     )
@@ -211,7 +213,7 @@ def _wanted_frames(sequence: ImageSequence, frames: str | None, embedded: str | 
             wanted = parse_frames(frames)
             if outside := sorted(set(wanted) - set(inside)):
                 raise ClipError(
-                    f"{sequence.pattern}: --frames {frames} includes {describe(outside)}, which "
+                    f'{sequence.pattern}: frames="{frames}" includes {describe(outside)}, which '
                     f"the pattern's own range {embedded} leaves out. Give one of the two."
                 )
     elif frames is not None:
@@ -223,7 +225,7 @@ def _wanted_frames(sequence: ImageSequence, frames: str | None, embedded: str | 
             raise ClipError(
                 f"{sequence.pattern}: the {len(found)} files are numbered from {found[0]} to "
                 f"{found[-1]}, which looks like dates or ids; expected frame numbers. "
-                "Number the files, or choose a range with --frames."
+                "Number the files, or choose a range with frames=…."
             )
         return list(range(found[0], found[-1] + 1, step))
     if not set(wanted) & set(found):
@@ -385,7 +387,16 @@ def _header(spec: Any, chosen: list[int]) -> Header:
             for param in spec.extra_attribs
             if param.name in CARRIED
         ),
+        note=_note(spec, chosen),
     )
+
+
+def _note(spec: Any, chosen: list[int]) -> str:
+    """Return a note if the channels that are read have no names of colours."""
+    names = [spec.channelnames[channel] for channel in chosen[:3]]
+    if len(set(names)) == 1 or [name.rpartition(".")[2] for name in names] == ["R", "G", "B"]:
+        return ""
+    return f"no channels R, G and B; {', '.join(names)} are used as red, green and blue"
 
 
 def _dpx_encoding(spec: Any) -> str:

@@ -67,6 +67,15 @@ _PLANAR_DEPTHS = (8, 9, 10, 12, 14, 16)
 #: Prefixes of the names of Y'CbCr layouts.
 _LUMA_CHROMA = ("yuv", "nv", "p0", "p2", "p4", "yuyv", "uyvy", "yvyu", "y2", "xv", "v")
 
+#: FFmpeg's names of the formats of `MOVIE_EXTENSIONS`. It recognises formats by content, and
+#: playlists such as ffconcat or HLS would lead it to other files.
+_FORMATS = (
+    *("asf", "avi", "flv", "gif", "m4v", "matroska", "mov", "mpeg", "mpegts", "mpegvideo", "mxf"),
+    *("nut", "ogg", "yuv4mpegpipe"),
+)
+#: The options of `av.open` for a movie.
+ONLY_FILES = {"format_whitelist": ",".join(_FORMATS), "protocol_whitelist": "file"}
+
 
 @dataclass
 class MovieClip(Clip):
@@ -239,9 +248,11 @@ def open_movie(
 def _open(path: Path) -> Any:
     try:
         # Without the protocol FFmpeg would read a name such as "cam:01.mov" as an address.
-        return av.open(f"file:{path}", mode="r")
+        return av.open(f"file:{path}", mode="r", options=ONLY_FILES)
     except (FFmpegError, OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
+        if isinstance(error, ValueError):  # EINVAL: not on the whitelist
+            reason = f"its content is none of {', '.join(_FORMATS)}"
         if path.is_file() and path.stat().st_size == 0:
             reason = "the file is empty"
         raise ClipError(

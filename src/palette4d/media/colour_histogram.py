@@ -23,6 +23,8 @@ CELLS = 12
 # Cells from 0 to 1; the cells above reach to about 60.
 CELLS_TO_ONE = 7
 ABOVE_ONE = 0.15
+_EASED = np.arange(CELLS) / CELLS_TO_ONE
+_CODE_VALUES = np.where(_EASED <= 1, _EASED**2, np.exp((_EASED - 1) / ABOVE_ONE))
 
 
 def histogram(rgb: F64, counts: F64) -> F64:
@@ -38,6 +40,19 @@ def histogram(rgb: F64, counts: F64) -> F64:
         out += np.bincount((r * CELLS + g) * CELLS + b, weight, minlength=CELLS**3)
     shares_of_cells: F64 = out / out.sum()
     return shares_of_cells
+
+
+def mean_shift(one: F64, other: F64) -> float:
+    """Return how far the pixels' code values differ in the channel that differs most.
+
+    It is the earth mover's distance of the channels' histograms, from the cells' code values.
+    """
+    excess = (one - other).reshape(CELLS, CELLS, CELLS)
+    shifts = [
+        np.abs(np.cumsum(excess.sum(axis=others))[:-1]) @ np.diff(_CODE_VALUES)
+        for others in ((1, 2), (0, 2), (0, 1))
+    ]
+    return float(max(shifts))
 
 
 def _eased(colours: F64) -> F64:

@@ -92,7 +92,7 @@ def spaces_of(clip: Clip, options: SpaceOptions) -> Spaces | None:
         raise Palette4dError(
             f"{clip.source}: found no colour space of the clip (its files say {clip.encoding!r}, "
             f"and no rule of {config_name} applies), expected one to go to "
-            f"{options.palette_space!r} from; give it with --input-space"
+            f"{options.palette_space!r} from; give it with input_space=…"
         )
     target = _palette_space(options, config, config_name, source)
     names = str(source.getName()), str(target.getName())
@@ -102,11 +102,11 @@ def spaces_of(clip: Clip, options: SpaceOptions) -> Spaces | None:
 
 def _input_space(clip: Clip, options: SpaceOptions, config: Any, config_name: str) -> Any:
     if options.input_space is not None:
-        return colour_space(config, config_name, options.input_space, "--input-space")
+        return colour_space(config, config_name, options.input_space, "input_space=")
     path = str(clip.file(clip.frames[0]))
     if not config.filepathOnlyMatchesDefaultRule(path):
         name, _ = config.getColorSpaceFromFilepath(path)
-        return colour_space(config, config_name, name, f"a file rule for {path}:")
+        return colour_space(config, config_name, name, f"a file rule for {path}: ")
     for name in same_encodings(clip.encoding):
         space = config.getColorSpace(name)
         if space is not None and not space.isData():
@@ -114,12 +114,12 @@ def _input_space(clip: Clip, options: SpaceOptions, config: Any, config_name: st
     if clip.depth not in FLOATS:
         return None
     name, _ = config.getColorSpaceFromFilepath(path)
-    return colour_space(config, config_name, name, "the default file rule:")
+    return colour_space(config, config_name, name, "the default file rule: ")
 
 
 def _palette_space(options: SpaceOptions, config: Any, config_name: str, source: Any) -> Any:
     if options.palette_space is not None:
-        return colour_space(config, config_name, options.palette_space, "--palette-space")
+        return colour_space(config, config_name, options.palette_space, "palette_space=")
     if source.getEncoding() != "scene-linear" and not _is_the_role(config, source, "scene_linear"):
         return source
     for name in (*LOG_ROLES, *same_encodings(LOG_SPACE)):
@@ -129,7 +129,7 @@ def _palette_space(options: SpaceOptions, config: Any, config_name: str, source:
     raise Palette4dError(
         f"{config_name}: {source.getName()!r} is scene-linear, in which palettes are of no use, "
         f"and the config has neither the roles {' and '.join(LOG_ROLES)} nor {LOG_SPACE}; name a "
-        "log encoding with --palette-space"
+        "log encoding with palette_space=…"
     )
 
 
@@ -238,7 +238,7 @@ def record(document: dict[str, Any], clip: Clip, spaces: Spaces | None) -> list[
     if seen.error > TOLERANCE:
         raise Palette4dError(
             f"{ways}: found a difference of {seen.error:.2g} from OpenColorIO on the clip's "
-            f"colours, expected at most {TOLERANCE:g}; choose another --palette-space"
+            f"colours, expected at most {TOLERANCE:g}; choose another palette_space=…"
         )
     document["clip"]["conversion"] = {
         "input_space": spaces.input_space,

@@ -9,6 +9,8 @@ grain) is a small difference. A frame begins a new shot if its difference from t
 meets all of these conditions:
 
 - It is at least `LEAST_DIFFERENCE`; a title or a banner changes less.
+- The code values change by `LEAST_SHIFT` on average in some channel: near black one step of 8 bits
+  moves every pixel to another cell of the histogram.
 - It is `LEAST_RATIO` times the differences around it: the second largest of the `AROUND` before or
   after. The factor is doubled near the ends of the clip, with fewer than `SURE` on a side. A pan, a
   fade, a time lapse or flicker change all the time.
@@ -30,11 +32,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palette4d.common.text import counted
+from palette4d.media.colour_histogram import mean_shift
 
 F64 = NDArray[np.float64]
 
 LEAST_DIFFERENCE = 0.15
 LEAST_RATIO = 3.0
+LEAST_SHIFT = 0.012  # three steps of 8 bits
 # Smaller differences count as this: after a still picture any change would look large.
 NOISE = 0.01
 # Around a flash the frames agree again: they differ by at most this share of the jump.
@@ -50,21 +54,27 @@ def find_cuts(histograms: Iterable[tuple[int, F64]]) -> list[int]:
 
     The input is (frame number, histogram) pairs in order of time; memory holds few of them.
     """
-    numbers, gaps = _gaps(histograms)
-    return [numbers[i] for i in range(1, len(numbers)) if _is_cut(gaps, i)]
+    numbers, gaps, moved = _gaps(histograms)
+    return [numbers[i] for i in range(1, len(numbers)) if moved[i - 1] and _is_cut(gaps, i)]
 
 
-def _gaps(histograms: Iterable[tuple[int, F64]]) -> tuple[list[int], dict[int, list[float]]]:
-    """Return the numbers of the frames, and `gaps[d][i]`, how frame i + d differs from frame i."""
-    numbers = []
+def _gaps(
+    histograms: Iterable[tuple[int, F64]],
+) -> tuple[list[int], dict[int, list[float]], list[bool]]:
+    """Return the numbers of the frames, `gaps[d][i]`, how frame i + d differs from frame i, and
+    `moved[i]`, whether code values differ by `LEAST_SHIFT` between frames i and i + 1."""
+    numbers: list[int] = []
+    moved: list[bool] = []
     gaps: dict[int, list[float]] = {d: [] for d in range(1, LONGEST_FLASH + 2)}
     recent: deque[F64] = deque(maxlen=LONGEST_FLASH + 1)
     for number, here in histograms:
         for d, before in enumerate(reversed(recent), start=1):
             gaps[d].append(difference(before, here))
+        if recent:
+            moved.append(mean_shift(recent[-1], here) >= LEAST_SHIFT)
         recent.append(here)
         numbers.append(number)
-    return numbers, gaps
+    return numbers, gaps, moved
 
 
 def _is_cut(gaps: dict[int, list[float]], at: int) -> bool:
@@ -108,12 +118,12 @@ def difference(one: F64, other: F64) -> float:
 
 def refusal(frames: Sequence[int], cuts: Sequence[int]) -> str:
     """Return the message that the clip has `cuts`, with the frame ranges to analyse."""
-    shots = [f"--frames {shot}" for shot in _shots(frames, cuts)]
+    shots = [f'frames="{shot}"' for shot in _shots(frames, cuts)]
     return (
         f"found {counted(len(cuts), 'sudden cut')}: a new shot begins at {_places(cuts)}; expected "
         "one shot, since a palette must not span a cut. Analyse each shot by itself "
-        f"({_some(shots)}; --detect-shots does all of them), or give --allow-cuts to analyse all "
-        f"frames as one shot.{_flash(frames, cuts)}"
+        f"({_some(shots)}; analyze_shots() does all of them), or give allow_cuts=True to analyse "
+        f"all frames as one shot.{_flash(frames, cuts)}"
     )
 
 
@@ -128,14 +138,14 @@ def _flash(frames: Sequence[int], cuts: Sequence[int]) -> str:
     ]
     if len(lasting) != 1:
         return ""
-    return f" If it is a flash at the end of the clip, leave it out: --frames {lasting[0]}."
+    return f' If it is a flash at the end of the clip, leave it out: frames="{lasting[0]}".'
 
 
 def refusal_inside(cuts: Sequence[int]) -> str:
     """Return the message that one clip of an edit has `cuts`."""
     return (
         f"found {counted(len(cuts), 'sudden cut')} inside one clip of the edit: a new shot begins "
-        f"at {_places(cuts)}; expected one shot. Blade the edit there, or give --allow-cuts"
+        f"at {_places(cuts)}; expected one shot. Blade the edit there, or give allow_cuts=True"
     )
 
 
@@ -154,7 +164,7 @@ def _some(texts: Sequence[str]) -> str:
 
 
 def _shots(frames: Sequence[int], cuts: Sequence[int]) -> list[str]:
-    """Return the frame range of each shot in the form of `--frames`."""
+    """Return the frame range of each shot in the form of `parse_frames`."""
     step = frames[1] - frames[0]
     bounds = [frames[0], *cuts, frames[-1] + step]
     out = []

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palette4d.common.errors import Palette4dError, WriteError
-from palette4d.common.files import replacing
+from palette4d.common.files import EXISTS, replacing
 
 FORMATS = ("exr", "png", "tif", "tiff")
 # What each format can hold of the metadata that `palette4d.media.clip_images.CARRIED` names.
@@ -39,8 +39,10 @@ class FramePattern:
     width: int | None
 
     @classmethod
-    def parse(cls, text: str) -> FramePattern:
+    def parse(cls, text: str, also: str = "") -> FramePattern:
         """Read `name.####.exr` (one # a digit), `name.%04d.exr`, `name.@@@@.exr` or `name.exr`.
+
+        `also` is what errors offer besides frames.
 
         Raises
         ------
@@ -55,7 +57,7 @@ class FramePattern:
         if path.suffix.lower().lstrip(".") not in FORMATS:
             raise OutputError(
                 f'output {text}: found the extension "{path.suffix}", expected .exr, .png or .tif; '
-                "name the frames as in OUT.####.exr"
+                f"name the frames as in OUT.####.exr{also}"
             )
         if not any(mark in path.name for mark in "#@%$"):
             return cls(path.parent, path.stem, path.suffix, None)
@@ -71,7 +73,7 @@ class FramePattern:
         if parsed.frameSet():
             raise OutputError(
                 f"output {text}: found the range {parsed.frameSet()} in its name, expected "
-                "a pattern such as OUT.####.exr; choose the frames with --frames"
+                "a pattern such as OUT.####.exr; choose the frames with frames=…"
             )
         return cls(
             path.parent, str(parsed.basename()), str(parsed.extension()), int(parsed.zfill())
@@ -92,7 +94,7 @@ class FramePattern:
         if self.width is None and len(frames) > 1:
             raise OutputError(
                 f"output {self.path(0)}: {len(frames)} frames would go into one file; expected a "
-                f"pattern such as {self.prefix}.####{self.suffix}, or one frame (--frames)"
+                f"pattern such as {self.prefix}.####{self.suffix}, or one frame (frames=…)"
             )
         return [self.path(frame) for frame in frames]
 
@@ -117,11 +119,8 @@ def check_targets(
         if target.is_dir():
             raise OutputError(f"output {target}: it is a folder; choose another name")
     if existing and not force:
-        more = f" ({len(existing)} of {len(targets)} files do)" if len(existing) > 1 else ""
-        raise OutputError(
-            f"output {existing[0]}: it exists already{more}; choose another place, or replace "
-            "with --force"
-        )
+        more = f"{existing[0].parent} has {len(existing)} of the {len(targets)} files. "
+        raise OutputError(f"{more if existing[1:] else ''}{existing[0]}: {EXISTS}")
 
 
 def _identity(path: Path) -> tuple[int, int] | str:
@@ -156,18 +155,18 @@ def sample_type(extension: str, depth: str, *, half: bool = False, bits: int | N
     if extension == "exr":
         if bits not in (None, 16, 32) or (bits == 32 and half):
             raise OutputError(
-                f"found --bits {bits} for EXR, expected 32-bit float, or 16 with --half"
+                f"found {bits} bits for EXR, expected 32-bit float, or 16 bits with half=True"
             )
         return "half" if half or bits == 16 else "float"
     if half:
-        raise OutputError(f"found --half for {extension.upper()}, expected it for EXR alone")
+        raise OutputError(f"found half=True for {extension.upper()}, expected it for EXR alone")
     if bits is None:
         if extension == "tif" and depth in ("float", "half", "double"):
             return "float"
         return "uint8" if depth == "uint8" else "uint16"
     if bits not in ((8, 16, 32) if extension == "tif" else (8, 16)):
         raise OutputError(
-            f"found --bits {bits} for {extension.upper()}, expected 8 or 16"
+            f"found {bits} bits for {extension.upper()}, expected 8 or 16"
             + (" or 32" if extension == "tif" else "")
         )
     return "float" if bits == 32 else f"uint{bits}"

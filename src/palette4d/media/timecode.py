@@ -25,7 +25,9 @@ def start_timecode(clip: Clip) -> str | None:
 def _of_movie(clip: Clip) -> str | None:
     import av
 
-    with av.open(f"file:{clip.file(0)}") as container:
+    from palette4d.media.clip_movie import ONLY_FILES
+
+    with av.open(f"file:{clip.file(0)}", options=ONLY_FILES) as container:
         stated = [container.metadata, *(stream.metadata for stream in container.streams)]
         for metadata in stated:
             found = _TIMECODE.search(metadata.get("timecode", ""))

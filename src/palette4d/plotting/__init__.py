@@ -6,24 +6,33 @@ timeline, `solid` the polyhedron's projection. The window draws these, too. `tim
 matplotlib is imported inside functions only, and its global state is never changed.
 """
 
+import os
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from palette4d.grade.document import Document
+
+EXTENSIONS = (".png", ".svg", ".pdf")
 
 
 def plot(
-    sidecar_path: Path,
-    output: Path,
+    document: "str | os.PathLike[str] | Document",
+    path: str | os.PathLike[str],
     *,
     frames: list[float] | None = None,
     clip: str | None = None,
     width: int = 2400,
     force: bool = False,
 ) -> list[float]:
-    """Write a picture of a sidecar to a .png, .svg or .pdf file.
+    """Draw a palette and its edits into a .png, .svg or .pdf file.
 
     Parameters
     ----------
-    sidecar_path, output : Path
-        The sidecar and the picture.
+    document : path or Document
+        The palette and its edits.
+    path : path
+        The picture.
     frames : list of float, optional
         Times to show; by default four or five over the clip, with edited frames.
     clip : str, optional
@@ -45,15 +54,23 @@ def plot(
     """
     import matplotlib.style
 
-    from palette4d import _core
     from palette4d.common.errors import Palette4dError
     from palette4d.common.files import refuse_existing, replacing
+    from palette4d.grade.document import Document
     from palette4d.media.source_clip import frame_colours
     from palette4d.plotting import page, style
     from palette4d.plotting.rows import Palette
 
+    output = Path(path)
+    if output.suffix.lower() not in EXTENSIONS:
+        raise Palette4dError(
+            f"{output}: found the extension {output.suffix!r}; expected one of "
+            f"{', '.join(EXTENSIONS)}"
+        )
     refuse_existing(output, force)
-    sidecar = _core.read_sidecar(str(sidecar_path))
+    if not isinstance(document, Document):
+        document = Document.load(document)
+    sidecar = document.core
     first, last = sidecar.polytope.first_frame, sidecar.polytope.last_frame
     if frames is None:
         frames = page.default_frames(first, last, Palette.of(sidecar).edited_times)
@@ -64,7 +81,7 @@ def plot(
                 f"frame {frame:g} is outside the clip {sidecar.clip['name']!r}; expected times "
                 f"from {first:g} to {last:g}"
             )
-        image, _ = frame_colours(sidecar_path, sidecar.clip, frame, clip)
+        image, _ = frame_colours(document.path or Path("document"), sidecar.clip, frame, clip)
         if image is not None and sidecar.conversion is not None:
             image = sidecar.conversion.steps.to_palette(image).astype("float32")
         columns.append(page.column(sidecar, frame, image))

@@ -61,6 +61,20 @@ class Scale:
         """The distance of two frames in x."""
         return (self.right - self.left) / max(self.last - self.first, 1e-9)
 
+    def ticks(self, low: float, high: float, apart: float = 70.0) -> list[float]:
+        """Return the frames to name between two x: the clip's ends, and round numbers."""
+        first, last = self.first, self.last
+        start, end = (float(self.frame(x)) for x in (low, high))
+        if last <= first or end <= start:
+            return [first]
+        least = (end - start) / max(2, int((high - low) / apart))
+        step = next(n * 10**k for k in range(9) for n in (1, 2, 5) if n * 10**k >= least)
+        inner = np.arange(np.ceil(start / step) * step, end + step / 2, step)
+        # No round number close to the clip's ends, which are always named.
+        near = 0.55 * apart / self.per_frame
+        kept = inner[(inner - first > near) & (last - inner > near)].tolist()
+        return sorted(t for t in {first, *kept, last} if start <= t <= end)
+
 
 @dataclass(frozen=True)
 class Disc:
@@ -121,12 +135,15 @@ class Timeline:
         The content, its rows and its times.
     row_height : float
         The height of a row.
+    radius : float
+        The largest radius of a vertex, in rows.
     """
 
     palette: Palette
     rows: Rows
     scale: Scale
     row_height: float
+    radius: float = RADIUS
 
     @property
     def height(self) -> float:
@@ -210,7 +227,7 @@ class Timeline:
         stop_xy = np.array(stops).reshape(-1, 2)
         home = np.concatenate([self.scale.x(palette.frames), stop_xy[:, 0]])
         y = np.concatenate([self.vertex_y, stop_xy[:, 1]])
-        largest = RADIUS * self.row_height
+        largest = self.radius * self.row_height
         counts = [len(palette.ids), len(palette.stops)]
         x, radius = place(np.repeat([largest, STOP * largest], counts), home, y, low, high)
         kinds: list[Kind] = ["edited" if changed else "plain" for changed in palette.changed]
@@ -271,20 +288,6 @@ class Timeline:
                     taken = middle + half
                     break
         return labels
-
-    def ticks(self, low: float, high: float, apart: float = 70.0) -> list[float]:
-        """Return the frames to name between two x: the clip's ends, and round numbers."""
-        first, last = self.palette.first, self.palette.last
-        start, end = (float(self.scale.frame(x)) for x in (low, high))
-        if last <= first or end <= start:
-            return [first]
-        least = (end - start) / max(2, int((high - low) / apart))
-        step = next(n * 10**k for k in range(9) for n in (1, 2, 5) if n * 10**k >= least)
-        inner = np.arange(np.ceil(start / step) * step, end + step / 2, step)
-        # No round number close to the clip's ends, which are always named.
-        near = 0.55 * apart / self.scale.per_frame
-        kept = inner[(inner - first > near) & (last - inner > near)].tolist()
-        return sorted(t for t in {first, *kept, last} if start <= t <= end)
 
 
 def half_bands(points: F64, half: float) -> tuple[F64, F64]:
@@ -353,6 +356,7 @@ def disc_names(
     width: Callable[[str], float],
     bottom: float,
     shorten: Callable[[str], str] = str,
+    collar: float = COLLAR,
 ) -> list[Label]:
     """Return the ids above or below their discs, edited ids first; ids without space are left out.
 
@@ -368,14 +372,16 @@ def disc_names(
         No name reaches below this y.
     shorten : callable
         Returns the text to draw for an id.
+    collar : float
+        Space that a disc takes beyond its radius.
     """
     taken: list[Box] = []
     for disc in discs:
-        reach = disc.radius + COLLAR
+        reach = disc.radius + collar
         taken.append((disc.x - reach, disc.y - reach, disc.x + reach, disc.y + reach))
     labels, tall = [], 0.95 * size
     for disc in sorted(discs, key=lambda disc: disc.kind == "plain"):
-        text, reach = shorten(disc.id), disc.radius + COLLAR + 0.5
+        text, reach = shorten(disc.id), disc.radius + collar + 0.5
         half = width(text) / 2
         for top in (disc.y - reach - tall, disc.y + reach):
             box = (disc.x - half, top, disc.x + half, top + tall)

@@ -138,7 +138,7 @@ def _draw_axis(axes: Any, panel: Panel) -> None:
     line = {"colors": style.GUIDE, "linewidth": 0.8, "zorder": 2}
     axes.hlines(panel.floor, min(ends[0], panel.left + 12), max(ends[1], panel.right - 12), **line)
     label = {**style.CENTRED, "zorder": 3, "fontsize": 8.5, "color": style.TEXT}
-    for value in panel.layout.ticks(*ends):
+    for value in scale.ticks(*ends):
         x = float(panel.x(value))
         axes.vlines(x, panel.floor - 4, panel.floor, **line)
         axes.text(x, panel.floor - 12, style.number(value), **label)

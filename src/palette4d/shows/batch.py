@@ -96,7 +96,7 @@ def analyse(
     shots: list[Shot],
     folder: Path,
     options: ShowOptions,
-    progress: Callable[[int, int, str], None] | None = None,
+    progress: Callable[[int, int, str], object] | None = None,
 ) -> Show:
     """Analyse shots into a folder.
 
@@ -129,7 +129,7 @@ def analyse(
     if unknown := [name for name in options.only if name not in {shot.name for shot in shots}]:
         some = ", ".join(sorted(shot.name for shot in shots)[:8]) + (", …" if shots[8:] else "")
         raise Palette4dError(
-            f"--only: there is no shot {unknown[0]!r}; expected names such as {some}"
+            f"only=…: there is no shot {unknown[0]!r}; expected names such as {some}"
         )
     make_folder(folder)
     show = Show(source, shots, folder, options)
@@ -220,7 +220,7 @@ class Show:
         self.entries[shot.name] = entry
 
     def stays(self, before: Entry, shot: Shot) -> bool:
-        """Whether the manifest's entry still holds for a shot that `--only` leaves out."""
+        """Whether the manifest's entry still holds for a shot that `only` leaves out."""
         own = before.shot
         if before.status != DONE:
             # The sidecar may exist although the manifest says otherwise.
@@ -240,7 +240,7 @@ class Show:
         if sidecar.load(target)["clip"]["source"] != entry.shot.clip:
             raise Palette4dError(
                 f"{target}: a sidecar of another clip is there already; choose another folder, or "
-                "replace it with --force"
+                "replace it with force=True"
             )
 
     def there(self, shot: Shot, before: Entry | None) -> tuple[int, int] | None:
@@ -333,7 +333,9 @@ def analyse_shot(task: ShotTask, threads: int) -> Analysed:
             f"the analysis ended with {type(error).__name__}: {error}; please report this"
         ) from error
     analysis.document["clip"]["name"] = shot.name
-    return Analysed(analysis.document, (*notes, *analysis.notes))
+    # The notes on a movie are told once, not for each of its shots.
+    told = clip.notes if shot.place is None else []
+    return Analysed(analysis.document, (*notes, *(n for n in analysis.notes if n not in told)))
 
 
 def _open(task: ShotTask, shot: Shot) -> Any:

@@ -33,7 +33,9 @@ def local_path(url: str) -> Path:
         if parts.scheme != "file":
             return Path(url)
         return Path(urllib.request.url2pathname(parts.path))
-    raise Palette4dError(f"found the media {url!r}, expected a file; relink it with --media FOLDER")
+    raise Palette4dError(
+        f"found the media {url!r}, expected a file; relink it, or name its folder with media=…"
+    )
 
 
 class Folder:
@@ -49,7 +51,7 @@ class Folder:
         """List the folder; `Palette4dError` if it is not a folder."""
         if not path.is_dir():
             raise Palette4dError(
-                f"{path}: there is no such folder; --media expects one with media in it"
+                f"{path}: found no such folder; expected one with media in it for media=…"
             )
         self.path = path
         self._by_name: dict[str, list[Path]] = {}
@@ -78,7 +80,7 @@ class Folder:
                     listed = " and ".join(str(one) for one in best[:4])
                     raise Palette4dError(
                         f"found {len(best)} media named {path.name!r} under {self.path}: {listed}; "
-                        "expected one, keep the others out of --media"
+                        "expected one, keep the others out of the folder"
                     )
                 return best[0]
         return None

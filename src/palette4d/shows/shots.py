@@ -103,7 +103,7 @@ def numbered(shots: Iterable[Shot]) -> tuple[list[Shot], list[str]]:
     return out, changed
 
 
-def detect(clip: Clip, progress: Callable[[int, int], None] | None = None) -> list[Shot]:
+def detect(clip: Clip, progress: Callable[[int, int], object] | None = None) -> list[Shot]:
     """Split a clip at its cuts.
 
     Returns
@@ -141,7 +141,7 @@ def detect(clip: Clip, progress: Callable[[int, int], None] | None = None) -> li
     return shots
 
 
-def cuts_of(clip: Clip, progress: Callable[[int, int], None] | None = None) -> list[int]:
+def cuts_of(clip: Clip, progress: Callable[[int, int], object] | None = None) -> list[int]:
     """Return the frames that begin a new shot; memory holds one histogram per frame."""
     tell = progress or (lambda done, total: None)
     options = AnalysisOptions(colours=BINS, coarse_colours=BINS)

@@ -194,11 +194,11 @@ class _Reader:
             return str(there)
         what = f"{named!r} is not there" if named else "the edit names no file for it"
         if self.folder is None:
-            help_ = "name the folder that holds it with --media FOLDER"
+            help_ = "name the folder that holds it with media=…"
         else:
             looked = " or ".join(map(repr, names)) or "its name"
             what += f", and nothing under {self.folder.path} is called {looked}"
-            help_ = "bring it there, or name another folder with --media"
+            help_ = "bring it there, or name another folder with media=…"
         raise Palette4dError(f"the media is missing: {what}; {help_}")
 
     def frames(self, clip: Any, used: Any, opened: Clip) -> tuple[int, int]:

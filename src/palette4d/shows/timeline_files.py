@@ -77,7 +77,7 @@ def read(path: Path, rate: Fraction | None = None) -> Document:
         raise Palette4dError(
             f"{path}: it cannot be read as a timeline ({_first_line(error)}); expected a whole "
             f".{extension} file"
-            + (", and its timecodes' rate in --rate" if extension == "edl" else "")
+            + (", and its timecodes' rate as rate=…" if extension == "edl" else "")
         ) from error
     if isinstance(found, otio.schema.SerializableCollection):
         timelines = [one for one in found if isinstance(one, otio.schema.Timeline)]

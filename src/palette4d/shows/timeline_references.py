@@ -33,7 +33,7 @@ def check(manifest: Manifest, manifest_path: Path, target: Path, force: bool) ->
     """
     if not manifest.is_timeline:
         raise Palette4dError(
-            f"{manifest_path}: its shots are those of the movie {manifest.source}; --otio expects "
+            f"{manifest_path}: its shots are those of the movie {manifest.source}; otio=… expects "
             "those of a timeline"
         )
     if target.suffix.lower() != ".otio":

@@ -48,7 +48,7 @@ def run(
             "window. `palette4d studio PATH --screenshot OUT.png` draws it without a screen; for "
             "the window itself use a remote screen (ssh -X, VNC)"
         )
-    from PySide6.QtCore import Qt, QTimer
+    from PySide6.QtCore import QSettings, Qt, QTimer
     from PySide6.QtWidgets import QApplication
 
     from palette4d.studio import theme
@@ -59,19 +59,23 @@ def run(
     assert isinstance(app, QApplication)
     theme.dress(app)
     session = Session()
-    window = Window(session)
+    settings = QSettings("palette4d", "studio")
+    if screenshot is not None:  # a picture does not depend on who draws it
+        settings = QSettings(os.devnull, QSettings.Format.IniFormat)
+    window = Window(session, settings)
     window.resize(*size)
+    window.arrange()
     if path is not None:
-        session.open_sidecar(path, clip)
+        window.open_path(path, clip)
     if frame is not None:
         session.go(frame)
     window.setAttribute(Qt.WidgetAttribute.WA_DontShowOnScreen, screenshot is not None)
     window.show()
     if screenshot is not None:
-        QTimer.singleShot(500, app.quit)
+        QTimer.singleShot(2500, app.quit)
         app.exec()
         if not window.grab().save(str(screenshot)):
             raise WriteError(f"{screenshot}: cannot be written; expected a folder that exists")
-        session.close()
+        window.shut()
         return 0
     return int(app.exec())

@@ -5,9 +5,12 @@ only the newest counts: what is not wanted any more is not read. A bad frame is 
 frame alone.
 """
 
+import contextlib
+import os
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -17,38 +20,63 @@ from palette4d.common.errors import in_words
 from palette4d.media.clip import Clip
 
 F32 = NDArray[np.float32]
+F16 = NDArray[np.float16]
 
 #: Bytes of whole frames that are kept; one frame is kept whatever its size.
-CACHE_BYTES = 400 << 20
+CACHE_BYTES = 300 << 20
+#: Bytes of scaled frames that are kept.
+SMALL_BYTES = 300 << 20
 
 K = TypeVar("K", bound=Hashable)
+V = TypeVar("V")
 
 
-class ByteCache(Generic[K]):
-    """Arrays by key, at most so many bytes; the one that was used longest ago goes first."""
+@dataclass(frozen=True)
+class Region:
+    """A part of a frame, in pixels of the frame, and the size that it is shown at.
+
+    The size is never larger than the part: what is larger on screen is scaled up by the screen.
+    """
+
+    left: int
+    top: int
+    right: int
+    bottom: int
+    width: int
+    height: int
+
+    @property
+    def whole(self) -> bool:
+        """Whether its pixels are the frame's, not scaled."""
+        return (self.width, self.height) == (self.right - self.left, self.bottom - self.top)
+
+
+class ByteCache(Generic[K, V]):
+    """Values by key, at most so many bytes; the one that was used longest ago goes first."""
 
     def __init__(self, limit: int) -> None:
         """Start empty."""
         self.limit, self.bytes = limit, 0
-        self._held: OrderedDict[K, NDArray[np.generic]] = OrderedDict()
+        self._held: OrderedDict[K, tuple[V, int]] = OrderedDict()
         self._lock = threading.Lock()
 
-    def get(self, key: K) -> NDArray[np.generic] | None:
-        """Return an array, or None."""
+    def get(self, key: K) -> V | None:
+        """Return a value, or None."""
         with self._lock:
-            if key in self._held:
-                self._held.move_to_end(key)
-            return self._held.get(key)
+            if key not in self._held:
+                return None
+            self._held.move_to_end(key)
+            return self._held[key][0]
 
-    def put(self, key: K, array: NDArray[np.generic]) -> None:
-        """Keep an array; the newest is kept whatever its size."""
+    def put(self, key: K, value: V, size: int) -> None:
+        """Keep a value of so many bytes; the newest is kept whatever its size."""
         with self._lock:
             if (old := self._held.pop(key, None)) is not None:
-                self.bytes -= old.nbytes
-            self._held[key] = array
-            self.bytes += array.nbytes
+                self.bytes -= old[1]
+            self._held[key] = value, size
+            self.bytes += size
             while self.bytes > self.limit and len(self._held) > 1:
-                self.bytes -= self._held.popitem(last=False)[1].nbytes
+                self.bytes -= self._held.popitem(last=False)[1][1]
 
     def clear(self) -> None:
         """Forget all."""
@@ -57,50 +85,87 @@ class ByteCache(Generic[K]):
             self.bytes = 0
 
     def __contains__(self, key: object) -> bool:
-        """Whether an array is kept."""
+        """Whether a value is kept."""
         return key in self._held
 
     def __len__(self) -> int:
-        """How many arrays are kept."""
+        """How many values are kept."""
         return len(self._held)
 
 
 class Player:
-    """Reads frames of a clip in a thread.
+    """Reads frames of a clip in threads.
 
     Parameters
     ----------
     clip : Clip
         The clip; the player alone reads it.
     ready : callable
-        Called in the player's thread with the number of a frame that was read, or that cannot be.
-    limit : int
-        Bytes of frames that are kept.
+        Called in a player's thread with the number of a frame that was read, or that cannot be.
+    limit, small_limit : int
+        Bytes of whole frames, and of scaled frames, that are kept.
     """
 
     def __init__(
-        self, clip: Clip, ready: Callable[[int], object], *, limit: int = CACHE_BYTES
+        self,
+        clip: Clip,
+        ready: Callable[[int], object],
+        *,
+        limit: int = CACHE_BYTES,
+        small_limit: int = SMALL_BYTES,
     ) -> None:
-        """Start the thread."""
-        self.clip, self.cache = clip, ByteCache[int](limit)
+        """Start the threads; a movie has one, because its frames are decoded in order."""
+        self.clip = clip
+        self.numbers = frozenset(clip.frames)
         self.errors: dict[int, str] = {}
-        self._ready, self._known = ready, frozenset(clip.frames)
-        self._wanted: list[int] = []
+        self._frames = ByteCache[int, F32](limit)
+        self._small = ByteCache[tuple[int, Region], F16](small_limit)
+        self._ready = ready
+        self._wanted: list[tuple[int, Region | None]] = []
+        self._later: list[tuple[int, Region | None]] = []
+        self._reading: set[int] = set()
         self._wake = threading.Condition()
         self._closed = False
-        self._reading = threading.Lock()
-        self._thread = threading.Thread(target=self._run, name="palette4d player", daemon=True)
-        self._thread.start()
+        self._order = threading.Lock() if clip.is_movie else contextlib.nullcontext()
+        for k in range(1 if clip.is_movie else min(2, os.cpu_count() or 1)):
+            name = f"palette4d player {k}"
+            threading.Thread(target=self._run, name=name, daemon=True).start()
 
     def frame(self, number: int) -> F32 | None:
         """Return a frame that has been read, or None."""
-        return self.cache.get(number)  # type: ignore[return-value]
+        return self._frames.get(number)
 
-    def want(self, frames: Sequence[int]) -> None:
-        """Read these frames, in this order, and no others; what was wanted before is dropped."""
+    def small(self, number: int, region: Region) -> F32 | None:
+        """Return a part of a frame at a smaller size, rounded to half floats, or None."""
+        found = self._small.get((number, region))
+        return None if found is None else found.astype(np.float32)
+
+    def has_small(self, number: int, region: Region) -> bool:
+        """Whether `small` has that part."""
+        return (number, region) in self._small
+
+    def want(self, frames: Sequence[int], region: Region | None = None) -> None:
+        """Read these frames, in this order, and no others; what was wanted before is dropped.
+
+        With a region only its scaled pixels are kept: for playing.
+        """
         with self._wake:
-            self._wanted = [n for n in frames if n not in self.cache and n not in self.errors]
-            self._wake.notify()
+            self._wanted = [(n, region) for n in frames if n in self.numbers]
+            self._wanted = [each for each in self._wanted if not self._have(*each)]
+            self._wake.notify_all()
+
+    def want_later(self, frames: Sequence[int], region: Region) -> None:
+        """Read these parts of frames when nothing else is wanted; replaces what was asked so."""
+        with self._wake:
+            self._later = [(n, region) for n in frames if n in self.numbers]
+            self._later = [each for each in self._later if not self._have(*each)]
+            if self._later:
+                self._wake.notify()
+
+    def _have(self, number: int, region: Region | None) -> bool:
+        if number in self.errors or number in self._reading:
+            return True
+        return number in self._frames if region is None else (number, region) in self._small
 
     def read(self, number: int) -> F32:
         """Return a frame, and read it now if need be.
@@ -112,9 +177,9 @@ class Player:
         """
         found = self.frame(number)
         if found is None:
-            with self._reading:
+            with self._order:
                 found = self.clip.load(number).pixels
-            self.cache.put(number, found)
+            self._frames.put(number, found, found.nbytes)
         return found
 
     def forget_errors(self) -> None:
@@ -122,24 +187,77 @@ class Player:
         self.errors.clear()
 
     def close(self) -> None:
-        """End the thread; it ends after the frame that it reads."""
+        """End the threads; each ends after the frame that it reads."""
         with self._wake:
             self._closed = True
-            self._wake.notify()
+            self._wake.notify_all()
 
     def _run(self) -> None:
         while True:
             with self._wake:
-                while not self._wanted and not self._closed:
+                while not self._wanted and not self._later and not self._closed:
                     self._wake.wait()
                 if self._closed:
                     return
-                number = self._wanted.pop(0)
-            if number in self.cache:
-                continue
+                number, region = (self._wanted or self._later).pop(0)
+                if self._have(number, region):
+                    continue
+                self._reading.add(number)
             try:
-                self.read(number)
+                self._take(number, region)
             except Exception as error:  # a decoder may fail in any way: the window stays
                 self.errors[number] = in_words(error) or type(error).__name__
+            finally:
+                with self._wake:
+                    self._reading.discard(number)
             if not self._closed:
                 self._ready(number)
+
+    def _take(self, number: int, region: Region | None) -> None:
+        if region is None:
+            self.read(number)
+            return
+        pixels = self.frame(number)
+        if pixels is None:
+            with self._order:
+                pixels = self.clip.load(number).pixels
+        with np.errstate(over="ignore"):
+            small = resampled(pixels, region).astype(np.float16)
+        self._small.put((number, region), small, small.nbytes)
+
+
+def resampled(pixels: F32, region: Region) -> F32:
+    """Return a part of a frame at a smaller size: whole pixels are averaged, then interpolated."""
+    part = pixels[region.top : region.bottom, region.left : region.right]
+    if region.whole:
+        return np.ascontiguousarray(part)
+    height, width = part.shape[:2]
+    step = max(1, min(width // region.width, height // region.height))
+    if step > 1:
+        # Beyond 4 the mean of every second pixel is near enough.
+        rows, columns = height // step, width // step
+        stride = max(1, step // 4)
+        cut = part[: rows * step, : columns * step]
+        total = np.zeros((rows, columns, part.shape[2]), np.float32)
+        count = 0
+        for y in range(0, step, stride):
+            for x in range(0, step, stride):
+                total += cut[y::step, x::step]
+                count += 1
+        part = total * np.float32(1 / count)
+        height, width = rows, columns
+    if (height, width) == (region.height, region.width):
+        return np.ascontiguousarray(part)
+    down, up, share = _taps(height, region.height)
+    part = part[down] * (1 - share)[:, None, None] + part[up] * share[:, None, None]
+    left, right, share = _taps(width, region.width)
+    return np.ascontiguousarray(
+        part[:, left] * (1 - share)[None, :, None] + part[:, right] * share[None, :, None]
+    )
+
+
+def _taps(size: int, wanted: int) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float32]]:
+    """Return the two neighbours of each new pixel, and the share of the second."""
+    at = np.clip((np.arange(wanted) + 0.5) * size / wanted - 0.5, 0, size - 1)
+    first = np.floor(at).astype(np.intp)
+    return first, np.minimum(first + 1, size - 1), (at - first).astype(np.float32)

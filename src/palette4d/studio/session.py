@@ -20,6 +20,7 @@ from palette4d.grade.document import Document
 from palette4d.media.clip import Clip, open_clip
 from palette4d.media.source_clip import find_clip
 from palette4d.studio import texts
+from palette4d.studio.display import Display, Look
 from palette4d.studio.player import Player
 
 Event = Literal[
@@ -114,6 +115,8 @@ class Session:
         The clip; None if it was not found.
     player : Player or None
         Reads the clip's frames.
+    display : Display or None
+        How code values of the clip become colours on the screen.
     frame : int
         The playhead.
     selection : tuple of str
@@ -128,6 +131,8 @@ class Session:
         Frames a step of the playback: 0 stands, 1 plays, -1 plays backwards, 2 is twice as fast.
     marks : (int, int) or None
         In and out point.
+    loop : bool
+        Whether playing begins again at the end.
     status : Status
         What the last action did.
     post : callable
@@ -146,6 +151,7 @@ class Session:
         self._unsaved_notes = False
         self.clip: Clip | None = None
         self.player: Player | None = None
+        self.display: Display | None = None
         self.frame = 0
         self.selection: tuple[str, ...] = ()
         self.hover: str | None = None
@@ -153,6 +159,7 @@ class Session:
         self.view = View()
         self.playing = 0
         self.marks: tuple[int, int] | None = None
+        self.loop = True
         self.status = Status()
         self.revision = 0  #: rises with every change of what `document` shows
         self.post: Callable[[Callable[[], object]], object] = lambda call: call()
@@ -248,7 +255,21 @@ class Session:
         self.clip = clip
         self.player = None if clip is None else Player(clip, self._arrived)
         self.marks = None
+        self._find_display()
         self.emit("clip")
+
+    def _find_display(self) -> None:
+        """Choose the display for the clip's encoding; it stays if the encoding does."""
+        encoding = "unknown" if self.clip is None else self.clip.encoding
+        found = Display.wanted(self._document, encoding)
+        if self.display is None or (self.display.space, self.display.asked) != found:
+            self.display = Display(*found)
+
+    @property
+    def looked(self) -> Look:
+        """The display, view, exposure and gamma of `view`."""
+        view = self.view
+        return Look(view.display, view.view, view.exposure, view.gamma)
 
     def _arrived(self, frame: int) -> None:
         """Tell the views that a frame was read; called by the player's threads."""
@@ -287,7 +308,7 @@ class Session:
         """Show an edit without doing it; each call replaces the last."""
         if self._document is None:
             return
-        trial = Document(self._document.fields())
+        trial = self._document.trial()
         try:
             operation(trial)
         except (Palette4dError, OSError) as error:
@@ -426,7 +447,7 @@ class Session:
         document = self._document
         if document is None or document.path is None:
             return document is None
-        before = document.fields()["edits"]
+        before = document.state
         try:
             document.save()
         except (Palette4dError, OSError) as error:
@@ -437,7 +458,7 @@ class Session:
         self._stamp = _stamp(document.path)
         with contextlib.suppress(OSError):
             recovery_file(document.path).unlink(missing_ok=True)
-        if document.fields()["edits"] != before:
+        if document.state != before:
             self.say(texts.MERGED)
             self._changed()
         self.emit("status")
@@ -450,7 +471,7 @@ class Session:
         copy = recovery_file(self._document.path)
         try:
             copy.parent.mkdir(parents=True, exist_ok=True)
-            Document(self._document.fields()).save(copy, on_edits="drop")
+            self._document.trial().save(copy, on_edits="drop")
             kept = texts.KEPT_IN.format(copy=copy)
         except (Palette4dError, OSError):
             kept = texts.KEPT_HERE
@@ -491,6 +512,7 @@ class Session:
             return
         self._document, self._trial, self._dragged = loaded, None, None
         self._stamp, self._edited_at = stamp, None
+        self._find_display()
         self.say(texts.RELOADED)
         self._changed()
 

@@ -1,6 +1,6 @@
 """Colours, sizes and the style sheet: dark and neutral, because colour is judged here."""
 
-from PySide6.QtGui import QColor, QFont, QFontDatabase, QPalette
+from PySide6.QtGui import QColor, QFont, QPalette
 from PySide6.QtWidgets import QApplication
 
 # All greys are neutral: red, green and blue are equal.
@@ -55,6 +55,7 @@ QLineEdit, QSpinBox, QDoubleSpinBox, QComboBox, QPlainTextEdit, QTextEdit {{ bac
   selection-background-color: #5a5a5a; selection-color: {BRIGHT}; }}
 QLineEdit:focus, QSpinBox:focus, QDoubleSpinBox:focus, QComboBox:focus, QPlainTextEdit:focus
   {{ border-color: {FAINT}; }}
+QAbstractSpinBox QLineEdit {{ background: transparent; border: none; padding: 0; }}
 QComboBox {{ background: {RAISED}; }}
 QComboBox::drop-down {{ border: none; width: 16px; }}
 QComboBox QAbstractItemView {{ background: {PANEL}; border: 1px solid {LINE};
@@ -89,7 +90,9 @@ QSplitter::handle {{ background: {PIT}; }}
 
 def numbers_font(size: float = 0) -> QFont:
     """Return the font for figures, whose digits are equally wide."""
-    font = QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont)
+    font = QFont(QApplication.font())
+    if hasattr(QFont, "Tag"):  # Qt 6.7
+        font.setFeature(QFont.Tag("tnum"), 1)
     if size:
         font.setPointSizeF(size)
     return font

@@ -1,9 +1,9 @@
-#include "colour_spaces.hpp"
+#include "convert/colour_spaces.hpp"
 
 #include <array>
 #include <cctype>
 
-namespace palette4d::node {
+namespace palette4d {
 namespace {
 
 /// Chromaticities x and y of red, green, blue and white.
@@ -268,8 +268,10 @@ std::shared_ptr<const ColourConversion> from_linear(const std::string& encoding)
 }
 
 Vec3 luminance_weights(const std::string& encoding) {
+    // Its luma weights are rounded, and not those of its primaries (ITU-R BT.601).
+    if (plain(encoding) == "rec601" || plain(encoding) == "bt601") return {0.299, 0.587, 0.114};
     const Space* space = space_of(encoding);
     return weights_of(space ? *space->gamut : kRec709);
 }
 
-}  // namespace palette4d::node
+}  // namespace palette4d

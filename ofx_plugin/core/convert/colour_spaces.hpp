@@ -8,7 +8,7 @@
 #include "convert/colour_conversion.hpp"
 #include "model/polytope.hpp"
 
-namespace palette4d::node {
+namespace palette4d {
 
 /// The names of an encoding in the standard's configuration (ofx-native-v1.5_aces-v1.3_ocio-v2.3).
 /// Best match first, its generic space last; empty for an unknown encoding. `core` limits them to
@@ -20,7 +20,8 @@ std::vector<std::string> colourspaces_of(const std::string& encoding, bool core 
 std::shared_ptr<const ColourConversion> from_linear(const std::string& encoding);
 
 /// The luminance weights of an encoding's red, green and blue; Rec.709's for an unknown encoding.
-/// They sum to 1. A weight is negative where the primary is not a visible colour.
+/// Rec.601's are its luma weights. They sum to 1. A weight is negative where the primary is not a
+/// visible colour.
 Vec3 luminance_weights(const std::string& encoding);
 
-}  // namespace palette4d::node
+}  // namespace palette4d

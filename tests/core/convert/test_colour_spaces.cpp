@@ -1,14 +1,11 @@
 // Colour spaces by name: what hosts are asked for, and what lightness weighs.
-#include "../../ofx_plugin/node/colour_spaces.hpp"
+#include "convert/colour_spaces.hpp"
 
 #include <cmath>
 
-#include "harness.hpp"
+#include "check.hpp"
 
-using namespace test;
-using palette4d::Vec3;
-using palette4d::node::colourspaces_of;
-using palette4d::node::luminance_weights;
+using namespace palette4d;
 
 namespace {
 
@@ -84,9 +81,10 @@ using Names = std::vector<std::string>;
 TEST(every_space_of_the_standards_configuration_is_known) {
     for (const Known& space : kKnown) {
         const Names wanted = {space.name, space.generic};
-        EXPECT(colourspaces_of(space.name) == wanted, space.name);
-        EXPECT(colourspaces_of(space.label) == wanted, space.label);
-        EXPECT(colourspaces_of(space.name, true).back() == space.generic, space.name);
+        check::report(colourspaces_of(space.name) == wanted, __FILE__, __LINE__, space.name);
+        check::report(colourspaces_of(space.label) == wanted, __FILE__, __LINE__, space.label);
+        check::report(colourspaces_of(space.name, true).back() == space.generic, __FILE__, __LINE__,
+                      space.name);
     }
     // What OpenColorIO's later configs call some of them.
     CHECK(colourspaces_of("sRGB Encoded Rec.709 (sRGB)") == Names({"srgb_tx", kSdr}));
@@ -119,14 +117,16 @@ TEST(luminance_weighs_as_the_spaces_makers_say) {
         {"Linear REDWideGamutRGB", {0.286694, 0.842979, -0.129673}},
         {"Linear DaVinci WideGamut", {0.274118, 0.873631, -0.147749}},
         {"adobergb", {0.29734, 0.62736, 0.07529}},
+        {"Rec.601", {0.299, 0.587, 0.114}},
         {"unknown", {0.2126, 0.7152, 0.0722}},
     };
     for (const auto& [name, row] : rows) {
         const Vec3 found = luminance_weights(name);
-        for (std::size_t c = 0; c < 3; ++c) EXPECT(std::abs(found[c] - row[c]) < 6e-5, name);
+        for (std::size_t c = 0; c < 3; ++c)
+            check::report(std::abs(found[c] - row[c]) < 6e-5, __FILE__, __LINE__, name);
     }
     for (const Known& space : kKnown) {
         const Vec3 w = luminance_weights(space.name);
-        EXPECT(std::abs(w[0] + w[1] + w[2] - 1) < 1e-12, space.name);
+        check::report(std::abs(w[0] + w[1] + w[2] - 1) < 1e-12, __FILE__, __LINE__, space.name);
     }
 }

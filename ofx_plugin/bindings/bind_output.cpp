@@ -1,0 +1,78 @@
+// What a frame shows, for Python: the picture, a matte, the palette below the picture.
+#include <map>
+#include <memory>
+#include <string>
+
+#include <pybind11/stl.h>
+
+#include "arrays.hpp"
+#include "binders.hpp"
+#include "convert/colour_spaces.hpp"
+#include "output/drawing.hpp"
+
+using namespace palette4d;
+using namespace palette4d::bindings;
+
+namespace {
+
+Output output_from(const std::string& name) {
+    static const std::map<std::string, Output> all = {{"recoloured", Output::kRecoloured},
+                                                      {"weight", Output::kWeight},
+                                                      {"palette", Output::kPalette},
+                                                      {"outside", Output::kOutside}};
+    const auto found = all.find(name);
+    if (found == all.end()) {
+        throw py::value_error("output: found '" + name +
+                              "', expected 'recoloured', 'weight', 'palette' or 'outside'");
+    }
+    return found->second;
+}
+
+py::array draw(const py::array& image, const std::string& output,
+               const std::shared_ptr<const Recolourer>& map, const py::object& original,
+               const py::object& edited, double strength, double keep_lightness,
+               const Vec3& lightness, double mix, bool matte_in_alpha, double outside_at,
+               bool premultiplied, int threads, const ColourConversion* conversion) {
+    require_image(image, "image");
+    if (threads < 0) throw py::value_error("threads: found less than 0, expected 0 or more");
+    if (!(outside_at > 0)) throw py::value_error("outside_at: expected a number above 0");
+    Drawing drawing;
+    drawing.options = {output_from(output), matte_in_alpha, outside_at, strength,
+                       keep_lightness,      lightness,      mix};
+    if (drawing.options.is_matte()) {
+        drawing.reader = map;
+    } else if (map->moves()) {
+        drawing.edit = map;
+    }
+    if (drawing.options.output == Output::kPalette) {
+        drawing.original = colours_from(original, "original");
+        drawing.edited = colours_from(edited, "edited");
+        if (drawing.original.size() != drawing.edited.size()) {
+            throw py::value_error("edited: expected as many colours as in original");
+        }
+    }
+    if (conversion && !conversion->identity()) {
+        drawing.conversion = {std::shared_ptr<void>(), conversion};  // Python owns it
+    }
+    py::array result = py::array_t<float>({image.shape(0), image.shape(1), image.shape(2)});
+    const auto in_view = view_of<ConstImageView>(image, static_cast<const float*>(image.data()));
+    const auto out_view = view_of<ImageView>(result, static_cast<float*>(result.mutable_data()));
+    const py::gil_scoped_release unlocked;
+    draw_picture(in_view, out_view, drawing, premultiplied, threads);
+    return result;
+}
+
+}  // namespace
+
+void bind_output(py::module_& module) {
+    module.def("draw", &draw, py::arg("image"), py::arg("output"), py::arg("map").none(false),
+               py::kw_only(), py::arg("original") = py::none(), py::arg("edited") = py::none(),
+               py::arg("strength") = 1.0, py::arg("keep_lightness") = 0.0,
+               py::arg("lightness") = Vec3{0, 0, 0}, py::arg("mix") = 1.0,
+               py::arg("matte_in_alpha") = false, py::arg("outside_at") = 0.05,
+               py::arg("premultiplied") = false, py::arg("threads") = 1,
+               py::arg("conversion") = py::none(),
+               "(h, w, 3 or 4) float32 in and out: what the node draws for a frame.");
+    module.def("luminance_weights", &luminance_weights, py::arg("encoding"),
+               "Weights of red, green and blue by an encoding's name; Rec.709's if unknown.");
+}

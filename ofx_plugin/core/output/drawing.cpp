@@ -1,0 +1,215 @@
+#include "output/drawing.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include "recolour/share_rows.hpp"
+
+namespace palette4d {
+namespace {
+
+/// Rows that draw_picture() draws at a time.
+constexpr int kRowsAtOnce = 8;
+/// Colours this near to the palette's surface count as inside: the surface is no more precise.
+constexpr double kAtSurface = 1e-3;
+/// Above this, a float has too few digits for the weight added to the colour.
+constexpr float kLarge = 256;
+constexpr int kStripPart = 8;  ///< the strip's height is 1/8 of the picture's
+
+double dot(const Vec3& weights, const float* rgb) {
+    return weights[0] * rgb[0] + weights[1] * rgb[1] + weights[2] * rgb[2];
+}
+
+bool finite(const float* rgb) {
+    return std::isfinite(rgb[0]) && std::isfinite(rgb[1]) && std::isfinite(rgb[2]);
+}
+
+/// Whether a channel is infinite and none is NaN: infinities count as outside, NaNs do not.
+bool infinite(const float* rgb) {
+    const auto is_infinite = [](float c) { return std::isinf(c); };
+    return std::none_of(rgb, rgb + 3, [](float c) { return std::isnan(c); }) &&
+           std::any_of(rgb, rgb + 3, is_infinite);
+}
+
+/// Restores the source's lightness by adding the same amount to each channel. Differences between
+/// channels, and with them hue, stay as edited.
+void keep_lightness(const Pixels& pixels, const DrawingOptions& options) {
+    for (std::size_t i = 0; i < pixels.count; ++i) {
+        const float* from = pixels.source + i * pixels.channels;
+        float* to = pixels.result + i * pixels.channels;
+        if (!finite(to)) continue;
+        const double lost =
+            options.keep * (dot(options.lightness, from) - dot(options.lightness, to));
+        if (lost == 0) continue;
+        for (std::size_t c = 0; c < 3; ++c) to[c] = static_cast<float>(to[c] + lost);
+    }
+}
+
+/// Unpremultiplied colours in the palette's code values: (pixels, 3); NaN where alpha is 0.
+std::vector<float> straight_colours(const Pixels& pixels, const ColourConversion* conversion) {
+    std::vector<float> straight(pixels.count * 3);
+    for (std::size_t i = 0; i < pixels.count; ++i) {
+        const float* from = pixels.source + i * pixels.channels;
+        const Vec3 seen = straight_colour(from, pixels.premultiplied);
+        float* colour = &straight[i * 3];
+        for (std::size_t c = 0; c < 3; ++c) {
+            const bool transparent = pixels.premultiplied && from[3] == 0;
+            colour[c] = transparent ? std::nanf("") : static_cast<float>(seen[c]);
+        }
+        if (!conversion || !finite(colour)) continue;
+        const Vec3 converted = conversion->to_palette({colour[0], colour[1], colour[2]});
+        for (std::size_t c = 0; c < 3; ++c) colour[c] = static_cast<float>(converted[c]);
+    }
+    return straight;
+}
+
+/// The weight of one colour; `read` is the colour plus the weight. The smallest channel is the most
+/// precise one; where it is large too, double precision is used.
+double weight_of(const float* colour, const float* read, const Recolourer& reader) {
+    const auto smaller = [](float a, float b) { return std::abs(a) < std::abs(b); };
+    const std::ptrdiff_t c = std::min_element(colour, colour + 3, smaller) - colour;
+    if (std::abs(colour[c]) < kLarge) return static_cast<double>(read[c]) - colour[c];
+    const Vec3 exact = reader.displaced({colour[0], colour[1], colour[2]}, 1);
+    return exact[static_cast<std::size_t>(c)] - colour[c];
+}
+
+/// The matte of one colour, 0 to 1; `read` is the colour plus what the reader adds.
+double matte_of(const float* colour, const float* read, const Drawing& drawing) {
+    const DrawingOptions& options = drawing.options;
+    if (options.output == Output::kOutside && infinite(colour)) return 1;
+    if (!finite(colour) || !finite(read)) return 0;
+    if (options.output == Output::kWeight) {
+        return std::clamp(weight_of(colour, read, *drawing.reader), 0.0, 1.0);
+    }
+    double square = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+        const double away = 2.0 * colour[c] - read[c];
+        square += away * away;
+    }
+    return std::clamp((std::sqrt(square) - kAtSurface) / options.reach, 0.0, 1.0);
+}
+
+void draw_matte(const Pixels& pixels, const Drawing& drawing) {
+    const std::vector<float> straight = straight_colours(pixels, drawing.conversion.get());
+    std::vector<float> read(straight.size());
+    const auto width = static_cast<int>(pixels.count);
+    const auto stride = static_cast<std::ptrdiff_t>(straight.size() * sizeof(float));
+    drawing.reader->apply({straight.data(), width, 1, 3, stride},
+                          {read.data(), width, 1, 3, stride}, {});
+    const bool in_alpha = drawing.options.in_alpha && pixels.channels == 4;
+    for (std::size_t i = 0; i < pixels.count; ++i) {
+        const float* from = pixels.source + i * pixels.channels;
+        float* to = pixels.result + i * pixels.channels;
+        const double matte = matte_of(&straight[i * 3], &read[i * 3], drawing);
+        if (pixels.channels == 4) to[3] = from[3];
+        const double alpha = pixels.premultiplied ? from[3] : 1.0;
+        for (std::size_t c = 0; c < 3; ++c) {
+            to[c] = !in_alpha              ? static_cast<float>(alpha * matte)
+                    : pixels.premultiplied ? static_cast<float>(matte * from[c])
+                                           : from[c];
+        }
+        if (in_alpha) to[3] = static_cast<float>(matte * from[3]);
+    }
+}
+
+/// Recolours without threads of its own: the caller shares out the pixels.
+void recolour(const Pixels& pixels, const Drawing& drawing) {
+    if (!drawing.edit) {
+        if (pixels.result != pixels.source) {
+            std::copy_n(pixels.source, pixels.count * pixels.channels, pixels.result);
+        }
+        return;
+    }
+    RecolourOptions options;
+    options.strength = drawing.options.strength;
+    options.premultiplied = pixels.premultiplied;
+    options.conversion = drawing.conversion.get();
+    const auto width = static_cast<int>(pixels.count);
+    const auto channels = static_cast<int>(pixels.channels);
+    const auto stride = static_cast<std::ptrdiff_t>(pixels.count * pixels.channels * sizeof(float));
+    drawing.edit->apply({pixels.source, width, 1, channels, stride},
+                        {pixels.result, width, 1, channels, stride}, options);
+}
+
+}  // namespace
+
+void draw_pixels(const Pixels& pixels, const Drawing& drawing) {
+    const DrawingOptions& options = drawing.options;
+    if (options.is_matte()) {
+        draw_matte(pixels, drawing);
+    } else {
+        recolour(pixels, drawing);
+        if (options.keep > 0) keep_lightness(pixels, options);
+    }
+    if (options.mix < 1) mix_in_source(pixels, options.mix, {});
+}
+
+void draw_strip(float* row, int x1, int x2, int y, std::size_t channels, const Drawing& drawing) {
+    const Area& picture = drawing.picture;
+    const std::int64_t width = static_cast<std::int64_t>(picture.x2) - picture.x1;
+    const std::int64_t height = static_cast<std::int64_t>(picture.y2) - picture.y1;
+    const std::int64_t strip = std::max<std::int64_t>(2, height / kStripPart);
+    const std::int64_t above = static_cast<std::int64_t>(y) - picture.y1;
+    if (above < 0 || above >= strip || width <= 0) return;
+    const std::vector<Vec3>& colours = above < strip / 2 ? drawing.edited : drawing.original;
+    const auto count = static_cast<std::int64_t>(colours.size());
+    for (int x = std::max(x1, picture.x1); x < std::min(x2, picture.x2); ++x) {
+        const std::int64_t column = (static_cast<std::int64_t>(x) - picture.x1) * count / width;
+        const Vec3& own = colours[static_cast<std::size_t>(column)];
+        const Vec3 colour = drawing.conversion ? drawing.conversion->to_clip(own) : own;
+        float* to = row + static_cast<std::size_t>(x - x1) * channels;
+        for (std::size_t c = 0; c < 3; ++c) to[c] = static_cast<float>(colour[c]);
+        if (channels == 4) to[3] = 1;
+    }
+}
+
+void mix_in_source(const Pixels& pixels, double mix, const std::vector<float>& mask) {
+    for (std::size_t i = 0; i < pixels.count * pixels.channels; ++i) {
+        const float from = pixels.source[i];
+        float& to = pixels.result[i];
+        if (from == to) continue;
+        const double share = mask.empty() ? mix : mix * mask[i / pixels.channels];
+        to = std::isfinite(from) && std::isfinite(to)
+                 ? static_cast<float>(from + share * (static_cast<double>(to) - from))
+                 : from;
+    }
+}
+
+void draw_picture(const ConstImageView& in, const ImageView& out, Drawing drawing,
+                  bool premultiplied, int threads) {
+    premultiplied = premultiplied && in.channels == 4;
+    const DrawingOptions& options = drawing.options;
+    if (options.passes()) {
+        drawing.options = {};
+        drawing.edit = nullptr;
+    }
+    const auto channels = static_cast<std::size_t>(in.channels);
+    const std::size_t row = static_cast<std::size_t>(in.width) * channels;
+    const auto row_bytes = static_cast<std::ptrdiff_t>(row * sizeof(float));
+    drawing.picture = {0, 0, in.width, in.height};
+    if (row == 0) return;
+    const bool packed = in.row_bytes == row_bytes && out.row_bytes == row_bytes;
+    const int at_once = packed ? kRowsAtOnce : 1;
+    const int bands = (in.height + at_once - 1) / at_once;
+    share_rows(bands, threads, [&](const NextRow& next) {
+        for (int band = next(); band >= 0; band = next()) {
+            const int first = band * at_once, last = std::min(first + at_once, in.height);
+            const auto* from = reinterpret_cast<const float*>(
+                reinterpret_cast<const char*>(in.data) + in.row_bytes * first);
+            auto* to =
+                reinterpret_cast<float*>(reinterpret_cast<char*>(out.data) + out.row_bytes * first);
+            const std::size_t count =
+                static_cast<std::size_t>(last - first) * static_cast<std::size_t>(in.width);
+            draw_pixels({from, to, count, channels, premultiplied}, drawing);
+            if (options.output != Output::kPalette) continue;
+            for (int y = first; y < last; ++y) {
+                draw_strip(to + row * static_cast<std::size_t>(y - first), 0, in.width,
+                           in.height - 1 - y, channels, drawing);
+            }
+        }
+    });
+}
+
+}  // namespace palette4d

@@ -1,0 +1,136 @@
+"""The actions of `edit` that keep what the user did: undo, redo, history, version."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from typing import TYPE_CHECKING
+
+from palette4d.common.arguments import whole
+from palette4d.common.text import counted
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from palette4d.grade.document import Document
+
+    Action = Callable[[str, str, str], argparse.ArgumentParser]
+
+
+def add_actions(action: Action) -> None:
+    """Add the actions to `edit`; `action` adds one from its name, usage and description."""
+    for name, text in (
+        ("undo", "revert the last step, also of an earlier session."),
+        ("redo", "apply the last undone step again."),
+    ):
+        parser = action(name, "[--steps N]", text)
+        parser.add_argument(
+            "--steps", type=whole(1), default=1, metavar="N", help="so many steps (default 1)"
+        )
+        parser.set_defaults(run=run_undo if name == "undo" else run_redo)
+    history = action(
+        "history",
+        "[--json | --clear]",
+        "list the steps that undo and redo know, oldest first. The sidecar keeps the last 200; "
+        "older steps are folded into one.",
+    )
+    either = history.add_mutually_exclusive_group()
+    either.add_argument("--json", action="store_true", help="print JSON")
+    either.add_argument("--clear", action="store_true", help="forget the steps; the edits stay")
+    history.set_defaults(run=run_history)
+    _add_version(action)
+
+
+def _add_version(action: Action) -> None:
+    version = action(
+        "version",
+        "(save NAME | list | use NAME | remove NAME)",
+        "keep edits under a name, list the names, or make the edits of a version the active edits. "
+        "Active edits that no version holds are kept as a version first.",
+    )
+    what = version.add_subparsers(title="actions", metavar="WHAT", dest="what", required=True)
+    for name, text in (
+        ("save", "keep the active edits under a name"),
+        ("use", "make a version's edits the active edits"),
+        ("remove", "remove a version"),
+    ):
+        parser = what.add_parser(name, help=text)
+        parser.add_argument("name", metavar="NAME", help="the version")
+        parser.set_defaults(run=run_version)
+    parser = what.add_parser("list", help="list the versions; * marks the active edits")
+    parser.set_defaults(run=run_version)
+
+
+def run_undo(args: argparse.Namespace) -> int:
+    """Revert the last steps."""
+    document = _load(args)
+    steps = [document.undo() for _ in range(args.steps)]
+    document.save()
+    for step in steps:
+        print(f"undone: {step.label}")
+    return 0
+
+
+def run_redo(args: argparse.Namespace) -> int:
+    """Apply the last undone steps again."""
+    document = _load(args)
+    steps = [document.redo() for _ in range(args.steps)]
+    document.save()
+    for step in steps:
+        print(f"done again: {step.label}")
+    return 0
+
+
+def run_history(args: argparse.Namespace) -> int:
+    """List or forget the steps."""
+    document = _load(args)
+    done, undone = document.history, document.undone
+    if args.clear:
+        document.forget_history()
+        document.save()
+        print(f"forgot {counted(len(done) + len(undone), 'step')}")
+        return 0
+    if args.json:
+        labels = {"done": [s.label for s in done], "undone": [s.label for s in undone]}
+        print(json.dumps(labels))
+        return 0
+    number = 0
+    for step in (*done, *reversed(undone)):
+        number += step.steps
+        note = "" if number <= sum(s.steps for s in done) else "  (undone)"
+        print(f"{number:>4}  {step.label}{note}")
+    if not number:
+        print("no steps")
+    return 0
+
+
+def run_version(args: argparse.Namespace) -> int:
+    """Save, list, use or remove a version."""
+    document = _load(args)
+    if args.what == "list":
+        for name in document.versions:
+            mark = "*" if document.same_edits(name) else " "
+            print(f"{mark} {name}")
+        if not document.versions:
+            print("no versions")
+        return 0
+    if args.what == "save":
+        document.save_version(args.name)
+        text = f"version {args.name}: holds the active edits"
+    elif args.what == "remove":
+        document.remove_version(args.name)
+        text = f"version {args.name}: removed"
+    else:
+        kept = document.use_version(args.name)
+        text = f"version {args.name}: its edits are the active edits"
+        if kept is not None:
+            text += f"\nthe edits before are kept as version {kept}"
+    document.save()
+    print(text)
+    return 0
+
+
+def _load(args: argparse.Namespace) -> Document:
+    from palette4d.grade.document import Document
+
+    return Document.load(args.sidecar)

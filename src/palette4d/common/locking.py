@@ -1,0 +1,166 @@
+"""Locks between programs that replace one file.
+
+Where the file system has locks, the folder of the file is locked: this creates no file and ends
+with the process. Elsewhere (some network file systems, Windows) a lock file beside the file says
+who holds it. If its owner died on this computer, the next program removes it.
+"""
+
+import contextlib
+import errno
+import os
+import platform
+import random
+import secrets
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from palette4d.common.errors import Palette4dError
+
+if sys.platform != "win32":
+    import fcntl
+
+#: Seconds to wait while another program holds the lock.
+LOCK_SECONDS = 10.0
+
+
+@contextlib.contextmanager
+def locked(target: Path) -> Iterator[Callable[[], None]]:
+    """Hold the lock of a file; yield a check that raises if the lock was lost.
+
+    Raises
+    ------
+    Palette4dError
+        Another program has held the lock for `LOCK_SECONDS`.
+    """
+    deadline = time.monotonic() + LOCK_SECONDS
+    with contextlib.ExitStack() as stack:
+        if sys.platform != "win32":
+            try:
+                folder = os.open(target.parent, os.O_RDONLY)
+            except OSError:
+                yield _nothing  # missing or closed to us: the write reports the error
+                return
+            stack.callback(os.close, folder)  # releases the lock
+            if _flocked(folder, target, deadline):
+                yield _nothing
+                return
+        yield stack.enter_context(_lock_file(target, deadline))
+
+
+def _nothing() -> None: ...
+
+
+def _flocked(folder: int, target: Path, deadline: float) -> bool:
+    """Lock a folder; return whether its file system has locks."""
+    while True:
+        try:
+            fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            if error.errno not in (errno.EWOULDBLOCK, errno.EAGAIN):
+                return False
+        else:
+            return True
+        if time.monotonic() > deadline:
+            raise Palette4dError(
+                f"{target}: another program has kept the folder {target.parent} locked for "
+                f"{LOCK_SECONDS:g} seconds; wait for it to finish, or end it"
+            )
+        time.sleep(0.05)
+
+
+@contextlib.contextmanager
+def _lock_file(target: Path, deadline: float) -> Iterator[Callable[[], None]]:
+    path = target.with_name(f".{target.name[:200]}.lock")
+    mine = f"{_computer()} {os.getpid()} {secrets.token_hex(8)}"
+    while not _created(path, mine):
+        owner = _content(path)
+        if owner is not None and _is_dead(owner):
+            _remove(path, owner)
+        elif time.monotonic() > deadline:
+            raise Palette4dError(
+                f"{target}: another program ({owner or 'unknown'}) has held {path} for "
+                f"{LOCK_SECONDS:g} seconds; wait for it to finish. If it no longer runs, remove "
+                "that file"
+            )
+        else:
+            time.sleep(random.uniform(0.002, 0.03))
+
+    def held() -> None:
+        if _content(path) != mine:
+            raise Palette4dError(
+                f"{target}: the lock file {path} was taken away; nothing was written. Try again"
+            )
+
+    try:
+        yield held
+    finally:
+        if _content(path) == mine:
+            with contextlib.suppress(OSError):
+                path.unlink(missing_ok=True)
+
+
+def _created(path: Path, content: str) -> bool:
+    try:
+        handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+    except FileExistsError:
+        return False
+    except PermissionError:
+        if sys.platform == "win32":  # another program is just removing it
+            return False
+        raise _cannot(path) from None
+    except OSError:
+        raise _cannot(path) from None
+    try:
+        os.write(handle, content.encode())
+    finally:
+        os.close(handle)
+    return True
+
+
+def _cannot(path: Path) -> Palette4dError:
+    return Palette4dError(
+        f"{path}: the lock file cannot be created; choose another folder or mend its permissions"
+    )
+
+
+def _content(path: Path) -> str | None:
+    try:
+        return path.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return None
+
+
+def _computer() -> str:
+    """Return a name of this computer; containers count as computers of their own."""
+    space = ""
+    with contextlib.suppress(OSError):
+        space = str(Path("/proc/self/ns/pid").readlink())
+    return f"{platform.node() or 'computer'}{space}".replace(" ", "_")
+
+
+def _is_dead(owner: str) -> bool:
+    """Whether the owner ran on this computer and has ended."""
+    computer, _, rest = owner.partition(" ")
+    pid = rest.partition(" ")[0]
+    if computer != _computer() or not pid.isdigit() or sys.platform == "win32":
+        return False
+    try:
+        os.kill(int(pid), 0)
+    except ProcessLookupError:
+        return True
+    except (OSError, OverflowError):
+        return False
+    return False
+
+
+def _remove(path: Path, owner: str) -> None:
+    """Remove the lock file of an owner that died, and no other."""
+    aside = path.with_name(f"{path.name}.{secrets.token_hex(8)}")
+    with contextlib.suppress(OSError):
+        path.rename(aside)
+        if _content(aside) != owner:  # another program was faster, and holds a lock of its own
+            os.link(aside, path)
+    with contextlib.suppress(OSError):
+        aside.unlink(missing_ok=True)

@@ -1,0 +1,162 @@
+"""What a frame shows: the recoloured picture, a matte, or the palette below the picture.
+
+The names and their meaning are those of the node's parameters, and the core draws for both.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palette4d import _core
+from palette4d.common.errors import Palette4dError
+from palette4d.grade.handles import unknown
+from palette4d.grade.palette import Palette
+
+F32 = NDArray[np.float32]
+Space = Literal["input", "palette"]
+
+#: The colour space of each value of `lightness_of`, by the core's names; "auto": the picture's own.
+LIGHTNESS_OF = {
+    "auto": "",
+    "rec709": "Rec.709",
+    "rec2020": "Rec.2020",
+    "p3": "P3-D65",
+    "ap1": "ACEScg",
+    "rec601": "Rec.601",
+}
+LEAST_REACH, MOST_REACH = 1e-4, 100.0
+
+
+@dataclass(frozen=True)
+class Output:
+    """What to draw; the defaults draw the recoloured picture.
+
+    Attributes
+    ----------
+    show : str
+        "recoloured"; "weight:ID", the matte of a vertex or stop, which follows its colour through
+        time; "outside", the matte of the colours outside the palette; "palette", the recoloured
+        picture with the frame's palette below, old colours above new.
+    strength : float
+        0 the original, 1 the edit.
+    keep_lightness : float
+        The share of the source's lightness that the recoloured picture keeps, 0..1.
+    lightness_of : str
+        The colour space whose luminance weights define lightness, a key of `LIGHTNESS_OF`.
+    mix : float
+        0 the source, 1 the output.
+    matte_in : {"picture", "alpha"}
+        "picture": a matte is a grey picture. "alpha": it multiplies alpha.
+    outside_at : float
+        The distance from the palette, in its code values, at which "outside" is 1.
+
+    Raises
+    ------
+    Palette4dError
+        A value is none of these.
+    """
+
+    show: str = "recoloured"
+    strength: float = 1.0
+    keep_lightness: float = 0.0
+    lightness_of: str = "auto"
+    mix: float = 1.0
+    matte_in: Literal["picture", "alpha"] = "picture"
+    outside_at: float = 0.05
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        kind = self.kind
+        if kind not in ("recoloured", "weight", "outside", "palette") or (
+            kind == "weight" and not self.handle
+        ):
+            raise Palette4dError(
+                f"found {self.show!r} to show, expected 'recoloured', 'weight:ID' with the id of "
+                "a vertex or stop, 'outside' or 'palette'"
+            )
+        for name in ("strength", "keep_lightness", "mix"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise Palette4dError(
+                    f"found the {name.replace('_', ' ')} {getattr(self, name)}, expected 0 to 1"
+                )
+        if self.lightness_of not in LIGHTNESS_OF:
+            raise Palette4dError(
+                f"found lightness of {self.lightness_of!r}, expected one of "
+                + ", ".join(LIGHTNESS_OF)
+            )
+        if self.matte_in not in ("picture", "alpha"):
+            raise Palette4dError(
+                f"found a matte in {self.matte_in!r}, expected 'picture' or 'alpha'"
+            )
+        if not LEAST_REACH <= self.outside_at <= MOST_REACH:
+            raise Palette4dError(
+                f"found outside at {self.outside_at}, expected {LEAST_REACH:g} to {MOST_REACH:g}"
+            )
+
+    @property
+    def kind(self) -> str:
+        """`show` without the handle's id."""
+        kind, colon, _ = self.show.partition(":")
+        return kind if colon == "" or kind == "weight" else self.show
+
+    @property
+    def handle(self) -> str:
+        """The id of the handle whose weight is shown, or ""."""
+        return self.show.partition(":")[2]
+
+    @property
+    def in_alpha(self) -> bool:
+        """Whether the output needs an alpha channel."""
+        return self.kind in ("weight", "outside") and self.matte_in == "alpha"
+
+    def draw(
+        self,
+        image: F32,
+        sidecar: _core.Sidecar,
+        palette: Palette,
+        edit: _core.Recolourer,
+        *,
+        premultiplied: bool,
+        space: Space,
+        threads: int,
+    ) -> F32:
+        """Draw a frame, (h, w, 3 or 4) float32, with its palette and its edit.
+
+        Raises
+        ------
+        Palette4dError
+            The sidecar has no such handle.
+        """
+        own = sidecar.conversion if space == "input" else None
+        encoding = own.input_space if own else sidecar.clip["encoding"]
+        reader = self._reader(sidecar, palette.frame)
+        return _core.draw(
+            image,
+            self.kind,  # type: ignore[arg-type]  # __post_init__ has checked it
+            edit if reader is None else _core.Recolourer(palette.rgb, reader, palette.faces),
+            original=palette.rgb,
+            edited=palette.edited,
+            strength=self.strength,
+            keep_lightness=self.keep_lightness,
+            lightness=_core.luminance_weights(LIGHTNESS_OF[self.lightness_of] or encoding),
+            mix=self.mix,
+            matte_in_alpha=self.in_alpha,
+            outside_at=self.outside_at,
+            premultiplied=premultiplied,
+            threads=threads,
+            conversion=own.steps if own else None,
+        )
+
+    def _reader(self, sidecar: _core.Sidecar, frame: float) -> NDArray[np.float64] | None:
+        """Return the edited colours that draw a matte, (n, 3); None without a matte."""
+        polytope, edits = sidecar.polytope, sidecar.edits
+        if self.kind == "outside":
+            return _core.surface_reader(_core.slice_at(polytope, frame))
+        if self.kind != "weight":
+            return None
+        ids = [*polytope.vertex_ids, *(stop["id"] for stop in edits.stops)]
+        if self.handle not in ids:
+            raise unknown(self.handle, "vertex or stop", ids)
+        return _core.weight_reader(polytope, edits, _core.slice_at(polytope, frame), self.handle)

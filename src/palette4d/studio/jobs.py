@@ -1,0 +1,123 @@
+"""Long work in a child process: the command line's own verbs, with progress and a way to stop.
+
+A child's crash is a message in the window, not its end. Its command line can be copied.
+"""
+
+import contextlib
+import os
+import re
+import shlex
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Sequence
+
+#: tqdm's bars: "colour_statistics:  40%|████      | 20/50 [00:01<00:02]".
+_BAR = re.compile(r"^(?P<what>[^%|\r\n]*?):?\s+(?P<percent>\d+)%\|")
+
+#: Seconds in which a stopped child may clean up.
+GRACE = 3.0
+
+
+def command_line(words: Sequence[str]) -> str:
+    """Return the command as a user types it."""
+    return shlex.join(["palette4d", *words])
+
+
+class Job:
+    """A verb of the command line that runs.
+
+    Parameters
+    ----------
+    words : sequence of str
+        The verb and its arguments.
+    changed : callable
+        Called in the job's thread when something changed.
+
+    Attributes
+    ----------
+    what : str
+        The stage that runs.
+    fraction : float or None
+        How much of it is done, 0..1; None if unknown.
+    output, messages : str
+        What it printed, and its notes and errors.
+    status : int or None
+        The exit status; None while it runs.
+    """
+
+    def __init__(self, words: Sequence[str], changed: Callable[["Job"], object]) -> None:
+        """Start it."""
+        self.words = tuple(words)
+        self.what, self.fraction = "", None  # type: tuple[str, float | None]
+        self.output = self.messages = ""
+        self.status: int | None = None
+        self.stopped = False
+        self._changed = changed
+        # tqdm draws its bars only for a terminal.
+        self._reader, writer = os.openpty()
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "palette4d", *words],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=writer,
+            env={**os.environ, "COLUMNS": "120"},
+            start_new_session=True,
+        )
+        os.close(writer)
+        threading.Thread(target=self._read_bars, name="palette4d job", daemon=True).start()
+        threading.Thread(target=self._wait, name="palette4d job", daemon=True).start()
+
+    @property
+    def command(self) -> str:
+        """The command line that does the same."""
+        return command_line(self.words)
+
+    def stop(self) -> None:
+        """Stop it as Ctrl-C does; a child that does not end is killed."""
+        self.stopped = True
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self._process.pid, 2)
+        timer = threading.Timer(GRACE, self._kill)
+        timer.daemon = True
+        timer.start()
+
+    def _kill(self) -> None:
+        with contextlib.suppress(ProcessLookupError):
+            if self._process.poll() is None:
+                os.killpg(self._process.pid, 9)
+
+    def wait(self, seconds: float | None = None) -> int:
+        """Wait for the end; return the exit status."""
+        return self._process.wait(seconds)
+
+    def _read_bars(self) -> None:
+        rest = ""
+        while True:
+            try:
+                data = os.read(self._reader, 4096)
+            except OSError:  # the child has closed the terminal
+                break
+            if not data:
+                break
+            *lines, rest = re.split(r"[\r\n]+", rest + data.decode("utf-8", "replace"))
+            for line in lines:
+                self._take(line)
+        self._take(rest)
+        os.close(self._reader)
+
+    def _take(self, line: str) -> None:
+        line = re.sub(r"\x1b\[[0-9;]*[A-Za-z]", "", line)
+        bar = _BAR.match(line)
+        if bar is not None:
+            self.what, self.fraction = bar["what"].strip(), int(bar["percent"]) / 100
+        elif line.strip():
+            self.messages += line + "\n"
+        self._changed(self)
+
+    def _wait(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            self.output += line.decode("utf-8", "replace")
+        self.status = self._process.wait()
+        self._changed(self)

@@ -1,0 +1,185 @@
+"""Lists beside the picture: the history of the edits, and the shots of a show."""
+
+import functools
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QIcon, QImage, QPixmap
+from PySide6.QtWidgets import QListWidget, QListWidgetItem, QVBoxLayout, QWidget
+
+from palette4d.common.errors import Palette4dError
+from palette4d.grade.document import Document
+from palette4d.media.source_clip import find_clip, nearest_frame
+from palette4d.shows import manifest
+from palette4d.studio import texts
+from palette4d.studio.display import Display, Look
+from palette4d.studio.player import Region, resampled
+from palette4d.studio.session import Session
+
+U8 = NDArray[np.uint8]
+
+#: The thumbnails' size in pixels.
+THUMB = QSize(112, 63)
+
+
+class History(QWidget):
+    """The steps of the grade; a click goes back or forward to one."""
+
+    def __init__(self, session: Session) -> None:
+        """Listen to the session."""
+        super().__init__()
+        self.session = session
+        self.list = QListWidget()
+        self.list.setAccessibleName(texts.HISTORY)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.list)
+        self.list.itemClicked.connect(lambda item: self.go_to(self.list.row(item)))
+        self.list.itemActivated.connect(lambda item: self.go_to(self.list.row(item)))
+        session.on("document", self._show)
+        self._show()
+
+    def _show(self) -> None:
+        document = self.session.document
+        if self.session.dragging:
+            return
+        rows = [texts.BEGINNING] if document is not None else []
+        done = 0
+        if document is not None:
+            rows += [edit.label for edit in document.history]
+            done = len(document.history)
+            rows += [edit.label for edit in reversed(document.undone)]
+        self.list.clear()
+        for k, text in enumerate(rows):
+            item = QListWidgetItem(text)
+            if k > done:
+                item.setText(f"{text}  {texts.UNDONE_STEP}")
+                item.setForeground(self.palette().placeholderText())
+            self.list.addItem(item)
+        if rows:
+            self.list.setCurrentRow(done)
+            self.list.scrollToItem(self.list.item(done))
+
+    def go_to(self, row: int) -> None:
+        """Undo or redo up to a row; row 0 is before the first step."""
+        document = self.session.document
+        if document is None:
+            return
+        for _ in range(len(document.history) - row):
+            self.session.undo()
+        for _ in range(row - len(document.history)):
+            self.session.redo()
+
+
+class Shots(QWidget):
+    """The shots of a manifest, with thumbnails and states."""
+
+    def __init__(self, session: Session, open_shot: Callable[[Path], object]) -> None:
+        """Begin empty."""
+        super().__init__()
+        self.session, self._open = session, open_shot
+        self.folder = Path()
+        self.entries: list[manifest.Entry] = []
+        self._generation = 0
+        self.list = QListWidget()
+        self.list.setIconSize(THUMB)
+        self.list.setSpacing(2)
+        self.list.setMinimumWidth(230)
+        self.list.setAccessibleName(texts.SHOTS)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.list)
+        self.list.itemActivated.connect(lambda item: self._chosen(self.list.row(item)))
+        self.list.itemClicked.connect(lambda item: self._chosen(self.list.row(item)))
+
+    def count(self) -> int:
+        """Return how many shots there are."""
+        return len(self.entries)
+
+    def load(self, path: Path) -> None:
+        """Show the shots of a manifest.
+
+        Raises
+        ------
+        Palette4dError
+            The manifest is unusable.
+        """
+        show = manifest.read(path)
+        self.folder, self.entries = path.absolute().parent, list(show.entries)
+        self._generation += 1
+        self.list.clear()
+        for entry in self.entries:
+            item = QListWidgetItem(f"{entry.shot.name}\n{texts.SHOT_STATES[entry.status]}")
+            item.setToolTip(entry.error or str(self.folder / entry.sidecar))
+            blank = QPixmap(THUMB)
+            blank.fill(Qt.GlobalColor.black)
+            item.setIcon(QIcon(blank))
+            if entry.status != manifest.DONE:
+                item.setFlags(Qt.ItemFlag.ItemIsSelectable)
+            self.list.addItem(item)
+        work = threading.Thread(
+            target=self._draw, args=(self._generation,), name="palette4d shots", daemon=True
+        )
+        work.start()
+
+    def _draw(self, generation: int) -> None:
+        """Draw the thumbnails, graded, in a thread."""
+        for row, entry in enumerate(list(self.entries)):
+            if generation != self._generation:
+                return
+            if entry.status != manifest.DONE:
+                continue
+            try:
+                pixels = thumbnail(self.folder / entry.sidecar)
+            except (Palette4dError, OSError):
+                continue
+            if pixels is not None:
+                self.session.post(functools.partial(self._set, generation, row, pixels))
+
+    def _set(self, generation: int, row: int, pixels: U8) -> None:
+        if generation == self._generation:
+            height, width = pixels.shape[:2]
+            image = QImage(pixels.data, width, height, 4 * width, QImage.Format.Format_RGBX8888)
+            self.list.item(row).setIcon(QIcon(QPixmap.fromImage(image)))
+
+    def _chosen(self, row: int) -> None:
+        if 0 <= row < len(self.entries) and self.entries[row].status == manifest.DONE:
+            self.list.setCurrentRow(row)
+            self._open(self.folder / self.entries[row].sidecar)
+
+    def open_first(self) -> None:
+        """Open the first shot that has a palette."""
+        for row, entry in enumerate(self.entries):
+            if entry.status == manifest.DONE:
+                self._chosen(row)
+                return
+
+    def step(self, way: int) -> None:
+        """Open the next or previous shot that has a palette."""
+        row = self.list.currentRow() + way
+        while 0 <= row < len(self.entries):
+            if self.entries[row].status == manifest.DONE:
+                self._chosen(row)
+                return
+            row += way
+
+
+def thumbnail(sidecar: Path) -> U8 | None:
+    """Return a shot's middle frame, graded, (h, w, 4) uint8; None without its clip."""
+    document = Document.load(sidecar)
+    clip = find_clip(sidecar, document.core.clip, None)
+    if clip is None:
+        return None
+    first, last, _ = document.frames
+    frame = nearest_frame(clip, (first + last) / 2)
+    pixels = clip.read(frame)
+    scale = min(THUMB.width() / clip.width, THUMB.height() / clip.height, 1.0)
+    width, height = max(1, round(clip.width * scale)), max(1, round(clip.height * scale))
+    small = resampled(pixels, Region(0, 0, clip.width, clip.height, width, height))
+    graded = document.recolour(small, frame, premultiplied=clip.premultiplied)
+    display = Display(*Display.wanted(document, clip.encoding))
+    return display.painter(Look()).paint(np.ascontiguousarray(graded[..., :3]))

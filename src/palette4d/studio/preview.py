@@ -1,0 +1,426 @@
+"""The preview: a frame before and after the edits, at the size on screen, beside the views' thread.
+
+Input: a frame's pixels, the palette at that time, a part of the frame and a look. Output: pictures
+of 8 bits. While something moves, the part is scaled down first and recoloured by the lattice; when
+nothing moves, the frame is recoloured exactly, as `palette4d render` does, and scaled down then.
+Of waiting requests only the newest is kept, and exact work stops for a new request.
+"""
+
+import contextlib
+import threading
+from collections import deque
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palette4d import _core
+from palette4d.common.errors import in_words
+from palette4d.grade.document import Document
+from palette4d.grade.palette import Palette
+from palette4d.studio.display import Display, Look
+from palette4d.studio.player import ByteCache, Region, resampled
+
+F32 = NDArray[np.float32]
+U8 = NDArray[np.uint8]
+
+#: Bytes of scaled frames, of pictures before the edits, and of pictures to play, that are kept.
+SMALL_BYTES, BEFORE_BYTES, REEL_BYTES = 100 << 20, 50 << 20, 400 << 20
+#: Pixels that are recoloured between two looks for a newer request.
+STRIP = 300_000
+#: Pixels in which colours outside of the palette are looked for.
+OUTSIDE_POINTS = 60_000
+#: The grey of a matte's other pixels, and how much of the picture shows through.
+MATTE_GREY, MATTE_SHOWS = 58, 0.12
+
+
+@dataclass(frozen=True)
+class Grade:
+    """A palette at a time with its edits: what recolouring needs."""
+
+    palette: Palette
+    conversion: Any
+    bumps: Any = None
+
+    @classmethod
+    def of(cls, document: Document, frame: float) -> "Grade":
+        """Return a document's grade at a time."""
+        core = document.core
+        own = core.conversion
+        steps = None if own is None else own.steps
+        bumps = core.bumps_at(frame)
+        return cls(document.palette(frame), steps, bumps if len(bumps) else None)
+
+    def recolourer(self) -> _core.Recolourer:
+        """Return the exact recolouring."""
+        palette = self.palette
+        options: Any = {} if self.bumps is None else {"bumps": self.bumps}
+        return _core.Recolourer(palette.rgb, palette.edited, palette.faces, **options)
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is to be shown.
+
+    Attributes
+    ----------
+    frame, pixels
+        The frame's number and its (h, w, 3 or 4) code values.
+    premultiplied : bool
+        Whether colours are multiplied by alpha.
+    grade, before : Grade or None
+        The edits after, and before (None: the source).
+    region : Region
+        The part and its size.
+    display, look
+        How code values become colours on the screen.
+    key : hashable
+        Changes with what `before` is.
+    revision : int
+        Changes with the grade.
+    sides : frozenset of str
+        "before", "after", or both.
+    settled : bool
+        Nothing moves: make the exact picture.
+    matte : str or None
+        A palette colour or handle whose weight is shown.
+    outside : bool
+        Mark colours outside of the palette.
+    scaled : bool
+        The pixels are the region's at its size, not the frame's.
+    """
+
+    frame: int
+    pixels: F32
+    premultiplied: bool
+    grade: Grade | None
+    before: Grade | None
+    region: Region
+    display: Display
+    look: Look
+    key: Any
+    revision: int
+    sides: frozenset[str] = frozenset({"after"})
+    settled: bool = True
+    matte: str | None = None
+    outside: bool = False
+    scaled: bool = False
+
+    @property
+    def film_key(self) -> tuple[Any, ...]:
+        """What a picture to play depends on."""
+        return self.frame, self.region, self.look, self.sides, self.key, self.revision
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Pictures of 8 bits, (h, w, 4), for a request.
+
+    Attributes
+    ----------
+    result : (h, w, 3 or 4) float32 or None
+        The frame's exact recoloured code values, of an exact picture.
+    outside : (h, w) bool or None
+        Where colours are outside of the palette.
+    share : float
+        The share of those.
+    """
+
+    request: Request
+    before: U8 | None
+    after: U8 | None
+    exact: bool
+    result: F32 | None = None
+    outside: U8 | None = None
+    share: float = 0.0
+    error: str = ""
+    quick_error: float = field(default=0.0)
+
+
+class _Newer(Exception):
+    """A newer request waits."""
+
+
+class Preview:
+    """Makes pictures in a thread.
+
+    Parameters
+    ----------
+    ready : callable
+        Called in the preview's thread with each `Picture`.
+    """
+
+    def __init__(self, ready: Callable[[Picture], object]) -> None:
+        self._ready = ready
+        self._small = ByteCache[tuple[int, Region], F32](SMALL_BYTES)
+        self._befores = ByteCache[tuple[Any, ...], U8](BEFORE_BYTES)
+        self._reel = ByteCache[tuple[Any, ...], Picture](REEL_BYTES)
+        self._film: deque[Callable[[], Request | None]] = deque()
+        self._wake = threading.Condition()
+        self._waiting: Request | None = None
+        self._closed = False
+        self._thread = threading.Thread(target=self._run, name="palette4d preview", daemon=True)
+        self._thread.start()
+
+    def ask(self, request: Request) -> None:
+        """Make this picture next; a request that still waits is dropped."""
+        with self._wake:
+            self._waiting = request
+            self._wake.notify()
+
+    def roll(self, film: Iterable[Callable[[], Request | None]]) -> None:
+        """Make these pictures to play, in this order, where no other picture is asked for.
+
+        Each is a function that returns the request, called in the preview's thread.
+        """
+        with self._wake:
+            self._film = deque(film)
+            self._wake.notify()
+
+    def played(self, key: tuple[Any, ...]) -> Picture | None:
+        """Return a picture that was made to play (`Request.film_key`), or None."""
+        return self._reel.get(key)
+
+    def forget(self) -> None:
+        """Forget the pixels that were kept."""
+        self._small.clear()
+        self._befores.clear()
+        self._reel.clear()
+
+    def close(self) -> None:
+        """End the thread."""
+        with self._wake:
+            self._closed, self._waiting = True, None
+            self._wake.notify()
+
+    def _run(self) -> None:
+        while True:
+            with self._wake:
+                while self._waiting is None and not self._film and not self._closed:
+                    self._wake.wait()
+                if self._closed:
+                    return
+                request, self._waiting = self._waiting, None
+                scene = self._film.popleft() if request is None else None
+            if request is None:
+                assert scene is not None
+                self._develop(scene)
+                continue
+            try:
+                # A quick picture first, unless the exact one takes no longer.
+                if not request.settled or request.pixels.size > 4 * STRIP:
+                    self._ready(self.make(request, exact=False))
+                if request.settled:
+                    self._ready(self.make(request, exact=True, check=self._check))
+            except _Newer:
+                continue
+            except Exception as error:  # whatever fails, the window stays and says it
+                text = in_words(error) or type(error).__name__
+                self._ready(Picture(request, None, None, False, error=text))
+
+    def _develop(self, scene: Callable[[], Request | None]) -> None:
+        """Make a picture to play; one that fails is dropped."""
+        with contextlib.suppress(Exception):
+            request = scene()
+            if request is None:
+                return
+            picture = self.make(request, exact=False)
+            sides = (picture.before, picture.after)
+            size = sum(side.nbytes for side in sides if side is not None)
+            self._reel.put(request.film_key, picture, size)
+            self._ready(picture)
+
+    def _check(self) -> None:
+        if self._waiting is not None or self._closed:
+            raise _Newer
+
+    def make(
+        self, request: Request, *, exact: bool, check: Callable[[], None] = lambda: None
+    ) -> Picture:
+        """Make a picture now.
+
+        Parameters
+        ----------
+        request : Request
+            What to show.
+        exact : bool
+            As `palette4d render`; or by the lattice at the size on screen.
+        check : callable
+            Called now and then; may raise to stop.
+        """
+        painter = request.display.painter(request.look)
+        region = request.region
+        before = after = None
+        result = None
+        small: F32 | None = None
+        if not exact or region.whole:
+            small = self._source(request)
+        if "before" in request.sides:
+            before = self._before(request, painter, exact, check)
+        if "after" in request.sides:
+            if request.grade is None:
+                colours = self._source(request)
+            elif exact:
+                result = self.exact(request.pixels, request.grade, request.premultiplied, check)
+                colours = resampled(result, region)
+            else:
+                assert small is not None
+                colours = _quick(small, request.grade, request.premultiplied)
+            after = _painted(painter, colours, request.premultiplied, exact, check)
+        if request.matte is not None and request.grade is not None and after is not None:
+            matte = matte_of(self._source(request), request.grade, request.matte)
+            if matte is not None:
+                after = _highlighted(after, matte)
+        outside, share = None, 0.0
+        if request.outside and request.grade is not None:
+            outside, share = outside_of(self._source(request), request.grade)
+        return Picture(
+            request, before, after, exact, result, outside, share, quick_error=painter.error
+        )
+
+    @staticmethod
+    def exact(
+        pixels: F32, grade: Grade, premultiplied: bool, check: Callable[[], None] = lambda: None
+    ) -> F32:
+        """Return (h, w, c) pixels recoloured as `palette4d render` does, to the bit."""
+        recolourer = grade.recolourer()
+        result = np.empty(pixels.shape, np.float32)
+        rows = max(1, STRIP // pixels.shape[1])
+        for top in range(0, len(pixels), rows):
+            check()
+            strip = np.ascontiguousarray(pixels[top : top + rows])
+            result[top : top + rows] = recolourer.apply(
+                strip,
+                premultiplied=premultiplied and pixels.shape[2] == 4,
+                precision="single",
+                conversion=grade.conversion,
+            )
+        return result
+
+    def _source(self, request: Request) -> F32:
+        if request.scaled:
+            return request.pixels
+        key = (request.frame, request.region)
+        found = self._small.get(key)
+        if found is None:
+            found = resampled(request.pixels, request.region)
+            self._small.put(key, found, found.nbytes)
+        return found
+
+    def _before(self, request: Request, painter: Any, exact: bool, check: Callable[[], None]) -> U8:
+        key = (request.frame, request.region, request.look, exact, request.key)
+        found = self._befores.get(key)
+        if found is None:
+            colours = self._source(request)
+            if request.before is not None:
+                colours = _quick(colours, request.before, request.premultiplied)
+            found = _painted(painter, colours, request.premultiplied, exact, check)
+            self._befores.put(key, found, found.nbytes)
+        return found
+
+
+def _quick(colours: F32, grade: Grade, premultiplied: bool) -> F32:
+    """Return colours recoloured by the lattice."""
+    recolourer = grade.recolourer()
+    if recolourer.identity:
+        return colours
+    return _core.Lattice(recolourer).apply(
+        colours,
+        premultiplied=premultiplied and colours.shape[2] == 4,
+        precision="single",
+        conversion=grade.conversion,
+    )
+
+
+def _painted(
+    painter: Any, colours: F32, premultiplied: bool, exact: bool, check: Callable[[], None]
+) -> U8:
+    """Return the (h, w, 4) picture of code values, laid over black where they have alpha."""
+    alpha = None
+    if colours.shape[2] == 4:
+        alpha = np.clip(np.nan_to_num(colours[..., 3:]), 0, 1)
+        straight = colours[..., :3]
+        if premultiplied:
+            straight = np.divide(straight, alpha, out=np.zeros_like(straight), where=alpha > 0)
+        colours = np.ascontiguousarray(straight)
+    rows = max(1, STRIP // colours.shape[1])
+    if exact and painter.error and rows < len(colours):
+        parts = []
+        for top in range(0, len(colours), rows):
+            check()
+            parts.append(painter.paint(colours[top : top + rows]))
+        result = np.concatenate(parts)
+    else:
+        result = painter.paint(colours, exact=exact)
+    if alpha is not None:
+        result[..., :3] = np.rint(result[..., :3] * alpha).astype(np.uint8)
+    return result
+
+
+def straight(pixels: F32, premultiplied: bool) -> F32:
+    """Return (h, w, 3) colours that are not multiplied by alpha; NaN where alpha is 0."""
+    if pixels.shape[2] == 3 or not premultiplied:
+        return np.ascontiguousarray(pixels[..., :3])
+    alpha = pixels[..., 3:]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.ascontiguousarray(pixels[..., :3] / alpha, np.float32)
+
+
+def shares_of(palette: Palette, id_: str) -> NDArray[np.float64]:
+    """Return how much of each palette colour a handle moves, (n,), 0..1.
+
+    A palette colour moves with the vertices at its edge's ends; a stop or an edge is its edge.
+    """
+    shares = np.zeros(len(palette.ids))
+    for k, (own, ends) in enumerate(zip(palette.ids, palette.ends, strict=True)):
+        if id_ == own:
+            shares[k] = 1
+        elif id_ in ends:
+            late = float(palette.weights[k])
+            shares[k] = late if id_ == ends[1] else 1 - late
+    return shares
+
+
+def matte_of(colours: F32, grade: Grade, id_: str) -> F32 | None:
+    """Return the (h, w) weight of a handle or palette colour; None if it has none here."""
+    palette = grade.palette
+    shares = shares_of(palette, id_)
+    if not shares.any():
+        return None
+    # Recolouring adds weights times displacements: displaced by its shares in red, a grey picture
+    # of the weights comes out, as quickly as a recoloured frame does.
+    moved = np.array(palette.rgb)
+    moved[:, 0] += shares
+    own = np.ascontiguousarray(colours[..., :3])
+    if grade.conversion is not None:
+        own = grade.conversion.to_palette(own).astype(np.float32)
+    done = _core.Lattice(_core.Recolourer(palette.rgb, moved, palette.faces)).apply(
+        own, precision="single"
+    )
+    matte: F32 = np.clip(np.nan_to_num(done[..., 0] - own[..., 0]), 0, 1)
+    return matte
+
+
+def _highlighted(picture: U8, matte: F32) -> U8:
+    """Return the picture where the matte is, and grey elsewhere."""
+    weight = (matte * (1 - MATTE_SHOWS) + MATTE_SHOWS)[..., None]
+    result = picture.copy()
+    result[..., :3] = picture[..., :3] * weight + MATTE_GREY * (1 - weight)
+    return result
+
+
+def outside_of(colours: F32, grade: Grade) -> tuple[U8, float]:
+    """Return where colours are more than 1/255 outside of the palette, 0 or 255, and the share.
+
+    Large pictures are looked at in every n-th pixel.
+    """
+    step = max(1, int(np.ceil(np.sqrt(colours.shape[0] * colours.shape[1] / OUTSIDE_POINTS))))
+    points: Any = colours[::step, ::step, :3]
+    if grade.conversion is not None:
+        points = grade.conversion.to_palette(points)
+    flat = np.asarray(points, np.float64).reshape(-1, 3)
+    _, distances = _core.palette_weights(flat, grade.palette.rgb, grade.palette.faces)
+    out = (distances > 1 / 255).reshape(points.shape[:2])
+    return (out * np.uint8(255)).astype(np.uint8), float(out.mean())

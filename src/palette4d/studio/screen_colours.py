@@ -1,0 +1,48 @@
+"""Palette colours and small pictures as the screen shows them: through the clip's display and view.
+
+Toolkit-free. Input: code values of the palette, or pixels of the clip. Output: 8 bits, as the
+viewer's pictures.
+"""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from palette4d.studio.session import Session
+
+F32 = NDArray[np.float32]
+U8 = NDArray[np.uint8]
+
+
+def on_screen(session: "Session", rgb: ArrayLike) -> U8:
+    """Return (…, 3) uint8 display values of (…, 3) code values of the palette; NaN is black."""
+    colours = np.nan_to_num(np.asarray(rgb, np.float64))
+    conversion = None if session.document is None else session.document.core.conversion
+    if conversion is not None:
+        colours = conversion.steps.to_clip(colours)
+    return _displayed(session, colours.astype(np.float32))
+
+
+def thumbnail(session: "Session", pixels: F32, frame: float, premultiplied: bool) -> U8:
+    """Return the (h, w, 3) uint8 picture of a frame's pixels with the edits, over black."""
+    if session.document is not None:
+        pixels = session.document.recolour(
+            np.ascontiguousarray(pixels), frame, premultiplied=premultiplied
+        )
+    colours, alpha = pixels[..., :3], pixels[..., 3:]
+    if alpha.size and premultiplied:
+        colours = np.divide(colours, alpha, out=np.zeros_like(colours), where=alpha > 0)
+    shown = _displayed(session, np.nan_to_num(colours))
+    return np.rint(shown * np.clip(alpha, 0, 1)).astype(np.uint8) if alpha.size else shown
+
+
+def _displayed(session: "Session", colours: F32) -> U8:
+    if session.display is None:
+        return np.rint(np.clip(colours, 0, 1) * 255).astype(np.uint8)
+    flat = np.ascontiguousarray(colours).reshape(1, -1, 3)
+    shown = session.display.painter(session.looked).paint(
+        flat, exact=flat.size < 1000, threads=False
+    )
+    return np.ascontiguousarray(shown[0, :, :3]).reshape(colours.shape)

@@ -1,0 +1,359 @@
+"""The bar below the picture: playing, the frame, what is compared, and the display."""
+
+import time
+from collections.abc import Callable
+
+from PySide6.QtCore import QObject, QPointF, QRectF, QSize, Qt, QTimer
+from PySide6.QtGui import QColor, QIcon, QPainter, QPixmap, QPolygonF
+from PySide6.QtWidgets import (
+    QButtonGroup,
+    QComboBox,
+    QDoubleSpinBox,
+    QHBoxLayout,
+    QLabel,
+    QSpinBox,
+    QToolButton,
+    QWidget,
+)
+
+from palette4d.studio import texts, theme
+from palette4d.studio.preview import Request
+from palette4d.studio.session import Session
+from palette4d.studio.viewer import Viewer
+
+#: Frames that are made ahead of the playhead while playing.
+AHEAD = 16
+#: Pictures that are ready when playing starts, and the longest wait for them (seconds).
+READY, PATIENCE = 4, 0.6
+#: Milliseconds between two looks at the clock while playing.
+CLOCK = 4
+
+
+class Playback(QObject):
+    """Plays in real time: a frame whose picture is late is dropped and counted."""
+
+    def __init__(self, session: Session, viewer: Viewer) -> None:
+        """Listen to the session."""
+        super().__init__(viewer)
+        self.session, self.viewer = session, viewer
+        self.dropped = self.shown = 0
+        self.rate = 0.0  #: frames a second that were shown lately
+        self._asked_from: tuple[int, int] | None = None
+        self._started: float | None = None
+        self._began = self._count_from = 0.0
+        self._from = session.frame
+        self._step = 0
+        self._timer = QTimer(self)
+        self._timer.setTimerType(Qt.TimerType.PreciseTimer)
+        self._timer.setInterval(CLOCK)
+        self._timer.timeout.connect(self._tick)
+        session.on("playing", self._changed)
+        session.on("pixels", self._pixels)
+        session.on("document", self._pixels)
+        session.on("view", self._pixels)
+
+    @property
+    def frames_per_second(self) -> float:
+        """The clip's rate."""
+        clip = self.session.clip
+        return 24.0 if clip is None else float(clip.rate)
+
+    def span(self) -> tuple[int, int, int]:
+        """Return the first and last frame to play, and the step."""
+        first, last, step = self.session.frames
+        low, high = self.session.marks or (first, last)
+        return low, high, step
+
+    def _changed(self) -> None:
+        if self.session.playing:
+            low, high, _ = self.span()
+            if not low <= self.session.frame <= high:
+                self.session.go(low if self.session.playing > 0 else high)
+            elif not self.session.loop:
+                end = high if self.session.playing > 0 else low
+                if self.session.frame == end:
+                    self.session.go(low if self.session.playing > 0 else high)
+            self._from, self._step, self._started = self.session.frame, 0, None
+            self._began = time.perf_counter()
+            self.dropped = self.shown = 0
+            self._timer.start()
+            self._ask(self.session.frame)
+        else:
+            self._timer.stop()
+            self.viewer.preview.roll(())
+            self.viewer._frame_changed()
+
+    def _pixels(self) -> None:
+        if self.session.playing:
+            self._ask(self.session.frame)
+
+    def nth(self, count: int) -> int | None:
+        """Return the frame so many steps after the start; None after the end."""
+        low, high, step = self.span()
+        total = (high - low) // step + 1
+        at = (self._from - low) // step + count * self.session.playing
+        if not self.session.loop and not 0 <= at < total:
+            return None
+        return low + at % total * step
+
+    def _ask(self, frame: int) -> None:
+        """Have the next frames read and made."""
+        viewer, player, region = self.viewer, self.session.player, self.viewer.region()
+        if player is None or region is None:
+            return
+        nexts = [self.nth(self._step + k) for k in range(AHEAD)]
+        frames = list(dict.fromkeys(n for n in nexts if n is not None))
+        film: list[Callable[[], Request | None]] = []
+        missing = []
+        for number in frames:
+            request = viewer.film(number)
+            if request is None or viewer.preview.played(request.film_key) is not None:
+                continue
+            missing.append(number)
+            if player.has_small(number, region):
+                film.append(lambda r=request: viewer.with_pixels(r))  # type: ignore[misc]
+        player.want(missing, region)
+        viewer.preview.roll(film)
+
+    def _tick(self) -> None:
+        now = time.perf_counter()
+        session, viewer = self.session, self.viewer
+        if session.player is None:
+            session.play(0)
+            return
+        if self._started is None:
+            ready = sum(
+                (frame := self.nth(k)) is not None and self._picture(frame) is not None
+                for k in range(READY)
+            )
+            if ready < READY and now - self._began < PATIENCE:
+                return
+            self._started, self._step = now, -1
+            self._count_from = now
+        due = int((now - self._started) * self.frames_per_second)
+        if due <= self._step:
+            return
+        # The newest picture that is ready; frames before it are dropped.
+        for count in range(due, self._step, -1):
+            frame = self.nth(count)
+            if frame is None:
+                session.play(0)
+                return
+            picture = self._picture(frame)
+            if picture is not None:
+                self.dropped += count - self._step - 1
+                self.shown += 1
+                self._step = count
+                viewer.show_picture(picture)
+                if session.frame != frame:
+                    session.frame = frame
+                    session.emit("frame")
+                self.rate = self.shown / max(now - self._count_from, 1e-3)
+                break
+        else:
+            if due - self._step > 2 * self.frames_per_second:
+                # Nothing came for two seconds: the clock waits.
+                self.dropped += due - self._step
+                self._step = due
+        self._ask(session.frame)
+
+    def _picture(self, frame: int):  # type: ignore[no-untyped-def]
+        request = self.viewer.film(frame)
+        return None if request is None else self.viewer.preview.played(request.film_key)
+
+
+class Transport(QWidget):
+    """The bar."""
+
+    def __init__(self, session: Session, playback: Playback) -> None:
+        """Make the widgets."""
+        super().__init__()
+        self.session, self.playback = session, playback
+        self._silent = False
+        row = QHBoxLayout(self)
+        row.setContentsMargins(8, 4, 8, 4)
+        row.setSpacing(3)
+        self.buttons: dict[str, QToolButton] = {}
+        for name in ("first_frame", "previous_frame", "play", "next_frame", "last_frame"):
+            button = QToolButton()
+            button.setProperty("flat", True)
+            button.setIconSize(QSize(16, 16))
+            button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+            button.setIcon(icon(name))
+            self.buttons[name] = button
+            row.addWidget(button)
+        row.addSpacing(6)
+        self.frame = QSpinBox()
+        self.frame.setFont(theme.numbers_font())
+        self.frame.setButtonSymbols(QSpinBox.ButtonSymbols.NoButtons)
+        self.frame.setAlignment(Qt.AlignmentFlag.AlignRight)
+        self.frame.setKeyboardTracking(False)
+        self.frame.setAccessibleName(texts.FRAME_FIELD)
+        self.frame.setFixedWidth(64)
+        self.frame.valueChanged.connect(self._typed)
+        row.addWidget(self.frame)
+        self.facts = QLabel()
+        self.facts.setStyleSheet(f"color: {theme.FAINT}")
+        row.addWidget(self.facts)
+        row.addStretch(1)
+        self.compare: dict[str, QToolButton] = {}
+        group = QButtonGroup(self)
+        for key, text in texts.COMPARE.items():
+            button = QToolButton()
+            button.setText(text)
+            button.setCheckable(True)
+            button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+            button.clicked.connect(lambda _=False, key=key: session.look(compare=key))
+            group.addButton(button)
+            self.compare[key] = button
+            row.addWidget(button)
+        row.addStretch(1)
+        self.look = QComboBox()
+        self.look.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.look.setSizeAdjustPolicy(
+            QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
+        )
+        self.look.setMinimumContentsLength(22)
+        self.look.setAccessibleName(texts.DISPLAY)
+        self.look.activated.connect(self._chosen)
+        row.addWidget(self.look)
+        row.addSpacing(6)
+        self.exposure = self._number(row, texts.EXPOSURE, -10, 10, 0.25, "exposure", "+0.00")
+        self.gamma = self._number(row, texts.GAMMA, 0.2, 5, 0.05, "gamma", "0.00")
+        for event in ("clip", "document", "view", "range"):
+            session.on(event, self._show)
+        session.on("frame", self._show_frame)
+        session.on("playing", self._show_playing)
+        self._clock = QTimer(self)
+        self._clock.timeout.connect(self._show_facts)
+        self._show()
+
+    def _number(
+        self, row: QHBoxLayout, text: str, low: float, high: float, step: float, name: str, _: str
+    ) -> QDoubleSpinBox:
+        label = QLabel(text)
+        label.setStyleSheet(f"color: {theme.FAINT}")
+        row.addWidget(label)
+        box = QDoubleSpinBox()
+        box.setRange(low, high)
+        box.setSingleStep(step)
+        box.setDecimals(2)
+        box.setButtonSymbols(QDoubleSpinBox.ButtonSymbols.NoButtons)
+        box.setAlignment(Qt.AlignmentFlag.AlignRight)
+        box.setFixedWidth(54)
+        box.setFont(theme.numbers_font())
+        box.setAccessibleName(text)
+        box.valueChanged.connect(
+            lambda value: None if self._silent else self.session.look(**{name: value})
+        )
+        row.addWidget(box)
+        return box
+
+    def _typed(self, value: int) -> None:
+        if not self._silent:
+            self.session.go(value)
+
+    def _chosen(self, index: int) -> None:
+        found = self.look.itemData(index)
+        if found:
+            self.session.look(display=found[0], view=found[1])
+
+    def _show(self) -> None:
+        session, display = self.session, self.session.display
+        self._silent = True
+        first, last, step = session.frames
+        self.frame.setRange(first, last)
+        self.frame.setSingleStep(step)
+        self.exposure.setValue(session.view.exposure)
+        self.gamma.setValue(session.view.gamma)
+        self.compare[session.view.compare].setChecked(True)
+        wanted = (
+            []
+            if display is None
+            else [(name, view) for name in display.displays() for view in display.views(name)]
+        )
+        if wanted != [tuple(self.look.itemData(k) or ()) for k in range(self.look.count())]:
+            self.look.clear()
+            for name, view in wanted:
+                self.look.addItem(f"{name} · {view}", (name, view))
+        if display is None or not wanted:
+            self.look.clear()
+            self.look.addItem(texts.NO_DISPLAY if display is None else texts.AS_IS)
+        else:
+            chosen = display.chosen(session.looked)
+            self.look.setCurrentIndex(wanted.index((chosen.display, chosen.view)))
+        if display is not None:
+            self.look.setToolTip(
+                texts.LOOK_TIP.format(space=display.space, config=display.name)
+                if display.known
+                else texts.AS_IS_TIP
+            )
+        self._silent = False
+        self._show_frame()
+        self._show_playing()
+
+    def _show_frame(self) -> None:
+        self._silent = True
+        self.frame.setValue(self.session.frame)
+        self._silent = False
+        if not self.session.playing:
+            self._show_facts()
+
+    def _show_playing(self) -> None:
+        self.buttons["play"].setIcon(icon("stop" if self.session.playing else "play"))
+        if self.session.playing:
+            self._clock.start(250)
+        else:
+            self._clock.stop()
+        self._show_facts()
+
+    def _show_facts(self) -> None:
+        _, last, _ = self.session.frames
+        facts = [f"/ {last}", texts.RATE.format(rate=f"{self.playback.frames_per_second:.5g}")]
+        if self.session.playing:
+            speed = self.session.playing
+            if speed != 1:
+                facts.append(f"{speed}×")
+            facts.append(texts.DROPPED.format(count=self.playback.dropped))
+        if self.session.marks is not None:
+            facts.append(texts.MARKS.format(*self.session.marks))
+        self.facts.setText("   ".join(facts))
+
+
+def icon(name: str) -> QIcon:
+    """Return the drawn sign of a button."""
+    pixmap = QPixmap(64, 64)
+    pixmap.fill(Qt.GlobalColor.transparent)
+    painter = QPainter(pixmap)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(QColor(theme.TEXT))
+
+    def triangle(left: float, right: float) -> None:
+        tip = [QPointF(left, 14), QPointF(right, 32), QPointF(left, 50)]
+        painter.drawPolygon(QPolygonF(tip))
+
+    def bar(left: float, width: float = 6) -> None:
+        painter.drawRect(QRectF(left, 14, width, 36))
+
+    if name == "play":
+        triangle(18, 50)
+    elif name == "stop":
+        bar(18, 9)
+        bar(37, 9)
+    elif name == "next_frame":
+        bar(16)
+        triangle(26, 50)
+    elif name == "previous_frame":
+        triangle(38, 14)
+        bar(42)
+    elif name == "first_frame":
+        bar(10)
+        triangle(36, 18)
+        triangle(54, 36)
+    elif name == "last_frame":
+        triangle(10, 28)
+        triangle(28, 46)
+        bar(48)
+    painter.end()
+    return QIcon(pixmap)

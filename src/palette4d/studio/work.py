@@ -1,0 +1,270 @@
+"""Dialogs of the long work: options, the command line that does the same, progress, and a stop."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QDialog,
+    QFileDialog,
+    QFormLayout,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QPlainTextEdit,
+    QProgressBar,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from palette4d.studio import texts, theme
+from palette4d.studio.jobs import Job, command_line
+
+FieldKind = Literal["text", "save", "open", "folder", "choice", "check"]
+
+
+@dataclass(frozen=True)
+class Field:
+    """One option of a verb.
+
+    Attributes
+    ----------
+    flag : str
+        The option; "" is the verb's own argument.
+    text : str
+        Its label.
+    kind : str
+        How it is entered.
+    value : str
+        Its first value; "yes" ticks a check box.
+    choices : tuple of str
+        The choices; "" leaves the option out.
+    hint : str
+        Shown where the field is empty.
+    """
+
+    flag: str
+    text: str
+    kind: FieldKind = "text"
+    value: str = ""
+    choices: tuple[str, ...] = ()
+    hint: str = ""
+
+
+class WorkDialog(QDialog):
+    """Runs one verb.
+
+    Parameters
+    ----------
+    title : str
+        The window's title.
+    verb : str
+        The verb of the command line.
+    fields : sequence of Field
+        Its options, in the order of the command line.
+    post : callable
+        Runs a function on the window's thread.
+    done : callable, optional
+        Called with the finished job after a success.
+    """
+
+    def __init__(
+        self,
+        parent: QWidget,
+        title: str,
+        verb: str,
+        fields: Sequence[Field],
+        post: Callable[[Callable[[], object]], object],
+        done: Callable[[Job], object] | None = None,
+    ) -> None:
+        """Make the form."""
+        super().__init__(parent)
+        self.setWindowTitle(title)
+        self.setMinimumWidth(620)
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.verb, self.fields = verb, tuple(fields)
+        self.job: Job | None = None
+        self._post, self._done = post, done
+        self.inputs: list[QLineEdit | QComboBox | QCheckBox] = []
+        column = QVBoxLayout(self)
+        column.setContentsMargins(16, 14, 16, 14)
+        column.setSpacing(10)
+        form = QFormLayout()
+        form.setLabelAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        form.setHorizontalSpacing(12)
+        form.setVerticalSpacing(7)
+        column.addLayout(form)
+        for field in fields:
+            form.addRow(*self._row(field))
+        caption = QLabel(texts.SAME_COMMAND)
+        caption.setStyleSheet(f"color: {theme.FAINT}")
+        column.addWidget(caption)
+        line = QHBoxLayout()
+        self.command = QLineEdit()
+        self.command.setReadOnly(True)
+        self.command.setFont(theme.numbers_font())
+        line.addWidget(self.command)
+        copy = QPushButton(texts.COPY)
+        copy.setAutoDefault(False)
+        copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(self.command.text()))
+        line.addWidget(copy)
+        column.addLayout(line)
+        self.bar = QProgressBar()
+        self.bar.setTextVisible(False)
+        self.bar.setFixedHeight(8)
+        self.stage = QLabel()
+        self.log = QPlainTextEdit()
+        self.log.setReadOnly(True)
+        self.log.setFont(theme.numbers_font(9))
+        self.log.setFixedHeight(130)
+        for widget in (self.bar, self.stage, self.log):
+            widget.hide()
+            column.addWidget(widget)
+        buttons = QHBoxLayout()
+        buttons.addStretch(1)
+        self.stop = QPushButton(texts.CLOSE)
+        self.stop.setAutoDefault(False)
+        self.stop.clicked.connect(self._stop_or_close)
+        self.go = QPushButton(title.rstrip("…"))
+        self.go.setDefault(True)
+        self.go.clicked.connect(self.start)
+        buttons.addWidget(self.stop)
+        buttons.addWidget(self.go)
+        column.addLayout(buttons)
+        self._show_command()
+
+    def _row(self, field: Field) -> tuple[QLabel, QWidget]:
+        label = QLabel(field.text)
+        if field.kind == "check":
+            check = QCheckBox()
+            check.setChecked(field.value == "yes")
+            check.toggled.connect(self._show_command)
+            self.inputs.append(check)
+            check.setAccessibleName(field.text)
+            return label, check
+        if field.kind == "choice":
+            choice = QComboBox()
+            for each in field.choices:
+                choice.addItem(each or field.hint, each)
+            choice.setCurrentIndex(max(0, choice.findData(field.value)))
+            choice.currentIndexChanged.connect(self._show_command)
+            self.inputs.append(choice)
+            choice.setAccessibleName(field.text)
+            return label, choice
+        line = QLineEdit(field.value)
+        line.setPlaceholderText(field.hint)
+        line.textChanged.connect(self._show_command)
+        line.setAccessibleName(field.text)
+        self.inputs.append(line)
+        if field.kind == "text":
+            return label, line
+        box = QWidget()
+        row = QHBoxLayout(box)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.addWidget(line)
+        choose = QPushButton(texts.CHOOSE)
+        choose.setAutoDefault(False)
+        choose.clicked.connect(lambda: self._choose(line, field))
+        row.addWidget(choose)
+        return label, box
+
+    def _choose(self, line: QLineEdit, field: Field) -> None:
+        if field.kind == "folder":
+            found = QFileDialog.getExistingDirectory(self, field.text, line.text())
+        elif field.kind == "save":
+            found = QFileDialog.getSaveFileName(self, field.text, line.text())[0]
+        else:
+            found = QFileDialog.getOpenFileName(self, field.text, line.text())[0]
+        if found:
+            line.setText(found)
+
+    def words(self) -> list[str]:
+        """Return the verb and its arguments."""
+        words = [self.verb]
+        for field, widget in zip(self.fields, self.inputs, strict=True):
+            if isinstance(widget, QCheckBox):
+                words += [field.flag] if widget.isChecked() else []
+                continue
+            if isinstance(widget, QComboBox):
+                value = str(widget.currentData())
+            else:
+                value = widget.text().strip()
+            if value:
+                words += [field.flag, value] if field.flag else [value]
+        return words
+
+    def value(self, flag: str) -> str:
+        """Return what was entered for an option."""
+        for field, widget in zip(self.fields, self.inputs, strict=True):
+            if field.flag == flag and isinstance(widget, QLineEdit):
+                return widget.text().strip()
+        return ""
+
+    def _show_command(self) -> None:
+        self.command.setText(command_line(self.words()))
+        self.command.setCursorPosition(0)
+
+    def start(self) -> None:
+        """Run the verb."""
+        self.log.clear()
+        self.bar.setRange(0, 0)
+        for widget in (self.bar, self.stage, self.log):
+            widget.show()
+        self.stage.setText(texts.RUNNING)
+        self.go.setEnabled(False)
+        self.stop.setText(texts.STOP_JOB)
+        for entry in self.inputs:
+            entry.setEnabled(False)
+        self.job = Job(self.words(), lambda job: self._post(lambda: self._changed(job)))
+
+    def _changed(self, job: Job) -> None:
+        if job is not self.job:
+            return
+        try:
+            if job.fraction is not None:
+                self.bar.setRange(0, 1000)
+                self.bar.setValue(round(job.fraction * 1000))
+                self.stage.setText(f"{job.what.replace('_', ' ')} {job.fraction:.0%}")
+            self.log.setPlainText((job.messages + job.output).strip())
+            if job.status is None:
+                return
+            self.bar.setRange(0, 1000)
+            self.bar.setValue(1000 if job.status == 0 else 0)
+            if job.stopped:
+                self.stage.setText(texts.STOPPED)
+            else:
+                self.stage.setText(texts.DONE if job.status == 0 else texts.FAILED)
+            self.go.setEnabled(True)
+            self.stop.setText(texts.CLOSE)
+            for entry in self.inputs:
+                entry.setEnabled(True)
+        except RuntimeError:  # the dialog was closed
+            return
+        self.job = None
+        if job.status == 0 and self._done is not None:
+            self._done(job)
+
+    def _stop_or_close(self) -> None:
+        if self.job is not None:
+            self.job.stop()
+        else:
+            self.close()
+
+    def reject(self) -> None:
+        """Stop what runs, then close."""
+        if self.job is not None:
+            self.job.stop()
+            self.job = None
+        super().reject()
+
+
+def beside(path: Path, ending: str) -> str:
+    """Return a file's name with another ending, in the same folder."""
+    stem = path.name.removesuffix(".p4d.json")
+    return str(path.with_name(stem + ending))

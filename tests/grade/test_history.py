@@ -1,0 +1,289 @@
+"""Steps and versions: kept in the file, reverted and applied again, never lost."""
+
+import contextlib
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from palette4d import _core
+from palette4d.common.errors import Palette4dError, SidecarError
+from palette4d.grade import sidecar
+from palette4d.grade.document import Document
+
+GOLDEN = Path(__file__).parents[1] / "golden" / "sidecars"
+
+
+@pytest.fixture
+def plain(tmp_path: Path) -> Path:
+    path = tmp_path / "clip.p4d.json"
+    path.write_bytes((GOLDEN / "v1_split.p4d.json").read_bytes())
+    return path
+
+
+def test_steps_are_undone_in_other_sessions(plain: Path) -> None:
+    first = plain.read_bytes()
+    files = []
+    acts: list[Callable[[Document], object]] = [
+        lambda d: d.set("v1", rgb="#ff8000"),
+        lambda d: d.stop("e1", frame=3, rgb=(0.5, 0.5, 0.5)),
+        lambda d: d.set_ramp("smooth"),
+        lambda d: d.save_version("warm"),
+        lambda d: d.set_ramp("hold", "s1"),
+        lambda d: d.move("s1", frame=4),
+        lambda d: d.use_version("warm"),
+        lambda d: d.reset(),
+        lambda d: d.remove_version("warm"),
+    ]
+    for each in acts:
+        document = Document.load(plain)
+        each(document)
+        document.save()
+        files.append(sidecar.load(plain))
+        assert files[-1]["history"]["done"][:-1] == (files[-2:-1] or [{}])[0].get(
+            "history", {"done": []}
+        ).get("done")
+
+    def without_history() -> Any:
+        return {**sidecar.load(plain), "history": None}
+
+    for expected in [*reversed(files[:-1]), json.loads(first)]:
+        document = Document.load(plain)
+        document.undo()
+        document.save()
+        assert without_history() == {**expected, "history": None}
+    document = Document.load(plain)
+    with pytest.raises(Palette4dError):
+        document.undo()
+    for expected in files:
+        document.redo()
+        document.save()
+        assert without_history() == {**expected, "history": None}
+    with pytest.raises(Palette4dError):
+        document.redo()
+    while document.history:
+        document.undo()
+    document.forget_history()
+    document.save()
+    assert plain.read_bytes() == first
+
+
+def test_a_step_that_changes_nothing_is_none(plain: Path) -> None:
+    before = plain.read_bytes()
+    document = Document.load(plain)
+    document.reset()
+    document.set_ramp("linear")
+    document.save()
+    assert (document.history, plain.read_bytes()) == ((), before)
+
+
+def test_several_edits_are_one_step(plain: Path) -> None:
+    document = Document.load(plain)
+    document.set("v1", rgb=(0, 0, 0))
+    with document.one_step("everything darker"):
+        document.set("v2", rgb=(0, 0, 0))
+        document.set("v3", rgb=(0, 0, 0))
+    assert [step.label for step in document.history] == ["set v1 to 0 0 0", "everything darker"]
+    document.undo()
+    assert list(document.settings) == ["v1"]
+    before = document.fields()
+    with contextlib.suppress(Palette4dError), document.one_step("half of it"):
+        document.set("v2", rgb=(0, 0, 0))
+        document.set("v99", rgb=(0, 0, 0))
+    assert document.fields() == before
+
+
+def test_the_history_stays_small(plain: Path) -> None:
+    document = Document.load(plain)
+    for i in range(700):
+        document.set(f"v{i % 5 + 1}", rgb=(i / 1000, 0.123456789, 0.987654321))
+        if i % 100 == 0:
+            document.save()
+    document.save()
+    assert len(document.history) == 200
+    assert plain.stat().st_size < 60_000
+    last = [document.colour(f"v{i}") for i in range(1, 6)]
+    document = Document.load(plain)
+    while document.history:
+        document.undo()
+    assert not document.settings
+    while document.undone:
+        document.redo()
+    assert [document.colour(f"v{i}") for i in range(1, 6)] == last
+
+
+@pytest.mark.parametrize(
+    "history",
+    [
+        {"done": 3},
+        {"done": [{"step": "x"}]},
+        {"done": [{"step": "x", "changes": []}]},
+        {"done": [{"step": "x", "changes": [["handle", "v1", None, {"rgb": [1, 2]}]]}]},
+        {"done": [{"step": "x", "changes": [["thing", "v1", None, {"rgb": [1, 2, 3]}]]}]},
+        {"undone": [{"step": 3, "changes": [["lock", "v1", None, True]]}]},
+        {"undone": [{"step": "x", "changes": [["lock", "v1", None, 3]]}]},
+        {"undone": [{"step": "x", "changes": [["version", "v1", None, 3]]}]},
+    ],
+)
+def test_a_broken_history_is_named(plain: Path, history: Any) -> None:
+    fields = {**sidecar.load(plain), "history": history}
+    with pytest.raises(SidecarError, match="/history"):
+        Document(fields)
+
+
+def test_a_history_that_does_not_fit_changes_nothing(plain: Path) -> None:
+    document = Document.load(plain)
+    document.set("v1", rgb=(0, 0, 0))
+    document.save()
+    fields = sidecar.load(plain)
+    fields["edits"]["vertices"] = [{"vertex": "v1", "rgb": [0.5, 0.5, 0.5]}]  # by hand
+    document = Document(fields)
+    with pytest.raises(Palette4dError, match="v1"):
+        document.undo()
+    assert document.colour("v1") == (0.5, 0.5, 0.5)
+
+
+def test_versions(plain: Path) -> None:
+    document = Document.load(plain)
+    document.set("v1", rgb=(1, 0, 0))
+    document.save_version("red")
+    document.set("v1", rgb=(0, 0, 1))
+    document.save_version("blue")
+    document.save()
+    document = Document.load(plain)
+    assert document.versions == ("blue", "red")
+    assert document.same_edits("blue")
+    assert document.use_version("red") is None
+    assert document.colour("v1") == (1, 0, 0)
+    document.set("v2", rgb=(0, 1, 0))
+    assert document.use_version("blue") == "before blue"
+    document.set("v3", rgb=(0, 1, 0))
+    assert document.use_version("blue") == "before blue 2"
+    assert document.version("before blue").colour("v2") == (0, 1, 0)
+    assert document.colour("v2") != (0, 1, 0)
+    document.save()
+    core = _core.read_sidecar(plain)
+    assert [name for name, _ in core.versions] == ["before blue", "before blue 2", "blue", "red"]
+    assert Document.load(plain).versions == document.versions
+
+
+def test_a_version_is_a_document_of_its_own(plain: Path, tmp_path: Path) -> None:
+    document = Document.load(plain)
+    document.set("v1", rgb=(1, 0, 0))
+    document.save_version("red")
+    document.reset()
+    document.save()
+    red = document.version("red")
+    assert red.colour("v1") == (1, 0, 0)
+    assert red.palette(0).edited[0].tolist() == [1, 0, 0]
+    assert not document.settings
+    before = plain.read_bytes()
+    for target in ((), (plain,)):
+        with pytest.raises(Palette4dError):
+            red.save(*target)
+    assert plain.read_bytes() == before
+    red.save(tmp_path / "red.p4d.json")
+    assert Document.load(tmp_path / "red.p4d.json").colour("v1") == (1, 0, 0)
+    assert document.version("") is document
+
+
+@pytest.mark.parametrize("name", ["", "  ", "a\nb", "x" * 101])
+def test_names_of_versions(plain: Path, name: str) -> None:
+    document = Document.load(plain)
+    with pytest.raises(Palette4dError):
+        document.save_version(name)
+
+
+@pytest.mark.parametrize("method", ["use_version", "remove_version", "version", "same_edits"])
+def test_a_version_that_is_not_there(plain: Path, method: str) -> None:
+    document = Document.load(plain)
+    document.save_version("warm")
+    with pytest.raises(Palette4dError, match="warm"):
+        getattr(document, method)("cold")
+
+
+def test_a_new_analysis_keeps_steps_and_versions(plain: Path) -> None:
+    document = Document.load(plain)
+    document.set("v1", rgb=(1, 0, 0))
+    document.save_version("red")
+    document.save()
+    before = sidecar.load(plain)
+    again = Document(sidecar.load(GOLDEN / "v1_split.p4d.json"))
+    with pytest.raises(Palette4dError):
+        again.save(plain)
+    again.save(plain, on_edits="keep")
+    assert {**sidecar.load(plain), "clip": None} == {**before, "clip": None}
+    assert again.versions == ("red",)
+
+
+ACTS = st.lists(
+    st.tuples(
+        st.sampled_from(
+            ["set", "stop", "move", "ramp", "reset", "undo", "redo", "save", "load", "keep", "use"]
+        ),
+        st.integers(1, 4),
+        st.integers(1, 7),
+    ),
+    max_size=40,
+)
+
+
+def act(document: Document, name: str, i: int, j: int) -> Document:
+    if name == "set":
+        document.set(f"v{i}", rgb=(j / 8, 0, 0))
+    elif name == "stop":
+        document.stop(f"e{i}", frame=j, rgb=(0, j / 8, 0))
+    elif name == "move":
+        document.move(f"s{i}", frame=j)
+    elif name == "ramp":
+        document.set_ramp(("linear", "smooth", "hold")[j % 3], (None, f"v{i}", f"s{i}")[j % 3])
+    elif name == "reset":
+        document.reset((None, f"v{i}", f"s{i}")[j % 3])
+    elif name == "undo":
+        document.undo()
+    elif name == "redo":
+        document.redo()
+    elif name == "keep":
+        document.save_version(f"version {i}")
+    elif name == "use":
+        document.use_version(f"version {i}")
+    elif name == "save":
+        document.save()
+    else:
+        document.save()
+        return Document.load(document.path or "")
+    return document
+
+
+@settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(acts=ACTS)
+def test_any_edits_can_be_undone_and_done_again(plain: Path, acts: list[Any]) -> None:
+    first = (GOLDEN / "v1_split.p4d.json").read_bytes()
+    plain.write_bytes(first)
+    document = Document.load(plain)
+    for name, i, j in acts:
+        before = document.fields()
+        try:
+            document = act(document, name, i, j)
+        except Palette4dError:
+            assert document.fields() == before
+    document.save()
+    last = {**sidecar.load(plain), "history": None}
+    while document.history:
+        document.undo()
+    document.save()
+    bare = {n: v for n, v in sidecar.load(plain).items() if n != "history"}
+    assert sidecar.encoded(bare) == first
+    document = Document.load(plain)
+    undone = 0
+    while document.undone and undone < len(acts):
+        document.redo()
+        undone += 1
+    if not document.undone and not any(name == "undo" for name, *_ in acts):
+        assert {**document.fields(), "history": None} == last

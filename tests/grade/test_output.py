@@ -1,0 +1,93 @@
+"""What a frame shows: mattes as arrays, and values that are refused.
+
+`tests/host/test_parity_node.py` compares every output with the node, bit by bit.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from palette4d.common.errors import Palette4dError
+from palette4d.grade.document import Document
+
+EDITED = Path(__file__).resolve().parents[1] / "golden" / "sidecars" / "v1_edited.p4d.json"
+
+
+@pytest.fixture
+def document() -> Document:
+    return Document.load(EDITED)
+
+
+@pytest.fixture
+def image() -> np.ndarray:
+    return np.random.default_rng(4).uniform(-0.2, 1.2, (40, 50, 3)).astype(np.float32)
+
+
+def test_the_weights_of_a_frames_colours_sum_to_one(document, image):
+    frame = document.frames[0]
+    mattes = [document.matte(image, frame, f"weight:{id_}") for id_ in document.palette(frame).ids]
+    assert mattes[0].shape == (40, 50)
+    assert mattes[0].dtype == np.float32
+    np.testing.assert_allclose(np.sum(mattes, axis=0), 1, atol=1e-3)
+    weights = document.weights(image, frame)
+    for index, matte in enumerate(mattes):
+        np.testing.assert_allclose(matte, weights[..., index], atol=3e-4)
+
+
+def test_a_weight_follows_its_colour_along_the_edge(document, image):
+    edge = next(iter(document.core.polytope.edge_ids))
+    first, last = (document.fields()["polytope"]["edges"][0][end] for end in ("from", "to"))
+    frames = {v["id"]: v["frame"] for v in document.fields()["polytope"]["vertices"]}
+    frame = (frames[first] + frames[last]) / 2
+    index = document.palette(frame).ids.index(edge)
+    matte = document.matte(image, frame, f"weight:{first}")
+    assert np.array_equal(matte, document.matte(image, frame, f"weight:{last}"))
+    assert (matte >= document.weights(image, frame)[..., index] - 3e-4).all()
+
+
+def test_outside_is_0_inside_and_1_far_away(document):
+    palette = document.palette(document.frames[0])
+    inside, far = palette.rgb.mean(axis=0), np.array([0, 0, 9])
+    points = np.array([[inside, inside + far, inside - far]], np.float32)
+    assert document.matte(points, document.frames[0], "outside").tolist() == [[0, 1, 1]]
+    near = document.matte(points, document.frames[0], "outside", outside_at=100)
+    assert (near[0, 1:] > 0).all()
+    assert (near[0, 1:] < 0.2).all()
+
+
+def test_kept_lightness_is_the_images(document, image):
+    weights = np.array([0.299, 0.587, 0.114])
+    edit = document.recolour(image, 6)
+    kept = document.recolour(image, 6, keep_lightness=1, lightness_of="rec601")
+    np.testing.assert_allclose(kept @ weights, image @ weights, atol=1e-5)
+    assert np.abs(edit @ weights - image @ weights).max() > 0.01
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"show": "weight"}, "weight:ID"),
+        ({"show": "weight:"}, "weight:ID"),
+        ({"show": "outside:v1"}, "outside"),
+        ({"show": "weight:nothing"}, "nothing"),
+        ({"keep_lightness": 1.5}, "0 to 1"),
+        ({"mix": float("nan")}, "0 to 1"),
+        ({"strength": -0.1}, "0 to 1"),
+        ({"lightness_of": "xyz"}, "rec709"),
+        ({"matte_in": "red"}, "alpha"),
+        ({"outside_at": 0}, "0.0001"),
+        ({"space": "lab"}, "input"),
+    ],
+)
+def test_other_values_are_refused(document, image, given, said):
+    with pytest.raises(Palette4dError, match=said):
+        document.recolour(image, 3, **given)
+
+
+@pytest.mark.parametrize("show", ["palette", "recoloured"])
+def test_a_picture_is_no_matte(document, image, show):
+    with pytest.raises(Palette4dError, match="weight:ID"):
+        document.matte(image, 3, show)

@@ -1,0 +1,135 @@
+"""Several processes edit one sidecar at once; no acknowledged edit is lost."""
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from palette4d.common import locking
+from palette4d.common.errors import Palette4dError
+from palette4d.grade.document import Document
+
+GOLDEN = Path(__file__).parents[1] / "golden" / "sidecars"
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="flock is there only")
+
+# The children wait for a common start. An error is an edit that is not acknowledged.
+WRITER = """
+import errno, fcntl, json, os, sys, time
+from palette4d.common.errors import Palette4dError
+from palette4d.grade.document import Document
+
+path, edge, count, error, start = sys.argv[1:]
+if error:
+    def flock(handle, operation):
+        raise OSError(getattr(errno, error), error)
+    fcntl.flock = flock
+while not os.path.exists(start):
+    time.sleep(0.001)
+acknowledged, refused = [], 0
+for i in range(int(count)):
+    try:
+        document = Document.load(path)
+        frame = 0.5 + i / 32
+        document.stop(edge, frame=frame, rgb=(i / 1000, 0.25, 0.5))
+        document.save()
+    except Palette4dError:
+        refused += 1
+    else:
+        acknowledged.append([edge, frame, i / 1000])
+print(json.dumps([acknowledged, refused]))
+"""
+
+
+def children(path: Path, count: int, error: str) -> tuple[list[list[object]], int]:
+    start = path.with_name("start")
+    run = [
+        subprocess.Popen(
+            [sys.executable, "-c", WRITER, str(path), edge, str(count), error, str(start)],
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        for edge in ("e1", "e2", "e4", "e3")
+    ]
+    time.sleep(0.5)
+    start.touch()
+    acknowledged, refused = [], 0
+    for child in run:
+        out, _ = child.communicate(timeout=300)
+        assert child.returncode == 0
+        found, not_found = json.loads(out)
+        acknowledged += found
+        refused += not_found
+    return acknowledged, refused
+
+
+@pytest.mark.parametrize(
+    ("error", "count"),
+    [
+        ("", 25),
+        ("ENOLCK", 25),
+        pytest.param("EOPNOTSUPP", 150, marks=pytest.mark.slow),
+    ],
+)
+def test_no_acknowledged_edit_is_lost(tmp_path: Path, error: str, count: int) -> None:
+    path = tmp_path / "clip.p4d.json"
+    path.write_bytes((GOLDEN / "v1_split.p4d.json").read_bytes())
+    acknowledged, refused = children(path, count, error)
+    document = Document.load(path)
+    found: dict[object, float] = {(s.edge, s.frame): s.rgb[0] for s in document.settings.values()}
+    for edge, frame, red in acknowledged:
+        assert found.pop((edge, frame)) == red
+    assert not found
+    assert refused <= count // 5
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["clip.p4d.json", "start"]
+
+
+def test_a_lock_file_of_a_dead_process_is_removed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(locking, "_flocked", lambda *_: False)
+    monkeypatch.setattr(locking, "LOCK_SECONDS", 0.3)
+    path = tmp_path / "clip.p4d.json"
+    path.write_bytes((GOLDEN / "v1_split.p4d.json").read_bytes())
+    left = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            "import os, sys; from pathlib import Path; from palette4d.common import locking\n"
+            "locking._flocked = lambda *_: False\n"
+            f"with locking.locked(Path({str(path)!r})): os._exit(0)",
+        ],
+        check=True,
+    )
+    assert left.returncode == 0
+    lock = tmp_path / ".clip.p4d.json.lock"
+    assert lock.exists()
+    document = Document.load(path)
+    document.set("v1", rgb=(0.5, 0.5, 0.5))
+    document.save()
+    assert [file.name for file in tmp_path.iterdir()] == ["clip.p4d.json"]
+    # The lock of a computer that cannot be asked is respected.
+    lock.write_text("elsewhere 1 abc")
+    document.set("v1", rgb=(0.6, 0.5, 0.5))
+    before = path.read_bytes()
+    with pytest.raises(Palette4dError, match=r"elsewhere.*\.lock"):
+        document.save()
+    assert path.read_bytes() == before
+    lock.unlink()
+    document.save()
+
+
+def test_a_lock_that_was_taken_away_stops_the_write(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(locking, "_flocked", lambda *_: False)
+    target = tmp_path / "clip.p4d.json"
+    with locking.locked(target) as held:
+        held()
+        (tmp_path / ".clip.p4d.json.lock").write_text("another 1 abc")
+        with pytest.raises(Palette4dError):
+            held()
+    assert (tmp_path / ".clip.p4d.json.lock").read_text() == "another 1 abc"
