@@ -236,8 +236,8 @@ def _together(a: Pick, b: Pick, step: float) -> float | None:
     return None
 
 
-def outside_range(pick: Pick, frames: tuple[int, int, int]) -> None:
-    """Refuse a pick whose range is empty or lies outside the clip.
+def check_range(pick: Pick, frames: tuple[int, int, int]) -> None:
+    """Refuse a pick whose range is empty or outside the clip, or whose radius is not positive.
 
     Raises
     ------
@@ -247,7 +247,7 @@ def outside_range(pick: Pick, frames: tuple[int, int, int]) -> None:
     first, last, _ = frames
     start = first if pick.start is None else pick.start
     until = last if pick.until is None else pick.until
-    if start > until:
+    if not start <= until:
         raise Palette4dError(
             f"found the range from frame {start:g} until {until:g}, expected a first frame that is "
             "not after the last one"
@@ -257,6 +257,14 @@ def outside_range(pick: Pick, frames: tuple[int, int, int]) -> None:
             f"the range from frame {start:g} until {until:g} lies outside the clip; choose frames "
             f"from {first} to {last}"
         )
+    if not 0 <= pick.fade <= 1e9:
+        raise Palette4dError(f"found a fade of {pick.fade:g} frames, expected 0 or more")
+    if pick.radius is not None and not 1e-4 <= pick.radius <= 1e6:
+        raise Palette4dError(
+            f"found the radius {pick.radius:g}, expected 0.0001 or more, such as 0.2"
+        )
+    if pick.toward not in ("shift", "colour"):
+        raise Palette4dError(f"found toward {pick.toward!r}, expected 'shift' or 'colour'")
 
 
 def _number(value: float) -> float:
