@@ -89,7 +89,7 @@ def between_error(
         else:
             farthest[look, True] = frame
     chosen = set(farthest.values())
-    if sidecar.edits.vertex_rgb or sidecar.edits.stops:
+    if not sidecar.edits.empty:
         chosen |= set(series.stops(sidecar)) - own
     viewing = viewing_of(str(sidecar.clip["encoding"]))
     worst: BetweenError | None = None

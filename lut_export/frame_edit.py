@@ -39,7 +39,7 @@ def check_frame(sidecar: _core.Sidecar, frame: float) -> None:
 
 @dataclass(frozen=True)
 class FrameEdit:
-    """p' = p + strength * sum_i w_i(q(p)) (v'_i - v_i), the recolouring at one time.
+    """p' = p + strength * (sum_i w_i(q(p)) (v'_i - v_i) + bumps at p), the edit at one time.
 
     Attributes
     ----------
@@ -51,6 +51,8 @@ class FrameEdit:
         The slice's triangles.
     strength : float
         0 leaves colours alone, 1 is the edit.
+    bumps : (b, 7) float64
+        Centre, radius and displacement of what moves besides the palette.
     recolourer : Recolourer
         The node's own code for the edit.
     conversion : ColourConversion or None
@@ -61,6 +63,7 @@ class FrameEdit:
     edited: F64
     faces: NDArray[np.int32]
     strength: float
+    bumps: F64
     recolourer: _core.Recolourer
     conversion: _core.ColourConversion | None = None
 
@@ -82,11 +85,19 @@ class FrameEdit:
             return points
         at = points if self.conversion is None else self.conversion.to_palette(points)
         weights, _ = _core.palette_weights(at, self.palette, self.faces)
-        step = self.strength * (weights @ (self.edited - self.palette))
+        step = self.strength * (weights @ (self.edited - self.palette) + self._bumped(at))
         if self.conversion is None:
             return points + step
         moved = (step != 0).any(axis=1, keepdims=True)
         return np.where(moved, self.conversion.to_clip(at + step), points)
+
+    def _bumped(self, at: F64) -> F64:
+        """Return the (m, 3) displacements of (m, 3) colours by the bumps, at strength 1."""
+        step = np.zeros_like(at)
+        for bump in self.bumps:
+            within = 1 - ((at - bump[:3]) ** 2).sum(axis=1, keepdims=True) / bump[3] ** 2
+            step += np.maximum(within, 0) ** 3 * bump[4:]
+        return step
 
 
 def frame_edit(
@@ -118,11 +129,13 @@ def frame_edit(
         raise Palette4dError(f"strength {strength} is not possible; expected 0 to 1")
     palette = _core.slice_at(sidecar.polytope, frame)
     edited = _core.edited_colours(sidecar.polytope, sidecar.edits, palette)
+    bumps = sidecar.edits.bumps_at(palette.frame)
     return FrameEdit(
         palette=palette.rgb,
         edited=edited,
         faces=palette.faces,
         strength=float(strength),
-        recolourer=_core.Recolourer(palette.rgb, edited, palette.faces),
+        bumps=bumps,
+        recolourer=_core.Recolourer(palette.rgb, edited, palette.faces, bumps=bumps),
         conversion=conversion,
     )

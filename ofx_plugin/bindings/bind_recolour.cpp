@@ -91,14 +91,15 @@ py::array apply(const Map& self, const py::array& image, double strength, bool p
 void bind_recolour(py::module_& module) {
     py::class_<Recolourer, std::shared_ptr<Recolourer>>(
         module, "Recolourer",
-        "One frame's recolouring: p' = p + strength * sum_i w_i(q) (v'_i - v_i).")
-        .def(py::init(
-                 [](const py::object& original, const py::object& edited, const py::object& faces) {
-                     return std::make_unique<Recolourer>(colours_from(original, "original"),
-                                                         colours_from(edited, "edited"),
-                                                         faces_from(faces));
-                 }),
-             py::arg("original"), py::arg("edited"), py::arg("faces"))
+        "One frame's recolouring: p' = p + strength * (sum_i w_i(q) (v'_i - v_i) + bumps at p).")
+        .def(py::init([](const py::object& original, const py::object& edited,
+                         const py::object& faces, const py::object& bumps) {
+                 return std::make_unique<Recolourer>(colours_from(original, "original"),
+                                                     colours_from(edited, "edited"),
+                                                     faces_from(faces), bumps_from(bumps));
+             }),
+             py::arg("original"), py::arg("edited"), py::arg("faces"), py::kw_only(),
+             py::arg("bumps") = py::none())
         .def_property_readonly(
             "identity", [](const Recolourer& self) { return !self.moves(); },
             "True when no colour moves: apply() then copies bit for bit.")

@@ -18,6 +18,8 @@ using palette4d::Edits;
 using palette4d::Ramp;
 using palette4d::Sidecar;
 using palette4d::Vec3;
+using palette4d::bindings::DoubleArray;
+using palette4d::bindings::to_array;
 
 namespace {
 
@@ -166,18 +168,17 @@ py::dict solution_of(const NamedEdits& self) {
     return result;
 }
 
-/// Seven columns, as palette4d::bindings::bumps_from() takes them.
-py::array bumps_of(const Edits& self, double frame) {
+bool empty(const NamedEdits& self) {
+    const palette4d::Solution& solution = self.solution;
+    return std::none_of(self.vertex_rgb.begin(), self.vertex_rgb.end(),
+                        [](const auto& rgb) { return rgb.has_value(); }) &&
+           self.stops.empty() && solution.vertex_by.empty() && solution.keys.empty() &&
+           solution.bumps.empty();
+}
+
+DoubleArray bumps_of(const Edits& self, double frame) {
     if (std::isnan(frame)) throw py::value_error("bumps_at: frame is not a number");
-    const std::vector<palette4d::Bump> bumps = palette4d::bumps_at(self, frame);
-    py::array_t<double> array({static_cast<py::ssize_t>(bumps.size()), py::ssize_t{7}});
-    double* out = array.mutable_data();
-    for (const palette4d::Bump& bump : bumps) {
-        out = std::copy(bump.centre.begin(), bump.centre.end(), out);
-        *out++ = bump.radius;
-        out = std::copy(bump.by.begin(), bump.by.end(), out);
-    }
-    return array;
+    return to_array(palette4d::bumps_at(self, frame));
 }
 
 /// (name, edits) of each version.
@@ -207,6 +208,7 @@ void bind_sidecar(py::module_& module) {
         .def_property_readonly("ramp",
                                [](const NamedEdits& self) { return name_of(self.default_ramp); })
         .def_property_readonly("solution", &solution_of)
+        .def_property_readonly("empty", &empty)
         .def("bumps_at", &bumps_of, py::arg("frame"),
              "(n, 7) float64: centre, radius and displacement of the bumps at a frame.");
 
@@ -221,8 +223,12 @@ void bind_sidecar(py::module_& module) {
         .def_property_readonly("versions", &versions_of)
         .def(
             "bumps_at",
-            [](const BoundSidecar& self, double frame) { return bumps_of(self.edits, frame); },
-            py::arg("frame"), "edits.bumps_at(frame).")
+            [](const BoundSidecar& self, double frame) {
+                const palette4d::Polytope& polytope = self.sidecar.polytope;
+                return bumps_of(self.edits,
+                                std::clamp(frame, polytope.first_frame(), polytope.last_frame()));
+            },
+            py::arg("frame"), "The bumps of the active edits; outside the clip, at its ends.")
         .def_property_readonly("conversion", [](const BoundSidecar& self) {
             // Shared with the sidecar; Python cannot modify it.
             return std::const_pointer_cast<palette4d::ClipConversion>(self.sidecar.conversion);

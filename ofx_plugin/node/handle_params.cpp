@@ -171,9 +171,9 @@ void notice_undone(const Params& params, ShownHandles& shown) {
     for (std::size_t i = 0; i < shown.size(); ++i) {
         ShownHandle& slot = shown[i];
         if (all_are_back && slot.before) {
-            slot = {slot.before, std::nullopt, slot.given, false};
+            slot = {slot.before, std::nullopt, slot.given, false, false};
         } else if (holds(params, slots()[i], slot.declined)) {  // redone
-            slot = {slot.declined, slot.given, std::nullopt, false};
+            slot = {slot.declined, slot.given, std::nullopt, false, false};
         }
     }
 }
@@ -226,7 +226,10 @@ void show_handles(const Params& params, const Chosen& chosen, ShownHandles& show
             for (ShownHandle& other : shown) other.before.reset();
         }
         given_one = true;
-        if (params.set_rgb(slot.colour.c_str(), rgb)) shown[i] = {rgb, now, std::nullopt, false};
+        if (!params.set_rgb(slot.colour.c_str(), rgb)) continue;
+        // The colour of a slot that was in use may be typed again after a reset.
+        const std::optional<Vec3> before = shown[i].was_used ? std::nullopt : now;
+        shown[i] = {rgb, before, std::nullopt, false, false};
     }
 }
 
@@ -235,11 +238,12 @@ namespace {
 /// Restores the slot's defaults; show_handles() then sets its handle's colour.
 void reset(const Params& params, const Slot& slot, ShownHandle& shown) {
     if (params.animated(slot.colour.c_str())) params.remove_keys(slot.colour.c_str());
-    if (params.int_now(slot.use.c_str()).value_or(0) != 0) params.set_int(slot.use.c_str(), 0);
+    const bool in_use = params.int_now(slot.use.c_str()).value_or(0) != 0;
+    if (in_use) params.set_int(slot.use.c_str(), 0);
     if (!params.string_now(slot.id.c_str()).value_or("").empty()) {
         params.set_string(slot.id.c_str(), "");
     }
-    shown = {params.rgb_now(slot.colour.c_str()), std::nullopt, shown.declined, false};
+    shown = {params.rgb_now(slot.colour.c_str()), std::nullopt, shown.declined, false, in_use};
 }
 
 void colour_changed(const Params& params, const Chosen& chosen, const Slot& slot,

@@ -41,6 +41,7 @@ struct ShownHandle {
     std::optional<Vec3> before;    ///< the colour before that, if set in the last batch
     std::optional<Vec3> declined;  ///< a colour that the user has undone
     bool switched_on = false;      ///< by handle_changed(), not by the user
+    bool was_used = false;         ///< before a reset, whose undo switches it on again
 };
 using ShownHandles = std::array<ShownHandle, kHandleSlots>;
 

@@ -203,13 +203,8 @@ void refresh(Entry& entry, const fs::path& path, const std::string& name) {
     entry.result = {nullptr, name + ": " + problem};
 }
 
-std::vector<Vec3> edited_at(const Sidecar& sidecar, const Slice& slice, const AppliedEdits& edits) {
-    const Polytope& polytope = sidecar.polytope;
-    if (edits.sidecar && edits.host.empty()) {
-        return edited_colours(polytope, sidecar.edits, slice);
-    }
-    return edited_colours(polytope,
-                          with_colours(polytope, sidecar.edits, edits.sidecar, edits.host), slice);
+Edits all_of(const Sidecar& sidecar, const AppliedEdits& edits) {
+    return with_colours(sidecar.polytope, sidecar.edits, edits.sidecar, edits.host);
 }
 
 std::shared_ptr<Entry> entry_of(const std::string& key) {
@@ -268,7 +263,7 @@ std::shared_ptr<const Recolourer> LoadedSidecar::surface_at(double frame) {
 std::pair<std::vector<Vec3>, std::vector<Vec3>> LoadedSidecar::palette_at(
     double frame, const AppliedEdits& edits) const {
     Slice slice = slice_at(sidecar_.polytope, frame);
-    return {slice.rgb, edited_at(sidecar_, slice, edits)};
+    return {slice.rgb, edited_colours(sidecar_.polytope, all_of(sidecar_, edits), slice)};
 }
 
 LoadedSidecar::Key LoadedSidecar::clamped(const Key& wanted) const {
@@ -361,10 +356,14 @@ std::shared_ptr<const Recolourer> LoadedSidecar::prepare(const Key& key) const {
     const auto& [frame, purpose, handle, edits] = key;
     Slice slice = slice_at(sidecar_.polytope, frame);
     std::vector<Vec3> edited;
+    std::vector<Bump> bumps;
     switch (purpose) {
-        case Purpose::kEdit:
-            edited = edited_at(sidecar_, slice, edits);
+        case Purpose::kEdit: {
+            const Edits all = all_of(sidecar_, edits);
+            edited = edited_colours(sidecar_.polytope, all, slice);
+            bumps = bumps_at(all, slice.frame);
             break;
+        }
         case Purpose::kWeight:
             edited = weight_reader(slice, Lineage(sidecar_.polytope, sidecar_.edits, handle));
             break;
@@ -372,7 +371,8 @@ std::shared_ptr<const Recolourer> LoadedSidecar::prepare(const Key& key) const {
             edited = surface_reader(slice);
             break;
     }
-    return std::make_shared<const Recolourer>(std::move(slice.rgb), edited, std::move(slice.faces));
+    return std::make_shared<const Recolourer>(std::move(slice.rgb), edited, std::move(slice.faces),
+                                              std::move(bumps));
 }
 
 SidecarResult load_sidecar(const std::string& path) {

@@ -54,6 +54,9 @@ class Edits:
     @property
     def solution(self) -> dict[str, Any]:
         """vertices, keys and bumps as in the file; vertices that do not move are left out."""
+    @property
+    def empty(self) -> bool:
+        """Whether nothing is edited: no vertex, no stop and no solution."""
     def bumps_at(self, frame: float) -> F64:
         """(n, 7) float64: centre (3), radius and displacement (3) of the bumps at a frame."""
 
@@ -96,7 +99,7 @@ class Sidecar:
     def versions(self) -> list[tuple[str, Edits]]:
         """Names and edits of the kept versions, in the file's order."""
     def bumps_at(self, frame: float) -> F64:
-        """``edits.bumps_at(frame)``."""
+        """The bumps of the active edits; outside the clip, those at its ends."""
     @property
     def conversion(self) -> ClipConversion | None:
         """None where the palette is in the clip's own numbers."""
@@ -143,9 +146,20 @@ def polytope_weights(points: ArrayLike, polytope: Polytope, frame: float) -> F64
     """Eq. 7: (m, 3) colours at one time -> (m, N) weights of the N polytope vertices."""
 
 class Recolourer:
-    """One frame's recolouring: p' = p + strength * sum_i w_i(q) (v'_i - v_i)."""
+    """One frame's recolouring: p' = p + strength * (sum_i w_i(q) (v'_i - v_i) + bumps at p).
 
-    def __init__(self, original: ArrayLike, edited: ArrayLike, faces: ArrayLike) -> None: ...
+    `bumps` is (n, 7), as `Edits.bumps_at` gives it. A bump at `centre` with a `radius` moves p by
+    max(0, 1 - |p - centre|^2 / radius^2)^3 times its displacement.
+    """
+
+    def __init__(
+        self,
+        original: ArrayLike,
+        edited: ArrayLike,
+        faces: ArrayLike,
+        *,
+        bumps: ArrayLike | None = ...,
+    ) -> None: ...
     @property
     def identity(self) -> bool: ...
     def apply(

@@ -57,7 +57,8 @@ def by_core(frame: float, pixels: np.ndarray, *, strength: float = 1.0, premulti
     palette = _core.slice_at(sidecar.polytope, frame)
     edited = _core.edited_colours(sidecar.polytope, sidecar.edits, palette)
     assert not np.array_equal(edited, palette.rgb)
-    recolourer = _core.Recolourer(palette.rgb, edited, palette.faces)
+    bumps = sidecar.edits.bumps_at(palette.frame)
+    recolourer = _core.Recolourer(palette.rgb, edited, palette.faces, bumps=bumps)
     return recolourer.apply(
         pixels, strength=strength, premultiplied=premultiplied, threads=1, precision="single"
     )

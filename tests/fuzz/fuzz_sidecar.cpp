@@ -22,7 +22,7 @@ void use(const Sidecar& sidecar, double frame) {
     const std::vector<Handle> handles = handles_of(sidecar.polytope, sidecar.edits);
     const Lineage lineage(sidecar.polytope, sidecar.edits, static_cast<int>(handles.size()) - 1);
     const Recolourer edit(slice.rgb, edited_colours(sidecar.polytope, sidecar.edits, slice),
-                          slice.faces);
+                          slice.faces, bumps_at(sidecar.edits, slice.frame));
     const Recolourer weight(slice.rgb, weight_reader(slice, lineage), slice.faces);
     const float pixels[3][4] = {{0.2f, 0.4f, 0.6f, 1}, {-1, 7, 0.5f, 0.5f}, {0, 0, 0, 0}};
     float result[3][4];

@@ -125,7 +125,7 @@ std::vector<unsigned char> recoloured(const palette4d::Sidecar& sidecar, double 
     using namespace palette4d;
     const Slice slice = slice_at(sidecar.polytope, frame);
     const Recolourer recolourer(slice.rgb, edited_colours(sidecar.polytope, sidecar.edits, slice),
-                                slice.faces);
+                                slice.faces, bumps_at(sidecar.edits, slice.frame));
     const std::vector<unsigned char> pixels = picture.pixels(area);
     const strict::Layout& layout = picture.layout();
     const int width = area.x2 - area.x1, height = area.y2 - area.y1;

@@ -48,7 +48,8 @@ def recolour(
     """What the core makes of a frame, clamped to 0..1 as files of integers are."""
     cut = _core.slice_at(sidecar.polytope, frame)
     edited = _core.edited_colours(sidecar.polytope, sidecar.edits, cut)
-    recolourer = _core.Recolourer(cut.rgb, edited, cut.faces)
+    bumps = sidecar.edits.bumps_at(cut.frame)
+    recolourer = _core.Recolourer(cut.rgb, edited, cut.faces, bumps=bumps)
     top = np.float32(np.iinfo(image.dtype).max)
     values = image.astype(np.float32) / top
     return np.clip(recolourer.apply(values, strength=strength, precision="single"), 0, 1)

@@ -209,6 +209,21 @@ TEST(changing_a_colour_brings_it_into_use) {
     CHECK(graded.render(1) == graded.expected(graded.parsed.edits, 1));
 }
 
+TEST(the_same_colour_after_a_reset_is_an_edit_again) {
+    Graded graded;
+    Instance& node = *graded.node;
+    for (int turn = 0; turn < 3; ++turn) {
+        node.set("handle02", Colour{1, 1, 0});
+        CHECK(node.changed("handle02") == kOfxStatOK);
+        CHECK(std::get<int>(node.value("handle02On")) == 1);
+        palette4d::Edits edits = graded.parsed.edits;
+        edits.vertex_rgb[1] = palette4d::Vec3{1, 1, 0};
+        CHECK(graded.render(1) == graded.expected(edits, 1));
+        CHECK(node.changed("resetHandles") == kOfxStatOK);
+        CHECK(graded.render(1) == graded.expected(graded.parsed.edits, 1));
+    }
+}
+
 TEST(colours_that_change_together_are_all_kept) {
     Graded graded;
     Instance& node = *graded.node;

@@ -50,7 +50,8 @@ std::vector<float> recoloured(const palette4d::Sidecar& sidecar, const palette4d
                               double frame) {
     palette4d::Slice slice = palette4d::slice_at(sidecar.polytope, frame);
     const auto edited = palette4d::edited_colours(sidecar.polytope, edits, slice);
-    const palette4d::Recolourer recolourer(slice.rgb, edited, slice.faces);
+    const palette4d::Recolourer recolourer(slice.rgb, edited, slice.faces,
+                                           palette4d::bumps_at(edits, slice.frame));
     std::vector<float> pixels = source_pixels();
     recolourer.apply({pixels.data(), kWidth, kHeight, 4, kWidth * 16},
                      {pixels.data(), kWidth, kHeight, 4, kWidth * 16}, {});

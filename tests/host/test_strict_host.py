@@ -47,7 +47,8 @@ def through_the_core(
     sidecar = _core.read_sidecar(str(path))
     cut = _core.slice_at(sidecar.polytope, frame)
     edited = _core.edited_colours(sidecar.polytope, sidecar.edits, cut)
-    recolourer = _core.Recolourer(cut.rgb, edited, cut.faces)
+    bumps = sidecar.edits.bumps_at(cut.frame)
+    recolourer = _core.Recolourer(cut.rgb, edited, cut.faces, bumps=bumps)
     conversion = None if sidecar.conversion is None else sidecar.conversion.steps
 
     def apply(values: Picture) -> Picture:

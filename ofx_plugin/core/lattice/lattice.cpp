@@ -23,7 +23,9 @@ public:
           strength_(static_cast<float>(options.strength)),
           premultiplied_(options.premultiplied),
           channels_(channels),
-          exact_(exact_worker(recolourer, options, channels)),
+          bumps_(store.bumps()),
+          set_bumps_(kernels_of<BumpKernels>(options.instructions).set),
+          exact_(exact_worker(recolourer, options, channels, true)),
           builder_(store, options.instructions) {
         waiting_.reserve(kMostLeft + kWaiting);
     }
@@ -94,8 +96,10 @@ private:
             others |= kernels_.choose_sides(store_.planes(), b, count);
         }
         kernels_.weigh(b, count);
+        const bool bumps = bumps_.count > 0 && set_bumps_(bumps_, b.colour, bumped_, count);
         if (blocks_++ % kSampleEvery == 0) sample(static_cast<int>(blocks_ % count));
         kernels_.blend(store_.nodes(), b, count, from, to, channels_, strength_, premultiplied_);
+        if (bumps) add_bumps(to, count);
         interpolated_ += count;
         if ((others & kLatticeKind) == 0) return true;
         for (int i = 0; i < count; ++i) {
@@ -105,6 +109,18 @@ private:
             }
         }
         return true;
+    }
+
+    /// Moves the block's interpolated pixels by bumped_.
+    void add_bumps(float* to, int count) const {
+        for (int i = 0; i < count; ++i, to += channels_) {
+            if ((block_.state[i] & kLatticeKind) != kLatticeGood) continue;
+            const float by = premultiplied_ ? to[3] * strength_ : strength_;
+            for (int c = 0; c < 3; ++c) {
+                const float moved = bumped_[c][i];
+                if (moved != 0) to[c] += by * moved;
+            }
+        }
     }
 
     /// Fills the states in block_. Returns how they differ from kGood, combined: below 0 when some
@@ -156,6 +172,7 @@ private:
             }
             sampled_.push_back(block_.colour[c][i]);
             sampled_moves_.push_back(moved);
+            sampled_bumps_.push_back(bumped_[c][i]);
         }
         if (sampled_.size() >= 3 * 1024) check_samples();
     }
@@ -164,14 +181,16 @@ private:
         const float* const exact = builder_.displacements(sampled_.data(), sampled_.size() / 3);
         double largest = 0;
         for (std::size_t i = 0; i < sampled_.size(); ++i) {
-            largest = std::max(largest, lattice_error(static_cast<double>(sampled_[i]),
-                                                      static_cast<double>(exact[i]),
-                                                      static_cast<double>(sampled_moves_[i]) -
-                                                          static_cast<double>(exact[i])));
+            const double displacement = static_cast<double>(exact[i]),
+                         bump = static_cast<double>(sampled_bumps_[i]);
+            largest = std::max(
+                largest, lattice_error(static_cast<double>(sampled_[i]), displacement + bump,
+                                       static_cast<double>(sampled_moves_[i]) - displacement));
         }
         store_.saw_error(largest);
         sampled_.clear();
         sampled_moves_.clear();
+        sampled_bumps_.clear();
     }
 
     Store& store_;
@@ -179,19 +198,22 @@ private:
     const float strength_;
     const bool premultiplied_;
     const int channels_;
+    const BumpPlan<float> bumps_;
+    decltype(BumpKernels::set) const set_bumps_;
     std::unique_ptr<ExactWorker> exact_;
     Store::Builder builder_;
     LatticeBlock block_{};
+    alignas(64) float bumped_[3][kSize]{};  ///< what the bumps do to the block's colours
     std::vector<Waiting> waiting_;
     std::size_t left_ = 0;  ///< blocks still waiting after the last do_waiting()
-    std::vector<float> sampled_, sampled_moves_;
+    std::vector<float> sampled_, sampled_moves_, sampled_bumps_;
     long long interpolated_ = 0, blocks_ = 0;
 };
 
 Lattice::Lattice(std::shared_ptr<const Recolourer> recolourer)
     : recolourer_(std::move(recolourer)) {
     if (!recolourer_) throw std::invalid_argument("lattice: no recolourer");
-    if (recolourer_->moves()) store_ = std::make_unique<Store>(*recolourer_);
+    if (recolourer_->palette_moves()) store_ = std::make_unique<Store>(*recolourer_);
 }
 
 Lattice::~Lattice() = default;
@@ -201,7 +223,8 @@ double Lattice::largest_error() const { return store_ ? store_->largest_error() 
 Lattice::Size Lattice::size() const { return store_ ? store_->size() : Size{}; }
 
 std::unique_ptr<RowWorker> Lattice::worker(const RecolourOptions& options, int channels) const {
-    if (options.precision == Precision::kDouble || options.strength <= 0 || options.strength > 1) {
+    if (!store_ || options.precision == Precision::kDouble || options.strength <= 0 ||
+        options.strength > 1) {
         return recolourer_->worker(options, channels);
     }
     return std::make_unique<Worker>(*recolourer_, *store_, options, channels);

@@ -20,6 +20,8 @@ namespace palette4d {
 /// Outside a convex palette (PaletteRegions) the displacement is affine in each region and needs no
 /// interpolation. Its nodes then hold mean value coordinates extended beyond the surface. So cells
 /// that the surface crosses interpolate smoothly.
+///
+/// Bumps are not interpolated: they are evaluated at each colour.
 class Lattice final : public ColourMap {
 public:
     /// Bound of |interpolated - exact| / max(|exact|, 0.1) for each channel. Probes use a tighter

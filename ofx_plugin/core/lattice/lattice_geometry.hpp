@@ -128,17 +128,7 @@ inline Point centre_of(const float* low, const float* step, const LatticePlace& 
     return centre;
 }
 
-/// The unit of relative errors, as in lattice_error().
-inline Four size_of(Four colour, Four moved) {
-    const Four exact = colour + moved, least = all_four(0.1f);
-    return where_negative(colour * exact, least, max(abs(exact), least));
-}
-
 inline float largest_of(Four error) { return std::max(std::max(error[0], error[1]), error[2]); }
-
-inline Four relative(Four error, Four colour, Four moved) {
-    return abs(error) / size_of(colour, moved);
-}
 
 }  // namespace
 }  // namespace palette4d

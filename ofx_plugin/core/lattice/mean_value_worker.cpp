@@ -43,8 +43,8 @@ void MeanValueWorker::Stage<T>::run(std::size_t count, const From& from, const T
 
 MeanValueWorker::MeanValueWorker(const Recolourer& recolourer, InstructionSet instructions)
     : recolourer_(recolourer),
-      single_(recolourer.plan().single, kernels_of<BlockKernels>(instructions).single),
-      twofold_(recolourer.plan().twofold, kernels_of<BlockKernels>(instructions).twofold),
+      single_(recolourer.plan().single.palette, kernels_of<BlockKernels>(instructions).single),
+      twofold_(recolourer.plan().twofold.palette, kernels_of<BlockKernels>(instructions).twofold),
       weights_(recolourer.original().size()) {}
 
 void MeanValueWorker::displacements(const float* colours, std::size_t count, float* moved) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include "recolour/one_by_one.hpp"
@@ -13,18 +14,31 @@ namespace palette4d {
 
 namespace {
 
+/// In place of the palette's kernels where no vertex moves.
+template <class T>
+void all_inside(const Plan<T>&, Block<T>& block, int count, T, T, T*) {
+    std::fill_n(block.verdict, count, T(1));
+}
+template <class T>
+void stay(const Plan<T>&, Block<T>& block, int, T, T*) {
+    for (T(&channel)[Block<T>::kSize] : block.moved) std::fill(channel, std::end(channel), T(0));
+}
+
 /// Collects pixels in blocks and sorts them into inside and outside the palette; one kernel for
 /// each computes the displacement. Pixels whose error a kernel cannot guarantee go to the next
 /// stage: float, double, one by one. A pixel's stage depends on its colour alone.
 class Pipeline final : public ExactWorker {
 public:
-    Pipeline(const Recolourer& recolourer, const RecolourOptions& options, int channels)
+    Pipeline(const Recolourer& recolourer, const RecolourOptions& options, int channels, bool bumps)
         : divide_(options.premultiplied),
           channels_(channels),
-          one_by_one_(recolourer, options, channels),
+          one_by_one_(recolourer, options, channels, bumps),
           twofold_(recolourer.plan().twofold,
-                   kernels_of<BlockKernels>(options.instructions).twofold, options, one_by_one_),
+                   kernels_of<BlockKernels>(options.instructions).twofold,
+                   bumps ? kernels_of<BumpKernels>(options.instructions).add_twofold : nullptr,
+                   options, one_by_one_),
           single_(recolourer.plan().single, kernels_of<BlockKernels>(options.instructions).single,
+                  bumps ? kernels_of<BumpKernels>(options.instructions).add_single : nullptr,
                   options, twofold_) {}
 
     void row(const float* from, float* to, int width) override {
@@ -61,12 +75,20 @@ public:
 private:
     template <class T, class Next>
     class Stage {
+        using AddBumps = void (*)(const BumpPlan<T>&, BumpKernels::Channels<const T>,
+                                  BumpKernels::Channels<const T>, BumpKernels::Channels<T>, int);
+
     public:
-        Stage(const PlanMemory<T>& plan, const Kernels<T>& kernels, const RecolourOptions& options,
-              Next& next)
-            : plan_(plan.plan()),
-              usable_(plan.usable()),
-              kernels_(kernels),
+        /// Without `add_bumps` there are none.
+        Stage(const PlanOf<T>& plan, const Kernels<T>& kernels, AddBumps add_bumps,
+              const RecolourOptions& options, Next& next)
+            : plan_(plan.palette.plan()),
+              usable_(plan.palette.usable()),
+              kernels_(usable_ && plan_.mover_count == 0
+                           ? Kernels<T>{&all_inside<T>, &stay<T>, &stay<T>, kernels.move}
+                           : kernels),
+              bumps_(plan.bumps.plan()),
+              add_bumps_(bumps_.count > 0 ? add_bumps : nullptr),
               strength_(static_cast<T>(options.strength)),
               divide_(options.premultiplied),
               // Half of the guaranteed tolerance; the other half is for rounding the result.
@@ -110,8 +132,7 @@ private:
             }
             const Kernel kernel = all_good ? same_kernel(batch.block, count) : nullptr;
             if (kernel) {
-                kernel(plan_, batch.block, count, tolerance_, scratch_.data());
-                kernels_.move(batch.block, count, strength_, divide_);
+                displace(kernel, batch.block, count);
             }
             for (int i = 0; i < count; ++i) {
                 const float* from = in + i * Channels;
@@ -173,6 +194,12 @@ private:
             }
         };
 
+        void displace(Kernel kernel, Block<T>& block, int count) {
+            kernel(plan_, block, count, tolerance_, scratch_.data());
+            if (add_bumps_) add_bumps_(bumps_, block.high, block.low, block.moved, count);
+            kernels_.move(block, count, strength_, divide_);
+        }
+
         /// The kernel for the whole block when its verdicts agree, else null.
         Kernel same_kernel(const Block<T>& block, int count) const {
             int inside = 0, outside = 0;
@@ -224,8 +251,7 @@ private:
 
         void flush(Batch& batch, Kernel kernel) {
             if (batch.count == 0) return;
-            kernel(plan_, batch.block, batch.count, tolerance_, scratch_.data());
-            kernels_.move(batch.block, batch.count, strength_, divide_);
+            displace(kernel, batch.block, batch.count);
             for (int i = 0; i < batch.count; ++i) {
                 float* to = batch.to[i];
                 if (batch.block.verdict[i] > 0) {
@@ -241,6 +267,8 @@ private:
         const Plan<T>& plan_;
         const bool usable_;
         const Kernels<T> kernels_;
+        const BumpPlan<T> bumps_;
+        const AddBumps add_bumps_;
         const T strength_;
         const bool divide_;
         const T tolerance_;
@@ -262,8 +290,9 @@ private:
 }  // namespace
 
 std::unique_ptr<ExactWorker> exact_worker(const Recolourer& recolourer,
-                                          const RecolourOptions& options, int channels) {
-    return std::make_unique<Pipeline>(recolourer, options, channels);
+                                          const RecolourOptions& options, int channels,
+                                          bool bumps) {
+    return std::make_unique<Pipeline>(recolourer, options, channels, bumps);
 }
 
 }  // namespace palette4d

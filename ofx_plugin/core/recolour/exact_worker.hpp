@@ -13,8 +13,8 @@ public:
     virtual void pixel(const float* from, float* to) = 0;
 };
 
-/// `recolourer` must outlive the worker and move some colour.
+/// `recolourer` must outlive the worker and move some colour. Its bumps count only with `bumps`.
 std::unique_ptr<ExactWorker> exact_worker(const Recolourer& recolourer,
-                                          const RecolourOptions& options, int channels);
+                                          const RecolourOptions& options, int channels, bool bumps);
 
 }  // namespace palette4d

@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <cstring>
 
+#include "model/vec3.hpp"
+
 namespace palette4d {
 namespace {
 
@@ -21,11 +23,13 @@ std::size_t slot(const Vec3& p) {
 
 }  // namespace
 
-OneByOne::OneByOne(const Recolourer& recolourer, const RecolourOptions& options, int channels)
+OneByOne::OneByOne(const Recolourer& recolourer, const RecolourOptions& options, int channels,
+                   bool bumps)
     : recolourer_(recolourer),
       strength_(options.strength),
       divide_(options.premultiplied),
       channels_(channels),
+      bumps_(bumps),
       weights_(recolourer.original().size()) {}
 
 void OneByOne::row(const float* from, float* to, int width) {
@@ -55,7 +59,9 @@ const Vec3& OneByOne::displacement(const Vec3& p) {
     if (memory_.empty()) memory_.assign(kSlots, Entry{{0, 0, 0}, {0, 0, 0}, false});
     Entry& entry = memory_[slot(p)];
     if (!entry.known || entry.colour != p) {
-        entry = {p, recolourer_.displacement_at(p, weights_, workspace_), true};
+        Vec3 moved = recolourer_.palette_displacement(p, weights_, workspace_);
+        if (bumps_) moved = moved + recolourer_.bumps_displacement(p);
+        entry = {p, moved, true};
     }
     return entry.displacement;
 }

@@ -12,8 +12,9 @@ namespace palette4d {
 /// on the colour alone, so the cache does not change results.
 class OneByOne final : public RowWorker {
 public:
-    /// `recolourer` must outlive this and move some colour.
-    OneByOne(const Recolourer& recolourer, const RecolourOptions& options, int channels);
+    /// `recolourer` must outlive this and move some colour. Its bumps count only with `bumps`.
+    OneByOne(const Recolourer& recolourer, const RecolourOptions& options, int channels,
+             bool bumps);
 
     void row(const float* from, float* to, int width) override;
     void finish() override {}
@@ -33,6 +34,7 @@ private:
     const double strength_;
     const bool divide_;
     const int channels_;
+    const bool bumps_;
     std::vector<double> weights_;
     PaletteBody::Workspace workspace_;
     std::vector<Entry> memory_;

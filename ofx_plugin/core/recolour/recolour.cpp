@@ -1,5 +1,7 @@
 #include "recolour/recolour.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -12,8 +14,8 @@
 namespace palette4d {
 
 Recolourer::Recolourer(std::vector<Vec3> original, const std::vector<Vec3>& edited,
-                       std::vector<Face> faces)
-    : body_(std::move(original), std::move(faces)) {
+                       std::vector<Face> faces, std::vector<Bump> bumps)
+    : body_(std::move(original), std::move(faces)), bumps_(std::move(bumps)) {
     const std::vector<Vec3>& colours = body_.rgb();
     if (edited.size() != colours.size()) {
         throw std::invalid_argument("recolour: " + std::to_string(edited.size()) +
@@ -28,16 +30,36 @@ Recolourer::Recolourer(std::vector<Vec3> original, const std::vector<Vec3>& edit
         displacement_.push_back(edited[i] - colours[i]);
         if (displacement_[i] != Vec3{0, 0, 0}) displaced_.push_back(static_cast<int>(i));
     }
-    if (!displaced_.empty()) plan_ = std::make_unique<RecolourPlan>(body_, displacement_);
+    for (const Bump& bump : bumps_) {
+        if (!finite(bump.centre) || !finite(bump.by) || !(bump.radius > 0) ||
+            !std::isfinite(bump.radius)) {
+            throw std::invalid_argument(
+                "recolour: found a bump with a number that is not finite, or with no radius");
+        }
+    }
+    const auto still = [](const Bump& bump) { return bump.by == Vec3{0, 0, 0}; };
+    bumps_.erase(std::remove_if(bumps_.begin(), bumps_.end(), still), bumps_.end());
+    if (moves()) plan_ = std::make_unique<RecolourPlan>(body_, displacement_, bumps_);
 }
 
 Recolourer::~Recolourer() = default;
 
-Vec3 Recolourer::displacement_at(const Vec3& p, std::vector<double>& weights,
-                                 PaletteBody::Workspace& workspace) const {
+Vec3 Recolourer::palette_displacement(const Vec3& p, std::vector<double>& weights,
+                                      PaletteBody::Workspace& workspace) const {
+    if (!palette_moves()) return {0, 0, 0};
     body_.project(p, weights.data(), workspace);
     Vec3 sum{};
     for (const int i : displaced_) sum = sum + weights[i] * displacement_[i];
+    return sum;
+}
+
+Vec3 Recolourer::bumps_displacement(const Vec3& p) const {
+    Vec3 sum{};
+    for (const Bump& bump : bumps_) {
+        const Vec3 away = bump.centre - p;
+        const double t = std::max(0.0, 1 - dot(away, away) / (bump.radius * bump.radius));
+        add(sum, t * t * t, bump.by);
+    }
     return sum;
 }
 
@@ -45,7 +67,7 @@ Vec3 Recolourer::displaced(const Vec3& p, double strength) const {
     if (!moves() || strength == 0 || !finite(p)) return p;
     std::vector<double> weights(body_.rgb().size());
     PaletteBody::Workspace workspace;
-    const Vec3 moved = displacement_at(p, weights, workspace);
+    const Vec3 moved = palette_displacement(p, weights, workspace) + bumps_displacement(p);
     Vec3 result = p;
     for (std::size_t c = 0; c < 3; ++c) {
         const double step = strength * moved[c];
@@ -56,9 +78,9 @@ Vec3 Recolourer::displaced(const Vec3& p, double strength) const {
 
 std::unique_ptr<RowWorker> Recolourer::worker(const RecolourOptions& options, int channels) const {
     if (options.precision == Precision::kDouble) {
-        return std::make_unique<OneByOne>(*this, options, channels);
+        return std::make_unique<OneByOne>(*this, options, channels, true);
     }
-    return exact_worker(*this, options, channels);
+    return exact_worker(*this, options, channels, true);
 }
 
 }  // namespace palette4d

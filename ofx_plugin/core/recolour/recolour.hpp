@@ -1,9 +1,10 @@
-// Recolouring of images: p' = p + strength * sum_i w_i(q) (v'_i - v_i).
+// Recolouring of images: p' = p + strength * (sum_i w_i(q) (v'_i - v_i) + the bumps at p).
 #pragma once
 
 #include <memory>
 #include <vector>
 
+#include "model/edits.hpp"
 #include "recolour/colour_map.hpp"
 #include "recolour/palette_body.hpp"
 
@@ -14,15 +15,18 @@ struct RecolourPlan;
 /// Prepared once per frame; const, so many threads share it.
 class Recolourer final : public ColourMap {
 public:
-    /// n original and n edited colours, and the faces between them, all finite. Throws
+    /// n original and n edited colours, the faces between them, and any bumps, all finite. Throws
     /// std::invalid_argument when they do not match.
-    Recolourer(std::vector<Vec3> original, const std::vector<Vec3>& edited,
-               std::vector<Face> faces);
+    Recolourer(std::vector<Vec3> original, const std::vector<Vec3>& edited, std::vector<Face> faces,
+               std::vector<Bump> bumps = {});
     ~Recolourer() override;
     Recolourer(const Recolourer&) = delete;
     Recolourer& operator=(const Recolourer&) = delete;
 
-    bool moves() const override { return !displaced_.empty(); }
+    bool moves() const override { return palette_moves() || !bumps_.empty(); }
+    /// Whether some vertex moves.
+    bool palette_moves() const { return !displaced_.empty(); }
+    const std::vector<Bump>& bumps() const { return bumps_; }
     std::unique_ptr<RowWorker> worker(const RecolourOptions& options, int channels) const override;
     const std::vector<Vec3>& original() const { return body_.rgb(); }
     /// For the core's own sources; the plan exists only where some colour moves.
@@ -35,13 +39,16 @@ public:
 private:
     friend class OneByOne;
 
-    /// At strength 1. `p` must be finite; `weights` has one element per vertex.
-    Vec3 displacement_at(const Vec3& p, std::vector<double>& weights,
-                         PaletteBody::Workspace& workspace) const;
+    /// At strength 1, without bumps. `p` must be finite; `weights` has one element per vertex.
+    Vec3 palette_displacement(const Vec3& p, std::vector<double>& weights,
+                              PaletteBody::Workspace& workspace) const;
+    /// What the bumps do, at strength 1.
+    Vec3 bumps_displacement(const Vec3& p) const;
 
     PaletteBody body_;
     std::vector<Vec3> displacement_;  ///< edited - original, one per vertex
     std::vector<int> displaced_;      ///< indices of the vertices that move
+    std::vector<Bump> bumps_;         ///< those that move a colour
     std::unique_ptr<const RecolourPlan> plan_;
 };
 

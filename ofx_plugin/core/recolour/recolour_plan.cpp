@@ -61,6 +61,10 @@ PlanMemory<T>::PlanMemory(const PaletteBody& body, const std::vector<Vec3>& disp
         round(delta, mover.delta);
         movers_.push_back(mover);
     }
+    if (movers_.empty()) {
+        usable_ = true;
+        return;
+    }
     plan_.spread = static_cast<T>(largest(high - low));
     // Leaves room, so that products of three lengths and of their inverses do not overflow.
     const double room = sizeof(T) == sizeof(float) ? 1e6 : 1e40;
@@ -173,7 +177,20 @@ void PlanMemory<T>::add_surface(const PaletteBody& body, const std::vector<Vec3>
     }
 }
 
+template <class T>
+BumpMemory<T>::BumpMemory(const std::vector<Bump>& bumps) {
+    for (const Bump& bump : bumps) {
+        typename BumpPlan<T>::One one;
+        split(bump.centre, one.high, one.low);
+        one.inverse_radius2 = static_cast<T>(1 / (bump.radius * bump.radius));
+        round(bump.by, one.by);
+        bumps_.push_back(one);
+    }
+}
+
 template class PlanMemory<float>;
 template class PlanMemory<double>;
+template class BumpMemory<float>;
+template class BumpMemory<double>;
 
 }  // namespace palette4d

@@ -4,7 +4,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "model/edits.hpp"
 #include "recolour/block_kernels.hpp"
+#include "recolour/bump_kernels.hpp"
 #include "recolour/palette_body.hpp"
 
 namespace palette4d {
@@ -18,7 +20,8 @@ public:
     PlanMemory& operator=(const PlanMemory&) = delete;
 
     const Plan<T>& plan() const { return plan_; }
-    /// Whether squares and products of the palette's lengths stay within the range of T.
+    /// Whether squares and products of the palette's lengths stay within the range of T. True
+    /// where no vertex moves: plan() then has no movers, and nothing else.
     bool usable() const { return usable_; }
 
 private:
@@ -39,6 +42,20 @@ private:
 extern template class PlanMemory<float>;
 extern template class PlanMemory<double>;
 
+/// The memory that a BumpPlan points to.
+template <class T>
+class BumpMemory {
+public:
+    explicit BumpMemory(const std::vector<Bump>& bumps);
+    BumpPlan<T> plan() const { return {bumps_.data(), static_cast<int>(bumps_.size())}; }
+
+private:
+    std::vector<typename BumpPlan<T>::One> bumps_;
+};
+
+extern template class BumpMemory<float>;
+extern template class BumpMemory<double>;
+
 /// Scratch memory for kernels, aligned.
 template <class T>
 class Scratch {
@@ -55,12 +72,21 @@ private:
     std::vector<T> memory_;
 };
 
+/// The plans of one palette and edit in one precision.
+template <class T>
+struct PlanOf {
+    PlanMemory<T> palette;
+    BumpMemory<T> bumps;
+};
+
 /// The plans of one palette and edit in both precisions.
 struct RecolourPlan {
-    RecolourPlan(const PaletteBody& body, const std::vector<Vec3>& displacement)
-        : single(body, displacement), twofold(body, displacement) {}
-    PlanMemory<float> single;
-    PlanMemory<double> twofold;
+    RecolourPlan(const PaletteBody& body, const std::vector<Vec3>& displacement,
+                 const std::vector<Bump>& bumps)
+        : single{{body, displacement}, BumpMemory<float>(bumps)},
+          twofold{{body, displacement}, BumpMemory<double>(bumps)} {}
+    PlanOf<float> single;
+    PlanOf<double> twofold;
 };
 
 }  // namespace palette4d

@@ -940,7 +940,9 @@ class Document:
         pixels = _checked_image(image)
         palette = self.palette(frame)
         self._conversion(space)
-        recolourer = _core.Recolourer(palette.rgb, palette.edited, palette.faces)
+        recolourer = _core.Recolourer(
+            palette.rgb, palette.edited, palette.faces, bumps=palette.bumps
+        )
         return output.draw(
             pixels,
             self.core,

@@ -112,9 +112,10 @@ def column(
     shape = Shape(rgb, np.asarray(edited), faces, even_sample(image, pixels))
     step = max(1, image.shape[1] // width)
     small = np.ascontiguousarray(image[::step, ::step], dtype=np.float32)
-    if not (sidecar.edits.vertex_rgb or sidecar.edits.stops):
+    if sidecar.edits.empty:
         return Column(frame, shape, (small,))
-    recolourer = _core.Recolourer(palette.rgb, edited, palette.faces)
+    bumps = sidecar.edits.bumps_at(palette.frame)
+    recolourer = _core.Recolourer(palette.rgb, edited, palette.faces, bumps=bumps)
     return Column(frame, shape, (small, recolourer.apply(small, threads=0)))
 
 

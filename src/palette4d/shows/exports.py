@@ -270,7 +270,7 @@ def _chooser(
     """Return sidecar -> its frames to bake; in a show an unedited shot has one stop."""
 
     def choose(sidecar: _core.Sidecar) -> tuple[int, ...]:
-        if stops and show and not (sidecar.edits.vertex_rgb or sidecar.edits.stops):
+        if stops and show and sidecar.edits.empty:
             return series.every(sidecar, 1)[:1]
         if stops:
             return series.stops(sidecar)

@@ -1,14 +1,567 @@
-"""Inspector: a view of the session."""
+"""The inspector: the selected colour, what it becomes, and the picks and holds.
 
-from PySide6.QtWidgets import QWidget
+Its wheel, bars and numbers all choose a colour; what that changes is the scope: the selected
+handles, their tracks, or the whole palette.
+"""
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import (
+    QButtonGroup,
+    QComboBox,
+    QDoubleSpinBox,
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QPushButton,
+    QScrollArea,
+    QSizePolicy,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from palette4d.common.errors import Palette4dError
+from palette4d.grade.document import Document
+from palette4d.grade.edits import RAMPS, as_colour
+from palette4d.plotting import style
+from palette4d.studio import texts, theme
+from palette4d.studio.colour_widgets import Bar, Swatch, Wheel
+from palette4d.studio.lch import Lch
+from palette4d.studio.screen_colours import on_screen
 from palette4d.studio.session import Session
+
+F64 = NDArray[np.float64]
+U8 = NDArray[np.uint8]
+Scope = Literal["handle", "track", "palette"]
+
+#: The width that a scroll bar takes.
+SCROLL_BAR = 10
+#: Colours of a bar.
+SAMPLES = 24
+
+
+@dataclass(frozen=True)
+class Target:
+    """What is inspected.
+
+    Attributes
+    ----------
+    id : str
+        A vertex, a stop, or an edge at the playhead.
+    kind : str
+        "vertex", "stop" or "edge".
+    frame : float
+        Where the colour is.
+    before, after : (3,) float64
+        The colour as analysed and as edited, in the palette's code values.
+    """
+
+    id: str
+    kind: Literal["vertex", "stop", "edge"]
+    frame: float
+    before: F64
+    after: F64
+
+
+def target_of(document: Document, id_: str, frame: float) -> Target | None:
+    """Return a selected handle or palette colour; None if it is not there at the playhead."""
+    polytope = document.core.polytope
+    if id_ in polytope.vertex_ids:
+        at = float(np.asarray(polytope.vertices)[polytope.vertex_ids.index(id_), 3])
+        return _in_palette(document, id_, "vertex", id_, at)
+    setting = document.settings.get(id_)
+    if setting is not None and setting.edge is not None and setting.frame is not None:
+        return _in_palette(document, id_, "stop", setting.edge, setting.frame)
+    if id_ in polytope.edge_ids:
+        found = _in_palette(document, id_, "edge", id_, frame)
+        if found is not None:
+            return found
+        # At its ends an edge is its vertex.
+        start, end = np.asarray(polytope.edges)[polytope.edge_ids.index(id_)]
+        for vertex in (start, end):
+            if float(np.asarray(polytope.vertices)[vertex, 3]) == frame:
+                return target_of(document, polytope.vertex_ids[vertex], frame)
+    return None
+
+
+def _in_palette(
+    document: Document,
+    id_: str,
+    kind: Literal["vertex", "stop", "edge"],
+    place: str,
+    frame: float,
+) -> Target | None:
+    palette = document.palette(frame)
+    if place not in palette.ids:
+        return None
+    index = palette.ids.index(place)
+    return Target(id_, kind, frame, palette.rgb[index], palette.edited[index])
 
 
 class Inspector(QWidget):
-    """A place for the view."""
+    """The inspector of a session."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         """Listen to the session."""
         super().__init__(parent)
         self.session = session
+        self.scope: Scope = "handle"
+        self.target: Target | None = None
+        self._lch: tuple[str, Lch] | None = None
+        self._silent = False
+        self._make()
+        for event in ("document", "selection", "frame", "view", "clip"):
+            session.on(event, self.refresh)
+        self.refresh()
+
+    # ------------------------------------------------------------------------------------- layout
+
+    def _make(self) -> None:
+        content = QWidget()
+        column = QVBoxLayout(content)
+        column.setContentsMargins(10, 8, 10, 10)
+        column.setSpacing(8)
+        column.addLayout(self._make_head())
+        column.addLayout(self._make_scope())
+        column.addLayout(self._make_colour())
+        column.addLayout(self._make_hex())
+        column.addLayout(self._make_buttons())
+        column.addStretch(1)
+        area = QScrollArea()
+        area.setWidget(content)
+        area.setWidgetResizable(True)
+        area.setFrameShape(QScrollArea.Shape.NoFrame)
+        area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        area.setMinimumWidth(content.minimumSizeHint().width() + SCROLL_BAR)
+        whole = QVBoxLayout(self)
+        whole.setContentsMargins(0, 0, 0, 0)
+        whole.addWidget(area)
+        self.column = column
+
+    def _make_head(self) -> QHBoxLayout:
+        row = QHBoxLayout()
+        self.swatch = Swatch()
+        self.title, self.place = QLabel(), QLabel()
+        self.title.setStyleSheet(f"color: {theme.BRIGHT}; font-weight: bold")
+        self.place.setStyleSheet(f"color: {theme.FAINT}")
+        self.place.setWordWrap(True)
+        words = QVBoxLayout()
+        words.setSpacing(1)
+        words.addWidget(self.title)
+        words.addWidget(self.place)
+        row.addWidget(self.swatch)
+        row.addSpacing(4)
+        row.addLayout(words, 1)
+        return row
+
+    def _make_scope(self) -> QHBoxLayout:
+        row = QHBoxLayout()
+        row.setSpacing(0)
+        group = QButtonGroup(self)
+        self.scopes: dict[str, QToolButton] = {}
+        for name, text in texts.SCOPES.items():
+            button = QToolButton()
+            button.setText(text)
+            button.setCheckable(True)
+            button.setToolTip(texts.SCOPE_TIPS[name])
+            button.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+            button.clicked.connect(lambda _=False, name=name: self.set_scope(name))
+            group.addButton(button)
+            row.addWidget(button)
+            self.scopes[name] = button
+        self.scopes["handle"].setChecked(True)
+        row.addSpacing(8)
+        label = QLabel(texts.RAMP)
+        label.setStyleSheet(f"color: {theme.FAINT}")
+        row.addWidget(label)
+        row.addSpacing(4)
+        self.ramp = QComboBox()
+        label.setBuddy(self.ramp)
+        self.ramp.setSizeAdjustPolicy(
+            QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
+        )
+        self.ramp.setMinimumContentsLength(8)
+        self.ramp.setAccessibleName(texts.RAMP)
+        self.ramp.setToolTip(texts.RAMP_TIP)
+        self.ramp.addItem(texts.RAMP_OF_CLIP, None)
+        for ramp in RAMPS:
+            self.ramp.addItem(texts.RAMPS[ramp], ramp)
+        self.ramp.activated.connect(self._ramp_chosen)
+        row.addWidget(self.ramp)
+        return row
+
+    def _make_colour(self) -> QHBoxLayout:
+        row = QHBoxLayout()
+        row.setSpacing(10)
+        self.wheel = Wheel()
+        self.wheel.setAccessibleName(texts.WHEEL)
+        self.wheel.setToolTip(texts.WHEEL_TIP)
+        self.wheel.moved.connect(self._wheel_moved)
+        self.wheel.let_go.connect(self.session.drop)
+        row.addWidget(self.wheel, 0, Qt.AlignmentFlag.AlignTop)
+        grid = QGridLayout()
+        grid.setHorizontalSpacing(4)
+        grid.setVerticalSpacing(2)
+        self.bars: dict[str, Bar] = {}
+        self.boxes: dict[str, QDoubleSpinBox] = {}
+        for line, (name, (text, step, decimals)) in enumerate(
+            {
+                "L": (texts.LIGHTNESS, 0.005, 3),
+                "C": (texts.CHROMA, 0.005, 3),
+                "h": (texts.HUE, 1.0, 1),
+                "R": (texts.RED, 0.005, 4),
+                "G": (texts.GREEN, 0.005, 4),
+                "B": (texts.BLUE, 0.005, 4),
+            }.items()
+        ):
+            label = QLabel(name)
+            label.setToolTip(text)
+            bar, box = Bar(text, step), QDoubleSpinBox()
+            bar.setToolTip(text)
+            box.setAccessibleName(text)
+            box.setDecimals(decimals)
+            box.setRange(-1e6, 1e6)
+            box.setSingleStep(step)
+            box.setKeyboardTracking(False)
+            box.setFixedWidth(60)
+            box.valueChanged.connect(lambda value, name=name: self._typed(name, value))
+            bar.moved.connect(lambda value, name=name: self._bar_moved(name, value))
+            bar.let_go.connect(self.session.drop)
+            label.setBuddy(box)
+            for place, part in enumerate((label, bar, box)):
+                grid.addWidget(part, line + (line >= 3), place)
+            self.bars[name], self.boxes[name] = bar, box
+        grid.setRowMinimumHeight(3, 4)
+        grid.setColumnStretch(1, 1)
+        row.addLayout(grid, 1)
+        return row
+
+    def _make_hex(self) -> QHBoxLayout:
+        row = QHBoxLayout()
+        row.setSpacing(6)
+        self.hex, self.hex_label, self.shown_hex = QLineEdit(), QLabel(texts.HEX), QLabel()
+        self.hex.setFixedWidth(74)
+        self.hex.setAccessibleName(texts.HEX)
+        self.hex.setToolTip(texts.HEX_TIP)
+        self.hex.editingFinished.connect(self._hex_typed)
+        self.hex_label.setBuddy(self.hex)
+        self.shown_hex.setStyleSheet(f"color: {theme.FAINT}")
+        self.shown_hex.setToolTip(texts.SHOWN_TIP)
+        self.shown_hex.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        row.addWidget(self.hex_label)
+        row.addWidget(self.hex)
+        row.addWidget(self.shown_hex, 1)
+        return row
+
+    def _make_buttons(self) -> QHBoxLayout:
+        row = QHBoxLayout()
+        row.setSpacing(6)
+        self.dropper = QPushButton(texts.EYEDROPPER)
+        self.dropper.setCheckable(True)
+        self.dropper.setToolTip(texts.EYEDROPPER_TIP)
+        self.reset = QPushButton(texts.RESET_SHORT)
+        self.reset.setToolTip(texts.RESET)
+        self.reset.clicked.connect(self.reset_target)
+        row.addWidget(self.dropper)
+        row.addWidget(self.reset)
+        row.addStretch(1)
+        return row
+
+    # ----------------------------------------------------------------------------- what it shows
+
+    @property
+    def lch(self) -> Lch:
+        """The conversion of the document's palette."""
+        document = self.session.document
+        encoding = "unknown" if document is None else document.encoding
+        if self._lch is None or self._lch[0] != encoding:
+            self._lch = encoding, Lch(encoding)
+        return self._lch[1]
+
+    def refresh(self) -> None:
+        """Show the selected colour."""
+        document, session = self.session.document, self.session
+        targets = []
+        if document is not None:
+            found = (target_of(document, id_, session.frame) for id_ in session.selection)
+            targets = [target for target in found if target is not None]
+        self.target = targets[0] if targets else None
+        self._silent = True
+        try:
+            self._show_words(len(session.selection))
+            self._show_colour(targets[1:])
+            self._show_ramp()
+        finally:
+            self._silent = False
+
+    def _show_words(self, count: int) -> None:
+        target = self.target
+        on = target is not None
+        parts = (self.wheel, self.hex, self.dropper, self.reset, *self.bars.values())
+        for part in (*parts, *self.boxes.values(), *self.scopes.values()):
+            part.setEnabled(on)
+        if target is None:
+            self.title.setText(texts.NOTHING_SELECTED)
+            self.place.setText(texts.SELECT_HINT if self.session.document is not None else "")
+            return
+        kinds = {"vertex": texts.VERTEX, "stop": texts.STOP, "edge": texts.EDGE}
+        more = texts.AND_MORE.format(count=count - 1) if count > 1 else ""
+        self.title.setText(f"{target.id}{more}")
+        where = f"{texts.FRAME} {style.number(target.frame)}"
+        self.place.setText(f"{kinds[target.kind]} · {where}")
+
+    def shown(self, rgb: F64) -> U8:
+        """Return what the screen shows of code values of the palette."""
+        return on_screen(self.session, rgb)
+
+    def _show_colour(self, others: list[Target]) -> None:
+        target = self.target
+        if target is None:
+            grey = np.full(3, 0x32, np.uint8)
+            self.swatch.show_colours(grey, grey, ("", ""))
+            self.hex.clear()
+            self.shown_hex.clear()
+            for box in self.boxes.values():
+                box.clear()
+            return
+        before, after = self.shown(np.stack([target.before, target.after]))
+        self.swatch.show_colours(before, after, (texts.BEFORE, texts.AFTER))
+        lch = self.lch
+        now, origin = lch.of(target.after), lch.of(target.before)
+        if now[1] < 1e-4:  # a grey keeps the hue that it had
+            now[2] = origin[2]
+        convert = (lch, self.shown, (self._lch and self._lch[0], self.session.looked))
+        self.wheel.show_colour(now, origin, [lch.of(o.after) for o in others], convert)
+        self._show_bars(now, origin, target)
+        self.hex.setText(hex_of(self.in_clip(target.after)))
+        self.shown_hex.setText(f"{texts.ON_SCREEN} #{bytes(after.tolist()).hex()}")
+
+    def _show_bars(self, now: F64, origin: F64, target: Target) -> None:
+        lch = self.lch
+        limits = {
+            "L": (0.0, max(1.0, float(now[0]) * 1.25, float(origin[0]) * 1.25)),
+            "C": (0.0, max(0.33, float(now[1]) * 1.1)),
+            "h": (0.0, 360.0),
+        }
+        for k, name in enumerate("LCh"):
+            low, high = limits[name]
+            range_ = np.repeat(now[None], SAMPLES, axis=0)
+            range_[:, k] = np.linspace(low, high, SAMPLES)
+            colours = self.shown(lch.fitted(range_))
+            self.bars[name].show_value(float(now[k]), float(origin[k]), low, high, colours)
+            self._set_box(name, float(now[k]))
+        both = np.concatenate([target.before, target.after])
+        low, high = min(0.0, float(both.min())), max(1.0, float(both.max()))
+        for k, name in enumerate("RGB"):
+            range_ = np.repeat(target.after[None], SAMPLES, axis=0)
+            range_[:, k] = np.linspace(low, high, SAMPLES)
+            value, origin_value = float(target.after[k]), float(target.before[k])
+            self.bars[name].show_value(value, origin_value, low, high, self.shown(range_))
+            self._set_box(name, value)
+
+    def _set_box(self, name: str, value: float) -> None:
+        box = self.boxes[name]
+        if not box.lineEdit().hasFocus() or not box.lineEdit().isModified():
+            box.setValue(value)
+
+    def _show_ramp(self) -> None:
+        document, target = self.session.document, self.target
+        own = None
+        if document is not None and target is not None and target.id in document.settings:
+            own = document.settings[target.id].ramp
+        can = target is None or (document is not None and target.id in document.settings)
+        self.ramp.setEnabled(document is not None and can)
+        shown = own
+        if target is None and document is not None:
+            shown = document.ramp
+        self.ramp.setCurrentIndex(max(0, self.ramp.findData(shown)))
+
+    def in_clip(self, rgb: F64) -> F64:
+        """Return code values of the clip for code values of the palette."""
+        document = self.session.document
+        own = None if document is None else document.core.conversion
+        return rgb if own is None else np.asarray(own.steps.to_clip(rgb))
+
+    def in_palette(self, rgb: F64) -> F64:
+        """Return code values of the palette for code values of the clip."""
+        document = self.session.document
+        own = None if document is None else document.core.conversion
+        return rgb if own is None else np.asarray(own.steps.to_palette(rgb))
+
+    # --------------------------------------------------------------------------------- what it does
+
+    def set_scope(self, scope: str) -> None:
+        """Choose what a new colour changes."""
+        assert scope in ("handle", "track", "palette")
+        self.scope = scope  # type: ignore[assignment]
+        self.scopes[scope].setChecked(True)
+
+    def operation(self, rgb: F64) -> Callable[[Document], object] | None:
+        """Return the edit that gives the inspected colour a new colour, within the scope."""
+        target = self.target
+        if target is None:
+            return None
+        ids, frame = self.session.selection, float(self.session.frame)
+        return Recolour(target.id, target.frame, ids, frame, tuple(rgb.tolist()))
+
+    def try_colour(self, rgb: F64) -> None:
+        """Show a colour without keeping it; `session.drop` keeps it."""
+        operation = self.operation(rgb)
+        if operation is not None:
+            self.session.drag(operation, self._said())
+
+    def set_colour(self, rgb: F64) -> None:
+        """Give the inspected colour a new colour."""
+        operation = self.operation(rgb)
+        if operation is not None:
+            self.session.edit(operation, self._said())
+
+    def _said(self) -> str:
+        return texts.COLOUR_SET.format(id=self.target.id if self.target is not None else "")
+
+    def _now(self) -> F64:
+        assert self.target is not None
+        lch = self.lch.of(self.target.after)
+        if lch[1] < 1e-4:
+            lch[2] = self.wheel.lch[2]
+        return lch
+
+    def _wheel_moved(self, value: tuple[float, float]) -> None:
+        if self.target is not None:
+            lch = self._now()
+            lch[1:] = value
+            self.try_colour(self.lch.fitted(lch))
+
+    def _with(self, name: str, value: float) -> F64:
+        """Return the inspected colour with one of its numbers changed."""
+        assert self.target is not None
+        if name in "RGB":
+            rgb = self.target.after.copy()
+            rgb["RGB".index(name)] = value
+            return rgb
+        lch = self._now()
+        lch["LCh".index(name)] = value % 360 if name == "h" else max(value, 0.0)
+        return self.lch.fitted(lch)
+
+    def _bar_moved(self, name: str, value: float) -> None:
+        if self.target is not None:
+            self.try_colour(self._with(name, value))
+
+    def _typed(self, name: str, value: float) -> None:
+        if not self._silent and self.target is not None:
+            self.set_colour(self._with(name, value))
+
+    def _hex_typed(self) -> None:
+        if self._silent or self.target is None or not self.hex.isModified():
+            return
+        self.hex.setModified(False)
+        text = self.hex.text().strip()
+        try:
+            rgb = as_colour(text if text.startswith("#") else f"#{text}")
+        except Palette4dError as error:
+            self.session.report(error)
+            self.refresh()
+            return
+        self.set_colour(self.in_palette(np.asarray(rgb)))
+
+    def _ramp_chosen(self, index: int) -> None:
+        ramp, target = self.ramp.itemData(index), self.target
+        document = self.session.document
+        if document is None:
+            return
+        if ramp is None:
+            ramp = document.ramp
+        ids: tuple[str | None, ...] = (None,)
+        if target is not None:
+            ids = tuple(id_ for id_ in self.session.selection if id_ in document.settings)
+
+        def change(document: Document) -> None:
+            with document.one_step(texts.RAMP_STEP.format(ramp=ramp)):
+                for id_ in ids:
+                    document.set_ramp(ramp, id_)
+
+        self.session.edit(change, texts.RAMP_SET.format(ramp=texts.RAMPS[ramp]))
+
+    def reset_target(self) -> None:
+        """Reset the selected vertices, and remove the selected stops."""
+        document = self.session.document
+        ids = (
+            []
+            if document is None
+            else [i for i in self.session.selection if i in document.settings]
+        )
+
+        def reset(document: Document) -> None:
+            with document.one_step(texts.WAS_RESET.format(ids=", ".join(ids))):
+                for id_ in ids:
+                    document.reset(id_)
+
+        if ids:
+            self.session.edit(reset, texts.WAS_RESET.format(ids=", ".join(ids)))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Escape takes a drag back."""
+        if event.key() == Qt.Key.Key_Escape and self.session.dragging:
+            self.session.cancel()
+            return
+        super().keyPressEvent(event)
+
+
+@dataclass(frozen=True)
+class Recolour:
+    """The edit that gives a colour to a handle, and the same change to others.
+
+    Attributes
+    ----------
+    id, frame : str and float
+        The inspected vertex or stop, or an edge at a frame.
+    ids : tuple of str
+        All selected handles.
+    playhead : float
+        The time at which selected edges move.
+    rgb : tuple of float
+        The new colour.
+    """
+
+    id: str
+    frame: float
+    ids: tuple[str, ...]
+    playhead: float
+    rgb: tuple[float, ...]
+
+    def __call__(self, document: Document) -> None:
+        """Do it, as one step."""
+        first = target_of(document, self.id, self.frame)
+        if first is None:
+            return
+        by = np.asarray(self.rgb) - first.after
+        with document.one_step(texts.COLOUR_SET.format(id=", ".join(self.ids) or self.id)):
+            for id_ in self.ids or (self.id,):
+                target = target_of(document, id_, self.playhead)
+                if target is None:
+                    continue
+                new = self.rgb if id_ == self.id else (target.after + by).tolist()
+                if target.kind == "edge":
+                    old = target.after.tolist()
+                    document.set_near(old, frame=target.frame, rgb=new, anyway=True)
+                else:
+                    document.set(target.id, rgb=new)
+
+
+def hex_of(rgb: Any) -> str:
+    """Return #rrggbb of code values 0..1; a note where they are outside of it.
+
+    >>> hex_of([1.0, 0.0, 0.2])
+    '#ff0033'
+    """
+    values = np.asarray(rgb, dtype=np.float64)
+    inside = np.rint(np.clip(values, 0, 1) * 255).astype(int).tolist()
+    return "#" + bytes(inside).hex()

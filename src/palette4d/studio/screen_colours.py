@@ -4,10 +4,13 @@ Toolkit-free. Input: code values of the palette, or pixels of the clip. Output: 
 viewer's pictures.
 """
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from palette4d.studio.display import Display, Look
 
 if TYPE_CHECKING:
     from palette4d.studio.session import Session
@@ -22,27 +25,33 @@ def on_screen(session: "Session", rgb: ArrayLike) -> U8:
     conversion = None if session.document is None else session.document.core.conversion
     if conversion is not None:
         colours = conversion.steps.to_clip(colours)
-    return _displayed(session, colours.astype(np.float32))
+    return _painted(session.display, session.looked, colours.astype(np.float32))
 
 
-def thumbnail(session: "Session", pixels: F32, frame: float, premultiplied: bool) -> U8:
-    """Return the (h, w, 3) uint8 picture of a frame's pixels with the edits, over black."""
-    if session.document is not None:
-        pixels = session.document.recolour(
-            np.ascontiguousarray(pixels), frame, premultiplied=premultiplied
-        )
-    colours, alpha = pixels[..., :3], pixels[..., 3:]
-    if alpha.size and premultiplied:
-        colours = np.divide(colours, alpha, out=np.zeros_like(colours), where=alpha > 0)
-    shown = _displayed(session, np.nan_to_num(colours))
-    return np.rint(shown * np.clip(alpha, 0, 1)).astype(np.uint8) if alpha.size else shown
+def thumbnail(session: "Session", frame: float, premultiplied: bool) -> Callable[[F32], U8]:
+    """Return a function that may run in a thread: a frame's pixels to 8 bits, with the edits.
+
+    It takes (h, w, 3 or 4) code values and returns (h, w, 3), over black.
+    """
+    document, display, look = session.document, session.display, session.looked
+
+    def picture(pixels: F32) -> U8:
+        if document is not None:
+            pixels = document.recolour(
+                np.ascontiguousarray(pixels), frame, premultiplied=premultiplied, threads=1
+            )
+        colours, alpha = pixels[..., :3], pixels[..., 3:]
+        if alpha.size and premultiplied:
+            colours = np.divide(colours, alpha, out=np.zeros_like(colours), where=alpha > 0)
+        shown = _painted(display, look, np.nan_to_num(colours))
+        return np.rint(shown * np.clip(alpha, 0, 1)).astype(np.uint8) if alpha.size else shown
+
+    return picture
 
 
-def _displayed(session: "Session", colours: F32) -> U8:
-    if session.display is None:
+def _painted(display: Display | None, look: Look, colours: F32) -> U8:
+    if display is None:
         return np.rint(np.clip(colours, 0, 1) * 255).astype(np.uint8)
     flat = np.ascontiguousarray(colours).reshape(1, -1, 3)
-    shown = session.display.painter(session.looked).paint(
-        flat, exact=flat.size < 1000, threads=False
-    )
+    shown = display.painter(look).paint(flat, exact=flat.size < 1000, threads=False)
     return np.ascontiguousarray(shown[0, :, :3]).reshape(colours.shape)

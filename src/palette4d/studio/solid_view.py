@@ -123,10 +123,10 @@ class SolidView(QWidget):
         """Return the projection; while a colour is dragged it stays as it was."""
         if self._drag is None or self._drag.index is None or self._extent is None:
             self._extent = extent_of([Shape(palette.rgb, palette.edited, palette.faces)])
-        size = max(60.0, min(self.width() - 34.0, self.height() - 74.0)) * self.zoom
+        size = max(60.0, min(self.width() - 34.0, self.height() - 34.0)) * self.zoom
         # The size of a ball around everything: it fits from all sides.
         away = float(np.linalg.norm(self._extent - 0.5, axis=1).max())
-        centre = np.array([self.width() / 2, -(self.height() - 14) / 2])
+        centre = np.array([self.width() / 2, -(self.height() - 6) / 2])
         return View(centre, 1.12 * size / (2 * away)).turned(self.azimuth, self.elevation)
 
     def places(self, palette: Palette, view: View) -> tuple[F64, F64]:
@@ -547,7 +547,8 @@ class SolidView(QWidget):
         words = texts.NOTHING_OPEN if palette is None else texts.SOLID_HINT
         if self.axis is not None:
             words = texts.SOLID_AXIS.format(axis=AXIS_NAMES[self.axis])
-        painter.drawText(QRectF(8, self.height() - tall - 6, wide, tall), foot, words)
+        words = painter.fontMetrics().elidedText(words, Qt.TextElideMode.ElideRight, int(wide))
+        painter.drawText(QRectF(8, self.height() - tall - 5, wide, tall), foot, words)
         if palette is None:
             return
         dents, turned = troubles(palette)
@@ -558,8 +559,8 @@ class SolidView(QWidget):
         said = [text for text, found in zip(said, (dents, turned), strict=True) if found.any()]
         if said:
             painter.setPen(QColor(theme.WARNING))
-            text = "⚠ " + ", ".join(said)
-            painter.drawText(QRectF(8, self.height() - 2 * tall - 9, wide, tall), foot, text)
+            head = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop
+            painter.drawText(QRectF(8, 6, wide, tall), head, "⚠ " + ", ".join(said))
 
 
 @dataclass(frozen=True)

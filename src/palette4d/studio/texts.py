@@ -179,8 +179,40 @@ WAS_RESET = "reset {ids}"
 
 # --------------------------------------------------------------------------------------- the solid
 RESET_SOLID = "Look at the solid from the front"
-SOLID_HINT = "drag turns · drag a colour moves it · with X, Y, Z along red, green, blue"
+SOLID_HINT = "drag to turn · drag a colour: X, Y, Z along R, G, B"
 SOLID_AXIS = "along {axis} alone"
 COLOUR_MOVED = "moved a colour"
 CONCAVE_EDGE, CONCAVE_EDGES = "concave edge", "concave edges"
 FLIPPED_FACE, FLIPPED_FACES = "face turned inside out", "faces turned inside out"
+
+# ----------------------------------------------------------------------------------- the inspector
+NOTHING_SELECTED = "Nothing is selected"
+SELECT_HINT = "Click a disc, a row, or a colour of the solid."
+EDGE = "row"
+AND_MORE = " and {count} more"
+SCOPES = {"handle": "Handle", "track": "Track", "palette": "Palette"}
+SCOPE_TIPS = {
+    "handle": "A new colour changes the selected handles",
+    "track": "A new colour changes the whole track of the selected colour",
+    "palette": "A new colour changes the whole palette by the same way",
+}
+RAMP = "Ramp"
+RAMP_TIP = "The way from this handle to the next; without a selection: the clip's"
+RAMP_OF_CLIP = "as the clip"
+RAMPS = {"linear": "linear", "smooth": "smooth", "hold": "hold"}
+RAMP_STEP = "ramp {ramp}"
+RAMP_SET = "ramp: {ramp}"
+WHEEL = "Hue and chroma"
+WHEEL_TIP = "Drag: hue and chroma. Shift keeps the chroma, Ctrl the hue."
+LIGHTNESS = "Lightness (OKLCh)"
+CHROMA = "Chroma (OKLCh)"
+HUE = "Hue (OKLCh, degrees)"
+RED, GREEN, BLUE = "Red code value", "Green code value", "Blue code value"
+HEX = "Hex"
+HEX_TIP = "The code values of the clip, 8 bits a channel"
+ON_SCREEN = "shown"
+SHOWN_TIP = "What the screen shows, through the display and view"
+EYEDROPPER = "Pipette"
+EYEDROPPER_TIP = "Then click the picture: the selected colour becomes the colour there"
+RESET_SHORT = "Reset"
+COLOUR_SET = "set {id}"

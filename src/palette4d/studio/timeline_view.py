@@ -6,6 +6,9 @@ lower half a line shows how much of the edit acts: the ramp. The left column has
 playhead, and the weights of the pixel under the pointer.
 """
 
+import contextlib
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Literal
 
@@ -16,6 +19,7 @@ from PySide6.QtGui import (
     QAction,
     QColor,
     QContextMenuEvent,
+    QImage,
     QKeyEvent,
     QKeySequence,
     QMouseEvent,
@@ -45,18 +49,22 @@ from palette4d.studio.player import Region
 from palette4d.studio.screen_colours import on_screen, thumbnail
 from palette4d.studio.session import Session
 
+F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
+U8 = NDArray[np.uint8]
 
 #: The column of colours at the left, the ruler, the frame strip, and the zoom bar, in pixels.
 GUTTER, RULER, STRIP, FOOT = 84, 24, 46, 12
 #: Space for the block names above the rows, below them, and beside the first and last frame.
 HEAD, TAIL, SIDE = 22.0, 10.0, 26.0
 #: The heights of a row, and the largest radius of a disc, in rows.
-LOWEST, HIGHEST, RADIUS = 24.0, 46.0, 0.27
+LOWEST, HIGHEST, RADIUS = 20.0, 46.0, 0.27
 #: Pixels between two sampled colours of a band.
 COLUMN = 2
 #: The fewest frames that fill the width.
 CLOSEST = 4.0
+#: Makes the strip's pictures.
+THREAD = ThreadPoolExecutor(1, thread_name_prefix="palette4d thumbnails")
 #: Pixels that the pointer moves before a press becomes a drag.
 THRESHOLD = 3
 
@@ -104,19 +112,20 @@ class TimelineView(QWidget):
         self._palette: tuple[object, Palette, Rows] | None = None
         self._layout: tuple[object, Timeline, list[Disc]] | None = None
         self._picture: tuple[object, tuple[QPixmap, QPixmap]] | None = None
-        self._thumbs: dict[int, tuple[int, QPixmap]] = {}
+        self._thumbs: dict[int, tuple[object, QPixmap]] = {}
+        self._making: set[int] = set()
         self._press: Press | None = None
         self._band: QRectF | None = None
         self.menu_actions = self._make_actions()
         for event, call in (
             ("document", self._changed),
-            ("clip", self._forget_thumbs),
+            ("clip", self._new_clip),
             ("frame", self._frame_moved),
             ("selection", self._redraw),
             ("hover", self.update),
             ("probe", self.update),
             ("range", self.update),
-            ("view", self._forget_thumbs),
+            ("view", self.update),
             ("pixels", self.update),
         ):
             session.on(event, call)  # type: ignore[arg-type]
@@ -278,7 +287,7 @@ class TimelineView(QWidget):
     def _redraw(self) -> None:
         self.update()
 
-    def _forget_thumbs(self) -> None:
+    def _new_clip(self) -> None:
         self._thumbs.clear()
         self._changed()
 
@@ -733,8 +742,8 @@ class TimelineView(QWidget):
 
     def _into_rows(self, painter: QPainter) -> None:
         """Clip to the rows, and put the first row's top at y = 0."""
-        top = RULER + STRIP + HEAD - 6
-        painter.setClipRect(QRectF(GUTTER, top, self.width() - GUTTER, self._room + TAIL + 6))
+        top = RULER + STRIP + HEAD - 10
+        painter.setClipRect(QRectF(GUTTER, top, self.width() - GUTTER, self._room + TAIL + 10))
         painter.translate(0, self._top)
 
     def _paint_bands(self, painter: QPainter, layout: Timeline) -> None:
@@ -890,22 +899,37 @@ class TimelineView(QWidget):
         return Region(0, 0, clip.width, clip.height, wide, tall)
 
     def _thumbnail(self, frame: int) -> QPixmap | None:
-        """Return a frame of the strip with the edits; a drag shows those from before it."""
-        player, region, session = self.session.player, self._thumb_region(), self.session
-        if player is None or region is None:
+        """Return a frame of the strip with the edits; a new one is made in a thread."""
+        session, region = self.session, self._thumb_region()
+        if session.player is None or session.clip is None or region is None:
             return None
-        old = self._thumbs.get(frame)
-        if old is not None and (session.dragging or old[0] == session.revision):
-            return old[1]
-        pixels = player.small(frame, region)
-        if pixels is None:
-            return None if old is None else old[1]
-        assert session.clip is not None
-        picture = QPixmap.fromImage(
-            paint.image_of(thumbnail(session, pixels, frame, session.clip.premultiplied))
-        )
-        self._thumbs[frame] = session.revision, picture
-        return picture
+        made = self._thumbs.get(frame)
+        key = (session.revision, session.looked)
+        if (made is None or made[0] != key) and not session.dragging and frame not in self._making:
+            pixels = session.player.small(frame, region)
+            if pixels is not None:
+                self._making.add(frame)
+                picture = thumbnail(session, frame, session.clip.premultiplied)
+                THREAD.submit(self._make_thumbnail, frame, key, picture, pixels)
+        return None if made is None else made[1]
+
+    def _make_thumbnail(
+        self, frame: int, key: object, picture: Callable[[F32], U8], pixels: F32
+    ) -> None:
+        """Make a frame of the strip; runs in a thread."""
+        try:
+            image = paint.image_of(picture(pixels))
+        except Exception:  # the viewer says what is wrong with a frame
+            image = QImage(1, 1, QImage.Format.Format_RGB888)
+            image.fill(QColor(theme.PIT))
+
+        def done() -> None:
+            self._making.discard(frame)
+            self._thumbs[frame] = key, QPixmap.fromImage(image)
+            self.update()
+
+        with contextlib.suppress(RuntimeError):  # the window is closed
+            self.session.post(done)
 
     def _paint_gutter(self, painter: QPainter) -> None:
         found = self.timeline
