@@ -753,6 +753,32 @@ class Document:
         """The ids of the handles that picks do not move."""
         return tuple(self._members()["edits"].get("locks", ()))
 
+    @property
+    def has_clip_colours(self) -> bool:
+        """Whether the sidecar has colours of its clip; without, picks guard the palette's only."""
+        return bool(self._fields.get("colours"))
+
+    def moved_by_picks(self) -> tuple[int, int]:
+        """Return how many vertices picks move by more than 1/255, and how many there are."""
+        solution = self._members()["edits"].get("solution", {"vertices": [], "keys": []})
+        moved = {
+            entry["vertex"]
+            for entry in solution["vertices"]
+            if max(map(abs, entry["by"])) > 1 / 255
+        }
+        return len(moved), len(self._handles.vertices)
+
+    def colour_of_pixel(
+        self,
+        frame: float,
+        pixel: tuple[float, float],
+        box: int = 1,
+        clip: str | os.PathLike[str] | None = None,
+    ) -> Colour:
+        """Return the mean colour of a box around a pixel of the clip, in the palette's values."""
+        self.check_frame(frame)
+        return self._clip_of_picks(clip).colour(frame, pixel, box)
+
     def _clip_of_picks(self, clip: str | os.PathLike[str] | None) -> "ClipOfPicks":
         from palette4d.grade.picking import ClipOfPicks
 
@@ -776,7 +802,7 @@ class Document:
                 "expected one of them"
             )
         if pixel is not None:
-            rgb = self._clip_of_picks(clip).colour(frame, pixel, box)
+            rgb = self.colour_of_pixel(frame, pixel, box, clip)
             return Pick("", "hold", frame, rgb, pixel=pixel, box=box)
         return Pick("", "hold", frame, self._checked(colour or (), any_value))
 

@@ -38,7 +38,7 @@ MOST_FRAMES = 600
 MOST_COLOURS = 2048
 
 #: Keys that a straight line between their neighbours meets within this are left out.
-STRAIGHT = 0.006
+STRAIGHT = 0.012
 #: At most so many keys; a path with more is told less exactly.
 MOST_KEYS = 48
 DIGITS = 4
