@@ -24,7 +24,7 @@ Progress = Callable[[int, int], object]
 """Called as progress(done, total)."""
 
 #: Standard deviation of the pixels that count as near, in code values.
-NEAR = 0.07
+NEAR = 0.08
 #: Rounds of the mean shift from one frame to the next, and the step at which it has arrived.
 ROUNDS, ARRIVED = 8, 1e-4
 #: A colour moves at most so far from one frame to the next; what jumps is another object.

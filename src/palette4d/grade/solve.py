@@ -41,14 +41,15 @@ F64 = NDArray[np.float64]
 
 # The constants below hold for all clips. docs/lab/picks.md shows what they were chosen by.
 
-# A pick or a hold weighs 1; the weights of the guard sum to GUARD.
-GUARD = 3.7
+# A pick or a hold weighs 1; the weights of the guard sum to GUARD, or less if less than the share
+# LEAST_GUARDED of the picture is guarded at all.
+GUARD, LEAST_GUARDED = 3.7, 0.2
 # A colour of few pixels counts in the guard as if it had this share of them: a lamp.
 LEAST_SHARE = 5e-4
 # The guard is off within NEAR_0 + NEAR_1 |change| of a pick, and full at NEAR_END times that.
 NEAR_0, NEAR_1, NEAR_END = 0.045, 0.4, 4.5
 # The radius of a pick's bump is RADIUS_0 + RADIUS_1 |change|; that of a hold's is HOLD_RADIUS.
-RADIUS_0, RADIUS_1, HOLD_RADIUS = 0.1, 0.6, 0.16
+RADIUS_0, RADIUS_1, HOLD_RADIUS = 0.1, 0.7, 0.16
 # Costs of a palette colour's displacement and of a bump, beside the weights above.
 RIDGE, BUMP = 6e-4, 0.4
 # Reweighting: rounds, and the sizes, as shares of the largest change, below which a palette
@@ -197,7 +198,7 @@ class _Problem:
             return _Solved(time, {}, {})
         most = strengths[active].max()
         share = strengths[active] / most
-        picks = [self.picks[i] for i in active]
+        picks = [self.picks[i] for i in active.tolist()]
         radii, reach = self.radii[active], self.reach[active]
         centres = np.array([pick.colour_at(time) for pick in picks])
         cut = _core.slice_at(clip.polytope, time)
@@ -221,7 +222,8 @@ class _Problem:
         )
         moving = np.array([pick.to is not None for pick in picks])
         guard = np.maximum(guarded[:, 3], LEAST_SHARE)
-        guard *= _far(guarded[:, :3], centres[moving], reach[moving], share[moving])
+        far = _far(guarded[:, :3], centres[moving], reach[moving], share[moving])
+        guard *= GUARD * far / max(float(guard @ far), LEAST_GUARDED * float(guard.sum()))
         count = len(free)
         found = _least_squares(rows, share, wanted, guard_rows, guard, count, scale)
         moves = found[:count] * free[:, None]
@@ -358,19 +360,18 @@ def _least_squares(
     """Return the displacements of the first `moves` columns and the sizes of the others, (n, 3)."""
     picked = rows.T @ (pick[:, None] * rows)
     target = rows.T @ (pick[:, None] * wanted)
-    guard = guard * (GUARD / max(float(guard.sum()), LEAST_SHARE))
     total = float(guard.sum())
     cost = np.full(rows.shape[1], BUMP)
     cost[:moves] = RIDGE
-    weight, normal, found = guard, picked, target
+    weight: F64 = guard
+    normal, found = picked, target
     for _ in range(ROUNDS):
         normal = picked + guard_rows.T @ (weight[:, None] * guard_rows) + np.diag(cost)
         found = np.linalg.solve(normal, target)
         cost[:moves] = RIDGE / (np.linalg.norm(found[:moves], axis=1) / scale + SMALL_MOVE)
         changed = np.linalg.norm(guard_rows @ found, axis=1) / scale
         weight = guard * (SMALL_CHANGE / (changed + SMALL_CHANGE)) ** ROBUST
-        if (sum_ := float(weight.sum())) > 0:
-            weight = weight * (total / sum_)
+        weight *= total / max(float(weight.sum()), total * 1e-9, 1e-9)
     few = np.linalg.norm(found, axis=1) > FEW * scale
     few[moves:] = True
     found[~few] = 0.0
