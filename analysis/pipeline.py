@@ -313,7 +313,6 @@ def _skew(run: _Run) -> SkewPolytope:
         size = min(options.palette_size, max(LEAST_COLOURS, most // 2))
         run.options = options = dataclasses.replace(options, palette_size=size)
     hulls = [_static(run), *static_hull.plain_hulls(run.frames, run.gamut, options)]
-    run.report("static_hull", static_hull.STARTS, static_hull.STARTS)
     convex = [h for h in hulls if h is hulls[0] or not _is_concave(h, run)]
     simple = min(convex, key=lambda hull: run.losses(hull).L_prime)
     bound = run.bound = run.losses(simple).L_prime

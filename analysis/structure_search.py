@@ -73,16 +73,12 @@ def search(
         return Priced(*refined)
 
     bound, found = math.inf, list[Priced]()
-    for at, start in enumerate(starts):
+    for at, start in enumerate(starts, start=1):
         some = [frames[i] for i in search_frames(start, frames)]
-
-        def tell(done: int, total: int, at: int = at) -> None:
-            progress(1000 * at + 1000 * done // total, 1000 * len(starts))
-
-        best = choose(remove_singly(start.polytope, some, gamut, options, tell, bound), options)
+        best = choose(remove_singly(start.polytope, some, gamut, options, bound), options)
         bound = min(bound, best.price(options))
         found.append(compared(best.polytope))
-        tell(1, 1)
+        progress(at, len(starts))
     found.append(compared(static))
     chosen = choose(found, options)
     at = found.index(chosen)
@@ -104,7 +100,6 @@ def remove_singly(
     frames: Sequence[FrameStatistics],
     gamut: Gamut,
     options: AnalysisOptions,
-    progress: Callable[[int, int], object] | None = None,
     bound: float = math.inf,
 ) -> list[Priced]:
     """Return the polytope with fewer and fewer vertices, most vertices first.
@@ -113,8 +108,7 @@ def remove_singly(
     below `bound`, the price from another start. `frames` may be a choice of the clip's frames.
     """
     found = [Priced(*refine_jointly(polytope, frames, gamut, options, FIRST_EVALUATIONS, True))]
-    most = len(polytope.vertices)
-    fewest = most - len(polytope.removable())
+    fewest = len(polytope.vertices) - len(polytope.removable())
     while True:
         last = found[-1]
         count = len(last.polytope.vertices)
@@ -133,8 +127,6 @@ def remove_singly(
         for vertex in sorted(cheapest[: count // 10 if count > SINGLY else 1], reverse=True):
             rest = rest.without(vertex)
         found.append(Priced(*refine_jointly(rest, frames, gamut, options, EVALUATIONS, True)))
-        if progress:
-            progress(most - len(rest.vertices), most)
     return found
 
 

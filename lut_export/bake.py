@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from palette4d.lut_export import cdl as cdls
 from palette4d.lut_export import lut3d
 from palette4d.lut_export import shaper as shapers
-from palette4d.lut_export.bake_error import Measure, load
+from palette4d.lut_export.bake_error import SEEN, Measure, load
 from palette4d.lut_export.bake_job import BakeSettings, Job, check_same, describe, grow, judged
 from palette4d.lut_export.formats import LutFormat, format_of, with_shaper
 from palette4d.lut_export.frame_edit import frame_edit
@@ -25,7 +25,7 @@ from palette4d.lut_export.shaper import UNSHAPED, Choice, Kind, Shaper
 from palette4d.lut_export.spaces import INPUT, space_of
 
 from palette4d import _core
-from palette4d.colour.difference import VISIBLE, viewing_of
+from palette4d.colour.difference import viewing_of
 from palette4d.common.errors import Palette4dError
 from palette4d.common.files import refuse_existing, replacing
 from palette4d.grade import sidecar as sidecars
@@ -104,8 +104,8 @@ class BakeResult:
 
     @property
     def visible(self) -> bool:
-        """Whether the error is visible on the clip's own colours: deltaE 2000 above 1."""
-        return self.clip is not None and self.clip.worst.delta_e_largest > VISIBLE
+        """Whether more than 1 % of the frame's pixels have a deltaE 2000 above 1."""
+        return self.clip is not None and self.clip.visible > SEEN
 
 
 def bake(

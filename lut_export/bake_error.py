@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from palette4d.lut_export.frame_edit import FrameEdit
 
-from palette4d.colour.difference import Viewing, delta_e_2000
+from palette4d.colour.difference import VISIBLE, Viewing, delta_e_2000
 from palette4d.colour.ocio_config import failures
 from palette4d.colour.ocio_processor import ExactProcessor
 from palette4d.common.errors import Palette4dError
@@ -31,6 +31,9 @@ F64 = NDArray[np.float64]
 
 #: The denominator of the relative error is at least this.
 FLOOR = 0.1
+
+#: An error is worth a warning if more of the colours than this have a visible one.
+SEEN = 0.01
 
 #: Colours in one piece of a thread's work: they fit in a processor's cache.
 PIECE = 1 << 14
@@ -104,6 +107,8 @@ class Measure:
         How many colours were compared.
     delta_e_colours : int
         How many of them, evenly spread, with deltaE.
+    visible : float
+        Share of these with a deltaE 2000 above `VISIBLE`, in the worst reading.
     outside_domain : float
         Share of colours with a channel outside the file's domain, where it clamps.
     worst : Figures
@@ -114,6 +119,7 @@ class Measure:
 
     colours: int
     delta_e_colours: int
+    visible: float
     outside_domain: float
     worst: Figures
     by_reading: dict[str, Figures]
@@ -121,13 +127,14 @@ class Measure:
 
 @dataclass(frozen=True)
 class _Part:
-    """Sums and maxima of a piece: `sums` and `maxima` are (readings, 3)."""
+    """Sums and maxima of a piece, (readings, 3), and its visible errors, (readings,)."""
 
     colours: int
     delta_e_colours: int
     outside: int
     sums: F64
     maxima: F64
+    visible: NDArray[np.int64]
 
 
 def measure(
@@ -180,6 +187,7 @@ def measure(
     return Measure(
         colours=count,
         delta_e_colours=seen,
+        visible=float(np.sum([part.visible for part in parts], axis=0).max() / max(seen, 1)),
         outside_domain=sum(part.outside for part in parts) / count,
         worst=_figures(total.max(axis=0), largest.max(axis=0)),
         by_reading={name: _figures(total[i], largest[i]) for i, name in enumerate(readers)},
@@ -210,8 +218,9 @@ def _compare(
     finite = np.isfinite(piece).all(axis=-1)
     colours = piece if finite.all() else np.ascontiguousarray(piece[finite])
     sums, maxima = np.zeros((len(readers), 3)), np.zeros((len(readers), 3))
+    visible = np.zeros(len(readers), np.int64)
     if not colours.size:
-        return _Part(0, 0, 0, sums, maxima)
+        return _Part(0, 0, 0, sums, maxima, visible)
     values = colours if shaped is None else shaped(colours)
     outside = int(((values < domain[0]) | (values > domain[1])).any(axis=-1).sum())
     exact = edit.exact(colours)
@@ -222,9 +231,10 @@ def _compare(
         absolute = np.abs(got - exact)
         relative = absolute / scale
         delta_e = delta_e_2000(lab, viewing.lab(got[::stride]))
+        visible[i] = (delta_e > VISIBLE).sum()
         for k, found in enumerate((absolute, relative, delta_e)):
             sums[i, k], maxima[i, k] = found.sum(), found.max()
-    return _Part(len(colours), len(lab), outside, sums, maxima)
+    return _Part(len(colours), len(lab), outside, sums, maxima, visible)
 
 
 def stated(value: float, digits: int = 3) -> str:

@@ -235,7 +235,7 @@ def _refuse_failed(names: list[str], baked: list[series.Series]) -> None:
 
 def _refuse_far(names: list[str], between: list[BetweenError | None]) -> None:
     far = [
-        f"shot {name}, frame {found.frame}: deltaE 2000 of {stated(found.delta_e)} from the look "
+        f"shot {name!r}, frame {found.frame}: deltaE 2000 of {stated(found.delta_e)} from the look "
         f"of frame {found.look}"
         for name, found in zip(names, between, strict=True)
         if found is not None and found.delta_e > LARGEST_DELTA_E

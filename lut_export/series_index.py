@@ -63,6 +63,7 @@ def entry_of(path: Path, result: BakeResult) -> Entry:
         "shaper": asdict(result.shaper),
         "error": result.error,
         "error_space": result.encoding,
+        "visible": result.visible,
         "clip": clip,
         "grid": asdict(result.grid.worst),
     }

@@ -242,14 +242,18 @@ std::vector<Vec3> edited_colours(const Polytope& polytope, const Edits& edits, c
     const auto vertex_ramp = [&](int vertex) {
         return edits.vertex_ramp.empty() ? std::nullopt : edits.vertex_ramp[vertex];
     };
+    const auto still_at = [&](const Stop* stop, int vertex) {
+        return still(stop ? displacements.of_stop(*stop) : displacements.of_vertex(vertex));
+    };
     const auto by_handles = [&](const SlicePoint& point, const Vec3& original) {
         if (point.edge < 0) return edited(point.from) ? colour(point.from) : original;
         const auto [before, after] = around(edits.stops, point.edge, slice.frame);
         const Ramp ramp =
             (before ? before->ramp : vertex_ramp(point.from)).value_or(edits.default_ramp);
         if (ramp == Ramp::kLinear) {
+            // Between handles that hold the clip's colours, mixing would change the last bits.
+            if (still_at(before, point.from) && still_at(after, point.to)) return original;
             if (before == nullptr && after == nullptr) {
-                if (!edited(point.from) && !edited(point.to)) return original;
                 return mixed(colour(point.from), colour(point.to), point.weight);
             }
             const double from = before ? before->frame : vertices[point.from].frame;

@@ -163,6 +163,6 @@ def warnings(result: BakeResult, format_: LutFormat) -> Iterator[str]:
         yield f"{what} outside {domain}, where the LUT clamps; {help_}"
     if clip and result.visible:
         yield (
-            f"the error can be seen: deltaE 2000 of up to {stated(clip.worst.delta_e_largest)} on "
-            f"the clip's colours; {nearer(result.size)}"
+            f"the error can be seen: {clip.visible:.2%} of the frame's pixels are off by a deltaE "
+            f"2000 above 1, up to {stated(clip.worst.delta_e_largest)}; {nearer(result.size)}"
         )

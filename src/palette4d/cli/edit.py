@@ -14,16 +14,25 @@ from palette4d.common.arguments import ColourAction, accept_negative_values, num
 from palette4d.common.errors import Palette4dError
 
 if TYPE_CHECKING:
-    from palette4d.grade.document import Document
-    from palette4d.grade.edits import Setting
+    from palette4d.grade.document import Document, How
+    from palette4d.grade.edits import Setting, State
+
+#: The words of `palette4d.grade.edits.RAMPS`, which would be slow to import for the help.
+RAMPS = ("linear", "smooth", "hold")
+
+#: The most handles that an action reports one by one.
+MOST_LINES = 12
 
 EPILOG = """\
 example:
   palette4d edit clip.p4d.json set --near 0.9,0.5,0.2 --frame 40 --rgb '#b23aee'
   palette4d edit clip.p4d.json set v12 --rgb 0.8 0.1 0.1
   palette4d edit clip.p4d.json set e4 --frame 23.5 --rgb 0.2 0.4 0.9
+  palette4d edit clip.p4d.json set v12 --rgb '#5ca832' --from 20 --until 40 --fade 5
+  palette4d edit clip.p4d.json track v12 --chroma 0.8
+  palette4d edit clip.p4d.json palette --lightness 1.05
   palette4d edit clip.p4d.json move s1 --frame 30
-  palette4d edit clip.p4d.json move v12 --by -0.1 0 0.05
+  palette4d edit clip.p4d.json ramp smooth
   palette4d edit clip.p4d.json reset v12
   palette4d edit clip.p4d.json pick --frame 40 --pixel 320,180 --box 5 --by 0.1,0,-0.05
   palette4d edit clip.p4d.json hold --frame 40 --colour '#7a6b5c'
@@ -49,6 +58,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     actions = edit.add_subparsers(title="actions", metavar="ACTION", dest="action", required=True)
     _add_set(actions)
     _add_move(actions)
+    _add_track(actions)
+    _add_ramp(actions)
     _add_reset(actions)
     for module in (picks, edit_history):
         module.add_actions(functools.partial(_action, actions))
@@ -75,10 +86,10 @@ def _add_set(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
     parser = _action(
         actions,
         "set",
-        "(ID | EDGE --frame T | --near C --frame T) --rgb C",
-        "give a palette colour another colour. With --near, the palette colour nearest to the one "
-        "that you see at a frame gets the new colour there: its vertex moves if it has one within "
-        "half a frame, else a stop is added.",
+        "(ID | EDGE --frame T | --near C --frame T) CHANGE [RANGE]",
+        "change the colour of a vertex, of a stop, or of an edge at a frame. With --near, the "
+        "palette colour nearest to the one that you see at a frame changes there: its vertex moves "
+        "if it has one within half a frame, else a stop is added.",
     )
     parser.add_argument("id", nargs="?", metavar="ID", help="a vertex, a stop, or an edge")
     parser.add_argument(
@@ -92,24 +103,112 @@ def _add_set(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
         "--frame", type=number(), metavar="T", help="when, with --near or an edge: a frame number"
     )
     parser.add_argument(
-        "--rgb",
-        nargs="+",
-        required=True,
-        metavar="C",
-        action=ColourAction,
-        help="the new colour: R G B, R,G,B or #rrggbb",
-    )
-    parser.add_argument(
         "--anyway",
         action="store_true",
         help="with --near: edit also when the nearest palette colour is further than 0.25 away",
     )
+    _add_change(parser)
+    parser.set_defaults(run=run_set, track=False)
+
+
+def _add_track(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = _action(
+        actions,
+        "track",
+        "ID CHANGE [RANGE]",
+        "change a colour all along its way: every handle of the colours that it comes from and "
+        "that it becomes. With --rgb the handle ID gets the colour, and the others move by as "
+        "much.",
+    )
+    parser.add_argument("id", metavar="ID", help="a vertex, a stop, or an edge")
     parser.add_argument(
+        "--frame",
+        type=number(),
+        metavar="T",
+        help="with an edge and --rgb: where it is this colour",
+    )
+    _add_change(parser)
+    parser.set_defaults(run=run_adjust, track=True)
+    parser = _action(
+        actions,
+        "palette",
+        "CHANGE [RANGE]",
+        "change every colour of the palette: by offsets, or by hue, chroma and lightness.",
+    )
+    _add_change(parser)
+    parser.set_defaults(run=run_adjust, id=None, frame=None, track=False)
+
+
+def _add_change(parser: argparse.ArgumentParser) -> None:
+    parser.set_defaults(usage_error=parser.error)
+    change = parser.add_argument_group("CHANGE: a colour, or offsets, or hue, chroma and lightness")
+    change.add_argument(
+        "--rgb",
+        nargs="+",
+        metavar="C",
+        action=ColourAction,
+        help="the new colour: R G B, R,G,B or #rrggbb",
+    )
+    change.add_argument(
         "--float",
         action="store_true",
         help="take colours such as 255 128 0 as they are, not as integers of 8 bits",
     )
-    parser.set_defaults(run=run_set)
+    change.add_argument(
+        "--by",
+        nargs="+",
+        metavar="D",
+        action=ColourAction,
+        help="added to the code values: DR DG DB or DR,DG,DB",
+    )
+    change.add_argument(
+        "--hue",
+        type=number(),
+        default=0.0,
+        metavar="DEG",
+        help="degrees added to the hue (OKLCh of the colour as displayed)",
+    )
+    change.add_argument(
+        "--chroma",
+        type=number(0),
+        default=1.0,
+        metavar="X",
+        help="factor of the chroma: 0.8 is a little less colour",
+    )
+    change.add_argument(
+        "--lightness",
+        type=number(0),
+        default=1.0,
+        metavar="X",
+        help="factor of the lightness: 1.1 is a little lighter",
+    )
+    times = parser.add_argument_group("RANGE: only some frames; nothing changes at other frames")
+    times.add_argument("--from", dest="start", type=number(), metavar="A", help="first frame")
+    times.add_argument("--until", type=number(), metavar="B", help="last frame")
+    times.add_argument(
+        "--fade",
+        type=number(0),
+        metavar="N",
+        help="frames of the ramps before A and after B (default: one frame)",
+    )
+    times.add_argument(
+        "--ramp", choices=RAMPS, help="the ramp of the changed handles, or of the fades of a range"
+    )
+
+
+def _add_ramp(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = _action(
+        actions,
+        "ramp",
+        "(linear | smooth | hold) [ID ...]",
+        "choose how edits go from one handle to the next handle in time: after these vertices or "
+        "stops, or (without ID) wherever a handle has no ramp of its own.",
+    )
+    parser.add_argument(
+        "ramp", choices=RAMPS, metavar="RAMP", help="linear, smooth (no overshoot), or hold"
+    )
+    parser.add_argument("ids", nargs="*", metavar="ID", help="vertices or stops")
+    parser.set_defaults(run=run_ramp)
 
 
 def _add_move(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -143,37 +242,94 @@ def _add_reset(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
 
 
 def run_set(args: argparse.Namespace) -> int:
-    """Set the colour of a vertex, a stop, or an edge at a frame."""
-    document = _load(args)
+    """Change a vertex, a stop, an edge at a frame, or the palette colour near a colour."""
     if (args.near is None) == (args.id is None):
         raise Palette4dError(
             f"found {'both' if args.id else 'neither'} ID and --near, expected one of them; "
             f"`palette4d info {shlex.quote(args.sidecar)}` lists the ids"
         )
-    if args.near is not None and args.frame is None:
+    if args.near is None:
+        return run_adjust(args)
+    if args.frame is None:
         raise Palette4dError("found --near without --frame, expected the frame where it is seen")
-    lines = []
-    if args.near is not None:
-        found = document.set_near(
-            args.near, frame=args.frame, rgb=args.rgb, anyway=args.anyway, any_value=args.float
-        )
-        before, handle = found.rgb, found.handle or found.id
-        lines.append(
-            f"the palette colour nearest to {shown(args.near)} at frame {args.frame:g} is "
-            f"{shown(before)} of {found.id}, {found.distance:.3g} away"
-        )
-    else:
-        before = document.colour(args.id, frame=args.frame)
-        if args.frame is None:
-            document.set(args.id, rgb=args.rgb, any_value=args.float)
-            handle = args.id
-        else:
-            handle = document.stop(args.id, frame=args.frame, rgb=args.rgb, any_value=args.float)
+    document = _load(args)
+    before = document.state
+    found = document.set_near(
+        args.near, frame=args.frame, anyway=args.anyway, any_value=args.float, **_how(args)
+    )
     document.save()
-    at = f" at frame {args.frame:g}" if args.frame is not None else ""
-    lines.append(f"{document.named(handle)}: {shown(before)} -> {shown(args.rgb)}{at}")
-    print("\n".join(lines))
+    print(
+        f"the palette colour nearest to {shown(args.near)} at frame {args.frame:g} is "
+        f"{shown(found.rgb)} of {found.id}, {found.distance:.3g} away"
+    )
+    if found.handle is None:
+        _report(document, before)
+    else:
+        after = document.near(found.rgb if args.rgb is None else args.rgb, frame=args.frame).rgb
+        at = f" at frame {args.frame:g}"
+        print(f"{document.named(found.handle)}: {shown(found.rgb)} -> {shown(after)}{at}")
     return 0
+
+
+def run_adjust(args: argparse.Namespace) -> int:
+    """Change a handle, a track or the palette."""
+    document = _load(args)
+    before = document.state
+    document.adjust(args.id, track=args.track, frame=args.frame, any_value=args.float, **_how(args))
+    document.save()
+    _report(document, before)
+    return 0
+
+
+def _how(args: argparse.Namespace) -> How:
+    kinds = (args.rgb, args.by, (args.hue, args.chroma, args.lightness))
+    if [kind in (None, (0, 1, 1)) for kind in kinds].count(False) != 1:
+        args.usage_error("expected either --rgb, or --by, or some of --hue, --chroma, --lightness")
+    return {
+        "rgb": args.rgb,
+        "by": args.by,
+        "hue": args.hue,
+        "chroma": args.chroma,
+        "lightness": args.lightness,
+        "start": args.start,
+        "until": args.until,
+        "fade": args.fade,
+        "ramp": args.ramp,
+    }
+
+
+def run_ramp(args: argparse.Namespace) -> int:
+    """Choose the ramp of handles, or of the clip."""
+    document = _load(args)
+    with document.one_step(f"ramp {args.ramp} {' '.join(args.ids)}".strip()):
+        for id_ in args.ids or [None]:
+            document.set_ramp(args.ramp, id_)
+    document.save()
+    places = ", ".join(map(document.named, args.ids)) or "the clip"
+    print(f"{places}: the ramp is {args.ramp}")
+    return 0
+
+
+def _report(document: Document, before: State) -> None:
+    """Print the handles that have changed, with their colours before and after."""
+    old = document.at(before)
+    changed = [
+        id_
+        for id_ in {**old.settings, **document.settings}
+        if old.settings.get(id_) != document.settings.get(id_)
+    ]
+    for id_ in changed[:MOST_LINES]:
+        setting = document.settings.get(id_)
+        edge = None if setting is None or id_ in old.settings else setting.edge
+        was = old.colour(edge, frame=setting.frame) if edge and setting else old.colour(id_)
+        now = document.colour(id_)
+        print(
+            f"{document.named(id_)}: {'holds' if was == now else shown(was) + ' ->'} {shown(now)}"
+        )
+    if len(changed) > MOST_LINES:
+        print(f"and {len(changed) - MOST_LINES} more handles")
+    if not changed:
+        print("nothing changed")
 
 
 def run_move(args: argparse.Namespace) -> int:

@@ -152,7 +152,6 @@ def report(done: Series) -> list[str]:
 
 def warn(done: list[Series]) -> None:
     """Print the notes and warnings for the user."""
-    from palette4d.colour.difference import VISIBLE
     from palette4d.lut_export.bake import nearer
     from palette4d.lut_export.bake_error import stated
     from palette4d.lut_export.formats import shaper_warning
@@ -173,7 +172,7 @@ def warn(done: list[Series]) -> None:
             "not all of the clip's frames could be read; the errors of the others are measured on "
             "the dense grid (name the clip with --clip)",
         )
-    missed = [e for e in entries if e["clip"] and e["clip"]["delta_e_largest"] > VISIBLE]
+    missed = [entry for entry in entries if entry["visible"]]
     if missed:
         smallest = min((e["size"] for e in missed if e["size"] is not None), default=None)
         worst = stated(max(e["clip"]["delta_e_largest"] for e in missed))

@@ -17,17 +17,18 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from palette4d import _core
+from palette4d.colour.oklch import Adjustment, adjuster
 from palette4d.common.errors import Palette4dError
 from palette4d.common.files import link_target
 from palette4d.common.locking import locked
 from palette4d.common.text import counted
-from palette4d.grade import edits, sidecar
+from palette4d.grade import edits, moves, sidecar
 from palette4d.grade.edits import (
     RAMP,
     Change,
@@ -47,6 +48,7 @@ from palette4d.grade.output import Output
 from palette4d.grade.palette import FAR, Near, Palette, palette_at
 from palette4d.grade.picks import MOST_PICKS, Pick, Toward, all_picks, check_range
 from palette4d.grade.sidecar import Fields, OnEdits
+from palette4d.grade.tracks import Track, tracks_of, way_of
 
 if TYPE_CHECKING:
     from palette4d.grade.picking import ClipOfPicks
@@ -67,6 +69,20 @@ _ACTIVE: tuple[Kind, ...] = ("handle", "ramp", "pick", "lock")
 
 #: Names of scene-linear colour spaces: "Linear", "lin_rec709", "ACEScg", "ACES2065-1", ...
 _LINEAR = re.compile(r"\blin(ear)?(\b|_)|scene.linear|acescg|aces2065", re.IGNORECASE)
+
+
+class How(TypedDict, total=False):
+    """A change of colours, and when: the keywords of `Document.adjust`."""
+
+    rgb: Iterable[float] | str | None
+    by: Iterable[float] | None
+    hue: float
+    chroma: float
+    lightness: float
+    start: float | None
+    until: float | None
+    fade: float | None
+    ramp: str | None
 
 
 class Document:
@@ -136,6 +152,7 @@ class Document:
 
     def _become(self, state: State) -> None:
         self._state = state
+        self._own: _core.Sidecar | None = None  # without the picks; None: parse it on demand
         self._settings: dict[str, Setting] = {
             id_: value for (kind, id_), value in state.items() if kind == "handle"
         }
@@ -275,6 +292,11 @@ class Document:
             f"{shown} is meant"
         )
 
+    @property
+    def tracks(self) -> list[Track]:
+        """The palette's colours through time: the rows of `palette4d plot`."""
+        return tracks_of(self._handles)
+
     def palette(self, frame: float) -> Palette:
         """Return the palette at a time: ids, colours as analysed and as edited, faces.
 
@@ -384,33 +406,33 @@ class Document:
         near: Iterable[float] | str,
         *,
         frame: float,
-        rgb: Iterable[float] | str,
         anyway: bool = False,
         any_value: bool = False,
+        **how: Unpack[How],
     ) -> Near:
-        """Set a new colour for the palette colour nearest to a given colour at a frame.
+        """Change the palette colour nearest to a given colour at a frame.
 
-        A vertex within half a frame step moves, so that the colour at the frame is exactly `rgb`.
-        Otherwise the stop at that time gets the colour, or a new stop.
+        A vertex within half a frame step moves, so that the colour at the frame is exactly the new
+        one. Otherwise the stop at that time gets the colour, or a new stop.
 
         Parameters
         ----------
-        near : 3 floats
+        near : 3 floats or "#rrggbb"
             The visible colour, after the edits so far.
         frame : float
             The time; within the clip.
-        rgb : 3 floats
-            The new colour.
         anyway : bool
             Edit the palette colour even if it is more than 0.25 away.
         any_value : bool
             Take colours such as 255 128 0 as they are.
+        **how
+            The change, as in `adjust`: ``rgb=``, or others.
 
         Returns
         -------
         Near
             The palette colour and its distance; `handle` is the vertex or stop that now has the
-            colour.
+            colour, or None after the change of a range.
 
         Raises
         ------
@@ -418,10 +440,17 @@ class Document:
             The nearest palette colour is more than 0.25 away; the message names the palette colours
             that `near` is mixed from.
         """
-        new, wanted = self._checked(rgb, any_value), self._checked(near, any_value)
+        wanted = self._checked(near, any_value)
         found = self.near(wanted, frame=frame)
         if found.distance > FAR and not anyway:
             raise Palette4dError(found.refusal(wanted))
+        start, until, fade = how.get("start"), how.get("until"), how.get("fade")
+        if moves.range_of(start, until, fade, self.frames) is not None:
+            at = frame if found.id in self._handles.edges else None
+            self.adjust(found.id, frame=at, any_value=any_value, **how)
+            return replace(found, handle=None)
+        move, _ = self._move(found.id, frame, how, any_value)
+        new = as_colour(move(found.rgb))
         handle, moved = found.handle, new
         if handle in self._handles.vertices and handle != found.id:
             share = self._share(handle, found.id, frame)
@@ -432,10 +461,14 @@ class Document:
                 moved = as_colour(
                     [o + (n - f) / share for o, n, f in zip(own, new, found.rgb, strict=True)]
                 )
-        if handle is not None:
-            self._set(handle, moved)
-        else:
-            handle = self._stop(found.id, frame, new)
+        ramp = how.get("ramp")
+        with self.one_step(f"set {handle or found.id} at frame {frame:g} to {_text(new)}"):
+            if handle is not None:
+                self._set(handle, moved)
+            else:
+                handle = self._stop(found.id, frame, new)
+            if ramp is not None:
+                self.set_ramp(ramp, handle)
         return Near(frame, found.id, handle, found.rgb, found.distance, found.shares)
 
     def _share(self, vertex: str, edge: str, frame: float) -> float:
@@ -476,6 +509,136 @@ class Document:
             )
         after = replace(before, frame=float(frame))
         self._put("handle", stop, after, f"move {stop} to frame {frame:g}")
+
+    def adjust(
+        self,
+        id: str | None = None,
+        *,
+        track: bool = False,
+        frame: float | None = None,
+        any_value: bool = False,
+        **how: Unpack[How],
+    ) -> tuple[str, ...]:
+        """Move the colours of a handle, of a track or of the whole palette, as one step.
+
+        Give either `rgb`, or `by`, or some of `hue`, `chroma` and `lightness`.
+
+        Parameters
+        ----------
+        id : str, optional
+            A vertex, a stop, or an edge with its `frame`; None: the whole palette.
+        track : bool
+            Move every handle along the colour's way: back to all colours that it comes from, and on
+            to all that it becomes. A range implies it.
+        frame : float, optional
+            The frame at which an edge's colour is meant.
+        rgb : 3 floats or "#rrggbb", optional
+            The new colour; other handles of the track move by as much.
+        by : 3 floats, optional
+            Offsets in code values.
+        hue : float
+            Degrees added to the hue, in OKLCh of the displayed colour.
+        chroma, lightness : float
+            Factors of 0 or more, in OKLCh of the displayed colour.
+        start, until, fade : float, optional
+            Only from frame `start` to `until`, with ramps of `fade` frames (at least one frame
+            step) before and after, and nothing beyond. A range without one end goes on to that end
+            of the clip.
+        ramp : {"linear", "smooth", "hold"}, optional
+            The ramp of the handles that move, or of the fades of a range.
+        any_value : bool
+            Take colours such as 255 128 0 as they are.
+
+        Returns
+        -------
+        tuple of str
+            The vertices and stops that changed.
+        """
+        start, until, fade = how.get("start"), how.get("until"), how.get("fade")
+        if frame is not None and id is not None:
+            self.check_frame(frame)
+            self._check_inside(id, frame)
+        elif id is not None and id not in self._handles.edges:
+            self._frame_of(id, None)  # refuses unknown ids
+        within = moves.range_of(start, until, fade, self.frames)
+        ramp = how.get("ramp")
+        known = None if ramp is None else as_ramp(ramp)
+        move, what = self._move(id, frame, how, any_value)
+        rgb = how.get("rgb")
+        if rgb is not None and within is not None and within.weight(self._frame_of(id, frame)) < 1:
+            raise Palette4dError(
+                f"the colour is meant at frame {self._frame_of(id, frame):g}, outside of the "
+                f"range {moves.range_text(start, until)}; expected a range with this frame"
+            )
+        stop = self._settings.get(id or "")
+        if id is None:
+            name, way = "palette", (set(self._handles.vertices), set(self._handles.edges))
+        elif within is not None or track:
+            name, way = f"track {id}", way_of(self._handles, (stop and stop.edge) or id)
+        elif id in self._handles.edges:
+            new = as_colour(move(self._own_colour(id, self._frame_of(id, frame))))
+            return (self._stop(id, self._frame_of(id, frame), new, known),)
+        else:
+            name, way = id, ({id}, set())
+        changed = moves.moved(
+            *(self._handles, self._settings, way, move, self._own_colour),
+            within=within,
+            ramp=known,
+            clip_ramp=self.ramp,
+        )
+        if within is not None:
+            what += f" {moves.range_text(start, until)}"
+        changes = [Change("handle", n, self._settings.get(n), v) for n, v in changed.items()]
+        self.apply(Edit(tuple(changes), f"{'move' if rgb is None else 'set'} {name} {what}"))
+        return tuple(change.id for change in changes if change.before != change.after)
+
+    def _move(
+        self, id: str | None, frame: float | None, how: How, any_value: bool
+    ) -> tuple[moves.Move, str]:
+        """Return the move that the user asked for, and its text for people."""
+        rgb, by = how.get("rgb"), how.get("by")
+        change = Adjustment(how.get("hue", 0.0), how.get("chroma", 1.0), how.get("lightness", 1.0))
+        if [rgb is None, by is None, change == Adjustment()].count(False) != 1:
+            raise Palette4dError(
+                "expected one kind of change: a new colour (--rgb; rgb=), offsets (--by; by=), or "
+                "hue, chroma and lightness (--hue …; hue=…)"
+            )
+        if by is not None:
+            offset = as_colour(by, "offset")
+            return moves.shift(offset), f"by {_text(offset)}"
+        if rgb is None:
+            return adjuster(self.encoding, change), str(change)
+        if id is None:
+            raise Palette4dError(
+                "the whole palette cannot get one colour; expected offsets (by), or hue, chroma "
+                "and lightness"
+            )
+        new, at = self._checked(rgb, any_value), self._frame_of(id, frame)
+        before = self._own_colour(id, at) if id in self._handles.edges else self.colour(id)
+        return moves.shift_to(before, new), f"to {_text(new)}"
+
+    def _frame_of(self, id: str | None, frame: float | None) -> float:
+        """Return the frame of a handle, or of an edge's colour that the user means."""
+        if id in self._handles.edges:
+            if frame is None:
+                raise self._handles.needs_frame(id)
+            return frame
+        setting = self._settings.get(id or "")
+        if setting is not None and setting.frame is not None:
+            return setting.frame
+        found: float = self._handles.vertex(id or "", self._settings)["frame"]
+        return found
+
+    def _own_colour(self, edge: str, frame: float) -> Colour:
+        """Return the colour of an edge at a frame, without the solution of the picks."""
+        if self._own is None:
+            fields = self._members()
+            own = {n: v for n, v in fields["edits"].items() if n not in ("picks", "solution")}
+            if own != fields["edits"]:
+                data = sidecar.encoded({**fields, "edits": own})
+                self._own = _core.parse_sidecar(data, self._name)
+        palette = palette_at(self._own or self.core, frame)
+        return as_colour(palette.edited[palette.ids.index(edge)])
 
     def reset(self, id: str | None = None) -> None:
         """Reset a vertex to its original colour, remove a stop, or (None) reset everything.
@@ -887,6 +1050,14 @@ class Document:
         self._version(name)
         self._put("version", name, None, f"remove version {name}")
 
+    def at(self, state: State) -> "Document":
+        """Return a document with another state of the user's edits, not bound to the file."""
+        found = copy.copy(self)
+        found._become(state)
+        found._disk, found._core, found._solved = None, None, None
+        found.forget_history()
+        return found
+
     def version(self, name: str) -> "Document":
         """Return a document with the edits of a version as the active edits; "" returns this one.
 
@@ -894,12 +1065,10 @@ class Document:
         """
         if not name:
             return self
-        found = copy.copy(self)
         fields = self._version(name)
         others = {key: value for key, value in self._state.items() if key[0] == "version"}
-        found._become({**edits.from_fields(fields), **others})
-        found._disk, found._core, found._solved = None, None, _stored_solution(fields)
-        found.forget_history()
+        found = self.at({**edits.from_fields(fields), **others})
+        found._solved = _stored_solution(fields)
         return found
 
     def _version(self, name: str) -> Fields:

@@ -31,11 +31,15 @@ class Handles:
         if id_ in self.vertices:
             return self.vertices[id_]
         if id_ in self.edges:
-            raise Palette4dError(
-                f"{id_} is an edge, whose colour changes in time; say at which frame it gets one, "
-                f"as in `set {id_} --frame T --rgb R G B`"
-            )
+            raise self.needs_frame(id_)
         raise unknown(id_, "vertex or stop", [*self.vertices, *others])
+
+    def needs_frame(self, edge: str) -> Palette4dError:
+        """Return the error for an edge without a frame."""
+        return Palette4dError(
+            f"{edge} is an edge, whose colour changes in time; say at which frame it gets one, "
+            f"as in `set {edge} --frame T --rgb R G B` or stop({edge!r}, frame=T, rgb=...)"
+        )
 
     def check_inside(self, edge: str, frame: float) -> None:
         """Check that a stop's place is between the ends of an edge.

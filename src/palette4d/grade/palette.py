@@ -87,12 +87,11 @@ class Near:
         """Return the error message if this palette colour is too far from the given colour."""
         shown = ", ".join(f"{value:.4g}" for value in wanted)
         there = ", ".join(f"{value:.4g}" for value in self.rgb)
-        made_of = ", ".join(f"{id_} {part:.0%}" for id_, part in self.shares[:5] if part >= 0.005)
+        mixed = ", ".join(f"{part:.0%} {id_}" for id_, part in self.shares[:5] if part >= 0.005)
         return (
-            f"the palette colour nearest to ({shown}) at frame {self.frame:g} is ({there}) of "
-            f"{self.id}, {self.distance:.3g} away; expected one within {FAR:g}. A pixel of "
-            f"({shown}) is made of {made_of}. Edit one of these, or edit {self.id} anyway "
-            "(--anyway; anyway=True)"
+            f"found no palette colour within {FAR:g} of ({shown}) at frame {self.frame:g}: pixels "
+            f"of this colour are a mix of {mixed}. Edit one of these by its id, or pass "
+            f"anyway=True to edit the nearest, {self.id} at ({there}), {self.distance:.3g} away"
         )
 
 

@@ -19,6 +19,7 @@ from palette4d.common.files import link_target, refuse_existing, replacing
 from palette4d.common.locking import locked
 from palette4d.common.text import counted
 from palette4d.grade import edits
+from palette4d.media.clip_sequence import IMAGE_EXTENSIONS, MOVIE_EXTENSIONS
 
 Fields = dict[str, Any]
 OnEdits = Literal["refuse", "keep", "drop"]
@@ -170,8 +171,17 @@ def read_bytes(path: str | os.PathLike[str]) -> bytes:
     Raises
     ------
     SidecarError
-        The file is missing or cannot be read.
+        The file is missing or cannot be read, or is a picture or a movie.
     """
+    kind = Path(path).suffix.lower().lstrip(".")
+    if kind in IMAGE_EXTENSIONS | MOVIE_EXTENSIONS and Path(path).is_file():
+        what = "a picture" if kind in IMAGE_EXTENSIONS else "a movie"
+        raise SidecarError(
+            os.fspath(path),
+            "",
+            f"{what}, which is no sidecar",
+            "a .p4d.json file, which `palette4d analyze CLIP -o OUT.p4d.json` writes",
+        )
     try:
         # Opening a pipe would block until a program writes into it.
         if stat.S_ISREG(Path(path).stat().st_mode):

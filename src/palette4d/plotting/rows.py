@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palette4d import _core
+from palette4d.grade.tracks import Chain, find_chains
 
 F64 = NDArray[np.float64]
 Row = list[int]
@@ -141,26 +142,6 @@ class Palette:
 
 
 @dataclass(frozen=True)
-class Chain:
-    """A palette colour through time.
-
-    Attributes
-    ----------
-    vertices : tuple of int
-        Vertices in this chain's row, in order of time.
-    edges : tuple of int
-        Its edges, in order of time; the outer ones may end on another chain's vertex.
-    first, last : float
-        The first and last frame, with forks.
-    """
-
-    vertices: tuple[int, ...]
-    edges: tuple[int, ...]
-    first: float
-    last: float
-
-
-@dataclass(frozen=True)
 class Rows:
     """Chains and their rows.
 
@@ -183,65 +164,6 @@ class Rows:
     def count(self) -> int:
         """The number of rows."""
         return int(self.row.max()) + 1 if self.row.size else 0
-
-
-def _continuations(
-    frames: F64, rgb: F64, edges: Sequence[tuple[int, int]]
-) -> tuple[dict[int, int], list[int]]:
-    """Return the next edge of each edge's chain, and the edge of each vertex (-1: none)."""
-
-    def change(edge: int) -> tuple[float, float, int]:
-        start, end = edges[edge]
-        # The edge with the least change of colour continues; the longer edge breaks ties.
-        length = float(frames[end] - frames[start])
-        return float(np.linalg.norm(rgb[end] - rgb[start])), -length, edge
-
-    follows: dict[int, int] = {}
-    home = []
-    for vertex in range(len(frames)):
-        arriving = [edge for edge, ends in enumerate(edges) if ends[1] == vertex]
-        leaving = [edge for edge, ends in enumerate(edges) if ends[0] == vertex]
-        home.append(min(arriving or leaving, key=change, default=-1))
-        if arriving and leaving:
-            follows[home[vertex]] = min(leaving, key=change)
-    return follows, home
-
-
-def find_chains(
-    frames: F64, rgb: F64, edges: Sequence[tuple[int, int]]
-) -> tuple[tuple[Chain, ...], NDArray[np.int64], NDArray[np.int64]]:
-    """Cut the edges into chains; return them with the chain of each vertex and of each edge."""
-    follows, home = _continuations(frames, rgb, edges)
-    edge_chain = np.full(len(edges), -1, dtype=np.int64)
-    members: list[list[int]] = []
-    carried_on = set(follows.values())
-    for first in range(len(edges)):
-        if first in carried_on:
-            continue
-        edge: int | None = first
-        chain: list[int] = []
-        while edge is not None:
-            edge_chain[edge] = len(members)
-            chain.append(edge)
-            edge = follows.get(edge)
-        members.append(chain)
-
-    vertex_chain = np.full(len(frames), -1, dtype=np.int64)
-    for vertex, edge_at in enumerate(home):
-        if edge_at >= 0:
-            vertex_chain[vertex] = edge_chain[edge_at]
-        else:  # no edge at all: a colour of one frame
-            vertex_chain[vertex] = len(members)
-            members.append([])
-
-    chains = []
-    for index, chain in enumerate(members):
-        standing = np.flatnonzero(vertex_chain == index)
-        standing = standing[np.argsort(frames[standing], kind="stable")]
-        times = [float(frames[v]) for v in standing]
-        times += [float(frames[v]) for e in chain for v in edges[e]]
-        chains.append(Chain(tuple(int(v) for v in standing), tuple(chain), min(times), max(times)))
-    return tuple(chains), vertex_chain, edge_chain
 
 
 def _fork_cost(

@@ -143,7 +143,7 @@ def _draw_axis(axes: Any, panel: Panel) -> None:
         axes.vlines(x, panel.floor - 4, panel.floor, **line)
         axes.text(x, panel.floor - 12, style.number(value), **label)
     faint = {**style.CENTRED, "ha": "left", "zorder": 3}
-    axes.text(panel.left + 14, panel.floor - 12, "frame", **faint)
+    axes.text(panel.left + 14, panel.floor - 24, "frame", **faint)
 
 
 def _draw_band(axes: Any, panel: Panel, edge: int, encoding: str, zorder: float) -> None:

@@ -1,0 +1,189 @@
+"""Moves of palette colours: of handles along a colour's way, over all time or within a range.
+
+A move is a function from a palette colour, as the user has edited it, to its new colour. Within a
+range the move comes and goes with ramps, and nothing changes outside of it: this needs stops at the
+ends of the ramps, also on other edges of vertices that move.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+from palette4d.common.errors import Palette4dError
+from palette4d.grade.edits import Colour, Ramp, Setting, as_colour, new_id
+from palette4d.grade.handles import Handles
+
+Move = Callable[[Colour], Colour]
+
+
+@dataclass(frozen=True)
+class Range:
+    """A range of time with ramps.
+
+    Attributes
+    ----------
+    first, last : float
+        The frames between which the move is full.
+    fade : float
+        Frames of the ramps before and after, more than 0.
+    """
+
+    first: float
+    last: float
+    fade: float
+
+    def weight(self, frame: float) -> float:
+        """Return the share of the move at a frame, 0..1."""
+        away = max(self.first - frame, frame - self.last, 0.0)
+        return max(0.0, 1 - away / self.fade)
+
+    @property
+    def start(self) -> float:
+        """The last frame before the move."""
+        return self.first - self.fade
+
+    @property
+    def end(self) -> float:
+        """The first frame after the move."""
+        return self.last + self.fade
+
+
+def shift(offset: Colour) -> Move:
+    """Return the move by an offset."""
+    return lambda colour: as_colour([a + b for a, b in zip(colour, offset, strict=True)])
+
+
+def shift_to(before: Colour, after: Colour) -> Move:
+    """Return the move by the difference of two colours; it gives exactly `after` for `before`."""
+    move = shift(as_colour([b - a for a, b in zip(before, after, strict=True)]))
+    return lambda colour: after if colour == before else move(colour)
+
+
+def range_of(
+    start: float | None, until: float | None, fade: float | None, frames: tuple[int, int, int]
+) -> Range | None:
+    """Return the range for frames that the user gave; None for the whole clip.
+
+    Raises
+    ------
+    Palette4dError
+        The range ends before it begins, does not meet the clip, or has a fade but no frames.
+    """
+    first, last, step = frames
+    if start is None and until is None:
+        if fade is not None:
+            raise Palette4dError(
+                "found a fade without a range; expected also its first or its last frame (--from, "
+                "--until; start, until)"
+            )
+        return None
+    # Without a first or last frame the range goes on beyond the clip.
+    begin = min(first, until if until is not None else first) - step if start is None else start
+    end = max(last, begin) + step if until is None else until
+    if not begin <= end or end < first or begin > last or not (fade is None or fade >= 0):
+        faded = f" with a fade of {fade:g}" if fade else ""
+        raise Palette4dError(
+            f"found the range {range_text(start, until)}{faded}; expected a range in order that "
+            f"meets the clip, which has the frames {first} to {last}, and a fade of 0 or more"
+        )
+    # Nothing is between two frames, so that a fade of one step is a cut.
+    return Range(float(begin), float(end), max(fade or 0.0, float(step)))
+
+
+def range_text(start: float | None, until: float | None) -> str:
+    """Return a range for people: "from frame 3 to 5", "until frame 5"."""
+    if start is None:
+        return f"until frame {until:g}"
+    return f"from frame {start:g} on" if until is None else f"from frame {start:g} to {until:g}"
+
+
+def moved(
+    handles: Handles,
+    settings: Mapping[str, Setting],
+    way: tuple[set[str], set[str]],
+    move: Move,
+    colour_at: Callable[[str, float], Colour],
+    *,
+    within: Range | None = None,
+    ramp: Ramp | None = None,
+    clip_ramp: Ramp = "linear",
+) -> dict[str, Setting]:
+    """Return the settings of the handles that change.
+
+    Parameters
+    ----------
+    handles, settings
+        The palette, and the settings of its handles.
+    way : (set of str, set of str)
+        The vertices and edges whose colours move (`tracks.way_of`); or one stop.
+    move : callable
+        The move.
+    colour_at : callable
+        The user's colour of an edge at a frame inside it.
+    within : Range, optional
+        The range; None: the whole clip.
+    ramp : str, optional
+        The ramp of the handles that move; in a range: of its fades.
+    clip_ramp : str
+        The clip's ramp.
+    """
+    vertices, edges = way
+    result: dict[str, Setting] = {}
+
+    def give(id_: str, before: Setting, frame: float) -> None:
+        share = 1.0 if within is None else within.weight(frame)
+        if share:
+            new = replace(before, rgb=_mixed(before.rgb, move(before.rgb), share))
+            result[id_] = replace(new, ramp=ramp) if ramp and within is None else new
+
+    for id_, vertex in handles.vertices.items():
+        if id_ in vertices:
+            own = Setting(as_colour(vertex["rgb"]))
+            give(id_, settings.get(id_, own), vertex["frame"])
+    for id_, stop in settings.items():
+        if stop.frame is not None and (stop.edge in edges or id_ in vertices):
+            give(id_, stop, stop.frame)
+    if within is None:
+        return result
+
+    touched = {id_ for id_ in result if id_ in handles.vertices}
+    for edge, ends in handles.edges.items():
+        if edge in edges:
+            times = {within.start, within.first, within.last, within.end}
+        elif ends["to"] in touched or ends["from"] in touched:
+            times = {within.start, within.end}  # the neighbour stays outside of the range
+        else:
+            continue
+        knots = _knots(handles, settings, edge)
+        for frame in sorted(times):
+            if not knots[0][0] < frame < knots[-1][0] or any(at == frame for at, _ in knots):
+                continue
+            way_on = next(own for at, own in reversed(knots) if at < frame)
+            colour = colour_at(edge, frame)
+            if edge in edges:
+                colour = _mixed(colour, move(colour), within.weight(frame))
+            if edge in edges and frame in (within.start, within.last):  # the fades begin here
+                way_on = ramp or ("linear" if (way_on or clip_ramp) == "hold" else way_on)
+            id_ = new_id("s", {*handles.vertices, *handles.edges, *settings, *result})
+            result[id_] = Setting(colour, edge, frame, way_on)
+    return result
+
+
+def _knots(
+    handles: Handles, settings: Mapping[str, Setting], edge: str
+) -> list[tuple[float, Ramp | None]]:
+    """Return the times of an edge's handles in order, with their own ramps."""
+    ends = [handles.edges[edge][end] for end in ("from", "to")]
+    knots = [
+        (handles.vertices[id_]["frame"], settings[id_].ramp if id_ in settings else None)
+        for id_ in ends
+    ]
+    knots += [
+        (s.frame, s.ramp) for s in settings.values() if s.edge == edge and s.frame is not None
+    ]
+    return sorted(knots, key=lambda knot: knot[0])
+
+
+def _mixed(before: Colour, after: Colour, share: float) -> Colour:
+    if share == 1:
+        return as_colour(after)
+    return as_colour([a + share * (b - a) for a, b in zip(before, after, strict=True)])

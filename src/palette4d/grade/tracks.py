@@ -1,0 +1,157 @@
+"""Tracks: the ways of palette colours through time, and where a colour comes from and goes to.
+
+A chain follows one palette colour through its vertices. At a split or a merge one edge continues
+the chain; every other edge begins or ends another chain.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palette4d.grade.handles import Handles
+
+F64 = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Chain:
+    """A palette colour through time.
+
+    Attributes
+    ----------
+    vertices : tuple of int
+        Vertices in this chain's row, in order of time.
+    edges : tuple of int
+        Its edges, in order of time; the outer ones may end on another chain's vertex.
+    first, last : float
+        The first and last frame, with forks.
+    """
+
+    vertices: tuple[int, ...]
+    edges: tuple[int, ...]
+    first: float
+    last: float
+
+
+def _continuations(
+    frames: F64, rgb: F64, edges: Sequence[tuple[int, int]]
+) -> tuple[dict[int, int], list[int]]:
+    """Return the next edge of each edge's chain, and the edge of each vertex (-1: none)."""
+
+    def change(edge: int) -> tuple[float, float, int]:
+        start, end = edges[edge]
+        # The edge with the least change of colour continues; the longer edge breaks ties.
+        length = float(frames[end] - frames[start])
+        return float(np.linalg.norm(rgb[end] - rgb[start])), -length, edge
+
+    follows: dict[int, int] = {}
+    home = []
+    for vertex in range(len(frames)):
+        arriving = [edge for edge, ends in enumerate(edges) if ends[1] == vertex]
+        leaving = [edge for edge, ends in enumerate(edges) if ends[0] == vertex]
+        home.append(min(arriving or leaving, key=change, default=-1))
+        if arriving and leaving:
+            follows[home[vertex]] = min(leaving, key=change)
+    return follows, home
+
+
+def find_chains(
+    frames: F64, rgb: F64, edges: Sequence[tuple[int, int]]
+) -> tuple[tuple[Chain, ...], NDArray[np.int64], NDArray[np.int64]]:
+    """Cut the edges into chains; return them with the chain of each vertex and of each edge."""
+    follows, home = _continuations(frames, rgb, edges)
+    edge_chain = np.full(len(edges), -1, dtype=np.int64)
+    members: list[list[int]] = []
+    carried_on = set(follows.values())
+    for first in range(len(edges)):
+        if first in carried_on:
+            continue
+        edge: int | None = first
+        chain: list[int] = []
+        while edge is not None:
+            edge_chain[edge] = len(members)
+            chain.append(edge)
+            edge = follows.get(edge)
+        members.append(chain)
+
+    vertex_chain = np.full(len(frames), -1, dtype=np.int64)
+    for vertex, edge_at in enumerate(home):
+        if edge_at >= 0:
+            vertex_chain[vertex] = edge_chain[edge_at]
+        else:  # no edge at all: a colour of one frame
+            vertex_chain[vertex] = len(members)
+            members.append([])
+
+    chains = []
+    for index, chain in enumerate(members):
+        standing = np.flatnonzero(vertex_chain == index)
+        standing = standing[np.argsort(frames[standing], kind="stable")]
+        times = [float(frames[v]) for v in standing]
+        times += [float(frames[v]) for e in chain for v in edges[e]]
+        chains.append(Chain(tuple(int(v) for v in standing), tuple(chain), min(times), max(times)))
+    return tuple(chains), vertex_chain, edge_chain
+
+
+@dataclass(frozen=True)
+class Track:
+    """One palette colour through time, as a row of `plot` shows it.
+
+    Attributes
+    ----------
+    name : str
+        The id of its first vertex.
+    first, last : float
+        The first and the last frame, with forks.
+    vertices, edges : tuple of str
+        Ids in order of time.
+    """
+
+    name: str
+    first: float
+    last: float
+    vertices: tuple[str, ...]
+    edges: tuple[str, ...]
+
+
+def tracks_of(handles: Handles) -> list[Track]:
+    """Return the tracks of a palette; every vertex and every edge belongs to exactly one."""
+    ids, edge_ids = list(handles.vertices), list(handles.edges)
+    place = {id_: index for index, id_ in enumerate(ids)}
+    chains, _, _ = find_chains(
+        np.array([vertex["frame"] for vertex in handles.vertices.values()], dtype=np.float64),
+        np.array([vertex["rgb"] for vertex in handles.vertices.values()], dtype=np.float64),
+        [(place[edge["from"]], place[edge["to"]]) for edge in handles.edges.values()],
+    )
+    tracks = []
+    for chain in chains:
+        edges = tuple(edge_ids[edge] for edge in chain.edges)
+        vertices = tuple(ids[vertex] for vertex in chain.vertices)
+        # A fork between two other tracks has no vertex of its own; its edge names it.
+        name = vertices[0] if vertices else edges[0]
+        tracks.append(Track(name, chain.first, chain.last, vertices, edges))
+    return tracks
+
+
+def way_of(handles: Handles, id_: str) -> tuple[set[str], set[str]]:
+    """Return the vertices and edges of the way of a colour through a vertex or an edge.
+
+    The way goes back to all colours that it comes from, and on to all that it becomes.
+    """
+    edges: set[str] = set()
+    if id_ in handles.edges:
+        edges.add(id_)
+        ends = handles.edges[id_]
+        starts = {"from": ends["from"], "to": ends["to"]}
+    else:
+        starts = {"from": id_, "to": id_}
+    vertices = set(starts.values())
+    for near, far in (("to", "from"), ("from", "to")):  # back, then on
+        open_: set[str] = {starts[far]}
+        while open_:
+            found = [id_ for id_, edge in handles.edges.items() if edge[near] in open_]
+            edges.update(found)
+            open_ = {handles.edges[edge][far] for edge in found}
+            vertices |= open_
+    return vertices, edges
