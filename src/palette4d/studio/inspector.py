@@ -4,6 +4,7 @@ Its wheel, bars and numbers all choose a colour; what that changes is the scope:
 handles, their tracks, or the whole palette.
 """
 
+import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -28,6 +29,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from palette4d.colour.oklch import Adjustment
 from palette4d.common.errors import Palette4dError
 from palette4d.grade.document import Document
 from palette4d.grade.edits import RAMPS, as_colour
@@ -115,6 +117,7 @@ class Inspector(QWidget):
         self.session = session
         self.scope: Scope = "handle"
         self.target: Target | None = None
+        self._settled: Target | None = None  # the target without the edit of a drag
         self._lch: tuple[str, Lch] | None = None
         self._silent = False
         self._make()
@@ -294,6 +297,8 @@ class Inspector(QWidget):
             found = (target_of(document, id_, session.frame) for id_ in session.selection)
             targets = [target for target in found if target is not None]
         self.target = targets[0] if targets else None
+        if not session.dragging:
+            self._settled = self.target
         self._silent = True
         try:
             self._show_words(len(session.selection))
@@ -404,60 +409,81 @@ class Inspector(QWidget):
         self.scope = scope  # type: ignore[assignment]
         self.scopes[scope].setChecked(True)
 
-    def operation(self, rgb: F64) -> Callable[[Document], object] | None:
-        """Return the edit that gives the inspected colour a new colour, within the scope."""
-        target = self.target
+    def operation(
+        self, rgb: F64, change: Adjustment | None = None
+    ) -> Callable[[Document], object] | None:
+        """Return the edit that gives the inspected colour a new colour, within the scope.
+
+        `change` is how the colour was changed, where that was a change of hue, chroma or lightness:
+        other colours of the scope change in the same way. Otherwise they move by as much.
+        """
+        target = self._settled or self.target
         if target is None:
             return None
-        ids, frame = self.session.selection, float(self.session.frame)
-        return Recolour(target.id, target.frame, ids, frame, tuple(rgb.tolist()))
+        new = tuple(rgb.tolist())
+        if self.scope == "handle":
+            return Recolour(target, self.session.selection, float(self.session.frame), new)
+        return RecolourMany(target, self.scope == "track", new, change)
 
-    def try_colour(self, rgb: F64) -> None:
+    def try_colour(self, rgb: F64, change: Adjustment | None = None) -> None:
         """Show a colour without keeping it; `session.drop` keeps it."""
-        operation = self.operation(rgb)
+        operation = self.operation(rgb, change)
         if operation is not None:
             self.session.drag(operation, self._said())
 
-    def set_colour(self, rgb: F64) -> None:
+    def set_colour(self, rgb: F64, change: Adjustment | None = None) -> None:
         """Give the inspected colour a new colour."""
-        operation = self.operation(rgb)
+        operation = self.operation(rgb, change)
         if operation is not None:
             self.session.edit(operation, self._said())
 
     def _said(self) -> str:
-        return texts.COLOUR_SET.format(id=self.target.id if self.target is not None else "")
+        name = self.target.id if self.target is not None else ""
+        return texts.SET_BY_SCOPE[self.scope].format(id=name)
 
-    def _now(self) -> F64:
-        assert self.target is not None
-        lch = self.lch.of(self.target.after)
+    def _start(self) -> F64:
+        """Return lightness, chroma and hue of the inspected colour, as it is without a drag."""
+        start = self._settled if self._settled is not None else self.target
+        assert start is not None
+        lch = self.lch.of(start.after)
         if lch[1] < 1e-4:
             lch[2] = self.wheel.lch[2]
         return lch
 
+    def _change_to(self, lch: F64) -> tuple[F64, Adjustment | None]:
+        """Return the colour of new lightness, chroma and hue, and the change to it."""
+        start = self._start()
+        change = None
+        if start[0] > 1e-3 and (start[1] > 1e-3 or lch[1] < 1e-3):
+            change = Adjustment(
+                hue=float((lch[2] - start[2] + 180) % 360 - 180),
+                chroma=float(lch[1] / max(start[1], 1e-3)),
+                lightness=float(lch[0] / start[0]),
+            )
+        return self.lch.fitted(lch), change
+
     def _wheel_moved(self, value: tuple[float, float]) -> None:
         if self.target is not None:
-            lch = self._now()
-            lch[1:] = value
-            self.try_colour(self.lch.fitted(lch))
+            self.try_colour(*self._change_to(np.array([self.wheel.lch[0], *value])))
 
-    def _with(self, name: str, value: float) -> F64:
-        """Return the inspected colour with one of its numbers changed."""
+    def _with(self, name: str, value: float) -> tuple[F64, Adjustment | None]:
+        """Return the inspected colour with one of its numbers changed, and the change."""
         assert self.target is not None
         if name in "RGB":
             rgb = self.target.after.copy()
             rgb["RGB".index(name)] = value
-            return rgb
-        lch = self._now()
+            return rgb, None
+        lch = self.wheel.lch.copy()
         lch["LCh".index(name)] = value % 360 if name == "h" else max(value, 0.0)
-        return self.lch.fitted(lch)
+        return self._change_to(lch)
 
     def _bar_moved(self, name: str, value: float) -> None:
         if self.target is not None:
-            self.try_colour(self._with(name, value))
+            self.try_colour(*self._with(name, value))
 
     def _typed(self, name: str, value: float) -> None:
         if not self._silent and self.target is not None:
-            self.set_colour(self._with(name, value))
+            self.set_colour(*self._with(name, value))
 
     def _hex_typed(self) -> None:
         if self._silent or self.target is None or not self.hex.isModified():
@@ -517,12 +543,12 @@ class Inspector(QWidget):
 
 @dataclass(frozen=True)
 class Recolour:
-    """The edit that gives a colour to a handle, and the same change to others.
+    """The edit that gives a colour to a handle, and the same offset to others, as one step.
 
     Attributes
     ----------
-    id, frame : str and float
-        The inspected vertex or stop, or an edge at a frame.
+    target : Target
+        The inspected colour, before the edit.
     ids : tuple of str
         All selected handles.
     playhead : float
@@ -531,29 +557,73 @@ class Recolour:
         The new colour.
     """
 
-    id: str
-    frame: float
+    target: Target
     ids: tuple[str, ...]
     playhead: float
     rgb: tuple[float, ...]
 
     def __call__(self, document: Document) -> None:
-        """Do it, as one step."""
-        first = target_of(document, self.id, self.frame)
+        """Do it."""
+        first = target_of(document, self.target.id, self.target.frame)
         if first is None:
             return
         by = np.asarray(self.rgb) - first.after
-        with document.one_step(texts.COLOUR_SET.format(id=", ".join(self.ids) or self.id)):
-            for id_ in self.ids or (self.id,):
+        many: contextlib.AbstractContextManager[None] = contextlib.nullcontext()
+        if len(self.ids) > 1:
+            many = document.one_step(texts.SET_BY_SCOPE["handle"].format(id=", ".join(self.ids)))
+        with many:
+            for id_ in self.ids or (self.target.id,):
                 target = target_of(document, id_, self.playhead)
                 if target is None:
                     continue
-                new = self.rgb if id_ == self.id else (target.after + by).tolist()
+                new = self.rgb if id_ == self.target.id else (target.after + by).tolist()
                 if target.kind == "edge":
                     old = target.after.tolist()
-                    document.set_near(old, frame=target.frame, rgb=new, anyway=True)
+                    document.set_near(old, frame=target.frame, rgb=new, anyway=True, any_value=True)
                 else:
-                    document.set(target.id, rgb=new)
+                    document.set(target.id, rgb=new, any_value=True)
+
+
+@dataclass(frozen=True)
+class RecolourMany:
+    """The edit of a whole track, or of the whole palette (`edit track`, `edit palette`).
+
+    Attributes
+    ----------
+    target : Target
+        The inspected colour, before the edit.
+    track : bool
+        Its track; else the palette.
+    rgb : tuple of float
+        Its new colour.
+    change : Adjustment or None
+        The change of hue, chroma and lightness; None: by as much as the inspected colour.
+    """
+
+    target: Target
+    track: bool
+    rgb: tuple[float, ...]
+    change: Adjustment | None
+
+    def __call__(self, document: Document) -> None:
+        """Do it."""
+        target = self.target
+        id_ = target.id if self.track else None
+        frame = target.frame if self.track and target.kind == "edge" else None
+        if self.change is None:
+            by = (np.asarray(self.rgb) - target.after).tolist()
+            if any(by):
+                document.adjust(id_, track=self.track, frame=frame, by=by)
+        elif self.change != Adjustment():
+            change = self.change
+            document.adjust(
+                id_,
+                track=self.track,
+                frame=frame,
+                hue=change.hue,
+                chroma=change.chroma,
+                lightness=change.lightness,
+            )
 
 
 def hex_of(rgb: Any) -> str:

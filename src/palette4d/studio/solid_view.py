@@ -58,6 +58,21 @@ TURN, STEP = 0.4, 6.0
 DISC, ORIGIN = 6.5, 3.6
 #: A face is drawn in this many strips, for a smooth gradient.
 STRIPS = 6
+
+
+def _pieces() -> F64:
+    """Return the (n, 3, 3) pieces of a face: of each corner its shares of the face's corners."""
+    found = []
+    for i in range(STRIPS):
+        for j in range(STRIPS - i):
+            found.append([(i, j), (i + 1, j), (i, j + 1)])
+            if i + j < STRIPS - 1:
+                found.append([(i + 1, j), (i + 1, j + 1), (i, j + 1)])
+    second, third = np.moveaxis(np.array(found) / STRIPS, -1, 0)
+    return np.stack([1 - second - third, second, third], axis=-1)
+
+
+PIECES = _pieces()
 AXIS_KEYS = {Qt.Key.Key_X: 0, Qt.Key.Key_Y: 1, Qt.Key.Key_Z: 2}
 AXIS_NAMES = ("R", "G", "B")
 
@@ -389,26 +404,13 @@ class SolidView(QWidget):
         painter.save()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, on=False)
         painter.setPen(Qt.PenStyle.NoPen)
-        steps = np.arange(STRIPS)
-        for face in faces:
-            corners, seen = at[face, :2], colours[face].astype(np.float64)
-
-            def mixed(of: F64, i: float, j: float) -> F64:
-                result: F64 = of[0] + (of[1] - of[0]) * i / STRIPS + (of[2] - of[0]) * j / STRIPS
-                return result
-
-            for i in steps.tolist():
-                for j in range(STRIPS - i):
-                    pieces = [[(i, j), (i + 1, j), (i, j + 1)]]
-                    if i + j < STRIPS - 1:
-                        pieces.append([(i + 1, j), (i + 1, j + 1), (i, j + 1)])
-                    for piece in pieces:
-                        middle = mixed(seen, *np.mean(piece, axis=0).tolist())
-                        colour = paint.colour_of(middle)
-                        colour.setAlphaF(alpha / 255)
-                        painter.setBrush(colour)
-                        points = [QPointF(*mixed(corners, *p).tolist()) for p in piece]
-                        painter.drawPolygon(QPolygonF(points))
+        # (face, piece, corner) from the three corners of each face.
+        seen = np.einsum("pc,fcx->fpx", PIECES.mean(axis=1), colours[faces].astype(np.float64))
+        points = np.einsum("pkc,fcx->fpkx", PIECES, at[faces, :2])
+        for pieces, places in zip(seen.tolist(), points.tolist(), strict=True):
+            for (red, green, blue), corners in zip(pieces, places, strict=True):
+                painter.setBrush(QColor(int(red), int(green), int(blue), round(alpha)))
+                painter.drawPolygon(QPolygonF([QPointF(x, y) for x, y in corners]))
         painter.restore()
 
     @staticmethod

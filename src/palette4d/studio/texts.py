@@ -69,6 +69,8 @@ LUT_ERROR = "while moving within {error:.1f}/255 of the view"
 OUTSIDE = "{share:.1%} of the pixels outside"
 RECOVERY = "edits that could not be saved are in {copy}; File > Open loads them"
 
+UNEXPECTED = "something went wrong in the program: {error}. Your edits are kept"
+
 # -------------------------------------------------------------------------------------- the menus
 RECENT = "Recent"
 VERSIONS = "Versions"
@@ -215,4 +217,8 @@ SHOWN_TIP = "What the screen shows, through the display and view"
 EYEDROPPER = "Pipette"
 EYEDROPPER_TIP = "Then click the picture: the selected colour becomes the colour there"
 RESET_SHORT = "Reset"
-COLOUR_SET = "set {id}"
+SET_BY_SCOPE = {
+    "handle": "set {id}",
+    "track": "moved the track of {id}",
+    "palette": "moved the palette",
+}

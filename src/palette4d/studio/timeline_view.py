@@ -61,6 +61,8 @@ HEAD, TAIL, SIDE = 22.0, 10.0, 26.0
 LOWEST, HIGHEST, RADIUS = 20.0, 46.0, 0.27
 #: Pixels between two sampled colours of a band.
 COLUMN = 2
+#: The same while something is dragged.
+DRAGGED_COLUMN = 8
 #: The fewest frames that fill the width.
 CLOSEST = 4.0
 #: Makes the strip's pictures.
@@ -234,7 +236,7 @@ class TimelineView(QWidget):
         """Return the time at an x; snapped to the clip's frames."""
         first, last, step = self.session.frames
         time = float(self.scale.frame(x))
-        return min(first + round((time - first) / step) * step, last) if snap else time
+        return float(min(first + round((time - first) / step) * step, last)) if snap else time
 
     def x_of(self, frame: float) -> float:
         """Return the x of a time."""
@@ -433,13 +435,15 @@ class TimelineView(QWidget):
         stop = next((stop for stop in content.stops if stop[0] == id_), None)
         if stop is None:
             return None
-        step = self.session.frames[2]
+        first, _, step = self.session.frames
         start, end = (float(t) for t in content.frames[list(content.edges[stop[1]])])
-        low, high = np.floor(start / step) * step + step, np.ceil(end / step) * step - step
-        if frame.is_integer() and low <= high:
+        low = first + (np.floor((start - first) / step) + 1) * step
+        high = first + (np.ceil((end - first) / step) - 1) * step
+        if float(frame).is_integer() and low <= high:
             frame = float(min(max(frame, low), high))
         else:
-            frame = float(np.clip(frame, start + 1e-3 * (end - start), end - 1e-3 * (end - start)))
+            room = 1e-3 * (end - start)
+            frame = float(np.clip(frame, start + room, end - room))
         edge = stop[1]
         taken = [other[2] for other in content.stops if other[1] == edge and other[0] != id_]
         return None if frame in taken else frame
@@ -750,8 +754,9 @@ class TimelineView(QWidget):
         palette, scale = layout.palette, layout.scale
         left = max(GUTTER, scale.left - 1)
         right = min(self.width(), scale.right + 1)
-        columns = np.arange(left, max(right, left + COLUMN), COLUMN, dtype=np.float64)
-        times = np.asarray(scale.frame(columns + COLUMN / 2)).reshape(-1)
+        wide = DRAGGED_COLUMN if self.session.dragging else COLUMN
+        columns = np.arange(left, max(right, left + wide), wide, dtype=np.float64)
+        times = np.asarray(scale.frame(columns + wide / 2)).reshape(-1)
         before, after = palette.sampled(times)
         selected = set(self.session.selection)
         moved = np.nan_to_num(np.linalg.norm(after - before, axis=-1))
@@ -766,7 +771,7 @@ class TimelineView(QWidget):
             painter.setPen(Qt.PenStyle.NoPen)
             for above, below, colours in parts:
                 seen = on_screen(self.session, colours[edge, inside])
-                painter.setBrush(paint.texture(seen, float(columns[inside[0]]), float(COLUMN)))
+                painter.setBrush(paint.texture(seen, float(columns[inside[0]]), float(wide)))
                 painter.drawPolygon(paint.polygon(np.concatenate([above, below[::-1]])))
             painter.setBrush(Qt.BrushStyle.NoBrush)
             chosen = palette.edge_ids[edge] in selected
@@ -776,15 +781,15 @@ class TimelineView(QWidget):
             if touched:
                 painter.setPen(paint.pen(style.INK, 0.9))
                 painter.drawPolyline(paint.polygon(line))
-                self._paint_ramp(painter, line, lower, columns[inside], moved[edge, inside])
+                middle = columns[inside] + wide / 2
+                self._paint_ramp(painter, line, lower, middle, moved[edge, inside])
 
     @staticmethod
-    def _paint_ramp(painter: QPainter, line: F64, lower: F64, columns: F64, moved: F64) -> None:
+    def _paint_ramp(painter: QPainter, line: F64, lower: F64, x: F64, moved: F64) -> None:
         """Draw how much an edit acts through time: at the seam nothing, at the rim the most."""
         most = float(moved.max())
         if most <= 1e-6:
             return
-        x = columns + COLUMN / 2
         seam = np.interp(x, line[:, 0], line[:, 1])
         rim = np.interp(x, lower[:, 0], lower[:, 1])
         curve = np.stack([x, seam + (rim - seam) * (0.12 + 0.76 * moved / most)], axis=-1)
