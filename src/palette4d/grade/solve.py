@@ -364,7 +364,7 @@ def _least_squares(
     cost = np.full(rows.shape[1], BUMP)
     cost[:moves] = RIDGE
     weight: F64 = guard
-    normal: F64 = picked
+    normal: NDArray[np.floating[Any]] = picked
     found = target
     for _ in range(ROUNDS):
         normal = picked + guard_rows.T @ (weight[:, None] * guard_rows) + np.diag(cost)
@@ -382,7 +382,7 @@ def _least_squares(
 
 def _interpolated(bumps: F64, left: F64) -> F64:
     """Return sizes of bumps that meet what is left at their centres, bounded (Tikhonov)."""
-    normal: F64 = bumps.T @ bumps + TIKHONOV**2 * np.eye(len(bumps))
+    normal: NDArray[np.floating[Any]] = bumps.T @ bumps + TIKHONOV**2 * np.eye(len(bumps))
     sizes: F64 = np.linalg.solve(normal, bumps.T @ left)
     return sizes
 
