@@ -8,7 +8,6 @@ results equal the node's bit by bit.
 import contextlib
 import copy
 import itertools
-import json
 import math
 import os
 import re
@@ -126,23 +125,25 @@ class Document:
         self.report = dict(report or {})
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> "Document":
-        """Load a sidecar (*.p4d.json).
+    def load(cls, path: str | os.PathLike[str], *, version: str = "") -> "Document":
+        """Load a sidecar (*.p4d.json), or a version in it (`Document.version`).
 
         Raises
         ------
         SidecarError
             There is no such file, or it is unusable.
+        Palette4dError
+            There is no such version.
         """
         document = cls.__new__(cls)
         data = sidecar.read_bytes(path)
         document._disk, document.path, document.notes = data, Path(path), ()
         document.report = {}
         document._start(data, _core.parse_sidecar(data, os.fspath(path)))
-        return document
+        return document.version(version)
 
     def _start(self, data: bytes, core: _core.Sidecar) -> None:
-        self._fields: Fields = json.loads(data)
+        self._fields: Fields = sidecar.fields_of(data)
         self._core: _core.Sidecar | None = core  # of `_state`; None: parse it on demand
         self._handles = Handles(self._fields["polytope"])
         self._become(sidecar.state_of(self._fields))
@@ -533,7 +534,7 @@ class Document:
         frame : float, optional
             The frame at which an edge's colour is meant.
         rgb : 3 floats or "#rrggbb", optional
-            The new colour; other handles of the track move by as much.
+            The new colour; other handles of the track move by as much, and darker ones by less.
         by : 3 floats, optional
             Offsets in code values.
         hue : float
@@ -585,6 +586,7 @@ class Document:
             within=within,
             ramp=known,
             clip_ramp=self.ramp,
+            exact=None if id is None or rgb is None or frame is None else (id, frame),
         )
         if within is not None:
             what += f" {moves.range_text(start, until)}"
