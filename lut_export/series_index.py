@@ -12,6 +12,7 @@ from palette4d.lut_export.bake_job import BakeSettings
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
 from palette4d.common.files import replacing
+from palette4d.common.json_files import UnusableFile, read_json
 from palette4d.common.text import counted
 
 SCHEMA, VERSION = "palette4d.series", 1
@@ -88,12 +89,13 @@ def read_index(path: Path, header: dict[str, Any], force: bool) -> dict[int, Ent
     if not path.exists():
         return {}
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-        entries = {int(entry["frame"]): entry for entry in document["frames"]}
-        known = {key: document[key] for key in header}
-        if not all(isinstance(entry["sha256"], str) for entry in entries.values()):
+        document = read_json(path)
+        if not all(map(_is_entry, document["frames"])):
             raise TypeError
-    except (ValueError, KeyError, TypeError) as error:
+        entries = {entry["frame"]: entry for entry in document["frames"]}
+        known = {key: document[key] for key in header}
+        sha256 = known["sidecar"]["sha256"]
+    except (UnusableFile, KeyError, TypeError) as error:
         if force:
             return {}
         raise Palette4dError(
@@ -101,7 +103,7 @@ def read_index(path: Path, header: dict[str, Any], force: bool) -> dict[int, Ent
             "earlier export wrote; replace it with force=True, or choose another folder"
         ) from error
     changed = [word for key, word in _CHANGED.items() if known[key] != header[key]]
-    if known["sidecar"].get("sha256") != header["sidecar"]["sha256"]:
+    if sha256 != header["sidecar"]["sha256"]:
         changed.append("another state of the sidecar")
     if not changed:
         return entries
@@ -111,3 +113,22 @@ def read_index(path: Path, header: dict[str, Any], force: bool) -> dict[int, Ent
             f"{' and '.join(changed)}; replace it with force=True, or choose another folder"
         )
     return {}
+
+
+def _is_entry(entry: Any) -> bool:
+    """Whether a value has the members of an entry that are used again."""
+    try:
+        numbers = [entry["error"], *([] if entry["size"] is None else [entry["size"]])]
+        if entry["clip"] is not None:
+            numbers.append(entry["clip"]["delta_e_largest"])
+        texts = [entry["file"], entry["sha256"], entry["shaper"]["kind"]]
+        flags = [entry["identity"]]
+        frame = entry["frame"]
+    except (KeyError, TypeError):
+        return False
+    return (
+        type(frame) is int
+        and all(type(number) in (int, float) for number in numbers)
+        and all(isinstance(text, str) for text in texts)
+        and all(isinstance(flag, bool) for flag in flags)
+    )

@@ -46,7 +46,7 @@ std::string as_format(const std::string& text) {
 
 void show(const Suites& suites, OfxImageEffectHandle effect, const std::string& problem,
           bool is_new) {
-    const std::string format = as_format(problem);
+    const std::string format = as_format(printable(problem));
     // A host may offer version 2 of the suite with null functions.
     if (suites.message2 && suites.message2->setPersistentMessage) {
         suites.message2->setPersistentMessage(effect, kOfxMessageError, kMessageId, format.c_str());

@@ -3,6 +3,7 @@
 #include <locale>
 #include <optional>
 #include <sstream>
+#include <utility>
 
 #include "paths.hpp"
 
@@ -26,7 +27,44 @@ std::string describe(const Sidecar& sidecar) {
     return text.str();
 }
 
+/// The code point of two or three bytes at `i`, or of one byte below 128; its length otherwise 1.
+std::pair<unsigned, std::size_t> code_point(const std::string& text, std::size_t i) {
+    const auto byte = [&](std::size_t at) {
+        return at < text.size() ? static_cast<unsigned char>(text[at]) : 0u;
+    };
+    const unsigned first = byte(i), second = byte(i + 1), third = byte(i + 2);
+    if ((first & 0xe0) == 0xc0 && (second & 0xc0) == 0x80) {
+        return {(first & 0x1f) << 6 | (second & 0x3f), 2};
+    }
+    if ((first & 0xf0) == 0xe0 && (second & 0xc0) == 0x80 && (third & 0xc0) == 0x80) {
+        return {(first & 0x0f) << 12 | (second & 0x3f) << 6 | (third & 0x3f), 3};
+    }
+    return {first, 1};
+}
+
+bool acts_on_terminals(unsigned code, std::size_t length) {
+    const bool control = code < 0x20 || code == 0x7f || (length == 2 && code < 0xa0);
+    return (control && code != '\n') || (code >= 0x2028 && code <= 0x202e) ||
+           (code >= 0x2066 && code <= 0x2069);
+}
+
 }  // namespace
+
+std::string printable(const std::string& text) {
+    static const char* const kDigits = "0123456789abcdef";
+    std::string result;
+    for (std::size_t i = 0; i < text.size();) {
+        const auto [code, length] = code_point(text, i);
+        if (acts_on_terminals(code, length)) {
+            result += "\\u";
+            for (const unsigned shift : {12u, 8u, 4u, 0u}) result += kDigits[code >> shift & 15];
+        } else {
+            result.append(text, i, length);
+        }
+        i += length;
+    }
+    return result;
+}
 
 std::string words_of_picture(const Sidecar& sidecar, const std::string& picture) {
     std::string text = "expects the picture in " + picture;
@@ -37,10 +75,11 @@ std::string words_of_picture(const Sidecar& sidecar, const std::string& picture)
 std::string status_of(const Chosen& chosen, int handles, const std::string& expects,
                       const std::string& copy, const std::string& shown) {
     if (!chosen.any) {
-        return chosen.media.empty() ? "No sidecar chosen"
-                                    : "No sidecar chosen, and none found for " + chosen.media;
+        return chosen.media.empty()
+                   ? "No sidecar chosen"
+                   : printable("No sidecar chosen, and none found for " + chosen.media);
     }
-    if (!chosen.result.loaded) return chosen.result.problem;
+    if (!chosen.result.loaded) return printable(chosen.result.problem);
     std::string text = describe(chosen.result.loaded->sidecar());
     if (handles > 0) {
         text +=
@@ -53,7 +92,7 @@ std::string status_of(const Chosen& chosen, int handles, const std::string& expe
     for (const std::string& line : {expects, copy, shown}) {
         if (!line.empty()) text += "\n" + line;
     }
-    return text;
+    return printable(text);
 }
 
 }  // namespace palette4d::node

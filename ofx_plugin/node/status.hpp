@@ -16,4 +16,8 @@ std::string words_of_picture(const Sidecar& sidecar, const std::string& picture)
 std::string status_of(const Chosen& chosen, int handles, const std::string& expects,
                       const std::string& copy, const std::string& shown);
 
+/// The text (UTF-8) without what acts on a terminal: control characters but line breaks, and marks
+/// that turn the direction of writing, become escapes such as \u001b.
+std::string printable(const std::string& text);
+
 }  // namespace palette4d::node

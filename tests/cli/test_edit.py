@@ -1,5 +1,6 @@
 """The verb ``edit``: by id, by nearness, stops, and everything that must leave the file alone."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -348,3 +349,105 @@ def _writable(folder: Path) -> bool:
         return False
     (folder / "probe").unlink()
     return True
+
+
+# ------------------------------------------------------------------- steps, versions, tracks, ramps
+
+
+def run(path: str, words: str) -> int:
+    return main.main(["edit", path, *words.split()])
+
+
+def test_undo_and_redo(plain: str, capsys: pytest.CaptureFixture[str]) -> None:
+    before = edits_of(plain)
+    assert run(plain, "undo") == 1
+    assert "nothing to undo" in capsys.readouterr().err
+    assert run(plain, "set v1 --rgb #ff0000") == 0
+    assert run(plain, "set e1 --frame 3 --rgb 0.5,0.5,0.5") == 0
+    after = edits_of(plain)
+    assert run(plain, "undo --steps 2") == 0
+    assert edits_of(plain) == before
+    assert run(plain, "undo") == 1
+    assert run(plain, "redo --steps 3") == 1
+    assert edits_of(plain) == before
+    assert run(plain, "redo --steps 2") == 0
+    assert edits_of(plain) == after
+    assert run(plain, "undo") == 0
+    capsys.readouterr()
+    assert run(plain, "history") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[:3] for line in lines] == [["1", "set", "v1"], ["2", "set", "e1"]]
+    assert ["undone" in line for line in lines] == [False, True]
+    assert run(plain, "history --json") == 0
+    assert {n: len(v) for n, v in json.loads(capsys.readouterr().out).items()} == {
+        "done": 1,
+        "undone": 1,
+    }
+
+
+def test_versions(plain: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(plain, "version list") == 0
+    assert run(plain, "version use warm") == 1
+    assert run(plain, "set v1 --rgb #ff0000") == 0
+    assert run(plain, "version save warm") == 0
+    warm = edits_of(plain)
+    assert run(plain, "set v1 --rgb #0000ff") == 0
+    cold = edits_of(plain)
+    capsys.readouterr()
+    assert run(plain, "version use warm") == 0
+    assert "before warm" in capsys.readouterr().out
+    assert edits_of(plain) == warm
+    assert run(plain, "version list") == 0
+    assert capsys.readouterr().out.splitlines() == ["  before warm", "* warm"]
+    assert run(plain, "undo") == 0
+    assert edits_of(plain) == cold
+    assert run(plain, "version remove warm") == 0
+    assert run(plain, "version remove warm") == 1
+    assert run(plain, "undo") == 0
+    assert run(plain, "version use warm") == 0
+
+
+def test_a_track_and_the_palette(plain: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(plain, "track v4 --by 0.1,0,0") == 0
+    assert "vertex v13" in capsys.readouterr().out
+    assert {entry["vertex"] for entry in edits_of(plain)["vertices"]} == {
+        *("v4", "v8", "v12", "v13", "v17", "v18")
+    }
+    assert run(plain, "palette --chroma 0 --from 5 --until 8 --fade 2 --ramp smooth") == 0
+    assert run(plain, "undo") == 0
+    assert run(plain, "set --near 0.12,0.1,0.1 --frame 9 --chroma 0.5 --lightness 1.1") == 0
+    assert run(plain, "set --near 0.12,0.1,0.1 --frame 9 --by 0.1,0,0 --from 8") == 0
+
+
+def test_ramps(plain: str) -> None:
+    assert run(plain, "ramp smooth") == 0
+    assert run(plain, "set v1 --rgb #ff0000 --ramp hold") == 0
+    assert run(plain, "ramp linear v2 v3") == 0
+    edits = edits_of(plain)
+    assert edits["ramp"] == "smooth"
+    assert [entry["ramp"] for entry in edits["vertices"]] == ["hold", "linear", "linear"]
+    assert run(plain, "ramp linear") == 0
+    assert "ramp" not in edits_of(plain)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "set v1 --rgb #ff0000 --by 1,1,1",
+        "track v1",
+        "palette --hue 3 --by 1,1,1",
+        "track v1 --chroma -1",
+        "ramp round",
+        "undo --steps 0",
+        "version",
+        "version save",
+        "history --json --clear",
+        "set v1 --rgb #ff0000 --fade -1",
+    ],
+)
+def test_wrong_usage_of_the_new_actions(plain: str, words: str) -> None:
+    before = Path(plain).read_bytes()
+    with pytest.raises(SystemExit) as caught:
+        run(plain, words)
+    assert caught.value.code == 2
+    assert Path(plain).read_bytes() == before

@@ -108,6 +108,24 @@ TEST(status_says_what_was_loaded) {
     CHECK(instance->text("status") == "No sidecar chosen");
 }
 
+TEST(names_from_a_sidecar_do_not_act_on_terminals) {
+    Plugin plugin(bundle());
+    const auto instance = plugin.create();
+    std::string text = sidecar_text();
+    const std::string name = "\"box\"";
+    const std::string hostile =
+        "\"\\u001b[2J\xc2\x9b"
+        "31m\xe2\x80\xae\xc3\xa9\"";
+    text.replace(text.find(name), name.size(), hostile);
+    instance->set("sidecar", write("hostile.p4d.json", text));
+    CHECK(instance->changed("sidecar") == kOfxStatOK);
+    CHECK(instance->text("status").find("\\u001b[2J\\u009b31m\\u202e\xc3\xa9: frames") == 0);
+    instance->set("sidecar", (folder() / "gone\x1b[2J.p4d.json").u8string());
+    CHECK(instance->changed("sidecar") == kOfxStatOK);
+    CHECK(instance->text("status").find('\x1b') == std::string::npos);
+    CHECK(instance->text("status").find("gone\\u001b[2J.p4d.json") != std::string::npos);
+}
+
 TEST(a_reopened_project_shows_its_handles) {
     // Nothing may be set while an instance is created, but the host has what it saved, and labels
     // are no values.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import zipfile
 from fractions import Fraction
 from pathlib import Path
 
@@ -380,3 +382,53 @@ class TestFiles:
         assert done.returncode == 1
         assert "pip install 'palette4d[timeline]'" in done.stderr
         assert not list(tmp_path.iterdir())
+
+
+class TestHostile:
+    """Files that crash or exhaust the library: an error, and the other shots are there."""
+
+    @pytest.mark.parametrize(
+        "metadata", ["[" * 200_000, '{"a":' * 200_000], ids=["lists", "objects"]
+    )
+    def test_nested_brackets(self, tmp_path: Path, metadata: str) -> None:
+        path = tmp_path / "deep.otio"
+        path.write_text('{"OTIO_SCHEMA": "Timeline.1", "metadata": ' + metadata)
+        with pytest.raises(Palette4dError, match="cannot be read as a timeline"):
+            timeline_files.read(path)
+
+    def test_an_archive_that_unpacks_to_too_much(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(timeline_files, "MEGABYTES", 300)
+        path = tmp_path / "bomb.otioz"
+        content = '{"OTIO_SCHEMA": "Timeline.1", "metadata": {"a": [0' + ",0" * 10_000_000 + "]}}"
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("content.otio", content)
+            archive.writestr("version.txt", "1.0.0")
+        assert path.stat().st_size < 100_000
+        with pytest.raises(Palette4dError, match="cannot be read as a timeline"):
+            timeline_files.read(path)
+
+    def test_a_pipe(self, tmp_path: Path) -> None:
+        os.mkfifo(tmp_path / "pipe.otio")
+        with pytest.raises(Palette4dError, match="expected a file"):
+            timeline_files.read(tmp_path / "pipe.otio")
+
+    def test_a_name_that_no_disk_can_hold(self, tmp_path: Path, plates: Path) -> None:
+        good = external("plates/b/take.mov")
+        made = timeline(
+            clip("n" * 300, good, 5, 10),
+            clip("m" * 300, external("m" * 300 + ".mov"), 5, 10),
+            clip("a\0b", external("a\0b.mov"), 5, 10),
+            clip("take", good, 5, 10),
+        )
+        found = edit(made, tmp_path).shots
+        assert [bool(shot.problem) for shot in found] == [False, True, True, False]
+        assert all(len(f"{shot.name}.p4d.json.0123") < 255 for shot in found)
+
+    def test_media_that_cannot_be_opened_in_time(
+        self, tmp_path: Path, plates: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(timelines, "SECONDS", 0.0)
+        (shot,) = edit(timeline(clip("x", external("plates/b/take.mov"), 5, 10)), tmp_path).shots
+        assert "take.mov: the media is unusable" in shot.problem

@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 
 from palette4d._core import __version__
 from palette4d.cli.messages import tell
+from palette4d.cli.terminal import printable_output
 from palette4d.common.arguments import Parser, accept_negative_values
 from palette4d.common.errors import Palette4dError, SidecarError, in_words
 
@@ -70,7 +71,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     SystemExit
         From argparse: wrong usage (2), ``--help`` and ``--version`` (0).
     """
-    args = build_parser().parse_args(argv)
+    with printable_output():
+        return _run(build_parser().parse_args(argv))
+
+
+def _run(args: argparse.Namespace) -> int:
     run: Callable[[argparse.Namespace], int] = args.run
     try:
         status = run(args)

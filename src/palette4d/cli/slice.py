@@ -8,10 +8,17 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from palette4d.cli.swatches import row
-from palette4d.common.arguments import frame_range_or_all, number, parse_frames
+from palette4d.common.arguments import (
+    frame_range_or_all,
+    frames_between,
+    number,
+    parse_frames,
+)
 from palette4d.common.text import counted
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from palette4d.grade.document import Document
     from palette4d.grade.palette import Palette
 
@@ -55,26 +62,29 @@ def run(args: argparse.Namespace) -> int:
 
     document = Document.load(args.sidecar)
     frames = [args.frame] if args.frames is None else _frames(args.frames, document)
-    palettes = [document.palette(frame) for frame in frames]
-    if args.frames is None and palettes[0].frame != args.frame:
-        print(
-            f"palette4d: frame {args.frame:g} is outside of the clip; this is frame "
-            f"{palettes[0].frame:g}",
-            file=sys.stderr,
-        )
+    separator = "[" if args.frames is not None else ""
+    for frame in frames:
+        palette = document.palette(frame)
+        if args.frames is None and palette.frame != args.frame:
+            print(
+                f"palette4d: frame {args.frame:g} is outside of the clip; this is frame "
+                f"{palette.frame:g}",
+                file=sys.stderr,
+            )
+        if args.json:
+            print(separator + json.dumps(_as_json(palette), allow_nan=False), end="")
+            separator = ", "
+        else:
+            _print(palette)
     if args.json:
-        values = [_as_json(palette) for palette in palettes]
-        print(json.dumps(values[0] if args.frames is None else values, allow_nan=False))
-        return 0
-    for palette in palettes:
-        _print(palette)
+        print("]" if args.frames is not None else "")
     return 0
 
 
-def _frames(text: str, document: Document) -> list[int]:
+def _frames(text: str, document: Document) -> Sequence[int]:
     first, last, step = document.frames
     if text == "all":
-        return list(range(first, last + 1, step))
+        return frames_between(first, last, step)
     frames = parse_frames(text)
     for end in (frames[0], frames[-1]):
         document.check_frame(end)

@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 
 from palette4d.common.errors import Palette4dError
 
-#: Longer than any clip, so that dates and ids are not read as frames.
+#: The most frames that a command works on: eleven hours. Dates and ids are not read as frames.
 MAX_FRAMES = 1_000_000
 
 # Without this pattern argparse reads "-3", "-5--4" and "-0.1,0.2,0.3" as options.
@@ -77,6 +77,26 @@ def parse_frames(text: str) -> list[int]:
             )
         frames.update(found)
     return sorted(frames)
+
+
+def frames_between(first: int, last: int, step: int = 1) -> range:
+    """Return every `step`-th frame from `first` to `last`.
+
+    Raises
+    ------
+    Palette4dError
+        There are more than `MAX_FRAMES`.
+
+    >>> list(frames_between(1001, 1006, 2))
+    [1001, 1003, 1005]
+    """
+    frames = range(first, last + 1, step)
+    if (last - first) // step >= MAX_FRAMES:
+        raise Palette4dError(
+            f"frames {first} to {last} hold more than {MAX_FRAMES} frames; choose fewer, with "
+            "frames=… or a larger step"
+        )
+    return frames
 
 
 def _range(part: str) -> range | None:

@@ -1,4 +1,4 @@
-"""Counts in messages, and safe file names."""
+"""Counts in messages, text for terminals, and safe file names."""
 
 import re
 
@@ -14,26 +14,41 @@ def counted(count: int, one: str, several: str | None = None) -> str:
     return f"{count} {one if count == 1 else several or one + 's'}"
 
 
+#: The longest name of a shot or a series: with frame number and extensions it fits any disk.
+LONGEST_NAME = 120
+
+# Control characters, line and paragraph separators, marks that turn the direction of writing, and
+# halves of characters, which no encoding can write.
+_ACTIVE = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+
+
+def printable(text: str) -> str:
+    """Return a text without characters that act on a terminal; line breaks stay.
+
+    They become escapes that JSON reads back.
+
+    >>> print(printable("red \x1b[31m"))
+    red \\u001b[31m
+    """
+    return _ACTIVE.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+
+
 def file_safe(name: str) -> str:
     """Return a name that is safe in files and in OpenColorIO: letters, digits, . _ -.
+
+    It has at most `LONGEST_NAME` characters.
 
     >>> file_safe("shot 010/a+b"), file_safe("-x")
     ('shot_010_a_b', 'x')
     """
-    return re.sub(r"[^A-Za-z0-9._-]+", "_", name).strip("-.") or "clip"
+    return re.sub(r"[^A-Za-z0-9._-]+", "_", name)[:LONGEST_NAME].strip("-.") or "clip"
 
 
 def checked_name(name: str) -> str:
-    """Return the name if it is safe in files.
-
-    Raises
-    ------
-    Palette4dError
-        It is not safe; the message suggests a safe name.
-    """
+    """Return the name if it is safe in files."""
     if file_safe(name) != name:
         raise Palette4dError(
-            f"found the name {name!r}, expected letters, digits, '.', '_' and '-' only, as in "
-            f"{file_safe(name)!r}"
+            f"found the name {name!r}, expected letters, digits, '.', '_' and '-' only, at most "
+            f"{LONGEST_NAME}, as in {file_safe(name)!r}"
         )
     return name

@@ -205,8 +205,21 @@ def load(path: str | os.PathLike[str]) -> Fields:
     """
     data = read_bytes(path)
     _core.parse_sidecar(data, os.fspath(path))
+    return fields_of(data)
+
+
+def fields_of(data: bytes) -> Fields:
+    """Return the members of a text that the core accepts; 24.0 becomes 24 where it is whole."""
     document: Fields = json.loads(data)
+    clip = document["clip"]
+    frames = clip["frames"]
+    for holder, names in ((frames, ("first", "last", "step", "skipped")), (clip, ("rate", "size"))):
+        holder.update({name: _whole(holder[name]) for name in names})
     return document
+
+
+def _whole(value: Any) -> Any:
+    return [int(one) for one in value] if isinstance(value, list) else int(value)
 
 
 def has_edits(document: Mapping[str, Any]) -> bool:

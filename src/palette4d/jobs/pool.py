@@ -1,16 +1,16 @@
 """Many tasks on this machine, in separate processes."""
 
 import contextlib
-import itertools
 import multiprocessing
 import os
 import signal
 import threading
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from palette4d.common.errors import Palette4dError, in_words
 
@@ -38,17 +38,12 @@ def run(
 
     Parameters
     ----------
-    work : callable
-        (task, threads to use) -> result; a module's function, so that it can be pickled.
-    tasks : mapping
-        The tasks, by any key.
-    take : callable
-        Called in this process with a key and the result, or `Failed` for a `Palette4dError`, an
+    work : (task, threads to use) -> result; a module's function, so that it can be pickled.
+    tasks : the tasks, by any key.
+    take : called in this process with a key and the result, or `Failed` for a `Palette4dError`, an
         `OSError`, or a process that was killed.
-    jobs : int
-        Processes; 0: one per processor; 1: run all tasks in this process.
-    patient : bool
-        After Ctrl-C, finish and report the running tasks; otherwise they are dropped.
+    jobs : processes; 0: one per processor; 1: run all tasks in this process.
+    patient : after Ctrl-C, finish and report the running tasks; otherwise they are dropped.
 
     Raises
     ------
@@ -67,9 +62,11 @@ def run(
         for key, task in tasks.items():
             told(key, outcome(work, task, threads))
         return
-    # Spawned, not forked: the libraries run threads, which a fork would break.
-    pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"))
-    left = iter(tasks.items())
+    pool = _new_pool(jobs)
+    left = deque(tasks)
+    # The tasks that ran when a process crashed. Each is run again alone, so that only the task
+    # that crashes its process fails.
+    suspects: set[Key] = set()
     order = {key: i for i, key in enumerate(tasks)}
     running: dict[Future[Result], Key] = {}
     others = set(multiprocessing.active_children())
@@ -78,13 +75,26 @@ def run(
             # Submit only as many tasks as can run: Ctrl-C waits for these. It reaches all
             # processes, but the workers inherit the block and finish their task.
             with without_interrupts():
-                for key, task in itertools.islice(left, jobs - len(running)):
-                    running[_submitted(pool, work, task, threads)] = key
+                while left and len(running) < (1 if suspects else jobs):
+                    key = left.popleft()
+                    running[_submitted(pool, work, tasks[key], threads)] = key
             if not running:
                 break
             done, _ = wait(running, return_when=FIRST_COMPLETED)
-            for future in sorted(done, key=lambda f: order[running[f]]):
-                told(running.pop(future), outcome(future.result))
+            broken = any(_is_broken(future) for future in done)
+            if broken:  # all other futures break, too
+                done, _ = wait(running)
+            for future in sorted(done, key=lambda f: order[running[f]], reverse=broken):
+                key = running.pop(future)
+                if _is_broken(future) and key not in suspects:
+                    suspects.add(key)
+                    left.appendleft(key)
+                else:
+                    suspects.discard(key)
+                    told(key, outcome(future.result))
+            if broken:
+                pool.shutdown()
+                pool = _new_pool(jobs)
     except KeyboardInterrupt:
         if not patient:
             for process in set(multiprocessing.active_children()) - others:
@@ -96,6 +106,15 @@ def run(
         for future, key in running.items():
             if not future.cancelled() and (patient or not future.exception()):
                 told(key, outcome(future.result))
+
+
+def _new_pool(jobs: int) -> ProcessPoolExecutor:
+    # Spawned, not forked: the libraries run threads, which a fork would break.
+    return ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"))
+
+
+def _is_broken(future: Future[Any]) -> bool:
+    return isinstance(future.exception(), BrokenProcessPool)
 
 
 def _submitted(
@@ -117,8 +136,8 @@ def outcome(call: Callable[..., Result], *arguments: object) -> Result | Failed:
         return Failed(in_words(error))
     except BrokenProcessPool:
         return Failed(
-            "its process was ended from outside (too little memory?); run the same command again, "
-            "with a smaller jobs=…"
+            "its process crashed or was ended from outside (too little memory?); run the same "
+            "command again"
         )
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -15,10 +16,13 @@ from typing import Any
 from palette4d import _core
 from palette4d.common.errors import Palette4dError, in_words
 from palette4d.common.files import replacing
+from palette4d.common.json_files import UnusableFile, read_json
 from palette4d.shows.shots import Place, Shot
 
 SCHEMA, VERSION = "palette4d.shots", 1
 ENDING = ".shots.json"
+
+_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,199}")
 
 DONE, FAILED, TO_DO = "done", "failed", "to do"
 
@@ -29,15 +33,11 @@ class Entry:
 
     Attributes
     ----------
-    shot : Shot
-        The shot before the analysis.
-    status : str
-        `DONE`, `FAILED` or `TO_DO`.
-    frames : (int, int) or None
-        The first and last frame of the sidecar. At cuts of the media there are fewer head or tail
-        frames.
-    error : str
-        The reason of a failure.
+    shot : the shot before the analysis.
+    status : `DONE`, `FAILED` or `TO_DO`.
+    frames : (int, int) or None; the first and last frame of the sidecar. At cuts of the media there
+        are fewer head or tail frames.
+    error : the reason of a failure.
     """
 
     shot: Shot
@@ -57,16 +57,11 @@ class Manifest:
 
     Attributes
     ----------
-    source : str
-        The timeline or the movie, relative to the manifest's folder.
-    source_sha256 : str
-        The hash of the timeline's file; "" for a movie.
-    rate : Fraction
-        Frames per second of the timeline, or of the movie.
-    options : dict
-        The options of the analysis, as sidecars record them.
-    entries : tuple of Entry
-        In the order of the edit.
+    source : the timeline or the movie, relative to the manifest's folder.
+    source_sha256 : the hash of the timeline's file; "" for a movie.
+    rate : frames per second of the timeline, or of the movie.
+    options : the options of the analysis, as sidecars record them.
+    entries : in the order of the edit.
     """
 
     source: str
@@ -92,13 +87,7 @@ def is_manifest(path: Path) -> bool:
 
 
 def write(manifest: Manifest, path: Path) -> None:
-    """Replace a manifest atomically; one line per shot.
-
-    Raises
-    ------
-    Palette4dError
-        It cannot be written.
-    """
+    """Replace a manifest atomically; one line per shot."""
     head = {
         "schema": SCHEMA,
         "version": VERSION,
@@ -134,21 +123,15 @@ def _row(entry: Entry) -> dict[str, Any]:
 
 
 def read(path: Path) -> Manifest:
-    """Read a manifest.
-
-    Raises
-    ------
-    Palette4dError
-        The file is missing, is not a manifest, is newer, or is broken.
-    """
+    """Read a manifest."""
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = read_json(path)
     except FileNotFoundError as error:
         raise Palette4dError(f"{path}: there is no such manifest; check the path") from error
     except OSError as error:
         raise Palette4dError(in_words(error)) from error
-    except ValueError as error:
-        raise Palette4dError(f"{path}: the manifest cannot be read: {error}{_MEND}") from error
+    except UnusableFile as error:
+        raise Palette4dError(f"{error}{_MEND}") from error
     schema = document.get("schema") if isinstance(document, dict) else None
     if schema != SCHEMA:
         raise Palette4dError(
@@ -168,7 +151,7 @@ def read(path: Path) -> Manifest:
             options=dict(document["options"]),
             entries=tuple(_entry(row) for row in document["shots"]),
         )
-    except (AttributeError, KeyError, TypeError, ValueError, ZeroDivisionError) as error:
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise Palette4dError(
             f"{path}: the manifest is broken ({type(error).__name__}: {error}){_MEND}"
         ) from error
@@ -186,7 +169,7 @@ def _entry(row: dict[str, Any]) -> Entry:
     if row["status"] not in (DONE, FAILED, TO_DO) or (row["status"] == DONE) != ("frames" in row):
         raise ValueError(f"status {row['status']!r}")
     name = str(row["name"])
-    if row["sidecar"] != f"{name}.p4d.json" or "/" in name:
+    if row["sidecar"] != f"{name}.p4d.json" or not _NAME.fullmatch(name):
         raise ValueError(f"sidecar {row['sidecar']!r} of the shot {name!r}")
     shot = Shot(
         name, str(row["clip"]), first, last, (used_first, used_last), int(row["step"]), place
@@ -201,13 +184,7 @@ def _entry(row: dict[str, Any]) -> Entry:
 
 
 def sidecars(path: Path) -> tuple[list[Path], list[str]]:
-    """Return the sidecars of a show's finished shots, and the names of the other shots.
-
-    Raises
-    ------
-    Palette4dError
-        The manifest cannot be read, none of its shots is finished, or a sidecar is missing.
-    """
+    """Return the sidecars of a show's finished shots, and the names of the other shots."""
     manifest = read(path)
     done = [path.parent / e.sidecar for e in manifest.entries if e.status == DONE]
     others = [e.shot.name for e in manifest.entries if e.status != DONE]

@@ -13,7 +13,8 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from palette4d.common.errors import Palette4dError
+from palette4d.common.child import Child, ChildError
+from palette4d.common.errors import Palette4dError, in_words
 from palette4d.common.text import counted, file_safe
 from palette4d.media.clip import Clip, open_clip
 from palette4d.media.clip_base import describe
@@ -21,6 +22,9 @@ from palette4d.media.timecode import start_timecode
 from palette4d.shows import find_media, media_range
 from palette4d.shows.shots import Place, Shot
 from palette4d.shows.timeline_files import Document, library
+
+#: Limits for opening one clip: a long movie's time stamps are read through a slow network.
+SECONDS, MEGABYTES = 300.0, 8192
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,39 +38,24 @@ class Edit:
 
 
 def shots_of(document: Document, folder: find_media.Folder | None = None, handles: int = 0) -> Edit:
-    """Return the shots of a timeline.
+    """Return the shots of a timeline; `Shot.problem` says if its media is missing or unusable.
 
-    Parameters
-    ----------
-    document : Document
-        The result of `read`; relative media paths start from its folder.
-    folder : find_media.Folder, optional
-        The folder to search for media first.
-    handles : int
-        Number of head frames and of tail frames; fewer where the media ends.
-
-    Returns
-    -------
-    Edit
-        `Shot.problem` says if a shot's media is missing or unusable.
-
-    Raises
-    ------
-    Palette4dError
-        There is no shot at all.
+    Media is looked for in `folder`, then beside the timeline. `handles` is the number of head and
+    of tail frames; there are fewer where the media ends.
     """
     otio = library()
     timeline, path = document.timeline, document.path
-    reader = _Reader(otio, document, folder, handles)
-    for index, track in enumerate(timeline.tracks):
-        if not isinstance(track, otio.schema.Track):
-            reader.walk(track, (index,), f"layer {index + 1}")
-        elif track.kind != otio.schema.TrackKind.Video:
-            continue
-        elif not track.enabled:
-            reader.passed_over("track is off", "tracks are off")
-        else:
-            reader.walk(track, (index,), track.name or f"V{index + 1}")
+    with Child(SECONDS, MEGABYTES) as child:
+        reader = _Reader(otio, document, folder, handles, child)
+        for index, track in enumerate(timeline.tracks):
+            if not isinstance(track, otio.schema.Track):
+                reader.walk(track, (index,), f"layer {index + 1}")
+            elif track.kind != otio.schema.TrackKind.Video:
+                continue
+            elif not track.enabled:
+                reader.passed_over("track is off", "tracks are off")
+            else:
+                reader.walk(track, (index,), track.name or f"V{index + 1}")
     if not reader.shots:
         raise Palette4dError(
             f"{path}: the timeline shows no clip: found {counted(len(timeline.tracks), 'track')}"
@@ -85,8 +74,14 @@ class _Reader:
     """Walks a timeline and gathers its shots."""
 
     def __init__(
-        self, otio: Any, document: Document, folder: find_media.Folder | None, handles: int
+        self,
+        otio: Any,
+        document: Document,
+        folder: find_media.Folder | None,
+        handles: int,
+        child: Child,
     ) -> None:
+        self.child = child
         self.otio, self.timeline, self.path = otio, document.timeline, document.path
         self.folder, self.handles = folder, handles
         self.clips: dict[str, Clip] = {}
@@ -132,16 +127,14 @@ class _Reader:
                 return
             place = Place(track, self.record_of(shown[0]), path)
             self.shots.append(self.shot(clip, place, shown[1]))
-        except Palette4dError as error:
+        except (Palette4dError, OSError, ValueError) as error:  # also of names no disk can hold
             name = file_safe(clip.name or "shot")
-            self.shots.append(Shot(name, "", 0, 0, (0, 0), place=place, problem=str(error)))
+            self.shots.append(Shot(name, "", 0, 0, (0, 0), place=place, problem=in_words(error)))
 
     def shot(self, clip: Any, place: Place, used: Any) -> Shot:
         """Return the shot for a clip and the time range of its media that the edit shows."""
         spec = self.found(clip)
-        if spec not in self.clips:
-            self.clips[spec] = open_clip(spec, skip_bad_frames=True)
-        media = self.clips[spec]
+        media = self.opened(spec)
         first, last = self.frames(clip, used, media)
         low, high = media.frames[0], media.frames[-1]
         if not low <= first <= last <= high:
@@ -157,6 +150,15 @@ class _Reader:
             used=(first, last),
             place=place,
         )
+
+    def opened(self, spec: str) -> Clip:
+        """Open media in the child process: hostile media must cost one shot only."""
+        if spec not in self.clips:
+            try:
+                self.clips[spec] = self.child.call(_open, spec)
+            except ChildError as error:
+                raise Palette4dError(f"{spec}: the media is unusable: {error}") from error
+        return self.clips[spec]
 
     def record_of(self, time: Any) -> str:
         """Return a time of the timeline as a timecode, else as a frame number."""
@@ -242,13 +244,17 @@ class _Reader:
 
     def stated(self, opened: Clip, rate: Fraction) -> int | None:
         """Return the start timecode in a clip's files as a frame count."""
-        text = start_timecode(opened)
+        text = self.child.call(start_timecode, opened)
         if text is None:
             return None
         try:
             return int(self.otio.opentime.from_timecode(text, float(rate)).to_frames())
         except ValueError:  # a rate that timecodes do not have
             return None
+
+
+def _open(spec: str) -> Clip:
+    return open_clip(spec, skip_bad_frames=True)
 
 
 def _rate(timeline: Any) -> float:

@@ -1,4 +1,7 @@
-"""Timeline files, read through OpenTimelineIO and its EDL adapter."""
+"""Timeline files, read through OpenTimelineIO and its EDL adapter.
+
+A child process reads the file first: a small one can crash the library, or take all memory.
+"""
 
 from __future__ import annotations
 
@@ -8,20 +11,20 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from palette4d.common.errors import Palette4dError
+from palette4d.common.child import Child
+from palette4d.common.errors import Palette4dError, in_words
+from palette4d.common.json_files import read_regular
 from palette4d.common.text import counted
 
 EXTENSIONS = frozenset({"otio", "otioz", "otiod", "edl"})
 
+#: Limits for reading a timeline; one of 10,000 shots takes some seconds and 200 MB.
+SECONDS, MEGABYTES = 120.0, 1024
+LARGEST_FILE = 512 << 20
+
 
 def library() -> Any:
-    """Return OpenTimelineIO.
-
-    Raises
-    ------
-    Palette4dError
-        It is not installed.
-    """
+    """Return OpenTimelineIO."""
     try:
         import opentimelineio
     except ImportError as error:
@@ -46,19 +49,9 @@ def is_timeline(spec: str) -> bool:
 
 
 def read(path: Path, rate: Fraction | None = None) -> Document:
-    """Read a timeline.
+    """Read an .otio, .otioz, .otiod or .edl file with exactly one timeline.
 
-    Parameters
-    ----------
-    path : Path
-        .otio, .otioz, .otiod or .edl.
-    rate : Fraction, optional
-        The rate of an EDL's timecodes, by default 24; other files state their rate.
-
-    Raises
-    ------
-    Palette4dError
-        The file is missing, or does not hold exactly one timeline.
+    `rate` is that of an EDL's timecodes, by default 24; other files state their rate.
     """
     otio = library()
     if not path.exists():
@@ -70,10 +63,16 @@ def read(path: Path, rate: Fraction | None = None) -> Document:
             f"{path}: OpenTimelineIO has no adapter for .{extension}; run: "
             "pip install 'palette4d[timeline]'"
         )
+    regular = path / "content.otio" if path.is_dir() else path
     arguments = {"rate": float(rate)} if rate is not None and extension == "edl" else {}
     try:
-        found = otio.adapters.read_from_file(str(path), **arguments)
-    except Exception as error:  # an adapter may raise anything on a broken file
+        read_regular(regular, LARGEST_FILE)
+        with Child(SECONDS, MEGABYTES) as child:
+            text = child.call(_as_json, str(path), arguments)
+        found = otio.adapters.read_from_string(text, "otio_json")
+    except OSError as error:
+        raise Palette4dError(in_words(error)) from error
+    except Palette4dError as error:
         raise Palette4dError(
             f"{path}: it cannot be read as a timeline ({_first_line(error)}); expected a whole "
             f".{extension} file"
@@ -95,6 +94,13 @@ def read(path: Path, rate: Fraction | None = None) -> Document:
     if extension == "edl":
         _rebase(found)
     return Document(path, found)
+
+
+def _as_json(path: str, arguments: dict[str, float]) -> str:
+    """Return a timeline file as OpenTimelineIO's JSON, which it has read without harm."""
+    otio = library()
+    found = otio.adapters.read_from_file(path, **arguments)
+    return str(otio.adapters.write_to_string(found, "otio_json", indent=0))
 
 
 def _first_line(error: Exception) -> str:
@@ -124,4 +130,4 @@ def _rebase(timeline: Any) -> None:
 def sha256(path: Path) -> str:
     """Return the hash of a timeline's file; for a folder (.otiod), of the timeline file in it."""
     file = path / "content.otio" if path.is_dir() else path
-    return hashlib.sha256(file.read_bytes()).hexdigest()
+    return hashlib.sha256(read_regular(file, LARGEST_FILE)).hexdigest()

@@ -69,6 +69,8 @@ LUT_ERROR = "while moving within {error:.1f}/255 of the view"
 OUTSIDE = "{share:.1%} of the pixels outside"
 RECOVERY = "edits that could not be saved are in {copy}; File > Open loads them"
 
+UNEXPECTED = "something went wrong in the program: {error}. Your edits are kept"
+
 # -------------------------------------------------------------------------------------- the menus
 RECENT = "Recent"
 VERSIONS = "Versions"
@@ -215,4 +217,27 @@ SHOWN_TIP = "What the screen shows, through the display and view"
 EYEDROPPER = "Pipette"
 EYEDROPPER_TIP = "Then click the picture: the selected colour becomes the colour there"
 RESET_SHORT = "Reset"
-COLOUR_SET = "set {id}"
+SET_BY_SCOPE = {
+    "handle": "set {id}",
+    "track": "moved the track of {id}",
+    "palette": "moved the palette",
+}
+PLACE = "pixel {x}, {y}"
+PLACE_HINT = "choose what it becomes"
+PICK, HOLD = "pick", "hold"
+PICKED = "the colour is picked"
+HELD = "the colour is held"
+FOLLOWING = "following the colour: {done} of {total} frames"
+PICK_LIST = "Picks, holds and locks"
+PICK_COLUMNS = ("id, kind, frame", "off by", "palette")
+MET, NOT_MET = "✓", "⚠"
+LOCKED = "{id} is locked"
+RANGE_SET = "{id} acts from frame {start} to {until}"
+PICK_TIP = "from frame {} to {}, fades of {} frames; “palette” is its share of the change"
+ENABLED, DISABLED = "{id} counts again", "{id} does not count"
+REMOVE = "Remove"
+REMOVED = "removed {ids}"
+KEEP = "Keep"
+KEEP_TIP = "Keep these edits as a version"
+USED = "●"
+USE_TIP = "Use version {name} (key {number})"

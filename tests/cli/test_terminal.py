@@ -1,0 +1,64 @@
+"""Names from files do not act on the terminal, whichever verb prints them."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from palette4d.cli.main import main
+from palette4d.cli.swatches import row
+
+EDITED = Path(__file__).resolve().parents[1] / "golden" / "sidecars" / "v1_edited.p4d.json"
+
+#: Sets the window's title, clears the screen, overwrites the line, turns the writing around.
+HOSTILE = "a\x1b]0;owned\x07\x1b[2J\rb\x9b31m\u202ec\u2066d"
+
+
+@pytest.fixture
+def hostile(tmp_path: Path) -> str:
+    document: dict[str, Any] = json.loads(EDITED.read_text(encoding="utf-8"))
+    clip = document["clip"]
+    clip["name"] = clip["source"] = clip["encoding"] = document["generator"] = HOSTILE
+    document["quality"]["stages"] = [{"stage": HOSTILE, HOSTILE: HOSTILE}]
+    path = tmp_path / "hostile.p4d.json"
+    path.write_text(json.dumps(document), encoding="utf-8")
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["info"],
+        ["info", "--json"],
+        ["slice", "--frame", "3"],
+        ["bake", "--frame", "3", "-o", "out.cube"],
+        ["bake", "--frame", "99", "-o", "out.cube"],
+        ["export", "--frames", "3", "-o", "out"],
+        ["edit", "reset", HOSTILE],
+        ["render", "gone.\x1b[2J.exr", "-o", "out.exr"],
+    ],
+    ids=" ".join,
+)
+def test_what_is_printed_is_printable(
+    hostile: str,
+    arguments: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    main([arguments[0], hostile, *arguments[1:]])
+    printed = "".join(capsys.readouterr())
+    assert printed
+    assert all(c == "\n" or (c.isprintable() and c not in "\u202e\u2066") for c in printed)
+
+
+def test_patches_of_colour_still_reach_the_terminal(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    assert main(["info", str(EDITED)]) == 0
+    assert row([0.1, 0.8, 0.1]) in capsys.readouterr().out
+    assert "\x1b[48;2;26;204;26m" in row([0.1, 0.8, 0.1])
