@@ -11,6 +11,7 @@ from PySide6.QtWidgets import (
     QDoubleSpinBox,
     QHBoxLayout,
     QLabel,
+    QSizePolicy,
     QSpinBox,
     QToolButton,
     QWidget,
@@ -201,8 +202,9 @@ class Transport(QWidget):
         row.addWidget(self.frame)
         self.facts = QLabel()
         self.facts.setStyleSheet(f"color: {theme.FAINT}")
-        row.addWidget(self.facts)
-        row.addStretch(1)
+        self.facts.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.facts.setMinimumWidth(96)
+        row.addWidget(self.facts, 2)
         self.compare: dict[str, QToolButton] = {}
         group = QButtonGroup(self)
         for key, text in texts.COMPARE.items():
@@ -214,16 +216,19 @@ class Transport(QWidget):
             group.addButton(button)
             self.compare[key] = button
             row.addWidget(button)
-        row.addStretch(1)
+        row.addSpacing(6)
         self.look = QComboBox()
         self.look.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.look.setSizeAdjustPolicy(
             QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )
-        self.look.setMinimumContentsLength(22)
+        self.look.setMinimumContentsLength(8)
+        self.look.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self.look.setMinimumWidth(90)
+        self.look.setMaximumWidth(230)
         self.look.setAccessibleName(texts.DISPLAY)
         self.look.activated.connect(self._chosen)
-        row.addWidget(self.look)
+        row.addWidget(self.look, 2)
         row.addSpacing(6)
         self.exposure = self._number(row, texts.EXPOSURE, -10, 10, 0.25, "exposure", "+0.00")
         self.gamma = self._number(row, texts.GAMMA, 0.2, 5, 0.05, "gamma", "0.00")
