@@ -1042,6 +1042,18 @@ class TimelineView(QWidget):
             painter.drawPolygon(paint.polygon(diamond))
         painter.restore()
 
+    @property
+    def settled(self) -> bool:
+        """Whether all pictures of the frame strip are made."""
+        key = (self.session.revision, self.session.looked)
+        region, player = self._thumb_region(), self.session.player
+        if player is None or region is None:
+            return True
+        return not self._making and all(
+            frame in player.errors or (frame in self._thumbs and self._thumbs[frame][0] == key)
+            for frame, _ in self.thumbnails()
+        )
+
     def _ask_thumbnails(self) -> None:
         """Have the strip's frames read when the player has nothing else to do."""
         if self.session.player is not None and (region := self._thumb_region()) is not None:

@@ -418,6 +418,7 @@ class Window(QMainWindow):
             and picture.request.frame == session.frame
             and picture.request.revision == session.revision
             and session.player.idle
+            and (self.timeline.settled or not self.timeline.isVisible())
         )
 
     def shut(self) -> None:
