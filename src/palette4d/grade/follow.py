@@ -29,6 +29,9 @@ NEAR = 0.08
 ROUNDS, ARRIVED = 8, 1e-4
 #: A colour moves at most so far from one frame to the next; what jumps is another object.
 MOST_STEP = 0.08
+#: How strongly a colour that is still there is kept there, per frame; it is still there while the
+#: pixels near it are not 1 / SAME fewer or more than at first.
+HOME, SAME = 0.5, 4
 #: Fewer near pixels than this share of a frame: the colour is out of sight and stays.
 LEAST_SHARE = 1e-5
 
@@ -148,37 +151,45 @@ def _joined(
 
 def _followed(colours: Sequence[tuple[F64, F64]], start: F64) -> F64:
     """Return the (n, 3) path from a colour in the first frame to the last one."""
+    home = _near(start, *colours[0])
     path = [start]
     for before, after in itertools.pairwise(colours):
-        here = path[-1]
-        mean = _mean_near(here, *before)
-        if mean is None:
-            path.append(here)
-            continue
-        offset = mean - here
-        there = here
-        for _ in range(ROUNDS):
-            mean = _mean_near(there, *after)
-            if mean is None:
-                there = here
-                break
-            step = mean - offset - there
-            there = there + step
-            if np.abs(step).max() < ARRIVED:
-                break
-        length = float(np.linalg.norm(there - here))
-        path.append(here + (there - here) * min(1.0, MOST_STEP / max(length, MOST_STEP)))
+        there = _shifted(path[-1], before, after)
+        now = _near(start, *after)
+        if home is not None and now is not None:
+            # While as many pixels as at first are near the start, the colour is still there:
+            # without this, small errors would add up in a still picture.
+            same = min(now[1] / home[1], home[1] / now[1])
+            still = start + now[0] - home[0]
+            there = there + HOME * max(0.0, 1 - (1 - same) * SAME) * (still - there)
+        path.append(there)
     return np.array(path)
 
 
-def _mean_near(colour: F64, rgb: F64, counts: F64) -> F64 | None:
-    """Return the mean of a frame's pixels near a colour; None if it has hardly any."""
+def _shifted(here: F64, before: tuple[F64, F64], after: tuple[F64, F64]) -> F64:
+    """Return where a colour of one frame is in the next one (mean shift)."""
+    found = _near(here, *before)
+    if found is None:
+        return here
+    offset, there = found[0] - here, here
+    for _ in range(ROUNDS):
+        found = _near(there, *after)
+        if found is None:
+            return here
+        step = found[0] - offset - there
+        there = there + step
+        if np.abs(step).max() < ARRIVED:
+            break
+    length = float(np.linalg.norm(there - here))
+    moved: F64 = here + (there - here) * min(1.0, MOST_STEP / max(length, MOST_STEP))
+    return moved
+
+
+def _near(colour: F64, rgb: F64, counts: F64) -> tuple[F64, float] | None:
+    """Return the mean of a frame's pixels near a colour, and their share; None for hardly any."""
     weight = counts * np.exp(((rgb - colour) ** 2).sum(axis=1) / (-2 * NEAR**2))
-    total = float(weight.sum())
-    if total < LEAST_SHARE * float(counts.sum()):
-        return None
-    mean: F64 = weight @ rgb / total
-    return mean
+    total, share = float(weight.sum()), float(weight.sum() / counts.sum())
+    return (weight @ rgb / total, share) if share >= LEAST_SHARE else None
 
 
 def _few(frames: F64, path: F64, fixed: set[int]) -> list[int]:

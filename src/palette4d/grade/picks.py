@@ -207,7 +207,7 @@ def unmet(picks: Iterable[Pick], step: float) -> list[str]:
 def _cause(pick: Pick, others: Sequence[Pick], step: float) -> str:
     rivals = []
     for other in others:
-        if other.id != pick.id and (frame := _together(pick, other, step)) is not None:
+        for frame in _together(pick, other, step) if other.id != pick.id else ():
             away = float(np.linalg.norm(pick.colour_at(frame) - other.colour_at(frame)))
             apart = float(np.linalg.norm(pick.change_at(frame) - other.change_at(frame)))
             if away < NEAR and apart > away:
@@ -225,15 +225,11 @@ def _cause(pick: Pick, others: Sequence[Pick], step: float) -> str:
     return ": the colour's surroundings or locked handles stand in its way"
 
 
-def _together(a: Pick, b: Pick, step: float) -> float | None:
-    """Return a frame where both ask for something, the first pick's own frame if possible."""
-    candidates = [a.frame, b.frame]
-    candidates += [key.frame for key in itertools.chain(a.path, b.path)]
-    candidates += [f for f in (a.start, a.until, b.start, b.until) if f is not None]
-    for frame in candidates:
-        if a.strength_at(frame, step) > 0 and b.strength_at(frame, step) > 0:
-            return frame
-    return None
+def _together(a: Pick, b: Pick, step: float) -> list[float]:
+    """Return the frames that either of two picks names, where both ask for something."""
+    frames = {key.frame for key in itertools.chain(a.path, b.path)} | {a.frame, b.frame}
+    frames |= {frame for frame in (a.start, a.until, b.start, b.until) if frame is not None}
+    return [f for f in sorted(frames) if min(p.strength_at(f, step) for p in (a, b)) > 0]
 
 
 def check_range(pick: Pick, frames: tuple[int, int, int]) -> None:

@@ -364,14 +364,15 @@ def _least_squares(
     cost = np.full(rows.shape[1], BUMP)
     cost[:moves] = RIDGE
     weight: F64 = guard
-    normal, found = picked, target
+    normal: NDArray[np.floating[Any]] = picked
+    found = target
     for _ in range(ROUNDS):
         normal = picked + guard_rows.T @ (weight[:, None] * guard_rows) + np.diag(cost)
         found = np.linalg.solve(normal, target)
         cost[:moves] = RIDGE / (np.linalg.norm(found[:moves], axis=1) / scale + SMALL_MOVE)
         changed = np.linalg.norm(guard_rows @ found, axis=1) / scale
-        weight = guard * (SMALL_CHANGE / (changed + SMALL_CHANGE)) ** ROBUST
-        weight *= total / max(float(weight.sum()), total * 1e-9, 1e-9)
+        weight = guard * np.power(SMALL_CHANGE / (changed + SMALL_CHANGE), ROBUST)
+        weight *= total / max(float(weight.sum()), 1e-9)
     few = np.linalg.norm(found, axis=1) > FEW * scale
     few[moves:] = True
     found[~few] = 0.0
@@ -381,7 +382,7 @@ def _least_squares(
 
 def _interpolated(bumps: F64, left: F64) -> F64:
     """Return sizes of bumps that meet what is left at their centres, bounded (Tikhonov)."""
-    normal = bumps.T @ bumps + TIKHONOV**2 * np.eye(len(bumps))
+    normal: NDArray[np.floating[Any]] = bumps.T @ bumps + TIKHONOV**2 * np.eye(len(bumps))
     sizes: F64 = np.linalg.solve(normal, bumps.T @ left)
     return sizes
 
