@@ -174,6 +174,9 @@ types: $(TOOLS)/.installed $(TEST_VENV)/.installed
 	@echo "== mypy --strict on the installed wheel"
 	$(TOOLS)/bin/mypy --python-executable $(TEST_VENV)/bin/python -p palette4d
 	$(TOOLS)/bin/mypy --python-executable $(TEST_VENV)/bin/python tools
+	@echo "== stubtest: _core.pyi against the compiled module"
+	@PYTHONPATH=$$($(TOOLS)/bin/python -c 'import sysconfig; print(sysconfig.get_path("platlib"))') \
+		$(TEST_VENV)/bin/python -m mypy.stubtest palette4d._core --allowlist tools/stub_allowlist.txt
 	@echo "== import-linter: who may import whom"
 	@PYTHONPATH=$$($(TEST_VENV)/bin/python -c 'import sysconfig; print(sysconfig.get_path("platlib"))') \
 		$(TOOLS)/bin/lint-imports --no-cache --config pyproject.toml
