@@ -47,20 +47,13 @@ class Request:
 
     Attributes
     ----------
-    sidecar, folder : Path
-        The input, and the folder for the files.
-    frames : tuple of int
-        Frame numbers in rising order.
-    settings : BakeSettings
-        For every frame. ``format`` must be set.
-    name : str or None
-        The files' common name; None: the clip's name.
-    padding : int
-        Digits of the frame numbers in the names.
-    clip : str or None
-        The clip, for shapers and errors; None: the clip that the sidecar names.
-    force : bool
-        Replace files that differ.
+    sidecar, folder : the input, and the folder for the files.
+    frames : frame numbers in rising order.
+    settings : for every frame. ``format`` must be set.
+    name : the files' common name; None: the clip's name.
+    padding : digits of the frame numbers in the names.
+    clip : the clip, for shapers and errors; None: the clip that the sidecar names.
+    force : replace files that differ.
     """
 
     sidecar: Path
@@ -121,12 +114,8 @@ def every(sidecar: _core.Sidecar, step: int) -> tuple[int, ...]:
 def stops(sidecar: _core.Sidecar) -> tuple[int, ...]:
     """Return the frames of the stops, the edited palette colours and their neighbours.
 
-    At a neighbouring palette colour an edit begins or ends. Each time is rounded to a frame.
-
-    Raises
-    ------
-    Palette4dError
-        Nothing is edited.
+    At a neighbouring palette colour an edit begins or ends. Each time is rounded to a frame. A
+    sidecar without edits is refused.
     """
     polytope, edits = sidecar.polytope, sidecar.edits
     index = {name: i for i, name in enumerate(polytope.vertex_ids)}
@@ -146,13 +135,7 @@ def stops(sidecar: _core.Sidecar) -> tuple[int, ...]:
 
 
 def check_frames(sidecar: _core.Sidecar, frames: tuple[int, ...]) -> tuple[int, ...]:
-    """Return `frames`, all within the clip.
-
-    Raises
-    ------
-    Palette4dError
-        The message names the first frame outside.
-    """
+    """Return `frames`, all within the clip."""
     low, high = _limits(sidecar)
     outside = [frame for frame in frames if not low <= frame <= high]
     if outside:
@@ -307,13 +290,7 @@ class _Export:
 
 
 def bake_frame(task: FrameTask, threads: int) -> tuple[Entry, bytes]:
-    """Bake one file of a series in a temporary folder; return its entry and its content.
-
-    Raises
-    ------
-    Palette4dError
-        It cannot be baked.
-    """
+    """Bake one file of a series in a temporary folder; return its entry and its content."""
     with tempfile.TemporaryDirectory(prefix="palette4d-") as scratch:
         path = Path(scratch) / task.file
         settings = asdict(task.settings)

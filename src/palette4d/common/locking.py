@@ -27,13 +27,7 @@ LOCK_SECONDS = 10.0
 
 @contextlib.contextmanager
 def locked(target: Path) -> Iterator[Callable[[], None]]:
-    """Hold the lock of a file; yield a check that raises if the lock was lost.
-
-    Raises
-    ------
-    Palette4dError
-        Another program has held the lock for `LOCK_SECONDS`.
-    """
+    """Hold the lock of a file; yield a check that raises if the lock was lost."""
     deadline = time.monotonic() + LOCK_SECONDS
     with contextlib.ExitStack() as stack:
         if sys.platform != "win32":

@@ -151,7 +151,7 @@ class Session:
         self._stamp: tuple[int, int, int] | None = None
         self._edited_at: float | None = None  # the first edit that is not on disk
         self._last_edit = self._next_try = 0.0
-        self._untold, self._told = False, 0.0  # of a drag, by `_tell`
+        self._untold, self._told = False, 0.0  # of a drag, by `tell`
         self.clip: Clip | None = None
         self.player: Player | None = None
         self.display: Display | None = None
@@ -321,12 +321,14 @@ class Session:
         self.revision += 1
         self.emit("trial")
         self._untold = True
-        self._tell()
+        if not self._callbacks.get("trial"):  # no picture whose painting goes first
+            self.tell()
 
-    def _tell(self) -> None:
-        """Tell the panels of a drag, not more often than they can paint beside the picture."""
+    def tell(self) -> None:
+        """Tell the panels of a drag; the viewer calls it when it has painted the picture."""
         now = time.monotonic()
-        if self._untold and now - self._told >= PANELS_EVERY:
+        late = now - self._told >= PANELS_EVERY or not self._callbacks.get("trial")
+        if self._untold and late:
             self._told, self._untold = now, False
             self.emit("document")
 
@@ -444,7 +446,7 @@ class Session:
         """Save what is due, and take over what another program wrote; call it often."""
         document = self._document
         if self._untold:
-            self._tell()
+            self.tell()
         if document is None or document.path is None or self._dragged is not None:
             return
         now = time.monotonic() if now is None else now

@@ -61,6 +61,8 @@ HEAD, TAIL, SIDE = 22.0, 10.0, 26.0
 LOWEST, HIGHEST, RADIUS = 20.0, 46.0, 0.27
 #: Pixels between two sampled colours of a band.
 COLUMN = 2
+#: The same while something is dragged.
+DRAGGED_COLUMN = 8
 #: The fewest frames that fill the width.
 CLOSEST = 4.0
 #: Makes the strip's pictures.
@@ -752,8 +754,9 @@ class TimelineView(QWidget):
         palette, scale = layout.palette, layout.scale
         left = max(GUTTER, scale.left - 1)
         right = min(self.width(), scale.right + 1)
-        columns = np.arange(left, max(right, left + COLUMN), COLUMN, dtype=np.float64)
-        times = np.asarray(scale.frame(columns + COLUMN / 2)).reshape(-1)
+        wide = DRAGGED_COLUMN if self.session.dragging else COLUMN
+        columns = np.arange(left, max(right, left + wide), wide, dtype=np.float64)
+        times = np.asarray(scale.frame(columns + wide / 2)).reshape(-1)
         before, after = palette.sampled(times)
         selected = set(self.session.selection)
         moved = np.nan_to_num(np.linalg.norm(after - before, axis=-1))
@@ -768,7 +771,7 @@ class TimelineView(QWidget):
             painter.setPen(Qt.PenStyle.NoPen)
             for above, below, colours in parts:
                 seen = on_screen(self.session, colours[edge, inside])
-                painter.setBrush(paint.texture(seen, float(columns[inside[0]]), float(COLUMN)))
+                painter.setBrush(paint.texture(seen, float(columns[inside[0]]), float(wide)))
                 painter.drawPolygon(paint.polygon(np.concatenate([above, below[::-1]])))
             painter.setBrush(Qt.BrushStyle.NoBrush)
             chosen = palette.edge_ids[edge] in selected
@@ -778,15 +781,15 @@ class TimelineView(QWidget):
             if touched:
                 painter.setPen(paint.pen(style.INK, 0.9))
                 painter.drawPolyline(paint.polygon(line))
-                self._paint_ramp(painter, line, lower, columns[inside], moved[edge, inside])
+                middle = columns[inside] + wide / 2
+                self._paint_ramp(painter, line, lower, middle, moved[edge, inside])
 
     @staticmethod
-    def _paint_ramp(painter: QPainter, line: F64, lower: F64, columns: F64, moved: F64) -> None:
+    def _paint_ramp(painter: QPainter, line: F64, lower: F64, x: F64, moved: F64) -> None:
         """Draw how much an edit acts through time: at the seam nothing, at the rim the most."""
         most = float(moved.max())
         if most <= 1e-6:
             return
-        x = columns + COLUMN / 2
         seam = np.interp(x, line[:, 0], line[:, 1])
         rim = np.interp(x, lower[:, 0], lower[:, 1])
         curve = np.stack([x, seam + (rim - seam) * (0.12 + 0.76 * moved / most)], axis=-1)
