@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from palette4d.analysis import (
     block_merging,
+    clip_colours,
     colour_statistics,
     frame_hulls,
     glue,
@@ -208,6 +209,7 @@ def analyze(
     notes = [*clip.notes]
     if skipped:
         notes.append(f"{counted(len(skipped), 'bad frame')} skipped: {describe(skipped)}")
+    document["colours"] = clip_colours.clip_colours(usable)
     notes += colour_space.record(document, clip, used)
     notes += [*gathered.notes, *missing, *found.notes, *warnings]
     return Analysis(

@@ -8,7 +8,7 @@ import shlex
 import textwrap
 from typing import TYPE_CHECKING
 
-from palette4d.cli import edit_copy, edit_history
+from palette4d.cli import edit_copy, edit_history, picks
 from palette4d.cli.swatches import shown
 from palette4d.common.arguments import ColourAction, accept_negative_values, number
 from palette4d.common.errors import Palette4dError
@@ -34,6 +34,8 @@ example:
   palette4d edit clip.p4d.json move s1 --frame 30
   palette4d edit clip.p4d.json ramp smooth
   palette4d edit clip.p4d.json reset v12
+  palette4d edit clip.p4d.json pick --frame 40 --pixel 320,180 --box 5 --by 0.1,0,-0.05
+  palette4d edit clip.p4d.json hold --frame 40 --colour '#7a6b5c'
   palette4d edit clip.p4d.json undo
   palette4d edit clip.p4d.json version save warm
   palette4d edit other.p4d.json copy clip.p4d.json
@@ -60,8 +62,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     _add_track(actions)
     _add_ramp(actions)
     _add_reset(actions)
-    edit_history.add_actions(functools.partial(_action, actions))
-    edit_copy.add_actions(functools.partial(_action, actions))
+    for module in (picks, edit_history, edit_copy):
+        module.add_actions(functools.partial(_action, actions))
     accept_negative_values(actions)
 
 

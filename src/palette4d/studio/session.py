@@ -9,6 +9,7 @@ import contextlib
 import dataclasses
 import hashlib
 import os
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -17,6 +18,7 @@ from typing import Literal, TypeVar
 
 from palette4d.common.errors import Palette4dError, in_words
 from palette4d.grade.document import Document
+from palette4d.grade.follow import Progress
 from palette4d.media.clip import Clip, open_clip
 from palette4d.media.source_clip import find_clip
 from palette4d.studio import texts
@@ -306,6 +308,49 @@ class Session:
             self.say(text)
         self._changed()
         return result
+
+    def edit_later(
+        self,
+        operation: Callable[[Document, Progress], T],
+        text: str,
+        then: Callable[[T], object],
+    ) -> None:
+        """Do an edit that reads the clip: in a thread on a copy, and then here.
+
+        What is being dragged stays visible until then. `then` gets the operation's result.
+        """
+        document = self._document
+        if document is None:
+            return
+        trial = document.trial()
+
+        def say(done: int, total: int) -> None:
+            words = texts.FOLLOWING.format(done=done, total=total)
+            self.post(lambda: self.say(words))
+
+        def finish(result: T) -> None:
+            if self._document is document:
+                self.edit(repeat, text)
+                then(result)
+
+        def repeat(own: Document) -> None:
+            for step in trial.history:
+                own.apply(step)
+
+        def fail(error: Exception) -> None:
+            self.cancel()
+            self.report(error)
+
+        def work() -> None:
+            try:
+                result = operation(trial, say)
+            except Exception as error:  # whatever fails, the window stays
+                failed = error
+                self.post(lambda: fail(failed))
+            else:
+                self.post(lambda: finish(result))
+
+        threading.Thread(target=work, name="palette4d edit", daemon=True).start()
 
     def drag(self, operation: Edit, text: str = "") -> None:
         """Show an edit without doing it; each call replaces the last."""

@@ -56,6 +56,8 @@ PIXELS = 5000
 TURN, STEP = 0.4, 6.0
 #: The radius of a disc, and of the place where an edited colour was.
 DISC, ORIGIN = 6.5, 3.6
+#: How far edited colours shrink the view, in radii of the others.
+FARTHEST = 1.35
 #: A face is drawn in this many strips, for a smooth gradient.
 STRIPS = 6
 
@@ -139,8 +141,11 @@ class SolidView(QWidget):
         if self._drag is None or self._drag.index is None or self._extent is None:
             self._extent = extent_of([Shape(palette.rgb, palette.edited, palette.faces)])
         size = max(60.0, min(self.width() - 34.0, self.height() - 34.0)) * self.zoom
-        # The size of a ball around everything: it fits from all sides.
-        away = float(np.linalg.norm(self._extent - 0.5, axis=1).max())
+        # The size of a ball around everything: it fits from all sides. A colour that an edit moves
+        # far away does not shrink the rest.
+        far = np.linalg.norm(self._extent - 0.5, axis=1)
+        near = float(far[: len(self._extent) - len(palette.edited)].max())
+        away = float(min(far.max(), FARTHEST * near))
         centre = np.array([self.width() / 2, -(self.height() - 6) / 2])
         return View(centre, 1.12 * size / (2 * away)).turned(self.azimuth, self.elevation)
 

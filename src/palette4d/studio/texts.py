@@ -222,3 +222,22 @@ SET_BY_SCOPE = {
     "track": "moved the track of {id}",
     "palette": "moved the palette",
 }
+PLACE = "pixel {x}, {y}"
+PLACE_HINT = "choose what it becomes"
+PICK, HOLD = "pick", "hold"
+PICKED = "the colour is picked"
+HELD = "the colour is held"
+FOLLOWING = "following the colour: {done} of {total} frames"
+PICK_LIST = "Picks, holds and locks"
+PICK_COLUMNS = ("id, kind, frame", "off by", "palette")
+MET, NOT_MET = "✓", "⚠"
+LOCKED = "{id} is locked"
+RANGE_SET = "{id} acts from frame {start} to {until}"
+PICK_TIP = "from frame {} to {}, fades of {} frames; “palette” is its share of the change"
+ENABLED, DISABLED = "{id} counts again", "{id} does not count"
+REMOVE = "Remove"
+REMOVED = "removed {ids}"
+KEEP = "Keep"
+KEEP_TIP = "Keep these edits as a version"
+USED = "●"
+USE_TIP = "Use version {name} (key {number})"

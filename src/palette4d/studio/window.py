@@ -76,6 +76,7 @@ class Window(QMainWindow):
         self.timeline = TimelineView(session)
         self.solid = SolidView(session)
         self.inspector = Inspector(session)
+        self.viewer.on_pick, self.viewer.on_hold = self.inspector.pick, self.inspector.hold
         self.history = History(session)
         self.shots = Shots(session, self.open_shot)
         middle = QWidget()
