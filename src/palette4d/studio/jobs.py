@@ -4,16 +4,22 @@ A child's crash is a message in the window, not its end. Its command line can be
 """
 
 import contextlib
+import fcntl
 import os
 import re
 import shlex
+import struct
 import subprocess
 import sys
+import termios
 import threading
 from collections.abc import Callable, Sequence
 
 #: tqdm's bars: "colour_statistics:  40%|████      | 20/50 [00:01<00:02]".
 _BAR = re.compile(r"^(?P<what>[^%|\r\n]*?):?\s+(?P<percent>\d+)%\|")
+
+#: Rows and columns of the terminal that a child sees.
+TERMINAL = (24, 120)
 
 #: Seconds in which a stopped child may clean up.
 GRACE = 3.0
@@ -56,12 +62,12 @@ class Job:
         self._changed = changed
         # tqdm draws its bars only for a terminal.
         self._reader, writer = os.openpty()
+        fcntl.ioctl(writer, termios.TIOCSWINSZ, struct.pack("HHHH", *TERMINAL, 0, 0))
         self._process = subprocess.Popen(
             [sys.executable, "-m", "palette4d", *words],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=writer,
-            env={**os.environ, "COLUMNS": "120"},
             start_new_session=True,
         )
         os.close(writer)
