@@ -56,7 +56,7 @@ class Handles:
             if frame == vertex["frame"]:
                 raise Palette4dError(
                     f"at frame {frame:g} edge {edge} has its end {vertex['id']}, which needs no "
-                    f"stop; set the colour of {vertex['id']} itself"
+                    f"stop; set {vertex['id']} itself"
                 )
         if not start["frame"] < frame < end["frame"]:
             raise Palette4dError(
