@@ -163,7 +163,8 @@ def _ramp_times(sidecar: _core.Sidecar, edge: str) -> list[float]:
     def moved(time: float) -> NDArray[np.float64]:
         cut = _core.slice_at(polytope, time)
         row = cut.edges.tolist().index(number)
-        return _core.edited_colours(polytope, edits, cut)[row] - cut.rgb[row]
+        by: NDArray[np.float64] = _core.edited_colours(polytope, edits, cut)[row] - cut.rgb[row]
+        return by
 
     def bends(start: float, end: float) -> list[float]:
         if end - start <= 1:
