@@ -28,6 +28,7 @@ from palette4d.common.files import link_target
 from palette4d.common.locking import locked
 from palette4d.common.text import counted
 from palette4d.grade import edits, moves, sidecar
+from palette4d.grade.copying import Fit, Time, copied, fit
 from palette4d.grade.edits import (
     RAMP,
     Change,
@@ -1031,14 +1032,62 @@ class Document:
             The name of the new version, such as "before NAME".
         """
         wanted = edits.from_fields(self._version(name))
-        versions = {key: value for key, value in self._state.items() if key[0] == "version"}
-        kept = None
-        if self._active() and not any(map(self.same_edits, self.versions)):
-            names = (f"before {name}"[: LONGEST_NAME - 4] + more for more in _suffixes())
-            kept = next(each for each in names if ("version", each) not in versions)
-            versions["version", kept] = self.fields()["edits"]
+        versions, kept = self._versions_with_active(f"before {name}")
         self.apply(edits.difference(self._state, {**wanted, **versions}, f"use version {name}"))
         return kept
+
+    def _versions_with_active(self, name: str) -> tuple[dict[Key, Any], str | None]:
+        """Return the versions, with the active edits as another one if none holds them."""
+        versions = {key: value for key, value in self._state.items() if key[0] == "version"}
+        if not self._active() or any(map(self.same_edits, self.versions)):
+            return versions, None
+        names = (name[: LONGEST_NAME - 4] + more for more in _suffixes())
+        kept = next(each for each in names if ("version", each) not in versions)
+        versions["version", kept] = self.fields()["edits"]
+        return versions, kept
+
+    def copy_from(self, source: "Document", *, time: Time = "relative") -> Fit:
+        """Take over the grade of another document, as one step.
+
+        Each handle gets the colour that the other grade makes of its colour at the corresponding
+        time. Picks are copied and solved again. Active edits that no version holds are kept as the
+        version "before copy".
+
+        Parameters
+        ----------
+        source : Document
+            The graded document.
+        time : "relative" or float
+            "relative": the first frame gets the look of the first frame, the last that of the last.
+            A frame: all frames get the look of this frame of `source`.
+
+        Returns
+        -------
+        Fit
+            How near the result is to the copied grade; its text is for people.
+
+        Raises
+        ------
+        Palette4dError
+            The source has no edits, the frame is outside of its clip, or its colour space cannot be
+            converted.
+        """
+        if not source.edited:
+            raise Palette4dError(
+                f"{source._name} has no edits; expected a graded palette to copy from"
+            )
+        state = copied(self, source, time)
+        before = (self._state, self._done, self._undone)
+        versions, _ = self._versions_with_active("before copy")
+        label = f"copy the grade of {source._fields['clip']['name']}"
+        locks = {key: value for key, value in self._state.items() if key[0] == "lock"}
+        self.apply(edits.difference(self._state, {**state, **locks, **versions}, label))
+        try:
+            return fit(self, source, time)
+        except BaseException:
+            self._become(before[0])
+            self._core, self._solved, (_, self._done, self._undone) = None, None, before
+            raise
 
     def same_edits(self, name: str) -> bool:
         """Whether a version holds the active edits."""
@@ -1240,8 +1289,9 @@ class Document:
         path : path, optional
             A file other than the loaded file.
         on_edits : {"refuse", "keep", "drop"}
-            What to do with edits in that file, which would be lost. "keep" takes them over; this
-            needs the same palette.
+            What to do with edits in that file, which would be lost. "keep" takes them over. If the
+            palette differs, it copies the grade and keeps the old file under another name; `notes`
+            says so.
 
         Raises
         ------
@@ -1264,12 +1314,15 @@ class Document:
         fields = self.fields()
         if self.path is None:
             fields["clip"]["source"] = _beside(fields["clip"]["source"], target)
+        from palette4d.grade import renewal  # which needs this module
+
         path, self.path = self.path, target
         try:
-            fields = sidecar.save(fields, target, on_edits=on_edits)
+            fields, notes = renewal.save(fields, target, on_edits=on_edits)
         except BaseException:
             self.path = path
             raise
+        self.notes += tuple(notes)
         self._disk = sidecar.encoded(fields)
         self._start(self._disk, _core.parse_sidecar(self._disk, str(target)))
 
