@@ -1,4 +1,4 @@
-"""The verb ``edit``: by id, by nearness, stops, and everything that must leave the file alone."""
+"""The verb ``edit``: by id, by the nearest colour, stops, and refusals that change nothing."""
 
 import json
 import subprocess

@@ -115,7 +115,7 @@ def _created(path: Path, content: str) -> bool:
 
 def _cannot(path: Path) -> Palette4dError:
     return Palette4dError(
-        f"{path}: the lock file cannot be created; choose another folder or mend its permissions"
+        f"{path}: the lock file cannot be created; choose another folder or change its permissions"
     )
 
 

@@ -16,12 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QPoint, QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import (
-    QAction,
     QColor,
     QContextMenuEvent,
     QImage,
     QKeyEvent,
-    QKeySequence,
     QMouseEvent,
     QPainter,
     QPaintEvent,
@@ -47,6 +45,8 @@ from palette4d.plotting.layout import (
 )
 from palette4d.plotting.rows import Palette, Rows, arrange
 from palette4d.studio import paint, texts, theme
+from palette4d.studio.actions import TIMELINE_ACTIONS, VIEW
+from palette4d.studio.menus import view_actions
 from palette4d.studio.player import Region
 from palette4d.studio.screen_colours import on_screen, thumbnail
 from palette4d.studio.session import Session
@@ -67,7 +67,8 @@ LOWEST, HIGHEST, RADIUS = 20.0, 46.0, 0.27
 COLUMN = 2
 #: The same while something is dragged.
 DRAGGED_COLUMN = 8
-#: The fewest frames that fill the width.
+#: A step of the zoom, and the fewest frames that fill the width.
+ZOOM = 0.6
 CLOSEST = 4.0
 #: Makes the strip's pictures.
 THREAD = ThreadPoolExecutor(1, thread_name_prefix="palette4d thumbnails")
@@ -136,7 +137,7 @@ class TimelineView(QWidget):
         self._making: set[int] = set()
         self._press: Press | None = None
         self._band: QRectF | None = None
-        self.menu_actions = self._make_actions()
+        self.menu_actions = view_actions(self, TIMELINE_ACTIONS)
         for event, call in (
             ("document", self._changed),
             ("clip", self._new_clip),
@@ -157,34 +158,6 @@ class TimelineView(QWidget):
     def minimumSizeHint(self) -> QSize:
         """Return the least size: a few rows."""
         return QSize(360, RULER + STRIP + FOOT + int(HEAD + TAIL) + 3 * int(LOWEST))
-
-    # ------------------------------------------------------------------------------------ actions
-
-    def _make_actions(self) -> dict[str, list[QAction]]:
-        rows = [
-            ("Palette", texts.ADD_STOP, "S", self.add_stop_at_playhead),
-            ("Palette", texts.RESET, "Del", self.reset_selected),
-            ("Palette", texts.SELECT_ALL, "Ctrl+A", self.select_all),
-            ("Palette", texts.NEXT_HANDLE, "Tab", lambda: self.step_handle(1)),
-            ("Palette", texts.PREVIOUS_HANDLE, "Shift+Tab", lambda: self.step_handle(-1)),
-            ("Palette", texts.ROW_ABOVE, "Up", lambda: self.step_row(-1)),
-            ("Palette", texts.ROW_BELOW, "Down", lambda: self.step_row(1)),
-            ("Palette", texts.STOP_EARLIER, "Alt+Left", lambda: self.nudge(-1)),
-            ("Palette", texts.STOP_LATER, "Alt+Right", lambda: self.nudge(1)),
-            ("View", texts.ZOOM_IN, "+", lambda: self.zoom(0.6)),
-            ("View", texts.ZOOM_OUT, "-", lambda: self.zoom(1 / 0.6)),
-            ("View", texts.ZOOM_ALL, "0", self.show_all),
-        ]
-        result: dict[str, list[QAction]] = {}
-        for menu, text, keys, call in rows:
-            action = QAction(text, self)
-            action.setShortcut(QKeySequence(keys))
-            # The keys work while the timeline has the keyboard; the menu entries always.
-            action.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
-            action.triggered.connect(call)
-            self.addAction(action)
-            result.setdefault(menu, []).append(action)
-        return result
 
     # ------------------------------------------------------------------------------------- layout
 
@@ -641,7 +614,7 @@ class TimelineView(QWidget):
             add = texts.ADD_STOP_AT.format(frame=style.number(time))
             menu.addAction(add, lambda: self.add_stop(hit.id, time))
             menu.addSeparator()
-        menu.addActions(self.menu_actions["View"])
+        menu.addActions(self.menu_actions[VIEW])
         return menu
 
     # ----------------------------------------------------------------------------------- gestures
@@ -714,6 +687,38 @@ class TimelineView(QWidget):
         found = self.timeline
         if found is not None:
             self.session.select(*(disc.id for disc in found[1]))
+
+    def next_handle(self) -> None:
+        """Select the next handle, row by row."""
+        self.step_handle(1)
+
+    def previous_handle(self) -> None:
+        """Select the handle before."""
+        self.step_handle(-1)
+
+    def row_above(self) -> None:
+        """Select the colour at the playhead in the row above."""
+        self.step_row(-1)
+
+    def row_below(self) -> None:
+        """Select the colour at the playhead in the row below."""
+        self.step_row(1)
+
+    def stop_earlier(self) -> None:
+        """Move the selected stops a frame earlier."""
+        self.nudge(-1)
+
+    def stop_later(self) -> None:
+        """Move the selected stops a frame later."""
+        self.nudge(1)
+
+    def zoom_in(self) -> None:
+        """Show fewer frames."""
+        self.zoom(ZOOM)
+
+    def zoom_out(self) -> None:
+        """Show more frames."""
+        self.zoom(1 / ZOOM)
 
     def step_handle(self, by: int) -> bool:
         """Select the next handle, row by row; return whether there is one."""
@@ -1036,6 +1041,18 @@ class TimelineView(QWidget):
             painter.setBrush(QColor(style.BRIGHT))
             painter.drawPolygon(paint.polygon(diamond))
         painter.restore()
+
+    @property
+    def settled(self) -> bool:
+        """Whether all pictures of the frame strip are made."""
+        key = (self.session.revision, self.session.looked)
+        region, player = self._thumb_region(), self.session.player
+        if player is None or region is None:
+            return True
+        return not self._making and all(
+            frame in player.errors or (frame in self._thumbs and self._thumbs[frame][0] == key)
+            for frame, _ in self.thumbnails()
+        )
 
     def _ask_thumbnails(self) -> None:
         """Have the strip's frames read when the player has nothing else to do."""

@@ -181,15 +181,11 @@ class Window(QMainWindow):
             if action.name == "open":
                 self.recent = menu.addMenu(texts.RECENT)
                 self.recent.aboutToShow.connect(self._fill_recent)
-        # The timeline's own keys work while it has the keyboard.
-        known = {action.text for action in ACTIONS}
-        for title, more in self.timeline.menu_actions.items():
-            self.menus[title].addSeparator()
-            for entry in more:
-                if entry.text() in known:
-                    self.timeline.removeAction(entry)
-                else:
-                    self.menus[title].addAction(entry)
+        # The views' own keys work while they have the keyboard.
+        for panel in (self.timeline, self.solid):
+            for title, more in panel.menu_actions.items():
+                self.menus[title].addSeparator()
+                self.menus[title].addActions(more)
         palette = self.menus[actions.PALETTE]
         self.versions = palette.addMenu(texts.VERSIONS)
         self.versions.aboutToShow.connect(self._fill_versions)
@@ -422,6 +418,7 @@ class Window(QMainWindow):
             and picture.request.frame == session.frame
             and picture.request.revision == session.revision
             and session.player.idle
+            and (self.timeline.settled or not self.timeline.isVisible())
         )
 
     def shut(self) -> None:
@@ -895,7 +892,8 @@ class Window(QMainWindow):
     def do_manual(self) -> None:
         """Show the gestures and keys."""
         rows = [f"{where}: {gesture} — {what}" for where, gesture, what in actions.GESTURES]
-        keys = [f"{', '.join(a.keys)} — {a.text}" for a in ACTIONS if a.keys]
+        listed = (*ACTIONS, *actions.TIMELINE_ACTIONS, *actions.SOLID_ACTIONS)
+        keys = [f"{', '.join(a.keys)} — {a.text}" for a in listed if a.keys]
         box = QMessageBox(QMessageBox.Icon.NoIcon, texts.MANUAL, "\n".join(rows), parent=self)
         box.setDetailedText("\n".join(keys))
         box.exec()
