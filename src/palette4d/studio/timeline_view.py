@@ -869,6 +869,7 @@ class TimelineView(QWidget):
         columns = np.arange(left, max(right, left + wide), wide, dtype=np.float64)
         times = np.asarray(scale.frame(columns + wide / 2)).reshape(-1)
         before, after = palette.sampled(times)
+        seen = on_screen(self.session, np.stack([before, after]))
         selected = set(self.session.selection)
         moved = np.nan_to_num(np.linalg.norm(after - before, axis=-1))
         for edge, (_, line) in layout.paths.items():
@@ -877,12 +878,12 @@ class TimelineView(QWidget):
                 continue
             upper, lower = half_bands(line, BAND * layout.row_height)
             touched = palette.touched(edge)
-            parts = [(upper, line if touched else lower, before)]
-            parts += [(line, lower, after)] if touched else []
+            parts = [(upper, line if touched else lower, seen[0])]
+            parts += [(line, lower, seen[1])] if touched else []
             painter.setPen(Qt.PenStyle.NoPen)
             for above, below, colours in parts:
-                seen = on_screen(self.session, colours[edge, inside])
-                painter.setBrush(paint.texture(seen, float(columns[inside[0]]), float(wide)))
+                start = float(columns[inside[0]])
+                painter.setBrush(paint.texture(colours[edge, inside], start, float(COLUMN)))
                 painter.drawPolygon(paint.polygon(np.concatenate([above, below[::-1]])))
             painter.setBrush(Qt.BrushStyle.NoBrush)
             chosen = palette.edge_ids[edge] in selected
@@ -914,14 +915,16 @@ class TimelineView(QWidget):
         self._into_rows(painter)
         shown = [d for d in discs if GUTTER - 30 < d.x < self.width() + 30]
         selected = set(self.session.selection)
-        for each in sorted(shown, key=lambda disc: disc.kind == "stop"):
+        shown.sort(key=lambda disc: disc.kind == "stop")
+        colours = np.array([[each.before, each.after] for each in shown]).reshape(-1, 2, 3)
+        seen = on_screen(self.session, colours)
+        for each, (before, after) in zip(shown, seen, strict=True):
             if abs(each.x - each.home) > 2.5:
                 foot = each.y + BAND * layout.row_height + 3.5
                 bent = [(each.home, each.y), (each.home, foot), (each.x, each.y + each.radius)]
                 painter.setBrush(Qt.BrushStyle.NoBrush)
                 painter.setPen(paint.pen(style.RING, 0.8))
                 painter.drawPolyline(paint.polygon(np.array(bent)))
-            before, after = on_screen(self.session, np.stack([each.before, each.after]))
             paint.disc(
                 painter,
                 each.x,
@@ -1123,6 +1126,7 @@ class TimelineView(QWidget):
         layout, top = found[0], self._top
         palette, frame = layout.palette, float(self.session.frame)
         before, after = palette.sampled(np.array([frame]))
+        seen = on_screen(self.session, np.stack([before[:, 0], after[:, 0]], axis=1))
         probe = self.session.probe
         weights = {} if probe is None else probe.weights
         caption = texts.WEIGHT if weights else ""
@@ -1132,7 +1136,7 @@ class TimelineView(QWidget):
         for edge, y in self._edges_at(layout, x):
             if np.isnan(before[edge, 0]).any():
                 continue
-            two = on_screen(self.session, np.stack([before[edge, 0], after[edge, 0]]))
+            two = seen[edge]
             box = QRectF(8, y + top - 7, 14, 14)
             painter.setPen(Qt.PenStyle.NoPen)
             painter.setBrush(paint.colour_of(two[0]))
