@@ -290,7 +290,7 @@ class Document:
         scaled = " ".join(f"{value / (2**bits - 1):.4g}" for value in values)
         raise Palette4dError(
             f"found the colour {shown}, expected code values where 1 is display white; "
-            f"{shown} in {bits} bits is {scaled}. Give that, or add --float (any_value=True) if "
+            f"{shown} in {bits} bits is {scaled}. Give that, or add any_value=True if "
             f"{shown} is meant"
         )
 
@@ -497,7 +497,7 @@ class Document:
             if stop in self._handles.vertices:
                 raise Palette4dError(
                     f"{stop} is a palette vertex, whose time the analysis found; only stops move "
-                    "in time. Its colour moves with --by"
+                    "in time. Its colour moves with by=…"
                 )
             stops = [id_ for id_, setting in self._settings.items() if setting.edge is not None]
             raise unknown(stop, "stop", stops)
@@ -603,8 +603,8 @@ class Document:
         change = Adjustment(how.get("hue", 0.0), how.get("chroma", 1.0), how.get("lightness", 1.0))
         if [rgb is None, by is None, change == Adjustment()].count(False) != 1:
             raise Palette4dError(
-                "expected one kind of change: a new colour (--rgb; rgb=), offsets (--by; by=), or "
-                "hue, chroma and lightness (--hue …; hue=…)"
+                "expected one kind of change: a new colour rgb=…, offsets by=…, or hue=…, "
+                "chroma=… and lightness=…"
             )
         if by is not None:
             offset = as_colour(by, "offset")
@@ -1390,8 +1390,8 @@ class Document:
     def _check_inside(self, edge: str, frame: float) -> None:
         if edge in self._settings or edge in self._handles.vertices:
             raise Palette4dError(
-                f"{self.named(edge)} has a time of its own; --frame goes with an edge, or with "
-                f"--near. Use `set {edge} --rgb R G B`"
+                f"{self.named(edge)} has a time of its own: leave out frame=…, which is for "
+                "edges and for near=…"
             )
         self._handles.check_inside(edge, frame)
 
