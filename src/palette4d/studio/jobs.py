@@ -65,7 +65,8 @@ class Job:
             start_new_session=True,
         )
         os.close(writer)
-        threading.Thread(target=self._read_bars, name="palette4d job", daemon=True).start()
+        self._bars = threading.Thread(target=self._read_bars, name="palette4d job", daemon=True)
+        self._bars.start()
         threading.Thread(target=self._wait, name="palette4d job", daemon=True).start()
 
     @property
@@ -89,7 +90,9 @@ class Job:
 
     def wait(self, seconds: float | None = None) -> int:
         """Wait for the end; return the exit status."""
-        return self._process.wait(seconds)
+        status = self._process.wait(seconds)
+        self._bars.join(GRACE)
+        return status
 
     def _read_bars(self) -> None:
         rest = ""
@@ -117,7 +120,10 @@ class Job:
 
     def _wait(self) -> None:
         assert self._process.stdout is not None
-        for line in self._process.stdout:
-            self.output += line.decode("utf-8", "replace")
-        self.status = self._process.wait()
+        with self._process.stdout as lines:
+            for line in lines:
+                self.output += line.decode("utf-8", "replace")
+        status = self._process.wait()
+        self._bars.join(GRACE)
+        self.status = status
         self._changed(self)

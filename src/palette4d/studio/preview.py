@@ -153,7 +153,7 @@ class Preview:
     """
 
     def __init__(self, ready: Callable[[Picture], object]) -> None:
-        self._ready = ready
+        self._tell = ready
         self._small = ByteCache[tuple[int, Region], F32](SMALL_BYTES)
         self._befores = ByteCache[tuple[Any, ...], U8](BEFORE_BYTES)
         self._reel = ByteCache[tuple[Any, ...], Picture](REEL_BYTES)
@@ -231,6 +231,10 @@ class Preview:
             size = sum(side.nbytes for side in sides if side is not None)
             self._reel.put(request.film_key, picture, size)
             self._ready(picture)
+
+    def _ready(self, picture: Picture) -> None:
+        if not self._closed:
+            self._tell(picture)
 
     def _check(self) -> None:
         if self._waiting is not None or self._closed:
@@ -313,9 +317,14 @@ class Preview:
         key = (request.frame, request.region, request.look, exact, request.key)
         found = self._befores.get(key)
         if found is None:
-            colours = self._source(request)
-            if request.before is not None:
-                colours = _quick(colours, request.before, request.premultiplied)
+            grade = request.before
+            if grade is None:
+                colours = self._source(request)
+            elif exact:
+                whole = self.exact(request.pixels, grade, request.premultiplied, check)
+                colours = resampled(whole, request.region)
+            else:
+                colours = _quick(self._source(request), grade, request.premultiplied)
             found = _painted(painter, colours, request.premultiplied, exact, check)
             self._befores.put(key, found, found.nbytes)
         return found

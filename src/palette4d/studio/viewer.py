@@ -164,6 +164,16 @@ class Viewer(QWidget):
             return None
         return self._request_of(frame, region, NO_PIXELS, settled=False, scaled=True)
 
+    def film_key(self, frame: int) -> tuple[Any, ...]:
+        """Return `Request.film_key` of the request for a frame to play."""
+        session = self.session
+        sides = frozenset(self.sides)
+        return frame, self.region(), session.looked, sides, self._before_key(), session.revision
+
+    def _before_key(self) -> str:
+        version = self.session.view.version
+        return f"{version} {self.session.revision}" if version else ""
+
     def with_pixels(self, request: Request) -> Request | None:
         """Return a request to play with its pixels; None if they are gone."""
         player = self.session.player
@@ -172,14 +182,14 @@ class Viewer(QWidget):
 
     def _request_of(self, frame: int, region: Region, pixels: F32, **more: Any) -> Request:
         session, view = self.session, self.session.view
+        revision = session.revision  # first: another thread may make pictures to play
         document = session.document
         assert session.clip is not None
         assert session.display is not None
         grade = None if document is None else Grade.of(document, frame)
-        before, key = None, ""
+        before = None
         if view.version and document is not None:
             before = version_grade(document, view.version, frame)
-            key = f"{view.version} {session.revision}"
         return Request(
             frame=frame,
             pixels=pixels,
@@ -189,8 +199,8 @@ class Viewer(QWidget):
             region=region,
             display=session.display,
             look=session.looked,
-            key=key,
-            revision=session.revision,
+            key=self._before_key(),
+            revision=revision,
             sides=frozenset(self.sides),
             **more,
         )

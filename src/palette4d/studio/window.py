@@ -251,7 +251,7 @@ class Window(QMainWindow):
         self.view_facts.setText(shown)
         name = session.path.name if session.path is not None else ""
         title = name or (session.clip.name if session.clip is not None else "")
-        self.setWindowTitle(f"{title} — {texts.TITLE}" if title else texts.TITLE)
+        self.setWindowTitle(f"{title}[*] — {texts.TITLE}" if title else texts.TITLE)
         self.setWindowModified(not session.saved)
         checks = {
             **{f"show_{each}": view.compare == each for each in texts.COMPARE},
