@@ -31,6 +31,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QMenu, QToolTip, QWidget
 
 from palette4d.grade.document import Document
+from palette4d.grade.edits import RAMPS, Ramp
 from palette4d.grade.follow import Progress
 from palette4d.grade.picks import Pick
 from palette4d.plotting import style
@@ -608,6 +609,11 @@ class TimelineView(QWidget):
             menu.addAction(go, lambda: self.session.go(frame))
             reset = texts.REMOVE_STOP if hit.stop else texts.RESET
             menu.addAction(reset, self.reset_selected)
+            self._add_ramps(menu)
+            menu.addAction(texts.LOCK_ENTRY, self.lock_selected)
+            menu.addSeparator()
+        elif hit.what == "pick":
+            menu.addAction(texts.REMOVE, self.remove_picks)
             menu.addSeparator()
         elif hit.what == "band":
             time = self.frame_at(x)
@@ -617,7 +623,55 @@ class TimelineView(QWidget):
         menu.addActions(self.menu_actions[VIEW])
         return menu
 
+    def _add_ramps(self, menu: QMenu) -> None:
+        """Add the ramps of the selected handles that are edited."""
+        document = self.session.document
+        ids = [
+            id_
+            for id_ in self.session.selection
+            if document is not None and id_ in document.settings
+        ]
+        ramps = menu.addMenu(texts.RAMP)
+        ramps.setEnabled(bool(ids))
+        for ramp in RAMPS:
+            entry = ramps.addAction(texts.RAMPS[ramp])
+            entry.triggered.connect(lambda _=False, ramp=ramp: self._set_ramp(ids, ramp))
+            entry.setCheckable(True)
+            if document is not None and ids:
+                entry.setChecked(all(document.settings[id_].ramp == ramp for id_ in ids))
+
+    def _set_ramp(self, ids: list[str], ramp: Ramp) -> None:
+        def change(document: Document) -> None:
+            with document.one_step(texts.RAMP_STEP.format(ramp=ramp)):
+                for id_ in ids:
+                    document.set_ramp(ramp, id_)
+
+        self.session.edit(change, texts.RAMP_SET.format(ramp=texts.RAMPS[ramp]))
+
     # ----------------------------------------------------------------------------------- gestures
+
+    def lock_selected(self) -> None:
+        """Lock the selected handles, or unlock them if all are locked."""
+        document = self.session.document
+        content = self._content
+        if document is None or content is None:
+            return
+        handles = {*content.ids, *(stop[0] for stop in content.stops)}
+        ids = [id_ for id_ in self.session.selection if id_ in handles]
+        if not ids:
+            return
+        if set(ids) <= set(document.locks):
+            self.session.edit(lambda document: document.unlock(*ids), texts.LOCK)
+        else:
+            new = [id_ for id_ in ids if id_ not in document.locks]
+            self.session.edit(lambda document: document.lock(*new), texts.LOCK)
+
+    def remove_picks(self) -> None:
+        """Remove the selected picks and holds."""
+        ids = [pick.id for pick, _ in self.lanes() if pick.id in self.session.selection]
+        if ids:
+            text = texts.REMOVED.format(ids=", ".join(ids))
+            self.session.edit(lambda document: document.unpick(*ids), text)
 
     def add_stop(self, edge: str, frame: float) -> None:
         """Add a stop of the colour that the edge has at a frame."""
@@ -935,6 +989,10 @@ class TimelineView(QWidget):
                 each.kind,
                 selected=each.id in selected,
             )
+        locks = set() if self.session.document is None else set(self.session.document.locks)
+        for each in shown:
+            if each.id in locks:
+                paint.padlock(painter, each.x + each.radius, each.y + each.radius)
         font = paint.small_font(self, -1.5)
         painter.setFont(font)
         metrics = painter.fontMetrics()
