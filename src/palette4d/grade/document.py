@@ -561,15 +561,15 @@ class Document:
             self.check_frame(frame)
             self._check_inside(id, frame)
         elif id is not None and id not in self._handles.edges:
-            self._frame_of(id, None)  # refuses unknown ids
+            self.frame_of(id, None)  # refuses unknown ids
         within = moves.range_of(start, until, fade, self.frames)
         ramp = how.get("ramp")
         known = None if ramp is None else as_ramp(ramp)
         move, what = self._move(id, frame, how, any_value)
         rgb = how.get("rgb")
-        if rgb is not None and within is not None and within.weight(self._frame_of(id, frame)) < 1:
+        if rgb is not None and within is not None and within.weight(self.frame_of(id, frame)) < 1:
             raise Palette4dError(
-                f"the colour is meant at frame {self._frame_of(id, frame):g}, outside of the "
+                f"the colour is meant at frame {self.frame_of(id, frame):g}, outside of the "
                 f"range {moves.range_text(start, until)}; expected a range with this frame"
             )
         stop = self._settings.get(id or "")
@@ -578,8 +578,8 @@ class Document:
         elif within is not None or track:
             name, way = f"track {id}", way_of(self._handles, (stop and stop.edge) or id)
         elif id in self._handles.edges:
-            new = as_colour(move(self._own_colour(id, self._frame_of(id, frame))))
-            return (self._stop(id, self._frame_of(id, frame), new, known),)
+            new = as_colour(move(self._own_colour(id, self.frame_of(id, frame))))
+            return (self._stop(id, self.frame_of(id, frame), new, known),)
         else:
             name, way = id, ({id}, set())
         changed = moves.moved(
@@ -616,12 +616,12 @@ class Document:
                 "the whole palette cannot get one colour; expected offsets (by), or hue, chroma "
                 "and lightness"
             )
-        new, at = self._checked(rgb, any_value), self._frame_of(id, frame)
+        new, at = self._checked(rgb, any_value), self.frame_of(id, frame)
         before = self._own_colour(id, at) if id in self._handles.edges else self.colour(id)
         return moves.shift_to(before, new), f"to {_text(new)}"
 
-    def _frame_of(self, id: str | None, frame: float | None) -> float:
-        """Return the frame of a handle, or of an edge's colour that the user means."""
+    def frame_of(self, id: str | None, frame: float | None = None) -> float:
+        """Return the frame of a vertex or stop; for an edge, the frame that is given."""
         if id in self._handles.edges:
             if frame is None:
                 raise self._handles.needs_frame(id)
