@@ -84,8 +84,7 @@ def read(path: Path, rate: Fraction | None = None) -> Document:
     try:
         read_regular(regular, LARGEST_FILE)
         with Child(SECONDS, MEGABYTES) as child:
-            text = child.call(_as_json, str(path), arguments)
-        found = otio.adapters.read_from_string(text, "otio_json")
+            text = child.call(as_json, str(path), arguments)
     except OSError as error:
         raise Palette4dError(in_words(error)) from error
     except Palette4dError as error:
@@ -94,6 +93,13 @@ def read(path: Path, rate: Fraction | None = None) -> Document:
             f".{extension} file"
             + (", and its timecodes' rate as rate=…" if extension == "edl" else "")
         ) from error
+    return document_of(path, text)
+
+
+def document_of(path: Path, text: str) -> Document:
+    """Return the only timeline of a file, from its `as_json`; `Palette4dError` if there is none."""
+    otio = library()
+    found = otio.adapters.read_from_string(text, "otio_json")
     if isinstance(found, otio.schema.SerializableCollection):
         timelines = [one for one in found if isinstance(one, otio.schema.Timeline)]
         if len(timelines) != 1:
@@ -107,12 +113,12 @@ def read(path: Path, rate: Fraction | None = None) -> Document:
             f"{path}: found a {type(found).__name__}, expected a timeline; write the edit to a "
             "file as a whole"
         )
-    if extension == "edl":
+    if path.suffix.lower() == ".edl":
         _rebase(found)
     return Document(path, found)
 
 
-def _as_json(path: str, arguments: dict[str, float]) -> str:
+def as_json(path: str, arguments: dict[str, float]) -> str:
     """Return a timeline file as OpenTimelineIO's JSON, which it has read without harm."""
     otio = library()
     found = otio.adapters.read_from_file(path, **arguments)
