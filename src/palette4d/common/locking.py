@@ -24,6 +24,9 @@ if sys.platform != "win32":
 #: Seconds to wait while another program holds the lock.
 LOCK_SECONDS = 10.0
 
+#: Seconds after which a lock file without an owner is that of a program that was killed.
+UNFINISHED_SECONDS = 2.0
+
 
 @contextlib.contextmanager
 def locked(target: Path) -> Iterator[Callable[[], None]]:
@@ -76,7 +79,7 @@ def _lock_file(target: Path, deadline: float) -> Iterator[Callable[[], None]]:
     mine = f"{_computer()} {os.getpid()} {secrets.token_hex(8)}"
     while not _created(path, mine):
         owner = _content(path)
-        if owner is not None and _is_dead(owner):
+        if owner is not None and (_is_dead(owner) or (not owner and _is_unfinished(path))):
             _remove(path, owner)
         elif time.monotonic() > deadline:
             raise Palette4dError(
@@ -153,6 +156,14 @@ def _is_dead(owner: str) -> bool:
     except (OSError, OverflowError):
         return False
     return False
+
+
+def _is_unfinished(path: Path) -> bool:
+    """Whether a lock file was created long ago, and its owner never written."""
+    try:
+        return time.time() - path.stat().st_mtime > UNFINISHED_SECONDS
+    except OSError:
+        return False
 
 
 def _remove(path: Path, owner: str) -> None:

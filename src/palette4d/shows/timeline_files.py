@@ -88,18 +88,25 @@ def read(path: Path, rate: Fraction | None = None) -> Document:
     except OSError as error:
         raise Palette4dError(in_words(error)) from error
     except Palette4dError as error:
-        raise Palette4dError(
-            f"{path}: it cannot be read as a timeline ({_first_line(error)}); expected a whole "
-            f".{extension} file"
-            + (", and its timecodes' rate as rate=…" if extension == "edl" else "")
-        ) from error
+        raise _unreadable(path, error) from error
     return document_of(path, text)
+
+
+def _unreadable(path: Path, error: Exception) -> Palette4dError:
+    extension = path.suffix.lower()
+    return Palette4dError(
+        f"{path}: it cannot be read as a timeline ({_first_line(error)}); expected a whole "
+        f"{extension} file" + (", and its timecodes' rate as rate=…" if extension == ".edl" else "")
+    )
 
 
 def document_of(path: Path, text: str) -> Document:
     """Return the only timeline of a file, from its `as_json`; `Palette4dError` if there is none."""
     otio = library()
-    found = otio.adapters.read_from_string(text, "otio_json")
+    try:
+        found = otio.adapters.read_from_string(text, "otio_json")
+    except Exception as error:  # it does not read back everything that it writes
+        raise _unreadable(path, error) from error
     if isinstance(found, otio.schema.SerializableCollection):
         timelines = [one for one in found if isinstance(one, otio.schema.Timeline)]
         if len(timelines) != 1:
