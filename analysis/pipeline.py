@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from palette4d.analysis import (
     block_merging,
+    clip_colours,
     colour_statistics,
     frame_hulls,
     glue,
@@ -208,6 +209,7 @@ def analyze(
     notes = [*clip.notes]
     if skipped:
         notes.append(f"{counted(len(skipped), 'bad frame')} skipped: {describe(skipped)}")
+    document["colours"] = clip_colours.clip_colours(usable)
     notes += colour_space.record(document, clip, used)
     notes += [*gathered.notes, *missing, *found.notes, *warnings]
     return Analysis(
@@ -246,7 +248,7 @@ def _usable(
     notes = []
     if blank := sorted(n for n, s in gathered.items() if s is None):
         one, more = "frame has no usable pixel and was", "frames have no usable pixel and were"
-        notes.append(f"{counted(len(blank), one, more)} passed over: {describe(blank)}")
+        notes.append(f"{counted(len(blank), one, more)} left out: {describe(blank)}")
     for end, nearest in ((numbers[0], min(have)), (numbers[-1], max(have))):
         if end not in have:
             have[end] = dataclasses.replace(have[nearest], frame=end)

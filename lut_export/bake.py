@@ -254,13 +254,7 @@ def _opened(
 
 
 def check_target(path: Path, force: bool) -> None:
-    """Refuse a file that may not be written.
-
-    Raises
-    ------
-    Palette4dError
-        As `common.files.refuse_existing`; also when `path` is a device or a pipe.
-    """
+    """Refuse a file that may not be written."""
     if path.exists() and not path.is_file() and not path.is_dir():
         raise Palette4dError(
             f"{path}: found a device or a pipe, expected a file name; for standard output run "
@@ -272,13 +266,7 @@ def check_target(path: Path, force: bool) -> None:
 def check_settings(
     settings: BakeSettings, format_: LutFormat, sidecar: _core.Sidecar, frame: float
 ) -> None:
-    """Refuse what cannot be baked, before any frame is read.
-
-    Raises
-    ------
-    Palette4dError
-        Time, size, strength, shaper or domain is out of range or does not fit the format.
-    """
+    """Refuse what cannot be baked, before any frame is read."""
     frame_edit(sidecar, frame, settings.strength)
     if format_.is_cdl:
         return

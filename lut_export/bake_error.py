@@ -103,18 +103,12 @@ class Measure:
 
     Attributes
     ----------
-    colours : int
-        How many colours were compared.
-    delta_e_colours : int
-        How many of them, evenly spread, with deltaE.
-    visible : float
-        Share of these with a deltaE 2000 above `VISIBLE`, in the worst reading.
-    outside_domain : float
-        Share of colours with a channel outside the file's domain, where it clamps.
-    worst : Figures
-        The larger of `by_reading`, figure by figure: a bound for every host.
-    by_reading : dict of str to Figures
-        For each reading of the file.
+    colours : how many colours were compared.
+    delta_e_colours : how many of them, evenly spread, with deltaE.
+    visible : share of these with a deltaE 2000 above `VISIBLE`, in the worst reading.
+    outside_domain : share of colours with a channel outside the file's domain, where it clamps.
+    worst : the larger of `by_reading`, figure by figure: a bound for every host.
+    by_reading : for each reading of the file.
     """
 
     colours: int
@@ -150,20 +144,14 @@ def measure(
 
     Parameters
     ----------
-    colours : (h, w, 3 or more) float array
-        The colours to compare. NaNs and infinities are left out: no LUT can hold them.
-    readers : mapping
-        For each reading, a function that applies the file.
-    edit : FrameEdit
-        The exact edit.
-    viewing : Viewing
-        For deltaE.
-    domain : (low, high)
-        Of the file, for `Measure.outside_domain`.
-    threads : int
-        0: one per processor; the result does not depend on it.
-    shaped : callable, optional
-        Converts colours to the code values of the domain.
+    colours : (h, w, 3 or more) float array; the colours to compare. NaNs and infinities are left
+        out: no LUT can hold them.
+    readers : for each reading, a function that applies the file.
+    edit : the exact edit.
+    viewing : for deltaE.
+    domain : (low, high); of the file, for `Measure.outside_domain`.
+    threads : 0: one per processor; the result does not depend on it.
+    shaped : converts colours to the code values of the domain.
 
     Returns
     -------
@@ -257,16 +245,6 @@ def figures_text(figures: Figures) -> str:
         f"|a-b|/max(|b|,0.1) mean {stated(f.relative_mean)}, largest {stated(f.relative_largest)}; "
         f"deltaE 2000 mean {stated(f.delta_e_mean)}, largest {stated(f.delta_e_largest)}"
     )
-
-
-def figures_info(figures: Figures) -> dict[str, str]:
-    """Return errors under their names in the Info of a CLF."""
-    return {
-        "RelativeMean": stated(figures.relative_mean),
-        "RelativeLargest": stated(figures.relative_largest),
-        "DeltaE2000Mean": stated(figures.delta_e_mean),
-        "DeltaE2000Largest": stated(figures.delta_e_largest),
-    }
 
 
 def table(rows: Iterable[tuple[str, Figures]]) -> list[str]:

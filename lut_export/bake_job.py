@@ -6,7 +6,6 @@ import uuid
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,6 @@ from palette4d.lut_export import lut3d
 from palette4d.lut_export.bake_error import (
     Measure,
     Reader,
-    figures_info,
     figures_text,
     load,
     measure,
@@ -166,44 +164,25 @@ def check_same(
 
 
 def describe(
-    job: Job,
-    content: Content,
-    errors: tuple[Measure, Measure | None] | None,
+    job: Job, content: Content, errors: tuple[Measure, Measure | None] | None
 ) -> Description:
-    """Return the file's description of itself; its lines repeat its Info."""
+    """Return the file's description of itself."""
     name, frame = job.sidecar.clip["name"], frame_text(job.frame)
     encoding = job.space.name or "the clip's own encoding"
-    info: dict[str, Any] = {
-        "Clip": name,
-        "Frame": frame,
-        "Strength": repr(job.settings.strength),
-        "Encoding": encoding,
-        "SidecarSha256": job.sha256,
-        "Shaper": job.shaper.kind,
-        "Domain": f"{job.shaper.low:g} {job.shaper.high:g}",
-    }
-    if job.conversion is not None:
-        info["Conversion"] = job.conversion
     if isinstance(content, lut3d.Lut3D):
         what, held = f"3D LUT {content.size}", content.values.tobytes()
     else:
         what, held = "CDL", repr(content).encode()
     lines = [
         f"clip {name}, frame {frame}, strength {job.settings.strength:g}, {what}",
-        f"sidecar sha256 {job.sha256}",
+        f"sidecar sha256 {job.sha256}, palette4d {_core.__version__}",
         f"shaper {job.shaper.text()}",
     ]
     if errors is not None:
-        info["Error"] = {}
-        measures = (
-            ("Grid", "dense grid", errors[0]),
-            ("Clip", f"clip's colours at frame {job.image_frame}", errors[1]),
-        )
-        for key, where, found in measures:
+        places = ("dense grid", f"clip's colours at frame {job.image_frame}")
+        for where, found in zip(places, errors, strict=True):
             if found is not None:
-                info["Error"][key] = figures_info(found.worst)
                 lines.append(f"error on the {where}: {figures_text(found.worst)}")
-        info["Error"]["Colours"] = job.viewing.assumption
         lines.append(f"errors hold for the readings {' and '.join(job.format.readings)}")
         lines.append(f"deltaE: {job.viewing.assumption}")
     made_from = f"{job.sha256} {job.frame!r} {job.settings.strength!r} {job.shaper!r}"
@@ -214,7 +193,5 @@ def describe(
         identifier=uuid.uuid5(NAMESPACE, digest).urn,
         name=f"palette4d {name} frame {frame}",
         lines=tuple(lines),
-        input_space=encoding,
-        output_space=encoding,
-        info={"AppRelease": f"palette4d {_core.__version__}", "Palette4D": info},
+        space=encoding,
     )

@@ -32,12 +32,10 @@ class BetweenError:
 
     Attributes
     ----------
-    delta_e : float
-        Between the edit at `frame` and the edit at `look`, the frame whose look is shown there.
-    frame, look : int
-        The frame with the largest error, and the baked frame whose look it shows.
-    on_clip : bool
-        Measured on the clip's colours at `frame`; False: on a grid over the palette's range.
+    delta_e : between the edit at `frame` and the edit at `look`, the frame whose look is shown
+        there.
+    frame, look : the frame with the largest error, and the baked frame whose look it shows.
+    on_clip : measured on the clip's colours at `frame`; False: on a grid over the palette's range.
     """
 
     delta_e: float
@@ -61,21 +59,8 @@ def between_error(
 ) -> BetweenError | None:
     """Return the largest error between looks; None if every frame has its own look.
 
-    Parameters
-    ----------
-    path, sidecar : Path, Sidecar
-        The sidecar's file, and the core's view of it.
-    baked : tuple of int
-        The frames that have a look, in rising order.
-    strength : float
-        The strength of the baked looks.
-    clip : str, optional
-        The clip; by default the clip that the sidecar names.
-
-    Raises
-    ------
-    Palette4dError
-        The clip that was given cannot be read.
+    `baked` are the frames that have a look, in rising order. Without `clip` the sidecar's clip is
+    used.
     """
     own = set(baked)
     between = [frame for frame in series.every(sidecar, 1) if frame not in own]

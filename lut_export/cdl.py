@@ -60,15 +60,7 @@ def _apply(numbers: F64, colours: F64) -> F64:
 
 
 def fit(edit: FrameEdit, colours: F32) -> Cdl:
-    """Return the CDL nearest to an edit on the given colours.
-
-    Parameters
-    ----------
-    edit : FrameEdit
-        The edit to fit.
-    colours : (h, w, 3) float32
-        The colours of the fit; NaNs and infinities are left out.
-    """
+    """Return the CDL nearest to an edit on (h, w, 3) float32 colours; only finite ones count."""
     if edit.identity:
         return Cdl()
     from scipy.optimize import least_squares
@@ -117,7 +109,7 @@ def write(cdl: Cdl, format_name: str, shot: str, description: Description) -> st
     transform.setSat(cdl.saturation)
     transform.setID(_unescaped(shot))
     metadata = transform.getFormatMetadata()
-    metadata.addChildElement("InputDescription", _unescaped(description.input_space))
+    metadata.addChildElement("InputDescription", _unescaped(description.space))
     for line in (description.name, *description.lines, f"id {description.identifier}"):
         metadata.addChildElement(ocio.METADATA_DESCRIPTION, _unescaped(line))
     group = ocio.GroupTransform([transform])

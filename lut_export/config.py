@@ -48,16 +48,11 @@ class Shot:
 
     Attributes
     ----------
-    name : str
-        The name of the look and of the files, and the value of SHOT.
-    process_space : str
-        A colour space of the config.
-    first, last : int
-        The clip's first and last frame. Each frame has a file.
-    baked : Series
-        The files that were baked; all other files are links to the nearest baked file.
-    between : BetweenError or None
-        The error at the frames between baked frames; None if every frame was baked.
+    name : the name of the look and of the files, and the value of SHOT.
+    process_space : a colour space of the config.
+    first, last : the clip's first and last frame. Each frame has a file.
+    baked : the files that were baked; all other files are links to the nearest baked file.
+    between : the error at the frames between baked frames; None if every frame was baked.
     """
 
     name: str
@@ -100,42 +95,20 @@ def write_config(
     anyway: bool = False,
     progress: Callable[[int, int], object] | None = None,
 ) -> WrittenConfig:
-    """Write a config with a look for each sidecar.
+    """Write a config with a look for each sidecar (`palette4d.config` explains the arguments).
 
     Parameters
     ----------
-    sidecars : list of Path
-        The shots.
-    folder : Path
-        The folder for the config and its LUTs.
-    settings : BakeSettings, optional
-        For every frame. The format is CLF by default. The colour space is always the palette's:
-        OpenColorIO itself converts to a look's process space.
-    choose : callable
-        sidecar -> the frames to bake; each other frame shows the nearest baked frame.
-    base : str, optional
-        A config's file, an .ocioz archive or an ``ocio://`` name; by default `BUILT_IN`.
-    names : tuple of str, optional
-        The shots' names, in the order of the sidecars; by default the clips' names.
-    process_space : str, optional
-        The process space of all shots; by default each sidecar's encoding.
-    clip : str, optional
-        The clip, for shapers and errors; by default the clip that each sidecar names.
-    workers : Workers, optional
-        The processes or the farm that bake.
-    force : bool
-        Replace an existing config, and looks of the same names.
-    anyway : bool
-        Write the config even where the error between the baked frames is above `LARGEST_DELTA_E`.
-    progress : callable, optional
-        Called with (frames done, frames in all), the first time before any is baked.
+    settings : for every frame. The format is CLF by default. The colour space is always the
+        palette's: OpenColorIO itself converts to a look's process space.
+    choose : sidecar -> the frames to bake; each other frame shows the nearest baked frame.
+    force : replace an existing config, and looks of the same names.
 
     Raises
     ------
     Palette4dError
-        Nothing was written: two shots have one name, the base is unusable or lacks a process space,
-        a config exists already, or the error between frames is too large. Only LUTs were written: a
-        frame could not be baked, or OpenColorIO refuses the config.
+        Nothing was written; or only LUTs, if a frame could not be baked or OpenColorIO refuses the
+        config.
     """
     import PyOpenColorIO as ocio
 

@@ -33,11 +33,6 @@ def space_of_sidecar(config: Any, base: str, sidecar: _core.Sidecar, wanted: str
 
     The lookup is by name, alias or role, under every name of the encoding. Otherwise OpenColorIO
     looks for a colour space that converts alike, if the config has the roles for that.
-
-    Raises
-    ------
-    Palette4dError
-        There is no such colour space, or the encoding is unknown.
     """
     import PyOpenColorIO as ocio
 
@@ -68,13 +63,7 @@ def space_of_sidecar(config: Any, base: str, sidecar: _core.Sidecar, wanted: str
 
 
 def refuse_looks(config: Any, base: str, names: list[str]) -> None:
-    """Refuse a base that has looks of these names, in upper or lower case.
-
-    Raises
-    ------
-    Palette4dError
-        The message names the first such look.
-    """
+    """Refuse a base that has looks of these names, in upper or lower case."""
     there = {str(name).lower() for name in config.getLookNames()}
     for name in names:
         if name.lower() in there:

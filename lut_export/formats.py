@@ -27,28 +27,19 @@ class LutFormat:
 
     Attributes
     ----------
-    name : str
-        For ``--format`` and ``--json``; for 3D LUTs OpenColorIO's name, if it is short.
-    title : str
-        The name for people.
-    extension : str
-        With the dot, lower case.
-    readings : tuple of str
-        The ways in which hosts read it (`bake_error.READINGS`); the error is stated for each.
-    rounding : str
-        The precision of the file's code values.
-    write : callable or None
-        (3D LUT, description) -> the file's text; None for a CDL.
-    shaper : bool
-        Whether it can hold a shaper.
-    described : bool
-        Whether it can describe itself in comments or metadata.
-    discrete : bool
-        Whether it holds a list of transforms, so also conversions before and after the 3D LUT.
-    smallest : int
-        The least number of samples per side.
-    powers : bool
-        It allows only 2^k + 1 samples per side.
+    name : for ``--format`` and ``--json``; for 3D LUTs OpenColorIO's name, if it is short.
+    title : the name for people.
+    extension : with the dot, lower case.
+    readings : the ways in which hosts read it (`bake_error.READINGS`); the error is stated for
+        each.
+    rounding : the precision of the file's code values.
+    write : (3D LUT, description) -> the file's text; None for a CDL.
+    shaper : whether it can hold a shaper.
+    described : whether it can describe itself in comments or metadata.
+    discrete : whether it holds a list of transforms, so also conversions before and after the 3D
+        LUT.
+    smallest : the least number of samples per side.
+    powers : it allows only 2^k + 1 samples per side.
     """
 
     name: str
@@ -69,13 +60,7 @@ class LutFormat:
         return self.write is None
 
     def check_size(self, size: int) -> None:
-        """Refuse a 3D LUT that the format cannot hold.
-
-        Raises
-        ------
-        Palette4dError
-            The message lists the sizes that it can hold.
-        """
+        """Refuse a 3D LUT that the format cannot hold."""
         if size < self.smallest or (self.powers and size not in self.sizes()):
             raise Palette4dError(
                 f"{self.title} cannot hold {size} samples a side; expected "
@@ -144,13 +129,7 @@ def format_names() -> list[str]:
 
 
 def format_named(name: str) -> LutFormat:
-    """Return the format of a name, or of an extension with or without its dot.
-
-    Raises
-    ------
-    Palette4dError
-        The name is unknown; the message lists similar names, or all.
-    """
+    """Return the format of a name, or of an extension with or without its dot."""
     wanted = name.lower()
     for known in FORMATS:
         if wanted in (known.name, known.extension, known.extension[1:]):
@@ -166,14 +145,7 @@ def format_named(name: str) -> LutFormat:
 
 
 def format_of(path: Path, name: str | None = None) -> LutFormat:
-    """Return the format of a file: the named format, else the format of its extension.
-
-    Raises
-    ------
-    Palette4dError
-        The extension is unknown (the message lists the known ones), or does not fit the named
-        format.
-    """
+    """Return the format of a file: the named format, else the format of its extension."""
     extension = path.suffix.lower()
     if name is not None:
         named = format_named(name)

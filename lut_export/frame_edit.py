@@ -22,13 +22,7 @@ def frame_text(frame: float) -> str:
 
 
 def check_frame(sidecar: _core.Sidecar, frame: float) -> None:
-    """Refuse a time outside the clip.
-
-    Raises
-    ------
-    Palette4dError
-        `frame` is before the first or after the last frame of the palette.
-    """
+    """Refuse a time outside the clip."""
     first, last = sidecar.polytope.first_frame, sidecar.polytope.last_frame
     if not first <= frame <= last:
         raise Palette4dError(
@@ -43,20 +37,13 @@ class FrameEdit:
 
     Attributes
     ----------
-    palette : (n, 3) float64
-        The slice's colours before the edit (eq. 5).
-    edited : (n, 3) float64
-        The same colours after the edit.
-    faces : (f, 3) int32
-        The slice's triangles.
-    strength : float
-        0 leaves colours alone, 1 is the edit.
-    bumps : (b, 7) float64
-        Centre, radius and displacement of what moves besides the palette.
-    recolourer : Recolourer
-        The node's own code for the edit.
-    conversion : ColourConversion or None
-        From the colours' space to the palette's space; None if they are the same.
+    palette : (n, 3) float64; the slice's colours before the edit (eq. 5).
+    edited : (n, 3) float64; the same colours after the edit.
+    faces : (f, 3) int32; the slice's triangles.
+    strength : 0 leaves colours alone, 1 is the edit.
+    bumps : (b, 7) float64; centre, radius and displacement of what moves besides the palette.
+    recolourer : the node's own code for the edit.
+    conversion : from the colours' space to the palette's space; None if they are the same.
     """
 
     palette: F64
@@ -106,23 +93,10 @@ def frame_edit(
     strength: float = 1.0,
     conversion: _core.ColourConversion | None = None,
 ) -> FrameEdit:
-    """Return the edit of a sidecar at a time.
+    """Return the edit of a sidecar at a time of the clip, which may lie between frames.
 
-    Parameters
-    ----------
-    sidecar : Sidecar
-        Palette and edits.
-    frame : float
-        A frame number of the clip; fractions are times between frames.
-    strength : float
-        0..1, as in the node.
-    conversion : ColourConversion, optional
-        From the space of the edit's colours to the palette's space.
-
-    Raises
-    ------
-    Palette4dError
-        The time is outside the clip, or the strength outside 0..1.
+    `conversion` goes from the space of the edit's colours to the palette's space. A time outside
+    the clip and a strength outside 0..1 are refused.
     """
     check_frame(sidecar, frame)
     if not 0 <= strength <= 1:

@@ -30,14 +30,12 @@ class Lut3D:
 
     Attributes
     ----------
-    values : (N, N, N, 3) float32
-        ``values[r, g, b]`` is the output for the r-th red, g-th green and b-th blue. Blue is
-        fastest in memory, as in `OpenColorIO.Lut3DTransform.setData` and in CLF.
-    shaper : Shaper
-        From code values to the LUT's 0..1.
-    steps : tuple of dict
-        A conversion before the shaper, in formats with lists of transforms (`spaces`). Its inverse
-        follows the LUT.
+    values : (N, N, N, 3) float32; ``values[r, g, b]`` is the output for the r-th red, g-th green
+        and b-th blue. Blue is fastest in memory, as in `OpenColorIO.Lut3DTransform.setData` and in
+        CLF.
+    shaper : from code values to the LUT's 0..1.
+    steps : a conversion before the shaper, in formats with lists of transforms (`spaces`). Its
+        inverse follows the LUT.
     """
 
     values: F32
@@ -78,25 +76,9 @@ def sample(
     threads: int = 0,
     steps: tuple[Step, ...] = (),
 ) -> Lut3D:
-    """Sample an edit.
+    """Sample an edit with `size` values a side; the threads do not change the result.
 
-    Parameters
-    ----------
-    edit : FrameEdit
-        The edit at one time, in the colour space after `steps`.
-    size : int
-        N, 2..129.
-    shaper : Shaper
-        The domain.
-    threads : int
-        0: one per processor; the result does not depend on it.
-    steps : tuple of dict
-        See `Lut3D.steps`.
-
-    Raises
-    ------
-    Palette4dError
-        The size is not possible.
+    The colours of `edit` are those after `steps` (`Lut3D.steps`).
     """
     check_size(size)
     nodes = shaper.inverse(np.linspace(0, 1, size)).astype(np.float32)

@@ -46,14 +46,7 @@ class Shaper:
     high: float = 1.0
 
     def __post_init__(self) -> None:
-        """Refuse an impossible domain.
-
-        Raises
-        ------
-        Palette4dError
-            low is not below high, a limit is not finite, or kind is "none" and the domain is not
-            0..1.
-        """
+        """Refuse an impossible domain."""
         if not (-LARGEST <= self.low < self.high <= LARGEST):
             raise Palette4dError(
                 f"found the domain {self.low:g} to {self.high:g}, expected two code values within "
@@ -144,12 +137,10 @@ def choose(kind: str, low: float, high: float) -> Shaper:
 
     Parameters
     ----------
-    kind : {"auto", "none", "linear", "log"}
-        "auto" is none if low..high lies within 0..1, linear if its width is at most
-        `LINEAR_WIDTH`, else log. "none" ignores low and high.
-    low, high : float
-        The smallest and largest code value to cover. 0..1 is always covered, and the limits are
-        rounded outwards to two digits.
+    kind : {"auto", "none", "linear", "log"}; "auto" is none if low..high lies within 0..1, linear
+        if its width is at most `LINEAR_WIDTH`, else log. "none" ignores low and high.
+    low, high : the smallest and largest code value to cover. 0..1 is always covered, and the limits
+        are rounded outwards to two digits.
     """
     low, high = min(0.0, -_outwards(-low)), max(1.0, _outwards(high))
     if kind == "auto":

@@ -35,14 +35,10 @@ class BakeSpace:
 
     Attributes
     ----------
-    name : str
-        The name for the file's metadata.
-    steps : tuple of dict
-        The conversion to the palette's colour space; empty if they are the same.
-    chain : ColourConversion or None
-        Applies the steps; None without steps.
-    clip : ColourConversion or None
-        From the clip's colour space to the palette's; None if they are the same.
+    name : the name for the file's metadata.
+    steps : the conversion to the palette's colour space; empty if they are the same.
+    chain : applies the steps; None without steps.
+    clip : from the clip's colour space to the palette's; None if they are the same.
     """
 
     name: str
@@ -69,22 +65,10 @@ class BakeSpace:
 def space_of(
     data: bytes, sidecar: _core.Sidecar, wanted: str, config_name: str | None
 ) -> BakeSpace:
-    """Return the space with this name.
+    """Return the space "input" (of the clip), "palette", or a colour space of the config.
 
-    Parameters
-    ----------
-    data, sidecar : bytes, Sidecar
-        A sidecar's JSON text, and the core's view of it.
-    wanted : str
-        "input" (the clip's code values), "palette", or a colour space of the config.
-    config_name : str or None
-        None: the config that the sidecar names, else ``$OCIO``, else the built-in config.
-
-    Raises
-    ------
-    Palette4dError
-        The config is unusable or lacks one of the spaces, or the conversion is more than matrices
-        and curves.
+    `data` is the sidecar's JSON text. Without `config_name` the sidecar's config is used, else
+    ``$OCIO``, else the built-in one.
     """
     encoding = str(sidecar.clip["encoding"])
     own = sidecar.conversion

@@ -6,7 +6,7 @@ samples it at the LUT's own nodes, where interpolation is exact.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,24 +22,16 @@ class Description:
 
     Attributes
     ----------
-    identifier : str
-        A URN that is the same for the same content.
-    name : str
-        A title of one line.
-    lines : tuple of str
-        Sentences for a reader, one per line.
-    input_space, output_space : str
-        The encodings of the input and output colours.
-    info : dict
-        Nested names and values for programs, if the format allows them.
+    identifier : a URN that is the same for the same content.
+    name : a title of one line.
+    lines : sentences for a reader, one per line.
+    space : the encoding of the input and output colours.
     """
 
     identifier: str
     name: str
     lines: tuple[str, ...] = ()
-    input_space: str = ""
-    output_space: str = ""
-    info: dict[str, Any] = field(default_factory=dict)
+    space: str = ""
 
 
 Writer = Callable[[Lut3D, Description], str]
@@ -101,32 +93,12 @@ def by_transforms(format_name: str) -> Writer:
         metadata.setName(one_line(description.name))
         for line in description.lines:
             metadata.addChildElement(ocio.METADATA_DESCRIPTION, one_line(line))
-        spaces = (
-            (ocio.METADATA_INPUT_DESCRIPTOR, description.input_space),
-            (ocio.METADATA_OUTPUT_DESCRIPTOR, description.output_space),
-        )
-        for element, space in spaces:
-            metadata.addChildElement(element, one_line(space))
-        if description.info:
-            metadata.addChildElement(ocio.METADATA_INFO, "")
-            _add_info(_last_child(metadata), description.info)
+        for element in (ocio.METADATA_INPUT_DESCRIPTOR, ocio.METADATA_OUTPUT_DESCRIPTOR):
+            metadata.addChildElement(element, one_line(description.space))
         text: str = group.write(formatName=format_name, config=ocio.Config.CreateRaw())
         return text
 
     return write
-
-
-def _last_child(metadata: Any) -> Any:
-    return list(metadata.getChildElements())[-1]
-
-
-def _add_info(element: Any, info: dict[str, Any]) -> None:
-    for name, value in info.items():
-        if isinstance(value, dict):
-            element.addChildElement(name, "")
-            _add_info(_last_child(element), value)
-        else:
-            element.addChildElement(name, one_line(str(value)))
 
 
 def by_baker(format_name: str) -> Writer:
@@ -159,7 +131,7 @@ def by_baker(format_name: str) -> Writer:
         baker.setTargetSpace("after")
         baker.setCubeSize(lut.size)
         metadata = baker.getFormatMetadata()
-        spaces = f"input {description.input_space}, output {description.output_space}"
+        spaces = f"input {description.space}, output {description.space}"
         for line in (description.name, *description.lines, spaces, f"id {description.identifier}"):
             metadata.addChildElement(ocio.METADATA_DESCRIPTION, one_line(line))
         try:

@@ -29,7 +29,8 @@ AT_ONCE = {"gamma": 0.0003, "handle_cost": 0.001, "blocks": 9}
 # No display-referred picture and no log encoding has larger code values.
 BRIGHT = 2.0
 
-DEFAULT = 'the default method="skew"'
+#: The remedy for the palettes of other methods.
+DEFAULT = 'take the default method="skew"'
 PARTS = "analyse parts of the clip by themselves with frames=…"
 
 
@@ -79,10 +80,8 @@ def _fit(x: Report, options: AnalysisOptions) -> str:
         what = f"the palette fits the clip loosely (mean L {x.mean_loss:.2f})"
     else:
         return ""
-    if options.method in ("static", "rgbt"):
-        ways = f"{DEFAULT} follows the colours"
-    elif options.method == "paper":
-        ways = "lower the setting eta2 or eta1" + (", lower gamma for a flash" if bad else "")
+    if options.method != "skew":
+        ways = DEFAULT
     elif options.vertices:
         ways = f"raise vertices=…, or {PARTS}"
     elif bad:
@@ -109,8 +108,8 @@ def _lost(x: Report, options: AnalysisOptions, farthest: Mapping[str, float]) ->
     if frame.lost < LOST_SHARE or not nearer:
         return ""
     where = " and ".join(f"{words} {distance:.2f}" for words, distance in nearer.items())
-    ways = f"{DEFAULT} follows the colours"
-    if options.method in OPTIONS["reach"].methods:
+    ways = DEFAULT
+    if options.method == "skew":
         reach = options.reach / 2 or OPTIONS["reach"].default
         ways = (
             f"try lambda_={10 * options.lambda_:g} or reach={reach:.2g}, so that rare "
@@ -128,11 +127,12 @@ def _lookalikes(x: Report, options: AnalysisOptions) -> str:
     if x.closest is None or x.closest[0] >= LOOKALIKE:
         return ""
     distance, frame, one, other = x.closest
-    ways = "lower the setting palette_size, or raise separation or merge_distance"
-    if options.method == "rgbt":
-        ways = f"{DEFAULT} keeps them apart"
-    elif options.method == "skew":  # a short clip may have a static palette
-        ways += '; or, if little moves, take method="static"'
+    ways = DEFAULT
+    if options.method == "skew":
+        ways = (
+            "lower the setting palette_size, or raise separation or merge_distance; or, if little "
+            'moves, take method="static"'
+        )
     return (
         f"near frame {frame} the handles {one} and {other} are hard to tell apart "
         f"({distance:.2f} apart): {ways}"
@@ -152,10 +152,7 @@ def _unused(x: Report, options: AnalysisOptions) -> str:
     handle, use = x.least_used
     if use >= UNUSED:
         return ""
-    ways = {
-        "skew": "raise handle_cost=…, or ask for fewer vertices=…",
-        "paper": "raise eta2=…",
-        "static": "raise the setting merge_distance or lower palette_size",
-        "rgbt": "ask for fewer vertices=…",
-    }[options.method]
+    ways = DEFAULT
+    if options.method == "skew":
+        ways = "raise handle_cost=…, or ask for fewer vertices=…"
     return f"the handle {handle} weighs less than {UNUSED:.1%} in every frame: {ways}"

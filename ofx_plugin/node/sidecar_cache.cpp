@@ -238,6 +238,21 @@ std::string revision_of(const std::string& text) {
 LoadedSidecar::LoadedSidecar(Sidecar sidecar, std::string revision)
     : sidecar_(std::move(sidecar)), revision_(std::move(revision)) {}
 
+std::shared_ptr<LoadedSidecar> LoadedSidecar::version(const std::string& name) {
+    for (const NamedVersion& one : sidecar_.versions) {
+        if (one.name != name) continue;
+        const std::lock_guard<std::mutex> lock(mutex_);
+        std::shared_ptr<LoadedSidecar>& found = versions_[name];
+        if (!found) {
+            Sidecar copy = sidecar_;
+            copy.edits = one.edits;
+            found = std::make_shared<LoadedSidecar>(std::move(copy), revision_);
+        }
+        return found;
+    }
+    return nullptr;
+}
+
 bool operator<(const AppliedEdits& a, const AppliedEdits& b) {
     if (a.sidecar != b.sidecar) return a.sidecar < b.sidecar;
     return std::lexicographical_compare(a.host.begin(), a.host.end(), b.host.begin(), b.host.end(),

@@ -35,6 +35,9 @@ public:
 
     const Sidecar& sidecar() const { return sidecar_; }
     const std::string& revision() const { return revision_; }
+    /// The same with a version's edits in place of the active ones; all callers share one. Null for
+    /// a name that is not there.
+    std::shared_ptr<LoadedSidecar> version(const std::string& name);
     /// The prepared palette at a sidecar frame (finite; clamped to the clip). Threads that ask for
     /// the same frame and edits share one. Throws what slicing throws, and std::invalid_argument
     /// for an unknown handle.
@@ -71,6 +74,7 @@ private:
     const Sidecar sidecar_;
     const std::string revision_;
     std::mutex mutex_;
+    std::map<std::string, std::shared_ptr<LoadedSidecar>> versions_;  ///< those in use so far
     std::map<Key, std::shared_ptr<Prepared>> frames_;
     std::list<const Key*> recent_;                       ///< keys of frames_, most recent first
     std::list<std::shared_ptr<Prepared>> with_lattice_;  ///< most recent first

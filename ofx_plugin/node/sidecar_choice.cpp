@@ -55,45 +55,25 @@ void find_by_name(Chosen& chosen, const std::string& folder, const std::string& 
     chosen.result = std::move(kept);
 }
 
-}  // namespace
-
-void define_file_params(ParamDefiner& define) {
-    define
-        .text({kParamSidecar, "Sidecar",
-               "The file that 'palette4d analyze' wrote for the clip: its palette and the edits. "
-               "The path may start with ~ and contain environment variables. The node reloads the "
-               "file whenever it changes."},
-              kOfxParamStringIsFilePath)
-        .set_int(kOfxParamPropStringFilePathExists, 1);
-    define
-        .text({kParamClipFolder, "Clip's folder",
-               "A relative path of the sidecar starts here. A sidecar that is not where its path "
-               "says is searched here by its name. The node fills this in when you choose a "
-               "sidecar whose clip it finds."},
-              kOfxParamStringIsDirectoryPath)
-        .set_int(kOfxParamPropStringFilePathExists, 0);
-    define.flag({kParamFindByName, "Find by clip's name",
-                 "While Sidecar is empty, the node uses the sidecar that has the clip's name: for "
-                 "shot.mov it searches shot.p4d.json beside the clip, in Clip's folder and in "
-                 "PALETTE4D_PATH. Works in hosts that report the clip's file: DaVinci Resolve."},
-                true);
-    define.button({kParamReload, "Reload",
-                   "Reloads the sidecar's file and makes the host render its frames again."});
-    define.flag({kParamEmbed, "Embed",
-                 "Keeps a copy of the sidecar in the project. The node uses the copy while the "
-                 "file is missing or cannot be read."},
-                false);
-    for (const char* name : {kParamEmbedded, kParamRevision}) {
-        const Properties hidden = define.text(
-            {name, name == kParamEmbedded ? "Embedded sidecar" : "Revision",
-             "The node sets this value."},
-            name == kParamEmbedded ? kOfxParamStringIsMultiLine : kOfxParamStringIsSingleLine);
-        hidden.set_int(kOfxParamPropSecret, 1);
-        hidden.set_int(kOfxParamPropCanUndo, 0);
+/// Goes over to the version that the user chose.
+void choose_version(Chosen& chosen, const std::string& name) {
+    if (name.empty() || !chosen.result.loaded) return;
+    std::shared_ptr<LoadedSidecar> version = chosen.result.loaded->version(name);
+    if (!version) {
+        std::string names;
+        for (const NamedVersion& one : chosen.sidecar()->versions) {
+            names += (names.empty() ? "'" : ", '") + one.name + "'";
+        }
+        chosen.result.problem = chosen.path + ": found no version '" + name + "', expected " +
+                                (names.empty() ? "none, since this sidecar has no versions"
+                                               : "nothing or one of " + names) +
+                                "; change Version";
     }
+    chosen.result.loaded = std::move(version);
+    chosen.version = name;
 }
 
-Chosen chosen_sidecar(const Params& params) {
+Chosen chosen_file(const Params& params) {
     const auto text = [&](const char* name) {
         return params.string_at(name, Params::kAnyTime).value_or("");
     };
@@ -131,6 +111,54 @@ Chosen chosen_sidecar(const Params& params) {
     if (!chosen.result.loaded && !missing.empty()) {
         chosen.result.problem = chosen.path + ": " + missing;
     }
+    return chosen;
+}
+
+}  // namespace
+
+void define_file_params(ParamDefiner& define) {
+    define
+        .text({kParamSidecar, "Sidecar",
+               "The file that 'palette4d analyze' wrote for the clip: its palette and the edits. "
+               "The path may start with ~ and contain environment variables. The node reloads the "
+               "file whenever it changes."},
+              kOfxParamStringIsFilePath)
+        .set_int(kOfxParamPropStringFilePathExists, 1);
+    define.text({kParamVersion, "Version",
+                 "The name of a version that 'palette4d edit' saved in the sidecar. Empty: the "
+                 "sidecar's active edits."},
+                kOfxParamStringIsSingleLine);
+    define
+        .text({kParamClipFolder, "Clip's folder",
+               "A relative path of the sidecar starts here. A sidecar that is not where its path "
+               "says is searched here by its name. The node fills this in when you choose a "
+               "sidecar whose clip it finds."},
+              kOfxParamStringIsDirectoryPath)
+        .set_int(kOfxParamPropStringFilePathExists, 0);
+    define.flag({kParamFindByName, "Find by clip's name",
+                 "While Sidecar is empty, the node uses the sidecar that has the clip's name: for "
+                 "shot.mov it searches shot.p4d.json beside the clip, in Clip's folder and in "
+                 "PALETTE4D_PATH. Works in hosts that report the clip's file: DaVinci Resolve."},
+                true);
+    define.button({kParamReload, "Reload",
+                   "Reloads the sidecar's file and makes the host render its frames again."});
+    define.flag({kParamEmbed, "Embed",
+                 "Keeps a copy of the sidecar in the project. The node uses the copy while the "
+                 "file is missing or cannot be read."},
+                false);
+    for (const char* name : {kParamEmbedded, kParamRevision}) {
+        const Properties hidden = define.text(
+            {name, name == kParamEmbedded ? "Embedded sidecar" : "Revision",
+             "The node sets this value."},
+            name == kParamEmbedded ? kOfxParamStringIsMultiLine : kOfxParamStringIsSingleLine);
+        hidden.set_int(kOfxParamPropSecret, 1);
+        hidden.set_int(kOfxParamPropCanUndo, 0);
+    }
+}
+
+Chosen chosen_sidecar(const Params& params) {
+    Chosen chosen = chosen_file(params);
+    choose_version(chosen, params.string_at(kParamVersion, Params::kAnyTime).value_or(""));
     return chosen;
 }
 

@@ -9,6 +9,7 @@
 
 namespace palette4d::node {
 
+inline constexpr const char* kParamVersion = "version";
 inline constexpr const char* kParamClipFolder = "clipFolder";
 inline constexpr const char* kParamFindByName = "findByName";
 inline constexpr const char* kParamReload = "reload";
@@ -21,15 +22,16 @@ void define_file_params(ParamDefiner& define);
 struct Chosen {
     bool any = false;  ///< the user chose a sidecar, or the clip's name found one
     SidecarResult result;
+    std::string version;    ///< the version that is used; empty: the active edits
     std::string path;       ///< where it is, or where it was expected
     bool embedded = false;  ///< the project's copy is used, since the file cannot be read
     std::string broken;     ///< what is wrong with the file, if there is one
     std::string media;      ///< the clip's file, in hosts that report it
 
-    /// Null when there is none or it cannot be read.
+    /// Null when there is none, when it cannot be read, or when it lacks the version.
     const Sidecar* sidecar() const { return result.loaded ? &result.loaded->sidecar() : nullptr; }
 };
-/// The sidecar that the parameters select, in any action.
+/// The sidecar and the version of its edits that the parameters select, in any action.
 Chosen chosen_sidecar(const Params& params);
 
 /// For instance changes only. Updates the project's copy, the clip's folder and the revision, whose

@@ -77,17 +77,19 @@ def __dir__() -> list[str]:
     return __all__
 
 
-def load(path: str | os.PathLike[str]) -> "Document":
-    """Load a sidecar (*.p4d.json): a clip's palette and its edits.
+def load(path: str | os.PathLike[str], *, version: str = "") -> "Document":
+    """Load a sidecar (*.p4d.json): a clip's palette and its edits, or those of a version.
 
     Raises
     ------
     SidecarError
         The file is missing or unusable.
+    Palette4dError
+        There is no such version.
     """
     from palette4d.grade.document import Document
 
-    return Document.load(path)
+    return Document.load(path, version=version)
 
 
 def analyze(

@@ -1,7 +1,9 @@
-"""The verb ``edit``: by id, by nearness, stops, and everything that must leave the file alone."""
+"""The verb ``edit``: by id, by the nearest colour, stops, and refusals that change nothing."""
 
+import json
 import subprocess
 import sys
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,8 @@ import pytest
 from palette4d import _core
 from palette4d.cli import main
 from palette4d.grade import sidecar
+from palette4d.shows import manifest
+from palette4d.shows.shots import Shot
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
 
@@ -348,3 +352,162 @@ def _writable(folder: Path) -> bool:
         return False
     (folder / "probe").unlink()
     return True
+
+
+# ------------------------------------------------------------------- steps, versions, tracks, ramps
+
+
+def run(path: str, words: str) -> int:
+    return main.main(["edit", path, *words.split()])
+
+
+def test_undo_and_redo(plain: str, capsys: pytest.CaptureFixture[str]) -> None:
+    before = edits_of(plain)
+    assert run(plain, "undo") == 1
+    assert "nothing to undo" in capsys.readouterr().err
+    assert run(plain, "set v1 --rgb #ff0000") == 0
+    assert run(plain, "set e1 --frame 3 --rgb 0.5,0.5,0.5") == 0
+    after = edits_of(plain)
+    assert run(plain, "undo --steps 2") == 0
+    assert edits_of(plain) == before
+    assert run(plain, "undo") == 1
+    assert run(plain, "redo --steps 3") == 1
+    assert edits_of(plain) == before
+    assert run(plain, "redo --steps 2") == 0
+    assert edits_of(plain) == after
+    assert run(plain, "undo") == 0
+    capsys.readouterr()
+    assert run(plain, "history") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[:3] for line in lines] == [["1", "set", "v1"], ["2", "set", "e1"]]
+    assert ["undone" in line for line in lines] == [False, True]
+    assert run(plain, "history --json") == 0
+    assert {n: len(v) for n, v in json.loads(capsys.readouterr().out).items()} == {
+        "done": 1,
+        "undone": 1,
+    }
+
+
+def test_versions(plain: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(plain, "version list") == 0
+    assert run(plain, "version use warm") == 1
+    assert run(plain, "set v1 --rgb #ff0000") == 0
+    assert run(plain, "version save warm") == 0
+    warm = edits_of(plain)
+    assert run(plain, "set v1 --rgb #0000ff") == 0
+    cold = edits_of(plain)
+    capsys.readouterr()
+    assert run(plain, "version use warm") == 0
+    assert "before warm" in capsys.readouterr().out
+    assert edits_of(plain) == warm
+    assert run(plain, "version list") == 0
+    assert capsys.readouterr().out.splitlines() == ["  before warm", "* warm"]
+    assert run(plain, "undo") == 0
+    assert edits_of(plain) == cold
+    assert run(plain, "version remove warm") == 0
+    assert run(plain, "version remove warm") == 1
+    assert run(plain, "undo") == 0
+    assert run(plain, "version use warm") == 0
+
+
+def test_a_track_and_the_palette(plain: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(plain, "track v4 --by 0.1,0,0") == 0
+    assert "vertex v13" in capsys.readouterr().out
+    assert {entry["vertex"] for entry in edits_of(plain)["vertices"]} == {
+        *("v4", "v8", "v12", "v13", "v17", "v18")
+    }
+    assert run(plain, "palette --chroma 0 --from 5 --until 8 --fade 2 --ramp smooth") == 0
+    assert run(plain, "undo") == 0
+    assert run(plain, "set --near 0.12,0.1,0.1 --frame 9 --chroma 0.5 --lightness 1.1") == 0
+    assert run(plain, "set --near 0.12,0.1,0.1 --frame 9 --by 0.1,0,0 --from 8") == 0
+
+
+def test_ramps(plain: str) -> None:
+    assert run(plain, "ramp smooth") == 0
+    assert run(plain, "set v1 --rgb #ff0000 --ramp hold") == 0
+    assert run(plain, "ramp linear v2 v3") == 0
+    edits = edits_of(plain)
+    assert edits["ramp"] == "smooth"
+    assert [entry["ramp"] for entry in edits["vertices"]] == ["hold", "linear", "linear"]
+    assert run(plain, "ramp linear") == 0
+    assert "ramp" not in edits_of(plain)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "set v1 --rgb #ff0000 --by 1,1,1",
+        "track v1",
+        "palette --hue 3 --by 1,1,1",
+        "track v1 --chroma -1",
+        "ramp round",
+        "undo --steps 0",
+        "version",
+        "version save",
+        "history --json --clear",
+        "set v1 --rgb #ff0000 --fade -1",
+    ],
+)
+def test_wrong_usage_of_the_new_actions(plain: str, words: str) -> None:
+    before = Path(plain).read_bytes()
+    with pytest.raises(SystemExit) as caught:
+        run(plain, words)
+    assert caught.value.code == 2
+    assert Path(plain).read_bytes() == before
+
+
+# ------------------------------------------------------------------------------------ copied grades
+
+
+def test_copy(plain: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    other = tmp_path / "other.p4d.json"
+    other.write_bytes(Path(plain).read_bytes())
+    assert run(plain, "track v4 --by 0.2,0.1,0") == 0
+    capsys.readouterr()
+    assert run(str(other), f"copy {plain}") == 0
+    assert "0.0 of 255 on average" in capsys.readouterr().out
+    found, expected = (
+        {entry["vertex"]: entry["rgb"] for entry in edits_of(path)["vertices"]}
+        for path in (str(other), plain)
+    )
+    assert found.keys() == expected.keys()
+    for id_, rgb in expected.items():
+        assert found[id_] == pytest.approx(rgb, abs=1e-6)
+    assert run(str(other), f"copy {plain} --time frame 3") == 0
+    assert run(str(other), f"copy {plain} --time frame 99") == 1
+    assert run(str(other), "reset") == 0
+    assert run(plain, f"copy {other}") == 1
+    assert "no edits" in capsys.readouterr().err
+    for words in ("--time never", "--time frame", "--time frame x", "--time relative 3"):
+        with pytest.raises(SystemExit):
+            run(str(other), f"copy {plain} {words}")
+
+
+def test_copy_to_the_shots_of_a_show(
+    plain: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(plain, "track v4 --by 0.2,0.1,0") == 0
+    show = tmp_path / "show"
+    show.mkdir()
+    entries = []
+    for name in ("a_1", "a_2", "b_1"):
+        (show / f"{name}.p4d.json").write_bytes((GOLDEN / "v1_split.p4d.json").read_bytes())
+        shot = Shot(name, "clip.mov", 0, 20, (0, 20))
+        entries.append(manifest.Entry(shot, manifest.DONE, (0, 20)))
+    path = show / "film.shots.json"
+    manifest.write(manifest.Manifest("film.mov", "", Fraction(24), {}, tuple(entries)), path)
+    source = show / "a_1.p4d.json"
+    source.write_bytes(Path(plain).read_bytes())
+    before = source.read_bytes()
+    assert run(str(path), f"copy {source} --shots a_*") == 0
+    assert "1 shot of 1" in capsys.readouterr().out
+    assert run(str(path), f"copy {source}") == 0
+    assert source.read_bytes() == before
+    for name in ("a_2", "b_1"):
+        assert {e["vertex"] for e in edits_of(str(show / f"{name}.p4d.json"))["vertices"]} == {
+            *("v4", "v8", "v12", "v13", "v17", "v18")
+        }
+    assert run(str(path), f"copy {source} --shots c_*") == 1
+    (show / "b_1.p4d.json").write_text("{}")
+    assert run(str(path), f"copy {source}") == 1
+    assert "1 shot of 2" in capsys.readouterr().out

@@ -1,4 +1,4 @@
-"""The verbs that only look: ``info`` and ``slice``, and the command line as a whole."""
+"""The verbs ``info`` and ``slice``, and the command line as a whole."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""The verb plot: pictures of all sorts of sidecars, and what must be seen in them."""
+"""The verb plot: pictures of many kinds of sidecars, and what they must show."""
 
 from __future__ import annotations
 
@@ -327,3 +327,36 @@ def test_chains_that_never_meet_share_a_row() -> None:
     rows = arrange(frames, rgb, [(0, 2), (1, 2), (2, 3), (3, 4), (3, 5)])
     assert len(rows.chains) == 3
     assert rows.count == 2
+
+
+def test_versions_are_drawn_and_compared(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "clip.p4d.json"
+    path.write_bytes((GOLDEN / "v1_split.p4d.json").read_bytes())
+    red, blue = [0.93, 0.07, 0.21], [0.11, 0.23, 0.97]
+    for name, colour in (("red", red), ("blue", blue)):
+        rgb = ",".join(map(str, colour))
+        assert main(["edit", str(path), "set", "v1", "--rgb", rgb]) == 0
+        assert main(["edit", str(path), "version", "save", name]) == 0
+    assert main(["edit", str(path), "reset"]) == 0
+
+    def drawn(*words: str) -> tuple[bool, bool]:
+        out = tmp_path / "palette.png"
+        words = ("plot", str(path), "-o", str(out), "--force", "--width", "1200", *words)
+        assert main([*words]) == 0
+        return holds(pixels(out), red, 100), holds(pixels(out), blue, 100)
+
+    assert drawn() == (False, False)
+    assert drawn("--version", "red") == (True, False)
+    assert drawn("--compare", "red,blue") == (True, True)
+    assert drawn("--compare", "blue") == (False, True)
+    assert main(["plot", str(path), "-o", str(tmp_path / "a.png"), "--compare", "green,red"]) == 1
+    assert "'blue', 'red'" in capsys.readouterr().err
+    for verb in (["bake", str(path), "--frame", "0", "-o"], ["render", str(path), "clip", "-o"]):
+        assert main([*verb, str(tmp_path / "a.cube"), "--version", "green"]) == 1
+        assert "'blue', 'red'" in capsys.readouterr().err
+    cube = tmp_path / "a.cube"
+    for words in ([], ["--version", "red"]):
+        assert main(["bake", str(path), "--frame", "0", "-o", str(cube), "--force", *words]) == 0
+        assert ("nothing is edited" in capsys.readouterr().out) == (not words)

@@ -82,7 +82,9 @@ def test_ids_name_what_to_edit(edited: Path) -> None:
         assert document.palette(frame).edited.tolist() == [[i / 8, 0, 0] for i in range(len(ids))]
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
+@pytest.mark.parametrize(
+    "path", [path for path in FILES if "picks" not in path.name], ids=lambda path: path.name
+)
 def test_edited_colours_are_linear_between_handles(path: Path) -> None:
     document = Document.load(path)
     fields = document.fields()
@@ -241,8 +243,8 @@ def test_a_colour_far_from_all_others_is_refused_with_what_it_is_made_of(plain: 
     middle = document.palette(3).rgb[:2].mean(axis=0)
     with pytest.raises(Palette4dError) as caught:
         document.set_near(middle, frame=3, rgb=WHITE)
-    assert "e1 50%" in str(caught.value)
-    assert "e2 50%" in str(caught.value)
+    assert "50% e1" in str(caught.value)
+    assert "50% e2" in str(caught.value)
     shares = document.near(middle, frame=3).shares
     assert dict(shares) == pytest.approx({"e1": 0.5, "e2": 0.5, "e3": 0, "e4": 0}, abs=1e-9)
     assert [share for _, share in shares] == sorted(dict(shares).values(), reverse=True)

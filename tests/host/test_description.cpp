@@ -44,9 +44,10 @@ TEST(node_describes_itself) {
         // Saved in projects: none of these names may ever go.
         const auto& order = effect->params.order;
         for (const char* name :
-             {"sidecar", "clipFolder", "reload", "embed", "embedded", "revision", "strength",
-              "frameOffset", "editsFrom", "resetHandles", "handle01", "handle01On", "handle01Id",
-              "handle32", "handle32On", "handle32Id", "mode", "status", "pictureIn"}) {
+             {"sidecar",      "version",    "clipFolder", "reload",      "embed",
+              "embedded",     "revision",   "strength",   "frameOffset", "editsFrom",
+              "resetHandles", "handle01",   "handle01On", "handle01Id",  "handle32",
+              "handle32On",   "handle32Id", "mode",       "status",      "pictureIn"}) {
             EXPECT(std::count(order.begin(), order.end(), name) == 1, std::string("no ") + name);
         }
         const auto& params = effect->params.params;

@@ -1,4 +1,4 @@
-"""The colour space a palette is found in: what is chosen, how exact it is, what is refused."""
+"""The palette's colour space: how it is chosen, its exactness, and refusals."""
 
 from __future__ import annotations
 
@@ -365,8 +365,8 @@ def test_the_neutral_stays_monotone_and_finite(linear_clip: str, tmp_path: Path)
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--input-space", "acesg"], ["'acesg'", "ACEScg", "--input-space"]),
-        (["--input-space", "ACEScg", "--palette-space", "logc3"], ["'logc3'", "LogC3"]),
+        (["--input-space", "acesg"], ["acesg", "ACEScg", "--input-space"]),
+        (["--input-space", "ACEScg", "--palette-space", "logc3"], ["logc3", "LogC3"]),
         (["--input-space", "Raw"], ["data, not colours"]),
         (["--ocio-config", "missing.ocio"], ["missing.ocio", "found no config", "--ocio-config"]),
         (["--ocio-config", "ocio://studio"], ["no such config", "ocio://studio-config-v"]),

@@ -1,4 +1,4 @@
-"""Sudden cuts: found between pictures, and nowhere else."""
+"""Sudden cuts are found at cuts, and not in flashes, fades, motion or noise."""
 
 from __future__ import annotations
 
@@ -245,16 +245,16 @@ def test_the_refusal_names_ranges_that_the_command_reads():
     text = cuts.refusal(frames_of_clip, [1009, 1019])
     assert "2 sudden cuts" in text
     assert "frames 1009, 1019" in text
-    assert "--frames 1001-1007x2, --frames 1009-1017x2, --frames 1019; --detect-shots" in text
-    assert "--allow-cuts" in text
-    assert "--frames 0-4, --frames 5-9;" in cuts.refusal(range(10), [5])
+    assert 'frames="1001-1007x2", frames="1009-1017x2", frames="1019"; analyze_shots()' in text
+    assert "allow_cuts=True" in text
+    assert 'frames="0-4", frames="5-9";' in cuts.refusal(range(10), [5])
     assert "flash" not in cuts.refusal(range(10), [3])
     for found, rest in (([1], "1-9"), ([2], "2-9"), ([8], "0-7"), ([2, 9], "2-8")):
-        assert f"flash at the end of the clip, leave it out: --frames {rest}." in cuts.refusal(
+        assert f'flash at the end of the clip, leave it out: frames="{rest}".' in cuts.refusal(
             range(10), found
         )
     many = cuts.refusal(range(100), list(range(5, 100, 5)))
-    assert many.count("--frames") == 8
+    assert many.count("frames=") == 8
     assert "19 sudden cuts" in many
     assert "…" in many
     assert "1 sudden cut, at frame 5" in cuts.note([5])

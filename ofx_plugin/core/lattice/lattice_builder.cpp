@@ -4,7 +4,7 @@
 
 #include "lattice/lattice_geometry.hpp"
 #include "lattice/lattice_store.hpp"
-#include "recolour/exact_worker.hpp"
+#include "recolour/float_worker.hpp"
 
 namespace palette4d {
 namespace {
@@ -68,7 +68,7 @@ bool goes_on(const LatticePlane& plane, const float* columns, int part, const Fo
 Lattice::Store::Builder::Builder(Store& store, InstructionSet instructions) : store_(store) {
     RecolourOptions options;
     options.instructions = instructions;
-    exact_ = exact_worker(store.recolourer_, options, 3, false);
+    exact_ = float_worker(store.recolourer_, options, 3, false);
     if (store.regions_) {
         mean_value_ = std::make_unique<MeanValueWorker>(store.recolourer_, instructions);
     }

@@ -809,9 +809,10 @@ void check_pick(const Cursor& pick, std::set<std::string>& taken) {
         std::optional<double> previous;
         for (std::size_t i = 0, n = path.list("colours over time"); i < n; ++i) {
             const Cursor step = path.element(i);
-            step.require_members({"frame", "rgb"});
+            step.require_members({"frame", "rgb"}, {"given"});
             read_later(step, previous);
             step.member("rgb").rgb();
+            if (step.has("given")) step.member("given").flag();
         }
     }
     if (pick.has("pixel")) {

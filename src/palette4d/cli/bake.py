@@ -54,6 +54,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     output = "the file; - for standard output, with --format"
     add("-o", "--output", metavar="OUT", required=True, help=output)
     add_lut_options(parser, None, space=True)
+    add(
+        "--version",
+        metavar="NAME",
+        help="the version whose edits are used (default: the active edits)",
+    )
     add("--force", action="store_true", help="replace an existing file")
     add("--json", action="store_true", help="print the result as JSON")
     parser.set_defaults(run=run, usage_error=parser.error)
@@ -61,9 +66,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Bake; print the written file and its error."""
+    from palette4d.grade.document import Document
     from palette4d.lut_export.bake import bake
     from palette4d.lut_export.formats import format_named, format_of
 
+    source = args.sidecar
+    if args.version:
+        source = Document.load(source, version=args.version)
     piped = args.output == "-"
     if piped and args.format is None:
         args.usage_error("-o - has no extension; expected --format FORMAT with it")
@@ -72,11 +81,11 @@ def run(args: argparse.Namespace) -> int:
     if piped:
         with tempfile.TemporaryDirectory(prefix="palette4d-") as folder:
             path = Path(folder) / f"baked{format_.extension}"
-            result = bake(args.sidecar, args.frame, path, **settings)
+            result = bake(source, args.frame, path, **settings)
             _to_stdout(path.read_bytes(), format_)
         result = replace(result, output="-")
     else:
-        result = bake(args.sidecar, args.frame, args.output, force=args.force, **settings)
+        result = bake(source, args.frame, args.output, force=args.force, **settings)
     out = sys.stderr if piped else sys.stdout
     if args.json:
         print(json.dumps(asdict(result), indent=2), file=out)

@@ -8,14 +8,14 @@ import shlex
 import textwrap
 from typing import TYPE_CHECKING
 
-from palette4d.cli.edit_history import add_actions
+from palette4d.cli import edit_copy, edit_history, picks
 from palette4d.cli.swatches import shown
 from palette4d.common.arguments import ColourAction, accept_negative_values, number
 from palette4d.common.errors import Palette4dError
 
 if TYPE_CHECKING:
     from palette4d.grade.document import Document, How
-    from palette4d.grade.edits import Setting, State
+    from palette4d.grade.edits import State
 
 #: The words of `palette4d.grade.edits.RAMPS`, which would be slow to import for the help.
 RAMPS = ("linear", "smooth", "hold")
@@ -34,8 +34,11 @@ example:
   palette4d edit clip.p4d.json move s1 --frame 30
   palette4d edit clip.p4d.json ramp smooth
   palette4d edit clip.p4d.json reset v12
+  palette4d edit clip.p4d.json pick --frame 40 --pixel 320,180 --box 5 --by 0.1,0,-0.05
+  palette4d edit clip.p4d.json hold --frame 40 --colour '#7a6b5c'
   palette4d edit clip.p4d.json undo
   palette4d edit clip.p4d.json version save warm
+  palette4d edit other.p4d.json copy clip.p4d.json
 
 Colours are R G B, R,G,B or #rrggbb, in the palette's own code values; they may
 lie outside 0..1. `palette4d info` lists the ids.
@@ -59,7 +62,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     _add_track(actions)
     _add_ramp(actions)
     _add_reset(actions)
-    add_actions(functools.partial(_action, actions))
+    for module in (picks, edit_history, edit_copy):
+        module.add_actions(functools.partial(_action, actions))
     accept_negative_values(actions)
 
 
@@ -114,8 +118,8 @@ def _add_track(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
         "track",
         "ID CHANGE [RANGE]",
         "change a colour all along its way: every handle of the colours that it comes from and "
-        "that it becomes. With --rgb the handle ID gets the colour, and the others move by as "
-        "much.",
+        "that it becomes. With --rgb the handle ID gets the colour; the others move by as much, "
+        "and darker ones by less.",
     )
     parser.add_argument("id", metavar="ID", help="a vertex, a stop, or an edge")
     parser.add_argument(
@@ -316,17 +320,21 @@ def _report(document: Document, before: State) -> None:
         if old.settings.get(id_) != document.settings.get(id_)
     ]
     for id_ in changed[:MOST_LINES]:
-        setting = document.settings.get(id_)
-        edge = None if setting is None or id_ in old.settings else setting.edge
-        was = old.colour(edge, frame=setting.frame) if edge and setting else old.colour(id_)
+        if id_ not in document.settings and old.settings[id_].edge is not None:
+            print(f"{old.named(id_)}: removed")
+            continue
+        stop = document.settings.get(id_)
+        if stop is not None and stop.edge is not None and id_ not in old.settings:
+            was = old.colour(stop.edge, frame=stop.frame)
+        else:
+            was = old.colour(id_)
         now = document.colour(id_)
-        print(
-            f"{document.named(id_)}: {'holds' if was == now else shown(was) + ' ->'} {shown(now)}"
-        )
+        how = "holds" if was == now else f"{shown(was)} ->"
+        print(f"{document.named(id_)}: {how} {shown(now)}")
     if len(changed) > MOST_LINES:
         print(f"and {len(changed) - MOST_LINES} more handles")
     if not changed:
-        print("nothing changed")
+        print("nothing to reset" if document.state == before else "done")
 
 
 def run_move(args: argparse.Namespace) -> int:
@@ -351,22 +359,11 @@ def run_move(args: argparse.Namespace) -> int:
 def run_reset(args: argparse.Namespace) -> int:
     """Reset a vertex, remove a stop, or reset everything."""
     document = _load(args)
-    before = dict(document.settings)
-    names = {id_: document.named(id_) for id_ in before}
+    before = document.state
     document.reset(args.id)
     document.save()
-    gone = [id_ for id_ in before if id_ not in document.settings]
-    for id_ in gone:
-        print(f"{names[id_]}: {_after_reset(document, id_, before[id_])}")
-    if not gone:
-        print("nothing to reset")
+    _report(document, before)
     return 0
-
-
-def _after_reset(document: Document, id_: str, before: Setting | None) -> str:
-    if before is None or before.edge is not None:
-        return "removed"
-    return f"{shown(before.rgb)} -> {shown(document.colour(id_))}"
 
 
 def _load(args: argparse.Namespace) -> Document:

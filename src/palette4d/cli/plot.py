@@ -2,11 +2,15 @@
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from palette4d.cli.lut_options import wide_help
 from palette4d.cli.messages import tell
 from palette4d.common.arguments import times, whole
 from palette4d.plotting import EXTENSIONS
+
+if TYPE_CHECKING:
+    from palette4d.grade.document import Document
 
 EPILOG = """\
 Each row is a palette colour through time, each disc a palette vertex. An edited disc or band shows
@@ -42,6 +46,19 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         metavar="CLIP",
         help="the clip (default: the sidecar's, beside the sidecar or in the working folder)",
     )
+    either = parser.add_mutually_exclusive_group()
+    either.add_argument(
+        "--version",
+        metavar="NAME",
+        default="",
+        help="the version whose edits are used (default: the active edits)",
+    )
+    either.add_argument(
+        "--compare",
+        metavar="A,B",
+        help="compare two versions: A in the place of the clip's colours; A alone: with the active "
+        "edits",
+    )
     width = "width of a .png (default 2400)"
     add("--width", metavar="PIXELS", type=whole(400, 16000), default=2400, help=width)
     add("--force", action="store_true", help="replace an existing file")
@@ -50,13 +67,20 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 def run(args: argparse.Namespace) -> int:
     """Draw the picture, and print its path."""
+    from palette4d.grade.document import Document
     from palette4d.plotting import plot
 
+    document = Document.load(args.sidecar)
+    before = None
+    if args.compare is not None:
+        before, args.version = _compared(document, args.compare)
     missing = plot(
-        args.sidecar,
+        document,
         args.output,
         frames=args.frames,
         clip=args.clip,
+        version=args.version,
+        before=before,
         width=args.width,
         force=args.force,
     )
@@ -69,3 +93,11 @@ def run(args: argparse.Namespace) -> int:
         )
     print(args.output)
     return 0
+
+
+def _compared(document: "Document", names: str) -> tuple[str, str]:
+    """Return the names of two versions; "" is the active edits."""
+    first, _, second = names.partition(",")
+    if names in document.versions:  # a name with a comma
+        return names, ""
+    return first.strip(), second.strip()

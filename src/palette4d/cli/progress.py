@@ -10,21 +10,10 @@ from collections.abc import Callable, Iterator
 def frames_bar(
     what: str, *, hidden: bool, total: int | None = None
 ) -> Iterator[Callable[..., None]]:
-    """Show a tqdm bar on standard error; after an error the bar disappears.
+    """Show a tqdm bar on standard error, if that is a terminal; after an error it disappears.
 
-    Parameters
-    ----------
-    what : str
-        The text before the bar.
-    hidden : bool
-        Show no bar. There is also no bar if standard error is not a terminal.
-    total : int, optional
-        Number of frames, if known from the start.
-
-    Yields
-    ------
-    callable
-        Call it with (frames done, frames in all) and, optionally, a text instead of `what`.
+    Yields a function to call with (frames done, frames in all) and, optionally, a text instead of
+    `what`.
     """
     from tqdm import tqdm
 

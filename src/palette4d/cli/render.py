@@ -127,6 +127,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="colour space of the clip's code values: the one that was analysed, or the "
         "palette's (default input)",
     )
+    parser.add_argument(
+        "--version",
+        metavar="NAME",
+        default="",
+        help="the version whose edits are used (default: the active edits)",
+    )
     parser.add_argument("--half", action="store_true", help="EXR with 16-bit float")
     parser.add_argument(
         "--bits", type=int, choices=(8, 16, 32), help="bits a sample of PNG (8, 16) or TIFF"
@@ -154,12 +160,13 @@ def _show(text: str) -> str:
 def run(args: argparse.Namespace) -> int:
     """Render; returns the exit status."""
     from palette4d.cli.progress import frames_bar
+    from palette4d.grade.document import Document
     from palette4d.grade.rendering import render
     from palette4d.media.clip_base import named
 
     with frames_bar("render", hidden=args.quiet) as progress:
         done = render(
-            args.sidecar,
+            Document.load(args.sidecar, version=args.version),
             args.clip,
             args.output,
             frames=args.frames,

@@ -35,13 +35,10 @@ class Conversion:
 
     Attributes
     ----------
-    steps : list of dict
-        The steps in a sidecar's form.
-    chain : ColourConversion
-        Applies the steps.
-    error : float
-        The largest |a - b| / max(|b|, 1) between the chain and OpenColorIO in both directions, less
-        the error of single precision. Colours that OpenColorIO cannot invert do not count.
+    steps : the steps in a sidecar's form.
+    chain : applies the steps.
+    error : the largest |a - b| / max(|b|, 1) between the chain and OpenColorIO in both directions,
+        less the error of single precision. Colours that OpenColorIO cannot invert do not count.
     """
 
     steps: list[Step]
@@ -50,14 +47,7 @@ class Conversion:
 
 
 def conversion(config: Any, source: str, target: str) -> Conversion:
-    """Return the chain from one colour space of a config to another.
-
-    Raises
-    ------
-    ConversionError
-        The conversion is more than matrices and curves, or the chain differs from OpenColorIO by
-        more than `TOLERANCE`.
-    """
+    """Return the chain from one colour space of a config to another."""
     try:
         forward = ExactProcessor(config.getProcessor(source, target))
         backward = ExactProcessor(config.getProcessor(target, source))

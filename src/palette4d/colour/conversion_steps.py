@@ -34,13 +34,7 @@ class ConversionError(Palette4dError):
 
 
 def steps_of(transform: Any) -> list[Step]:
-    """Return one of OpenColorIO's transforms as steps of a sidecar.
-
-    Raises
-    ------
-    ConversionError
-        It is more than matrices and curves of one channel, or has no inverse.
-    """
+    """Return one of OpenColorIO's transforms as steps of a sidecar."""
     name = type(transform).__name__
     translate = {
         "MatrixTransform": _matrix,

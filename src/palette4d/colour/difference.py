@@ -24,12 +24,9 @@ class Viewing:
 
     Attributes
     ----------
-    assumption : str
-        One phrase about the encoding, to print beside every deltaE.
-    to_srgb : ExactProcessor or None
-        From the encoding to sRGB; None if it is sRGB or assumed to be sRGB.
-    encoding : str
-        OpenColorIO's kind of the encoding: "log", "scene-linear", …; "" if unknown.
+    assumption : one phrase about the encoding, to print beside every deltaE.
+    to_srgb : from the encoding to sRGB; None if it is sRGB or assumed to be sRGB.
+    encoding : OpenColorIO's kind of the encoding: "log", "scene-linear", …; "" if unknown.
     """
 
     assumption: str

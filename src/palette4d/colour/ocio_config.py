@@ -55,19 +55,9 @@ def failures() -> tuple[type[Exception], ...]:
 
 
 def load_config(name: str, option: str) -> Any:
-    """Return the config with this name.
+    """Return a config.ocio, an .ocioz archive, or a built-in ``ocio://`` config.
 
-    Parameters
-    ----------
-    name : str
-        A config.ocio, an .ocioz archive, or a built-in ``ocio://`` name.
-    option : str
-        The option or variable that named it ("ocio_config=…", "$OCIO"), for errors.
-
-    Raises
-    ------
-    Palette4dError
-        There is no such config, or OpenColorIO cannot use it.
+    `option` is the option or variable that named it ("ocio_config=…", "$OCIO"), for errors.
     """
     import PyOpenColorIO as ocio
 
@@ -105,11 +95,6 @@ def chosen_config(given: str | None) -> tuple[Any, str]:
     """Return the given config, else the config of ``$OCIO``, else `BUILT_IN`; and its name.
 
     The name of a file is absolute.
-
-    Raises
-    ------
-    Palette4dError
-        The config is unusable.
     """
     for name, option in ((given, "ocio_config=…"), (os.environ.get("OCIO") or None, "$OCIO")):
         if name is not None:
@@ -118,13 +103,7 @@ def chosen_config(given: str | None) -> tuple[Any, str]:
 
 
 def colour_space(config: Any, config_name: str, name: str, what: str) -> Any:
-    """Return the colour space with this name, alias or role; `what` names its source in errors.
-
-    Raises
-    ------
-    Palette4dError
-        There is none (the message suggests similar names), or it holds data, not colours.
-    """
+    """Return the colour space with this name, alias or role; `what` names its source in errors."""
     found = config.getColorSpace(name)
     if found is None:
         raise Palette4dError(

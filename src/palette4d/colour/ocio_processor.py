@@ -9,13 +9,7 @@ F32 = NDArray[np.float32]
 
 
 class ExactProcessor:
-    """An OpenColorIO processor without approximations of logarithms and powers.
-
-    Parameters
-    ----------
-    processor : PyOpenColorIO.Processor
-        A processor for any transform.
-    """
+    """An OpenColorIO processor without approximations of logarithms and powers."""
 
     def __init__(self, processor: Any) -> None:
         """Prepare it."""

@@ -25,14 +25,7 @@ _swept: set[Path] = set()
 
 
 def refuse_existing(path: Path, force: bool) -> None:
-    """Check that a file may be written to `path`.
-
-    Raises
-    ------
-    Palette4dError
-        `path` is a folder, lies in a folder that does not exist, or exists and `force` is false;
-        `WriteError` if its folder is not writable.
-    """
+    """Check that a file may be written to `path`."""
     if path.is_dir():
         raise Palette4dError(f"{path}: found a folder, expected a file name for the output")
     if not path.parent.is_dir():
@@ -44,13 +37,7 @@ def refuse_existing(path: Path, force: bool) -> None:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder and its parents.
-
-    Raises
-    ------
-    Palette4dError
-        The folder cannot be created.
-    """
+    """Make a folder and its parents."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -78,17 +65,9 @@ def replacing(
 
     Parameters
     ----------
-    path : Path
-        The file to write; a symbolic link is kept and its target is written.
-    force : bool
-        Replace a file that exists.
-    check : callable, optional
-        Called immediately before the rename; if it raises, `path` is unchanged.
-
-    Raises
-    ------
-    Palette4dError
-        As `refuse_existing`; `WriteError` if the folder is not writable or the disk is full.
+    path : the file to write; a symbolic link is kept and its target is written.
+    force : replace a file that exists.
+    check : called immediately before the rename; if it raises, `path` is unchanged.
     """
     path = link_target(path)
     refuse_existing(path, force)

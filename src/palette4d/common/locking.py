@@ -30,13 +30,7 @@ UNFINISHED_SECONDS = 2.0
 
 @contextlib.contextmanager
 def locked(target: Path) -> Iterator[Callable[[], None]]:
-    """Hold the lock of a file; yield a check that raises if the lock was lost.
-
-    Raises
-    ------
-    Palette4dError
-        Another program has held the lock for `LOCK_SECONDS`.
-    """
+    """Hold the lock of a file; yield a check that raises if the lock was lost."""
     deadline = time.monotonic() + LOCK_SECONDS
     with contextlib.ExitStack() as stack:
         if sys.platform != "win32":
@@ -124,7 +118,7 @@ def _created(path: Path, content: str) -> bool:
 
 def _cannot(path: Path) -> Palette4dError:
     return Palette4dError(
-        f"{path}: the lock file cannot be created; choose another folder or mend its permissions"
+        f"{path}: the lock file cannot be created; choose another folder or change its permissions"
     )
 
 

@@ -45,13 +45,7 @@ def file_safe(name: str) -> str:
 
 
 def checked_name(name: str) -> str:
-    """Return the name if it is safe in files.
-
-    Raises
-    ------
-    Palette4dError
-        It is not safe; the message suggests a safe name.
-    """
+    """Return the name if it is safe in files."""
     if file_safe(name) != name:
         raise Palette4dError(
             f"found the name {name!r}, expected letters, digits, '.', '_' and '-' only, at most "

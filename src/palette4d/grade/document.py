@@ -11,12 +11,12 @@ import itertools
 import math
 import os
 import re
-from collections.abc import Generator, Iterable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal, TypedDict, Unpack
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ from palette4d.common.files import link_target
 from palette4d.common.locking import locked
 from palette4d.common.text import counted
 from palette4d.grade import edits, moves, sidecar
+from palette4d.grade.copying import Fit, Time, copied, fit
 from palette4d.grade.edits import (
     RAMP,
     Change,
@@ -45,8 +46,12 @@ from palette4d.grade.edits import (
 from palette4d.grade.handles import Handles, unknown
 from palette4d.grade.output import Output
 from palette4d.grade.palette import FAR, Near, Palette, palette_at
+from palette4d.grade.picks import MOST_PICKS, Pick, Toward, all_picks, check_range
 from palette4d.grade.sidecar import Fields, OnEdits
 from palette4d.grade.tracks import Track, tracks_of, way_of
+
+if TYPE_CHECKING:
+    from palette4d.grade.picking import ClipOfPicks
 
 F32 = NDArray[np.float32]
 
@@ -121,20 +126,22 @@ class Document:
         self.report = dict(report or {})
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> "Document":
-        """Load a sidecar (*.p4d.json).
+    def load(cls, path: str | os.PathLike[str], *, version: str = "") -> "Document":
+        """Load a sidecar (*.p4d.json), or a version in it (`Document.version`).
 
         Raises
         ------
         SidecarError
             There is no such file, or it is unusable.
+        Palette4dError
+            There is no such version.
         """
         document = cls.__new__(cls)
         data = sidecar.read_bytes(path)
         document._disk, document.path, document.notes = data, Path(path), ()
         document.report = {}
         document._start(data, _core.parse_sidecar(data, os.fspath(path)))
-        return document
+        return document.version(version)
 
     def _start(self, data: bytes, core: _core.Sidecar) -> None:
         self._fields: Fields = sidecar.fields_of(data)
@@ -528,7 +535,7 @@ class Document:
         frame : float, optional
             The frame at which an edge's colour is meant.
         rgb : 3 floats or "#rrggbb", optional
-            The new colour; other handles of the track move by as much.
+            The new colour; other handles of the track move by as much, and darker ones by less.
         by : 3 floats, optional
             Offsets in code values.
         hue : float
@@ -580,6 +587,7 @@ class Document:
             within=within,
             ramp=known,
             clip_ramp=self.ramp,
+            exact=None if id is None or rgb is None or frame is None else (id, frame),
         )
         if within is not None:
             what += f" {moves.range_text(start, until)}"
@@ -719,6 +727,284 @@ class Document:
         self._core = None
         self._solved = None
 
+    # -------------------------------------------------------------------------------------- picks
+
+    @property
+    def picks(self) -> tuple[Pick, ...]:
+        """The picks and holds, with their measured residuals, in the order of their ids."""
+        return all_picks(self._members()["edits"])
+
+    def pick(
+        self,
+        frame: float,
+        *,
+        colour: Iterable[float] | str | None = None,
+        pixel: tuple[float, float] | None = None,
+        box: int = 1,
+        to: Iterable[float] | str | None = None,
+        by: Iterable[float] | None = None,
+        clip: str | os.PathLike[str] | None = None,
+        follow: bool = True,
+        toward: Toward = "shift",
+        start: float | None = None,
+        until: float | None = None,
+        fade: float = 0.0,
+        radius: float | None = None,
+        global_only: bool = False,
+        any_value: bool = False,
+        progress: Callable[[int, int], object] | None = None,
+    ) -> Pick:
+        """Change a colour of the clip into another one, and little else.
+
+        All picks and holds are solved together, again after every edit (docs/grading.md).
+
+        Parameters
+        ----------
+        frame : float
+            Where the colour is picked.
+        colour : 3 floats or "#rrggbb"
+            The picked colour as it is before edits, in the palette's code values.
+        pixel : (float, float)
+            Instead of `colour`: a pixel of the clip's frame, x from the left, y from the top.
+        box : int
+            With `pixel`: the side of the box around it whose mean is picked.
+        to, by : 3 floats
+            The new colour, or the change; one of them.
+        clip : path, optional
+            The clip; default: the sidecar's.
+        follow : bool
+            Follow the colour through the clip. Without the clip, or without this, the pick is at
+            the same colour in all frames.
+        toward : {"shift", "colour"}
+            At other frames: the same change, or the same new colour.
+        start, until : float, optional
+            First and last frame with the full change; default: the clip's.
+        fade : float
+            Frames of the ramps before `start` and after `until`; beyond them nothing changes.
+        radius : float, optional
+            Where the local remainder ends, in code values.
+        global_only : bool
+            No local remainder: only palette colours move.
+        any_value : bool
+            Take colours such as 255 128 0 as they are.
+        progress : callable, optional
+            Called as progress(done, total) while frames are read.
+
+        Returns
+        -------
+        Pick
+            With its id, its path and its measured residual.
+
+        Raises
+        ------
+        Palette4dError
+            A value is out of range, or the clip does not fit.
+        """
+        at = self._picked(frame, colour, pixel, box, clip, any_value)
+        if (to is None) == (by is None):
+            raise Palette4dError(
+                f"found {'both' if to is not None else 'neither'} of the new colour (to) and the "
+                "change (by), expected one of them"
+            )
+        if to is not None:
+            new = self._checked(to, any_value)
+        else:
+            change = as_colour(by or (), "change")
+            new = as_colour([a + b for a, b in zip(at.rgb, change, strict=True)])
+        found = replace(at, kind="pick", to=new, toward=toward, start=start, until=until)
+        found = replace(found, fade=fade, radius=radius, global_only=global_only)
+        return self._add_pick(found, clip, follow, progress)
+
+    def hold(
+        self,
+        frame: float,
+        *,
+        colour: Iterable[float] | str | None = None,
+        pixel: tuple[float, float] | None = None,
+        box: int = 1,
+        clip: str | os.PathLike[str] | None = None,
+        follow: bool = True,
+        start: float | None = None,
+        until: float | None = None,
+        fade: float = 0.0,
+        radius: float | None = None,
+        global_only: bool = False,
+        any_value: bool = False,
+        progress: Callable[[int, int], object] | None = None,
+    ) -> Pick:
+        """Keep a colour of the clip as it is, whatever picks and handles do; as `pick`."""
+        at = self._picked(frame, colour, pixel, box, clip, any_value)
+        found = replace(at, start=start, until=until, fade=fade, radius=radius)
+        return self._add_pick(replace(found, global_only=global_only), clip, follow, progress)
+
+    def correct_path(
+        self,
+        id: str,
+        frame: float,
+        *,
+        colour: Iterable[float] | str | None = None,
+        pixel: tuple[float, float] | None = None,
+        box: int = 1,
+        clip: str | os.PathLike[str] | None = None,
+        any_value: bool = False,
+        progress: Callable[[int, int], object] | None = None,
+    ) -> Pick:
+        """Say where the colour of a pick or hold is at another frame; it is followed again.
+
+        Between two given frames the path goes gradually from what follows the one to what follows
+        the other.
+        """
+        from palette4d.grade.picking import corrected
+
+        at = self._picked(frame, colour, pixel, box, clip, any_value)
+        found = corrected(self._pick(id), at.frame, at.rgb)
+        found = replace(found, path=self._clip_of_picks(clip).path(found, progress))
+        self._put("pick", id, found.to_fields(), f"correct {id} at frame {frame:g}")
+        return self._pick(id)
+
+    def change_pick(
+        self,
+        id: str,
+        *,
+        any_value: bool = False,
+        clip: str | os.PathLike[str] | None = None,
+        progress: Callable[[int, int], object] | None = None,
+        **changes: Any,
+    ) -> Pick:
+        """Change a pick or hold: any of the attributes of `Pick` but id, kind and path.
+
+        A new `frame`, `rgb` or range is followed again, if the pick was followed.
+        """
+        old = self._pick(id)
+        for name in ("rgb", "to"):
+            if name in changes:
+                changes[name] = self._checked(changes[name], any_value)
+        if old.kind == "hold" and (bad := {"to", "toward"} & changes.keys()):
+            raise Palette4dError(f"{id} is a hold, which has no {' and no '.join(sorted(bad))}")
+        new = replace(old, **changes)
+        self._check_pick(new)
+        moved = {"frame", "rgb", "start", "until", "fade"} & changes.keys()
+        if moved and old.path:
+            given = tuple(key for key in old.path if key.given and key.frame != old.frame)
+            path = self._clip_of_picks(clip).path(replace(new, path=given), progress)
+            new = replace(new, path=path)
+        self._put("pick", id, new.to_fields(), f"change {id}")
+        return self._pick(id)
+
+    def unpick(self, *ids: str) -> None:
+        """Remove picks and holds."""
+        for id_ in ids:
+            self._pick(id_)
+        self._remove([("pick", id_) for id_ in dict.fromkeys(ids)], f"remove {' '.join(ids)}")
+
+    def lock(self, *ids: str) -> None:
+        """Keep vertices and stops where they are: picks do not move them."""
+        for id_ in ids:
+            if id_ not in self._settings:
+                self._handles.vertex(id_, self._settings)
+        with self.one_step(f"lock {' '.join(ids)}"):
+            for id_ in ids:
+                self._put("lock", id_, True, "")
+
+    def unlock(self, *ids: str) -> None:
+        """Let picks move these vertices and stops again."""
+        for id_ in ids:
+            if ("lock", id_) not in self._state:
+                locked = [known for kind, known in self._state if kind == "lock"]
+                raise unknown(id_, "lock", locked)
+        self._remove([("lock", id_) for id_ in dict.fromkeys(ids)], f"unlock {' '.join(ids)}")
+
+    @property
+    def locks(self) -> tuple[str, ...]:
+        """The ids of the handles that picks do not move."""
+        return tuple(self._members()["edits"].get("locks", ()))
+
+    @property
+    def has_clip_colours(self) -> bool:
+        """Whether the sidecar has colours of its clip; without, picks guard the palette's only."""
+        return bool(self._fields.get("colours"))
+
+    def moved_by_picks(self) -> tuple[int, int]:
+        """Return how many vertices picks move by more than 1/255, and how many there are."""
+        solution = self._members()["edits"].get("solution", {"vertices": [], "keys": []})
+        moved = {
+            entry["vertex"]
+            for entry in solution["vertices"]
+            if max(map(abs, entry["by"])) > 1 / 255
+        }
+        return len(moved), len(self._handles.vertices)
+
+    def colour_of_pixel(
+        self,
+        frame: float,
+        pixel: tuple[float, float],
+        box: int = 1,
+        clip: str | os.PathLike[str] | None = None,
+    ) -> Colour:
+        """Return the mean colour of a box around a pixel of the clip, in the palette's values."""
+        self.check_frame(frame)
+        return self._clip_of_picks(clip).colour(frame, pixel, box)
+
+    def _clip_of_picks(self, clip: str | os.PathLike[str] | None) -> "ClipOfPicks":
+        from palette4d.grade.picking import ClipOfPicks
+
+        conversion = self._conversion("input")
+        return ClipOfPicks(self._fields["clip"], conversion, self.path, clip)
+
+    def _picked(
+        self,
+        frame: float,
+        colour: Iterable[float] | str | None,
+        pixel: tuple[float, float] | None,
+        box: int,
+        clip: str | os.PathLike[str] | None,
+        any_value: bool,
+    ) -> Pick:
+        """Return a hold of a colour at a frame."""
+        self.check_frame(frame)
+        if (colour is None) == (pixel is None):
+            raise Palette4dError(
+                f"found {'both' if colour is not None else 'neither'} of a colour and a pixel, "
+                "expected one of them"
+            )
+        if pixel is not None:
+            rgb = self.colour_of_pixel(frame, pixel, box, clip)
+            return Pick("", "hold", frame, rgb, pixel=pixel, box=box)
+        return Pick("", "hold", frame, self._checked(colour or (), any_value))
+
+    def _add_pick(
+        self,
+        found: Pick,
+        clip: str | os.PathLike[str] | None,
+        follow: bool,
+        progress: Callable[[int, int], object] | None,
+    ) -> Pick:
+        enabled = sum(
+            kind == "pick" and v.get("enabled", True) for (kind, _), v in self._state.items()
+        )
+        if enabled >= MOST_PICKS:
+            raise Palette4dError(
+                f"there are {enabled} picks and holds, and at most {MOST_PICKS} can be "
+                "solved together; remove or disable some (`unpick`, `disable`)"
+            )
+        self._check_pick(found)
+        if follow:
+            found = replace(found, path=self._clip_of_picks(clip).path(found, progress))
+        taken = (id_ for kind, id_ in self._state if kind == "pick")
+        found = replace(found, id=edits.new_id("p", taken))
+        self._put("pick", found.id, found.to_fields(), f"{found.kind} {_text(found.rgb)}")
+        return self._pick(found.id)
+
+    def _check_pick(self, found: Pick) -> None:
+        self.check_frame(found.frame)
+        check_range(found, self.frames)
+
+    def _pick(self, id_: str) -> Pick:
+        for found in self.picks:
+            if found.id == id_:
+                return found
+        raise unknown(id_, "pick or hold", [found.id for found in self.picks])
+
     # ----------------------------------------------------------------------------------- versions
 
     @property
@@ -746,14 +1032,62 @@ class Document:
             The name of the new version, such as "before NAME".
         """
         wanted = edits.from_fields(self._version(name))
-        versions = {key: value for key, value in self._state.items() if key[0] == "version"}
-        kept = None
-        if self._active() and not any(map(self.same_edits, self.versions)):
-            names = (f"before {name}"[: LONGEST_NAME - 4] + more for more in _suffixes())
-            kept = next(each for each in names if ("version", each) not in versions)
-            versions["version", kept] = self.fields()["edits"]
+        versions, kept = self._versions_with_active(f"before {name}")
         self.apply(edits.difference(self._state, {**wanted, **versions}, f"use version {name}"))
         return kept
+
+    def _versions_with_active(self, name: str) -> tuple[dict[Key, Any], str | None]:
+        """Return the versions, with the active edits as another one if none holds them."""
+        versions = {key: value for key, value in self._state.items() if key[0] == "version"}
+        if not self._active() or any(map(self.same_edits, self.versions)):
+            return versions, None
+        names = (name[: LONGEST_NAME - 4] + more for more in _suffixes())
+        kept = next(each for each in names if ("version", each) not in versions)
+        versions["version", kept] = self.fields()["edits"]
+        return versions, kept
+
+    def copy_from(self, source: "Document", *, time: Time = "relative") -> Fit:
+        """Take over the grade of another document, as one step.
+
+        Each handle gets the colour that the other grade makes of its colour at the corresponding
+        time. Picks are copied and solved again. Active edits that no version holds are kept as the
+        version "before copy".
+
+        Parameters
+        ----------
+        source : Document
+            The graded document.
+        time : "relative" or float
+            "relative": the first frame gets the look of the first frame, the last that of the last.
+            A frame: all frames get the look of this frame of `source`.
+
+        Returns
+        -------
+        Fit
+            How near the result is to the copied grade; its text is for people.
+
+        Raises
+        ------
+        Palette4dError
+            The source has no edits, the frame is outside of its clip, or its colour space cannot be
+            converted.
+        """
+        if not source.edited:
+            raise Palette4dError(
+                f"{source._name} has no edits; expected a graded palette to copy from"
+            )
+        state = copied(self, source, time)
+        before = (self._state, self._done, self._undone)
+        versions, _ = self._versions_with_active("before copy")
+        label = f"copy the grade of {source._fields['clip']['name']}"
+        locks = {key: value for key, value in self._state.items() if key[0] == "lock"}
+        self.apply(edits.difference(self._state, {**state, **locks, **versions}, label))
+        try:
+            return fit(self, source, time)
+        except BaseException:
+            self._become(before[0])
+            self._core, self._solved, (_, self._done, self._undone) = None, None, before
+            raise
 
     def same_edits(self, name: str) -> bool:
         """Whether a version holds the active edits."""
@@ -955,8 +1289,9 @@ class Document:
         path : path, optional
             A file other than the loaded file.
         on_edits : {"refuse", "keep", "drop"}
-            What to do with edits in that file, which would be lost. "keep" takes them over; this
-            needs the same palette.
+            What to do with edits in that file, which would be lost. "keep" takes them over. If the
+            palette differs, it copies the grade and keeps the old file under another name; `notes`
+            says so.
 
         Raises
         ------
@@ -979,12 +1314,15 @@ class Document:
         fields = self.fields()
         if self.path is None:
             fields["clip"]["source"] = _beside(fields["clip"]["source"], target)
+        from palette4d.grade import renewal  # which needs this module
+
         path, self.path = self.path, target
         try:
-            fields = sidecar.save(fields, target, on_edits=on_edits)
+            fields, notes = renewal.save(fields, target, on_edits=on_edits)
         except BaseException:
             self.path = path
             raise
+        self.notes += tuple(notes)
         self._disk = sidecar.encoded(fields)
         self._start(self._disk, _core.parse_sidecar(self._disk, str(target)))
 
@@ -1070,10 +1408,9 @@ def _solve(fields: Fields) -> Solved:
     """Return the solution of the picks in a sidecar's members, and what it measured of each."""
     if not any(pick.get("enabled", True) for pick in fields["edits"].get("picks", ())):
         return {}, {}
-    from palette4d.grade import solve  # type: ignore[attr-defined]
+    from palette4d.grade import solve
 
-    found: Solved = solve.solve(fields)
-    return found
+    return solve.solve(fields)
 
 
 def _suffixes() -> Iterator[str]:

@@ -53,9 +53,27 @@ def shift(offset: Colour) -> Move:
 
 
 def shift_to(before: Colour, after: Colour) -> Move:
-    """Return the move by the difference of two colours; it gives exactly `after` for `before`."""
-    move = shift(as_colour([b - a for a, b in zip(before, after, strict=True)]))
-    return lambda colour: after if colour == before else move(colour)
+    """Return the move of one colour to another, as it moves other colours of a track.
+
+    They move by the same difference, and darker colours by less: by their share of the luma of
+    `before`. So black stays black where a track fades out.
+    """
+    luma = _luma(before)
+
+    def move(colour: Colour) -> Colour:
+        if colour == before:
+            return after
+        share = min(1.0, max(0.0, _luma(colour)) / luma) if luma > 0 else 1.0
+        found = [c + share * (b - a) for a, b, c in zip(before, after, colour, strict=True)]
+        return as_colour(found)
+
+    return move
+
+
+def _luma(colour: Colour) -> float:
+    """Return the Rec. 709 luma."""
+    r, g, b = colour
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b
 
 
 def range_of(
@@ -106,6 +124,7 @@ def moved(
     within: Range | None = None,
     ramp: Ramp | None = None,
     clip_ramp: Ramp = "linear",
+    exact: tuple[str, float] | None = None,
 ) -> dict[str, Setting]:
     """Return the settings of the handles that change.
 
@@ -125,6 +144,8 @@ def moved(
         The ramp of the handles that move; in a range: of its fades.
     clip_ramp : str
         The clip's ramp.
+    exact : (str, float), optional
+        An edge and a frame where the colour moves exactly, by a stop.
     """
     vertices, edges = way
     result: dict[str, Setting] = {}
@@ -142,16 +163,14 @@ def moved(
     for id_, stop in settings.items():
         if stop.frame is not None and (stop.edge in edges or id_ in vertices):
             give(id_, stop, stop.frame)
-    if within is None:
-        return result
-
     touched = {id_ for id_ in result if id_ in handles.vertices}
     for edge, ends in handles.edges.items():
-        if edge in edges:
-            times = {within.start, within.first, within.last, within.end}
-        elif ends["to"] in touched or ends["from"] in touched:
-            times = {within.start, within.end}  # the neighbour stays outside of the range
-        else:
+        times = {exact[1]} if exact is not None and exact[0] == edge else set()
+        if within is not None and edge in edges:
+            times |= {within.start, within.first, within.last, within.end}
+        elif within is not None and (ends["to"] in touched or ends["from"] in touched):
+            times |= {within.start, within.end}  # the neighbour stays outside of the range
+        if not times:
             continue
         knots = _knots(handles, settings, edge)
         for frame in sorted(times):
@@ -160,8 +179,10 @@ def moved(
             way_on = next(own for at, own in reversed(knots) if at < frame)
             colour = colour_at(edge, frame)
             if edge in edges:
-                colour = _mixed(colour, move(colour), within.weight(frame))
-            if edge in edges and frame in (within.start, within.last):  # the fades begin here
+                share = 1.0 if within is None else within.weight(frame)
+                colour = _mixed(colour, move(colour), share)
+            begins_fade = within is not None and frame in (within.start, within.last)
+            if edge in edges and begins_fade:
                 way_on = ramp or ("linear" if (way_on or clip_ramp) == "hold" else way_on)
             id_ = new_id("s", {*handles.vertices, *handles.edges, *settings, *result})
             result[id_] = Setting(colour, edge, frame, way_on)

@@ -28,13 +28,7 @@ def default_destination(platform: str = sys.platform) -> Path:
 
 
 def find_bundle() -> Path:
-    """Return the bundle inside the installed package.
-
-    Raises
-    ------
-    Palette4dError
-        When this installation holds no bundle.
-    """
+    """Return the bundle inside the installed package."""
     # It lies beside the compiled module, which in an editable installation is not in the sources.
     bundle = Path(_core.__file__).parent / "_ofx" / BUNDLE
     if any(bundle.glob("Contents/*/*.ofx")):
@@ -48,28 +42,10 @@ def find_bundle() -> Path:
 def install_bundle(
     bundle: Path, destination: Path, *, link: bool = False, force: bool = False
 ) -> Path:
-    """Copy or link the bundle into a plugin folder.
+    """Copy or link the bundle into a folder of plugins, which is made if it is missing.
 
-    Parameters
-    ----------
-    bundle : Path
-        The bundle to install.
-    destination : Path
-        The folder of plugins; created if it is missing.
-    link : bool
-        Make a symbolic link instead of a copy.
-    force : bool
-        Replace something at the destination that is not an earlier Palette4D bundle.
-
-    Returns
-    -------
-    Path
-        The installed bundle.
-
-    Raises
-    ------
-    Palette4dError
-        When the destination is occupied, not writable, or not a folder.
+    `force` replaces something that is not an earlier Palette4D bundle. Returns the installed
+    bundle.
     """
     bundle = bundle.resolve()
     target = destination / BUNDLE

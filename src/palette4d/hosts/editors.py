@@ -11,19 +11,9 @@ from palette4d.hosts import MARK, kdenlive, shotcut
 
 
 def data_folder(program: str, platform: str = sys.platform) -> Path:
-    """Return the user's folder from which a program loads additional effects or filters.
+    """Return the user's folder from which "kdenlive" or "shotcut" loads effects or filters.
 
-    Parameters
-    ----------
-    program : str
-        "kdenlive" or "shotcut".
-    platform : str
-        As `sys.platform`.
-
-    Raises
-    ------
-    Palette4dError
-        On platforms other than Linux, which are untested: the user has to name the folder.
+    Platforms other than Linux are untested: there the user has to name the folder.
     """
     below = {
         "kdenlive": "kdenlive/effects",
@@ -40,33 +30,15 @@ def data_folder(program: str, platform: str = sys.platform) -> Path:
 
 
 def install_kdenlive(folder: Path, *, force: bool = False) -> list[Path]:
-    """Write Kdenlive's effect file into a folder of effects.
+    """Write Kdenlive's effect file into a folder of effects; return the written files.
 
-    Parameters
-    ----------
-    folder : Path
-        The folder; created if it is missing.
-    force : bool
-        Replace a file of that name that palette4d has not written.
-
-    Returns
-    -------
-    list of Path
-        The written files.
-
-    Raises
-    ------
-    Palette4dError
-        Another program's file is in the way, or the folder is not writable.
+    `force` replaces a file of that name that palette4d has not written.
     """
     return _write(folder, {kdenlive.FILE: kdenlive.effect_file(__version__)}, force)
 
 
 def install_shotcut(folder: Path, *, force: bool = False) -> list[Path]:
-    """Write Shotcut's filter, a folder of its own, into a folder of filters.
-
-    Parameters, result and errors are as for `install_kdenlive`.
-    """
+    """Write Shotcut's filter, a folder of its own, as `install_kdenlive` does."""
     return _write(folder / shotcut.FOLDER, shotcut.filter_files(__version__), force)
 
 

@@ -19,13 +19,7 @@ Recolours a clip by the edits made to its time-varying colour palette. Choose th
 
 
 def effect_file(version: str) -> str:
-    """Return the effect file's text, an XML document.
-
-    Parameters
-    ----------
-    version : str
-        The version of palette4d, for the comment in the file.
-    """
+    """Return the effect file's text, an XML document that names this version of palette4d."""
     effect = ElementTree.Element(
         "effect",
         {"xmlns": "https://www.kdenlive.org", "tag": SERVICE, "id": SERVICE, "type": "video"},

@@ -130,11 +130,6 @@ def filter_files(version: str) -> dict[str, str]:
     """Return the texts of the folder's files by name, in the order in which to write them.
 
     The last file makes Shotcut load the folder.
-
-    Parameters
-    ----------
-    version : str
-        The version of palette4d, for the first line of the files.
     """
     by = origin(version)
     rows = "\n".join(

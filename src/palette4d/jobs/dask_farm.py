@@ -41,13 +41,7 @@ ASKED_EVERY = 0.2
 
 
 def check_address(text: str) -> str:
-    """Return the value of --cluster if it is a scheduler's address.
-
-    Raises
-    ------
-    Palette4dError
-        It is not an address.
-    """
+    """Return the value of --cluster if it is a scheduler's address."""
     if re.fullmatch(r"([a-z]+://)?[^/:\s]+:[0-9]+", text):
         return text
     raise Palette4dError(
@@ -69,12 +63,6 @@ def run(
         A scheduler's address (`check_address`).
     work, tasks, take
         As in `pool.run`; a worker runs one task at a time, with all its threads.
-
-    Raises
-    ------
-    Palette4dError
-        Dask is not installed, no scheduler answers, there is no worker, or a worker has another
-        version of palette4d.
     """
     if not tasks:
         return

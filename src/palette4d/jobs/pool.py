@@ -38,17 +38,12 @@ def run(
 
     Parameters
     ----------
-    work : callable
-        (task, threads to use) -> result; a module's function, so that it can be pickled.
-    tasks : mapping
-        The tasks, by any key.
-    take : callable
-        Called in this process with a key and the result, or `Failed` for a `Palette4dError`, an
+    work : (task, threads to use) -> result; a module's function, so that it can be pickled.
+    tasks : the tasks, by any key.
+    take : called in this process with a key and the result, or `Failed` for a `Palette4dError`, an
         `OSError`, or a process that was killed.
-    jobs : int
-        Processes; 0: one per processor; 1: run all tasks in this process.
-    patient : bool
-        After Ctrl-C, finish and report the running tasks; otherwise they are dropped.
+    jobs : processes; 0: one per processor; 1: run all tasks in this process.
+    patient : after Ctrl-C, finish and report the running tasks; otherwise they are dropped.
 
     Raises
     ------

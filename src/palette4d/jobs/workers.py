@@ -11,15 +11,7 @@ __all__ = ["Failed", "Workers"]
 
 @dataclass(frozen=True)
 class Workers:
-    """The choice of workers.
-
-    Attributes
-    ----------
-    jobs : int
-        Processes on this machine; 0: one per processor.
-    cluster : str or None
-        The Dask scheduler's address of a farm, to use instead.
-    """
+    """Processes on this machine (`jobs`; 0: one per processor), or a Dask farm (`cluster`)."""
 
     jobs: int = 0
     cluster: str | None = None

@@ -99,6 +99,30 @@ class MovieClip(Clip):
         picture = self._picture(frame)
         return Image(frame, _upright(picture_pixels(picture), picture))
 
+    def load_small(self, frame: int, width: int, height: int) -> F32:
+        """Decode one picture for a preview, scaled before it is converted where that is quicker.
+
+        Returns
+        -------
+        (height, width, 3 or 4) float32, or the whole picture as `load` where the layout needs it.
+        """
+        picture = self._picture(frame)
+        if picture.rotation or not _is_luma_chroma(picture):
+            return _upright(picture_pixels(picture), picture)
+        matrix, full = _matrix(picture), int(picture.color_range) == _FULL_RANGE
+        spread = 2 if full else 1
+        small = picture.reformat(
+            width=width,
+            height=height,
+            src_colorspace=5,
+            dst_colorspace=5,
+            src_color_range=spread,
+            dst_color_range=spread,
+            interpolation="AREA",
+        )
+        small.colorspace, small.color_range = matrix, spread
+        return picture_pixels(small)
+
     def fills(self, frames: Sequence[int]) -> Iterator[tuple[int, Fill]]:
         """Decode the frames in order; one frame may be binned while the next is decoded."""
         for frame in frames:

@@ -75,12 +75,6 @@ def spaces_of(clip: Clip, options: SpaceOptions) -> Spaces | None:
     -------
     Spaces or None
         None if no colour space is given or known: then the code values are not converted.
-
-    Raises
-    ------
-    Palette4dError
-        The config is unusable, it lacks a name, or the conversion is not a chain of matrices and
-        curves.
     """
     if not options.asked:
         return None
@@ -221,14 +215,7 @@ def converted(clip: Clip, spaces: Spaces | None) -> Clip:
 
 
 def record(document: dict[str, Any], clip: Clip, spaces: Spaces | None) -> list[str]:
-    """Write the conversion into a sidecar's document; returns notes for the user.
-
-    Raises
-    ------
-    Palette4dError
-        On the clip's own colours the conversion differs from OpenColorIO's by more than 1e-5,
-        beyond the error of single precision.
-    """
+    """Write the conversion into a sidecar's document; returns notes for the user."""
     if not isinstance(clip, ConvertedClip):
         return []
     assert spaces is not None

@@ -43,11 +43,6 @@ class FramePattern:
         """Read `name.####.exr` (one # a digit), `name.%04d.exr`, `name.@@@@.exr` or `name.exr`.
 
         `also` is what errors offer besides frames.
-
-        Raises
-        ------
-        OutputError
-            When the extension is not one that can be written, or the pattern has a range.
         """
         from fileseq.constants import PAD_STYLE_HASH1
         from fileseq.exceptions import FileSeqException
@@ -102,13 +97,7 @@ class FramePattern:
 def check_targets(
     targets: Sequence[Path], inputs: Iterable[Path] = (), force: bool = False
 ) -> None:
-    """Check all outputs before the first is written.
-
-    Raises
-    ------
-    OutputError
-        An output is a folder or one of the `inputs`, or exists and `force` is false.
-    """
+    """Check all outputs before the first is written."""
     existing = [target for target in targets if os.path.lexists(target)]
     own = {_identity(path) for path in inputs} if existing else set()
     for target in existing:
@@ -137,20 +126,11 @@ def sample_type(extension: str, depth: str, *, half: bool = False, bits: int | N
 
     Parameters
     ----------
-    extension : str
-        "exr", "png" or "tif".
-    depth : str
-        `Clip.depth` of the source.
-    half : bool
-        16-bit float, EXR only.
-    bits : int, optional
-        8 or 16 for PNG, 8, 16 or 32 for TIFF. By default 8 for an 8-bit source, else 16; 32 (float)
-        for a TIFF of a float source.
-
-    Raises
-    ------
-    OutputError
-        When the format has no such samples.
+    extension : "exr", "png" or "tif".
+    depth : `Clip.depth` of the source.
+    half : 16-bit float, EXR only.
+    bits : 8 or 16 for PNG, 8, 16 or 32 for TIFF. By default 8 for an 8-bit source, else 16; 32
+        (float) for a TIFF of a float source.
     """
     if extension == "exr":
         if bits not in (None, 16, 32) or (bits == 32 and half):
@@ -214,16 +194,12 @@ def write_frame(
 
     Parameters
     ----------
-    path : Path
-        `.exr`, `.png`, `.tif` or `.tiff`; a file that is there is replaced.
-    pixels : (h, w, 3 or 4) float32
-        RGB or RGBA.
-    samples : str
-        As `sample_type` gives it.
-    premultiplied : bool
-        Whether the colours of RGBA pixels are multiplied by alpha.
-    metadata : iterable of (name, OpenImageIO type, value)
-        Members that the format cannot hold are left out.
+    path : `.exr`, `.png`, `.tif` or `.tiff`; a file that is there is replaced.
+    pixels : (h, w, 3 or 4) float32; RGB or RGBA.
+    samples : as `sample_type` gives it.
+    premultiplied : whether the colours of RGBA pixels are multiplied by alpha.
+    metadata : iterable of (name, OpenImageIO type, value); members that the format cannot hold are
+        left out.
 
     Raises
     ------

@@ -65,28 +65,17 @@ def movie_writer(
 
     Parameters
     ----------
-    path : Path
-        `.mp4` or `.mov`; a file that is there is replaced.
-    size : (int, int)
-        Width and height in pixels. Two columns (in .mp4 also two rows) share a chroma sample, so an
-        odd size grows by one: the last column or row is repeated.
-    rate : Fraction
-        Frames per second.
-    encoding : str
-        `Clip.encoding`, for the movie's colour tags; Rec.709 if it is unknown.
+    path : `.mp4` or `.mov`; a file that is there is replaced.
+    size : (int, int); width and height in pixels. Two columns (in .mp4 also two rows) share a
+        chroma sample, so an odd size grows by one: the last column or row is repeated.
+    rate : frames per second.
+    encoding : `Clip.encoding`, for the movie's colour tags; Rec.709 if it is unknown.
 
     Yields
     ------
     callable
         ((h, w, 3 or 4) float32 R'G'B'(A), whether colours are premultiplied). Values are clamped
         to 0..1; NaN is 0.
-
-    Raises
-    ------
-    OutputError
-        FFmpeg cannot encode such a movie.
-    Palette4dError
-        The file cannot be written (`replacing`).
     """
     form = _FORMATS[path.suffix.lower().lstrip(".")]
     primaries, transfer, matrix = _TAGS.get(encoding, _REC709)

@@ -23,26 +23,10 @@ def candidates(sidecar_path: Path, source: str) -> list[str]:
 
 
 def find_clip(sidecar_path: Path, clip: Mapping[str, Any], given: str | None) -> Clip | None:
-    """Open the clip of a sidecar.
+    """Open the clip of a sidecar; None if none was given and the sidecar's clip is missing.
 
-    Parameters
-    ----------
-    sidecar_path : Path
-        The sidecar file; a relative source is looked up in its folder, then in the working folder.
-    clip : mapping
-        `Sidecar.clip`: ``source`` and the size.
-    given : str or None
-        The user's clip, to use instead; then it must open.
-
-    Returns
-    -------
-    Clip or None
-        None if no clip was given and the stored source is missing.
-
-    Raises
-    ------
-    Palette4dError
-        The clip that was given cannot be opened.
+    A relative source is looked up in the sidecar's folder, then in the working folder. `clip` is
+    `Sidecar.clip`. A `given` clip is used instead and must open.
     """
     if given is not None:
         return open_clip(given, skip_bad_frames=True)
@@ -63,20 +47,10 @@ def nearest_frame(clip: Clip, frame: float) -> int:
 def frame_colours(
     sidecar_path: Path, clip: Mapping[str, Any], frame: float, given: str | None
 ) -> tuple[NDArray[np.float32] | None, int | None]:
-    """Read the colours of the clip's frame nearest to a time.
+    """Read the colours of the clip's frame nearest to a time, and that frame's number.
 
-    Returns
-    -------
-    colours : (h, w, 3) float32 or None
-        Straight colours (`Clip.straight_colours`): NaN where alpha is 0. None if no clip was given
-        and the stored clip cannot be found or read.
-    number : int or None
-        The frame that was read.
-
-    Raises
-    ------
-    Palette4dError
-        The clip that was given cannot be opened or its frame not read.
+    The colours are (h, w, 3) float32, straight (`Clip.straight_colours`): NaN where alpha is 0.
+    None, None if no clip was given and the sidecar's clip cannot be found or read.
     """
     opened = find_clip(sidecar_path, clip, given)
     if opened is None:

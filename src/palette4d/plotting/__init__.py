@@ -22,6 +22,8 @@ def plot(
     *,
     frames: list[float] | None = None,
     clip: str | None = None,
+    version: str = "",
+    before: str | None = None,
     width: int = 2400,
     force: bool = False,
 ) -> list[float]:
@@ -37,6 +39,10 @@ def plot(
         Times to show; by default four or five over the clip, with edited frames.
     clip : str, optional
         The clip; by default the clip that the sidecar names.
+    version : str
+        The version to draw; "": the active edits.
+    before : str, optional
+        A version to compare with: its colours stand in the place of the clip's.
     width : int
         Pixels, for .png.
     force : bool
@@ -70,10 +76,12 @@ def plot(
     refuse_existing(output, force)
     if not isinstance(document, Document):
         document = Document.load(document)
-    sidecar = document.core
+    sidecar = document.version(version).core
+    against = None if before is None else document.version(before).core.edits
+    names = ("before", "after") if before is None else (before or "active", version or "active")
     first, last = sidecar.polytope.first_frame, sidecar.polytope.last_frame
     if frames is None:
-        frames = page.default_frames(first, last, Palette.of(sidecar).edited_times)
+        frames = page.default_frames(first, last, Palette.of(sidecar, against).edited_times)
     columns = []
     for frame in sorted(set(frames)):
         if not first <= frame <= last:
@@ -84,12 +92,12 @@ def plot(
         image, _ = frame_colours(document.path or Path("document"), sidecar.clip, frame, clip)
         if image is not None and sidecar.conversion is not None:
             image = sidecar.conversion.steps.to_palette(image).astype("float32")
-        columns.append(page.column(sidecar, frame, image))
+        columns.append(page.column(sidecar, frame, image, against))
     with (
         matplotlib.style.context("default"),
         matplotlib.rc_context(style.RC),
         replacing(output, force=force) as temporary,
     ):
-        figure = page.build(sidecar, columns)
+        figure = page.build(sidecar, columns, against, names)
         page.save(figure, temporary, output.suffix.lower()[1:], width)
     return [column.frame for column in columns if not column.pictures]

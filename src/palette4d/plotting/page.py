@@ -89,7 +89,13 @@ def default_frames(
 
 
 def column(
-    sidecar: _core.Sidecar, frame: float, image: F32 | None, *, width: int = 640, pixels: int = 4000
+    sidecar: _core.Sidecar,
+    frame: float,
+    image: F32 | None,
+    against: _core.Edits | None = None,
+    *,
+    width: int = 640,
+    pixels: int = 4000,
 ) -> Column:
     """Slice the palette at a time and recolour the clip's frame there.
 
@@ -101,6 +107,8 @@ def column(
         The time.
     image : (h, w, 3) float32 or None
         Straight colours of the clip's frame, in the palette's colour space.
+    against : Edits, optional
+        Other edits, whose result stands in the place of the clip's colours.
     width : int
         Pictures are at least this wide, or as wide as a smaller clip, and less than twice as wide.
     pixels : int
@@ -109,23 +117,37 @@ def column(
     palette = _core.slice_at(sidecar.polytope, frame)
     edited = _core.edited_colours(sidecar.polytope, sidecar.edits, palette)
     rgb, faces = np.asarray(palette.rgb), np.asarray(palette.faces)
+    if against is not None:
+        rgb = np.asarray(_core.edited_colours(sidecar.polytope, against, palette))
     if image is None:
         return Column(frame, Shape(rgb, np.asarray(edited), faces))
     shape = Shape(rgb, np.asarray(edited), faces, even_sample(image, pixels))
     step = max(1, image.shape[1] // width)
     small = np.ascontiguousarray(image[::step, ::step], dtype=np.float32)
-    if sidecar.edits.empty:
+
+    def recoloured(edits: _core.Edits | None) -> F32:
+        if edits is None or edits.empty:
+            return small
+        colours = _core.edited_colours(sidecar.polytope, edits, palette)
+        bumps = edits.bumps_at(palette.frame)
+        recolourer = _core.Recolourer(palette.rgb, colours, palette.faces, bumps=bumps)
+        return recolourer.apply(small, threads=0)
+
+    if sidecar.edits.empty and against is None:
         return Column(frame, shape, (small,))
-    bumps = sidecar.edits.bumps_at(palette.frame)
-    recolourer = _core.Recolourer(palette.rgb, edited, palette.faces, bumps=bumps)
-    return Column(frame, shape, (small, recolourer.apply(small, threads=0)))
+    return Column(frame, shape, (recoloured(against), recoloured(sidecar.edits)))
 
 
-def build(sidecar: _core.Sidecar, columns: Sequence[Column]) -> Any:
+def build(
+    sidecar: _core.Sidecar,
+    columns: Sequence[Column],
+    against: _core.Edits | None = None,
+    named: Sequence[str] = ("before", "after"),
+) -> Any:
     """Lay out and draw the page; return a matplotlib Figure of `WIDTH` points."""
     from matplotlib.figure import Figure
 
-    palette = Palette.of(sidecar)
+    palette = Palette.of(sidecar, against)
     encoding = str(sidecar.clip["encoding"])
     rows = arrange(palette.frames, palette.rgb, palette.edges)
     row_height = float(np.clip(1100.0 / max(rows.count, 1), 16.0, 50.0))
@@ -136,7 +158,7 @@ def build(sidecar: _core.Sidecar, columns: Sequence[Column]) -> Any:
     aspect = max((shape[0] / shape[1] for shape in shapes), default=0.0)
     picture_width = min(wide, 420.0, 260.0 / aspect if aspect else wide)
     picture_height = picture_width * aspect
-    names = ["before", "after"] if any(len(c.pictures) > 1 for c in columns) else ["clip"]
+    names = named if any(len(c.pictures) > 1 for c in columns) else ["clip"]
     pictures = len(names) * (picture_height + GAP) - 2 + LEADER if shapes else 0.0
     cube = min(wide * 0.96, 300.0)
     height = HEADER + pictures + panel.height + MARGIN

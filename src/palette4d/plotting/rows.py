@@ -54,6 +54,8 @@ class Palette:
         The first and last frame.
     sidecar : Sidecar
         Where all this is from.
+    against : Edits or None
+        The edits that make the colours before; None: the clip's colours.
     """
 
     ids: list[str]
@@ -68,26 +70,30 @@ class Palette:
     first: float
     last: float
     sidecar: _core.Sidecar
+    against: _core.Edits | None = None
 
     @classmethod
-    def of(cls, sidecar: _core.Sidecar) -> "Palette":
-        """Read the arrays from a sidecar."""
+    def of(cls, sidecar: _core.Sidecar, against: _core.Edits | None = None) -> "Palette":
+        """Read the arrays from a sidecar; `against`: other edits as the colours before."""
         polytope, edits = sidecar.polytope, sidecar.edits
         vertices = np.asarray(polytope.vertices, dtype=np.float64).reshape(-1, 4)
         ids, edge_ids = list(polytope.vertex_ids), list(polytope.edge_ids)
-        edited = vertices[:, :3].copy()
+        rgb, edited = vertices[:, :3].copy(), vertices[:, :3].copy()
         for frame in np.unique(vertices[:, 3]):
             cut = _core.slice_at(polytope, float(frame))
             at_vertex = cut.edges < 0
             after = _core.edited_colours(polytope, edits, cut)
             edited[cut.ends[at_vertex, 0]] = after[at_vertex]
+            if against is not None:
+                other = _core.edited_colours(polytope, against, cut)
+                rgb[cut.ends[at_vertex, 0]] = other[at_vertex]
+        given = [against is None and name in edits.vertex_rgb for name in ids]
         result = cls(
             ids=ids,
             frames=vertices[:, 3].copy(),
-            rgb=vertices[:, :3].copy(),
+            rgb=rgb,
             edited=edited,
-            changed=np.array([name in edits.vertex_rgb for name in ids], dtype=bool)
-            | (edited != vertices[:, :3]).any(axis=1),
+            changed=np.array(given, dtype=bool) | (edited != rgb).any(axis=1),
             edges=[(int(a), int(b)) for a, b in np.asarray(polytope.edges).reshape(-1, 2)],
             edge_ids=edge_ids,
             stops=[],
@@ -95,6 +101,7 @@ class Palette:
             first=float(polytope.first_frame),
             last=float(polytope.last_frame),
             sidecar=sidecar,
+            against=against,
         )
         for stop in edits.stops:
             edge, frame = edge_ids.index(stop["edge"]), float(stop["frame"])
@@ -115,7 +122,10 @@ class Palette:
         for k, frame in enumerate(np.asarray(frames, dtype=np.float64).tolist()):
             cut = _core.slice_at(polytope, frame)
             inside = cut.edges >= 0
-            before[cut.edges[inside], k] = cut.rgb[inside]
+            old = cut.rgb
+            if self.against is not None:
+                old = _core.edited_colours(polytope, self.against, cut)
+            before[cut.edges[inside], k] = old[inside]
             after[cut.edges[inside], k] = _core.edited_colours(polytope, edits, cut)[inside]
         for end in (0, 1):
             vertices = np.array([edge[end] for edge in self.edges], dtype=np.int64)

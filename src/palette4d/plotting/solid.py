@@ -134,14 +134,14 @@ def concave(rgb: F64, faces: NDArray[np.int32]) -> NDArray[np.bool_]:
     """Return which edges of `edges_of` bend inwards, (e,)."""
     edges, beside = edges_of(faces)
     result = np.zeros(len(edges), dtype=bool)
-    for index, (edge, (one, other)) in enumerate(zip(edges, beside, strict=True)):
-        if one < 0 or other < 0:
-            continue
-        a, b, c = rgb[faces[one]]
-        normal = np.cross(b - a, c - a)
-        apex = next(v for v in faces[other] if v not in edge)
-        height = float((rgb[apex] - a) @ normal) / max(float(np.linalg.norm(normal)), 1e-12)
-        result[index] = height > BENT
+    inner = np.flatnonzero((beside >= 0).all(axis=1))
+    one, other = faces[beside[inner, 0]], faces[beside[inner, 1]]
+    a, b, c = np.moveaxis(rgb[one], 1, 0)
+    normal = np.cross(b - a, c - a)
+    # The other face's corner that is not on the edge.
+    apex = other.sum(axis=1) - edges[inner].sum(axis=1)
+    height = ((rgb[apex] - a) * normal).sum(axis=1)
+    result[inner] = height / np.maximum(np.linalg.norm(normal, axis=1), 1e-12) > BENT
     return result
 
 

@@ -20,7 +20,7 @@ from palette4d.analysis.options import AnalysisOptions
 from palette4d.common.errors import Palette4dError, in_words
 from palette4d.common.files import make_folder
 from palette4d.common.text import counted
-from palette4d.grade import sidecar
+from palette4d.grade import renewal, sidecar
 from palette4d.jobs.workers import Failed, Workers
 from palette4d.media.clip import open_clip
 from palette4d.media.colour_space import SpaceOptions
@@ -31,27 +31,7 @@ from palette4d.shows.shots import Shot, trimmed
 
 @dataclasses.dataclass(frozen=True)
 class ShowOptions:
-    """The options for the analysis of a show.
-
-    Attributes
-    ----------
-    analysis : AnalysisOptions
-        For every shot.
-    spaces : SpaceOptions
-        The colour spaces of the clips' code values and of the palettes.
-    rate : Fraction or None
-        Frames per second of image sequences.
-    skip_bad_frames, allow_cuts : bool
-        As for one clip.
-    on_edits : {"refuse", "keep", "drop"}
-        What to do with the edits of existing sidecars that are replaced.
-    force : bool
-        Also analyse shots that have a sidecar already.
-    only : tuple of str
-        The names of the shots to analyse; empty: all.
-    workers : Workers
-        The processes or the farm that analyse.
-    """
+    """The options for the analysis of a show; `palette4d.analyze_shots` explains them."""
 
     analysis: AnalysisOptions
     spaces: SpaceOptions = dataclasses.field(default_factory=SpaceOptions)
@@ -98,33 +78,11 @@ def analyse(
     options: ShowOptions,
     progress: Callable[[int, int, str], object] | None = None,
 ) -> Show:
-    """Analyse shots into a folder.
+    """Analyse shots of different names into a folder, which is made if it is missing.
 
-    Parameters
-    ----------
-    source : Source
-        The source of the shots.
-    shots : list of Shot
-        The shots; their names differ.
-    folder : Path
-        The folder for sidecars and the manifest; created if it is missing.
-    options : ShowOptions
-        The options of the analysis.
-    progress : callable, optional
-        Called with (frames done, frames in all, words on the shots), the first time before any
-        shot is analysed.
-
-    Returns
-    -------
-    Show
-        Also if shots failed: the other shots are complete.
-
-    Raises
-    ------
-    Palette4dError
-        The folder is not writable, its manifest is invalid, or no shot has a name in `only`.
-    KeyboardInterrupt
-        Ctrl-C; all written sidecars are complete, and the manifest lists them.
+    `progress` is called with (frames done, frames in all, words on the shots), the first time
+    before any shot is analysed. If shots fail, the others are complete. After Ctrl-C all written
+    sidecars are complete, and the manifest lists them.
     """
     if unknown := [name for name in options.only if name not in {shot.name for shot in shots}]:
         some = ", ".join(sorted(shot.name for shot in shots)[:8]) + (", …" if shots[8:] else "")
@@ -154,12 +112,10 @@ class Show:
 
     Attributes
     ----------
-    path : Path
-        The manifest.
-    analysed, kept : list of str
-        Names of the shots that were analysed, and of the shots whose sidecars were kept.
-    notes : dict of str to tuple of str
-        Notes of the analysis, by shot.
+    path : the manifest.
+    analysed, kept : names of the shots that were analysed, and of the shots whose sidecars were
+        kept.
+    notes : notes of the analysis, by shot.
     """
 
     def __init__(
@@ -280,11 +236,11 @@ class Show:
             document = outcome.document
             document["clip"]["source"] = entry.shot.clip
             target = self.folder / entry.sidecar
-            sidecar.save(document, target, on_edits=self.options.on_edits)
+            _, notes = renewal.save(document, target, on_edits=self.options.on_edits)
             frames = document["clip"]["frames"]
             self.entries[name] = Entry(entry.shot, DONE, (frames["first"], frames["last"]))
             self.analysed.append(name)
-            self.notes[name] = outcome.notes
+            self.notes[name] = (*outcome.notes, *notes)
         except (Palette4dError, OSError) as error:
             self.entries[name] = Entry(entry.shot, FAILED, error=in_words(error))
         self.save()
@@ -303,14 +259,7 @@ class Show:
 
 
 def analyse_shot(task: ShotTask, threads: int) -> Analysed:
-    """Analyse one shot.
-
-    Raises
-    ------
-    Palette4dError
-        Its frames cannot be read, there is a cut inside the frames that the edit shows, or the
-        analysis failed.
-    """
+    """Analyse one shot."""
     options = task.options
     shot = task.shot
     notes: list[str] = []

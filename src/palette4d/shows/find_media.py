@@ -21,13 +21,7 @@ _NUMBERS = re.compile(r"(%0?[0-9]*d|#+|@+|\[[0-9]+-[0-9]+\]|(?<![0-9])[0-9]+)(?=
 
 
 def local_path(url: str) -> Path:
-    """Return the path for a media reference's URL or path.
-
-    Raises
-    ------
-    Palette4dError
-        The URL does not name a file.
-    """
+    """Return the path for a media reference's URL or path."""
     parts = urllib.parse.urlsplit(url)
     if parts.scheme in ("", "file") or len(parts.scheme) == 1:  # a drive's letter
         if parts.scheme != "file":
@@ -39,13 +33,7 @@ def local_path(url: str) -> Path:
 
 
 class Folder:
-    """The media under a folder, by name.
-
-    Attributes
-    ----------
-    path : Path
-        The folder.
-    """
+    """The media under a folder, by name."""
 
     def __init__(self, path: Path) -> None:
         """List the folder; `Palette4dError` if it is not a folder."""
@@ -65,11 +53,6 @@ class Folder:
 
         The name's own extension comes before others. If several folders hold the name, the folder
         path most like the name's path wins.
-
-        Raises
-        ------
-        Palette4dError
-            Several media match equally well.
         """
         for name in names:
             path = Path(name)

@@ -33,15 +33,11 @@ class Entry:
 
     Attributes
     ----------
-    shot : Shot
-        The shot before the analysis.
-    status : str
-        `DONE`, `FAILED` or `TO_DO`.
-    frames : (int, int) or None
-        The first and last frame of the sidecar. At cuts of the media there are fewer head or tail
-        frames.
-    error : str
-        The reason of a failure.
+    shot : the shot before the analysis.
+    status : `DONE`, `FAILED` or `TO_DO`.
+    frames : (int, int) or None; the first and last frame of the sidecar. At cuts of the media there
+        are fewer head or tail frames.
+    error : the reason of a failure.
     """
 
     shot: Shot
@@ -61,16 +57,11 @@ class Manifest:
 
     Attributes
     ----------
-    source : str
-        The timeline or the movie, relative to the manifest's folder.
-    source_sha256 : str
-        The hash of the timeline's file; "" for a movie.
-    rate : Fraction
-        Frames per second of the timeline, or of the movie.
-    options : dict
-        The options of the analysis, as sidecars record them.
-    entries : tuple of Entry
-        In the order of the edit.
+    source : the timeline or the movie, relative to the manifest's folder.
+    source_sha256 : the hash of the timeline's file; "" for a movie.
+    rate : frames per second of the timeline, or of the movie.
+    options : the options of the analysis, as sidecars record them.
+    entries : in the order of the edit.
     """
 
     source: str
@@ -96,13 +87,7 @@ def is_manifest(path: Path) -> bool:
 
 
 def write(manifest: Manifest, path: Path) -> None:
-    """Replace a manifest atomically; one line per shot.
-
-    Raises
-    ------
-    Palette4dError
-        It cannot be written.
-    """
+    """Replace a manifest atomically; one line per shot."""
     head = {
         "schema": SCHEMA,
         "version": VERSION,
@@ -138,13 +123,7 @@ def _row(entry: Entry) -> dict[str, Any]:
 
 
 def read(path: Path) -> Manifest:
-    """Read a manifest.
-
-    Raises
-    ------
-    Palette4dError
-        The file is missing, is not a manifest, is newer, or is broken.
-    """
+    """Read a manifest."""
     try:
         document = read_json(path)
     except FileNotFoundError as error:
@@ -205,13 +184,7 @@ def _entry(row: dict[str, Any]) -> Entry:
 
 
 def sidecars(path: Path) -> tuple[list[Path], list[str]]:
-    """Return the sidecars of a show's finished shots, and the names of the other shots.
-
-    Raises
-    ------
-    Palette4dError
-        The manifest cannot be read, none of its shots is finished, or a sidecar is missing.
-    """
+    """Return the sidecars of a show's finished shots, and the names of the other shots."""
     manifest = read(path)
     done = [path.parent / e.sidecar for e in manifest.entries if e.status == DONE]
     others = [e.shot.name for e in manifest.entries if e.status != DONE]

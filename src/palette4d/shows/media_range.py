@@ -20,11 +20,6 @@ def shown(clip: Any) -> tuple[Any, Any] | None:
 
     None if the edit shows nothing of the clip. The start is in the time of the timeline's stack,
     the range in the media's time.
-
-    Raises
-    ------
-    Palette4dError
-        The clip or a compound around it plays at a speed that is not supported.
     """
     schema = library().schema
     whole = clip.visible_range()  # with the media that the neighbouring transitions show

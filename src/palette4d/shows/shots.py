@@ -26,12 +26,9 @@ class Place:
 
     Attributes
     ----------
-    track : str
-        The name of the video track.
-    record : str
-        Its start in the edit: a timecode or a frame number.
-    path : tuple of int
-        The clip's place in the timeline: indices of children, from the timeline's stack down.
+    track : the name of the video track.
+    record : its start in the edit: a timecode or a frame number.
+    path : the clip's place in the timeline: indices of children, from the timeline's stack down.
     """
 
     track: str
@@ -45,20 +42,14 @@ class Shot:
 
     Attributes
     ----------
-    name : str
-        The name of the sidecar, the look and the files; unique, also without regard to case.
-    clip : str
-        The name for `open_clip`; "" if the media is missing.
-    first, last : int
-        The first and last frame of the analysis, with head and tail frames; the clip's own numbers.
-    used : (int, int)
-        The first and the last frame that the edit shows.
-    step : int
-        The distance between frames.
-    place : Place or None
-        The place in the edit.
-    problem : str
-        The reason why it cannot be analysed, or "".
+    name : the name of the sidecar, the look and the files; unique, also without regard to case.
+    clip : the name for `open_clip`; "" if the media is missing.
+    first, last : the first and last frame of the analysis, with head and tail frames; the clip's
+        own numbers.
+    used : (int, int); the first and the last frame that the edit shows.
+    step : the distance between frames.
+    place : the place in the edit.
+    problem : the reason why it cannot be analysed, or "".
     """
 
     name: str
@@ -111,11 +102,6 @@ def detect(clip: Clip, progress: Callable[[int, int], object] | None = None) -> 
     list of Shot
         In order of time, without gaps; one shot for a clip without cuts. The names are NAME_s001
         and so on.
-
-    Raises
-    ------
-    Palette4dError
-        A frame cannot be read, or the frames are not evenly spaced.
     """
     step = even_step(clip.frames)
     if not step:
@@ -175,17 +161,8 @@ def cuts_of(clip: Clip, progress: Callable[[int, int], object] | None = None) ->
 def trimmed(shot: Shot, clip: Clip) -> Shot:
     """Return a shot of an edit with its head and tail frames cut off at the media's cuts.
 
-    Parameters
-    ----------
-    shot : Shot
-        The shot.
-    clip : Clip
-        Its media, over the shot's frames.
-
-    Raises
-    ------
-    Palette4dError
-        There is a cut inside the frames that the edit shows.
+    `clip` is its media, over the shot's frames. A cut inside the frames that the edit shows is
+    refused.
     """
     starts = cuts_of(clip)
     first, last = shot.used

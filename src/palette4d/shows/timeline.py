@@ -38,26 +38,10 @@ class Edit:
 
 
 def shots_of(document: Document, folder: find_media.Folder | None = None, handles: int = 0) -> Edit:
-    """Return the shots of a timeline.
+    """Return the shots of a timeline; `Shot.problem` says if its media is missing or unusable.
 
-    Parameters
-    ----------
-    document : Document
-        The result of `read`; relative media paths start from its folder.
-    folder : find_media.Folder, optional
-        The folder to search for media first.
-    handles : int
-        Number of head frames and of tail frames; fewer where the media ends.
-
-    Returns
-    -------
-    Edit
-        `Shot.problem` says if a shot's media is missing or unusable.
-
-    Raises
-    ------
-    Palette4dError
-        There is no shot at all.
+    Media is looked for in `folder`, then beside the timeline. `handles` is the number of head and
+    of tail frames; there are fewer where the media ends.
     """
     otio = library()
     timeline, path = document.timeline, document.path

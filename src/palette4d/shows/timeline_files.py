@@ -24,13 +24,7 @@ LARGEST_FILE = 512 << 20
 
 
 def library() -> Any:
-    """Return OpenTimelineIO.
-
-    Raises
-    ------
-    Palette4dError
-        It is not installed.
-    """
+    """Return OpenTimelineIO."""
     try:
         import opentimelineio
     except ImportError as error:
@@ -55,19 +49,9 @@ def is_timeline(spec: str) -> bool:
 
 
 def read(path: Path, rate: Fraction | None = None) -> Document:
-    """Read a timeline.
+    """Read an .otio, .otioz, .otiod or .edl file with exactly one timeline.
 
-    Parameters
-    ----------
-    path : Path
-        .otio, .otioz, .otiod or .edl.
-    rate : Fraction, optional
-        The rate of an EDL's timecodes, by default 24; other files state their rate.
-
-    Raises
-    ------
-    Palette4dError
-        The file is missing, or does not hold exactly one timeline.
+    `rate` is that of an EDL's timecodes, by default 24; other files state their rate.
     """
     otio = library()
     if not path.exists():

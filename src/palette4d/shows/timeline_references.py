@@ -24,14 +24,7 @@ NAMESPACE, VERSION = "palette4d", 1
 
 
 def check(manifest: Manifest, manifest_path: Path, target: Path, force: bool) -> Path:
-    """Return the timeline of a show, and refuse early what `write` would refuse.
-
-    Raises
-    ------
-    Palette4dError
-        The show does not come from an edit, its timeline is missing or has changed since the
-        analysis, or `target` cannot be written.
-    """
+    """Return the timeline of a show, and refuse early what `write` would refuse."""
     if not manifest.is_timeline:
         raise Palette4dError(
             f"{manifest_path}: its shots are those of the movie {manifest.source}; otio=… expects "
@@ -64,30 +57,10 @@ def write(
     *,
     force: bool = False,
 ) -> int:
-    """Write a copy of a timeline with references to the exported files.
+    """Write a copy of a timeline with references to exported files; return how many clips do.
 
-    Parameters
-    ----------
-    source : Path
-        The timeline, from `check`.
-    manifest, manifest_path : Manifest, Path
-        The show.
-    exported : mapping
-        The series of each shot, by its name.
-    target : Path
-        The new timeline, an .otio file; file names are relative to its folder.
-    force : bool
-        Replace an existing file.
-
-    Returns
-    -------
-    int
-        How many clips have references.
-
-    Raises
-    ------
-    Palette4dError
-        A shot is not at the place in the manifest, or the file cannot be written.
+    `source` comes from `check`, `exported` has the series of each shot by its name. File names are
+    relative to the folder of `target`.
     """
     document = _document(source)
     timeline = _timeline(document, source)

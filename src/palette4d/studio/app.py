@@ -1,13 +1,26 @@
 """Starting the window, with or without a screen."""
 
+import functools
 import os
 import sys
+import time
+import traceback
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from palette4d.common.errors import Palette4dError, WriteError
+from palette4d.studio import texts
 
-#: Milliseconds after which a screenshot is taken even if something is still being computed.
-LONGEST_WAIT = 60_000
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from PySide6.QtWidgets import QApplication
+
+    from palette4d.studio.session import Session
+    from palette4d.studio.window import Window
+
+#: Seconds after which a screenshot is taken even if something is still being computed.
+LONGEST_WAIT = 60.0
 
 
 def has_screen() -> bool:
@@ -24,6 +37,8 @@ def run(
     frame: float | None = None,
     screenshot: Path | None = None,
     size: tuple[int, int] = (1600, 1000),
+    until_shown: bool = False,
+    prepare: "Callable[[Window], object] | None" = None,
 ) -> int:
     """Open the window, and return the exit status when it is closed.
 
@@ -39,8 +54,13 @@ def run(
         Draw the window into this file and return; needs no screen.
     size : (int, int)
         The window's size in pixels.
+    until_shown : bool
+        Return when the first picture is drawn, without a screen: for benchmarks.
+    prepare : callable, optional
+        Called with the window before a screenshot, when everything is drawn: for the docs.
     """
-    if screenshot is not None:
+    hidden = screenshot is not None or until_shown
+    if hidden:
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
     elif not has_screen():
         raise Palette4dError(
@@ -48,19 +68,24 @@ def run(
             "window. `palette4d studio PATH --screenshot OUT.png` draws it without a screen; for "
             "the window itself use a remote screen (ssh -X, VNC)"
         )
-    from PySide6.QtCore import QSettings, Qt, QTimer
+    from PySide6.QtCore import QSettings, Qt
     from PySide6.QtWidgets import QApplication
 
     from palette4d.studio import theme
+    from palette4d.studio.instance import bring_forward
     from palette4d.studio.session import Session
     from palette4d.studio.window import Window
 
     app = QApplication.instance() or QApplication(["palette4d"])
     assert isinstance(app, QApplication)
+    if not hidden and path is not None and bring_forward(path, frame):
+        return 0
     theme.dress(app)
+    # The picture's thread waits for the window's at most this long.
+    sys.setswitchinterval(0.001)
     session = Session()
     settings = QSettings("palette4d", "studio")
-    if screenshot is not None:  # a picture does not depend on who draws it
+    if hidden:  # a picture does not depend on who draws it
         settings = QSettings(os.devnull, QSettings.Format.IniFormat)
     window = Window(session, settings)
     window.resize(*size)
@@ -69,13 +94,34 @@ def run(
         window.open_path(path, clip)
     if frame is not None:
         session.go(frame)
-    window.setAttribute(Qt.WidgetAttribute.WA_DontShowOnScreen, screenshot is not None)
+    window.setAttribute(Qt.WidgetAttribute.WA_DontShowOnScreen, hidden)
     window.show()
-    if screenshot is not None:
-        QTimer.singleShot(2500, app.quit)
-        app.exec()
-        if not window.grab().save(str(screenshot)):
-            raise WriteError(f"{screenshot}: cannot be written; expected a folder that exists")
+    sys.excepthook = functools.partial(_unexpected, session)
+    if hidden:
+        wait_until_shown(app, window)
+        if prepare is not None:
+            prepare(window)
+            wait_until_shown(app, window)
+        saved = screenshot is None or window.grab().save(str(screenshot))
         window.shut()
+        if not saved:
+            raise WriteError(f"{screenshot}: cannot be written; expected a folder that exists")
         return 0
     return int(app.exec())
+
+
+def _unexpected(
+    session: "Session", kind: type[BaseException], error: BaseException, trace: Any
+) -> None:
+    """Show an error of the program itself; the window stays, and nothing is lost."""
+    traceback.print_exception(kind, error, trace)
+    session.say(texts.UNEXPECTED.format(error=error), "error")
+
+
+def wait_until_shown(app: "QApplication", window: "Window") -> None:
+    """Wait until nothing in the window is being read or computed any more."""
+    end, calm = time.monotonic() + LONGEST_WAIT, 0
+    while calm < 3 and time.monotonic() < end:
+        app.processEvents()
+        time.sleep(0.01)
+        calm = calm + 1 if window.settled else 0

@@ -41,7 +41,7 @@ OFFSET, HIGHEST = 0.01, 128.0
 #: Views that show display-referred code values as they are, in the built-in configs.
 PLAIN_VIEWS = ("Un-tone-mapped", "Raw")
 #: Painters that are kept: one for each display, view, exposure and gamma.
-KEPT = 8
+KEPT = 16
 
 _THREADS = ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="palette4d display")
 
@@ -225,12 +225,12 @@ class Display:
 
     def painter(self, look: Look) -> Painter:
         """Return the look's conversion; it may take a tenth of a second the first time."""
-        look = self.chosen(look)
         found = self._painters.get(look)
         if found is None:
-            found = self._make(look)
-            self._painters[look] = found
-            if len(self._painters) > KEPT:
+            chosen = self.chosen(look)
+            found = self._painters.get(chosen) or self._make(chosen)
+            self._painters[chosen] = self._painters[look] = found
+            while len(self._painters) > KEPT:
                 self._painters.popitem(last=False)
         return found
 

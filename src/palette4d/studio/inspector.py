@@ -4,6 +4,7 @@ Its wheel, bars and numbers all choose a colour; what that changes is the scope:
 handles, their tracks, or the whole palette.
 """
 
+import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -28,15 +29,19 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from palette4d.colour.oklch import Adjustment
 from palette4d.common.errors import Palette4dError
 from palette4d.grade.document import Document
 from palette4d.grade.edits import RAMPS, as_colour
+from palette4d.grade.follow import Progress
 from palette4d.plotting import style
 from palette4d.studio import texts, theme
 from palette4d.studio.colour_widgets import Bar, Swatch, Wheel
 from palette4d.studio.lch import Lch
+from palette4d.studio.pick_list import PickList, Versions
 from palette4d.studio.screen_colours import on_screen
 from palette4d.studio.session import Session
+from palette4d.studio.viewer import Place
 
 F64 = NDArray[np.float64]
 U8 = NDArray[np.uint8]
@@ -57,18 +62,26 @@ class Target:
     id : str
         A vertex, a stop, or an edge at the playhead.
     kind : str
-        "vertex", "stop" or "edge".
+        "vertex", "stop" or "edge"; "pick" or "hold"; "place" is a pixel that is not picked yet.
     frame : float
         Where the colour is.
     before, after : (3,) float64
-        The colour as analysed and as edited, in the palette's code values.
+        The colour as analysed or in the clip, and as edited, in the palette's code values.
+    place : Place or None
+        The pixel.
     """
 
     id: str
-    kind: Literal["vertex", "stop", "edge"]
+    kind: Literal["vertex", "stop", "edge", "pick", "hold", "place"]
     frame: float
     before: F64
     after: F64
+    place: Place | None = None
+
+    @property
+    def picked(self) -> bool:
+        """Whether it is a colour of the clip, not of the palette."""
+        return self.kind in ("pick", "hold", "place")
 
 
 def target_of(document: Document, id_: str, frame: float) -> Target | None:
@@ -77,6 +90,11 @@ def target_of(document: Document, id_: str, frame: float) -> Target | None:
     if id_ in polytope.vertex_ids:
         at = float(np.asarray(polytope.vertices)[polytope.vertex_ids.index(id_), 3])
         return _in_palette(document, id_, "vertex", id_, at)
+    for pick in document.picks:
+        if pick.id == id_:
+            before = np.asarray(pick.rgb)
+            after = before if pick.to is None else np.asarray(pick.to)
+            return Target(id_, pick.kind, pick.frame, before, after)
     setting = document.settings.get(id_)
     if setting is not None and setting.edge is not None and setting.frame is not None:
         return _in_palette(document, id_, "stop", setting.edge, setting.frame)
@@ -115,6 +133,9 @@ class Inspector(QWidget):
         self.session = session
         self.scope: Scope = "handle"
         self.target: Target | None = None
+        self._place: Place | None = None  # a pixel that is to be picked
+        self._tried: tuple[float, ...] = ()  # the colour that a drag shows
+        self._settled: Target | None = None  # the target without the edit of a drag
         self._lch: tuple[str, Lch] | None = None
         self._silent = False
         self._make()
@@ -134,7 +155,11 @@ class Inspector(QWidget):
         column.addLayout(self._make_colour())
         column.addLayout(self._make_hex())
         column.addLayout(self._make_buttons())
-        column.addStretch(1)
+        self.picks = PickList(self.session)
+        column.addWidget(self.picks, 1)
+        self.versions = Versions(self.session, self.keep_version)
+        column.addWidget(self.versions)
+        column.addStretch(0)
         area = QScrollArea()
         area.setWidget(content)
         area.setWidgetResizable(True)
@@ -205,7 +230,7 @@ class Inspector(QWidget):
         self.wheel.setAccessibleName(texts.WHEEL)
         self.wheel.setToolTip(texts.WHEEL_TIP)
         self.wheel.moved.connect(self._wheel_moved)
-        self.wheel.let_go.connect(self.session.drop)
+        self.wheel.let_go.connect(self.keep)
         row.addWidget(self.wheel, 0, Qt.AlignmentFlag.AlignTop)
         grid = QGridLayout()
         grid.setHorizontalSpacing(4)
@@ -234,7 +259,7 @@ class Inspector(QWidget):
             box.setFixedWidth(60)
             box.valueChanged.connect(lambda value, name=name: self._typed(name, value))
             bar.moved.connect(lambda value, name=name: self._bar_moved(name, value))
-            bar.let_go.connect(self.session.drop)
+            bar.let_go.connect(self.keep)
             label.setBuddy(box)
             for place, part in enumerate((label, bar, box)):
                 grid.addWidget(part, line + (line >= 3), place)
@@ -293,7 +318,13 @@ class Inspector(QWidget):
         if document is not None:
             found = (target_of(document, id_, session.frame) for id_ in session.selection)
             targets = [target for target in found if target is not None]
+            if session.selection or self._place is None or self._place.frame != session.frame:
+                self._place = None
+            else:
+                targets = [self._target_at(document, self._place)]
         self.target = targets[0] if targets else None
+        if not session.dragging:
+            self._settled = self.target
         self._silent = True
         try:
             self._show_words(len(session.selection))
@@ -304,17 +335,33 @@ class Inspector(QWidget):
 
     def _show_words(self, count: int) -> None:
         target = self.target
-        on = target is not None
-        parts = (self.wheel, self.hex, self.dropper, self.reset, *self.bars.values())
-        for part in (*parts, *self.boxes.values(), *self.scopes.values()):
+        on = target is not None and target.kind != "hold"
+        parts = (self.wheel, self.hex, self.dropper, *self.bars.values())
+        for part in (*parts, *self.boxes.values()):
             part.setEnabled(on)
+        document = self.session.document
+        for part in self.scopes.values():
+            part.setEnabled(target is not None and not target.picked)
+        self.reset.setEnabled(
+            document is not None and any(id_ in document.settings for id_ in self.session.selection)
+        )
         if target is None:
             self.title.setText(texts.NOTHING_SELECTED)
             self.place.setText(texts.SELECT_HINT if self.session.document is not None else "")
             return
-        kinds = {"vertex": texts.VERTEX, "stop": texts.STOP, "edge": texts.EDGE}
+        kinds = {
+            "vertex": texts.VERTEX,
+            "stop": texts.STOP,
+            "edge": texts.EDGE,
+            "pick": texts.PICK,
+            "hold": texts.HOLD,
+            "place": texts.PLACE_HINT,
+        }
         more = texts.AND_MORE.format(count=count - 1) if count > 1 else ""
-        self.title.setText(f"{target.id}{more}")
+        name = target.id
+        if target.place is not None:
+            name = texts.PLACE.format(x=target.place.x, y=target.place.y)
+        self.title.setText(f"{name}{more}")
         where = f"{texts.FRAME} {style.number(target.frame)}"
         self.place.setText(f"{kinds[target.kind]} · {where}")
 
@@ -404,60 +451,152 @@ class Inspector(QWidget):
         self.scope = scope  # type: ignore[assignment]
         self.scopes[scope].setChecked(True)
 
-    def operation(self, rgb: F64) -> Callable[[Document], object] | None:
-        """Return the edit that gives the inspected colour a new colour, within the scope."""
-        target = self.target
+    def operation(
+        self, rgb: F64, change: Adjustment | None = None
+    ) -> Callable[[Document], object] | None:
+        """Return the edit that gives the inspected colour a new colour, within the scope.
+
+        `change` is how the colour was changed, where that was a change of hue, chroma or lightness:
+        other colours of the scope change in the same way. Otherwise they move by as much.
+        """
+        target = self._settled or self.target
         if target is None:
             return None
-        ids, frame = self.session.selection, float(self.session.frame)
-        return Recolour(target.id, target.frame, ids, frame, tuple(rgb.tolist()))
+        new = tuple(rgb.tolist())
+        if target.picked:
+            return PickTo(target, new)
+        if self.scope == "handle":
+            return Recolour(target, self.session.selection, float(self.session.frame), new)
+        return RecolourMany(target, self.scope == "track", new, change)
 
-    def try_colour(self, rgb: F64) -> None:
+    def try_colour(self, rgb: F64, change: Adjustment | None = None) -> None:
         """Show a colour without keeping it; `session.drop` keeps it."""
-        operation = self.operation(rgb)
+        operation = self.operation(rgb, change)
         if operation is not None:
+            self._tried = tuple(rgb.tolist())
             self.session.drag(operation, self._said())
 
-    def set_colour(self, rgb: F64) -> None:
+    def set_colour(self, rgb: F64, change: Adjustment | None = None) -> None:
         """Give the inspected colour a new colour."""
-        operation = self.operation(rgb)
-        if operation is not None:
+        operation = self.operation(rgb, change)
+        if operation is None:
+            return
+        if self.target is not None and self.target.place is not None:
+            self.try_colour(rgb, change)
+            self.keep()
+        else:
             self.session.edit(operation, self._said())
 
-    def _said(self) -> str:
-        return texts.COLOUR_SET.format(id=self.target.id if self.target is not None else "")
+    def keep(self) -> None:
+        """Keep the colour that is shown: a new pick follows its colour through the clip first."""
+        target = self._settled
+        if target is None or target.place is None:
+            self.session.drop()
+            return
+        if self.target is None or not self.session.dragging:
+            return
+        place, clip, to = target.place, self.session.clip, self._tried
 
-    def _now(self) -> F64:
-        assert self.target is not None
-        lch = self.lch.of(self.target.after)
+        def pick(document: Document, progress: Progress) -> str:
+            if clip is None:
+                made = document.pick(place.frame, colour=place.colour, to=to, any_value=True)
+            else:
+                made = document.pick(
+                    place.frame,
+                    pixel=(place.x, place.y),
+                    box=place.box,
+                    to=to,
+                    clip=clip.source,
+                    any_value=True,
+                    progress=progress,
+                )
+            return made.id
+
+        self.session.edit_later(pick, texts.PICKED, self.session.select)
+
+    def pick(self, place: Place) -> None:
+        """Inspect a pixel of the clip; a new colour for it becomes a pick.
+
+        With the pipette, the selected colour becomes the pixel's colour.
+        """
+        if self.dropper.isChecked() and self.target is not None:
+            self.dropper.setChecked(False)
+            self.set_colour(np.asarray(place.colour))
+            return
+        self.session.select()
+        self._place = place
+        self.refresh()
+
+    def hold(self, place: Place) -> None:
+        """Hold the colour of a pixel."""
+        clip = self.session.clip
+
+        def hold(document: Document, progress: Progress) -> str:
+            if clip is None:
+                return document.hold(place.frame, colour=place.colour, any_value=True).id
+            pixel = (place.x, place.y)
+            return document.hold(
+                place.frame, pixel=pixel, box=place.box, clip=clip.source, progress=progress
+            ).id
+
+        self.session.edit_later(hold, texts.HELD, self.session.select)
+
+    def _target_at(self, document: Document, place: Place) -> Target:
+        """Return the target of a pixel, with the colour that the edits give it."""
+        before = np.asarray(place.colour, dtype=np.float64)
+        pixel = before.astype(np.float32).reshape(1, 1, 3)
+        after = document.recolour(pixel, place.frame, space="palette")[0, 0].astype(np.float64)
+        return Target("", "place", place.frame, before, after, place)
+
+    def _said(self) -> str:
+        name = self.target.id if self.target is not None else ""
+        if self.target is not None and self.target.picked:
+            return texts.PICKED
+        return texts.SET_BY_SCOPE[self.scope].format(id=name)
+
+    def _start(self) -> F64:
+        """Return lightness, chroma and hue of the inspected colour, as it is without a drag."""
+        start = self._settled if self._settled is not None else self.target
+        assert start is not None
+        lch = self.lch.of(start.after)
         if lch[1] < 1e-4:
             lch[2] = self.wheel.lch[2]
         return lch
 
+    def _change_to(self, lch: F64) -> tuple[F64, Adjustment | None]:
+        """Return the colour of new lightness, chroma and hue, and the change to it."""
+        start = self._start()
+        change = None
+        if start[0] > 1e-3 and (start[1] > 1e-3 or lch[1] < 1e-3):
+            change = Adjustment(
+                hue=float((lch[2] - start[2] + 180) % 360 - 180),
+                chroma=float(lch[1] / max(start[1], 1e-3)),
+                lightness=float(lch[0] / start[0]),
+            )
+        return self.lch.fitted(lch), change
+
     def _wheel_moved(self, value: tuple[float, float]) -> None:
         if self.target is not None:
-            lch = self._now()
-            lch[1:] = value
-            self.try_colour(self.lch.fitted(lch))
+            self.try_colour(*self._change_to(np.array([self.wheel.lch[0], *value])))
 
-    def _with(self, name: str, value: float) -> F64:
-        """Return the inspected colour with one of its numbers changed."""
+    def _with(self, name: str, value: float) -> tuple[F64, Adjustment | None]:
+        """Return the inspected colour with one of its numbers changed, and the change."""
         assert self.target is not None
         if name in "RGB":
             rgb = self.target.after.copy()
             rgb["RGB".index(name)] = value
-            return rgb
-        lch = self._now()
+            return rgb, None
+        lch = self.wheel.lch.copy()
         lch["LCh".index(name)] = value % 360 if name == "h" else max(value, 0.0)
-        return self.lch.fitted(lch)
+        return self._change_to(lch)
 
     def _bar_moved(self, name: str, value: float) -> None:
         if self.target is not None:
-            self.try_colour(self._with(name, value))
+            self.try_colour(*self._with(name, value))
 
     def _typed(self, name: str, value: float) -> None:
         if not self._silent and self.target is not None:
-            self.set_colour(self._with(name, value))
+            self.set_colour(*self._with(name, value))
 
     def _hex_typed(self) -> None:
         if self._silent or self.target is None or not self.hex.isModified():
@@ -507,6 +646,14 @@ class Inspector(QWidget):
         if ids:
             self.session.edit(reset, texts.WAS_RESET.format(ids=", ".join(ids)))
 
+    def keep_version(self) -> None:
+        """Keep the edits as the next version: A, B, C…"""
+        document = self.session.document
+        if document is not None:
+            name = next(c for c in map(chr, range(65, 91)) if c not in document.versions)
+            text = texts.KEPT_VERSION.format(name=name)
+            self.session.edit(lambda document: document.save_version(name), text)
+
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Escape takes a drag back."""
         if event.key() == Qt.Key.Key_Escape and self.session.dragging:
@@ -517,12 +664,12 @@ class Inspector(QWidget):
 
 @dataclass(frozen=True)
 class Recolour:
-    """The edit that gives a colour to a handle, and the same change to others.
+    """The edit that gives a colour to a handle, and the same offset to others, as one step.
 
     Attributes
     ----------
-    id, frame : str and float
-        The inspected vertex or stop, or an edge at a frame.
+    target : Target
+        The inspected colour, before the edit.
     ids : tuple of str
         All selected handles.
     playhead : float
@@ -531,29 +678,98 @@ class Recolour:
         The new colour.
     """
 
-    id: str
-    frame: float
+    target: Target
     ids: tuple[str, ...]
     playhead: float
     rgb: tuple[float, ...]
 
     def __call__(self, document: Document) -> None:
-        """Do it, as one step."""
-        first = target_of(document, self.id, self.frame)
+        """Do it."""
+        first = target_of(document, self.target.id, self.target.frame)
         if first is None:
             return
         by = np.asarray(self.rgb) - first.after
-        with document.one_step(texts.COLOUR_SET.format(id=", ".join(self.ids) or self.id)):
-            for id_ in self.ids or (self.id,):
+        many: contextlib.AbstractContextManager[None] = contextlib.nullcontext()
+        if len(self.ids) > 1:
+            many = document.one_step(texts.SET_BY_SCOPE["handle"].format(id=", ".join(self.ids)))
+        with many:
+            for id_ in self.ids or (self.target.id,):
                 target = target_of(document, id_, self.playhead)
                 if target is None:
                     continue
-                new = self.rgb if id_ == self.id else (target.after + by).tolist()
+                new = self.rgb if id_ == self.target.id else (target.after + by).tolist()
                 if target.kind == "edge":
                     old = target.after.tolist()
-                    document.set_near(old, frame=target.frame, rgb=new, anyway=True)
+                    document.set_near(old, frame=target.frame, rgb=new, anyway=True, any_value=True)
                 else:
-                    document.set(target.id, rgb=new)
+                    document.set(target.id, rgb=new, any_value=True)
+
+
+@dataclass(frozen=True)
+class PickTo:
+    """The edit that gives a colour of the clip a new colour, while it is dragged.
+
+    Attributes
+    ----------
+    target : Target
+        A pick, or a pixel.
+    rgb : tuple of float
+        Its new colour.
+    """
+
+    target: Target
+    rgb: tuple[float, ...]
+
+    def __call__(self, document: Document) -> None:
+        """Do it; a new pick is not followed yet."""
+        target = self.target
+        if target.kind == "pick":
+            document.change_pick(target.id, to=self.rgb, any_value=True)
+        elif target.kind == "place":
+            rgb, colour = self.rgb, target.before.tolist()
+            document.pick(target.frame, colour=colour, to=rgb, follow=False, any_value=True)
+
+
+@dataclass(frozen=True)
+class RecolourMany:
+    """The edit of a whole track, or of the whole palette (`edit track`, `edit palette`).
+
+    Attributes
+    ----------
+    target : Target
+        The inspected colour, before the edit.
+    track : bool
+        Its track; else the palette.
+    rgb : tuple of float
+        Its new colour.
+    change : Adjustment or None
+        The change of hue, chroma and lightness; None: by as much as the inspected colour.
+    """
+
+    target: Target
+    track: bool
+    rgb: tuple[float, ...]
+    change: Adjustment | None
+
+    def __call__(self, document: Document) -> None:
+        """Do it."""
+        target = self.target
+        id_ = target.id if self.track else None
+        frame = target.frame if self.track and target.kind == "edge" else None
+        if self.change is None:
+            by = (np.asarray(self.rgb) - target.after).tolist()
+            if any(by):
+                document.adjust(id_, track=self.track, frame=frame, by=by)
+        elif self.change != Adjustment():
+            change = self.change
+            document.adjust(
+                id_,
+                track=self.track,
+                frame=frame,
+                hue=change.hue,
+                chroma=change.chroma,
+                lightness=change.lightness,
+            )
 
 
 def hex_of(rgb: Any) -> str:

@@ -35,7 +35,12 @@ def pen(colour: str | QColor, width: float = 1.0, dash: list[float] | None = Non
 
 
 def polygon(points: F64) -> QPolygonF:
-    """Return (n, 2) points as a polygon."""
+    """Return (n, 2) points as a polygon, without points in the middle of straight lines."""
+    if len(points) > 2:
+        before, after = points[1:-1] - points[:-2], points[2:] - points[1:-1]
+        turn = np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])
+        back = (before * after).sum(axis=1) < 0
+        points = points[np.concatenate([[True], (turn > 1e-6) | back, [True]])]
     return QPolygonF([QPointF(x, y) for x, y in points.tolist()])
 
 

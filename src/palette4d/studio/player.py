@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from palette4d.common.errors import in_words
 from palette4d.media.clip import Clip
+from palette4d.media.clip_movie import MovieClip
 
 F32 = NDArray[np.float32]
 F16 = NDArray[np.float16]
@@ -44,6 +45,11 @@ class Region:
     bottom: int
     width: int
     height: int
+
+    @property
+    def part(self) -> tuple[int, int, int, int]:
+        """Left, top, right and bottom."""
+        return self.left, self.top, self.right, self.bottom
 
     @property
     def whole(self) -> bool:
@@ -182,6 +188,12 @@ class Player:
             self._frames.put(number, found, found.nbytes)
         return found
 
+    @property
+    def idle(self) -> bool:
+        """Whether everything that was wanted is read."""
+        with self._wake:
+            return not self._wanted and not self._reading
+
     def forget_errors(self) -> None:
         """Try frames again that could not be read."""
         self.errors.clear()
@@ -218,11 +230,17 @@ class Player:
             self.read(number)
             return
         pixels = self.frame(number)
+        whole = (0, 0, self.clip.width, self.clip.height)
         if pixels is None:
             with self._order:
-                pixels = self.clip.load(number).pixels
+                if isinstance(self.clip, MovieClip) and region.part == whole:
+                    pixels = self.clip.load_small(number, region.width, region.height)
+                else:
+                    pixels = self.clip.load(number).pixels
+        if pixels.shape[:2] != (region.height, region.width):
+            pixels = resampled(pixels, region)
         with np.errstate(over="ignore"):
-            small = resampled(pixels, region).astype(np.float16)
+            small = pixels.astype(np.float16)
         self._small.put((number, region), small, small.nbytes)
 
 

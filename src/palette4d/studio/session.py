@@ -9,6 +9,7 @@ import contextlib
 import dataclasses
 import hashlib
 import os
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -17,6 +18,7 @@ from typing import Literal, TypeVar
 
 from palette4d.common.errors import Palette4dError, in_words
 from palette4d.grade.document import Document
+from palette4d.grade.follow import Progress
 from palette4d.media.clip import Clip, open_clip
 from palette4d.media.source_clip import find_clip
 from palette4d.studio import texts
@@ -24,7 +26,8 @@ from palette4d.studio.display import Display, Look
 from palette4d.studio.player import Player
 
 Event = Literal[
-    "document",  # the palette or its edits, also while something is dragged
+    "document",  # the palette or its edits; while something is dragged, now and then
+    "trial",  # every step of a drag, for the picture alone
     "clip",  # another clip, or none
     "frame",
     "pixels",  # the frame's pixels have arrived, or the reason why they cannot
@@ -41,6 +44,8 @@ T = TypeVar("T")
 
 #: Seconds between the last edit and its save, and the most while edits go on.
 SAVE_AFTER, SAVE_AT_MOST = 0.4, 1.5
+#: Seconds between two events "document" while something is dragged.
+PANELS_EVERY = 0.04
 #: Seconds until a save that failed is tried again.
 TRY_AGAIN = 5.0
 
@@ -148,7 +153,7 @@ class Session:
         self._stamp: tuple[int, int, int] | None = None
         self._edited_at: float | None = None  # the first edit that is not on disk
         self._last_edit = self._next_try = 0.0
-        self._unsaved_notes = False
+        self._untold, self._told = False, 0.0  # of a drag, by `tell`
         self.clip: Clip | None = None
         self.player: Player | None = None
         self.display: Display | None = None
@@ -304,6 +309,49 @@ class Session:
         self._changed()
         return result
 
+    def edit_later(
+        self,
+        operation: Callable[[Document, Progress], T],
+        text: str,
+        then: Callable[[T], object],
+    ) -> None:
+        """Do an edit that reads the clip: in a thread on a copy, and then here.
+
+        What is being dragged stays visible until then. `then` gets the operation's result.
+        """
+        document = self._document
+        if document is None:
+            return
+        trial = document.trial()
+
+        def say(done: int, total: int) -> None:
+            words = texts.FOLLOWING.format(done=done, total=total)
+            self.post(lambda: self.say(words))
+
+        def finish(result: T) -> None:
+            if self._document is document:
+                self.edit(repeat, text)
+                then(result)
+
+        def repeat(own: Document) -> None:
+            for step in trial.history:
+                own.apply(step)
+
+        def fail(error: Exception) -> None:
+            self.cancel()
+            self.report(error)
+
+        def work() -> None:
+            try:
+                result = operation(trial, say)
+            except Exception as error:  # whatever fails, the window stays
+                failed = error
+                self.post(lambda: fail(failed))
+            else:
+                self.post(lambda: finish(result))
+
+        threading.Thread(target=work, name="palette4d edit", daemon=True).start()
+
     def drag(self, operation: Edit, text: str = "") -> None:
         """Show an edit without doing it; each call replaces the last."""
         if self._document is None:
@@ -315,7 +363,19 @@ class Session:
             self.report(error)
             return
         self._trial, self._dragged = trial, (operation, text)
-        self._changed()
+        self.revision += 1
+        self.emit("trial")
+        self._untold = True
+        if not self._callbacks.get("trial"):  # no picture whose painting goes first
+            self.tell()
+
+    def tell(self) -> None:
+        """Tell the panels of a drag; the viewer calls it when it has painted the picture."""
+        now = time.monotonic()
+        late = now - self._told >= PANELS_EVERY or not self._callbacks.get("trial")
+        if self._untold and late:
+            self._told, self._untold = now, False
+            self.emit("document")
 
     def drop(self) -> None:
         """Do the edit that was dragged last."""
@@ -345,6 +405,7 @@ class Session:
 
     def _changed(self) -> None:
         self.revision += 1
+        self._untold = False
         self.emit("document")
 
     # --------------------------------------------------------------------------------- where he is
@@ -429,6 +490,8 @@ class Session:
     def tick(self, now: float | None = None) -> None:
         """Save what is due, and take over what another program wrote; call it often."""
         document = self._document
+        if self._untold:
+            self.tell()
         if document is None or document.path is None or self._dragged is not None:
             return
         now = time.monotonic() if now is None else now

@@ -10,12 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import (
-    QAction,
     QBrush,
     QColor,
     QImage,
     QKeyEvent,
-    QKeySequence,
     QMouseEvent,
     QPainter,
     QPaintEvent,
@@ -44,6 +42,8 @@ from palette4d.plotting.solid import (
     flipped,
 )
 from palette4d.studio import paint, texts, theme
+from palette4d.studio.actions import SOLID_ACTIONS
+from palette4d.studio.menus import view_actions
 from palette4d.studio.preview import straight
 from palette4d.studio.screen_colours import on_screen
 from palette4d.studio.session import Session
@@ -56,8 +56,25 @@ PIXELS = 5000
 TURN, STEP = 0.4, 6.0
 #: The radius of a disc, and of the place where an edited colour was.
 DISC, ORIGIN = 6.5, 3.6
+#: How far edited colours shrink the view, in radii of the others.
+FARTHEST = 1.35
 #: A face is drawn in this many strips, for a smooth gradient.
 STRIPS = 6
+
+
+def _pieces() -> F64:
+    """Return the (n, 3, 3) pieces of a face: of each corner its shares of the face's corners."""
+    found = []
+    for i in range(STRIPS):
+        for j in range(STRIPS - i):
+            found.append([(i, j), (i + 1, j), (i, j + 1)])
+            if i + j < STRIPS - 1:
+                found.append([(i + 1, j), (i + 1, j + 1), (i, j + 1)])
+    second, third = np.moveaxis(np.array(found) / STRIPS, -1, 0)
+    return np.stack([1 - second - third, second, third], axis=-1)
+
+
+PIECES = _pieces()
 AXIS_KEYS = {Qt.Key.Key_X: 0, Qt.Key.Key_Y: 1, Qt.Key.Key_Z: 2}
 AXIS_NAMES = ("R", "G", "B")
 
@@ -95,12 +112,7 @@ class SolidView(QWidget):
         self._drag: Drag | None = None
         self._pixels: tuple[object, F64, NDArray[np.uint8]] | None = None
         self._extent: F64 | None = None
-        reset = QAction(texts.RESET_SOLID, self)
-        reset.setShortcut(QKeySequence("0"))
-        reset.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
-        reset.triggered.connect(self.reset_view)
-        self.addAction(reset)
-        self.menu_actions = {"View": [reset]}
+        self.menu_actions = view_actions(self, SOLID_ACTIONS)
         for event in ("document", "clip", "frame", "pixels", "selection", "hover", "view", "probe"):
             session.on(event, self.update)
 
@@ -124,8 +136,11 @@ class SolidView(QWidget):
         if self._drag is None or self._drag.index is None or self._extent is None:
             self._extent = extent_of([Shape(palette.rgb, palette.edited, palette.faces)])
         size = max(60.0, min(self.width() - 34.0, self.height() - 34.0)) * self.zoom
-        # The size of a ball around everything: it fits from all sides.
-        away = float(np.linalg.norm(self._extent - 0.5, axis=1).max())
+        # The size of a ball around everything: it fits from all sides. A colour that an edit moves
+        # far away does not shrink the rest.
+        far = np.linalg.norm(self._extent - 0.5, axis=1)
+        near = float(far[: len(self._extent) - len(palette.edited)].max())
+        away = float(min(far.max(), FARTHEST * near))
         centre = np.array([self.width() / 2, -(self.height() - 6) / 2])
         return View(centre, 1.12 * size / (2 * away)).turned(self.azimuth, self.elevation)
 
@@ -296,17 +311,35 @@ class SolidView(QWidget):
 
     def focusNextPrevChild(self, forward: bool) -> bool:
         """Tab goes through the colours, and then to the next panel."""
+        return self._step(forward) or super().focusNextPrevChild(forward)
+
+    def next_colour(self) -> None:
+        """Select the next colour."""
+        self._step(True)
+
+    def _step(self, forward: bool) -> bool:
+        """Select the next colour or the one before; return whether there is one."""
         palette = self.palette_now()
         if palette is None:
-            return super().focusNextPrevChild(forward)
+            return False
         handles = [self.handle_of(palette, k) for k in range(len(palette.ids))]
         held = [handles.index(id_) for id_ in self.session.selection if id_ in handles]
         ends = 0 if forward else len(handles) - 1
         at = held[0] + (1 if forward else -1) if held else ends
         if not 0 <= at < len(handles):
-            return super().focusNextPrevChild(forward)
+            return False
         self.session.select(handles[at])
         return True
+
+    def event(self, event: QEvent) -> bool:
+        """Keep the axis keys and the arrows from the window's shortcuts."""
+        if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent):
+            arrows = (Qt.Key.Key_Left, Qt.Key.Key_Right, Qt.Key.Key_Up, Qt.Key.Key_Down)
+            control = event.modifiers() & Qt.KeyboardModifier.ControlModifier
+            if not control and Qt.Key(event.key()) in (*AXIS_KEYS, *arrows):
+                event.accept()
+                return True
+        return super().event(event)
 
     def _nudge(self, dx: int, dy: int) -> None:
         """Move the selected colour by about a hundredth, as a drag by the same way would."""
@@ -389,26 +422,13 @@ class SolidView(QWidget):
         painter.save()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, on=False)
         painter.setPen(Qt.PenStyle.NoPen)
-        steps = np.arange(STRIPS)
-        for face in faces:
-            corners, seen = at[face, :2], colours[face].astype(np.float64)
-
-            def mixed(of: F64, i: float, j: float) -> F64:
-                result: F64 = of[0] + (of[1] - of[0]) * i / STRIPS + (of[2] - of[0]) * j / STRIPS
-                return result
-
-            for i in steps.tolist():
-                for j in range(STRIPS - i):
-                    pieces = [[(i, j), (i + 1, j), (i, j + 1)]]
-                    if i + j < STRIPS - 1:
-                        pieces.append([(i + 1, j), (i + 1, j + 1), (i, j + 1)])
-                    for piece in pieces:
-                        middle = mixed(seen, *np.mean(piece, axis=0).tolist())
-                        colour = paint.colour_of(middle)
-                        colour.setAlphaF(alpha / 255)
-                        painter.setBrush(colour)
-                        points = [QPointF(*mixed(corners, *p).tolist()) for p in piece]
-                        painter.drawPolygon(QPolygonF(points))
+        # (face, piece, corner) from the three corners of each face.
+        seen = np.einsum("pc,fcx->fpx", PIECES.mean(axis=1), colours[faces].astype(np.float64))
+        points = np.einsum("pkc,fcx->fpkx", PIECES, at[faces, :2])
+        for pieces, places in zip(seen.tolist(), points.tolist(), strict=True):
+            for (red, green, blue), corners in zip(pieces, places, strict=True):
+                painter.setBrush(QColor(int(red), int(green), int(blue), round(alpha)))
+                painter.drawPolygon(QPolygonF([QPointF(x, y) for x, y in corners]))
         painter.restore()
 
     @staticmethod

@@ -50,13 +50,13 @@ QPushButton:pressed, QToolButton:pressed, QToolButton:checked {{ background: #4a
   color: {BRIGHT}; }}
 QPushButton:default {{ border-color: {FAINT}; color: {BRIGHT}; }}
 QPushButton:disabled, QToolButton:disabled {{ color: #5e5e5e; }}
-QLineEdit, QSpinBox, QDoubleSpinBox, QComboBox, QPlainTextEdit, QTextEdit {{ background: {PIT};
+QLineEdit, QAbstractSpinBox, QComboBox, QPlainTextEdit, QTextEdit {{ background: {PIT};
   border: 1px solid {LINE}; border-radius: 3px; padding: 2px 5px; color: {TEXT};
   selection-background-color: #5a5a5a; selection-color: {BRIGHT}; }}
 QLineEdit:focus, QSpinBox:focus, QDoubleSpinBox:focus, QComboBox:focus, QPlainTextEdit:focus
   {{ border-color: {FAINT}; }}
 QAbstractSpinBox::up-button, QAbstractSpinBox::down-button {{ width: 0; border: none; }}
-QAbstractSpinBox QLineEdit {{ background: transparent; border: none; padding: 0; }}
+QAbstractSpinBox QLineEdit {{ background: transparent; border: none; padding: 0 4px; }}
 QComboBox {{ background: {RAISED}; }}
 QComboBox::drop-down {{ border: none; width: 16px; }}
 QComboBox QAbstractItemView {{ background: {PANEL}; border: 1px solid {LINE};

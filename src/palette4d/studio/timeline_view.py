@@ -16,12 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QPoint, QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import (
-    QAction,
     QColor,
     QContextMenuEvent,
     QImage,
     QKeyEvent,
-    QKeySequence,
     QMouseEvent,
     QPainter,
     QPaintEvent,
@@ -33,6 +31,8 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QMenu, QToolTip, QWidget
 
 from palette4d.grade.document import Document
+from palette4d.grade.follow import Progress
+from palette4d.grade.picks import Pick
 from palette4d.plotting import style
 from palette4d.plotting.layout import (
     BAND,
@@ -45,6 +45,8 @@ from palette4d.plotting.layout import (
 )
 from palette4d.plotting.rows import Palette, Rows, arrange
 from palette4d.studio import paint, texts, theme
+from palette4d.studio.actions import TIMELINE_ACTIONS, VIEW
+from palette4d.studio.menus import view_actions
 from palette4d.studio.player import Region
 from palette4d.studio.screen_colours import on_screen, thumbnail
 from palette4d.studio.session import Session
@@ -55,13 +57,18 @@ U8 = NDArray[np.uint8]
 
 #: The column of colours at the left, the ruler, the frame strip, and the zoom bar, in pixels.
 GUTTER, RULER, STRIP, FOOT = 84, 24, 46, 12
+#: The height of a pick's range, and the most that are drawn above each other.
+LANE, MOST_LANES = 13, 5
 #: Space for the block names above the rows, below them, and beside the first and last frame.
 HEAD, TAIL, SIDE = 22.0, 10.0, 26.0
 #: The heights of a row, and the largest radius of a disc, in rows.
 LOWEST, HIGHEST, RADIUS = 20.0, 46.0, 0.27
 #: Pixels between two sampled colours of a band.
 COLUMN = 2
-#: The fewest frames that fill the width.
+#: The same while something is dragged.
+DRAGGED_COLUMN = 8
+#: A step of the zoom, and the fewest frames that fill the width.
+ZOOM = 0.6
 CLOSEST = 4.0
 #: Makes the strip's pictures.
 THREAD = ThreadPoolExecutor(1, thread_name_prefix="palette4d thumbnails")
@@ -71,11 +78,23 @@ THRESHOLD = 3
 
 @dataclass(frozen=True)
 class Hit:
-    """What is under the pointer; `id` of a disc is its handle, of a band its edge."""
+    """What is under the pointer.
 
-    what: Literal["ruler", "gutter", "disc", "band", "zoom", "ground"]
+    Attributes
+    ----------
+    what : str
+    id : str
+        The handle of a disc, the edge of a band, the id of a pick.
+    stop : bool
+        The disc is a stop.
+    grip : str
+        The end of a pick's range: "start" or "until".
+    """
+
+    what: Literal["ruler", "lane", "pick", "gutter", "disc", "band", "zoom", "ground"]
     id: str = ""
     stop: bool = False
+    grip: str = ""
 
 
 @dataclass
@@ -111,12 +130,14 @@ class TimelineView(QWidget):
         self._scroll = 0.0
         self._palette: tuple[object, Palette, Rows] | None = None
         self._layout: tuple[object, Timeline, list[Disc]] | None = None
+        self._lanes: tuple[int, list[tuple[Pick, int]]] | None = None
+        self._range: tuple[str, float, float] | None = None  # of a pick, while it is dragged
         self._picture: tuple[object, tuple[QPixmap, QPixmap]] | None = None
         self._thumbs: dict[int, tuple[object, QPixmap]] = {}
         self._making: set[int] = set()
         self._press: Press | None = None
         self._band: QRectF | None = None
-        self.menu_actions = self._make_actions()
+        self.menu_actions = view_actions(self, TIMELINE_ACTIONS)
         for event, call in (
             ("document", self._changed),
             ("clip", self._new_clip),
@@ -137,34 +158,6 @@ class TimelineView(QWidget):
     def minimumSizeHint(self) -> QSize:
         """Return the least size: a few rows."""
         return QSize(360, RULER + STRIP + FOOT + int(HEAD + TAIL) + 3 * int(LOWEST))
-
-    # ------------------------------------------------------------------------------------ actions
-
-    def _make_actions(self) -> dict[str, list[QAction]]:
-        rows = [
-            ("Palette", texts.ADD_STOP, "S", self.add_stop_at_playhead),
-            ("Palette", texts.RESET, "Del", self.reset_selected),
-            ("Palette", texts.SELECT_ALL, "Ctrl+A", self.select_all),
-            ("Palette", texts.NEXT_HANDLE, "Tab", lambda: self.step_handle(1)),
-            ("Palette", texts.PREVIOUS_HANDLE, "Shift+Tab", lambda: self.step_handle(-1)),
-            ("Palette", texts.ROW_ABOVE, "Up", lambda: self.step_row(-1)),
-            ("Palette", texts.ROW_BELOW, "Down", lambda: self.step_row(1)),
-            ("Palette", texts.STOP_EARLIER, "Alt+Left", lambda: self.nudge(-1)),
-            ("Palette", texts.STOP_LATER, "Alt+Right", lambda: self.nudge(1)),
-            ("View", texts.ZOOM_IN, "+", lambda: self.zoom(0.6)),
-            ("View", texts.ZOOM_OUT, "-", lambda: self.zoom(1 / 0.6)),
-            ("View", texts.ZOOM_ALL, "0", self.show_all),
-        ]
-        result: dict[str, list[QAction]] = {}
-        for menu, text, keys, call in rows:
-            action = QAction(text, self)
-            action.setShortcut(QKeySequence(keys))
-            # The keys work while the timeline has the keyboard; the menu entries always.
-            action.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
-            action.triggered.connect(call)
-            self.addAction(action)
-            result.setdefault(menu, []).append(action)
-        return result
 
     # ------------------------------------------------------------------------------------- layout
 
@@ -218,9 +211,56 @@ class TimelineView(QWidget):
         return self._layout[1], self._layout[2]
 
     @property
+    def _upper(self) -> float:
+        """The y below the frame strip and the ranges of the picks."""
+        lanes = max((lane for _, lane in self.lanes()), default=-1) + 1
+        return RULER + STRIP + (lanes * LANE + 4 if lanes else 0)
+
+    def lanes(self) -> list[tuple[Pick, int]]:
+        """Return the picks and holds with the lanes of their ranges; ranges of a lane are apart."""
+        document = self.session.document
+        if document is None:
+            return []
+        if self._lanes is None or self._lanes[0] != self.session.revision:
+            ends: list[float] = []
+            placed = []
+            for pick in sorted(document.picks, key=lambda pick: self.reach(pick)[0]):
+                start, *_, end = self.reach(pick)
+                free = [lane for lane, last in enumerate(ends) if last < start]
+                lane = free[0] if free else min(len(ends), MOST_LANES - 1)
+                ends[lane : lane + 1] = [end]
+                placed.append((pick, lane))
+            self._lanes = self.session.revision, placed
+        return self._lanes[1]
+
+    def reach(self, pick: Pick) -> tuple[float, float, float, float]:
+        """Return where a pick begins to act, acts fully, no longer fully, and no more."""
+        first, last, _ = self.session.frames
+        start = float(first if pick.start is None else pick.start)
+        until = float(last if pick.until is None else pick.until)
+        if self._range is not None and self._range[0] == pick.id:
+            start, until = self._range[1:]
+        return max(start - pick.fade, first), start, until, min(until + pick.fade, last)
+
+    def _lane_y(self, lane: int) -> float:
+        return RULER + STRIP + 4 + (lane + 0.5) * LANE
+
+    def _hit_lane(self, at: QPointF) -> Hit:
+        """Return the pick at a point, and which end of its range."""
+        found = Hit("lane")
+        for pick, lane in self.lanes():
+            begin, start, until, end = (self.x_of(t) for t in self.reach(pick))
+            if abs(at.y() - self._lane_y(lane)) > LANE / 2 or not begin - 7 <= at.x() <= end + 7:
+                continue
+            near = {"start": abs(at.x() - start), "until": abs(at.x() - until)}
+            grip = min(near, key=lambda name: near[name])
+            found = Hit("pick", pick.id, grip=grip if near[grip] <= 7 else "")
+        return found
+
+    @property
     def _room(self) -> float:
         """The height that rows can have."""
-        return self.height() - RULER - STRIP - HEAD - TAIL - FOOT
+        return self.height() - self._upper - HEAD - TAIL - FOOT
 
     @property
     def _top(self) -> float:
@@ -228,13 +268,13 @@ class TimelineView(QWidget):
         found = self.timeline
         limit = 0.0 if found is None else max(0.0, found[0].height - self._room)
         self._scroll = min(max(self._scroll, 0.0), limit)
-        return RULER + STRIP + HEAD - self._scroll
+        return self._upper + HEAD - self._scroll
 
     def frame_at(self, x: float, *, snap: bool = True) -> float:
         """Return the time at an x; snapped to the clip's frames."""
         first, last, step = self.session.frames
         time = float(self.scale.frame(x))
-        return min(first + round((time - first) / step) * step, last) if snap else time
+        return float(min(first + round((time - first) / step) * step, last)) if snap else time
 
     def x_of(self, frame: float) -> float:
         """Return the x of a time."""
@@ -244,6 +284,8 @@ class TimelineView(QWidget):
         """Return what is at a point."""
         if at.y() < RULER + STRIP:
             return Hit("ruler")
+        if at.y() < self._upper:
+            return self._hit_lane(at)
         if at.y() >= self.height() - FOOT:
             return Hit("zoom")
         found = self.timeline
@@ -408,6 +450,8 @@ class TimelineView(QWidget):
         elif press.hit.stop:
             free = bool(event.modifiers() & Qt.KeyboardModifier.AltModifier)
             self._drag_stop(press.hit.id, at.x() - press.grab, snap=not free)
+        elif press.hit.grip:
+            self._drag_range(press.hit, at.x())
         elif press.hit.what == "ground":
             self._band = QRectF(press.at, at).normalized()
             self._select_in(self._band)
@@ -425,6 +469,35 @@ class TimelineView(QWidget):
             text = texts.STOP_MOVED.format(id=id_, frame=style.number(frame))
             self.session.drag(lambda document: document.move(id_, frame=frame), text)
 
+    def _drag_range(self, hit: Hit, x: float) -> None:
+        pick = next((pick for pick, _ in self.lanes() if pick.id == hit.id), None)
+        if pick is None:
+            return
+        _, start, until, _ = self.reach(pick)
+        frame = self.frame_at(x)
+        if hit.grip == "start":
+            self._range = (hit.id, min(frame, until), until)
+        else:
+            self._range = (hit.id, start, max(frame, start))
+        self.update()
+
+    def set_range(self, id_: str, start: float, until: float) -> None:
+        """Give a pick or hold a range; at the clip's ends it has no limit."""
+        first, last, _ = self.session.frames
+        clip = None if self.session.clip is None else self.session.clip.source
+        begin = None if start <= first else start
+        end = None if until >= last else until
+
+        def change(document: Document, progress: Progress) -> None:
+            document.change_pick(id_, clip=clip, progress=progress, start=begin, until=end)
+
+        def done(_: object) -> None:
+            self._range = None
+            self.update()
+
+        text = texts.RANGE_SET.format(id=id_, start=style.number(start), until=style.number(until))
+        self.session.edit_later(change, text, done)
+
     def place_for(self, id_: str, frame: float) -> float | None:
         """Return the time nearest to a wanted one that a stop can have; None: it stays."""
         content, document = self._content, self.session.document
@@ -433,13 +506,15 @@ class TimelineView(QWidget):
         stop = next((stop for stop in content.stops if stop[0] == id_), None)
         if stop is None:
             return None
-        step = self.session.frames[2]
+        first, _, step = self.session.frames
         start, end = (float(t) for t in content.frames[list(content.edges[stop[1]])])
-        low, high = np.floor(start / step) * step + step, np.ceil(end / step) * step - step
-        if frame.is_integer() and low <= high:
+        low = first + (np.floor((start - first) / step) + 1) * step
+        high = first + (np.ceil((end - first) / step) - 1) * step
+        if float(frame).is_integer() and low <= high:
             frame = float(min(max(frame, low), high))
         else:
-            frame = float(np.clip(frame, start + 1e-3 * (end - start), end - 1e-3 * (end - start)))
+            room = 1e-3 * (end - start)
+            frame = float(np.clip(frame, start + room, end - room))
         edge = stop[1]
         taken = [other[2] for other in content.stops if other[1] == edge and other[0] != id_]
         return None if frame in taken else frame
@@ -452,17 +527,19 @@ class TimelineView(QWidget):
 
     def _hover(self, at: QPointF) -> None:
         hit = self.hit(at)
-        self.session.hover_over(hit.id or None)
+        self.session.hover_over(hit.id or None if hit.what != "pick" else None)
         shape = Qt.CursorShape.ArrowCursor
-        if hit.stop:
+        if hit.stop or hit.grip:
             shape = Qt.CursorShape.SizeHorCursor
-        elif hit.what in ("disc", "band"):
+        elif hit.what in ("disc", "band", "pick"):
             shape = Qt.CursorShape.PointingHandCursor
         self.setCursor(shape)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         """End a drag."""
         press, self._press, self._band = self._press, None, None
+        if press is not None and press.hit.grip and press.moved and self._range is not None:
+            self.set_range(*self._range)
         if press is not None and press.hit.stop and press.moved:
             self.session.drop()
         self.update()
@@ -505,6 +582,11 @@ class TimelineView(QWidget):
             return line if before == after else f"{line} → {after}"
         if hit.what == "band":
             return texts.ROW_TIP.format(id=hit.id)
+        for pick, _ in self.lanes() if hit.what == "pick" else ():
+            if pick.id == hit.id:
+                _, start, until, _ = self.reach(pick)
+                ends = style.number(start), style.number(until), style.number(pick.fade)
+                return f"{pick.id}: {texts.PICK_TIP.format(*ends)}"
         return ""
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
@@ -532,7 +614,7 @@ class TimelineView(QWidget):
             add = texts.ADD_STOP_AT.format(frame=style.number(time))
             menu.addAction(add, lambda: self.add_stop(hit.id, time))
             menu.addSeparator()
-        menu.addActions(self.menu_actions["View"])
+        menu.addActions(self.menu_actions[VIEW])
         return menu
 
     # ----------------------------------------------------------------------------------- gestures
@@ -606,6 +688,38 @@ class TimelineView(QWidget):
         if found is not None:
             self.session.select(*(disc.id for disc in found[1]))
 
+    def next_handle(self) -> None:
+        """Select the next handle, row by row."""
+        self.step_handle(1)
+
+    def previous_handle(self) -> None:
+        """Select the handle before."""
+        self.step_handle(-1)
+
+    def row_above(self) -> None:
+        """Select the colour at the playhead in the row above."""
+        self.step_row(-1)
+
+    def row_below(self) -> None:
+        """Select the colour at the playhead in the row below."""
+        self.step_row(1)
+
+    def stop_earlier(self) -> None:
+        """Move the selected stops a frame earlier."""
+        self.nudge(-1)
+
+    def stop_later(self) -> None:
+        """Move the selected stops a frame later."""
+        self.nudge(1)
+
+    def zoom_in(self) -> None:
+        """Show fewer frames."""
+        self.zoom(ZOOM)
+
+    def zoom_out(self) -> None:
+        """Show more frames."""
+        self.zoom(1 / ZOOM)
+
     def step_handle(self, by: int) -> bool:
         """Select the next handle, row by row; return whether there is one."""
         found = self.timeline
@@ -677,6 +791,7 @@ class TimelineView(QWidget):
         bands, discs = self._pictures()
         painter.drawPixmap(0, 0, bands)
         self._paint_strip(painter)
+        self._paint_lanes(painter)
         self._paint_ruler(painter)
         self._paint_playhead(painter)
         painter.drawPixmap(0, 0, discs)
@@ -715,7 +830,7 @@ class TimelineView(QWidget):
         return self._picture[1]
 
     def _paint_rows(self, painter: QPainter, layout: Timeline, discs: list[Disc]) -> None:
-        top, floor = RULER + STRIP, self.height() - FOOT
+        top, floor = self._upper, self.height() - FOOT
         painter.setClipRect(QRectF(GUTTER, top, self.width() - GUTTER, floor - top))
         for section in layout.sections():
             if section.number % 2:
@@ -742,7 +857,7 @@ class TimelineView(QWidget):
 
     def _into_rows(self, painter: QPainter) -> None:
         """Clip to the rows, and put the first row's top at y = 0."""
-        top = RULER + STRIP + HEAD - 10
+        top = self._upper + HEAD - 10
         painter.setClipRect(QRectF(GUTTER, top, self.width() - GUTTER, self._room + TAIL + 10))
         painter.translate(0, self._top)
 
@@ -750,8 +865,9 @@ class TimelineView(QWidget):
         palette, scale = layout.palette, layout.scale
         left = max(GUTTER, scale.left - 1)
         right = min(self.width(), scale.right + 1)
-        columns = np.arange(left, max(right, left + COLUMN), COLUMN, dtype=np.float64)
-        times = np.asarray(scale.frame(columns + COLUMN / 2)).reshape(-1)
+        wide = DRAGGED_COLUMN if self.session.dragging else COLUMN
+        columns = np.arange(left, max(right, left + wide), wide, dtype=np.float64)
+        times = np.asarray(scale.frame(columns + wide / 2)).reshape(-1)
         before, after = palette.sampled(times)
         selected = set(self.session.selection)
         moved = np.nan_to_num(np.linalg.norm(after - before, axis=-1))
@@ -766,7 +882,7 @@ class TimelineView(QWidget):
             painter.setPen(Qt.PenStyle.NoPen)
             for above, below, colours in parts:
                 seen = on_screen(self.session, colours[edge, inside])
-                painter.setBrush(paint.texture(seen, float(columns[inside[0]]), float(COLUMN)))
+                painter.setBrush(paint.texture(seen, float(columns[inside[0]]), float(wide)))
                 painter.drawPolygon(paint.polygon(np.concatenate([above, below[::-1]])))
             painter.setBrush(Qt.BrushStyle.NoBrush)
             chosen = palette.edge_ids[edge] in selected
@@ -776,15 +892,15 @@ class TimelineView(QWidget):
             if touched:
                 painter.setPen(paint.pen(style.INK, 0.9))
                 painter.drawPolyline(paint.polygon(line))
-                self._paint_ramp(painter, line, lower, columns[inside], moved[edge, inside])
+                middle = columns[inside] + wide / 2
+                self._paint_ramp(painter, line, lower, middle, moved[edge, inside])
 
     @staticmethod
-    def _paint_ramp(painter: QPainter, line: F64, lower: F64, columns: F64, moved: F64) -> None:
+    def _paint_ramp(painter: QPainter, line: F64, lower: F64, x: F64, moved: F64) -> None:
         """Draw how much an edit acts through time: at the seam nothing, at the rim the most."""
         most = float(moved.max())
         if most <= 1e-6:
             return
-        x = columns + COLUMN / 2
         seam = np.interp(x, line[:, 0], line[:, 1])
         rim = np.interp(x, lower[:, 0], lower[:, 1])
         curve = np.stack([x, seam + (rim - seam) * (0.12 + 0.76 * moved / most)], axis=-1)
@@ -885,6 +1001,59 @@ class TimelineView(QWidget):
             result.append((number, QRectF(middle - wide / 2, RULER + 3, wide, tall)))
         return result
 
+    def _paint_lanes(self, painter: QPainter) -> None:
+        """Draw the ranges of picks and holds: the fades as wedges, the frame as a diamond."""
+        picks = self.lanes()
+        if not picks:
+            return
+        painter.save()
+        painter.setClipRect(QRectF(GUTTER, RULER + STRIP, self.width() - GUTTER, self._upper))
+        for pick, lane in picks:
+            y, half = self._lane_y(lane), LANE / 2 - 2
+            begin, start, until, end = (self.x_of(t) for t in self.reach(pick))
+            start, until = max(start, begin + 0.5), max(until, start + 1)
+            shape = np.array(
+                [
+                    (begin, y),
+                    (start, y - half),
+                    (until, y - half),
+                    (end, y),
+                    (until, y + half),
+                    (start, y + half),
+                ]
+            )
+            chosen = pick.id in self.session.selection
+            rim = paint.pen(style.BRIGHT if chosen else style.RING, 1.8 if chosen else 0.9)
+            colour = on_screen(self.session, pick.rgb if pick.to is None else pick.to)
+            painter.setBrush(paint.colour_of(colour))
+            if not pick.enabled:
+                rim.setDashPattern([3, 3])
+                painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.setPen(rim)
+            painter.drawPolygon(paint.polygon(shape))
+            if pick.kind == "hold":  # a hold has a bar along it
+                for grey, width in ((style.INK, 3.4), (style.BRIGHT, 1.4)):
+                    painter.setPen(paint.pen(grey, width))
+                    painter.drawLine(QPointF(start + 4, y), QPointF(until - 4, y))
+            x = self.x_of(pick.frame)
+            diamond = np.array([(x - 5, y), (x, y - 5), (x + 5, y), (x, y + 5)])
+            painter.setPen(paint.pen(style.INK, 1.2))
+            painter.setBrush(QColor(style.BRIGHT))
+            painter.drawPolygon(paint.polygon(diamond))
+        painter.restore()
+
+    @property
+    def settled(self) -> bool:
+        """Whether all pictures of the frame strip are made."""
+        key = (self.session.revision, self.session.looked)
+        region, player = self._thumb_region(), self.session.player
+        if player is None or region is None:
+            return True
+        return not self._making and all(
+            frame in player.errors or (frame in self._thumbs and self._thumbs[frame][0] == key)
+            for frame, _ in self.thumbnails()
+        )
+
     def _ask_thumbnails(self) -> None:
         """Have the strip's frames read when the player has nothing else to do."""
         if self.session.player is not None and (region := self._thumb_region()) is not None:
@@ -942,15 +1111,24 @@ class TimelineView(QWidget):
         painter.drawText(QRectF(0, 0, GUTTER - 8, RULER), right, texts.FRAME)
         if found is None:
             return
+        names: dict[int, list[str]] = {}
+        for pick, lane in self.lanes():
+            names.setdefault(lane, []).append(pick.id)
+        for lane, ids in names.items():
+            box = QRectF(4, self._lane_y(lane) - LANE, GUTTER - 12, 2 * LANE)
+            text = painter.fontMetrics().elidedText(
+                " ".join(ids), Qt.TextElideMode.ElideRight, int(box.width())
+            )
+            painter.drawText(box, right, text)
         layout, top = found[0], self._top
         palette, frame = layout.palette, float(self.session.frame)
         before, after = palette.sampled(np.array([frame]))
         probe = self.session.probe
         weights = {} if probe is None else probe.weights
         caption = texts.WEIGHT if weights else ""
-        painter.drawText(QRectF(0, RULER + STRIP, GUTTER - 8, HEAD), right, caption)
+        painter.drawText(QRectF(0, self._upper, GUTTER - 8, HEAD), right, caption)
         x = self.x_of(frame)
-        painter.setClipRect(QRectF(0, RULER + STRIP + HEAD - 6, GUTTER, self.height()))
+        painter.setClipRect(QRectF(0, self._upper + HEAD - 6, GUTTER, self.height()))
         for edge, y in self._edges_at(layout, x):
             if np.isnan(before[edge, 0]).any():
                 continue
@@ -999,7 +1177,7 @@ class TimelineView(QWidget):
         if found is not None and self.session.hover is not None:
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.setClipRect(
-                QRectF(GUTTER, RULER + STRIP, self.width() - GUTTER, self._room + HEAD)
+                QRectF(GUTTER, self._upper, self.width() - GUTTER, self._room + HEAD)
             )
             layout, discs = found
             for disc in discs:

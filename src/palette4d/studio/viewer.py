@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, QTimer
 from PySide6.QtGui import (
     QBrush,
     QColor,
@@ -94,6 +94,7 @@ class Viewer(QWidget):
         self.on_hold: Any = None  #: the same with Alt
         session.on("clip", self._clip_changed)
         session.on("document", self.refresh)
+        session.on("trial", self.refresh)
         session.on("playing", self.refresh)
         session.on("frame", self._frame_changed)
         session.on("pixels", self.refresh)
@@ -340,6 +341,8 @@ class Viewer(QWidget):
             frame = QRectF(self._press, self._pointer).normalized()
             _ring(painter, lambda: painter.drawRect(frame))
         self._draw_probe(painter)
+        if self.session.dragging:
+            QTimer.singleShot(0, self.session.tell)
 
     def _target(self, pane: QRectF) -> QRectF:
         assert self.picture is not None
@@ -614,10 +617,9 @@ def frames_around(session: Session) -> list[int]:
     """Return the frames to read, the playhead's first."""
     assert session.clip is not None
     _, _, step = session.frames
-    way = -1 if session.playing < 0 else 1
-    offsets = [0]
-    for k in range(1, AHEAD + 1):
-        offsets += [k * way] + ([-k * way] if k <= BEHIND else [])
+    # Movies are decoded forwards; going back takes long.
+    behind = 0 if session.clip.is_movie else BEHIND
+    offsets = [0, *range(1, AHEAD + 1), *range(-1, -behind - 1, -1)]
     known = frozenset() if session.player is None else session.player.numbers
     frames = [session.frame + offset * step for offset in offsets]
     return [frame for frame in frames if frame in known]

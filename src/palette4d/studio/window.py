@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QEvent, QObject, QSettings, Qt, QTimer, Signal
+from PySide6.QtCore import QObject, QSettings, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QAction,
     QActionGroup,
@@ -16,7 +16,6 @@ from PySide6.QtGui import (
     QKeySequence,
 )
 from PySide6.QtWidgets import (
-    QApplication,
     QDockWidget,
     QFileDialog,
     QLabel,
@@ -31,6 +30,7 @@ from palette4d.shows import manifest
 from palette4d.studio import actions, texts, theme
 from palette4d.studio.actions import ACTIONS, Action
 from palette4d.studio.inspector import Inspector
+from palette4d.studio.instance import Listener
 from palette4d.studio.jobs import Job
 from palette4d.studio.panels import History, Shots
 from palette4d.studio.session import Session, recovery_file
@@ -42,6 +42,8 @@ from palette4d.studio.work import Field, WorkDialog, beside
 
 #: Milliseconds between two looks at the file.
 TICK = 200
+#: Shows the picture before while it is down.
+COMPARE_KEY = Qt.Key.Key_C
 #: Recent files that the menu keeps.
 RECENT = 10
 
@@ -74,6 +76,7 @@ class Window(QMainWindow):
         self.timeline = TimelineView(session)
         self.solid = SolidView(session)
         self.inspector = Inspector(session)
+        self.viewer.on_pick, self.viewer.on_hold = self.inspector.pick, self.inspector.hold
         self.history = History(session)
         self.shots = Shots(session, self.open_shot)
         middle = QWidget()
@@ -96,12 +99,11 @@ class Window(QMainWindow):
         for event in ("document", "status", "clip", "selection", "view", "playing"):
             session.on(event, self._show)
         self._dialogs: list[WorkDialog] = []
+        self._listener = Listener(self, self._asked_for)
+        session.on("document", lambda: self._listener.listen(session.path))
         self._timer = QTimer(self)
         self._timer.timeout.connect(session.tick)
         self._timer.start(TICK)
-        app = QApplication.instance()
-        if app is not None:
-            app.installEventFilter(self)
         self._show()
 
     # ------------------------------------------------------------------------------------- layout
@@ -179,15 +181,11 @@ class Window(QMainWindow):
             if action.name == "open":
                 self.recent = menu.addMenu(texts.RECENT)
                 self.recent.aboutToShow.connect(self._fill_recent)
-        # The timeline's own keys work while it has the keyboard.
-        known = {action.text for action in ACTIONS}
-        for title, more in self.timeline.menu_actions.items():
-            self.menus[title].addSeparator()
-            for entry in more:
-                if entry.text() in known:
-                    self.timeline.removeAction(entry)
-                else:
-                    self.menus[title].addAction(entry)
+        # The views' own keys work while they have the keyboard.
+        for panel in (self.timeline, self.solid):
+            for title, more in panel.menu_actions.items():
+                self.menus[title].addSeparator()
+                self.menus[title].addActions(more)
         palette = self.menus[actions.PALETTE]
         self.versions = palette.addMenu(texts.VERSIONS)
         self.versions.aboutToShow.connect(self._fill_versions)
@@ -400,13 +398,34 @@ class Window(QMainWindow):
         self.shut()
         event.accept()
 
+    def _asked_for(self, frame: float | None) -> None:
+        """Come to the front, and go to a frame."""
+        if frame is not None:
+            self.session.go(frame)
+        self.setWindowState(self.windowState() & ~Qt.WindowState.WindowMinimized)
+        self.raise_()
+        self.activateWindow()
+
+    @property
+    def settled(self) -> bool:
+        """Whether what is shown is final: the exact picture, and all that the panels draw."""
+        session, picture = self.session, self.viewer.picture
+        if session.player is None or self.viewer.problem:
+            return True
+        return (
+            picture is not None
+            and picture.exact
+            and picture.request.frame == session.frame
+            and picture.request.revision == session.revision
+            and session.player.idle
+            and (self.timeline.settled or not self.timeline.isVisible())
+        )
+
     def shut(self) -> None:
         """End all threads and close the document."""
         self._timer.stop()
+        self._listener.listen(None)
         self.session.play(0)
-        app = QApplication.instance()
-        if app is not None:
-            app.removeEventFilter(self)
         self.viewer.preview.close()
         self.session.close()
 
@@ -873,7 +892,8 @@ class Window(QMainWindow):
     def do_manual(self) -> None:
         """Show the gestures and keys."""
         rows = [f"{where}: {gesture} — {what}" for where, gesture, what in actions.GESTURES]
-        keys = [f"{', '.join(a.keys)} — {a.text}" for a in ACTIONS if a.keys]
+        listed = (*ACTIONS, *actions.TIMELINE_ACTIONS, *actions.SOLID_ACTIONS)
+        keys = [f"{', '.join(a.keys)} — {a.text}" for a in listed if a.keys]
         box = QMessageBox(QMessageBox.Icon.NoIcon, texts.MANUAL, "\n".join(rows), parent=self)
         box.setDetailedText("\n".join(keys))
         box.exec()
@@ -884,21 +904,24 @@ class Window(QMainWindow):
 
         QMessageBox.about(self, texts.TITLE, texts.ABOUT.format(version=__version__))
 
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Watch the key of hold-to-compare."""
-        kinds = (QEvent.Type.KeyPress, QEvent.Type.KeyRelease)
-        if event.type() in kinds and isinstance(event, QKeyEvent) and self.isActiveWindow():
-            plain = event.modifiers() == Qt.KeyboardModifier.NoModifier
-            typing = _takes_text(QApplication.focusWidget())
-            if event.key() == Qt.Key.Key_C and plain and not event.isAutoRepeat() and not typing:
-                self.viewer.hold_to_compare(event.type() == QEvent.Type.KeyPress)
-        return super().eventFilter(watched, event)
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Show the picture before while the key of hold-to-compare is down."""
+        if self._compares(event):
+            self.viewer.hold_to_compare(True)
+        else:
+            super().keyPressEvent(event)
 
+    def keyReleaseEvent(self, event: QKeyEvent) -> None:
+        """Show the picture after again."""
+        if event.key() == COMPARE_KEY and not event.isAutoRepeat():
+            self.viewer.hold_to_compare(False)
+        else:
+            super().keyReleaseEvent(event)
 
-def _takes_text(widget: QWidget | None) -> bool:
-    from PySide6.QtWidgets import QAbstractSpinBox, QLineEdit, QPlainTextEdit
-
-    return isinstance(widget, QLineEdit | QPlainTextEdit | QAbstractSpinBox)
+    @staticmethod
+    def _compares(event: QKeyEvent) -> bool:
+        plain = event.modifiers() == Qt.KeyboardModifier.NoModifier
+        return event.key() == COMPARE_KEY and plain and not event.isAutoRepeat()
 
 
 def _as_one(document: Any, what: str, ids: tuple[str, ...], change: Callable[[Any], None]) -> None:

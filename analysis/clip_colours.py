@@ -1,0 +1,70 @@
+"""Clip colours: a few weighted colours of the clip, for the solver of picks.
+
+Input: the statistics of the frames. Output: the sidecar's member "colours". Each entry stands for
+the frames around it, so that a colour of a short time counts too. Colours far from all others are
+kept however rare they are. The clip is not read again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
+
+F64 = NDArray[np.float64]
+
+# Entries and colours per entry: with four digits each, about 25 KB as JSON.
+MOST_ENTRIES, MOST_COLOURS = 12, 64
+# Colours of one cell count as one. Cells per unit of the gamut's longest side.
+CELLS = 32
+# A colour's share of the pixels counts in its fourth root when colours are chosen, and at least
+# this share: a lamp of a few pixels is chosen for its distance.
+LEAST_SHARE, ROOT = 1e-4, 0.25
+DIGITS = 4
+
+
+def clip_colours(frames: Sequence[FrameStatistics]) -> list[dict[str, Any]]:
+    """Return the sidecar's member "colours" of at least one frame, in order of time.
+
+    Each entry has a ``frame`` and its ``rgbw``: (m, 4) colours in the palette's code values, and
+    the share of the pixels that each stands for.
+    """
+    gamut = Gamut.of(frames)
+    count = min(MOST_ENTRIES, len(frames))
+    at = np.unique(np.linspace(0, len(frames) - 1, count).round().astype(int))
+    nearest = np.abs(np.arange(len(frames))[:, None] - at).argmin(axis=1)
+    return [
+        {
+            "frame": frames[centre].frame,
+            "rgbw": _reduced([frames[i] for i in np.flatnonzero(nearest == part)], gamut),
+        }
+        for part, centre in enumerate(at.tolist())
+    ]
+
+
+def _reduced(frames: Sequence[FrameStatistics], gamut: Gamut) -> list[list[float]]:
+    rgb = np.concatenate([one.coarse.rgb for one in frames])
+    shares = np.concatenate([one.coarse.counts / one.coarse.total for one in frames]) / len(frames)
+    cells = np.floor((rgb - gamut.low) * (CELLS / gamut.scale)).astype(np.int64)
+    rgb, shares = _grouped(rgb, shares, cells @ [(CELLS + 1) ** 2, CELLS + 1, 1])
+    chosen = [int(shares.argmax())]
+    distance = np.linalg.norm(rgb - rgb[chosen[0]], axis=1)
+    worth = np.maximum(shares, LEAST_SHARE) ** ROOT
+    while len(chosen) < min(MOST_COLOURS, len(rgb)):
+        chosen.append(int((distance * worth).argmax()))
+        distance = np.minimum(distance, np.linalg.norm(rgb - rgb[chosen[-1]], axis=1))
+    nearest = np.linalg.norm(rgb[:, None] - rgb[chosen], axis=2).argmin(axis=1)
+    rgb, shares = _grouped(rgb, shares, nearest)
+    rows: list[list[float]] = np.column_stack([rgb, shares]).round(DIGITS).tolist()
+    return sorted(rows, key=lambda row: (-row[3], row))
+
+
+def _grouped(rgb: F64, shares: F64, keys: NDArray[np.int64]) -> tuple[F64, F64]:
+    """Return the means and the shares of the colours with equal keys."""
+    _, group = np.unique(keys, return_inverse=True)
+    total = np.bincount(group, shares)
+    means = [np.bincount(group, shares * rgb[:, channel]) / total for channel in range(3)]
+    return np.column_stack(means), total

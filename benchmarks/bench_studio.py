@@ -1,0 +1,330 @@
+"""Is the window quick enough to grade in? Latencies, playback and memory, without a screen.
+
+    python benchmarks/bench_studio.py SIDECAR CLIP [--times 200] [--size 1400x1000] [--hd HD.mp4]
+        [--long LONG.mp4]
+
+SIDECAR and CLIP are a small clip (SEASONS). `--hd` and `--long` name movies of 1920x1080 with 120
+and 800 frames; where they do not exist they are made from CLIP (some minutes). Each figure is the
+95th percentile, with the median in brackets, beside the bar and the goal of the design. A drag
+counts from the gesture until the whole window, timeline and panels included, has painted the
+picture of that colour. Others who use the machine make all figures worse.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+os.environ["QT_QPA_PLATFORM"] = "offscreen"
+
+import av
+import numpy as np
+from PySide6.QtCore import QSettings
+from PySide6.QtWidgets import QApplication
+
+from palette4d.grade.document import Document
+from palette4d.media.clip import open_clip
+from palette4d.studio import theme
+from palette4d.studio.session import Session
+from palette4d.studio.viewer import probe_at
+from palette4d.studio.window import Window
+
+HD = (1920, 1080)
+
+
+def make_movie(clip: str, out: Path, count: int) -> None:
+    """Write a movie of 1920x1080 with the clip's frames, there and back, slowly moving.
+
+    H.264 with a key frame every 12 frames, as cameras write it.
+    """
+    opened = open_clip(clip)
+    frames = [*opened.frames, *opened.frames[-2:0:-1]]
+    y = np.arange(HD[1])[:, None] * opened.height // HD[1]
+    x = np.arange(HD[0])[None, :] * opened.width // HD[0]
+    options = {"crf": "16", "g": "12", "preset": "veryfast"}
+    with av.open(str(out), "w") as movie:
+        stream = movie.add_stream("libx264", rate=opened.rate, options=options)
+        stream.width, stream.height = HD
+        stream.pix_fmt = "yuv420p"
+        for k in range(count):
+            pixels = opened.read(frames[k * len(frames) // count % len(frames)])[..., :3]
+            moved = np.roll(pixels[y, x], k, axis=1)
+            picture = av.VideoFrame.from_ndarray(np.rint(moved * 255).astype(np.uint8), "rgb24")
+            movie.mux(stream.encode(picture))
+        movie.mux(stream.encode(None))
+
+
+def stretched(sidecar: Path, clip: str, out: Path) -> Path:
+    """Write the sidecar with its times stretched to another clip's frames."""
+    fields = Document.load(sidecar).fields()
+    opened = open_clip(clip)
+    was = fields["clip"]["frames"]
+    scale = (opened.frames[-1] - opened.frames[0]) / (was["last"] - was["first"])
+
+    def moved(frame: float) -> float:
+        return round(opened.frames[0] + (frame - was["first"]) * scale, 6)
+
+    for vertex in fields["polytope"]["vertices"]:
+        vertex["frame"] = moved(vertex["frame"])
+    for block in fields["polytope"]["blocks"]:
+        block["first"], block["last"] = moved(block["first"]), moved(block["last"])
+    fields["clip"] |= {
+        "source": str(Path(clip).absolute()),
+        "name": Path(clip).stem,
+        "size": [opened.width, opened.height],
+        "frames": {
+            "first": opened.frames[0],
+            "last": opened.frames[-1],
+            "step": 1,
+            "skipped": [],
+        },
+    }
+    fields.pop("colours", None)
+    Document(fields).save(out, on_edits="drop")
+    return out
+
+
+class Bench:
+    """One window."""
+
+    def __init__(self, app: QApplication, path: Path, clip: str | None, size: tuple[int, int]):
+        self.app = app
+        settings = QSettings(str(path.with_suffix(".ini")), QSettings.Format.IniFormat)
+        self.window = Window(Session(), settings)
+        self.window.resize(*size)
+        self.window.show()
+        self.window.arrange()
+        self.window.open_path(str(path), clip)
+        self.session = self.window.session
+        self.wait(self.settled)
+
+    def wait(self, ready: Callable[[], bool], seconds: float = 20) -> None:
+        """Handle events until something is so."""
+        end = time.perf_counter() + seconds
+        while not ready():
+            self.app.processEvents()
+            if time.perf_counter() > end:
+                raise TimeoutError(self.session.status.text)
+            time.sleep(0.0002)
+
+    def current(self) -> bool:
+        """Whether the picture of now is shown."""
+        picture = self.window.viewer.picture
+        return (
+            picture is not None
+            and picture.request.revision == self.session.revision
+            and picture.request.frame == self.session.frame
+        )
+
+    def settled(self) -> bool:
+        """Whether that is the exact one."""
+        picture = self.window.viewer.picture
+        return self.current() and picture is not None and picture.exact
+
+    def painted(self) -> None:
+        """Paint all that has to be painted."""
+        self.app.processEvents()
+        self.window.viewer.repaint()
+
+    def drags(self, times: int) -> Iterator[float]:
+        """Drag a colour; yield the seconds of each step."""
+        document = self.session.document
+        assert document is not None
+        palette = document.palette(self.session.frame)
+        id_ = palette.ends[int(np.argmax(np.asarray(palette.rgb).sum(axis=1)))][0]
+        rng = np.random.default_rng(3)
+        for _ in range(times):
+            rgb = rng.random(3).tolist()
+            start = time.perf_counter()
+            self.session.drag(lambda document, rgb=rgb: document.set(id_, rgb=rgb))
+            self.wait(self.current)
+            self.painted()
+            yield time.perf_counter() - start
+        self.session.drop()
+        self.wait(self.settled)
+
+    def jumps(self, times: int, *, cached: bool) -> Iterator[float]:
+        """Go to frames; yield the seconds of each."""
+        first, last, _ = self.session.frames
+        player = self.session.player
+        assert player is not None
+        rng = np.random.default_rng(4)
+        near = [first + k for k in range(min(5, last - first))]
+        for frame in near if cached else ():
+            player.read(frame)
+        for _ in range(times):
+            frame = self.session.frame
+            while frame == self.session.frame:
+                frame = int(rng.choice(near)) if cached else int(rng.integers(first, last + 1))
+            if not cached:
+                player._frames.clear()
+                self.window.viewer.preview.forget()
+            start = time.perf_counter()
+            self.session.go(frame)
+            self.wait(self.current)
+            self.painted()
+            yield time.perf_counter() - start
+            self.wait(self.settled)
+
+    def probes(self, times: int) -> Iterator[float]:
+        """Move the pointer; yield the seconds of each step."""
+        clip = self.session.clip
+        assert clip is not None
+        rng = np.random.default_rng(6)
+        for _ in range(times):
+            x, y = int(rng.integers(clip.width)), int(rng.integers(clip.height))
+            start = time.perf_counter()
+            self.session.show_probe(probe_at(self.session, x, y))
+            self.painted()
+            yield time.perf_counter() - start
+
+    def picks(self, times: int) -> Iterator[float]:
+        """Drag picks; yield the seconds of each step."""
+        document = self.session.document
+        clip = self.session.clip
+        assert document is not None
+        assert clip is not None
+        rng = np.random.default_rng(7)
+        viewer = self.window.viewer
+        pixels = self.session.player.read(self.session.frame)  # type: ignore[union-attr]
+        for _ in range(times):
+            x, y = int(rng.integers(clip.width)), int(rng.integers(clip.height))
+            colour = pixels[y, x, :3].tolist()
+            to = rng.random(3).tolist()
+            frame = self.session.frame
+            start = time.perf_counter()
+            self.session.drag(
+                lambda document, f=frame, c=colour, q=to: document.pick(f, colour=c, to=q)
+            )
+            self.wait(self.current)
+            viewer.repaint()
+            yield time.perf_counter() - start
+        self.session.cancel()
+
+    def playback(self) -> list[tuple[int, int, float]]:
+        """Play twice; return shown and dropped frames and the rate of each pass."""
+        first, last, _ = self.session.frames
+        count = last - first + 1
+        self.session.go(first)
+        self.wait(self.settled)
+        passes = []
+        playback = self.window.playback
+        self.session.play(1)
+        for _ in range(2):
+            shown, dropped, start = playback.shown, playback.dropped, time.perf_counter()
+            target = shown + dropped + count
+            self.wait(lambda target=target: playback.shown + playback.dropped >= target, 300)
+            passes.append(
+                (
+                    playback.shown - shown,
+                    playback.dropped - dropped,
+                    (playback.shown - shown) / (time.perf_counter() - start),
+                )
+            )
+        self.session.play(0)
+        return passes
+
+    def close(self) -> None:
+        """Close the window."""
+        self.window.shut()
+        self.window.close()
+
+
+def show(name: str, seconds: list[float], bar: float, goal: float) -> None:
+    """Print a row: the 95th percentile, the median, the bar and the goal in milliseconds."""
+    worst = float(np.percentile(seconds, 95)) * 1e3
+    middle = statistics.median(seconds) * 1e3
+    verdict = "goal" if worst <= goal else "bar" if worst <= bar else "MISSED"
+    print(
+        f"{name:<42} {worst:7.1f} ({middle:6.1f}) ms   {bar:g} / {goal:g} ms   {verdict}",
+        flush=True,
+    )
+
+
+def cold(path: Path, clip: str) -> float:
+    """Return the seconds from the command until the window has its first picture."""
+    program = (
+        "import sys, time\n"
+        "from palette4d.studio import app\n"
+        "app.run(sys.argv[1], clip=sys.argv[2], until_shown=True)\n"
+    )
+    start = time.perf_counter()
+    subprocess.run([sys.executable, "-c", program, str(path), clip], check=True)
+    return time.perf_counter() - start
+
+
+def memory() -> float:
+    """Return the most memory that was used so far, in bytes."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024.0
+
+
+def main() -> None:
+    """Run all, and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("sidecar", type=Path)
+    parser.add_argument("clip")
+    parser.add_argument("--times", type=int, default=200)
+    parser.add_argument("--size", default="1400x1000")
+    parser.add_argument("--hd", type=Path, default=Path("build/bench_hd.mp4"))
+    parser.add_argument("--long", type=Path, default=Path("build/bench_long.mp4"))
+    args = parser.parse_args()
+    for path, count in ((args.hd, 120), (args.long, 800)):
+        if not path.exists():
+            print(f"making {path}", flush=True)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            make_movie(args.clip, path, count)
+    size = tuple(map(int, args.size.split("x")))
+    folder = Path(tempfile.mkdtemp(prefix="palette4d-bench-"))
+    small = folder / "small.p4d.json"
+    small.write_bytes(args.sidecar.read_bytes())
+    hd = stretched(args.sidecar, str(args.hd), folder / "hd.p4d.json")
+    long = stretched(args.sidecar, str(args.long), folder / "long.p4d.json")
+    app = QApplication.instance() or QApplication([])
+    assert isinstance(app, QApplication)
+    theme.dress(app)
+    print(f"{'action':<42} {'95 % (median)':>20}   bar / goal")
+    show("first window, cold", [cold(small, args.clip) for _ in range(3)], 3000, 2000)
+    bench = Bench(app, small, args.clip, (1290, size[1]))
+    viewer = bench.window.viewer
+    print(f"  viewer {viewer.width()}x{viewer.height()}")
+    show("drag a colour, small clip", list(bench.drags(args.times)), 33, 16)
+    show("jump, cached, small clip", list(bench.jumps(args.times, cached=True)), 50, 33)
+    show("weights under the pointer, small clip", list(bench.probes(args.times)), 50, 33)
+    if hasattr(Document, "pick"):
+        show("a pick solved, small clip", list(bench.picks(args.times)), 100, 50)
+    bench.close()
+    bench = Bench(app, hd, None, (2400, 1350))
+    viewer = bench.window.viewer
+    print(f"  viewer {viewer.width()}x{viewer.height()}")
+    show("drag a colour, 1080p fitted", list(bench.drags(args.times)), 50, 33)
+    show("jump, cached, 1080p", list(bench.jumps(args.times, cached=True)), 50, 33)
+    show("jump, not decoded, 1080p", list(bench.jumps(args.times, cached=False)), 200, 150)
+    show("weights under the pointer, 1080p", list(bench.probes(args.times)), 50, 33)
+    bench.close()
+    bench = Bench(app, hd, None, size)
+    for number, (shown, dropped, rate) in enumerate(bench.playback(), 1):
+        verdict = "goal" if number == 1 and not dropped else "bar" if not dropped else "MISSED"
+        print(
+            f"playback 1080p, pass {number}: {shown} shown, {dropped} dropped, {rate:.1f} fps"
+            f"   {verdict}"
+        )
+    bench.close()
+    bench = Bench(app, long, None, size)
+    passes = bench.playback()
+    print(f"800 frames: {passes}")
+    used = memory() / 2**30
+    verdict = "goal" if used <= 1.5 else "bar" if used <= 2 else "MISSED"
+    print(f"{'memory, 800 frames of 1080p':<42} {used:7.2f} GB   2 / 1.5 GB   {verdict}")
+    bench.close()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,357 @@
+"""The actions of `edit` for picks: pick, hold, change, enable, disable, unpick, lock, picks."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+from palette4d.cli.swatches import shown
+from palette4d.common.arguments import ColourAction, number, whole
+from palette4d.common.errors import Palette4dError
+from palette4d.common.text import counted
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from palette4d.grade.document import Document
+    from palette4d.grade.picks import Pick
+
+    Action = Callable[[str, str, str], argparse.ArgumentParser]
+
+_WHERE = "--frame T (--colour C | --pixel X,Y [--box N])"
+_WHEN = "[--from A] [--until B] [--fade N]"
+
+
+def add_actions(action: Action) -> None:
+    """Add the actions to `edit`; `action` adds one from its name, usage and description."""
+    pick = action(
+        "pick",
+        f"{_WHERE} (--to C2 | --by DR,DG,DB | --with ID) {_WHEN}",
+        "change a colour of the clip into another one, and little else. The pick follows its "
+        "colour through the clip. All picks and holds are solved together: the palette does what "
+        "it can, a small neighbourhood of the colour the rest. With --with, say where the colour "
+        "of an earlier pick is at another frame.",
+    )
+    _add_where(pick)
+    _add_new(pick)
+    _add_how(pick)
+    pick.add_argument(
+        "--toward",
+        choices=("shift", "colour"),
+        help="at other frames: the same change (shift, default), or the same new colour",
+    )
+    pick.add_argument("--with", dest="same", metavar="ID", help="the pick whose path is corrected")
+    pick.set_defaults(run=run_pick)
+    hold = action(
+        "hold",
+        f"{_WHERE} [--with ID] {_WHEN}",
+        "keep a colour of the clip as it is, whatever picks and handles do. A hold follows its "
+        "colour as a pick does.",
+    )
+    _add_where(hold)
+    _add_how(hold)
+    hold.add_argument("--with", dest="same", metavar="ID", help="the hold whose path is corrected")
+    hold.set_defaults(run=run_pick, to=None, by=None, toward=None)
+    _add_change(action)
+    for name, text in (
+        ("enable", "switch picks and holds on again."),
+        ("disable", "switch picks and holds off, and keep them."),
+        ("unpick", "remove picks and holds."),
+    ):
+        parser = action(name, "ID [ID …]", text)
+        parser.add_argument("ids", nargs="+", metavar="ID", help="p1, p2, …")
+        parser.set_defaults(run=run_switch)
+    lock = action("lock", "ID [ID …]", "keep vertices and stops where they are when picks are met.")
+    lock.add_argument("ids", nargs="+", metavar="ID", help="a vertex or a stop")
+    lock.set_defaults(run=run_lock)
+    unlock = action("unlock", "ID [ID …]", "let picks move these vertices and stops again.")
+    unlock.add_argument("ids", nargs="+", metavar="ID", help="a locked vertex or stop")
+    unlock.set_defaults(run=run_lock)
+    picks = action("picks", "[--json]", "list the picks, holds and locks.")
+    picks.add_argument("--json", action="store_true", help="print JSON")
+    picks.set_defaults(run=run_picks)
+
+
+def _add_where(parser: argparse.ArgumentParser, required: bool = True) -> None:
+    parser.add_argument(
+        "--frame", type=number(), required=required, metavar="T", help="where the colour is picked"
+    )
+    where = parser.add_mutually_exclusive_group(required=required)
+    where.add_argument(
+        "--colour",
+        nargs="+",
+        metavar="C",
+        action=ColourAction,
+        help="the colour as it is before edits: R G B, R,G,B or #rrggbb",
+    )
+    where.add_argument(
+        "--pixel",
+        type=_pixel,
+        metavar="X,Y",
+        help="a pixel of the clip: X from the left, Y from the top, both from 0",
+    )
+    parser.add_argument(
+        "--box",
+        type=whole(1),
+        metavar="N",
+        help="with --pixel: the mean of N x N pixels (default 1)",
+    )
+    parser.add_argument(
+        "--clip", metavar="CLIP", help="the clip (default: the sidecar's, if it is there)"
+    )
+    parser.add_argument(
+        "--float",
+        action="store_true",
+        help="take colours such as 255 128 0 as they are, not as integers of 8 bits",
+    )
+
+
+def _add_new(parser: argparse.ArgumentParser) -> None:
+    new = parser.add_mutually_exclusive_group()
+    new.add_argument(
+        "--to", nargs="+", metavar="C2", action=ColourAction, help="the new colour, as --colour"
+    )
+    new.add_argument(
+        "--by",
+        nargs="+",
+        metavar="D",
+        action=ColourAction,
+        help="the change: DR DG DB or DR,DG,DB",
+    )
+
+
+def _add_how(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("--from", dest="start", type=number(), metavar="A", help="first frame with the full change")
+    add("--until", type=number(), metavar="B", help="last frame with the full change")
+    add(
+        "--fade",
+        type=number(0, 1e9),
+        metavar="N",
+        help="ramps of N frames before A and after B; beyond them nothing changes (default 0)",
+    )
+    add(
+        "--radius",
+        type=number(1e-4, 1e6),
+        metavar="R",
+        help="where the local neighbourhood ends, in code values (default: grows with the change)",
+    )
+    add("--global-only", action="store_true", help="move palette colours only")
+    add("--no-follow", action="store_true", help="the colour is the same in all frames")
+
+
+def _add_change(action: Action) -> None:
+    parser = action(
+        "change",
+        f"ID [--frame T] [--colour C | --pixel X,Y [--box N]] [--to C2 | --by D] {_WHEN}",
+        "change a pick or hold: its place, its new colour, its range. What is not given stays.",
+    )
+    parser.add_argument("id", metavar="ID", help="p1, p2, …")
+    _add_where(parser, required=False)
+    _add_new(parser)
+    _add_how(parser)
+    parser.add_argument("--toward", choices=("shift", "colour"), help="as in pick")
+    parser.set_defaults(run=run_change)
+
+
+def _pixel(text: str) -> tuple[float, float]:
+    try:
+        x, y = (float(part) for part in text.split(","))
+    except ValueError:
+        x = y = math.nan
+    if not (math.isfinite(x) and math.isfinite(y)):
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected X,Y, such as 320,180")
+    return x, y
+
+
+def run_pick(args: argparse.Namespace) -> int:
+    """Add a pick or a hold, or correct the path of one."""
+    document = _load(args)
+    where: dict[str, Any] = {
+        "colour": args.colour,
+        "pixel": args.pixel,
+        "box": _box(args) or 1,
+        "clip": args.clip,
+        "any_value": args.float,
+    }
+    how = {
+        "start": args.start,
+        "until": args.until,
+        "fade": args.fade,
+        "radius": args.radius,
+        "toward": args.toward,
+        "global_only": args.global_only or None,
+        "follow": False if args.no_follow else None,
+    }
+    given = {name: value for name, value in how.items() if value is not None}
+    with _bar(args) as progress:
+        if args.same is not None:
+            if args.to is not None or args.by is not None or given:
+                raise Palette4dError(
+                    "--with corrects the path of an earlier pick; it goes with --frame, --colour, "
+                    f"--pixel, --box and --clip only. `change {args.same}` changes the rest"
+                )
+            found = document.correct_path(args.same, args.frame, **where, progress=progress)
+        elif args.action == "hold":
+            found = document.hold(args.frame, **where, **given, progress=progress)
+        else:
+            if args.to is None and args.by is None:
+                raise Palette4dError(
+                    "found neither --to nor --by, expected the new colour or the change "
+                    "(or --with ID)"
+                )
+            found = document.pick(
+                args.frame, **where, to=args.to, by=args.by, **given, progress=progress
+            )
+    document.save()
+    print(_told(document, found, followed=not args.no_follow))
+    _print_notes(document)
+    return 0
+
+
+def run_change(args: argparse.Namespace) -> int:
+    """Change a pick or hold."""
+    document = _load(args)
+    old = next((pick for pick in document.picks if pick.id == args.id), None)
+    changes: dict[str, Any] = {
+        name: value
+        for name in ("frame", "to", "start", "until", "fade", "radius", "toward")
+        if (value := getattr(args, name)) is not None
+    }
+    if args.global_only:
+        changes["global_only"] = True
+    box = _box(args)
+    if args.no_follow:
+        changes["path"] = ()
+    with _bar(args) as progress:
+        if args.pixel is not None:
+            changes |= {"pixel": args.pixel, "box": box or 1}
+            changes["rgb"] = document.colour_of_pixel(
+                changes.get("frame", old.frame if old else 0.0), args.pixel, box or 1, args.clip
+            )
+        elif args.colour is not None:
+            changes |= {"rgb": args.colour, "pixel": None, "box": None}
+        if args.by is not None:
+            base = changes.get("rgb", old.rgb if old else (0.0, 0.0, 0.0))
+            changes["to"] = tuple(a + b for a, b in zip(base, args.by, strict=True))
+        if not changes:
+            raise Palette4dError("found nothing to change, expected at least one option")
+        found = document.change_pick(
+            args.id, any_value=args.float, clip=args.clip, progress=progress, **changes
+        )
+    document.save()
+    print(_told(document, found, followed=not args.no_follow))
+    _print_notes(document)
+    return 0
+
+
+def run_switch(args: argparse.Namespace) -> int:
+    """Enable, disable or remove picks and holds."""
+    document = _load(args)
+    ids = list(dict.fromkeys(args.ids))
+    if args.action == "unpick":
+        document.unpick(*ids)
+    else:
+        with document.one_step(f"{args.action} {' '.join(ids)}"):
+            for id_ in ids:
+                document.change_pick(id_, enabled=args.action == "enable")
+    document.save()
+    done = {"unpick": "removed", "enable": "enabled", "disable": "disabled"}[args.action]
+    print(f"{done}: {', '.join(ids)}")
+    _print_notes(document)
+    return 0
+
+
+def run_lock(args: argparse.Namespace) -> int:
+    """Lock or unlock handles."""
+    document = _load(args)
+    (document.lock if args.action == "lock" else document.unlock)(*args.ids)
+    document.save()
+    print(f"{args.action}ed: {', '.join(map(document.named, dict.fromkeys(args.ids)))}")
+    _print_notes(document)
+    return 0
+
+
+def run_picks(args: argparse.Namespace) -> int:
+    """List the picks, holds and locks."""
+    document = _load(args)
+    if args.json:
+        edits = document.fields()["edits"]
+        listed = {"picks": edits.get("picks", []), "locks": edits.get("locks", [])}
+        print(json.dumps(listed, allow_nan=False))
+        return 0
+    for pick in document.picks:
+        print(_told(document, pick))
+    if document.locks:
+        print(f"locked: {', '.join(map(document.named, document.locks))}")
+    if not document.picks and not document.locks:
+        print("no picks, holds or locks")
+    _print_notes(document)
+    return 0
+
+
+def _told(document: Document, pick: Pick, followed: bool = True) -> str:
+    """Return a pick or hold for people: what was asked, and how it is met."""
+    asked = shown(pick.rgb) + (f" -> {shown(pick.to)}" if pick.to is not None else " stays")
+    lines = [f"{pick.id}: {pick.kind} at frame {pick.frame:g}: {asked}"]
+    if pick.start is not None or pick.until is not None:
+        start = "the start" if pick.start is None else f"frame {pick.start:g}"
+        until = "the end" if pick.until is None else f"frame {pick.until:g}"
+        fade = f", ramps of {pick.fade:g} frames" if pick.fade else ""
+        lines[0] += f"; from {start} until {until}{fade}"
+    if not pick.enabled:
+        return f"{lines[0]}; disabled"
+    if pick.path:
+        first, last = pick.path[0].frame, pick.path[-1].frame
+        keys = counted(len(pick.path), "key")
+        lines.append(f"  follows its colour from frame {first:g} to {last:g} ({keys})")
+    else:
+        source = document.core.clip["source"]
+        why = f": the clip {source!r} was not found; give it with --clip" if followed else ""
+        lines.append(f"  is at the same colour in all frames{why}")
+    if pick.residual is not None and pick.share is not None:
+        what = "the palette" if pick.kind == "pick" else "kept by the palette"
+        lines.append(
+            f"  off by {pick.residual:.4f} at most; {pick.share:.0%} {what}, "
+            f"{1 - pick.share:.0%} its neighbourhood"
+        )
+    return "\n".join(lines)
+
+
+def _print_notes(document: Document) -> None:
+    """Print what the solution moves, and what it does not meet."""
+    from palette4d.grade.picks import unmet
+
+    enabled = [pick for pick in document.picks if pick.enabled]
+    if not enabled:
+        return
+    moved, among = document.moved_by_picks()
+    print(f"{moved} of {counted(among, 'handle')} move")
+    for line in unmet(enabled, document.frames[2]):
+        print(f"not met: {line}")
+    if not document.has_clip_colours:
+        print(
+            "note: this sidecar has no colours of its clip, so that only the palette's colours "
+            "are guarded. Analyse the clip again for a better guard"
+        )
+
+
+def _box(args: argparse.Namespace) -> int | None:
+    if args.box is not None and args.pixel is None:
+        raise Palette4dError("found --box without --pixel, expected both or neither")
+    box: int | None = args.box
+    return box
+
+
+def _bar(args: argparse.Namespace) -> Any:
+    from palette4d.cli.progress import frames_bar
+
+    return frames_bar("following", hidden=False)
+
+
+def _load(args: argparse.Namespace) -> Document:
+    from palette4d.grade.document import Document
+
+    return Document.load(args.sidecar)

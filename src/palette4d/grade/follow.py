@@ -1,0 +1,207 @@
+"""Following: where a picked colour is at the other frames of its clip.
+
+Input: a clip, a colour at a frame, and the frames of interest. Output: a path of a few keys. From
+each frame to the next the colour moves as the mean of the pixels near it moves (mean shift). One
+pass reads the frames; memory holds at most `MOST_COLOURS` colours for at most `MOST_FRAMES` frames.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palette4d import _core
+from palette4d.common.errors import Palette4dError
+from palette4d.grade.edits import Colour, as_colour
+from palette4d.grade.picks import PathKey
+from palette4d.media.clip_base import Clip, FrameError
+
+F64 = NDArray[np.float64]
+Progress = Callable[[int, int], object]
+"""Called as progress(done, total)."""
+
+#: Standard deviation of the pixels that count as near, in code values.
+NEAR = 0.08
+#: Rounds of the mean shift from one frame to the next, and the step at which it has arrived.
+ROUNDS, ARRIVED = 8, 1e-4
+#: A colour moves at most so far from one frame to the next; what jumps is another object.
+MOST_STEP = 0.08
+#: How strongly a colour that is still there is kept there, per frame; it is still there while the
+#: pixels near it are not 1 / SAME fewer or more than at first.
+HOME, SAME = 0.5, 4
+#: Fewer near pixels than this share of a frame: the colour is out of sight and stays.
+LEAST_SHARE = 1e-5
+
+#: In a longer range every n-th frame is read.
+MOST_FRAMES = 600
+#: Colours kept for each frame.
+MOST_COLOURS = 2048
+
+#: Keys that a straight line between their neighbours meets within this are left out.
+STRAIGHT = 0.012
+#: At most so many keys; a path with more is told less exactly.
+MOST_KEYS = 48
+DIGITS = 4
+
+
+def paths(
+    clip: Clip,
+    starts: Sequence[tuple[int, Colour]],
+    span: tuple[float, float],
+    *,
+    conversion: _core.ColourConversion | None = None,
+    progress: Progress | None = None,
+) -> tuple[PathKey, ...]:
+    """Follow one colour through a clip, from one or more frames where it is known.
+
+    Parameters
+    ----------
+    clip : Clip
+        The clip; its frames are read once, in order.
+    starts : list of (int, 3 floats)
+        Frames where the colour is known, and the colour, in the palette's code values. Between two
+        of them the path goes gradually from what follows the one to what follows the other.
+    span : (float, float)
+        First and last frame of interest.
+    conversion : ColourConversion, optional
+        From the clip's code values to the palette's.
+    progress : callable, optional
+        Called as progress(done, total) for each frame.
+
+    Returns
+    -------
+    tuple of PathKey
+        Keys in order of time; linear between them. The first and the last are at the ends of the
+        span; keys at `starts` are marked as given.
+
+    Raises
+    ------
+    Palette4dError
+        A start is no frame of the clip, or a frame cannot be read.
+    """
+    known = dict(sorted(starts))
+    for frame in known:
+        if frame not in clip.frames:
+            raise Palette4dError(
+                f"{clip.source} has no frame {frame}; expected one from {clip.frames[0]} to "
+                f"{clip.frames[-1]}"
+            )
+    low, high = min(span[0], *known), max(span[1], *known)
+    inside = [frame for frame in clip.frames if low <= frame <= high]
+    every = -(-len(inside) // MOST_FRAMES)
+    chosen = sorted({*inside[::every], inside[-1], *known})
+    frames, colours = _read(clip, chosen, conversion, progress)
+    for frame in known:
+        if frame not in frames:
+            raise Palette4dError(
+                f"frame {frame} of {clip.source} has no pixel that can be followed"
+            )
+    found = _joined(frames, colours, known)
+    kept = _few(np.array(frames, float), found, {frames.index(frame) for frame in known})
+    return tuple(
+        PathKey(frames[i], as_colour(np.round(found[i], DIGITS)), frames[i] in known) for i in kept
+    )
+
+
+def _read(
+    clip: Clip,
+    chosen: Sequence[int],
+    conversion: _core.ColourConversion | None,
+    progress: Progress | None,
+) -> tuple[list[int], list[tuple[F64, F64]]]:
+    """Return the frames with pixels, and the weighted colours of each."""
+    frames, colours = [], []
+    binner = _core.ColourBinner()
+    for done, (frame, fill) in enumerate(clip.fills(chosen), start=1):
+        try:
+            fill(binner)
+            taken = binner.take(MOST_COLOURS, MOST_COLOURS)
+        except FrameError:
+            taken = None
+        finally:
+            binner.clear()
+        if taken is not None:
+            rgb, counts = taken[0].rgb, taken[0].counts
+            frames.append(frame)
+            colours.append((rgb if conversion is None else conversion.to_palette(rgb), counts))
+        if progress:
+            progress(done, len(chosen))
+    return frames, colours
+
+
+def _joined(
+    frames: Sequence[int], colours: Sequence[tuple[F64, F64]], known: dict[int, Colour]
+) -> F64:
+    """Return the (n, 3) path through all known colours."""
+    at = {frames.index(frame): np.array(rgb) for frame, rgb in known.items()}
+    order = sorted(at)
+    found = np.empty((len(frames), 3))
+    found[: order[0] + 1] = _followed(colours[: order[0] + 1][::-1], at[order[0]])[::-1]
+    found[order[-1] :] = _followed(colours[order[-1] :], at[order[-1]])
+    for a, b in itertools.pairwise(order):
+        forward = _followed(colours[a : b + 1], at[a])
+        backward = _followed(colours[a : b + 1][::-1], at[b])[::-1]
+        part = np.linspace(0, 1, b - a + 1)[:, None]
+        found[a : b + 1] = (1 - part) * forward + part * backward
+    return found
+
+
+def _followed(colours: Sequence[tuple[F64, F64]], start: F64) -> F64:
+    """Return the (n, 3) path from a colour in the first frame to the last one."""
+    home = _near(start, *colours[0])
+    path = [start]
+    for before, after in itertools.pairwise(colours):
+        there = _shifted(path[-1], before, after)
+        now = _near(start, *after)
+        if home is not None and now is not None:
+            # While as many pixels as at first are near the start, the colour is still there:
+            # without this, small errors would add up in a still picture.
+            same = min(now[1] / home[1], home[1] / now[1])
+            still = start + now[0] - home[0]
+            there = there + HOME * max(0.0, 1 - (1 - same) * SAME) * (still - there)
+        path.append(there)
+    return np.array(path)
+
+
+def _shifted(here: F64, before: tuple[F64, F64], after: tuple[F64, F64]) -> F64:
+    """Return where a colour of one frame is in the next one (mean shift)."""
+    found = _near(here, *before)
+    if found is None:
+        return here
+    offset, there = found[0] - here, here
+    for _ in range(ROUNDS):
+        found = _near(there, *after)
+        if found is None:
+            return here
+        step = found[0] - offset - there
+        there = there + step
+        if np.abs(step).max() < ARRIVED:
+            break
+    length = float(np.linalg.norm(there - here))
+    moved: F64 = here + (there - here) * min(1.0, MOST_STEP / max(length, MOST_STEP))
+    return moved
+
+
+def _near(colour: F64, rgb: F64, counts: F64) -> tuple[F64, float] | None:
+    """Return the mean of a frame's pixels near a colour, and their share; None for hardly any."""
+    weight = counts * np.exp(((rgb - colour) ** 2).sum(axis=1) / (-2 * NEAR**2))
+    total, share = float(weight.sum()), float(weight.sum() / counts.sum())
+    return (weight @ rgb / total, share) if share >= LEAST_SHARE else None
+
+
+def _few(frames: F64, path: F64, fixed: set[int]) -> list[int]:
+    """Return the indices of the keys that are needed, at most `MOST_KEYS` beside the fixed ones.
+
+    The key that is farthest from the straight lines between the others is added first.
+    """
+    kept = sorted({0, len(frames) - 1, *fixed})
+    while len(kept) < MOST_KEYS + len(fixed):
+        lines = np.column_stack([np.interp(frames, frames[kept], path[kept, c]) for c in range(3)])
+        off = np.abs(lines - path).max(axis=1)
+        if off.max() <= STRAIGHT:
+            break
+        kept = sorted({*kept, int(off.argmax())})
+    return kept

@@ -1,0 +1,268 @@
+"""Picks and holds: colours of the clip that change or stay, as the user asked.
+
+A pick or a hold is stored in the sidecar's ``edits.picks``. `grade.solve` finds the displacements
+that meet all of them; `grade.follow` finds where a picked colour is at other frames.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palette4d.common.errors import Palette4dError
+from palette4d.grade.edits import Colour, as_colour
+
+F64 = NDArray[np.float64]
+Kind = Literal["pick", "hold"]
+Toward = Literal["shift", "colour"]
+
+#: More enabled picks and holds than this are refused: solving and recolouring would be slow.
+MOST_PICKS = 100
+
+#: A residual above this is told: 3 of 255.
+MET = 0.012
+
+#: Two picks nearer than this in colour are named together if one of them is not met.
+NEAR = 0.2
+
+
+@dataclass(frozen=True)
+class PathKey:
+    """Where a picked colour is at a frame; `given`: by the user, not found by following it."""
+
+    frame: float
+    rgb: Colour
+    given: bool = False
+
+
+@dataclass(frozen=True)
+class Pick:
+    """A colour that changes (kind "pick") or stays (kind "hold").
+
+    Attributes
+    ----------
+    id : str
+        p1, p2, …
+    kind : {"pick", "hold"}
+    frame, rgb : float and 3 floats
+        The colour, in the palette's code values, and the frame where it was picked; before edits.
+    to : 3 floats or None
+        The new colour; None for a hold.
+    toward : {"shift", "colour"}
+        At other frames: the same change as at `frame`, or the same new colour.
+    start, until : float or None
+        First and last frame with the full change; None: the clip's first and last.
+    fade : float
+        Frames of the ramps before `start` and after `until`.
+    radius : float or None
+        Where the local remainder ends, in the palette's code values; None: chosen by the solver.
+    global_only : bool
+        No local remainder.
+    enabled : bool
+    path : tuple of PathKey
+        Where the colour is at other frames, linear between the keys; empty: always `rgb`.
+    pixel, box : (x, y) and int, or None
+        The pixel and the side of the box around it whose mean was picked.
+    residual : float or None
+        How far the result is from what was asked, at worst, where the change is full.
+    share : float or None
+        Share, 0..1, of the change that the palette does; the local remainder does the rest.
+    """
+
+    id: str
+    kind: Kind
+    frame: float
+    rgb: Colour
+    to: Colour | None = None
+    toward: Toward = "shift"
+    start: float | None = None
+    until: float | None = None
+    fade: float = 0.0
+    radius: float | None = None
+    global_only: bool = False
+    enabled: bool = True
+    path: tuple[PathKey, ...] = ()
+    pixel: tuple[float, float] | None = None
+    box: int | None = None
+    residual: float | None = None
+    share: float | None = None
+
+    @classmethod
+    def from_fields(cls, fields: Mapping[str, Any]) -> Pick:
+        """Return the pick of an entry of a sidecar's ``edits.picks``."""
+        to, pixel = fields.get("to"), fields.get("pixel")
+        return cls(
+            id=fields["id"],
+            kind=fields["kind"],
+            frame=fields["frame"],
+            rgb=as_colour(fields["rgb"]),
+            to=None if to is None else as_colour(to),
+            toward=fields.get("toward", "shift"),
+            start=fields.get("from"),
+            until=fields.get("until"),
+            fade=fields.get("fade", 0.0),
+            radius=fields.get("radius"),
+            global_only=fields.get("global_only", False),
+            enabled=fields.get("enabled", True),
+            path=tuple(
+                PathKey(key["frame"], as_colour(key["rgb"]), key.get("given", False))
+                for key in fields.get("path", ())
+            ),
+            pixel=None if pixel is None else (pixel[0], pixel[1]),
+            box=fields.get("box"),
+            residual=fields.get("residual"),
+            share=fields.get("global"),
+        )
+
+    def to_fields(self) -> dict[str, Any]:
+        """Return the pick as the user asked for it, without what was measured."""
+        path = [
+            {"frame": _number(key.frame), "rgb": list(key.rgb)}
+            | ({"given": True} if key.given else {})
+            for key in self.path
+        ]
+        every: dict[str, Any] = {
+            "id": self.id,
+            "kind": self.kind,
+            "frame": _number(self.frame),
+            "rgb": list(self.rgb),
+            "to": None if self.to is None else list(self.to),
+            "toward": None if self.toward == "shift" else self.toward,
+            "from": None if self.start is None else _number(self.start),
+            "until": None if self.until is None else _number(self.until),
+            "fade": _number(self.fade) or None,
+            "radius": self.radius,
+            "global_only": self.global_only or None,
+            "enabled": None if self.enabled else False,
+            "path": path or None,
+            "pixel": None if self.pixel is None else [_number(value) for value in self.pixel],
+            "box": self.box,
+        }
+        return {name: value for name, value in every.items() if value is not None}
+
+    def colour_at(self, frame: float) -> F64:
+        """Return where the colour is at a frame, (3,)."""
+        if not self.path:
+            return np.array(self.rgb)
+        frames = [key.frame for key in self.path]
+        return np.array(
+            [
+                np.interp(frame, frames, channel)
+                for channel in np.transpose([k.rgb for k in self.path])
+            ]
+        )
+
+    def change_at(self, frame: float) -> F64:
+        """Return the full change that is asked for at a frame, (3,)."""
+        if self.to is None:
+            return np.zeros(3)
+        return np.array(self.to) - (self.colour_at(frame) if self.toward == "colour" else self.rgb)
+
+    def knots(self, step: float) -> tuple[float, float, float, float]:
+        """Return where the change begins, is full, is full for the last time, and ends.
+
+        Without a fade the ramps take one frame of the clip (`step` frame numbers).
+        """
+        start = -math.inf if self.start is None else self.start
+        until = math.inf if self.until is None else self.until
+        ramp = max(self.fade, step)
+        return start - ramp, start, until, until + ramp
+
+    def strength_at(self, frame: float, step: float) -> float:
+        """Return how much of the change is asked for at a frame, 0..1."""
+        begin, start, until, end = self.knots(step)
+        if start <= frame <= until:
+            return 1.0
+        before = (frame - begin) / (start - begin) if frame < start else 1.0
+        after = (end - frame) / (end - until) if frame > until else 1.0
+        return max(0.0, min(before, after))
+
+
+def all_picks(fields: Mapping[str, Any]) -> tuple[Pick, ...]:
+    """Return the picks and holds of a sidecar's member "edits"."""
+    return tuple(Pick.from_fields(entry) for entry in fields.get("picks", ()))
+
+
+def unmet(picks: Iterable[Pick], step: float) -> list[str]:
+    """Return a line for each enabled pick and hold that is not met, with the likely cause."""
+    enabled = [pick for pick in picks if pick.enabled]
+    lines = []
+    for number, pick in enumerate(enabled):
+        if number >= MOST_PICKS:
+            lines.append(
+                f"{pick.id} is not solved: only the first {MOST_PICKS} enabled picks and holds "
+                "are. Disable or remove some"
+            )
+        elif pick.residual is not None and pick.residual > MET:
+            lines.append(f"{pick.id} is off by {pick.residual:.3f}{_cause(pick, enabled, step)}")
+    return lines
+
+
+def _cause(pick: Pick, others: Sequence[Pick], step: float) -> str:
+    rivals = []
+    for other in others:
+        for frame in _together(pick, other, step) if other.id != pick.id else ():
+            away = float(np.linalg.norm(pick.colour_at(frame) - other.colour_at(frame)))
+            apart = float(np.linalg.norm(pick.change_at(frame) - other.change_at(frame)))
+            if away < NEAR and apart > away:
+                rivals.append((away, other.id, frame, apart))
+    if rivals:
+        away, id_, frame, apart = min(rivals)
+        return (
+            f": at frame {frame:g} the colour of {id_} is only {away:.3f} away, and the two ask "
+            f"for changes that differ by {apart:.3f}. Move or disable one of {pick.id} and {id_}"
+        )
+    if pick.global_only:
+        return ": the palette alone cannot express it. Leave out --global-only"
+    if pick.to is not None and any(not -0.05 <= value <= 1.05 for value in pick.to):
+        return ": its new colour lies far outside 0..1"
+    return ": the colour's surroundings or locked handles stand in its way"
+
+
+def _together(a: Pick, b: Pick, step: float) -> list[float]:
+    """Return the frames that either of two picks names, where both ask for something."""
+    frames = {key.frame for key in itertools.chain(a.path, b.path)} | {a.frame, b.frame}
+    frames |= {frame for frame in (a.start, a.until, b.start, b.until) if frame is not None}
+    return [f for f in sorted(frames) if min(p.strength_at(f, step) for p in (a, b)) > 0]
+
+
+def check_range(pick: Pick, frames: tuple[int, int, int]) -> None:
+    """Refuse a pick whose range is empty or outside the clip, or whose radius is not positive.
+
+    Raises
+    ------
+    Palette4dError
+        As said.
+    """
+    first, last, _ = frames
+    start = first if pick.start is None else pick.start
+    until = last if pick.until is None else pick.until
+    if not start <= until:
+        raise Palette4dError(
+            f"found the range from frame {start:g} until {until:g}, expected a first frame that is "
+            "not after the last one"
+        )
+    if start > last or until < first:
+        raise Palette4dError(
+            f"the range from frame {start:g} until {until:g} lies outside the clip; choose frames "
+            f"from {first} to {last}"
+        )
+    if not 0 <= pick.fade <= 1e9:
+        raise Palette4dError(f"found a fade of {pick.fade:g} frames, expected 0 or more")
+    if pick.radius is not None and not 1e-4 <= pick.radius <= 1e6:
+        raise Palette4dError(
+            f"found the radius {pick.radius:g}, expected 0.0001 or more, such as 0.2"
+        )
+    if pick.toward not in ("shift", "colour"):
+        raise Palette4dError(f"found toward {pick.toward!r}, expected 'shift' or 'colour'")
+
+
+def _number(value: float) -> float:
+    """Return whole numbers as int, so that the file has 40 and not 40.0."""
+    return int(value) if float(value).is_integer() else float(value)

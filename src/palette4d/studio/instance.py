@@ -1,0 +1,95 @@
+"""One window for a sidecar: a second `palette4d studio` of it brings the first to the front.
+
+Each window listens on a local socket named after its sidecar; only this user may connect.
+"""
+
+import hashlib
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtCore import QObject
+from PySide6.QtNetwork import QLocalServer, QLocalSocket
+
+#: Milliseconds that a window has for its answer.
+PATIENCE = 1000
+
+
+def name_of(sidecar: str | os.PathLike[str]) -> str:
+    """Return the socket's name for a sidecar."""
+    user = os.getuid() if hasattr(os, "getuid") else 0
+    key = f"{user} {os.path.realpath(sidecar)}"
+    return f"palette4d-studio-{hashlib.sha256(key.encode()).hexdigest()[:20]}"
+
+
+def bring_forward(sidecar: str | os.PathLike[str], frame: float | None) -> bool:
+    """Ask the window of a sidecar to come to the front and go to a frame; False without one."""
+    socket = QLocalSocket()
+    socket.connectToServer(name_of(sidecar))
+    if not socket.waitForConnected(PATIENCE):
+        return False
+    socket.write(json.dumps({"frame": frame}).encode() + b"\n")
+    socket.flush()
+    heard = socket.waitForReadyRead(PATIENCE)
+    socket.disconnectFromServer()
+    return heard
+
+
+class Listener(QObject):
+    """Listens for other starts with the sidecar of now.
+
+    Parameters
+    ----------
+    asked : callable
+        Called with the frame that was asked for, or None.
+    """
+
+    def __init__(self, parent: QObject, asked: Callable[[float | None], object]) -> None:
+        """Listen to nothing yet."""
+        super().__init__(parent)
+        self._asked = asked
+        self._server: QLocalServer | None = None
+        self._path: Path | None = None
+
+    def listen(self, sidecar: Path | None) -> None:
+        """Listen for a sidecar, or for none; quick if it is the same."""
+        if sidecar == self._path:
+            return
+        self._path = sidecar
+        if self._server is not None:
+            self._server.close()
+            self._server.deleteLater()
+            self._server = None
+        if sidecar is None:
+            return
+        probe = QLocalSocket()
+        probe.connectToServer(name_of(sidecar))
+        if probe.waitForConnected(100):  # another window has it; that one goes on listening
+            probe.disconnectFromServer()
+            return
+        QLocalServer.removeServer(name_of(sidecar))  # of a window that was killed
+        server = QLocalServer(self)
+        server.setSocketOptions(QLocalServer.SocketOption.UserAccessOption)
+        server.newConnection.connect(self._connected)
+        server.listen(name_of(sidecar))
+        self._server = server
+
+    def _connected(self) -> None:
+        assert self._server is not None
+        socket = self._server.nextPendingConnection()
+        socket.readyRead.connect(lambda: self._read(socket))
+        if socket.bytesAvailable():
+            self._read(socket)
+
+    def _read(self, socket: QLocalSocket) -> None:
+        if not socket.canReadLine():
+            return
+        try:
+            frame = json.loads(bytes(socket.readLine(4096).data()))["frame"]
+            wanted = None if frame is None else float(frame)
+        except (ValueError, KeyError, TypeError):
+            return
+        socket.write(b"ok\n")
+        socket.flush()
+        self._asked(wanted)

@@ -1,0 +1,227 @@
+"""Lists below the inspected colour: picks, holds and locks with what they reach, and versions."""
+
+from collections.abc import Callable
+
+import numpy as np
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QIcon, QKeyEvent, QPainter, QPixmap
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QPushButton,
+    QToolButton,
+    QTreeWidget,
+    QTreeWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from palette4d.grade.document import Document
+from palette4d.grade.picks import MET, Pick
+from palette4d.plotting import style
+from palette4d.studio import paint, texts, theme
+from palette4d.studio.screen_colours import on_screen
+from palette4d.studio.session import Session
+
+#: The size of the colours before a pick's name.
+ICON = QSize(34, 14)
+ID = Qt.ItemDataRole.UserRole
+
+
+class PickList(QWidget):
+    """Picks, holds and locks: enabled or not, selected, removed."""
+
+    def __init__(self, session: Session) -> None:
+        """Listen to the session."""
+        super().__init__()
+        self.session = session
+        self._silent = False
+        self.title = QLabel(texts.PICK_LIST)
+        self.title.setStyleSheet(f"color: {theme.FAINT}")
+        self.list = QTreeWidget()
+        self.list.setAccessibleName(texts.PICK_LIST)
+        self.list.setColumnCount(3)
+        self.list.setHeaderLabels(texts.PICK_COLUMNS)
+        self.list.setRootIsDecorated(False)
+        self.list.setUniformRowHeights(True)
+        self.list.setIconSize(ICON)
+        self.list.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
+        self.list.setMinimumHeight(96)
+        header = self.list.header()
+        header.setStretchLastSection(False)
+        header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
+        for column in (1, 2):
+            header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
+        self.remove = QPushButton(texts.REMOVE)
+        self.remove.clicked.connect(self.remove_selected)
+        row = QHBoxLayout()
+        row.addWidget(self.title, 1)
+        row.addWidget(self.remove)
+        column_ = QVBoxLayout(self)
+        column_.setContentsMargins(0, 0, 0, 0)
+        column_.setSpacing(4)
+        column_.addLayout(row)
+        column_.addWidget(self.list, 1)
+        self.list.itemSelectionChanged.connect(self._selected)
+        self.list.itemChanged.connect(self._toggled)
+        for event in ("document", "selection", "view"):
+            session.on(event, self.refresh)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Show the document's picks, holds and locks."""
+        document = self.session.document
+        picks = () if document is None else document.picks
+        locks = () if document is None else document.locks
+        self._silent = True
+        self.list.clear()
+        for pick in picks:
+            item = QTreeWidgetItem(self._words(pick))
+            item.setData(0, ID, pick.id)
+            item.setCheckState(
+                0, Qt.CheckState.Checked if pick.enabled else Qt.CheckState.Unchecked
+            )
+            item.setIcon(0, self._icon(pick))
+            item.setToolTip(0, self._tip(pick))
+            self.list.addTopLevelItem(item)
+            item.setSelected(pick.id in self.session.selection)
+        for id_ in locks:
+            item = QTreeWidgetItem([texts.LOCKED.format(id=id_), "", ""])
+            item.setData(0, ID, id_)
+            self.list.addTopLevelItem(item)
+            item.setSelected(id_ in self.session.selection)
+        self.remove.setEnabled(bool(self.list.selectedItems()))
+        self.setVisible(bool(picks or locks))
+        self._silent = False
+
+    @staticmethod
+    def _words(pick: Pick) -> list[str]:
+        kind = texts.HOLD if pick.kind == "hold" else texts.PICK
+        name = f"{pick.id} {kind} · {style.number(pick.frame)}"
+        if not pick.enabled or pick.residual is None:
+            return [name, "–", "–"]
+        met = texts.MET if pick.residual <= MET else texts.NOT_MET
+        share = "–" if pick.share is None else f"{pick.share:.0%}"
+        return [name, f"{met} {pick.residual:.3f}", share]
+
+    def _tip(self, pick: Pick) -> str:
+        first, last, _ = self.session.frames
+        start = first if pick.start is None else pick.start
+        until = last if pick.until is None else pick.until
+        ends = style.number(start), style.number(until), style.number(pick.fade)
+        return texts.PICK_TIP.format(*ends)
+
+    def _icon(self, pick: Pick) -> QIcon:
+        """Return the colour before and after; a hold has a bar across."""
+        ratio = self.devicePixelRatioF()
+        picture = QPixmap(ICON * ratio)
+        picture.setDevicePixelRatio(ratio)
+        both = np.array([pick.rgb, pick.rgb if pick.to is None else pick.to])
+        before, after = on_screen(self.session, both)
+        painter = QPainter(picture)
+        half = ICON.width() / 2
+        painter.fillRect(QRectF(0, 0, half, ICON.height()), paint.colour_of(before))
+        painter.fillRect(QRectF(half, 0, half, ICON.height()), paint.colour_of(after))
+        painter.setPen(paint.pen(style.RIM, 1.0))
+        painter.drawRect(QRectF(0.5, 0.5, ICON.width() - 1, ICON.height() - 1))
+        if pick.kind == "hold":
+            for colour, width in ((style.INK, 4.0), (style.BRIGHT, 2.0)):
+                painter.setPen(paint.pen(colour, width))
+                painter.drawLine(
+                    QPointF(4, ICON.height() / 2), QPointF(ICON.width() - 4, ICON.height() / 2)
+                )
+        painter.end()
+        return QIcon(picture)
+
+    def _selected(self) -> None:
+        if not self._silent:
+            self.session.select(*(item.data(0, ID) for item in self.list.selectedItems()))
+
+    def _toggled(self, item: QTreeWidgetItem, _: int) -> None:
+        if self._silent:
+            return
+        id_, on = item.data(0, ID), item.checkState(0) == Qt.CheckState.Checked
+        text = (texts.ENABLED if on else texts.DISABLED).format(id=id_)
+        self.session.edit(lambda document: document.change_pick(id_, enabled=on), text)
+
+    def remove_selected(self) -> None:
+        """Remove the selected picks and holds, and unlock the selected handles."""
+        ids = [item.data(0, ID) for item in self.list.selectedItems()]
+
+        def remove(document: Document) -> None:
+            with document.one_step(texts.REMOVED.format(ids=", ".join(ids))):
+                if locks := [id_ for id_ in ids if id_ in document.locks]:
+                    document.unlock(*locks)
+                if picks := [pick.id for pick in document.picks if pick.id in ids]:
+                    document.unpick(*picks)
+
+        if ids:
+            self.session.edit(remove, texts.REMOVED.format(ids=", ".join(ids)))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Delete removes."""
+        if event.key() in (Qt.Key.Key_Delete, Qt.Key.Key_Backspace):
+            self.remove_selected()
+            return
+        super().keyPressEvent(event)
+
+
+class Versions(QWidget):
+    """The versions of the grade: a button uses one."""
+
+    def __init__(self, session: Session, keep: Callable[[], object]) -> None:
+        """Listen to the session; `keep` keeps the edits as the next version."""
+        super().__init__()
+        self.session = session
+        self._shown: tuple[object, ...] = ()
+        label = QLabel(texts.VERSIONS)
+        label.setStyleSheet(f"color: {theme.FAINT}")
+        self.row = QHBoxLayout(self)
+        self.row.setContentsMargins(0, 0, 0, 0)
+        self.row.setSpacing(4)
+        self.row.addWidget(label)
+        self.row.addSpacing(4)
+        self.buttons: dict[str, QToolButton] = {}
+        self.row.addStretch(1)
+        self.keep = QPushButton(texts.KEEP)
+        self.keep.setToolTip(texts.KEEP_TIP)
+        self.keep.clicked.connect(keep)
+        self.row.addWidget(self.keep)
+        session.on("document", self.refresh)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Show the versions; the one whose edits are in use is checked."""
+        document = self.session.document
+        self.keep.setEnabled(document is not None)
+        if self.session.dragging:
+            return
+        names = () if document is None else document.versions
+        used = tuple(n for n in names if document is not None and document.same_edits(n))
+        if (names, used) == self._shown:
+            return
+        self._shown = (names, used)
+        for button in self.buttons.values():
+            self.row.removeWidget(button)
+            button.hide()
+            button.deleteLater()
+        self.buttons = {}
+        for number, name in enumerate(names, 1):
+            button = QToolButton()
+            button.setText(f"{texts.USED} {name}" if name in used else name)
+            button.setCheckable(True)
+            button.setChecked(name in used)
+            button.setToolTip(texts.USE_TIP.format(name=name, number=number))
+            button.clicked.connect(lambda _=False, name=name: self.use(name))
+            self.row.insertWidget(1 + number, button)
+            self.buttons[name] = button
+
+    def use(self, name: str) -> None:
+        """Use a version."""
+        self.session.edit(
+            lambda document: document.use_version(name), texts.USES_VERSION.format(name=name)
+        )
+        self._shown = ()
+        self.refresh()

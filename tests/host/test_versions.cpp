@@ -1,0 +1,143 @@
+// The solution of picks and the versions of a sidecar's edits, in the node.
+#include <cstring>
+
+#include "harness.hpp"
+#include "model/handles.hpp"
+
+using namespace strict;
+using namespace test;
+using palette4d::Vec3;
+
+namespace {
+
+/// A bump that moves most colours of the test picture, a vertex that moves too, and two versions.
+const std::string kSolution =
+    R"("solution": {"vertices": [{"vertex": "v2", "by": [0.125, 0, -0.0625]}], "keys": [],
+    "bumps": [{"radius": 1.5, "keys": [{"frame": 11, "rgb": [0.5, 0.5, 0.5], "by": [0.25, -0.125, 0]},
+    {"frame": 19, "rgb": [0.4, 0.5, 0.6], "by": [0, 0.125, 0.25]}]}]})";
+
+std::string text_with(const std::string& solution, const std::string& versions) {
+    std::string text = sidecar_text();
+    const std::size_t edits = text.find("\"edits\": {") + 10;
+    text.insert(edits, solution + ", ");
+    return text.insert(text.find("\"edits\""), "\"versions\": [" + versions + "], ");
+}
+
+const std::string kVersions = R"({"name": "warm 'Gr\u00fcn", "edits": {"vertices": [],
+    "stops": [], )" + kSolution +
+                              R"(}}, {"name": "plain", "edits": {"vertices": [], "stops": []}})";
+
+struct Scene : Ready {
+    Layout layout;
+    Picture source{layout}, output{layout};
+    explicit Scene(const std::string& text) : Ready(test::write("clip.p4d.json", text)) {
+        fill(source);
+    }
+    std::vector<unsigned char> render(double time = 2) {
+        output = Picture(layout);
+        CHECK(instance->render(time, &source, output, layout.bounds) == kOfxStatOK);
+        return output.pixels(layout.bounds);
+    }
+    std::vector<unsigned char> unchanged() const { return source.pixels(layout.bounds); }
+    std::vector<unsigned char> expected(const palette4d::Edits& edits, double frame = 12) const {
+        palette4d::Sidecar sidecar = parsed;
+        sidecar.edits = edits;
+        return recoloured(sidecar, frame, source, layout.bounds);
+    }
+    std::string message() { return instance->effect().persistent_message; }
+};
+
+}  // namespace
+
+TEST(the_node_applies_the_solution_of_the_picks) {
+    Scene scene(text_with(kSolution, ""));
+    scene.set("mode", 1);
+    palette4d::Edits without = scene.parsed.edits;
+    without.solution = {};
+    for (const double time : {0.0, 2.0, 5.5, 10.0}) {
+        const auto found = scene.render(time);
+        CHECK(found == scene.expected(scene.parsed.edits, 10 + time));
+        CHECK(found != scene.expected(without, 10 + time));
+    }
+    // Rewritten with another solution.
+    std::string other = kSolution;
+    other.replace(other.find("0.25, -0.125"), 12, "0.50, -0.125");
+    write("clip.p4d.json", text_with(other, ""));
+    const auto found = scene.render();
+    CHECK(found != scene.expected(scene.parsed.edits));
+    CHECK(found == scene.expected(palette4d::read_sidecar(scene.path).edits));
+}
+
+TEST(colours_from_the_host_keep_the_solution) {
+    Scene scene(text_with(kSolution, ""));
+    scene.set("mode", 1);
+    scene.set("handle02On", 1);
+    scene.set("handle02", std::array<double, 3>{0.75, 0.25, 0.5});
+    const auto with = [&](bool keep) {
+        return palette4d::with_colours(scene.parsed.polytope, scene.parsed.edits, keep,
+                                       {{1, {0.75, 0.25, 0.5}}});
+    };
+    CHECK(!with(true).solution.bumps.empty() && with(false).solution.bumps.empty());
+    CHECK(scene.render() == scene.expected(with(true)));
+    // The host's edits alone: the picks are the sidecar's.
+    scene.set("editsFrom", 1);
+    CHECK(scene.render() == scene.expected(with(false)));
+    CHECK(scene.expected(with(false)) != scene.expected(with(true)));
+}
+
+TEST(mattes_are_of_the_palette_alone) {
+    Scene plain(sidecar_text()), solved(text_with(kSolution, ""));
+    for (const int output : {1, 3}) {  // the weight of a handle, and what lies outside
+        std::vector<unsigned char> found[2];
+        for (Scene* scene : {&plain, &solved}) {
+            scene->set("output", output);
+            scene->set("weightOf", 2);
+            found[scene == &solved] = scene->render();
+        }
+        CHECK(found[0] == found[1]);
+        CHECK(found[0] != plain.unchanged());
+    }
+}
+
+TEST(the_user_chooses_a_version) {
+    Scene scene(text_with(kSolution, kVersions));
+    scene.set("mode", 1);
+    const auto active = scene.render();
+    CHECK(active == scene.expected(scene.parsed.edits));
+    scene.set("version", std::string("warm 'Gr\u00fcn"));
+    CHECK(scene.render() == scene.expected(scene.parsed.versions[0].edits));
+    CHECK(scene.render() != active);
+    scene.set("version", std::string("plain"));
+    CHECK(scene.render() == scene.unchanged());
+    CHECK(scene.message().empty());
+    // The status counts the version's edits and names the version.
+    CHECK(scene.instance->changed("version") == kOfxStatOK);
+    CHECK(scene.instance->text("status").find("0 edits") != std::string::npos);
+    CHECK(scene.instance->text("status").find("'plain'") != std::string::npos);
+    scene.set("version", std::string());
+    CHECK(scene.render() == active);
+    CHECK(scene.instance->changed("version") == kOfxStatOK);
+    CHECK(scene.instance->text("status").find("version") == std::string::npos);
+}
+
+TEST(a_version_that_is_not_there_is_said) {
+    Scene scene(text_with(kSolution, kVersions));
+    scene.set("version", std::string("warn"));
+    CHECK(scene.render() == scene.unchanged());
+    for (const char* word : {"'warn'", "'warm 'Gr\u00fcn'", "'plain'"}) {
+        EXPECT(scene.message().find(word) != std::string::npos, scene.message());
+    }
+    CHECK(scene.instance->changed("version") == kOfxStatOK);
+    CHECK(scene.instance->text("status") == scene.message());
+    // It comes back with the file.
+    std::string text = text_with(kSolution, kVersions);
+    text.replace(text.find("\"plain\""), 7, "\"warn\"");
+    write("clip.p4d.json", text);
+    scene.set("mode", 1);
+    CHECK(scene.render() == scene.unchanged() && scene.message().empty());
+    write("clip.p4d.json", text_with(kSolution, ""));
+    CHECK(scene.render() == scene.unchanged());
+    EXPECT(scene.message().find("no versions") != std::string::npos, scene.message());
+    scene.set("version", std::string());
+    CHECK(scene.render() != scene.unchanged() && scene.message().empty());
+}

@@ -1,0 +1,87 @@
+"""Fixtures of the window's tests: no screen, a small clip with its palette, and a window."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Generator
+from pathlib import Path
+
+import pytest
+
+os.environ["QT_QPA_PLATFORM"] = "offscreen"
+
+pytest.importorskip("PySide6", reason="the extra palette4d[studio] is not installed")
+
+from PySide6.QtCore import QSettings
+from PySide6.QtWidgets import QApplication
+
+from palette4d.cli.main import main
+from palette4d.studio import theme
+from palette4d.studio.session import Session
+from palette4d.studio.window import Window
+
+LATER = 1e9
+
+
+@pytest.fixture(scope="session")
+def analysed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a small clip, clip/frame.####.png, and its palette, clip.p4d.json."""
+    folder = tmp_path_factory.mktemp("analysed")
+    clip = str(folder / "clip" / "frame.####.png")
+    assert main(["sample-clip", "-o", clip, "--size", "160x90", "--frames", "12"]) == 0
+    out = str(folder / "clip.p4d.json")
+    assert main(["analyze", clip, "-o", out, "--quiet"]) == 0
+    return folder
+
+
+@pytest.fixture
+def sidecar(analysed: Path, tmp_path: Path) -> Path:
+    """The clip's sidecar, to be edited."""
+    path = tmp_path / "clip.p4d.json"
+    path.write_bytes((analysed / "clip.p4d.json").read_bytes())
+    (tmp_path / "clip").symlink_to(analysed / "clip")
+    return path
+
+
+@pytest.fixture
+def window(qapp: QApplication, tmp_path: Path) -> Generator[Window]:
+    """A window without a document."""
+    theme.dress(qapp)
+    settings = QSettings(str(tmp_path / "settings.ini"), QSettings.Format.IniFormat)
+    made = Window(Session(), settings)
+    made.resize(1200, 800)
+    made.show()
+    yield made
+    made.shut()
+    made.deleteLater()
+    qapp.processEvents()
+
+
+@pytest.fixture
+def opened(window: Window, sidecar: Path, settle: Callable[[Window], None]) -> Window:
+    """A window with the clip and its palette, drawn."""
+    window.open_path(str(sidecar))
+    settle(window)
+    return window
+
+
+@pytest.fixture
+def settle(qtbot) -> Callable[[Window], None]:  # type: ignore[no-untyped-def]
+    """Wait until the exact picture of the frame is shown."""
+
+    def wait(window: Window) -> None:
+        def shown() -> bool:
+            picture = window.viewer.picture
+            session = window.session
+            return (
+                picture is not None
+                and picture.exact
+                and picture.request.frame == session.frame
+                and picture.request.revision == session.revision
+                and picture.request.look == session.looked
+                and picture.request.sides == frozenset(window.viewer.sides)
+            )
+
+        qtbot.waitUntil(shown, timeout=20_000)
+
+    return wait

@@ -1,0 +1,246 @@
+"""The timeline in the window: what a person sees, drags and types."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Generator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+os.environ["QT_QPA_PLATFORM"] = "offscreen"
+pytest.importorskip("PySide6", reason="the extra palette4d[studio] is not installed")
+
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtWidgets import QApplication
+
+from palette4d.cli.main import main
+from palette4d.studio import theme, timeline_view
+from palette4d.studio.session import Probe, Session
+from palette4d.studio.timeline_view import TimelineView
+
+GOLDEN = Path(__file__).resolve().parent.parent / "golden" / "sidecars"
+LATER = 1e9
+LEFT = Qt.MouseButton.LeftButton
+
+
+@pytest.fixture
+def sidecar(tmp_path: Path) -> Path:
+    return Path(shutil.copy(GOLDEN / "v1_edited.p4d.json", tmp_path / "a.p4d.json"))
+
+
+@pytest.fixture
+def view(qapp: QApplication, sidecar: Path) -> Generator[TimelineView]:
+    theme.dress(qapp)
+    session = Session()
+    made = TimelineView(session)
+    made.resize(1000, 360)
+    made.show()
+    session.open_sidecar(sidecar)
+    qapp.processEvents()
+    yield made
+    session.close()
+    made.deleteLater()
+    qapp.processEvents()
+
+
+def place(view: TimelineView, id_: str) -> QPoint:
+    """Where a handle is drawn."""
+    disc = view._disc(id_)
+    assert disc is not None
+    return QPointF(disc.x, disc.y + view._top).toPoint()
+
+
+def on_band(view: TimelineView, edge: str, frame: float) -> QPoint:
+    found = view.timeline
+    assert found is not None
+    x, y = found[0].at(found[0].palette.edge_ids.index(edge), frame)
+    return QPointF(x, y + view._top).toPoint()
+
+
+def drag(qtbot: Any, view: TimelineView, start: QPoint, end: QPoint) -> None:
+    qtbot.mousePress(view, LEFT, pos=start)
+    for share in (0.4, 0.8, 1.0):
+        at = QPointF(start) * (1 - share) + QPointF(end) * share
+        qtbot.mouseMove(view, at.toPoint())
+        # Offscreen, a moved pointer carries no button: send what a mouse sends.
+        view.mouseMoveEvent(_moved(at))
+    qtbot.mouseRelease(view, LEFT, pos=end)
+
+
+def _moved(at: QPointF) -> Any:
+    from PySide6.QtCore import QEvent
+    from PySide6.QtGui import QMouseEvent
+
+    keys = Qt.KeyboardModifier.NoModifier
+    return QMouseEvent(QEvent.Type.MouseMove, at, at, Qt.MouseButton.NoButton, LEFT, keys)
+
+
+def seen(view: TimelineView, at: QPoint) -> np.ndarray:
+    colour = view.grab().toImage().pixelColor(at)
+    return np.array([colour.red(), colour.green(), colour.blue()])
+
+
+def test_a_row_shows_the_colour_before_above_and_after_below(view: TimelineView) -> None:
+    document = view.session.document
+    assert document is not None
+    id_ = "v3"
+    view.session.edit(lambda d: d.set(id_, rgb=(0.9, 0.1, 0.6)))
+    view.session.go(14)
+    disc = view._disc(id_)
+    assert disc is not None
+    at = place(view, id_)
+    half = QPoint(0, round(disc.radius / 2))
+    before = np.round(disc.before * 255)
+    assert np.abs(seen(view, at - half) - before).max() <= 2
+    assert np.abs(seen(view, at + half) - [230, 26, 153]).max() <= 2
+
+
+def test_a_click_selects_and_shift_adds(qtbot: Any, view: TimelineView) -> None:
+    qtbot.mouseClick(view, LEFT, pos=place(view, "v1"))
+    assert view.session.selection == ("v1",)
+    qtbot.mouseClick(view, LEFT, Qt.KeyboardModifier.ShiftModifier, place(view, "v2"))
+    assert view.session.selection == ("v1", "v2")
+    qtbot.mouseClick(view, LEFT, Qt.KeyboardModifier.ShiftModifier, place(view, "v1"))
+    assert view.session.selection == ("v2",)
+    qtbot.mouseClick(view, LEFT, pos=on_band(view, "e1", 5))
+    assert view.session.selection == ("e1",)
+    qtbot.mouseClick(view, LEFT, pos=QPoint(500, view.height() - timeline_view.FOOT - 3))
+    assert view.session.selection == ()
+
+
+def test_a_double_click_adds_a_stop_as_the_verb_does(
+    qtbot: Any, view: TimelineView, sidecar: Path, tmp_path: Path
+) -> None:
+    twin = Path(shutil.copy(sidecar, tmp_path / "twin.p4d.json"))
+    document = view.session.document
+    assert document is not None
+    rgb = document.colour("e1", frame=5)
+    qtbot.mouseDClick(view, LEFT, pos=on_band(view, "e1", 5))
+    document = view.session.document
+    (new,) = view.session.selection
+    assert document.settings[new].edge == "e1"
+    assert document.settings[new].frame == 5
+    view.session.tick(LATER)
+    words = ["set", "e1", "--frame", "5", "--rgb", *(repr(value) for value in rgb)]
+    assert main(["edit", str(twin), *words]) == 0
+    assert sidecar.read_bytes() == twin.read_bytes()
+
+
+def test_a_stop_is_dragged_to_whole_frames_and_stays_inside_its_edge(
+    qtbot: Any, view: TimelineView
+) -> None:
+    view.session.edit(lambda d: d.stop("e1", frame=4, rgb=(0.5, 0.5, 0.9)))
+    document = view.session.document
+    assert document is not None
+    stop = next(i for i, s in document.settings.items() if s.edge == "e1" and s.frame == 4)
+    steps = len(document.history)
+    start = place(view, stop)
+    end = QPoint(round(view.x_of(6.3)), start.y() + 40)
+    drag(qtbot, view, start, end)
+    document = view.session.document
+    assert document.settings[stop].frame == 6
+    assert len(document.history) == steps + 1  # a drag is one step
+    drag(qtbot, view, place(view, stop), QPoint(view.width() + 500, start.y()))
+    assert view.session.document is not None
+    last = view.session.document.settings[stop].frame
+    edge = next(e for e in document.core.polytope.edges[:1])
+    assert last is not None
+    assert last < float(document.core.polytope.vertices[edge[1], 3])
+    view.session.undo()
+    view.session.undo()
+    assert view.session.document.settings[stop].frame == 4
+
+
+def test_keys_go_through_handles_and_rows(qtbot: Any, view: TimelineView) -> None:
+    view.setFocus()
+    seen = []
+    for _ in range(4):
+        assert view.focusNextPrevChild(True)
+        seen.append(view.session.selection)
+    assert len(set(seen)) == 4
+    assert view.focusNextPrevChild(False)
+    assert view.session.selection == seen[2]
+    view.step_row(1)
+    (edge,) = view.session.selection
+    view.step_row(1)
+    assert view.session.selection != (edge,)
+    qtbot.keyClick(view, Qt.Key.Key_Escape)
+    assert view.session.selection == ()
+
+
+def test_nudge_and_reset_of_a_selected_stop(view: TimelineView) -> None:
+    view.session.edit(lambda d: d.stop("e1", frame=4, rgb=(0.5, 0.5, 0.9)))
+    document = view.session.document
+    assert document is not None
+    stop = next(i for i, s in document.settings.items() if s.edge == "e1" and s.frame == 4)
+    view.session.select(stop)
+    view.nudge(1)
+    assert view.session.document.settings[stop].frame == 5
+    view.reset_selected()
+    assert stop not in view.session.document.settings
+
+
+def test_the_ruler_moves_the_playhead(qtbot: Any, view: TimelineView) -> None:
+    qtbot.mouseClick(view, LEFT, pos=QPoint(round(view.x_of(7.4)), 10))
+    assert view.session.frame == 7
+
+
+def test_zoom_keeps_the_frame_under_the_pointer_and_pans_with_the_playhead(
+    view: TimelineView,
+) -> None:
+    x = view.x_of(6)
+    view.zoom(0.5, x)
+    assert view.x_of(6) == pytest.approx(x, abs=1.5)
+    start, end = view.span
+    assert end - start == pytest.approx(10)
+    view.session.go(20)
+    start, end = view.span
+    assert start <= 20 <= end
+    view.show_all()
+    assert view.span == (0, 20)
+
+
+def test_weights_of_the_pixel_are_written_beside_the_rows(view: TimelineView) -> None:
+    gutter = (0, timeline_view.RULER, timeline_view.GUTTER, view.height())
+    before = view.grab().copy(*gutter).toImage()
+    ids = view.session.document.palette(view.session.frame).ids  # type: ignore[union-attr]
+    view.session.show_probe(Probe(0, 0, (0, 0, 0), (0, 0, 0), {ids[0]: 0.75, ids[1]: 0.25}))
+    assert view.grab().copy(*gutter).toImage() != before
+
+
+def test_hover_is_shared(qtbot: Any, view: TimelineView) -> None:
+    view.mouseMoveEvent(_moved(QPointF(place(view, "v1"))))
+    assert view.session.hover == "v1"
+    view.leaveEvent(None)  # type: ignore[arg-type]
+    assert view.session.hover is None
+
+
+def test_ten_thousand_frames_zoom_to_single_frames(
+    qapp: QApplication, tmp_path: Path, qtbot: Any
+) -> None:
+    import json
+
+    data = json.loads((GOLDEN / "v1_split.p4d.json").read_text(encoding="utf-8"))
+    for part in (data["polytope"]["vertices"], data["polytope"]["blocks"]):
+        for entry in part:
+            entry.update({k: 500 * entry[k] for k in ("frame", "first", "last") if k in entry})
+    data["clip"]["frames"]["last"] = 10_000
+    path = tmp_path / "long.p4d.json"
+    path.write_text(json.dumps(data), encoding="utf-8")
+    session = Session()
+    view = TimelineView(session)
+    view.resize(1000, 300)
+    session.open_sidecar(path)
+    for _ in range(40):
+        view.zoom(0.6)
+    start, end = view.span
+    assert end - start == pytest.approx(timeline_view.CLOSEST)
+    x = view.x_of(session.frame)
+    assert view.frame_at(x + view.scale.per_frame) == session.frame + 1
+    view.grab()
+    session.close()
+    view.deleteLater()
