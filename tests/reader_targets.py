@@ -59,7 +59,7 @@ def index(path: Path, folder: Path) -> str:
 def correction(path: Path, folder: Path) -> str:
     """Write a CDL whose texts are the bytes; OpenColorIO must read its numbers back."""
     text = path.read_bytes().decode("utf-8", "ignore")
-    about = Description("urn:x", text, (text,), text, text, {})
+    about = Description("urn:x", text, (text,), text)
     written = cdl.Cdl((1.5, 1.0, 1.0), saturation=0.5)
     for name in ("cc", "ccc", "cdl"):
         file = folder / f"x.{name}"
