@@ -67,6 +67,51 @@ def test_the_exact_picture_has_the_bits_of_render(
     assert not np.array_equal(picture.result, picture.request.pixels)
 
 
+def test_a_picked_colour_has_the_bits_of_render(
+    opened: Window, sidecar: Path, settle: Settle, tmp_path: Path
+) -> None:
+    at = opened.viewer.point_of(60.5, 60.5).toPoint()
+    QTest.mouseClick(opened.viewer, Qt.MouseButton.LeftButton, pos=at)
+    session = opened.session
+    assert session.document is not None
+    place = opened.viewer.place(at.toPointF(), at.toPointF())
+    assert place is not None
+    session.edit(
+        lambda document: document.pick(FRAME, colour=place.colour, to=(0.9, 0.1, 0.5), follow=False)
+    )
+    settle(opened)
+    session.save()
+    clip, out = str(tmp_path / "clip"), str(tmp_path / "picked.####.tif")
+    words = ["render", str(sidecar), clip, "-o", out, "--bits", "32", "--frames", str(FRAME)]
+    assert main([*words, "--quiet"]) == 0
+    rendered = oiio.ImageBuf(str(tmp_path / "picked.0006.tif")).get_pixels(oiio.FLOAT)
+    picture = opened.viewer.picture
+    assert picture is not None
+    assert picture.result is not None
+    assert np.array_equal(picture.result, rendered[..., : picture.result.shape[2]])
+    y, x = place.y, place.x
+    assert np.abs(picture.result[y, x] - (0.9, 0.1, 0.5)).max() < 0.05
+
+
+def test_alt_click_is_a_hold_as_the_verb_makes_it(
+    opened: Window, sidecar: Path, tmp_path: Path, qtbot: Any
+) -> None:
+    twin = Path(shutil.copy(sidecar, tmp_path / "twin.p4d.json"))
+    at = opened.viewer.point_of(60.5, 60.5).toPoint()
+    place = opened.viewer.place(at.toPointF(), at.toPointF())
+    assert place is not None
+    alt = Qt.KeyboardModifier.AltModifier
+    QTest.mouseClick(opened.viewer, Qt.MouseButton.LeftButton, alt, at)
+    session = opened.session
+    qtbot.waitUntil(
+        lambda: session.document is not None and len(session.document.picks) == 1, timeout=30_000
+    )
+    assert session.save()
+    words = ["edit", str(twin), "hold", "--frame", str(FRAME), "--pixel", f"{place.x},{place.y}"]
+    assert main(words) == 0
+    assert sidecar.read_bytes() == twin.read_bytes()
+
+
 def test_the_picture_of_a_drag_is_near_the_exact_one(opened: Window, settle: Settle) -> None:
     id_ = busiest(opened)
     opened.session.edit(lambda document: document.set(id_, rgb=(0.9, 0.3, 0.1)))

@@ -56,8 +56,7 @@ class Grade:
     def recolourer(self) -> _core.Recolourer:
         """Return the exact recolouring."""
         palette = self.palette
-        options: Any = {} if self.bumps is None else {"bumps": self.bumps}
-        return _core.Recolourer(palette.rgb, palette.edited, palette.faces, **options)
+        return _core.Recolourer(palette.rgb, palette.edited, palette.faces, bumps=self.bumps)
 
 
 @dataclass(frozen=True)

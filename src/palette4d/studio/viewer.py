@@ -94,6 +94,8 @@ class Viewer(QWidget):
         self.on_hold: Any = None  #: the same with Alt
         session.on("clip", self._clip_changed)
         session.on("document", self.refresh)
+        session.on("document", self._probe_again)
+        session.on("pixels", self._probe_again)
         session.on("trial", self.refresh)
         session.on("playing", self.refresh)
         session.on("frame", self._frame_changed)
@@ -123,6 +125,7 @@ class Viewer(QWidget):
         if not session.playing:
             session.player.want(frames_around(session))
             self.refresh()
+        self._probe_again()
 
     def refresh(self) -> None:
         """Ask for the picture of now; while playing, the playback chooses the pictures."""
@@ -613,6 +616,11 @@ class Viewer(QWidget):
             return None
         mean = colours.mean(axis=0).tolist()
         return Place(session.frame, x, y, side, (mean[0], mean[1], mean[2]))
+
+    def _probe_again(self) -> None:
+        """Probe the same pixel of another frame or grade."""
+        if self._pointer is not None:
+            self._probe(self._pointer)
 
     def _probe(self, point: QPointF) -> None:
         at = self.pixel_at(point)
