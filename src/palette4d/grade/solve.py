@@ -365,7 +365,7 @@ def _least_squares(
     cost[:moves] = RIDGE
     weight: F64 = guard
     normal: NDArray[np.floating[Any]] = picked
-    found = target
+    found: NDArray[np.floating[Any]] = target
     for _ in range(ROUNDS):
         normal = picked + guard_rows.T @ (weight[:, None] * guard_rows) + np.diag(cost)
         found = np.linalg.solve(normal, target)
@@ -377,7 +377,7 @@ def _least_squares(
     few[moves:] = True
     found[~few] = 0.0
     found[few] = np.linalg.solve(normal[np.ix_(few, few)], target[few])
-    return found
+    return found.astype(np.float64)
 
 
 def _interpolated(bumps: F64, left: F64) -> F64:
