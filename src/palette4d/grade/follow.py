@@ -29,8 +29,8 @@ NEAR = 0.08
 ROUNDS, ARRIVED = 8, 1e-4
 #: A colour moves at most so far from one frame to the next; what jumps is another object.
 MOST_STEP = 0.08
-#: Weight of the path's bends: what is shorter than some 2 pi STIFF^(1/4) frames is jitter. Jitter of
-#: a path would be flicker of the grade. And the weight of places that the user gave.
+#: Weight of the path's bends: what is shorter than some 2 pi STIFF^(1/4) frames is jitter, which
+#: would be flicker of the grade. And the weight of colours that the user gave.
 STIFF, PINNED = 12.0, 1e6
 #: How strongly a colour that is still there is kept there, per frame; it is still there while the
 #: pixels near it are not 1 / SAME fewer or more than at first.
@@ -176,7 +176,7 @@ def _smoothed(path: F64, fixed: Sequence[int]) -> F64:
     bend = np.diff(np.eye(len(path)), 2, axis=0)
     smooth = np.linalg.solve(np.diag(weight) + STIFF * bend.T @ bend, weight[:, None] * path)
     smooth[list(fixed)] = path[list(fixed)]
-    return smooth
+    return np.asarray(smooth, np.float64)
 
 
 def _shifted(here: F64, before: tuple[F64, F64], after: tuple[F64, F64]) -> F64:
