@@ -39,12 +39,13 @@ SOURCES := pyproject.toml README.md LICENSE $(shell find src ofx_plugin analysis
 	! -name '__pycache__*' ! -name '*.pyc')
 CXX_FILES = $(shell find ofx_plugin tests -name '*.cpp' -o -name '*.hpp' -o -name '*.h' -o -name '*.inl')
 
-.PHONY: help demo test test-all install dev wheel lint style types build-cpp build-sanitize build-threads \
+.PHONY: help demo studio docs-images test test-all install dev wheel lint style types build-cpp build-sanitize build-threads \
 	build-fuzz test-cpp test-sanitize test-threads test-threads-short test-fuzz test-py format clean \
 	compiler fuzz-compiler
 
 help: ## this list
 	@echo "make demo            from nothing to results in demo_output/"
+	@echo "make studio          the window, with the demo's result"
 	@echo "make test            lint, C++ tests (plain and sanitized), the wheel, host tests; no slow tests"
 	@echo "make test-all        the same with the slow tests, ThreadSanitizer and libFuzzer, before a release"
 	@echo
@@ -58,6 +59,7 @@ help: ## this list
 	@echo "make test-fuzz       libFuzzer over the sidecar's reader for FUZZ_SECONDS (needs Clang; not part of make test)"
 	@echo "make test-py         pytest on the wheel in a fresh environment (PYTEST_ARGS=... is passed on)"
 	@echo "make format          rewrite the sources as ruff and clang-format want them"
+	@echo "make docs-images     draw the pictures of the docs again, from the demo"
 	@echo "make clean           remove everything that was built"
 	@echo
 	@echo "PYTHON=/path/to/python3.12 chooses the Python; CXX=... the compiler; OPENFX_ROOT=... a folder"
@@ -145,6 +147,23 @@ $(TEST_VENV)/.installed: build/test-wheel.stamp
 demo: $(VENV)/.installed ## from nothing to results in demo_output/
 	@$(VENV)/bin/python tools/demo.py demo_output
 
+demo_output/sample.p4d.json:
+	$(MAKE) demo
+
+$(VENV)/.studio: $(VENV)/.installed pyproject.toml
+	@echo "== the window's toolkit into $(VENV)"
+	$(VENV)/bin/python tools/requirements.py studio > $(VENV)/studio.txt
+	$(VENV)/bin/python $(PIP) install -r $(VENV)/studio.txt
+	@touch $@
+
+studio: $(VENV)/.studio demo_output/sample.p4d.json ## the window, with the demo's result
+	@$(VENV)/bin/palette4d studio demo_output/sample.p4d.json
+
+docs-images: $(VENV)/.studio demo_output/sample.p4d.json ## draw the pictures of the docs again
+	$(VENV)/bin/python docs/pictures.py demo_output
+	$(VENV)/bin/python docs/page_pictures.py
+	$(VENV)/bin/python docs/studio_pictures.py demo_output
+
 # ---------------------------------------------------------------------------- tests
 
 test: lint test-cpp test-sanitize test-py ## what a change must pass: all but the slow tests
@@ -174,6 +193,9 @@ types: $(TOOLS)/.installed $(TEST_VENV)/.installed
 	@echo "== mypy --strict on the installed wheel"
 	$(TOOLS)/bin/mypy --python-executable $(TEST_VENV)/bin/python -p palette4d
 	$(TOOLS)/bin/mypy --python-executable $(TEST_VENV)/bin/python tools
+	@echo "== stubtest: _core.pyi against the compiled module"
+	@PYTHONPATH=$$($(TOOLS)/bin/python -c 'import sysconfig; print(sysconfig.get_path("platlib"))') \
+		$(TEST_VENV)/bin/python -m mypy.stubtest palette4d._core --allowlist tools/stub_allowlist.txt
 	@echo "== import-linter: who may import whom"
 	@PYTHONPATH=$$($(TEST_VENV)/bin/python -c 'import sysconfig; print(sysconfig.get_path("platlib"))') \
 		$(TOOLS)/bin/lint-imports --no-cache --config pyproject.toml
@@ -214,9 +236,12 @@ test-fuzz: build-fuzz
 test-py: $(TEST_VENV)/.installed
 	@echo "== pytest on the installed wheel"
 	@rm -rf build/test-run && mkdir -p build/test-run
-	@wheel=$$(echo "$(CURDIR)"/$(TEST_WHEELS)/*.whl) && cd build/test-run && \
+	@qt=$$($(TEST_VENV)/bin/python -c 'import PySide6.QtWidgets' 2>&1) && qt= || { \
+		echo "== without the window's tests: Qt needs libegl1 libgl1 libxkbcommon0 libfontconfig1 libdbus-1-3"; \
+		qt="-p no:pytest-qt"; }; \
+	wheel=$$(echo "$(CURDIR)"/$(TEST_WHEELS)/*.whl) && cd build/test-run && \
 		PALETTE4D_WHEEL="$$wheel" "$(CURDIR)/$(TEST_VENV)/bin/python" -P -m pytest \
-		-c "$(CURDIR)/pyproject.toml" --rootdir "$(CURDIR)" "$(CURDIR)/tests" -n $(JOBS) --durations 10 \
+		-c "$(CURDIR)/pyproject.toml" --rootdir "$(CURDIR)" "$(CURDIR)/tests" -n $(JOBS) --durations 10 $$qt \
 		$(if $(SLOW),,-m "not slow") $(PYTEST_ARGS)
 
 format: $(TOOLS)/.installed ## rewrite the sources as ruff and clang-format want them

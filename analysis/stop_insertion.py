@@ -8,7 +8,7 @@ median's, and those with lost pixels (`LOST`).
 The colours outside the palette of such a frame get a stop on a track near them, with or without
 stops before and after that keep the rest of the track where it is. In the clip's first and last
 frame the vertex of the track itself takes the colour. A stop need not be worth `handle_cost`, which
-judges the mean. It stays if it mends most of the frame's misfit at little cost elsewhere: where
+judges the mean. It stays if it removes most of the frame's misfit at little cost elsewhere: where
 pixels are lost, the value of `Objective` may rise by `WORTH`. Its edges count little in eq. 11,
 which would otherwise rather lose the colour than let it change quickly.
 """
@@ -33,7 +33,7 @@ F64 = NDArray[np.float64]
 
 MOST_ROUNDS = 10
 BAD = 3.0  # times the median frame's loss: such a frame gets a stop
-MENDED = 0.5  # the least share of a misfit that a stop must mend
+REMOVED = 0.5  # the least share of a misfit that a stop must remove
 WORTH = 0.04  # the most that lost pixels may raise the value of `Objective`
 SAME_COLOUR = 0.25  # lost colours within this distance belong together
 FARTHEST = 1000  # lost colours that are looked at
@@ -76,9 +76,9 @@ def insert_stops(
                 continue
             price = change + options.handle_cost * len(trial.new)
             rest = _Misfit.of(moved.polytope, [frames[i] for i in trial.span], gamut, options)
-            mended = [misfit.mended(i, rest, at, trial.share) for at, i in enumerate(trial.span)]
-            left = mended.count(False)
-            if mended[trial.span.index(worst)] and (best is None or (left, price) < best[:2]):
+            removed = [misfit.removed(i, rest, at, trial.share) for at, i in enumerate(trial.span)]
+            left = removed.count(False)
+            if removed[trial.span.index(worst)] and (best is None or (left, price) < best[:2]):
                 best = left, price, moved
         if best is None:
             hopeless.add(worst)
@@ -131,15 +131,15 @@ class _Misfit:
                 return max(found, key=lambda i: of[i])
         return None
 
-    def mended(self, frame: int, rest: _Misfit, at: int, share: float) -> bool:
+    def removed(self, frame: int, rest: _Misfit, at: int, share: float) -> bool:
         """Return whether most of a frame's misfit is gone in frame `at` of `rest`.
 
         With `share`, of the pixels of one lost colour, that is the misfit that counts.
         """
         if share:
-            less = self.lost[frame] - rest.lost[at] >= MENDED * min(share, self.lost[frame])
+            less = self.lost[frame] - rest.lost[at] >= REMOVED * min(share, self.lost[frame])
             return bool(less and rest.far[at] <= self.far[frame])
-        return bool(rest.loss[at] <= self.loss[frame] - MENDED * (self.loss[frame] - self.usual))
+        return bool(rest.loss[at] <= self.loss[frame] - REMOVED * (self.loss[frame] - self.usual))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""What is a palette worth in linear light, and what does the way to another colour space cost?
+"""How much does a log palette space gain on a scene-linear clip, and how long does conversion take?
 
 A scene-linear clip (ACEScg, from below 0 to 50: a bright edge above a dim scene) is analysed with
 the same options in ACEScct and in its own linear light. Then frames of it are recoloured in one

@@ -1,4 +1,4 @@
-"""Which finder of cuts is surer: palette4d's, or a detector of PySceneDetect?
+"""Which detector finds sudden cuts more reliably: palette4d's or PySceneDetect's?
 
 Every finder sees the same decoded frames and is judged by cuts that are known: those given with the
 clips (looked up by eye), and those of splices made here. A splice puts pieces of 2 to 12 frames

@@ -1,4 +1,4 @@
-"""How do the cost and the memory of an analysis grow with a clip's frames and with its resolution?
+"""How do time and memory of an analysis grow with a clip's frames and with its resolution?
 
 Draws movies (the sample clip's scene from day to night, with grain; H.264, 4:2:0, 8 bit) into a
 temporary folder, then runs `palette4d analyze` on each in a fresh process and, in turn, one that

@@ -1,4 +1,4 @@
-"""How good is a palette of how many handles, and what is traded for what?
+"""How good is a palette with a given number of handles, and what do more handles cost?
 
 Runs `palette4d analyze --vertices N` from the fewest vertices that a clip's structure allows to 40,
 and measures each palette on every pixel; the static hull stands at one end, hulls of single frames

@@ -1,4 +1,4 @@
-"""What do the paper's experiments give with this program, and what does its own method give?
+"""What do the paper's experiments give with this program, with its default and the paper's method?
 
 Sections 6.1 and 6.2 on a clip, by the real command: Table 1 (alpha and eta1), Table 2 (beta),
 figure 8 (eta2), figure 9 (vertex refinement), and the comparison of methods. The paper's rules are

@@ -8,6 +8,7 @@ Other processes or machines bake the frames. Only this process writes in the fol
 """
 
 import hashlib
+import itertools
 import math
 import tempfile
 import time
@@ -16,6 +17,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from palette4d.lut_export.bake import bake, check_settings, check_target
 from palette4d.lut_export.bake_job import BakeSettings
 from palette4d.lut_export.formats import format_named
@@ -39,6 +42,9 @@ from palette4d.jobs.workers import Failed, Workers
 
 #: Seconds between two updates of the index file while frames are baked.
 INDEX_EVERY = 2.0
+
+#: How far a smooth ramp may be from a line between two frames of `stops`, in code values.
+STRAIGHT = 0.004
 
 
 @dataclass(frozen=True)
@@ -112,19 +118,26 @@ def every(sidecar: _core.Sidecar, step: int) -> tuple[int, ...]:
 
 
 def stops(sidecar: _core.Sidecar) -> tuple[int, ...]:
-    """Return the frames of the stops, the edited palette colours and their neighbours.
+    """Return the frames between which the grade changes along a line.
 
-    At a neighbouring palette colour an edit begins or ends. Each time is rounded to a frame. A
-    sidecar without edits is refused.
+    These are the frames of the stops, of the edited palette colours and of their neighbours, where
+    an edit begins or ends, and the same of the solution of picks. A smooth ramp and a bump that
+    follows its colour have more between them, a held edit its last frame. Each time is rounded to a
+    frame. A sidecar without edits is refused.
     """
     polytope, edits = sidecar.polytope, sidecar.edits
     index = {name: i for i, name in enumerate(polytope.vertex_ids)}
     edges = dict(zip(polytope.edge_ids, polytope.edges.tolist(), strict=True))
+    solution = edits.solution
     edited = {index[name] for name in edits.vertex_rgb}
+    edited |= {index[entry["vertex"]] for entry in solution["vertices"]}
     around = edited | {end for ends in edges.values() if edited & set(ends) for end in ends}
-    around |= {end for stop in edits.stops for end in edges[stop["edge"]]}
-    times = [float(stop["frame"]) for stop in edits.stops]
+    marks = [*edits.stops, *solution["keys"]]
+    around |= {end for mark in marks for end in edges[mark["edge"]]}
+    times = [float(mark["frame"]) for mark in marks]
     times += [float(polytope.vertices[i, 3]) for i in around]
+    times += [time for edge in edges for time in _ramp_times(sidecar, edge)]
+    times += [time for bump in solution["bumps"] for time in _bump_times(bump)]
     if not times:
         raise Palette4dError(
             "nothing is edited in this sidecar, so that there are no stops; edit it, or choose "
@@ -132,6 +145,60 @@ def stops(sidecar: _core.Sidecar) -> tuple[int, ...]:
         )
     low, high = _limits(sidecar)
     return tuple(sorted({min(max(math.floor(t + 0.5), low), high) for t in times}))
+
+
+def _ramp_times(sidecar: _core.Sidecar, edge: str) -> list[float]:
+    """Return the times on an edge, besides its handles, that its ramps need."""
+    polytope, edits = sidecar.polytope, sidecar.edits
+    number = polytope.edge_ids.index(edge)
+    ends = [polytope.vertex_ids[i] for i in polytope.edges[number]]
+    stops = sorted((s for s in edits.stops if s["edge"] == edge), key=lambda s: float(s["frame"]))
+    if not stops and not edits.vertex_rgb.keys() & set(ends):
+        return []
+    times = [float(polytope.vertices[polytope.edges[number, 0], 3])]
+    times += [float(stop["frame"]) for stop in stops]
+    times += [float(polytope.vertices[polytope.edges[number, 1], 3])]
+    ramps = [edits.vertex_ramp.get(ends[0]), *(stop.get("ramp") for stop in stops)]
+
+    def moved(time: float) -> NDArray[np.float64]:
+        cut = _core.slice_at(polytope, time)
+        row = cut.edges.tolist().index(number)
+        by: NDArray[np.float64] = _core.edited_colours(polytope, edits, cut)[row] - cut.rgb[row]
+        return by
+
+    def bends(start: float, end: float) -> list[float]:
+        if end - start <= 1:
+            return []
+        parts = np.linspace(0, 1, 5)
+        # Just inside: at its ends the edge has no place of its own in a slice.
+        inner = start + (end - start) * np.clip(parts, 1e-6, 1 - 1e-6)
+        found = np.array([moved(time) for time in inner.tolist()])
+        line = found[0] + parts[:, None] * (found[-1] - found[0])
+        if np.abs(found - line).max() <= STRAIGHT:
+            return []
+        middle = (start + end) / 2
+        return [*bends(start, middle), middle, *bends(middle, end)]
+
+    result = []
+    for (start, end), own in zip(itertools.pairwise(times), ramps, strict=True):
+        ramp = own or edits.ramp
+        if ramp == "smooth":
+            result += bends(start, end)
+        elif ramp == "hold" and start < math.ceil(end) - 1:
+            result.append(math.ceil(end) - 1.0)
+    return result
+
+
+def _bump_times(bump: dict[str, Any]) -> list[float]:
+    """Return the times of a bump's keys, and those that it needs while its centre moves."""
+    result = [float(key["frame"]) for key in bump["keys"]]
+    for before, after in itertools.pairwise(bump["keys"]):
+        span = after["frame"] - before["frame"]
+        steps = math.ceil(4 * math.dist(before["rgb"], after["rgb"]) / bump["radius"])
+        steps = min(steps, math.ceil(span))
+        if any(before["by"]) or any(after["by"]):
+            result += [before["frame"] + span * i / steps for i in range(1, steps)]
+    return result
 
 
 def check_frames(sidecar: _core.Sidecar, frames: tuple[int, ...]) -> tuple[int, ...]:

@@ -1,4 +1,4 @@
-"""What `pip install` lays down: the wheel's content, its metadata, the command and its help."""
+"""What `pip install` installs: the wheel's content, its metadata, the command and its help."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`import palette4d`: what is public, that it loads quickly, and that its page is true."""
+"""`import palette4d`: its public names, quick import, and docs/python.md line by line."""
 
 import re
 import subprocess

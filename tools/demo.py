@@ -7,6 +7,7 @@ ends the demo with its exit status. Only before_after.png is made here, from the
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import json
 import shlex
 import shutil
@@ -113,10 +114,10 @@ def demo(out: Path) -> None:
     clip, graded = out / "clip", out / "graded"
     sidecar, sheet = out / "sample.p4d.json", out / "before_after.png"
     palette, edited = out / "palette.png", out / "palette_edited.png"
-    cube, clf = out / "autumn.cube", out / "autumn.clf"
+    cube, clf, studio = out / "autumn.cube", out / "autumn.clf", out / "studio.png"
     for folder in (clip, graded):
         shutil.rmtree(folder, ignore_errors=True)
-    for file in (sidecar, sheet, palette, edited, cube, clf):
+    for file in (sidecar, sheet, palette, edited, cube, clf, studio):
         file.unlink(missing_ok=True)
     for folder in (clip, graded):
         folder.mkdir(parents=True)
@@ -146,6 +147,15 @@ def demo(out: Path) -> None:
             *("bake", str(sidecar), "--frame", str(AUTUMN), "--clip", frames, "-o", str(file)),
         )
     before_after(clip, graded, sheet)
+    window = ""
+    if importlib.util.find_spec("PySide6") is not None:
+        run(
+            "The window, drawn without a screen",
+            *("studio", str(sidecar), "--frame", str(GOLD), "--screenshot", str(studio)),
+        )
+        window = f"""
+  {studio}
+        the window with the sidecar"""
 
     command = shown(COMMAND)
     say(f"""
@@ -163,10 +173,12 @@ def demo(out: Path) -> None:
   {sidecar}
         the sidecar: the palette and its edits, a text file
   {clip}/sample.####.png
-        the sample clip, 16 bit
+        the sample clip, 16 bit{window}
 
 == What to try next
 
+  the same in a window: click a colour, choose what it becomes
+      make studio
   another colour
       {command} edit {sidecar} set --near 0.9,0.11,0.05 --frame 30 --rgb 0.1 0.4 0.9
       {command} render {sidecar} '{frames}' -o '{graded}/sample.####.exr' --force

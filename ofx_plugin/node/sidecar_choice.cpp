@@ -70,6 +70,7 @@ void choose_version(Chosen& chosen, const std::string& name) {
                                 "; change Version";
     }
     chosen.result.loaded = std::move(version);
+    chosen.version = name;
 }
 
 Chosen chosen_file(const Params& params) {

@@ -22,6 +22,7 @@ void define_file_params(ParamDefiner& define);
 struct Chosen {
     bool any = false;  ///< the user chose a sidecar, or the clip's name found one
     SidecarResult result;
+    std::string version;    ///< the version that is used; empty: the active edits
     std::string path;       ///< where it is, or where it was expected
     bool embedded = false;  ///< the project's copy is used, since the file cannot be read
     std::string broken;     ///< what is wrong with the file, if there is one

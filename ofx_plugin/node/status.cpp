@@ -81,6 +81,7 @@ std::string status_of(const Chosen& chosen, int handles, const std::string& expe
     }
     if (!chosen.result.loaded) return printable(chosen.result.problem);
     std::string text = describe(chosen.result.loaded->sidecar());
+    if (!chosen.version.empty()) text += " in version '" + chosen.version + "'";
     if (handles > 0) {
         text +=
             ", " + counted(static_cast<std::size_t>(handles), "handle", "handles") + " in use here";

@@ -1,4 +1,4 @@
-"""Colour statistics: exact for few colours, bounded for everything, their error on a real clip."""
+"""Colour statistics: exact for few colours, bounded memory, and their error on a real clip."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Per-frame palettes: they enclose, they are small, and flat colours get flat palettes."""
+"""Per-frame palettes enclose the colours, have few vertices, and are flat for flat colours."""
 
 from __future__ import annotations
 

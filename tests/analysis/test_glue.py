@@ -1,4 +1,4 @@
-"""Gluing: the four rules hold, the obvious correspondence is found, the mesh between is closed."""
+"""Gluing: the four topological rules hold, tracks join like colours, the mesh between is closed."""
 
 from __future__ import annotations
 

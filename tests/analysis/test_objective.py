@@ -1,4 +1,4 @@
-"""Eq. 12 as a function of the vertices: gradient, boxes, and moving all vertices jointly."""
+"""Eq. 12 as a function of the vertices: its gradient, box limits, joint moves of all vertices."""
 
 from __future__ import annotations
 

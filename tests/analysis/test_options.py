@@ -1,4 +1,4 @@
-"""Which method looks at which option: what is refused has no effect, what is taken has one."""
+"""Options and methods: a refused option has no effect on its method, an accepted one has one."""
 
 from __future__ import annotations
 

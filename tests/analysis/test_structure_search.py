@@ -1,4 +1,4 @@
-"""The structure search: predictable vertices go, those that are worth their cost stay."""
+"""The structure search removes vertices on straight paths and keeps those worth their cost."""
 
 from __future__ import annotations
 

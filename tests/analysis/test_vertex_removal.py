@@ -1,4 +1,4 @@
-"""Thinning out: what straight paths predict goes at once, bends stay."""
+"""Vertex removal: vertices on straight paths go at once, vertices at bends stay."""
 
 from __future__ import annotations
 

@@ -148,7 +148,7 @@ def test_a_frame_of_which_nothing_shows_is_passed_over(tmp_path, capsys):
     assert main.main(["analyze", str(folder), "-o", str(out), "--json"]) == 0
     printed = capsys.readouterr()
     notes = json.loads(printed.out)["notes"]
-    assert "2 frames have no usable pixel and were passed over: 1, 4" in notes
+    assert "2 frames have no usable pixel and were left out: 1, 4" in notes
     assert "frame 1 takes the palette of frame 2" in notes
     assert not any("it was ignored" in note for note in notes)
     assert json.loads(out.read_text())["clip"]["frames"]["first"] == 1

@@ -1,4 +1,4 @@
-"""What every verb reads alike: frames, negative values, numbers that no file can make right."""
+"""Values that all verbs parse alike: frames, negative numbers, values that are never valid."""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
-"""The verb ``edit``: by id, by nearness, stops, and everything that must leave the file alone."""
+"""The verb ``edit``: by id, by the nearest colour, stops, and refusals that change nothing."""
 
 import json
 import subprocess
 import sys
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,8 @@ import pytest
 from palette4d import _core
 from palette4d.cli import main
 from palette4d.grade import sidecar
+from palette4d.shows import manifest
+from palette4d.shows.shots import Shot
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
 
@@ -451,3 +454,60 @@ def test_wrong_usage_of_the_new_actions(plain: str, words: str) -> None:
         run(plain, words)
     assert caught.value.code == 2
     assert Path(plain).read_bytes() == before
+
+
+# ------------------------------------------------------------------------------------ copied grades
+
+
+def test_copy(plain: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    other = tmp_path / "other.p4d.json"
+    other.write_bytes(Path(plain).read_bytes())
+    assert run(plain, "track v4 --by 0.2,0.1,0") == 0
+    capsys.readouterr()
+    assert run(str(other), f"copy {plain}") == 0
+    assert "0.0 of 255 on average" in capsys.readouterr().out
+    found, expected = (
+        {entry["vertex"]: entry["rgb"] for entry in edits_of(path)["vertices"]}
+        for path in (str(other), plain)
+    )
+    assert found.keys() == expected.keys()
+    for id_, rgb in expected.items():
+        assert found[id_] == pytest.approx(rgb, abs=1e-6)
+    assert run(str(other), f"copy {plain} --time frame 3") == 0
+    assert run(str(other), f"copy {plain} --time frame 99") == 1
+    assert run(str(other), "reset") == 0
+    assert run(plain, f"copy {other}") == 1
+    assert "no edits" in capsys.readouterr().err
+    for words in ("--time never", "--time frame", "--time frame x", "--time relative 3"):
+        with pytest.raises(SystemExit):
+            run(str(other), f"copy {plain} {words}")
+
+
+def test_copy_to_the_shots_of_a_show(
+    plain: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(plain, "track v4 --by 0.2,0.1,0") == 0
+    show = tmp_path / "show"
+    show.mkdir()
+    entries = []
+    for name in ("a_1", "a_2", "b_1"):
+        (show / f"{name}.p4d.json").write_bytes((GOLDEN / "v1_split.p4d.json").read_bytes())
+        shot = Shot(name, "clip.mov", 0, 20, (0, 20))
+        entries.append(manifest.Entry(shot, manifest.DONE, (0, 20)))
+    path = show / "film.shots.json"
+    manifest.write(manifest.Manifest("film.mov", "", Fraction(24), {}, tuple(entries)), path)
+    source = show / "a_1.p4d.json"
+    source.write_bytes(Path(plain).read_bytes())
+    before = source.read_bytes()
+    assert run(str(path), f"copy {source} --shots a_*") == 0
+    assert "1 shot of 1" in capsys.readouterr().out
+    assert run(str(path), f"copy {source}") == 0
+    assert source.read_bytes() == before
+    for name in ("a_2", "b_1"):
+        assert {e["vertex"] for e in edits_of(str(show / f"{name}.p4d.json"))["vertices"]} == {
+            *("v4", "v8", "v12", "v13", "v17", "v18")
+        }
+    assert run(str(path), f"copy {source} --shots c_*") == 1
+    (show / "b_1.p4d.json").write_text("{}")
+    assert run(str(path), f"copy {source}") == 1
+    assert "1 shot of 2" in capsys.readouterr().out

@@ -1,4 +1,4 @@
-"""The verb plot: pictures of all sorts of sidecars, and what must be seen in them."""
+"""The verb plot: pictures of many kinds of sidecars, and what they must show."""
 
 from __future__ import annotations
 

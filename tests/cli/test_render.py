@@ -1,4 +1,4 @@
-"""The verb `render`: the core over files, exact where nothing is edited, careful with files."""
+"""The verb `render`: exact pixels, unchanged where nothing is edited, and files that are kept."""
 
 from __future__ import annotations
 

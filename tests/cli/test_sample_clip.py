@@ -1,4 +1,4 @@
-"""The built-in sample clip: the same every time, in range, and with the colours it promises."""
+"""The built-in sample clip: always the same, in range, with the colours that its page names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Errors for people: what was found, and no errno."""
+"""Errors are sentences that say what was found, without [Errno …]."""
 
 from pathlib import Path
 

@@ -17,12 +17,12 @@ namespace {
 using namespace palette4d;
 
 /// A frame of a sidecar that was accepted: whatever it holds, nothing may come of it but numbers.
-void use(const Sidecar& sidecar, double frame) {
+void use(const Sidecar& sidecar, const Edits& edits, double frame) {
     const Slice slice = slice_at(sidecar.polytope, frame);
-    const std::vector<Handle> handles = handles_of(sidecar.polytope, sidecar.edits);
-    const Lineage lineage(sidecar.polytope, sidecar.edits, static_cast<int>(handles.size()) - 1);
-    const Recolourer edit(slice.rgb, edited_colours(sidecar.polytope, sidecar.edits, slice),
-                          slice.faces, bumps_at(sidecar.edits, slice.frame));
+    const std::vector<Handle> handles = handles_of(sidecar.polytope, edits);
+    const Lineage lineage(sidecar.polytope, edits, static_cast<int>(handles.size()) - 1);
+    const Recolourer edit(slice.rgb, edited_colours(sidecar.polytope, edits, slice), slice.faces,
+                          bumps_at(edits, slice.frame));
     const Recolourer weight(slice.rgb, weight_reader(slice, lineage), slice.faces);
     const float pixels[3][4] = {{0.2f, 0.4f, 0.6f, 1}, {-1, 7, 0.5f, 0.5f}, {0, 0, 0, 0}};
     float result[3][4];
@@ -43,7 +43,11 @@ std::string outcome_of(const std::uint8_t* data, std::size_t size) {
         const double first = sidecar.polytope.first_frame(), last = sidecar.polytope.last_frame();
         for (const double part : {0.0, 0.31, 0.5, 1.0, 2.0}) {
             try {
-                use(sidecar, first + part * (last - first));
+                const double frame = first + part * (last - first);
+                use(sidecar, sidecar.edits, frame);
+                for (const NamedVersion& version : sidecar.versions) {
+                    use(sidecar, version.edits, frame);
+                }
             } catch (const std::invalid_argument&) {
                 // The node says so and passes the picture through.
             }

@@ -68,7 +68,9 @@ private:
             "\\u0000",    "\\ud800",   "\xff",      "\xef\xbb\xbf",
             "//",         "NaN",       "Infinity",  "[[[[[[[[",
             "\"id\"",     "\"rgb\"",   "\"frame\"", "\"faces\"",
-            "\"tracks\"", "\"stops\"", "\"edge\"",  "\"version\""};
+            "\"tracks\"", "\"stops\"", "\"edge\"",  "\"version\"",
+            "\"ramp\"",   "\"hold\"",  "\"by\"",    "\"keys\"",
+            "\"radius\"", "\"bumps\"", "\"picks\"", "\"smooth\""};
         static const std::vector<std::string> kNumbers = {
             "0",          "-0",          "1",
             "-1",         "2",           "3",

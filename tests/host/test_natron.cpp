@@ -136,13 +136,13 @@ TEST(a_cache_keyed_by_the_parameters_is_never_stale) {
     CHECK(node.cached(5, window.source) == unchanged);
     shows(unchanged, "broken");
     write("clip.p4d.json", whole);
-    shows(edited, "mended");
+    shows(edited, "fixed");
     CHECK(node.cached(5, window.source) ==
           recoloured(window.parsed, 15, window.source, window.layout.bounds));
     write("clip.p4d.json", plain);
     CHECK(node.cached(6, window.source) == unchanged);
     write("clip.p4d.json", whole);
-    // Nothing that the node has seen has changed, but the cache is wrong: Reload mends that.
+    // Nothing that the node has seen has changed, but the cache is wrong: Reload discards it.
     CHECK(node.changed("reload") == kOfxStatOK);
     CHECK(node.cached(6, window.source) ==
           recoloured(window.parsed, 16, window.source, window.layout.bounds));

@@ -167,7 +167,7 @@ OUTPUTS: list[tuple[dict[str, Any], list[str]]] = [
 
 
 @pytest.mark.parametrize(("channels", "premultiplied"), SHAPES)
-@pytest.mark.parametrize("name", ["v1_edited", "v1_scene_linear"])
+@pytest.mark.parametrize("name", ["v1_edited", "v1_scene_linear", "v1_picks"])
 @pytest.mark.parametrize(("given", "parameters"), OUTPUTS)
 def test_every_output_of_the_node_is_the_documents(
     node: Node,

@@ -1,4 +1,4 @@
-"""What is asked of melt again, and what is not."""
+"""A run of melt without output is repeated; a run that ends in the middle is a failure."""
 
 from __future__ import annotations
 

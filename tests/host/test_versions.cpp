@@ -110,11 +110,14 @@ TEST(the_user_chooses_a_version) {
     scene.set("version", std::string("plain"));
     CHECK(scene.render() == scene.unchanged());
     CHECK(scene.message().empty());
-    // The status counts the version's edits.
+    // The status counts the version's edits and names the version.
     CHECK(scene.instance->changed("version") == kOfxStatOK);
     CHECK(scene.instance->text("status").find("0 edits") != std::string::npos);
+    CHECK(scene.instance->text("status").find("'plain'") != std::string::npos);
     scene.set("version", std::string());
     CHECK(scene.render() == active);
+    CHECK(scene.instance->changed("version") == kOfxStatOK);
+    CHECK(scene.instance->text("status").find("version") == std::string::npos);
 }
 
 TEST(a_version_that_is_not_there_is_said) {

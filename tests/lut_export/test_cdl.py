@@ -1,4 +1,4 @@
-"""CDLs: exact where the edit is a CDL, near elsewhere, and honest about what is left over."""
+"""CDLs: exact where the edit is a CDL, near elsewhere, and their error is stated."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A .cube applied by a program that has nothing to do with OpenColorIO: ffmpeg's filter lut3d.
+"""A .cube applied by ffmpeg's filter lut3d, which does not use OpenColorIO.
 
 The filter comes with PyAV, which carries ffmpeg's libraries.
 """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import os
 import resource
@@ -17,10 +18,12 @@ from pathlib import Path
 import numpy as np
 import PyOpenColorIO as ocio
 import pytest
+from numpy.typing import NDArray
 from palette4d.lut_export import series
 from palette4d.lut_export.bake_job import BakeSettings
 from palette4d.lut_export.frame_edit import frame_edit
 from palette4d.lut_export.series import Request, Series
+from parity.cases import bump, edited, solution, split_merge_document
 
 from palette4d import Palette4dError, _core
 from palette4d.common.errors import WriteError
@@ -282,6 +285,41 @@ class TestStops:
         ]
         path.write_text(json.dumps(document), "utf-8")
         assert series.stops(_core.read_sidecar(str(path))) == (0, 4, 10)
+
+    @pytest.mark.parametrize("ramp", ["linear", "smooth", "hold"])
+    def test_between_them_an_edit_is_a_line(self, ramp: str) -> None:
+        stops = [("ea", 9, (0.0, 0.0, 1.0)), ("ea", 21, (0.5, 1.0, 0.0))]
+        document = edited(split_merge_document(), {"a1": (1.0, 1.0, 0.0)}, stops, ramp=ramp)
+        document["edits"]["solution"] = solution({"b0": (0.1, 0, 0)}, [("ea", 4, (0, 0.3, 0))], [])
+        sidecar = _core.parse_sidecar(json.dumps(document))
+        times = series.stops(sidecar)
+        assert {0, 4, 9, 21, 30} <= set(times)
+        assert len(times) < (31 if ramp == "smooth" else 15)
+
+        def moved(frame: float) -> NDArray[np.float64]:
+            cut = _core.slice_at(sidecar.polytope, frame)
+            return (_core.edited_colours(sidecar.polytope, sidecar.edits, cut) - cut.rgb)[0]
+
+        for start, end in itertools.pairwise(times):
+            for frame in range(start, end):
+                share = (frame - start) / (end - start)
+                line = moved(start) + share * (moved(end) - moved(start))
+                np.testing.assert_allclose(moved(frame), line, rtol=0, atol=0.01)
+
+    def test_bumps_have_their_keys_and_more_while_they_follow_a_colour(self) -> None:
+        still = bump(0.5, (12, (0.5, 0.5, 0.5), (0, 0, 0)), (15, (0.5, 0.5, 0.5), (0.1, 0, 0)))
+        moving = bump(0.2, (18, (0.5, 0.5, 0.5), (0.1, 0, 0)), (26, (0.5, 0.5, 0.7), (0.1, 0, 0)))
+        document = edited(split_merge_document(), {}, [])
+        document["edits"]["solution"] = solution({}, [], [still, moving])
+        assert series.stops(_core.parse_sidecar(json.dumps(document))) == (
+            12,
+            15,
+            18,
+            20,
+            22,
+            24,
+            26,
+        )
 
     def test_nothing_edited(self, write_sidecar: Callable[..., Path]) -> None:
         with pytest.raises(Palette4dError, match="nothing is edited"):

@@ -1,4 +1,4 @@
-"""Files in the space that is asked for: exact conversions beside the table, tables elsewhere."""
+"""Files in another colour space: transforms beside the 3D LUT in CLF, else within it."""
 
 from __future__ import annotations
 

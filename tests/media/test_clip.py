@@ -1,4 +1,4 @@
-"""Clip reading: what is found, what is read, what is refused, and in which words."""
+"""Clip reading: which files are found, their pixels, and the errors for unusable ones."""
 
 from __future__ import annotations
 

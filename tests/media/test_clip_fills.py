@@ -1,4 +1,4 @@
-"""What the analysis counts of a frame is what a recolouring sees of it, however it is stored."""
+"""The analysis counts the same colours that a recolouring sees, for every storage of a frame."""
 
 from __future__ import annotations
 

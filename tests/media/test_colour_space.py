@@ -1,4 +1,4 @@
-"""The colour space a palette is found in: what is chosen, how exact it is, what is refused."""
+"""The palette's colour space: how it is chosen, its exactness, and refusals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sudden cuts: found between pictures, and nowhere else."""
+"""Sudden cuts are found at cuts, and not in flashes, fades, motion or noise."""
 
 from __future__ import annotations
 

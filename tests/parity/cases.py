@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 F64 = NDArray[np.float64]
 Document = dict[str, Any]
+Colour = tuple[float, float, float]
 
 TETRAHEDRON = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
 # Corner 3 of the tetrahedron as two corners, 3 and 4.
@@ -61,8 +62,10 @@ def edited(
     base: Document,
     vertices: dict[str, tuple[float, float, float]],
     stops: list[tuple[str, float, tuple[float, float, float]]],
+    ramps: dict[str, str] | None = None,
+    **more: Any,
 ) -> Document:
-    """The same sidecar with edits."""
+    """The same sidecar with edits; `ramps` of vertices and of stops by their number."""
     result = copy.deepcopy(base)
     result["edits"] = {
         "vertices": [{"vertex": name, "rgb": list(rgb)} for name, rgb in vertices.items()],
@@ -70,8 +73,34 @@ def edited(
             {"id": f"stop{i}", "edge": edge, "frame": frame, "rgb": list(rgb)}
             for i, (edge, frame, rgb) in enumerate(stops)
         ],
+        **more,
     }
+    for entry in result["edits"]["vertices"] + result["edits"]["stops"]:
+        name = entry.get("vertex", entry.get("id"))
+        if ramps and name in ramps:
+            entry["ramp"] = ramps[name]
     return result
+
+
+def bump(radius: float, *keys: tuple[float, Colour, Colour]) -> dict[str, Any]:
+    """A bump of a solution: its keys are frame, centre and displacement."""
+    return {
+        "radius": radius,
+        "keys": [{"frame": t, "rgb": list(rgb), "by": list(by)} for t, rgb, by in keys],
+    }
+
+
+def solution(
+    vertices: dict[str, Colour],
+    keys: list[tuple[str, float, Colour]],
+    bumps: list[dict[str, Any]],
+) -> dict[str, Any]:
+    """A solution of picks."""
+    return {
+        "vertices": [{"vertex": name, "by": list(by)} for name, by in vertices.items()],
+        "keys": [{"edge": edge, "frame": t, "by": list(by)} for edge, t, by in keys],
+        "bumps": bumps,
+    }
 
 
 def still_document() -> Document:
@@ -195,6 +224,25 @@ def split_merge_document() -> Document:
     return document(vertices, edges, blocks, transitions)
 
 
+#: Edits at splits, merges and vertices that a colour passes, and several stops on an edge.
+HANDLES: dict[str, Colour] = {
+    "a0": (0.1, 0.05, 0.0),
+    "bm": (0.7, 0.3, 0.2),
+    "d1": (0.3, 0.0, 0.7),
+    "m": (0.5, 0.3, 0.9),
+    "a1": (0.0, 0.3, 0.3),
+}
+STOPS: list[tuple[str, float, Colour]] = [
+    ("ea", 21.5, (0.2, 0.0, 0.0)),
+    ("ea", 9, (0.0, 0.2, 0.1)),
+    ("ea", 15, (0.1, 0.1, 0.3)),
+    ("eb1", 22, (0.8, 0.2, 0.4)),
+    ("ec2", 12.25, (0.4, 0.9, 0.2)),
+    ("dm", 21, (0.0, 0.9, 0.9)),
+    ("ed2", 13, (0.1, 0.4, 0.7)),
+]
+
+
 def all_documents() -> dict[str, Document]:
     """Sidecars by name."""
     changes = split_merge_document()
@@ -223,6 +271,51 @@ def all_documents() -> dict[str, Document]:
                 ("ec2", 12.25, (0.4, 0.9, 0.2)),
                 ("dm", 21, (0.0, 0.9, 0.9)),
             ],
+        ),
+        "changes-smooth": edited(changes, HANDLES, STOPS, ramp="smooth"),
+        "changes-hold": edited(
+            changes,
+            HANDLES,
+            STOPS,
+            {"a1": "linear", "stop1": "smooth", "bm": "linear"},
+            ramp="hold",
+        ),
+        "changes-picks": edited(
+            changes,
+            {"d1": (0.3, 0.0, 0.7)},
+            [("ea", 9, (0.0, 0.2, 0.1))],
+            ramp="smooth",
+            solution=solution(
+                {"bm": (0.1, -0.05, 0.0), "d1": (-0.05, 0.1, 0.02), "m1": (0.0, 0.1, 0.1)},
+                [
+                    ("ea", 12, (0.1, 0.0, -0.1)),
+                    ("ea", 6.5, (0.0, 0.05, 0.0)),
+                    ("dm", 22, (0.2, 0.0, 0.0)),
+                ],
+                [
+                    bump(
+                        0.5,
+                        (0, (0.3, 0.4, 0.5), (0.0, 0.0, 0.0)),
+                        (5, (0.4, 0.4, 0.4), (0.2, -0.1, 0.1)),
+                        (22, (0.6, 0.5, 0.3), (0.1, 0.1, -0.2)),
+                        (25, (0.6, 0.5, 0.3), (0.0, 0.0, 0.0)),
+                    ),
+                    bump(0.08, (11, (0.5, 0.5, 0.5), (-0.3, 0.0, 0.2))),
+                    bump(3.0, (30, (0.0, 1.0, 0.0), (0.05, -0.1, 0.0))),
+                ],
+            ),
+        ),
+        "still-bumps": edited(
+            still_document(),
+            {},
+            [],
+            solution=solution({}, [], [bump(0.7, (7, (0.4, 0.3, 0.2), (0.1, -0.2, 0.05)))]),
+        ),
+        "colour-bumps": edited(
+            colour_document(),
+            {},
+            [],
+            solution=solution({}, [], [bump(0.9, (0, (0.4, 0.3, 0.2), (0.1, -0.2, 0.05)))]),
         ),
         "changes-back": edited(changes, {"b0": (1.0, 0.0, 0.0)}, []),
     }
@@ -256,6 +349,9 @@ def frames_of(name: str) -> list[float]:
     marks = {vertex["frame"] for vertex in polytope["vertices"]}
     marks |= {block[end] for block in polytope["blocks"] for end in ("first", "last")}
     marks |= {stop["frame"] for stop in DOCUMENTS[name]["edits"]["stops"]}
+    solution = DOCUMENTS[name]["edits"].get("solution", {"keys": [], "bumps": []})
+    marks |= {key["frame"] for key in solution["keys"]}
+    marks |= {key["frame"] for bump in solution["bumps"] for key in bump["keys"]}
     times = sorted(float(mark) for mark in marks)
     between = [a + 0.37 * (b - a) for a, b in itertools.pairwise(times)]
     beside = [mark + side for mark in times for side in (-NUDGE, NUDGE)]

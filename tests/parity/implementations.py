@@ -92,7 +92,8 @@ class Reference:
         original = reference.slice_rgb(document, frame)
         faces = reference.slice_faces(document, frame)
         edited = reference.edited_colours(document, frame)
-        return reference.recolour(image, original, edited, faces, strength, premultiplied)
+        bumps = reference.bumps_at(document, frame)
+        return reference.recolour(image, original, edited, faces, strength, premultiplied, bumps)
 
 
 class Core:
@@ -128,7 +129,8 @@ class Core:
         sidecar = self.sidecar(document)
         cut = _core.slice_at(sidecar.polytope, frame)
         edited = _core.edited_colours(sidecar.polytope, sidecar.edits, cut)
-        return _core.Recolourer(cut.rgb, edited, cut.faces)
+        bumps = sidecar.edits.bumps_at(cut.frame)
+        return _core.Recolourer(cut.rgb, edited, cut.faces, bumps=bumps)
 
     def mvc(self, points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> F64:
         return _core.mean_value_coordinates(points, rgb, faces)

@@ -8,6 +8,7 @@ cases of `cases.py` run on it and on the compiled core; where they differ, one o
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -80,29 +81,158 @@ def slice_faces(document: Document, frame: float) -> list[list[int]]:
     return section_at(document, clamped(document, frame))["faces"]
 
 
-def edited_colours(document: Document, frame: float) -> F64:
-    """(n, 3) palette colours at a frame after the edits: each edge is a line through its stops."""
-    frame = clamped(document, frame)
+Knots = list[tuple[float, F64]]
+
+
+def edge_between(document: Document, earlier: str, later: str) -> dict[str, Any]:
+    """The edge from a vertex to another."""
+    edges = document["polytope"]["edges"]
+    return next(edge for edge in edges if (edge["from"], edge["to"]) == (earlier, later))
+
+
+def displacements(document: Document, edge: dict[str, Any]) -> Knots:
+    """What the handles of an edge do: times and displacements, its ends included."""
     vertices = vertices_by_id(document)
     new = {edit["vertex"]: edit["rgb"] for edit in document["edits"]["vertices"]}
-    edges = {(edge["from"], edge["to"]): edge["id"] for edge in document["polytope"]["edges"]}
+    ends = [vertices[edge[end]] for end in ("from", "to")]
+    times = [float(end["frame"]) for end in ends]
+    knots = [
+        (end["frame"], np.subtract(new.get(end["id"], end["rgb"]), end["rgb"])) for end in ends
+    ]
+    for stop in document["edits"]["stops"]:
+        if stop["edge"] == edge["id"]:
+            own = [
+                np.interp(stop["frame"], times, [end["rgb"][c] for end in ends]) for c in range(3)
+            ]
+            knots.append((stop["frame"], np.subtract(stop["rgb"], own)))
+    return sorted(knots, key=lambda knot: knot[0])
+
+
+def chain(document: Document, edge: dict[str, Any]) -> tuple[Knots, bool, bool]:
+    """The knots of a colour's way through an edge, and whether it splits or merges at either end.
+
+    The way goes on across vertices that one edge enters and one leaves.
+    """
+    edges = document["polytope"]["edges"]
+    knots, branches = displacements(document, edge), [False, False]
+    for side, (here, there) in enumerate((("from", "to"), ("to", "from"))):
+        at = edge
+        while True:
+            beyond = [e for e in edges if e[there] == at[here]]
+            alike = [e for e in edges if e[here] == at[here]]
+            branches[side] = len(beyond) > 1 or len(alike) > 1
+            if branches[side] or not beyond:
+                break
+            at = beyond[0]
+            more = displacements(document, at)
+            knots = more[:-1] + knots if side == 0 else knots + more[1:]
+    return knots, branches[0], branches[1]
+
+
+def smooth(document: Document, edge: dict[str, Any], frame: float) -> F64:
+    """The monotone cubic of Fritsch and Butland (1984) through a chain, Hermite's form."""
+    knots, splits, merges = chain(document, edge)
+    times = np.array([time for time, _ in knots], float)
+    values = np.array([value for _, value in knots])
+    steps = np.diff(times)
+    secants = np.diff(values, axis=0) / steps[:, None]
+    slopes = np.zeros_like(values)
+    for c in range(3):
+        for k in range(1, len(times) - 1):
+            before, after = secants[k - 1, c], secants[k, c]
+            if before * after > 0:
+                weights = 2 * steps[k] + steps[k - 1], steps[k] + 2 * steps[k - 1]
+                slopes[k, c] = sum(weights) / (weights[0] / before + weights[1] / after)
+        for end, inner, free in ((0, 1, not splits), (-1, -2, not merges)):
+            if not free:
+                continue
+            first = secants[end, c]
+            if len(secants) == 1:
+                slopes[end, c] = first
+                continue
+            second, h, k = secants[inner, c], steps[end], steps[inner]
+            slope = ((2 * h + k) * first - h * second) / (h + k)
+            if slope * first <= 0:
+                slope = 0.0
+            elif first * second <= 0 and abs(slope) > 3 * abs(first):
+                slope = 3 * first
+            slopes[end, c] = slope
+    i = int(np.searchsorted(times, frame, "right")) - 1
+    h = steps[i]
+    u = (frame - times[i]) / h
+    return (
+        (1 + 2 * u) * (1 - u) ** 2 * values[i]
+        + u * (1 - u) ** 2 * h * slopes[i]
+        + u**2 * (3 - 2 * u) * values[i + 1]
+        + u**2 * (u - 1) * h * slopes[i + 1]
+    )
+
+
+def solved(document: Document, earlier: str, later: str, frame: float) -> F64:
+    """The solution's displacement between two vertices."""
+    solution = document["edits"].get("solution", {"vertices": [], "keys": []})
+    moved = {entry["vertex"]: entry["by"] for entry in solution["vertices"]}
+    if earlier == later:
+        return np.array(moved.get(earlier, (0, 0, 0)), float)
+    vertices, edge = vertices_by_id(document), edge_between(document, earlier, later)
+    knots = [(vertices[name]["frame"], moved.get(name, (0, 0, 0))) for name in (earlier, later)]
+    knots += [(k["frame"], k["by"]) for k in solution["keys"] if k["edge"] == edge["id"]]
+    times, values = zip(*sorted(knots), strict=True)
+    return np.array([np.interp(frame, times, channel) for channel in zip(*values, strict=True)])
+
+
+def edited_colours(document: Document, frame: float) -> F64:
+    """(n, 3) palette colours at a frame after the edits: handles, ramps, and the solution."""
+    frame = clamped(document, frame)
+    vertices, edits = vertices_by_id(document), document["edits"]
+    new = {edit["vertex"]: edit["rgb"] for edit in edits["vertices"]}
     rows = []
-    for earlier, later, _ in positions(document, frame):
+    for original, (earlier, later, _) in zip(
+        slice_rgb(document, frame), positions(document, frame), strict=True
+    ):
         ends = {name: new.get(name, vertices[name]["rgb"]) for name in (earlier, later)}
         if earlier == later:
-            rows.append(np.array(ends[earlier], float))
-            continue
-        knots = [(vertices[name]["frame"], rgb) for name, rgb in ends.items()]
-        for stop in document["edits"]["stops"]:
-            if stop["edge"] == edges[earlier, later]:
-                knots.append((stop["frame"], stop["rgb"]))
-        knots.sort(key=lambda knot: knot[0])
-        for (start, before), (end, after) in itertools.pairwise(knots):
-            if start <= frame <= end:
+            row = np.array(ends[earlier], float)
+        else:
+            edge = edge_between(document, earlier, later)
+            knots = [(vertices[name]["frame"], rgb) for name, rgb in ends.items()]
+            own = [edit.get("ramp") for edit in edits["vertices"] if edit["vertex"] == earlier]
+            ramps = {vertices[earlier]["frame"]: own[0] if own else None}
+            for stop in edits["stops"]:
+                if stop["edge"] == edge["id"]:
+                    knots.append((stop["frame"], stop["rgb"]))
+                    ramps[stop["frame"]] = stop.get("ramp")
+            knots.sort(key=lambda knot: knot[0])
+            for (start, before), (end, after) in itertools.pairwise(knots):
+                if not start <= frame < end:
+                    continue
+                ramp = ramps[start] or edits.get("ramp", "linear")
                 weight = (frame - start) / (end - start)
-                row = (1 - weight) * np.array(before, float) + weight * np.array(after, float)
-        rows.append(row)
+                if start == frame:
+                    row = np.array(before, float)
+                elif ramp == "linear":
+                    row = (1 - weight) * np.array(before, float) + weight * np.array(after, float)
+                elif ramp == "smooth":
+                    row = original + smooth(document, edge, frame)
+                else:
+                    row = original + dict(displacements(document, edge))[start]
+        rows.append(row + solved(document, earlier, later, frame))
     return np.array(rows).reshape(-1, 3)
+
+
+def bumps_at(document: Document, frame: float) -> list[tuple[F64, float, F64]]:
+    """Centre, radius and displacement of every bump at a frame."""
+    frame = clamped(document, frame)
+    found = []
+    for bump in document["edits"].get("solution", {"bumps": []})["bumps"]:
+        keys = bump["keys"]
+        times = [key["frame"] for key in keys]
+        centre, by = (
+            np.array([np.interp(frame, times, [key[name][c] for key in keys]) for c in range(3)])
+            for name in ("rgb", "by")
+        )
+        found.append((centre, float(bump["radius"]), by))
+    return found
 
 
 # Weights -----------------------------------------------------------------------------------------
@@ -254,8 +384,9 @@ def recolour(
     faces: ArrayLike,
     strength: float = 1.0,
     premultiplied: bool = False,
+    bumps: Sequence[tuple[F64, float, F64]] = (),
 ) -> NDArray[np.float32]:
-    """p' = p + strength sum_i w_i(q) (v'_i - v_i) for every pixel of an (h, w, 3 or 4) image."""
+    """p' = p + strength (sum_i w_i(q) (v'_i - v_i) + bumps) for an (h, w, 3 or 4) image."""
     displacement = np.asarray(edited, float) - np.asarray(original, float)
     result = image.copy()
     for y in range(image.shape[0]):
@@ -267,7 +398,11 @@ def recolour(
             if not np.isfinite(p).all() or not np.isfinite(alpha) or alpha == 0:
                 continue
             weights, _ = palette_weights([p / alpha], original, faces)
-            moved = alpha * strength * (weights[0] @ displacement)
+            moved = weights[0] @ displacement
+            for centre, radius, by in bumps:
+                within = 1 - float(((p / alpha - centre) ** 2).sum()) / radius**2
+                moved = moved + max(within, 0.0) ** 3 * by
+            moved = alpha * strength * moved
             for channel in range(3):
                 if moved[channel] != 0:
                     result[y, x, channel] = np.float32(p[channel] + moved[channel])

@@ -1,4 +1,4 @@
-"""Conversions between a clip's numbers and its palette's: the core against plain NumPy."""
+"""Conversions from a clip's code values to its palette's: the core against plain NumPy."""
 
 from __future__ import annotations
 

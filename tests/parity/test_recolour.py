@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 import pytest
 from parity.cases import (
@@ -24,6 +26,7 @@ from parity.implementations import (
     Implementation,
     Lattice,
 )
+from parity.reference import bumps_at
 
 from palette4d import _core
 
@@ -138,3 +141,36 @@ def test_rounds_are_rare_where_the_implementations_differ() -> None:
     result = CORE.recolour(image, DOCUMENTS["changes-stops"], 12.5)
     expected = REFERENCE.recolour(image, DOCUMENTS["changes-stops"], 12.5)
     assert same_bits(result, expected).mean() > 0.98
+
+
+@pytest.mark.parametrize("name", ["still-bumps", "colour-bumps"])
+def test_colours_beyond_all_bumps_keep_their_bits(name: str) -> None:
+    image = picture(3)
+    for frame in times_of(name):
+        (centre, radius, _), *_ = bumps_at(DOCUMENTS[name], frame)
+        away = np.linalg.norm(image - centre, axis=2)
+        beyond = ~(away < radius * (1 - 1e-6))  # NaN too
+        assert 0 < beyond.sum() < beyond.size
+        for code in (CORE, FAST, LATTICE):
+            found = code.recolour(image, DOCUMENTS[name], frame)
+            assert same_bits(found, image)[beyond].all()
+            assert not same_bits(found, image)[~beyond].all(axis=1).any()
+
+
+def test_bumps_add_to_what_the_palette_does() -> None:
+    """The same picture without and with bumps differs by them alone."""
+    document, frame, image = DOCUMENTS["changes-picks"], 12.5, picture(3)
+    finite = np.isfinite(image).all(axis=2)
+    plain = copy.deepcopy(document)
+    plain["edits"]["solution"]["bumps"] = []
+    colours = image[finite].astype(float)
+    wanted = np.zeros_like(colours)
+    for centre, radius, by in bumps_at(document, frame):
+        within = 1 - ((colours - centre) ** 2).sum(axis=1, keepdims=True) / radius**2
+        wanted += np.maximum(within, 0) ** 3 * by
+    for code in (CORE, FAST, LATTICE):
+        found, without = (
+            code.recolour(image, d, frame)[finite].astype(float) for d in (document, plain)
+        )
+        near = np.abs(colours).max(axis=1) < 10
+        np.testing.assert_allclose((found - without)[near], wanted[near], rtol=0, atol=1e-6)

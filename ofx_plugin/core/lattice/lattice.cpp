@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "lattice/lattice_store.hpp"
-#include "recolour/exact_worker.hpp"
+#include "recolour/float_worker.hpp"
 #include "simd/kernel_choice.hpp"
 
 namespace palette4d {
@@ -25,7 +25,7 @@ public:
           channels_(channels),
           bumps_(store.bumps()),
           set_bumps_(kernels_of<BumpKernels>(options.instructions).set),
-          exact_(exact_worker(recolourer, options, channels, true)),
+          exact_(float_worker(recolourer, options, channels, true)),
           builder_(store, options.instructions) {
         waiting_.reserve(kMostLeft + kWaiting);
     }
@@ -200,7 +200,7 @@ private:
     const int channels_;
     const BumpPlan<float> bumps_;
     decltype(BumpKernels::set) const set_bumps_;
-    std::unique_ptr<ExactWorker> exact_;
+    std::unique_ptr<FloatWorker> exact_;
     Store::Builder builder_;
     LatticeBlock block_{};
     alignas(64) float bumped_[3][kSize]{};  ///< what the bumps do to the block's colours

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "model/vec3.hpp"
-#include "recolour/exact_worker.hpp"
-#include "recolour/one_by_one.hpp"
+#include "recolour/double_worker.hpp"
+#include "recolour/float_worker.hpp"
 #include "recolour/recolour_plan.hpp"
 
 namespace palette4d {
@@ -78,9 +78,9 @@ Vec3 Recolourer::displaced(const Vec3& p, double strength) const {
 
 std::unique_ptr<RowWorker> Recolourer::worker(const RecolourOptions& options, int channels) const {
     if (options.precision == Precision::kDouble) {
-        return std::make_unique<OneByOne>(*this, options, channels, true);
+        return std::make_unique<DoubleWorker>(*this, options, channels, true);
     }
-    return exact_worker(*this, options, channels, true);
+    return float_worker(*this, options, channels, true);
 }
 
 }  // namespace palette4d

@@ -37,7 +37,7 @@ public:
     Vec3 displaced(const Vec3& p, double strength) const;
 
 private:
-    friend class OneByOne;
+    friend class DoubleWorker;
 
     /// At strength 1, without bumps. `p` must be finite; `weights` has one element per vertex.
     Vec3 palette_displacement(const Vec3& p, std::vector<double>& weights,

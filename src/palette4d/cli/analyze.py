@@ -129,7 +129,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     edits = parser.add_mutually_exclusive_group()
     for flag, text in (
-        ("keep", "carry the edits of an existing OUT over (needs the same palette)"),
+        (
+            "keep",
+            "carry the edits of an existing OUT over (copies the grade if the palette changed)",
+        ),
         ("drop", "discard the edits of an existing OUT"),
     ):
         edits.add_argument(

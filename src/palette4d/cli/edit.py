@@ -8,7 +8,7 @@ import shlex
 import textwrap
 from typing import TYPE_CHECKING
 
-from palette4d.cli import edit_history, picks
+from palette4d.cli import edit_copy, edit_history, picks
 from palette4d.cli.swatches import shown
 from palette4d.common.arguments import ColourAction, accept_negative_values, number
 from palette4d.common.errors import Palette4dError
@@ -38,6 +38,7 @@ example:
   palette4d edit clip.p4d.json hold --frame 40 --colour '#7a6b5c'
   palette4d edit clip.p4d.json undo
   palette4d edit clip.p4d.json version save warm
+  palette4d edit other.p4d.json copy clip.p4d.json
 
 Colours are R G B, R,G,B or #rrggbb, in the palette's own code values; they may
 lie outside 0..1. `palette4d info` lists the ids.
@@ -61,7 +62,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     _add_track(actions)
     _add_ramp(actions)
     _add_reset(actions)
-    for module in (picks, edit_history):
+    for module in (picks, edit_history, edit_copy):
         module.add_actions(functools.partial(_action, actions))
     accept_negative_values(actions)
 
@@ -312,7 +313,8 @@ def run_ramp(args: argparse.Namespace) -> int:
 
 def _report(document: Document, before: State) -> None:
     """Print the handles that have changed, with their colours before and after."""
-    old = document.at(before)
+    # The colours are the user's own; the solution of picks comes on top.
+    old = document.at({key: value for key, value in before.items() if key[0] != "pick"})
     changed = [
         id_
         for id_ in {**old.settings, **document.settings}

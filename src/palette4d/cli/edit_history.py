@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from palette4d.grade.document import Document
 
+    #: Adds an action by its name, usage and description.
     Action = Callable[[str, str, str], argparse.ArgumentParser]
 
 

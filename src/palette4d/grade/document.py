@@ -28,6 +28,7 @@ from palette4d.common.files import link_target
 from palette4d.common.locking import locked
 from palette4d.common.text import counted
 from palette4d.grade import edits, moves, sidecar
+from palette4d.grade.copying import Fit, Time, copied, fit
 from palette4d.grade.edits import (
     RAMP,
     Change,
@@ -289,7 +290,7 @@ class Document:
         scaled = " ".join(f"{value / (2**bits - 1):.4g}" for value in values)
         raise Palette4dError(
             f"found the colour {shown}, expected code values where 1 is display white; "
-            f"{shown} in {bits} bits is {scaled}. Give that, or add --float (any_value=True) if "
+            f"{shown} in {bits} bits is {scaled}. Give that, or add any_value=True if "
             f"{shown} is meant"
         )
 
@@ -496,7 +497,7 @@ class Document:
             if stop in self._handles.vertices:
                 raise Palette4dError(
                     f"{stop} is a palette vertex, whose time the analysis found; only stops move "
-                    "in time. Its colour moves with --by"
+                    "in time. Its colour moves with by=…"
                 )
             stops = [id_ for id_, setting in self._settings.items() if setting.edge is not None]
             raise unknown(stop, "stop", stops)
@@ -560,15 +561,15 @@ class Document:
             self.check_frame(frame)
             self._check_inside(id, frame)
         elif id is not None and id not in self._handles.edges:
-            self._frame_of(id, None)  # refuses unknown ids
+            self.frame_of(id, None)  # refuses unknown ids
         within = moves.range_of(start, until, fade, self.frames)
         ramp = how.get("ramp")
         known = None if ramp is None else as_ramp(ramp)
         move, what = self._move(id, frame, how, any_value)
         rgb = how.get("rgb")
-        if rgb is not None and within is not None and within.weight(self._frame_of(id, frame)) < 1:
+        if rgb is not None and within is not None and within.weight(self.frame_of(id, frame)) < 1:
             raise Palette4dError(
-                f"the colour is meant at frame {self._frame_of(id, frame):g}, outside of the "
+                f"the colour is meant at frame {self.frame_of(id, frame):g}, outside of the "
                 f"range {moves.range_text(start, until)}; expected a range with this frame"
             )
         stop = self._settings.get(id or "")
@@ -577,8 +578,8 @@ class Document:
         elif within is not None or track:
             name, way = f"track {id}", way_of(self._handles, (stop and stop.edge) or id)
         elif id in self._handles.edges:
-            new = as_colour(move(self._own_colour(id, self._frame_of(id, frame))))
-            return (self._stop(id, self._frame_of(id, frame), new, known),)
+            new = as_colour(move(self._own_colour(id, self.frame_of(id, frame))))
+            return (self._stop(id, self.frame_of(id, frame), new, known),)
         else:
             name, way = id, ({id}, set())
         changed = moves.moved(
@@ -602,8 +603,8 @@ class Document:
         change = Adjustment(how.get("hue", 0.0), how.get("chroma", 1.0), how.get("lightness", 1.0))
         if [rgb is None, by is None, change == Adjustment()].count(False) != 1:
             raise Palette4dError(
-                "expected one kind of change: a new colour (--rgb; rgb=), offsets (--by; by=), or "
-                "hue, chroma and lightness (--hue …; hue=…)"
+                "expected one kind of change: a new colour rgb=…, offsets by=…, or hue=…, "
+                "chroma=… and lightness=…"
             )
         if by is not None:
             offset = as_colour(by, "offset")
@@ -615,12 +616,12 @@ class Document:
                 "the whole palette cannot get one colour; expected offsets (by), or hue, chroma "
                 "and lightness"
             )
-        new, at = self._checked(rgb, any_value), self._frame_of(id, frame)
+        new, at = self._checked(rgb, any_value), self.frame_of(id, frame)
         before = self._own_colour(id, at) if id in self._handles.edges else self.colour(id)
         return moves.shift_to(before, new), f"to {_text(new)}"
 
-    def _frame_of(self, id: str | None, frame: float | None) -> float:
-        """Return the frame of a handle, or of an edge's colour that the user means."""
+    def frame_of(self, id: str | None, frame: float | None = None) -> float:
+        """Return the frame of a vertex or stop; for an edge, the frame that is given."""
         if id in self._handles.edges:
             if frame is None:
                 raise self._handles.needs_frame(id)
@@ -1031,14 +1032,62 @@ class Document:
             The name of the new version, such as "before NAME".
         """
         wanted = edits.from_fields(self._version(name))
-        versions = {key: value for key, value in self._state.items() if key[0] == "version"}
-        kept = None
-        if self._active() and not any(map(self.same_edits, self.versions)):
-            names = (f"before {name}"[: LONGEST_NAME - 4] + more for more in _suffixes())
-            kept = next(each for each in names if ("version", each) not in versions)
-            versions["version", kept] = self.fields()["edits"]
+        versions, kept = self._versions_with_active(f"before {name}")
         self.apply(edits.difference(self._state, {**wanted, **versions}, f"use version {name}"))
         return kept
+
+    def _versions_with_active(self, name: str) -> tuple[dict[Key, Any], str | None]:
+        """Return the versions, with the active edits as another one if none holds them."""
+        versions = {key: value for key, value in self._state.items() if key[0] == "version"}
+        if not self._active() or any(map(self.same_edits, self.versions)):
+            return versions, None
+        names = (name[: LONGEST_NAME - 4] + more for more in _suffixes())
+        kept = next(each for each in names if ("version", each) not in versions)
+        versions["version", kept] = self.fields()["edits"]
+        return versions, kept
+
+    def copy_from(self, source: "Document", *, time: Time = "relative") -> Fit:
+        """Take over the grade of another document, as one step.
+
+        Each handle gets the colour that the other grade makes of its colour at the corresponding
+        time. Picks are copied and solved again. Active edits that no version holds are kept as the
+        version "before copy".
+
+        Parameters
+        ----------
+        source : Document
+            The graded document.
+        time : "relative" or float
+            "relative": the first frame gets the look of the first frame, the last that of the last.
+            A frame: all frames get the look of this frame of `source`.
+
+        Returns
+        -------
+        Fit
+            How near the result is to the copied grade; its text is for people.
+
+        Raises
+        ------
+        Palette4dError
+            The source has no edits, the frame is outside of its clip, or its colour space cannot be
+            converted.
+        """
+        if not source.edited:
+            raise Palette4dError(
+                f"{source._name} has no edits; expected a graded palette to copy from"
+            )
+        state = copied(self, source, time)
+        before = (self._state, self._done, self._undone)
+        versions, _ = self._versions_with_active("before copy")
+        label = f"copy the grade of {source._fields['clip']['name']}"
+        locks = {key: value for key, value in self._state.items() if key[0] == "lock"}
+        self.apply(edits.difference(self._state, {**state, **locks, **versions}, label))
+        try:
+            return fit(self, source, time)
+        except BaseException:
+            self._become(before[0])
+            self._core, self._solved, (_, self._done, self._undone) = None, None, before
+            raise
 
     def same_edits(self, name: str) -> bool:
         """Whether a version holds the active edits."""
@@ -1240,8 +1289,9 @@ class Document:
         path : path, optional
             A file other than the loaded file.
         on_edits : {"refuse", "keep", "drop"}
-            What to do with edits in that file, which would be lost. "keep" takes them over; this
-            needs the same palette.
+            What to do with edits in that file, which would be lost. "keep" takes them over. If the
+            palette differs, it copies the grade and keeps the old file under another name; `notes`
+            says so.
 
         Raises
         ------
@@ -1264,12 +1314,15 @@ class Document:
         fields = self.fields()
         if self.path is None:
             fields["clip"]["source"] = _beside(fields["clip"]["source"], target)
+        from palette4d.grade import renewal  # which needs this module
+
         path, self.path = self.path, target
         try:
-            fields = sidecar.save(fields, target, on_edits=on_edits)
+            fields, notes = renewal.save(fields, target, on_edits=on_edits)
         except BaseException:
             self.path = path
             raise
+        self.notes += tuple(notes)
         self._disk = sidecar.encoded(fields)
         self._start(self._disk, _core.parse_sidecar(self._disk, str(target)))
 
@@ -1337,8 +1390,8 @@ class Document:
     def _check_inside(self, edge: str, frame: float) -> None:
         if edge in self._settings or edge in self._handles.vertices:
             raise Palette4dError(
-                f"{self.named(edge)} has a time of its own; --frame goes with an edge, or with "
-                f"--near. Use `set {edge} --rgb R G B`"
+                f"{self.named(edge)} has a time of its own: leave out frame=…, which is for "
+                "edges and for near=…"
             )
         self._handles.check_inside(edge, frame)
 

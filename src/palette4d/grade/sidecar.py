@@ -290,7 +290,7 @@ def check_target(path: str | os.PathLike[str], *, on_edits: OnEdits = "refuse") 
     """
     target = link_target(path)
     refuse_existing(target, force=True)
-    old = _existing(target, on_edits)
+    old = existing(target, on_edits)
     if old is not None and has_edits(old) and on_edits == "refuse":
         raise _would_lose(target, old)
 
@@ -300,6 +300,7 @@ def save(
     path: str | os.PathLike[str],
     *,
     on_edits: OnEdits = "refuse",
+    replaces: bytes | None = None,
 ) -> Fields:
     """Write a sidecar and return the document as written.
 
@@ -314,7 +315,10 @@ def save(
         A symbolic link is followed; permissions of an existing file are kept.
     on_edits : {"refuse", "keep", "drop"}
         What to do if the file exists and holds edits that `document` lacks. "keep" copies the edits
-        (and ``extra``). It needs the same polytope, because edits refer to its vertices and edges.
+        (and ``extra``). It needs the same polytope, because edits refer to its vertices and edges;
+        `grade.renewal` copies grades to another polytope.
+    replaces : bytes, optional
+        The expected content of the file; another one is an error.
 
     Raises
     ------
@@ -326,7 +330,7 @@ def save(
     canonical: Fields = _canonical(document, "")
     target = link_target(path)
     with locked(target) as held:
-        old = _existing(target, on_edits)
+        old = existing(target, on_edits)
         if old is not None and has_edits(old) and old["edits"] != canonical.get("edits"):
             if on_edits == "refuse":
                 raise _would_lose(target, old)
@@ -334,7 +338,7 @@ def save(
                 canonical = _with_edits_of(old, canonical, target)
         data = encoded(canonical)
         _core.parse_sidecar(data, os.fspath(target))
-        write(target, data, held)
+        write(target, data, held, replaces=replaces)
     return canonical
 
 
@@ -415,7 +419,12 @@ def _text(value: Any, where: str, depth: int) -> str:
 # ----------------------------------------------------------------------------------- edits at stake
 
 
-def _existing(target: Path, on_edits: OnEdits) -> Fields | None:
+def same_palette(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    """Return whether two documents have the same polytope, so that edits of one fit the other."""
+    return bool(_canonical(one, "")["polytope"] == _canonical(other, "")["polytope"])
+
+
+def existing(target: Path, on_edits: OnEdits) -> Fields | None:
     """Return the document that a save would replace; None if no edits would be lost."""
     if on_edits not in ("refuse", "keep", "drop"):
         raise ValueError(f"on_edits: found {on_edits!r}, expected 'refuse', 'keep' or 'drop'")
@@ -443,7 +452,7 @@ def _summary(document: Fields) -> str:
 def _would_lose(target: Path, old: Fields) -> Palette4dError:
     return Palette4dError(
         f"{target} holds edits ({_summary(old)}) that this would lose. "
-        'Keep them with on_edits="keep" (works if the palette is unchanged), '
+        'Keep them with on_edits="keep" (a changed palette gets a copy of the grade), '
         'discard them with on_edits="drop", or choose another output'
     )
 
@@ -454,7 +463,7 @@ def _with_edits_of(old: Fields, new: Fields, target: Path) -> Fields:
             f"{target} holds edits ({_summary(old)}) and so does what is to be written; they "
             "cannot be mixed. Choose another output"
         )
-    if _canonical(old, "")["polytope"] != new["polytope"]:
+    if not same_palette(old, new):
         raise Palette4dError(
             f"{target} holds edits ({_summary(old)}) for a palette that differs from "
             'the new one, so they cannot be kept. Discard them with on_edits="drop", or choose '

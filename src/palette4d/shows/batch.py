@@ -20,7 +20,7 @@ from palette4d.analysis.options import AnalysisOptions
 from palette4d.common.errors import Palette4dError, in_words
 from palette4d.common.files import make_folder
 from palette4d.common.text import counted
-from palette4d.grade import sidecar
+from palette4d.grade import renewal, sidecar
 from palette4d.jobs.workers import Failed, Workers
 from palette4d.media.clip import open_clip
 from palette4d.media.colour_space import SpaceOptions
@@ -236,11 +236,11 @@ class Show:
             document = outcome.document
             document["clip"]["source"] = entry.shot.clip
             target = self.folder / entry.sidecar
-            sidecar.save(document, target, on_edits=self.options.on_edits)
+            _, notes = renewal.save(document, target, on_edits=self.options.on_edits)
             frames = document["clip"]["frames"]
             self.entries[name] = Entry(entry.shot, DONE, (frames["first"], frames["last"]))
             self.analysed.append(name)
-            self.notes[name] = outcome.notes
+            self.notes[name] = (*outcome.notes, *notes)
         except (Palette4dError, OSError) as error:
             self.entries[name] = Entry(entry.shot, FAILED, error=in_words(error))
         self.save()

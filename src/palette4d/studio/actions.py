@@ -106,13 +106,54 @@ ACTIONS = (
     Action("about", HELP, "About palette4d", ()),
 )
 
-#: What the pointer does: where, the gesture, and what it does.
+#: Actions of the timeline and of the solid: `name` is the view's method. Their keys work while
+#: the view has the keyboard, their menu entries always.
+TIMELINE_ACTIONS = (
+    Action("select_all", PALETTE, "Select all handles", ("Ctrl+A",)),
+    Action("next_handle", PALETTE, "Next handle", ("Tab",)),
+    Action("previous_handle", PALETTE, "Previous handle", ("Shift+Tab",)),
+    Action("row_above", PALETTE, "Row above", ("Up",)),
+    Action("row_below", PALETTE, "Row below", ("Down",)),
+    Action("stop_earlier", PALETTE, "Move the stop a frame earlier", ("Alt+Left",)),
+    Action("stop_later", PALETTE, "Move the stop a frame later", ("Alt+Right",)),
+    Action("zoom_in", VIEW, "Zoom the timeline in", ("+",)),
+    Action("zoom_out", VIEW, "Zoom the timeline out", ("-",)),
+    Action("show_all", VIEW, "Show all frames", ("0",)),
+)
+SOLID_ACTIONS = (
+    Action("next_colour", PALETTE, "Next colour of the solid", ("Tab",)),
+    Action("reset_view", VIEW, "Look at the solid from the front", ("0",)),
+)
+
+#: What the pointer and held keys do: where, the gesture, and what it does.
 GESTURES = (
     ("picture", "click", "pick: choose what the colour becomes"),
     ("picture", "drag", "pick the mean colour of a box"),
     ("picture", "Alt-click, Alt-drag", "hold: the colour stays"),
+    ("picture", "move the pointer", "see the pixel's values, and its weights on the rows"),
     ("picture", "wheel", "zoom at the pointer"),
     ("picture", "middle button, Shift-drag", "pan"),
     ("picture", "drag the wipe's line", "move the wipe"),
+    ("timeline", "click a disc or a row", "select it; Shift or Ctrl adds"),
+    ("timeline", "drag over the ground", "select the discs in the box"),
+    ("timeline", "move over a disc or a row", "see its weight as a matte over the picture"),
+    ("timeline", "double-click a row", "add a stop there"),
+    ("timeline", "double-click a disc", "go to its frame"),
+    ("timeline", "drag a stop", "move it to another frame; with Alt between frames"),
+    ("timeline", "drag an end of a pick's range", "change when the pick acts"),
+    ("timeline", "right-click", "the menu of what is there"),
+    ("timeline", "click or drag in the ruler or the strip", "move the playhead"),
+    ("timeline", "wheel over the ruler, Ctrl-wheel", "zoom at the pointer"),
+    ("timeline", "Shift-wheel, middle button", "pan"),
+    ("solid", "drag the ground", "turn the solid"),
+    ("solid", "drag a colour", "move it in the plane of the screen"),
+    ("solid", "X, Y or Z while dragging", "move along red, green or blue alone"),
+    ("solid", "Alt-arrows", "move the selected colour by a hundredth"),
+    ("solid", "arrows, wheel", "turn, zoom"),
+    ("solid", "double-click", "look from the front again"),
+    ("inspector", "drag in the wheel", "hue and chroma; Shift keeps the chroma, Ctrl the hue"),
+    ("inspector", "drag a bar, type a number", "one of L, C, h, R, G, B"),
+    ("inspector", "arrows in the wheel or on a bar", "change it by a step"),
+    ("inspector", "Pipette, then click the picture", "take the colour there"),
     ("window", "drop a clip, a sidecar or a manifest", "open it"),
 )

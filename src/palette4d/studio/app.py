@@ -12,6 +12,8 @@ from palette4d.common.errors import Palette4dError, WriteError
 from palette4d.studio import texts
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from PySide6.QtWidgets import QApplication
 
     from palette4d.studio.session import Session
@@ -36,6 +38,7 @@ def run(
     screenshot: Path | None = None,
     size: tuple[int, int] = (1600, 1000),
     until_shown: bool = False,
+    prepare: "Callable[[Window], object] | None" = None,
 ) -> int:
     """Open the window, and return the exit status when it is closed.
 
@@ -53,6 +56,8 @@ def run(
         The window's size in pixels.
     until_shown : bool
         Return when the first picture is drawn, without a screen: for benchmarks.
+    prepare : callable, optional
+        Called with the window before a screenshot, when everything is drawn: for the docs.
     """
     hidden = screenshot is not None or until_shown
     if hidden:
@@ -94,6 +99,9 @@ def run(
     sys.excepthook = functools.partial(_unexpected, session)
     if hidden:
         wait_until_shown(app, window)
+        if prepare is not None:
+            prepare(window)
+            wait_until_shown(app, window)
         saved = screenshot is None or window.grab().save(str(screenshot))
         window.shut()
         if not saved:

@@ -10,12 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import (
-    QAction,
     QBrush,
     QColor,
     QImage,
     QKeyEvent,
-    QKeySequence,
     QMouseEvent,
     QPainter,
     QPaintEvent,
@@ -44,6 +42,8 @@ from palette4d.plotting.solid import (
     flipped,
 )
 from palette4d.studio import paint, texts, theme
+from palette4d.studio.actions import SOLID_ACTIONS
+from palette4d.studio.menus import view_actions
 from palette4d.studio.preview import straight
 from palette4d.studio.screen_colours import on_screen
 from palette4d.studio.session import Session
@@ -59,7 +59,7 @@ DISC, ORIGIN = 6.5, 3.6
 #: How far edited colours shrink the view, in radii of the others.
 FARTHEST = 1.35
 #: A face is drawn in this many strips, for a smooth gradient.
-STRIPS = 6
+STRIPS = 5
 
 
 def _pieces() -> F64:
@@ -112,12 +112,7 @@ class SolidView(QWidget):
         self._drag: Drag | None = None
         self._pixels: tuple[object, F64, NDArray[np.uint8]] | None = None
         self._extent: F64 | None = None
-        reset = QAction(texts.RESET_SOLID, self)
-        reset.setShortcut(QKeySequence("0"))
-        reset.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
-        reset.triggered.connect(self.reset_view)
-        self.addAction(reset)
-        self.menu_actions = {"View": [reset]}
+        self.menu_actions = view_actions(self, SOLID_ACTIONS)
         for event in ("document", "clip", "frame", "pixels", "selection", "hover", "view", "probe"):
             session.on(event, self.update)
 
@@ -316,17 +311,35 @@ class SolidView(QWidget):
 
     def focusNextPrevChild(self, forward: bool) -> bool:
         """Tab goes through the colours, and then to the next panel."""
+        return self._step(forward) or super().focusNextPrevChild(forward)
+
+    def next_colour(self) -> None:
+        """Select the next colour."""
+        self._step(True)
+
+    def _step(self, forward: bool) -> bool:
+        """Select the next colour or the one before; return whether there is one."""
         palette = self.palette_now()
         if palette is None:
-            return super().focusNextPrevChild(forward)
+            return False
         handles = [self.handle_of(palette, k) for k in range(len(palette.ids))]
         held = [handles.index(id_) for id_ in self.session.selection if id_ in handles]
         ends = 0 if forward else len(handles) - 1
         at = held[0] + (1 if forward else -1) if held else ends
         if not 0 <= at < len(handles):
-            return super().focusNextPrevChild(forward)
+            return False
         self.session.select(handles[at])
         return True
+
+    def event(self, event: QEvent) -> bool:
+        """Keep the axis keys and the arrows from the window's shortcuts."""
+        if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent):
+            arrows = (Qt.Key.Key_Left, Qt.Key.Key_Right, Qt.Key.Key_Up, Qt.Key.Key_Down)
+            control = event.modifiers() & Qt.KeyboardModifier.ControlModifier
+            if not control and Qt.Key(event.key()) in (*AXIS_KEYS, *arrows):
+                event.accept()
+                return True
+        return super().event(event)
 
     def _nudge(self, dx: int, dy: int) -> None:
         """Move the selected colour by about a hundredth, as a drag by the same way would."""

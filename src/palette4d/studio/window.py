@@ -67,7 +67,7 @@ class Window(QMainWindow):
         self.session = session
         self.settings = settings if settings is not None else QSettings("palette4d", "studio")
         session.post = _Post(self).called.emit
-        self.setWindowTitle(texts.TITLE)
+        self.setWindowTitle(f"{texts.TITLE}[*]")
         self.setAcceptDrops(True)
         self.setDockNestingEnabled(True)
         self.viewer = Viewer(session)
@@ -139,7 +139,8 @@ class Window(QMainWindow):
             [solid, max(200, height - solid)],
             both.Vertical,
         )
-        self.resizeDocks([self.docks["timeline"]], [height * 3 // 10], both.Vertical)
+        low = max(height * 3 // 10, min(300, height * 2 // 5))
+        self.resizeDocks([self.docks["timeline"]], [low], both.Vertical)
 
     def _dock(self, title: str, view: QWidget, area: Qt.DockWidgetArea) -> QDockWidget:
         dock = QDockWidget(title, self)
@@ -181,15 +182,11 @@ class Window(QMainWindow):
             if action.name == "open":
                 self.recent = menu.addMenu(texts.RECENT)
                 self.recent.aboutToShow.connect(self._fill_recent)
-        # The timeline's own keys work while it has the keyboard.
-        known = {action.text for action in ACTIONS}
-        for title, more in self.timeline.menu_actions.items():
-            self.menus[title].addSeparator()
-            for entry in more:
-                if entry.text() in known:
-                    self.timeline.removeAction(entry)
-                else:
-                    self.menus[title].addAction(entry)
+        # The views' own keys work while they have the keyboard.
+        for panel in (self.timeline, self.solid):
+            for title, more in panel.menu_actions.items():
+                self.menus[title].addSeparator()
+                self.menus[title].addActions(more)
         palette = self.menus[actions.PALETTE]
         self.versions = palette.addMenu(texts.VERSIONS)
         self.versions.aboutToShow.connect(self._fill_versions)
@@ -255,7 +252,7 @@ class Window(QMainWindow):
         self.view_facts.setText(shown)
         name = session.path.name if session.path is not None else ""
         title = name or (session.clip.name if session.clip is not None else "")
-        self.setWindowTitle(f"{title} — {texts.TITLE}" if title else texts.TITLE)
+        self.setWindowTitle(f"{title}[*] — {texts.TITLE}" if title else texts.TITLE)
         self.setWindowModified(not session.saved)
         checks = {
             **{f"show_{each}": view.compare == each for each in texts.COMPARE},
@@ -422,6 +419,7 @@ class Window(QMainWindow):
             and picture.request.frame == session.frame
             and picture.request.revision == session.revision
             and session.player.idle
+            and (self.timeline.settled or not self.timeline.isVisible())
         )
 
     def shut(self) -> None:
@@ -895,7 +893,8 @@ class Window(QMainWindow):
     def do_manual(self) -> None:
         """Show the gestures and keys."""
         rows = [f"{where}: {gesture} — {what}" for where, gesture, what in actions.GESTURES]
-        keys = [f"{', '.join(a.keys)} — {a.text}" for a in ACTIONS if a.keys]
+        listed = (*ACTIONS, *actions.TIMELINE_ACTIONS, *actions.SOLID_ACTIONS)
+        keys = [f"{', '.join(a.keys)} — {a.text}" for a in listed if a.keys]
         box = QMessageBox(QMessageBox.Icon.NoIcon, texts.MANUAL, "\n".join(rows), parent=self)
         box.setDetailedText("\n".join(keys))
         box.exec()

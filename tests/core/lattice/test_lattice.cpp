@@ -430,3 +430,62 @@ TEST(what_is_wrong_is_said) {
     Image empty(0, 0, 3);
     CHECK_EQUAL(lattice.apply(empty.in(), empty.out(), {}).exact(), 0LL);
 }
+
+TEST(bumps_are_evaluated_at_each_colour) {
+    Random random(60);
+    const std::vector<Bump> bumps = {{{0.5, 0.4, 0.3}, 0.3, {0.3, -0.35, 0.2}},
+                                     {{0.6, 0.6, 0.6}, 0.02, {-0.55, 0.5, -0.5}},
+                                     {{0.2, 0.7, 0.5}, 0.6, {0.1, -0.6, 0.1}}};
+    for (const Edited& palette : {edited(random_convex(random, 9), 3), edited(dented_cube(), 4)}) {
+        const auto recolourer = std::make_shared<Recolourer>(palette.mesh.rgb, palette.colours,
+                                                             palette.mesh.faces, bumps);
+        for (const bool premultiplied : {false, true}) {
+            const Lattice lattice(recolourer);
+            Image image = picture(400, 120, 4, 77);
+            for (std::size_t i = 0; premultiplied && i < image.data.size(); ++i) {
+                if (i % 4 < 3) image.data[i] *= image.data[i / 4 * 4 + 3];
+            }
+            Image expected(400, 120, 4), found(400, 120, 4);
+            RecolourOptions way{1.0, premultiplied, 2};
+            const RecolourCounts counts = lattice.apply(image.in(), found.out(), way);
+            CHECK(counts.interpolated > 20000);
+            way.precision = Precision::kDouble;
+            recolourer->apply(image.in(), expected.out(), way);
+            if (premultiplied) {  // the bound is that of straight colours
+                for (Image* one : {&expected, &found}) {
+                    for (std::size_t i = 0; i < one->data.size(); ++i) {
+                        if (i % 4 < 3) one->data[i] /= image.data[i / 4 * 4 + 3];
+                    }
+                }
+            }
+            CHECK(difference(found, expected) <= Lattice::kTolerance);
+            CHECK(lattice.largest_error() <= Lattice::kTolerance);
+            Image place = image;
+            lattice.apply(place.in(), place.out(), {1.0, premultiplied, 3});
+            Image again(400, 120, 4);
+            Lattice(recolourer).apply(image.in(), again.out(), {1.0, premultiplied, 1});
+            CHECK(same_bits(place.data, again.data));
+            for (const InstructionSet set : instruction_sets()) {
+                Image other(400, 120, 4);
+                RecolourOptions with{1.0, premultiplied, 1};
+                with.instructions = set;
+                lattice.apply(image.in(), other.out(), with);
+                CHECK(same_bits(other.data, again.data));
+            }
+        }
+    }
+}
+
+TEST(bumps_alone_need_no_lattice) {
+    const auto recolourer =
+        std::make_shared<Recolourer>(cube().rgb, cube().rgb, cube().faces,
+                                     std::vector<Bump>{{{0.5, 0.5, 0.5}, 0.5, {0.1, -0.2, 0.3}}});
+    const Lattice lattice(recolourer);
+    const Image image = picture(96, 20, 4, 14);
+    Image expected(96, 20, 4), found(96, 20, 4);
+    CHECK(lattice.moves());
+    recolourer->apply(image.in(), expected.out(), {0.5, true});
+    CHECK_EQUAL(lattice.apply(image.in(), found.out(), {0.5, true}).interpolated, 0LL);
+    CHECK(same_bits(found.data, expected.data) && !same_bits(found.data, image.data));
+    CHECK_EQUAL(lattice.size().cells, 0LL);
+}

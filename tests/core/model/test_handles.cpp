@@ -77,3 +77,25 @@ TEST(handles_that_do_not_exist_and_colours_that_are_none_are_refused) {
     CHECK_THROWS(std::invalid_argument, with_colours(polytope, edits, true, {{17, {0, 0, 0}}}));
     CHECK_THROWS(std::invalid_argument, with_colours(polytope, edits, true, {{0, {0, nan, 0}}}));
 }
+
+TEST(colours_of_the_host_keep_ramps_and_the_solution) {
+    const Polytope polytope = split_parts().build();
+    Edits edits;
+    edits.vertex_rgb.resize(polytope.vertices().size());
+    edits.vertex_ramp.resize(polytope.vertices().size());
+    edits.vertex_ramp[1] = Ramp::kHold;
+    edits.default_ramp = Ramp::kSmooth;
+    edits.stops = {{"s1", 0, 5, {0, 1, 0}, Ramp::kLinear}};
+    edits.solution.vertex_by.resize(polytope.vertices().size());
+    edits.solution.keys = {{0, 10, {0.25, 0, 0}}};
+    edits.solution.bumps = {{0.5, {{2, {0, 0, 0}, {0, 2, 0}}}}};
+    const int stop = static_cast<int>(polytope.vertices().size());
+    const Edits kept = with_colours(polytope, edits, true, {{1, {1, 1, 1}}, {stop, {0, 0, 1}}});
+    CHECK(kept.default_ramp == Ramp::kSmooth && kept.vertex_ramp == edits.vertex_ramp);
+    CHECK(kept.stops[0].ramp == Ramp::kLinear && kept.stops[0].rgb == (Vec3{0, 0, 1}));
+    CHECK(kept.solution.keys.size() == 1 && kept.solution.bumps.size() == 1);
+    // Alone, they are all there is.
+    const Edits alone = with_colours(polytope, edits, false, {{1, {1, 1, 1}}});
+    CHECK(alone.solution.vertex_by.empty() && alone.solution.bumps.empty());
+    CHECK(alone.default_ramp == Ramp::kLinear && alone.stops.empty());
+}

@@ -1,7 +1,9 @@
 #include "model/slice.hpp"
 
+#include <algorithm>
 #include <cstring>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 
 #include "check.hpp"
@@ -188,4 +190,98 @@ TEST(edits_of_another_polytope_are_refused) {
     Edits edits;
     edits.vertex_rgb.resize(3);
     CHECK_THROWS(std::invalid_argument, edited_colours(polytope, edits, slice_at(polytope, 1)));
+}
+
+TEST(edits_of_the_wrong_size_are_refused) {
+    const Polytope polytope = split_parts().build();
+    Edits ramps = no_edits(polytope), solution = no_edits(polytope);
+    ramps.vertex_ramp.resize(3);
+    solution.solution.vertex_by.resize(3);
+    for (const Edits& edits : {ramps, solution}) {
+        CHECK_THROWS(std::invalid_argument, edited_colours(polytope, edits, slice_at(polytope, 1)));
+    }
+}
+
+TEST(a_held_edit_stays_and_a_smooth_one_does_not_overshoot) {
+    const Polytope polytope = split_parts().build();
+    Edits edits = no_edits(polytope);
+    edits.vertex_rgb[1] = Vec3{0, 1, 1};  // the end of the edge a0 -> a1, 0 to 20
+    edits.stops = {{"s2", 0, 15, {1, 0, 0}}, {"s1", 0, 5, {0, 1, 0}, Ramp::kLinear}};
+    const auto moved = [&](double t) {
+        const Slice slice = slice_at(polytope, t);
+        const Vec3 colour = edited_colours(polytope, edits, slice)[0];
+        Vec3 by{};
+        for (std::size_t c = 0; c < 3; ++c) by[c] = colour[c] - slice.rgb[0][c];
+        return by;
+    };
+    edits.default_ramp = Ramp::kHold;
+    for (const double t : {0.0, 2.5, 4.999}) CHECK(same_bits(moved(t), {0, 0, 0}));
+    CHECK(apart(moved(10), {0.5 - 0.05, 0.5, 0}) < 1e-14);  // the stop at 5 has its own ramp
+    for (const double t : {15.5, 19.999}) CHECK(apart(moved(t), moved(15)) < 1e-14);
+    CHECK(same_bits(edited_colours(polytope, edits, slice_at(polytope, 20))[0], {0, 1, 1}));
+    CHECK(same_bits(edited_colours(polytope, edits, slice_at(polytope, 15))[0], {1, 0, 0}));
+    edits.default_ramp = Ramp::kSmooth;
+    edits.stops[1].ramp = std::nullopt;
+    for (double t = 0; t < 20; t += 0.125) {
+        const double from = t < 5 ? 0 : t < 15 ? 5 : 15, to = t < 5 ? 5 : t < 15 ? 15 : 20;
+        const Vec3 a = moved(from), b = moved(to), here = moved(t);
+        for (std::size_t c = 0; c < 3; ++c) {
+            CHECK(here[c] >= std::min(a[c], b[c]) - 1e-14 &&
+                  here[c] <= std::max(a[c], b[c]) + 1e-14);
+        }
+        CHECK(apart(here, moved(t + 1e-9)) < 1e-8);
+    }
+    // A vertex's own ramp comes before the default.
+    edits.vertex_ramp.resize(polytope.vertices().size());
+    edits.vertex_ramp[0] = Ramp::kHold;
+    CHECK(same_bits(moved(4.9), {0, 0, 0}) && !same_bits(moved(6), moved(5)));
+}
+
+TEST(the_solution_is_added_to_the_edited_colours) {
+    const Polytope polytope = split_parts().build();
+    Edits edits = no_edits(polytope);
+    edits.solution.vertex_by.resize(polytope.vertices().size());
+    edits.solution.vertex_by[1] = {0, 0, 0.5};
+    edits.solution.keys = {{0, 10, {0.25, 0, 0}}, {0, 5, {0, 0.5, 0}}};
+    const auto by = [&](double t) {
+        const Slice slice = slice_at(polytope, t);
+        Edits plain = edits;
+        plain.solution = {};
+        const Vec3 with = edited_colours(polytope, edits, slice)[0],
+                   without = edited_colours(polytope, plain, slice)[0];
+        return Vec3{with[0] - without[0], with[1] - without[1], with[2] - without[2]};
+    };
+    for (const Ramp ramp : {Ramp::kLinear, Ramp::kSmooth}) {
+        edits.default_ramp = ramp;
+        CHECK(same_bits(by(0), {0, 0, 0}));
+        CHECK(apart(by(2.5), {0, 0.25, 0}) < 1e-15);
+        CHECK(apart(by(7.5), {0.125, 0.25, 0}) < 1e-15);
+        CHECK(apart(by(10), {0.25, 0, 0}) < 1e-15);
+        CHECK(apart(by(15), {0.125, 0, 0.25}) < 1e-15);
+        CHECK(apart(by(20), {0, 0, 0.5}) < 1e-15);
+        edits.stops = {{"s1", 0, 4, {0.2, 0.9, 0.4}}};
+    }
+    // Other edges keep their bits.
+    const Slice slice = slice_at(polytope, 7);
+    const auto colours = edited_colours(polytope, edits, slice);
+    for (std::size_t i = 1; i < colours.size(); ++i) CHECK(same_bits(colours[i], slice.rgb[i]));
+}
+
+TEST(bumps_follow_their_keys_and_are_left_out_while_they_do_nothing) {
+    Edits edits;
+    CHECK(bumps_at(edits, 3).empty());
+    edits.solution.bumps = {
+        {0.5, {{2, {0, 0, 0}, {0, 0, 0}}, {4, {1, 0, 0}, {0, 2, 0}}, {6, {1, 1, 0}, {0, 0, 0}}}},
+        {0.25, {{3, {0.5, 0.5, 0.5}, {0.125, 0, 0}}}}};
+    for (const double t : {-1e9, 0.0, 2.0, 6.0, 7.0, 1e9}) {
+        const std::vector<Bump> bumps = bumps_at(edits, t);
+        CHECK_EQUAL(bumps.size(), 1u);
+        CHECK_EQUAL(bumps[0].radius, 0.25);
+        CHECK(same_bits(bumps[0].by, {0.125, 0, 0}));
+    }
+    const std::vector<Bump> bumps = bumps_at(edits, 3);
+    CHECK_EQUAL(bumps.size(), 2u);
+    CHECK(same_bits(bumps[0].centre, {0.5, 0, 0}) && same_bits(bumps[0].by, {0, 1, 0}));
+    CHECK(same_bits(bumps_at(edits, 4)[0].centre, {1, 0, 0}));
+    CHECK(same_bits(bumps_at(edits, 5)[0].centre, {1, 0.5, 0}));
 }

@@ -1,5 +1,7 @@
 #include "recolour/recolour.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <stdexcept>
@@ -261,4 +263,141 @@ TEST(mismatched_input_is_refused) {
     CHECK_THROWS(std::invalid_argument, Recolourer({{0, 0, 0}}, {}, {}));
     CHECK_THROWS(std::invalid_argument, Recolourer({{0, 0, 0}}, {{kNan, 0, 0}}, {}));
     CHECK_THROWS(std::invalid_argument, Recolourer(cube().rgb, cube().rgb, {{0, 1, 9}}));
+}
+
+namespace {
+
+const std::vector<Bump> kBumps = {{{0.5, 0.4, 0.3}, 0.4, {0.2, -0.1, 0.05}},
+                                  {{0.9, 0.9, 0.9}, 0.07, {-0.3, 0, 0.1}},
+                                  {{1.3, 0.2, 0.1}, 0.5, {0, 0.25, 0}}};
+
+/// What the bumps do to a colour, in plain words.
+Vec3 bumped(const std::vector<Bump>& bumps, const Vec3& p) {
+    Vec3 sum{};
+    for (const Bump& bump : bumps) {
+        double distance2 = 0;
+        for (std::size_t c = 0; c < 3; ++c) distance2 += std::pow(p[c] - bump.centre[c], 2);
+        const double within = std::max(0.0, 1 - distance2 / (bump.radius * bump.radius));
+        for (std::size_t c = 0; c < 3; ++c) sum[c] += std::pow(within, 3) * bump.by[c];
+    }
+    return sum;
+}
+
+}  // namespace
+
+TEST(bumps_add_to_what_the_palette_does) {
+    const Recolourer plain = cube_recolourer();
+    const Recolourer both(cube().rgb, moved_cube(), cube().faces, kBumps);
+    const Recolourer only(cube().rgb, cube().rgb, cube().faces, kBumps);
+    CHECK(only.moves() && !only.palette_moves());
+    Random random(21);
+    for (int i = 0; i < 500; ++i) {
+        const Vec3 p = random.colour(-0.3, 1.6), by = bumped(kBumps, p);
+        const Vec3 a = both.displaced(p, 0.75), b = plain.displaced(p, 0.75),
+                   c = only.displaced(p, 0.75);
+        for (std::size_t k = 0; k < 3; ++k) {
+            CHECK_NEAR(a[k] - b[k], 0.75 * by[k], 1e-14);
+            CHECK_NEAR(c[k] - p[k], 0.75 * by[k], 1e-14);
+            if (by == Vec3{0, 0, 0}) CHECK(c[k] == p[k] && a[k] == b[k]);
+        }
+    }
+}
+
+TEST(bumps_in_pictures_are_the_same_by_every_way) {
+    const Recolourer both(cube().rgb, moved_cube(), cube().faces, kBumps);
+    const Recolourer only(cube().rgb, cube().rgb, cube().faces, kBumps);
+    for (const Recolourer* recolourer : {&both, &only}) {
+        for (const int channels : {3, 4}) {
+            const Image image = noise(203, 9, channels, 5);
+            const RecolourOptions way{0.75, channels == 4, 1};
+            Image expected(203, 9, channels), exact(203, 9, channels);
+            recolourer->apply(image.in(), expected.out(), way);
+            RecolourOptions twofold = way;
+            twofold.precision = Precision::kDouble;
+            recolourer->apply(image.in(), exact.out(), twofold);
+            for (std::size_t i = 0; i < image.data.size(); ++i) {
+                const double alpha =
+                    channels == 4 ? std::max(std::abs(image.data[i / 4 * 4 + 3]), 1.0f) : 1;
+                const bool close = std::abs(expected.data[i] - exact.data[i]) <=
+                                   alpha * kSingleTolerance + 1e-6 * std::abs(exact.data[i]);
+                CHECK(close || same_bits({expected.data[i]}, {exact.data[i]}) ||
+                      (std::isnan(expected.data[i]) && std::isnan(exact.data[i])));
+            }
+            // Threads, instruction sets, places in a row, and the same memory do not show.
+            for (const InstructionSet set : instruction_sets()) {
+                Image found = image;
+                RecolourOptions other = way;
+                other.threads = 3;
+                other.instructions = set;
+                recolourer->apply(found.in(), found.out(), other);
+                CHECK(same_bits(found.data, expected.data));
+            }
+            for (const int x : {0, 1, 17, 130, 202}) {
+                const std::size_t at = (4 * 203 + static_cast<std::size_t>(x)) * channels;
+                float pixel[4];
+                recolourer->apply({&image.data[at], 1, 1, channels, 16},
+                                  {pixel, 1, 1, channels, 16}, way);
+                CHECK(std::memcmp(pixel, &expected.data[at], sizeof(float) * channels) == 0);
+            }
+        }
+    }
+}
+
+TEST(colours_beyond_all_bumps_keep_their_bits) {
+    const Recolourer only(cube().rgb, cube().rgb, cube().faces, kBumps);
+    const Image image = noise(211, 7, 4, 6);
+    for (const bool premultiplied : {false, true}) {
+        Image found(211, 7, 4);
+        only.apply(image.in(), found.out(), {1.0, premultiplied, 1});
+        int still = 0, moved = 0;
+        for (std::size_t i = 0; i < image.data.size(); i += 4) {
+            const float* from = &image.data[i];
+            const double alpha = premultiplied ? from[3] : 1.0;
+            bool beyond = true;
+            for (const Bump& bump : kBumps) {
+                double distance2 = 0;
+                for (std::size_t c = 0; c < 3; ++c) {
+                    distance2 += std::pow(from[c] / alpha - bump.centre[c], 2);
+                }
+                beyond &= !(distance2 < bump.radius * bump.radius * (1 + 1e-5));  // NaN too
+            }
+            const bool same = std::memcmp(from, &found.data[i], 16) == 0;
+            if (beyond) CHECK(same);
+            still += same;
+            moved += !same;
+        }
+        CHECK(still > 20 && moved > 20);
+    }
+}
+
+TEST(bumps_far_from_0_and_small_ones_are_exact_too) {
+    // The centre and the colours are large compared with the radius.
+    for (const double at : {0.5, 300.0, 20000.0}) {
+        const double radius = at > 1 ? 1.0 : 1e-4;
+        const std::vector<Bump> bumps = {{{at + 1e-9, at, -at}, radius, {0.5, -0.25, 0.125}}};
+        const Recolourer recolourer(cube().rgb, cube().rgb, cube().faces, bumps);
+        Random random(8);
+        Image image(64, 1, 3), found(64, 1, 3);
+        for (std::size_t i = 0; i < image.data.size(); ++i) {
+            image.data[i] =
+                static_cast<float>((i % 3 == 2 ? -at : at) + random.uniform(-0.5, 0.5) * radius);
+        }
+        recolourer.apply(image.in(), found.out(), {});
+        for (std::size_t i = 0; i < image.data.size(); i += 3) {
+            const float* p = &image.data[i];
+            const Vec3 by = bumped(bumps, {p[0], p[1], p[2]});
+            for (std::size_t c = 0; c < 3; ++c) {
+                CHECK_NEAR(found.data[i + c], p[c] + by[c], kSingleTolerance + 1e-7 * at);
+            }
+        }
+    }
+}
+
+TEST(bumps_that_are_no_bumps_are_refused) {
+    for (const Bump& bump : {Bump{{0, 0, kNan}, 1, {1, 1, 1}}, Bump{{0, 0, 0}, 0, {1, 1, 1}},
+                             Bump{{0, 0, 0}, kInf, {1, 1, 1}}, Bump{{0, 0, 0}, 1, {1, kInf, 1}}}) {
+        CHECK_THROWS(std::invalid_argument,
+                     Recolourer(cube().rgb, cube().rgb, cube().faces, {bump}));
+    }
+    CHECK(!Recolourer(cube().rgb, cube().rgb, cube().faces, {{{0, 0, 0}, 1, {0, 0, 0}}}).moves());
 }

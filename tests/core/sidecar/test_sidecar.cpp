@@ -177,6 +177,70 @@ TEST(broken_documents_are_refused_where_they_are_broken) {
         CHECK_EQUAL(problem.pointer(), std::string(broken.pointer));
         CHECK_EQUAL(problem.file(), std::string("clip.p4d.json"));
     }
+    const std::vector<Case> picks = {
+        {"\"ramp\": \"smooth\",\n", "\"ramp\": \"slow\",\n", "/edits/ramp"},
+        {"\"ramp\": \"hold\"}", "\"ramp\": 1}", "/edits/vertices/0/ramp"},
+        {"\"ramp\": \"linear\"", "\"ramp\": null", "/edits/stops/1/ramp"},
+        {"\"kind\": \"pick\"", "\"kind\": \"want\"", "/edits/picks/0/kind"},
+        {"\"id\": \"p2\"", "\"id\": \"p1\"", "/edits/picks/1/id"},
+        {"\"enabled\": false", "\"enabled\": 0", "/edits/picks/1/enabled"},
+        {"\"enabled\": false", "\"on\": false", "/edits/picks/1/on"},
+        {"\"pixel\": [10, 7]", "\"pixel\": [10, -7]", "/edits/picks/0/pixel/1"},
+        {"{\"frame\": 12, \"rgb\": [0.3, 0.35, 0.3]}]", "{\"frame\": 0, \"rgb\": [0, 0, 0]}]",
+         "/edits/picks/0/path/1/frame"},
+        {"[\"v8\", \"s1\"]", "[\"v8\", 1]", "/edits/locks/1"},
+        {"{\"vertex\": \"v8\"", "{\"vertex\": \"v2\"", "/edits/solution/vertices/1/vertex"},
+        {"{\"vertex\": \"v8\"", "{\"vertex\": \"v99\"", "/edits/solution/vertices/1/vertex"},
+        {"\"frame\": 2.5, \"by\"", "\"frame\": 6, \"by\"", "/edits/solution/keys/1/frame"},
+        {"\"frame\": 2.5, \"by\"", "\"frame\": 9, \"by\"", "/edits/solution/keys/1/frame"},
+        {"{\"radius\": 0.3,", "{\"radius\": 0,", "/edits/solution/bumps/1/radius"},
+        {"{\"radius\": 0.3,", "{\"radius\": 0.3, \"x\": 1,", "/edits/solution/bumps/1/x"},
+        {"{\"radius\": 0.3, \"keys\": [{\"frame\": 5, \"rgb\": [0.5, 0.35, 0.2], \"by\": "
+         "[-0.03, 0.08, 0.04]}]}",
+         "{\"radius\": 0.3, \"keys\": []}", "/edits/solution/bumps/1/keys"},
+        {"{\"frame\": 14, \"rgb\"", "{\"frame\": 12, \"rgb\"",
+         "/edits/solution/bumps/0/keys/3/frame"},
+        {"[0.4, 0.3, 0.25, 0.5]", "[0.4, 0.3, 0.25, 1.5]", "/colours/0/rgbw/0/3"},
+        {"{\"frame\": 20, \"rgbw\"", "{\"frame\": 0, \"rgbw\"", "/colours/1/frame"},
+        {"\"name\": \"none\"", "\"name\": \"warm Gr\u00fcn\"", "/versions/1/name"},
+        {"\"name\": \"none\"", "\"name\": \"\"", "/versions/1/name"},
+        {"\"name\": \"none\"", "\"name\": \"a\\nb\"", "/versions/1/name"},
+        {"\"edge\": \"e5\", \"frame\": 12", "\"edge\": \"e5\", \"frame\": 21",
+         "/versions/0/edits/stops/0/frame"},
+        {"\"history\": {", "\"history\": [], \"extra\": {", "/extra"},
+    };
+    for (const Case& broken : picks) {
+        const SidecarError problem = refused(replaced(golden("picks"), broken.from, broken.to));
+        CHECK_EQUAL(problem.pointer(), std::string(broken.pointer));
+    }
+}
+
+TEST(picks_ramps_and_versions_arrive) {
+    const Sidecar sidecar = parse_sidecar(golden("picks"), "picks");
+    const Edits& edits = sidecar.edits;
+    CHECK(edits.default_ramp == Ramp::kSmooth);
+    CHECK(edits.vertex_ramp[3] == Ramp::kHold && !edits.vertex_ramp[4]);
+    CHECK(!edits.stops[0].ramp && edits.stops[1].ramp == Ramp::kLinear);
+    CHECK(edits.solution.vertex_by[7] == (Vec3{-0.04, 0.015, 0.03}));
+    CHECK(edits.solution.vertex_by[0] == (Vec3{0, 0, 0}));
+    CHECK_EQUAL(edits.solution.keys.size(), 3u);
+    CHECK_EQUAL(edits.solution.keys[1].frame, 2.5);
+    CHECK_EQUAL(edits.solution.bumps.size(), 2u);
+    CHECK_EQUAL(edits.solution.bumps[0].keys.size(), 4u);
+    CHECK(edits.solution.bumps[0].keys[2].by == (Vec3{0.06, -0.04, 0.02}));
+    CHECK_EQUAL(sidecar.versions.size(), 2u);
+    CHECK_EQUAL(sidecar.versions[0].name, std::string("warm Gr\u00fcn"));
+    CHECK(sidecar.versions[0].edits.default_ramp == Ramp::kHold);
+    CHECK_EQUAL(sidecar.versions[0].edits.stops[0].id, std::string("s1"));
+    CHECK(sidecar.versions[1].edits.stops.empty());
+    // A name counts characters, not bytes.
+    std::string name;
+    for (int i = 0; i < 100; ++i) name += "\u7d75";
+    const auto named = [&](const std::string& text) {
+        return replaced(golden("picks"), "\"name\": \"none\"", "\"name\": \"" + text + '"');
+    };
+    CHECK_EQUAL(parse_sidecar(named(name), "name").versions[1].name, name);
+    CHECK_EQUAL(refused(named(name + "x")).pointer(), std::string("/versions/1/name"));
 }
 
 TEST(a_newer_version_asks_for_an_update) {

@@ -10,11 +10,11 @@ namespace palette4d {
 
 /// Caches some displacements, since colours repeat in flat areas and in 8-bit images. They depend
 /// on the colour alone, so the cache does not change results.
-class OneByOne final : public RowWorker {
+class DoubleWorker final : public RowWorker {
 public:
     /// `recolourer` must outlive this and move some colour. Its bumps count only with `bumps`.
-    OneByOne(const Recolourer& recolourer, const RecolourOptions& options, int channels,
-             bool bumps);
+    DoubleWorker(const Recolourer& recolourer, const RecolourOptions& options, int channels,
+                 bool bumps);
 
     void row(const float* from, float* to, int width) override;
     void finish() override {}

@@ -8,13 +8,13 @@
 namespace palette4d {
 
 /// Single pixels too, with the same bits as row().
-class ExactWorker : public RowWorker {
+class FloatWorker : public RowWorker {
 public:
     virtual void pixel(const float* from, float* to) = 0;
 };
 
 /// `recolourer` must outlive the worker and move some colour. Its bumps count only with `bumps`.
-std::unique_ptr<ExactWorker> exact_worker(const Recolourer& recolourer,
+std::unique_ptr<FloatWorker> float_worker(const Recolourer& recolourer,
                                           const RecolourOptions& options, int channels, bool bumps);
 
 }  // namespace palette4d

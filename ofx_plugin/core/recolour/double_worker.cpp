@@ -1,4 +1,4 @@
-#include "recolour/one_by_one.hpp"
+#include "recolour/double_worker.hpp"
 
 #include <cstdint>
 #include <cstring>
@@ -23,8 +23,8 @@ std::size_t slot(const Vec3& p) {
 
 }  // namespace
 
-OneByOne::OneByOne(const Recolourer& recolourer, const RecolourOptions& options, int channels,
-                   bool bumps)
+DoubleWorker::DoubleWorker(const Recolourer& recolourer, const RecolourOptions& options,
+                           int channels, bool bumps)
     : recolourer_(recolourer),
       strength_(options.strength),
       divide_(options.premultiplied),
@@ -32,7 +32,7 @@ OneByOne::OneByOne(const Recolourer& recolourer, const RecolourOptions& options,
       bumps_(bumps),
       weights_(recolourer.original().size()) {}
 
-void OneByOne::row(const float* from, float* to, int width) {
+void DoubleWorker::row(const float* from, float* to, int width) {
     for (int x = 0; x < width; ++x, from += channels_, to += channels_) {
         if (channels_ == 4) to[3] = from[3];
         if (recolourable(from, divide_)) {
@@ -43,7 +43,7 @@ void OneByOne::row(const float* from, float* to, int width) {
     }
 }
 
-void OneByOne::recolour(const float* from, float* to) {
+void DoubleWorker::recolour(const float* from, float* to) {
     ++count_;
     const double alpha = divide_ ? from[3] : 1.0;
     const Vec3& moved = displacement(straight_colour(from, divide_));
@@ -55,7 +55,7 @@ void OneByOne::recolour(const float* from, float* to) {
     }
 }
 
-const Vec3& OneByOne::displacement(const Vec3& p) {
+const Vec3& DoubleWorker::displacement(const Vec3& p) {
     if (memory_.empty()) memory_.assign(kSlots, Entry{{0, 0, 0}, {0, 0, 0}, false});
     Entry& entry = memory_[slot(p)];
     if (!entry.known || entry.colour != p) {

@@ -1,11 +1,11 @@
-#include "recolour/exact_worker.hpp"
+#include "recolour/float_worker.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <iterator>
 #include <limits>
 
-#include "recolour/one_by_one.hpp"
+#include "recolour/double_worker.hpp"
 #include "recolour/recolour_plan.hpp"
 #include "simd/kernel_choice.hpp"
 #include "simd/split.hpp"
@@ -27,7 +27,7 @@ void stay(const Plan<T>&, Block<T>& block, int, T, T*) {
 /// Collects pixels in blocks and sorts them into inside and outside the palette; one kernel for
 /// each computes the displacement. Pixels whose error a kernel cannot guarantee go to the next
 /// stage: float, double, one by one. A pixel's stage depends on its colour alone.
-class Pipeline final : public ExactWorker {
+class Pipeline final : public FloatWorker {
 public:
     Pipeline(const Recolourer& recolourer, const RecolourOptions& options, int channels, bool bumps)
         : divide_(options.premultiplied),
@@ -282,14 +282,14 @@ private:
 
     const bool divide_;
     const int channels_;
-    OneByOne one_by_one_;
-    Stage<double, OneByOne> twofold_;
-    Stage<float, Stage<double, OneByOne>> single_;
+    DoubleWorker one_by_one_;
+    Stage<double, DoubleWorker> twofold_;
+    Stage<float, Stage<double, DoubleWorker>> single_;
 };
 
 }  // namespace
 
-std::unique_ptr<ExactWorker> exact_worker(const Recolourer& recolourer,
+std::unique_ptr<FloatWorker> float_worker(const Recolourer& recolourer,
                                           const RecolourOptions& options, int channels,
                                           bool bumps) {
     return std::make_unique<Pipeline>(recolourer, options, channels, bumps);

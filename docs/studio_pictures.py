@@ -1,0 +1,110 @@
+"""Draw the pictures of the window, without a screen, from the results of `make demo`.
+
+    .venv/bin/python docs/studio_pictures.py demo_output
+
+It writes docs/images/studio.jpg, of the whole window, and studio_NAME.jpg of its parts. The demo's
+sidecar is copied first, and stays as it is. `make docs-images` calls this.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+os.environ["QT_QPA_PLATFORM"] = "offscreen"
+
+from PIL import Image
+
+from palette4d.studio import app
+
+IMAGES = Path(__file__).resolve().parent / "images"
+COMMAND = Path(sys.executable).with_name("palette4d")
+Prepare = Callable[[Any], object]
+
+
+def edit(sidecar: Path, *words: str) -> None:
+    """Do an edit on the command line."""
+    subprocess.run([COMMAND, "edit", sidecar, *words], check=True, stdout=subprocess.DEVNULL)
+
+
+def draw(
+    name: str,
+    sidecar: Path,
+    frame: int,
+    prepare: Prepare,
+    *,
+    size: tuple[int, int] = (1600, 1000),
+    part: str = "",
+) -> None:
+    """Draw the window, or one of its parts, into docs/images/NAME.jpg."""
+    box: list[tuple[int, int, int, int]] = []
+
+    def ready(window: Any) -> None:
+        prepare(window)
+        if part:
+            view = getattr(window, part)
+            at = view.mapTo(window, view.rect().topLeft())
+            box.append((at.x(), at.y(), at.x() + view.width(), at.y() + view.height()))
+
+    with tempfile.TemporaryDirectory() as folder:
+        shot = Path(folder) / "shot.png"
+        app.run(str(sidecar), frame=frame, screenshot=shot, size=size, prepare=ready)
+        with Image.open(shot) as picture:
+            shown = picture.convert("RGB")
+            if box:
+                shown = shown.crop(box[0])
+            shown.save(IMAGES / f"{name}.jpg", quality=88, subsampling=0, optimize=True)
+    print(IMAGES / f"{name}.jpg")
+
+
+def main() -> None:
+    """Draw all pictures from the demo's folder that the command line names."""
+    demo = Path(sys.argv[1]).absolute()
+    with tempfile.TemporaryDirectory() as folder:
+        sidecar = Path(folder) / "sample.p4d.json"
+        shutil.copy(demo / "sample.p4d.json", sidecar)
+        (Path(folder) / "clip").symlink_to(demo / "clip")
+        draw("studio", sidecar, 28, whole)
+        draw("studio_compare", sidecar, 11, wipe, size=(1400, 860), part="viewer")
+        draw("studio_timeline", sidecar, 22, timeline, size=(1500, 1450), part="timeline")
+        draw("studio_solid", sidecar, 28, solid, size=(1500, 1300), part="solid")
+        when = ("--from", "22", "--until", "36", "--fade", "6")
+        edit(sidecar, "pick", "--pixel", "250,60", "--frame", "28", "--to", "0.6,0.62,0.75", *when)
+        edit(sidecar, "hold", "--pixel", "60,20", "--frame", "28", *when)
+        draw("studio_picks", sidecar, 28, picks)
+
+
+def whole(window: Any) -> None:
+    """Select the rose of autumn."""
+    window.session.select("v14")
+
+
+def wipe(window: Any) -> None:
+    """Compare by a wipe."""
+    window.session.look(compare="wipe", wipe=0.52)
+
+
+def timeline(window: Any) -> None:
+    """Select a stop."""
+    window.session.select("s1")
+
+
+def solid(window: Any) -> None:
+    """Select the rose of autumn, seen from the side."""
+    window.session.select("v14")
+    window.solid.azimuth, window.solid.elevation = 24.0, 14.0
+
+
+def picks(window: Any) -> None:
+    """Select the pick."""
+    window.session.select("p1")
+
+
+if __name__ == "__main__":
+    main()

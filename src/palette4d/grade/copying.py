@@ -1,0 +1,304 @@
+"""Copied grades: another palette gets the look of a graded palette.
+
+Each handle of the target gets the colour that the source's grade makes of its colour at the
+corresponding time. Stops are added where the change along an edge is not linear. Picks are copied
+and solved again, so that they stay picks.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palette4d import _core
+from palette4d.colour.between import between
+from palette4d.common.errors import Palette4dError
+from palette4d.grade import edits
+from palette4d.grade.edits import Key, Setting, as_colour
+
+if TYPE_CHECKING:
+    from palette4d.grade.document import Document
+
+F64 = NDArray[np.float64]
+Time = Literal["relative"] | float
+
+#: Smaller deviations from straight lines need no stop: three steps of 8 bits.
+TOLERANCE = 3 / 255
+#: Smaller changes of a handle are rounding errors of 32-bit floats.
+LEAST = 1e-6
+#: Colours farther than this from the source's palette are not in its clip.
+NEAR = 0.05
+#: At most this many stops an edge.
+MOST_STOPS = 64
+
+
+@dataclass(frozen=True)
+class Fit:
+    """How well a copied grade fits, measured on the colours of the target's clip.
+
+    Attributes
+    ----------
+    change : float
+        The mean change that the source's grade makes of these colours, in code values.
+    mean, largest : float
+        The mean difference of the copy from the source's grade, and the difference that 99 % of the
+        colours stay below.
+    foreign : float
+        The share of the colours, 0..1, that are farther than `NEAR` from the source's palette:
+        there the source's grade says little.
+    """
+
+    change: float
+    mean: float
+    largest: float
+    foreign: float
+
+    def __str__(self) -> str:
+        """Return the figures for people, in steps of 8 bits."""
+        text = (
+            f"the copy differs from the copied grade by {self.mean * 255:.1f} of 255 on average, "
+            f"by {self.largest * 255:.1f} at most (99 % of the colours); the grade changes the "
+            f"colours by {self.change * 255:.1f}"
+        )
+        if self.foreign >= 0.005:
+            text += (
+                f"; {self.foreign:.0%} of the clip's colours are not in the other clip's palette"
+            )
+        return text
+
+
+@dataclass(frozen=True)
+class Match:
+    """The times and the colours of two documents."""
+
+    target: "Document"
+    source: "Document"
+    time: Time
+
+    def there(self, frame: float) -> float:
+        """Return the source's time for a time of the target."""
+        if self.time != "relative":
+            return float(self.time)
+        first, last, _ = self.target.frames
+        begin, end, _ = self.source.frames
+        return begin + (frame - first) * (end - begin) / max(last - first, 1)
+
+    def back(self, frame: float) -> float:
+        """Return the target's time for a time of the source, with `time` "relative"."""
+        first, last, _ = self.target.frames
+        begin, end, _ = self.source.frames
+        return first + (frame - begin) * (last - first) / max(end - begin, 1)
+
+    @property
+    def pace(self) -> float:
+        """Frames of the target for one frame of the source."""
+        return self.back(1.0) - self.back(0.0)
+
+
+def copied(target: "Document", source: "Document", time: Time = "relative") -> dict[Key, Any]:
+    """Return the state of a document with the grade of another document.
+
+    Parameters
+    ----------
+    target, source : Document
+        The documents.
+    time : "relative" or float
+        "relative": the first frame gets the look of the first frame, the last that of the last. A
+        frame: all frames get the look of this frame of the source.
+
+    Raises
+    ------
+    Palette4dError
+        The frame is outside of the source's clip, or no config converts between the colour spaces.
+    """
+    match = _match(target, source, time)
+    picks = [value for (kind, _), value in source.state.items() if kind == "pick"]
+    own = {key: value for key, value in source.state.items() if key[0] in ("handle", "ramp")}
+    graded = _grade(match, source.at(own))
+    state: dict[Key, Any] = dict(_handles(target, graded))
+    into = between(source.encoding, target.encoding, _configs(target, source))
+    for pick in picks:
+        if (found := _pick(match, pick, into)) is not None:
+            state["pick", found["id"]] = found
+    return state
+
+
+def fit(target: "Document", source: "Document", time: Time = "relative") -> Fit:
+    """Measure how near a document's grade is to another document's grade on its colours."""
+    match = _match(target, source, time)
+    graded = _grade(match, source)
+    into = between(target.encoding, source.encoding, _configs(target, source))
+    figures = []
+    for frame, colours, weights in _colours(target):
+        result = _recoloured(target, colours, frame)
+        expected = graded(colours, frame)
+        palette = source.palette(match.there(frame))
+        there = colours if into is None else into(colours)
+        _, distances = _core.palette_weights(there, palette.rgb, palette.faces)
+        figures.append(
+            np.column_stack(
+                [
+                    weights,
+                    np.abs(expected - colours).max(axis=1),
+                    np.abs(result - expected).max(axis=1),
+                    distances > NEAR,
+                ]
+            )
+        )
+    weight, change, off, foreign = np.vstack(figures).T
+    order = np.argsort(off, kind="stable")
+    reached = np.cumsum(weight[order]) / weight.sum()
+    worst = off[order][min(int(np.searchsorted(reached, 0.99)), len(off) - 1)]
+    mean = [float(np.average(values, weights=weight)) for values in (change, off, foreign)]
+    return Fit(mean[0], mean[1], float(worst), mean[2])
+
+
+def _match(target: "Document", source: "Document", time: Time) -> Match:
+    if time != "relative":
+        if isinstance(time, str):
+            raise Palette4dError(f"found the time {time!r}, expected 'relative' or a frame")
+        source.check_frame(time)
+    return Match(target, source, time)
+
+
+def _configs(*documents: "Document") -> Iterator[str]:
+    for document in documents:
+        name = document.fields()["clip"].get("conversion", {}).get("config")
+        if name:
+            yield name
+
+
+def _recoloured(document: "Document", colours: F64, frame: float) -> F64:
+    image = np.asarray(colours, dtype=np.float32)[None]
+    result: F64 = document.recolour(image, frame, space="palette")[0].astype(np.float64)
+    return result
+
+
+def _grade(match: Match, source: "Document") -> Callable[[F64, float], F64]:
+    """Return what the source's grade makes of (n, 3) colours of the target at a target's time."""
+    configs = tuple(_configs(match.target, match.source))
+    there = between(match.target.encoding, match.source.encoding, configs)
+    back = between(match.source.encoding, match.target.encoding, configs)
+
+    def graded(colours: F64, frame: float) -> F64:
+        before = colours if there is None else there(colours)
+        after = _recoloured(source, before, match.there(frame))
+        moved = np.abs(after - before.astype(np.float32)).max(axis=1) > LEAST
+        if back is not None:
+            # The difference, so that rounding of the conversions is no edit.
+            after = colours + back(after) - back(before)
+        result: F64 = np.where(moved[:, None], after, colours)
+        return result
+
+    return graded
+
+
+def _handles(
+    target: "Document", graded: Callable[[F64, float], F64]
+) -> Iterator[tuple[Key, Setting]]:
+    """Yield the settings of vertices, and of the stops that edges need."""
+    polytope = target.fields()["polytope"]
+    vertices = {vertex["id"]: vertex for vertex in polytope["vertices"]}
+    taken = {*vertices, *(edge["id"] for edge in polytope["edges"])}
+    shifts: dict[str, F64] = {}
+    for id_, vertex in vertices.items():
+        before = np.array([vertex["rgb"]], dtype=np.float64)
+        after = graded(before, vertex["frame"])
+        shifts[id_] = (after - before)[0]
+        if shifts[id_].any():
+            yield ("handle", id_), Setting(as_colour(after[0].tolist()))
+
+    first, last, step = target.frames
+    before_at: dict[str, list[tuple[float, F64, F64]]] = {}
+    for at in range(first, last + 1, step):
+        palette = target.palette(at)
+        after = graded(palette.rgb, at)
+        for id_, colour, new in zip(palette.ids, palette.rgb, after, strict=True):
+            if id_ not in vertices:
+                before_at.setdefault(id_, []).append((float(at), colour, new))
+    for edge in polytope["edges"]:
+        samples = before_at.get(edge["id"], [])
+        ends = [(vertices[edge[end]]["frame"], shifts[edge[end]]) for end in ("from", "to")]
+        for index in _needed(ends, [(frame, new - old) for frame, old, new in samples]):
+            frame, _, new = samples[index]
+            id_ = edits.new_id("s", taken)
+            taken.add(id_)
+            yield ("handle", id_), Setting(as_colour(new.tolist()), edge["id"], frame)
+
+
+def _needed(ends: list[tuple[float, F64]], samples: list[tuple[float, F64]]) -> list[int]:
+    """Return the samples that straight lines must pass to be near all samples."""
+    if not samples:
+        return []
+    frames = np.array([frame for frame, _ in samples])
+    wanted = np.array([shift for _, shift in samples])
+    chosen: list[int] = []
+    while len(chosen) < MOST_STOPS:
+        knots = sorted([*ends, *(samples[i] for i in chosen)], key=lambda knot: knot[0])
+        times = [frame for frame, _ in knots]
+        lines = np.column_stack(
+            [np.interp(frames, times, [shift[c] for _, shift in knots]) for c in range(3)]
+        )
+        off = np.abs(lines - wanted).max(axis=1)
+        if off.max() <= TOLERANCE:
+            break
+        chosen.append(int(off.argmax()))
+    return sorted(chosen)
+
+
+def _pick(match: Match, pick: dict[str, Any], into: Any) -> dict[str, Any] | None:
+    """Return a pick as it is in the target, or None if it does nothing at the chosen frame."""
+
+    def colour(rgb: Any) -> list[float]:
+        return list(as_colour(rgb if into is None else into(rgb).tolist()))
+
+    def time(frame: float) -> float:
+        first, last, _ = match.target.frames
+        nearest = float(min(max(match.back(frame), first), last))
+        return int(nearest) if nearest.is_integer() else nearest
+
+    left_out = ("pixel", "box", "path", "from", "until", "fade")  # of the other clip
+    found = {name: value for name, value in pick.items() if name not in left_out}
+    if "to" in pick:
+        found["to"] = colour(pick["to"])
+    path = [(key["frame"], key["rgb"]) for key in pick.get("path", ())]
+    if match.time == "relative":
+        found |= {"frame": time(pick["frame"]), "rgb": colour(pick["rgb"])}
+        found |= {name: time(pick[name]) for name in ("from", "until") if name in pick}
+        if pick.get("fade"):
+            found["fade"] = pick["fade"] * match.pace
+        if path:
+            keys = {time(frame): colour(rgb) for frame, rgb in path}
+            found["path"] = [{"frame": frame, "rgb": rgb} for frame, rgb in sorted(keys.items())]
+        return found
+    at = float(match.time)
+    if not pick.get("from", at) <= at <= pick.get("until", at):
+        return None
+    if path:
+        times = [frame for frame, _ in path]
+        rgb = [float(np.interp(at, times, [key[c] for _, key in path])) for c in range(3)]
+        if "to" in pick and pick.get("toward", "shift") == "shift":
+            found["to"] = colour(
+                [q + now - p for q, now, p in zip(pick["to"], rgb, pick["rgb"], strict=True)]
+            )
+    else:
+        rgb = pick["rgb"]
+    return {**found, "frame": match.target.frames[0], "rgb": colour(rgb)}
+
+
+def _colours(target: "Document") -> Iterator[tuple[float, F64, F64]]:
+    """Yield frames with colours of the target's clip and their weights."""
+    stored = target.fields().get("colours")
+    if stored:
+        for entry in stored:
+            rows = np.array(entry["rgbw"], dtype=np.float64).reshape(-1, 4)
+            if len(rows):
+                yield float(entry["frame"]), rows[:, :3], rows[:, 3]
+        return
+    # Without the clip's colours: even mixtures of the palette's colours.
+    for frame in np.unique(np.linspace(*target.frames[:2], 9)):
+        rgb = target.palette(float(frame)).rgb
+        pairs = [(a + b) / 2 for i, a in enumerate(rgb) for b in rgb[i + 1 :]] or [*rgb]
+        yield float(frame), np.array(pairs), np.ones(len(pairs))

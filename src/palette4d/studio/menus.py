@@ -1,0 +1,29 @@
+"""Menu entries of the views: the timeline and the solid do their actions themselves."""
+
+from collections.abc import Iterable
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction, QKeySequence
+from PySide6.QtWidgets import QWidget
+
+from palette4d.studio.actions import Action
+
+#: Keys that the view sees itself: at the last handle, Tab goes on to the next panel.
+OWN_KEYS = ("Tab", "Shift+Tab")
+
+
+def view_actions(view: QWidget, actions: Iterable[Action]) -> dict[str, list[QAction]]:
+    """Return the entries for a view's actions by menu; each calls the view's method of its name."""
+    result: dict[str, list[QAction]] = {}
+    for action in actions:
+        made = QAction(action.text, view)
+        if action.keys[0] in OWN_KEYS:
+            made.setText(f"{action.text}\t{action.keys[0]}")
+        else:
+            made.setShortcuts([QKeySequence(keys) for keys in action.keys])
+        made.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
+        method = getattr(view, action.name)
+        made.triggered.connect(lambda _=False, method=method: method())
+        view.addAction(made)
+        result.setdefault(action.menu, []).append(made)
+    return result

@@ -1,0 +1,169 @@
+"""Copied grades: the look of one palette for another, and for a new analysis of the same clip."""
+
+import copy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from palette4d.colour.between import between
+from palette4d.common.errors import Palette4dError
+from palette4d.grade import sidecar
+from palette4d.grade.document import Document
+
+GOLDEN = Path(__file__).parents[1] / "golden" / "sidecars"
+
+
+def members(name: str) -> dict[str, Any]:
+    return sidecar.load(GOLDEN / f"v1_{name}.p4d.json")
+
+
+def stretched(fields: dict[str, Any], factor: int, shift: int) -> dict[str, Any]:
+    """The same palette over another range of frames."""
+    fields = copy.deepcopy(fields)
+    clip, polytope = fields["clip"], fields["polytope"]
+    for name in ("first", "last"):
+        clip["frames"][name] = clip["frames"][name] * factor + shift
+    for vertex in polytope["vertices"]:
+        vertex["frame"] = vertex["frame"] * factor + shift
+    for block in polytope["blocks"]:
+        for name in ("first", "last"):
+            block[name] = block[name] * factor + shift
+    fields["edits"] = {"vertices": [], "stops": []}
+    return fields
+
+
+def graded() -> Document:
+    document = Document(members("split"))
+    document.adjust("v1", track=True, by=(0.2, 0.1, 0))
+    document.adjust("v4", track=True, rgb=(0.6, 0.1, 0.8), start=0, until=6, fade=3)
+    return document
+
+
+def worst(one: Document, other: Document, times: list[tuple[float, float]]) -> float:
+    return max(
+        float(np.abs(one.palette(t).edited - other.palette(u).edited).max()) for t, u in times
+    )
+
+
+def test_the_same_palette_gets_the_same_grade() -> None:
+    source, target = graded(), Document(members("split"))
+    fit = target.copy_from(source)
+    assert worst(target, source, [(t, t) for t in range(21)]) < 4 / 255
+    assert fit.change > 0.02
+    assert fit.mean < 1 / 255
+    assert fit.largest < 4 / 255
+    assert fit.foreign == 0
+    assert len(target.settings) < 25
+
+
+def test_another_length_has_corresponding_times() -> None:
+    source = graded()
+    target = Document(stretched(members("split"), 3, 1000))
+    target.copy_from(source)
+    assert worst(target, source, [(1000 + 3 * t, t) for t in range(21)]) < 5 / 255
+
+
+def test_one_frame_gives_its_look_to_all_frames() -> None:
+    source, target = graded(), Document(members("split"))
+    target.copy_from(source, time=2)
+    there = source.palette(2)
+    for frame in (0, 7, 15, 20):
+        palette = target.palette(frame)
+        image = palette.rgb[None].astype(np.float32)
+        expected = source.recolour(image, 2, space="palette")[0]
+        assert palette.edited == pytest.approx(expected, abs=4 / 255)
+    assert there.edited != pytest.approx(there.rgb)
+
+
+def test_a_copy_is_one_step_and_loses_no_edits() -> None:
+    source, target = graded(), Document(members("edited"))
+    before = target.fields()["edits"]
+    target.copy_from(source)
+    assert target.versions == ("before copy",)
+    assert target.version("before copy").fields()["edits"] == before
+    assert len(target.history) == 1
+    target.undo()
+    assert target.fields()["edits"] == before
+
+
+def test_colours_of_another_encoding_are_converted() -> None:
+    source = graded()
+    fields = stretched(members("split"), 1, 0)
+    convert = between("sRGB", "ACEScct")
+    assert convert is not None
+    fields["clip"]["encoding"] = "ACEScct"
+    for vertex in fields["polytope"]["vertices"]:
+        vertex["rgb"] = convert(vertex["rgb"]).tolist()
+    target = Document(fields)
+    target.copy_from(source)
+    back = between("ACEScct", "sRGB")
+    assert back is not None
+    for id_ in ("v1", "v12", "v4"):
+        assert back(target.colour(id_)) == pytest.approx(source.colour(id_), abs=0.01)
+    for id_ in ("v2", "v3"):
+        assert id_ not in target.settings
+
+
+def test_encodings_that_cannot_be_converted_are_refused() -> None:
+    fields = stretched(members("split"), 1, 0)
+    fields["clip"]["encoding"] = "unknown"
+    target = Document(fields)
+    before = target.fields()
+    with pytest.raises(Palette4dError, match=r"unknown.*sRGB|sRGB.*unknown"):
+        target.copy_from(graded())
+    assert target.fields() == before
+
+
+@pytest.mark.parametrize("time", [-1, 21, "absolute", float("nan")])
+def test_wrong_times_are_refused(time: Any) -> None:
+    target = Document(members("split"))
+    before = target.fields()
+    with pytest.raises(Palette4dError):
+        target.copy_from(graded(), time=time)
+    with pytest.raises(Palette4dError):
+        target.copy_from(Document(members("split")))
+    assert target.fields() == before
+
+
+def test_colours_that_the_source_lacks_are_reported() -> None:
+    target = Document(members("split"))
+    fields = members("split")
+    for vertex in fields["polytope"]["vertices"]:
+        vertex["rgb"] = [value * 0.3 for value in vertex["rgb"]]
+    source = Document(fields)
+    source.adjust(by=(0.1, 0, 0))
+    fit = target.copy_from(source)
+    assert fit.foreign > 0.5
+    assert "not in" in str(fit)
+
+
+def test_a_new_analysis_with_another_palette_gets_the_grade(tmp_path: Path) -> None:
+    path = tmp_path / "clip.p4d.json"
+    document = graded()
+    document.save_version("purple")
+    document.adjust(by=(0, 0.1, 0))
+    document.save(path)
+    read = path.read_bytes()
+    fields = members("merge")
+    fields["edits"] = {"vertices": [], "stops": []}
+    for on_edits in ("refuse", "keep"):
+        new = Document(fields)
+        if on_edits == "refuse":
+            with pytest.raises(Palette4dError):
+                new.save(path)
+            assert path.read_bytes() == read
+        else:
+            new.save(path, on_edits="keep")
+    assert (tmp_path / "clip.former.p4d.json").read_bytes() == read
+    assert any("clip.former.p4d.json" in note for note in new.notes)
+    found = Document.load(path)
+    assert found.fields()["polytope"] == fields["polytope"]
+    assert found.versions == ("purple",)
+    assert found.settings
+    assert found.version("purple").settings != found.settings
+    assert len(found.history) == 1
+    again = Document(members("split"))
+    again.save(path, on_edits="keep")
+    assert (tmp_path / "clip.former2.p4d.json").exists()
