@@ -13,14 +13,14 @@ struct HostClip {
     std::optional<double> first, last;     ///< times of the first and last frame
     std::optional<double> rate;            ///< host frames per second
     std::optional<double> source_frame{};  ///< media frame from 0, independent of the time
-    std::optional<double> first_number{};  ///< of the media's frames, for a sequence
+    std::optional<double> first_number{};  ///< number of a sequence's first frame
 };
 
 struct TimeSettings {
     bool automatic = true;
     double start = 0;       ///< host time of the clip's first frame; manual timing only
-    bool by_rates = false;  ///< seconds count, at the host's and the clip's rate; likewise
-    double host_rate = 0;   ///< 0: the reported rate; likewise
+    bool by_rates = false;  ///< by seconds, not frames; manual timing only
+    double host_rate = 0;   ///< 0: the reported rate; manual timing only
     double in_point = 0;    ///< clip frames before the first one that the host shows
     double offset = 0;      ///< frames added
     double speed = 1;       ///< clip frames per host frame

@@ -58,13 +58,45 @@ def test_info_as_json(capsys: pytest.CaptureFixture[str]) -> None:
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
 def test_info_for_people(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main.main(["info", str(path)]) == 0
+    assert main.main(["info", str(path), "--handles", "--quality"]) == 0
     out = capsys.readouterr().out
     document = json.loads(path.read_text(encoding="utf-8"))
     ids = [row["id"] for part in ("vertices", "edges") for row in document["polytope"][part]]
     ids += [row["id"] for row in document["edits"]["stops"]]
     assert set(ids) <= {line.split()[0] for line in out.splitlines() if line}
     assert "\x1b" not in out
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
+def test_info_shows_tracks_first(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    document = Document.load(path)
+    assert main.main(["info", str(path)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    start = next(i for i, line in enumerate(lines) if line.startswith("track "))
+    names = [line.split()[0] for line in lines[start + 1 : start + 1 + len(document.tracks)]]
+    assert names == [track.name for track in document.tracks]
+    assert len(lines) < start + len(names) + 6
+    assert not any("deepest" in line or "K" in line.split() for line in lines)
+    for name in names:
+        assert document.adjust(name, track=True, by=(0.01, 0, 0))
+
+
+def test_info_tells_of_all_edits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "clip.p4d.json"
+    path.write_bytes(Path(EDITED).read_bytes())
+    for words in ("ramp smooth", "version save warm", "set v1 --rgb #ff0000"):
+        assert main.main(["edit", str(path), *words.split()]) == 0
+    capsys.readouterr()
+    assert main.main(["info", str(path)]) == 0
+    out = capsys.readouterr().out
+    assert "3 vertices, 3 stops, smooth ramps; 3 steps to undo" in out
+    assert "versions  warm" in out
+    assert main.main(["info", str(path), "--json"]) == 0
+    info = json.loads(capsys.readouterr().out)
+    assert (info["ramp"], info["steps"], info["versions"]) == ("smooth", 3, ["warm"])
+    track = next(track for track in info["tracks"] if "v1" in track["vertices"])
+    assert "v1" in track["edited"]
+    assert track["rgb"] != track["edited_rgb"]
 
 
 class Terminal:
@@ -86,7 +118,7 @@ def test_colours_are_shown_on_terminals(
 ) -> None:
     monkeypatch.setenv("NO_COLOR", no_colour)
     monkeypatch.setattr(sys, "stdout", Terminal(sys.stdout))
-    assert main.main(["info", EDITED]) == 0
+    assert main.main(["info", EDITED, "--handles"]) == 0
     assert ("\x1b[48;2;26;26;230m" in capsys.readouterr().out) == (not no_colour)
 
 

@@ -244,3 +244,42 @@ def test_ten_thousand_frames_zoom_to_single_frames(
     view.grab()
     session.close()
     view.deleteLater()
+
+
+def test_the_menu_of_a_stop_sets_its_ramp_and_locks_it(view: TimelineView) -> None:
+    view.session.edit(lambda d: d.stop("e1", frame=4, rgb=(0.5, 0.5, 0.9)))
+    document = view.session.document
+    assert document is not None
+    stop = next(i for i, s in document.settings.items() if s.edge == "e1" and s.frame == 4)
+    at = QPointF(place(view, stop))
+    menu = view.menu_for(view.hit(at), at.x())
+    ramps = next(a.menu() for a in menu.actions() if a.menu() is not None)
+    next(a for a in ramps.actions() if a.text() == "hold").trigger()
+    assert view.session.document.settings[stop].ramp == "hold"
+    view.lock_selected()
+    assert view.session.document.locks == (stop,)
+    view.lock_selected()
+    assert view.session.document.locks == ()
+    next(a for a in menu.actions() if "stop" in a.text().lower()).trigger()
+    assert stop not in view.session.document.settings
+
+
+@pytest.mark.parametrize("name", sorted(path.name for path in GOLDEN.glob("v1_*.p4d.json")))
+def test_every_kind_of_palette_is_drawn(qapp: QApplication, tmp_path: Path, name: str) -> None:
+    """One colour, one frame, scene-linear, picks: each is drawn in all panels."""
+    from palette4d.studio.inspector import Inspector
+    from palette4d.studio.solid_view import SolidView
+
+    session = Session()
+    views = [kind(session) for kind in (TimelineView, SolidView, Inspector)]
+    empty = [view.grab().toImage() for view in views]
+    session.open_sidecar(shutil.copy(GOLDEN / name, tmp_path / "a.p4d.json"))
+    document = session.document
+    assert document is not None
+    for id_ in (*document.core.polytope.vertex_ids, *document.core.polytope.edge_ids):
+        session.select(id_)
+    for view, before in zip(views, empty, strict=True):
+        assert view.grab().toImage() != before
+    session.close()
+    for view in views:
+        view.deleteLater()

@@ -126,8 +126,8 @@ PaletteRegions::Within Lattice::Store::Builder::within_part(int brick,
                                                             const LatticePlace& place) const {
     const PaletteRegions::Within found =
         within(place, store_.bricks_[brick].half / 2, PaletteRegions::kInside);
-    // A brick without nodes cannot interpolate, even if rounding finds some of the inside in a
-    // part.
+    // Rounding may find a part with some of the inside, but a brick without nodes cannot
+    // interpolate it.
     if (brick >= kLatticeBricks && found.inside) return {PaletteRegions::kSeveral, -1, false};
     return found;
 }
@@ -240,7 +240,7 @@ void Lattice::Store::Builder::judge(const LatticePlace& place, float half, const
         farthest = max(farthest, beyond[i]);
     }
     const bool all_good = largest_of(farthest) <= 0;
-    // In a cut cell, lines are no proof that one part is good when others are not.
+    // In a cut cell one part can be good and another not; its lines cannot tell which.
     const bool is_brick = half < kCellWidth;
     for (std::size_t part = 0; part < 8; ++part) {
         bool good = all_good;

@@ -313,7 +313,8 @@ def run_ramp(args: argparse.Namespace) -> int:
 
 def _report(document: Document, before: State) -> None:
     """Print the handles that have changed, with their colours before and after."""
-    old = document.at(before)
+    # The colours are the user's own; the solution of picks comes on top.
+    old = document.at({key: value for key, value in before.items() if key[0] != "pick"})
     changed = [
         id_
         for id_ in {**old.settings, **document.settings}

@@ -172,7 +172,7 @@ def warn(done: list[Series]) -> None:
             "not all of the clip's frames could be read; the errors of the others are measured on "
             "the dense grid (name the clip with --clip)",
         )
-    missed = [entry for entry in entries if entry["visible"]]
+    missed = [entry for entry in entries if entry.get("visible")]
     if missed:
         smallest = min((e["size"] for e in missed if e["size"] is not None), default=None)
         worst = stated(max(e["clip"]["delta_e_largest"] for e in missed))

@@ -2,14 +2,19 @@
 
 import argparse
 import json
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from palette4d.cli.swatches import hex_of, row, swatch
 from palette4d.common.text import counted
 
+if TYPE_CHECKING:
+    from palette4d.grade.document import Document
+    from palette4d.grade.tracks import Track
+
 EPILOG = """\
 example:
   palette4d info clip.p4d.json
+  palette4d info clip.p4d.json --handles
   palette4d info clip.p4d.json --json | python -m json.tool
 """
 
@@ -22,12 +27,18 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser = subparsers.add_parser(
         "info",
         help="show what a sidecar holds",
-        description="Show what a sidecar holds: the clip, the palette with its ids and colours, "
-        "the edits and the losses of the analysis.",
+        description="Show what a sidecar holds: the clip, the edits and the palette's tracks. A "
+        "track is a palette colour through time; its name is an id for `edit`.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("sidecar", metavar="SIDECAR", help="the sidecar file (*.p4d.json)")
+    parser.add_argument(
+        "--handles", action="store_true", help="also list the vertices, edges and stops"
+    )
+    parser.add_argument(
+        "--quality", action="store_true", help="also show the figures of the analysis"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON instead of tables")
     parser.set_defaults(run=run)
 
@@ -36,18 +47,22 @@ def run(args: argparse.Namespace) -> int:
     """Print the content of a sidecar."""
     from palette4d.grade.document import Document
 
-    info = info_of(Document.load(args.sidecar).fields())
+    info = info_of(Document.load(args.sidecar))
     if args.json:
         print(json.dumps(info, ensure_ascii=True, allow_nan=False))
         return 0
     _print_head(info)
-    _print_stages(info["stages"])
-    _print_palette(info)
+    _print_tracks(info)
+    if args.handles:
+        _print_palette(info)
+    if args.quality:
+        _print_stages(info["stages"])
     return 0
 
 
-def info_of(fields: dict[str, Any]) -> dict[str, Any]:
+def info_of(document: "Document") -> dict[str, Any]:
     """Return the output of ``palette4d info --json``; docs/sidecar.md explains the names."""
+    fields = document.fields()
     clip, polytope = fields["clip"], fields["polytope"]
     frames = clip["frames"]
     edited = {entry["vertex"]: entry["rgb"] for entry in fields["edits"]["vertices"]}
@@ -70,6 +85,12 @@ def info_of(fields: dict[str, Any]) -> dict[str, Any]:
         "blocks": len(polytope["blocks"]),
         "stops": len(stops),
         "edited_vertices": len(edited),
+        "ramp": document.ramp,
+        "picks": len(fields["edits"].get("picks", [])),
+        "locks": fields["edits"].get("locks", []),
+        "versions": list(document.versions),
+        "steps": len(document.history),
+        "tracks": [_track(document, track) for track in document.tracks],
         "losses": stages[-1] if stages else {},
         "stages": stages,
         "palette": [
@@ -83,6 +104,59 @@ def info_of(fields: dict[str, Any]) -> dict[str, Any]:
         "palette_stops": stops,
         "block_ranges": [[block["first"], block["last"]] for block in polytope["blocks"]],
     }
+
+
+def _track(document: "Document", track: "Track") -> dict[str, Any]:
+    """Return a track with its edited handles, and its colours where they change most."""
+    settings = document.settings
+    edited = [id_ for id_ in track.vertices if id_ in settings]
+    edited += [id_ for id_, setting in settings.items() if setting.edge in track.edges]
+    inside = {*track.vertices, *track.edges}
+    found = []
+    frames = [(track.first + track.last) / 2, track.first]
+    for frame in [*frames, *(document.frame_of(id_) for id_ in edited)]:
+        palette = document.palette(frame)
+        for id_, ends, rgb, after in zip(
+            palette.ids, palette.ends, palette.rgb, palette.edited, strict=True
+        ):
+            if id_ in inside or inside & {*ends}:
+                change = float(abs(after - rgb).max()) + (id_ in inside) * 1e-9
+                found.append((change, palette.frame, rgb.tolist(), after.tolist()))
+    _, frame, rgb, after = max(found, key=lambda each: each[0])
+    return {
+        "name": track.name,
+        "frames": [track.first, track.last],
+        "frame": frame,
+        "rgb": rgb,
+        "edited_rgb": after,
+        "vertices": list(track.vertices),
+        "edges": list(track.edges),
+        "edited": edited,
+    }
+
+
+def _print_tracks(info: dict[str, Any]) -> None:
+    """Print a line for each palette colour through time, before and after."""
+    wide = max([5, *(len(track["name"]) for track in info["tracks"])])
+    patch = swatch(None)
+    print(f"\n{'track':<{wide}}  {'frames':>13}  {patch}{'clip':8} {patch}{'edited':8}  handles")
+    for track in info["tracks"]:
+        span = "-".join(f"{frame:.6g}" for frame in track["frames"])
+        before, after = track["rgb"], track["edited_rgb"]
+        line = f"{track['name']:<{wide}}  {span:>13}  {swatch(before)}{hex_of(before):8} "
+        changed = before != after
+        line += f"{swatch(after)}{hex_of(after):8}" if changed else patch + " " * 8
+        print(f"{line}  {_some(track['edited'])}".rstrip())
+    first = info["tracks"][0]["name"]
+    print(
+        "\nColours are those of the largest edit, else halfway. `info SIDECAR --handles` lists the"
+    )
+    print(f"vertices and stops. `edit SIDECAR track {first} …` changes a track.")
+
+
+def _some(names: list[str], most: int = 6) -> str:
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return " ".join(names[:most]) + more
 
 
 def _print_head(info: dict[str, Any]) -> None:
@@ -103,7 +177,13 @@ def _print_head(info: dict[str, Any]) -> None:
     print(
         f"edits     {counted(info['edited_vertices'], 'vertex', 'vertices')}, "
         f"{counted(info['stops'], 'stop')}"
+        + (f", {counted(info['picks'], 'pick')}" if info["picks"] else "")
+        + (f", {counted(len(info['locks']), 'lock')}" if info["locks"] else "")
+        + (f", {info['ramp']} ramps" if info["ramp"] != "linear" else "")
+        + (f"; {counted(info['steps'], 'step')} to undo" if info["steps"] else "")
     )
+    if info["versions"]:
+        print(f"versions  {', '.join(info['versions'])}")
     print(f"by        {info['generator']}")
 
 

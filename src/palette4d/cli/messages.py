@@ -14,6 +14,9 @@ _SPECIAL = {
     'on_edits="keep"': "--keep-edits",
     'on_edits="drop"': "--drop-edits",
     "analyze_shots()": "--detect-shots",
+    "any_value=True": "--float",
+    "follow=False": "--no-follow",
+    "start=…": "--from",
 }
 
 

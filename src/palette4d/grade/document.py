@@ -290,7 +290,7 @@ class Document:
         scaled = " ".join(f"{value / (2**bits - 1):.4g}" for value in values)
         raise Palette4dError(
             f"found the colour {shown}, expected code values where 1 is display white; "
-            f"{shown} in {bits} bits is {scaled}. Give that, or add --float (any_value=True) if "
+            f"{shown} in {bits} bits is {scaled}. Give that, or add any_value=True if "
             f"{shown} is meant"
         )
 
@@ -497,7 +497,7 @@ class Document:
             if stop in self._handles.vertices:
                 raise Palette4dError(
                     f"{stop} is a palette vertex, whose time the analysis found; only stops move "
-                    "in time. Its colour moves with --by"
+                    "in time. Its colour moves with by=…"
                 )
             stops = [id_ for id_, setting in self._settings.items() if setting.edge is not None]
             raise unknown(stop, "stop", stops)
@@ -561,15 +561,15 @@ class Document:
             self.check_frame(frame)
             self._check_inside(id, frame)
         elif id is not None and id not in self._handles.edges:
-            self._frame_of(id, None)  # refuses unknown ids
+            self.frame_of(id, None)  # refuses unknown ids
         within = moves.range_of(start, until, fade, self.frames)
         ramp = how.get("ramp")
         known = None if ramp is None else as_ramp(ramp)
         move, what = self._move(id, frame, how, any_value)
         rgb = how.get("rgb")
-        if rgb is not None and within is not None and within.weight(self._frame_of(id, frame)) < 1:
+        if rgb is not None and within is not None and within.weight(self.frame_of(id, frame)) < 1:
             raise Palette4dError(
-                f"the colour is meant at frame {self._frame_of(id, frame):g}, outside of the "
+                f"the colour is meant at frame {self.frame_of(id, frame):g}, outside of the "
                 f"range {moves.range_text(start, until)}; expected a range with this frame"
             )
         stop = self._settings.get(id or "")
@@ -578,8 +578,8 @@ class Document:
         elif within is not None or track:
             name, way = f"track {id}", way_of(self._handles, (stop and stop.edge) or id)
         elif id in self._handles.edges:
-            new = as_colour(move(self._own_colour(id, self._frame_of(id, frame))))
-            return (self._stop(id, self._frame_of(id, frame), new, known),)
+            new = as_colour(move(self._own_colour(id, self.frame_of(id, frame))))
+            return (self._stop(id, self.frame_of(id, frame), new, known),)
         else:
             name, way = id, ({id}, set())
         changed = moves.moved(
@@ -603,8 +603,8 @@ class Document:
         change = Adjustment(how.get("hue", 0.0), how.get("chroma", 1.0), how.get("lightness", 1.0))
         if [rgb is None, by is None, change == Adjustment()].count(False) != 1:
             raise Palette4dError(
-                "expected one kind of change: a new colour (--rgb; rgb=), offsets (--by; by=), or "
-                "hue, chroma and lightness (--hue …; hue=…)"
+                "expected one kind of change: a new colour rgb=…, offsets by=…, or hue=…, "
+                "chroma=… and lightness=…"
             )
         if by is not None:
             offset = as_colour(by, "offset")
@@ -616,12 +616,12 @@ class Document:
                 "the whole palette cannot get one colour; expected offsets (by), or hue, chroma "
                 "and lightness"
             )
-        new, at = self._checked(rgb, any_value), self._frame_of(id, frame)
+        new, at = self._checked(rgb, any_value), self.frame_of(id, frame)
         before = self._own_colour(id, at) if id in self._handles.edges else self.colour(id)
         return moves.shift_to(before, new), f"to {_text(new)}"
 
-    def _frame_of(self, id: str | None, frame: float | None) -> float:
-        """Return the frame of a handle, or of an edge's colour that the user means."""
+    def frame_of(self, id: str | None, frame: float | None = None) -> float:
+        """Return the frame of a vertex or stop; for an edge, the frame that is given."""
         if id in self._handles.edges:
             if frame is None:
                 raise self._handles.needs_frame(id)
@@ -801,16 +801,16 @@ class Document:
             A value is out of range, or the clip does not fit.
         """
         at = self._picked(frame, colour, pixel, box, clip, any_value)
-        if (to is None) == (by is None):
+        if to is not None and by is None:
+            new = self._checked(to, any_value)
+        elif by is not None and to is None:
+            change = as_colour(by, "change")
+            new = as_colour([a + b for a, b in zip(at.rgb, change, strict=True)])
+        else:
             raise Palette4dError(
-                f"found {'both' if to is not None else 'neither'} of the new colour (to) and the "
+                f"found {'neither' if to is None else 'both'} of the new colour (to) and the "
                 "change (by), expected one of them"
             )
-        if to is not None:
-            new = self._checked(to, any_value)
-        else:
-            change = as_colour(by or (), "change")
-            new = as_colour([a + b for a, b in zip(at.rgb, change, strict=True)])
         found = replace(at, kind="pick", to=new, toward=toward, start=start, until=until)
         found = replace(found, fade=fade, radius=radius, global_only=global_only)
         return self._add_pick(found, clip, follow, progress)
@@ -962,15 +962,15 @@ class Document:
     ) -> Pick:
         """Return a hold of a colour at a frame."""
         self.check_frame(frame)
-        if (colour is None) == (pixel is None):
-            raise Palette4dError(
-                f"found {'both' if colour is not None else 'neither'} of a colour and a pixel, "
-                "expected one of them"
-            )
-        if pixel is not None:
+        if colour is not None and pixel is None:
+            return Pick("", "hold", frame, self._checked(colour, any_value))
+        if colour is None and pixel is not None:
             rgb = self.colour_of_pixel(frame, pixel, box, clip)
             return Pick("", "hold", frame, rgb, pixel=pixel, box=box)
-        return Pick("", "hold", frame, self._checked(colour or (), any_value))
+        raise Palette4dError(
+            f"found {'neither' if colour is None else 'both'} of a colour and a pixel, expected "
+            "one of them"
+        )
 
     def _add_pick(
         self,
@@ -1390,8 +1390,8 @@ class Document:
     def _check_inside(self, edge: str, frame: float) -> None:
         if edge in self._settings or edge in self._handles.vertices:
             raise Palette4dError(
-                f"{self.named(edge)} has a time of its own; --frame goes with an edge, or with "
-                f"--near. Use `set {edge} --rgb R G B`"
+                f"{self.named(edge)} has a time of its own: leave out frame=…, which is for "
+                "edges and for near=…"
             )
         self._handles.check_inside(edge, frame)
 

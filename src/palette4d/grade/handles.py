@@ -37,8 +37,8 @@ class Handles:
     def needs_frame(self, edge: str) -> Palette4dError:
         """Return the error for an edge without a frame."""
         return Palette4dError(
-            f"{edge} is an edge, whose colour changes in time; say at which frame it gets one, "
-            f"as in `set {edge} --frame T --rgb R G B` or stop({edge!r}, frame=T, rgb=...)"
+            f"{edge} is an edge, whose colour changes in time; give the frame at which it gets "
+            "one as frame=…"
         )
 
     def check_inside(self, edge: str, frame: float) -> None:
@@ -56,7 +56,7 @@ class Handles:
             if frame == vertex["frame"]:
                 raise Palette4dError(
                     f"at frame {frame:g} edge {edge} has its end {vertex['id']}, which needs no "
-                    f"stop; use `set {vertex['id']} --rgb R G B`"
+                    f"stop; set {vertex['id']} itself"
                 )
         if not start["frame"] < frame < end["frame"]:
             raise Palette4dError(

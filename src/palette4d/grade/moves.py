@@ -90,8 +90,8 @@ def range_of(
     if start is None and until is None:
         if fade is not None:
             raise Palette4dError(
-                "found a fade without a range; expected also its first or its last frame (--from, "
-                "--until; start, until)"
+                "found a fade without a range; expected also its first or its last frame: "
+                "start=… or until=…"
             )
         return None
     # Without a first or last frame the range goes on beyond the clip.

@@ -70,14 +70,14 @@ class ClipOfPicks:
         if (clip.width, clip.height) != (width, height):
             raise Palette4dError(
                 f"{clip.source} has {clip.width}x{clip.height} pixels, but the palette's clip has "
-                f"{width}x{height}: it is another clip. Give the palette's clip (--clip CLIP), or "
-                "pick by --colour with --no-follow"
+                f"{width}x{height}: it is another clip. Give the palette's clip as clip=…, or "
+                "pick by colour=… with follow=False"
             )
         if missing := [frame for frame in (known[0], known[-1]) if frame not in clip.frames]:
             raise Palette4dError(
                 f"{clip.source} has the frames {describe(clip.frames)}, but not frame "
                 f"{missing[0]} of the palette's clip ({known[0]} to {known[-1]}): it is another "
-                "clip. Give the palette's clip (--clip CLIP), or pick by --colour with --no-follow"
+                "clip. Give the palette's clip as clip=…, or pick by colour=… with follow=False"
             )
         return clip
 
@@ -93,7 +93,7 @@ class ClipOfPicks:
         if clip is None:
             raise Palette4dError(
                 f"the clip {self._fields['source']!r} is not there, so that its pixels cannot be "
-                "read; give it (--clip CLIP), or give the colour itself (--colour C)"
+                "read; give clip=…, or the colour itself with colour=…"
             )
         if frame not in clip.frames:
             raise Palette4dError(
@@ -115,7 +115,7 @@ class ClipOfPicks:
         if not len(found):
             raise Palette4dError(
                 f"the pixel {x:g},{y:g} of frame {frame:g} has no colour: it is transparent or not "
-                "a finite number. Pick another pixel, or a larger --box"
+                "a finite number. Pick another pixel, or a larger box=…"
             )
         if self._conversion is not None:
             found = self._conversion.to_palette(found)
@@ -147,8 +147,8 @@ def corrected(pick: Pick, frame: float, rgb: Colour) -> Pick:
     """
     if frame == pick.frame:
         raise Palette4dError(
-            f"{pick.id} was picked at frame {frame:g} itself; --with corrects its path at another "
-            f"frame. `change {pick.id} --colour C` changes the colour at its own frame"
+            f"{pick.id} was picked at frame {frame:g} itself, expected another frame: change its "
+            "colour=… there"
         )
     keys = {key.frame: key for key in pick.path if key.given and key.frame != pick.frame}
     keys[frame] = PathKey(frame, rgb, True)

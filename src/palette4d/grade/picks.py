@@ -219,7 +219,7 @@ def _cause(pick: Pick, others: Sequence[Pick], step: float) -> str:
             f"for changes that differ by {apart:.3f}. Move or disable one of {pick.id} and {id_}"
         )
     if pick.global_only:
-        return ": the palette alone cannot express it. Leave out --global-only"
+        return ": the palette alone cannot express it. Leave out global_only=True"
     if pick.to is not None and any(not -0.05 <= value <= 1.05 for value in pick.to):
         return ": its new colour lies far outside 0..1"
     return ": the colour's surroundings or locked handles stand in its way"

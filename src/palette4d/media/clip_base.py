@@ -64,7 +64,7 @@ class Image:
     metadata: tuple[tuple[str, Any, Any], ...] = ()
 
 
-@dataclass
+@dataclass(repr=False)
 class Clip(abc.ABC):
     """An opened clip; see `palette4d.media.clip.open_clip`.
 
@@ -111,6 +111,13 @@ class Clip(abc.ABC):
     is_movie: bool = False
     notes: list[str] = field(default_factory=list)
     skipped: list[int] = field(default_factory=list)
+
+    def __repr__(self) -> str:
+        """Return one line: the name, the frames, the size, and the encoding."""
+        return (
+            f"<{type(self).__name__} {self.name!r}: frames {self.frames[0]} to {self.frames[-1]}, "
+            f"{self.width} x {self.height}, {self.depth}, {self.encoding}>"
+        )
 
     @property
     def step(self) -> int:

@@ -66,7 +66,7 @@ _ENCODINGS = {
 }
 
 
-@dataclass
+@dataclass(repr=False)
 class ImageClip(Clip):
     """An image sequence, or a single image as a clip of one frame."""
 

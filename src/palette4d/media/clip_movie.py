@@ -77,7 +77,7 @@ _FORMATS = (
 ONLY_FILES = {"format_whitelist": ",".join(_FORMATS), "protocol_whitelist": "file"}
 
 
-@dataclass
+@dataclass(repr=False)
 class MovieClip(Clip):
     """A movie file. Reading in order decodes each picture once; reading backwards seeks."""
 

@@ -4,16 +4,22 @@ A child's crash is a message in the window, not its end. Its command line can be
 """
 
 import contextlib
+import fcntl
 import os
 import re
 import shlex
+import struct
 import subprocess
 import sys
+import termios
 import threading
 from collections.abc import Callable, Sequence
 
 #: tqdm's bars: "colour_statistics:  40%|████      | 20/50 [00:01<00:02]".
 _BAR = re.compile(r"^(?P<what>[^%|\r\n]*?):?\s+(?P<percent>\d+)%\|")
+
+#: Rows and columns of the terminal that a child sees.
+TERMINAL = (24, 120)
 
 #: Seconds in which a stopped child may clean up.
 GRACE = 3.0
@@ -56,16 +62,17 @@ class Job:
         self._changed = changed
         # tqdm draws its bars only for a terminal.
         self._reader, writer = os.openpty()
+        fcntl.ioctl(writer, termios.TIOCSWINSZ, struct.pack("HHHH", *TERMINAL, 0, 0))
         self._process = subprocess.Popen(
             [sys.executable, "-m", "palette4d", *words],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=writer,
-            env={**os.environ, "COLUMNS": "120"},
             start_new_session=True,
         )
         os.close(writer)
-        threading.Thread(target=self._read_bars, name="palette4d job", daemon=True).start()
+        self._bars = threading.Thread(target=self._read_bars, name="palette4d job", daemon=True)
+        self._bars.start()
         threading.Thread(target=self._wait, name="palette4d job", daemon=True).start()
 
     @property
@@ -89,7 +96,9 @@ class Job:
 
     def wait(self, seconds: float | None = None) -> int:
         """Wait for the end; return the exit status."""
-        return self._process.wait(seconds)
+        status = self._process.wait(seconds)
+        self._bars.join(GRACE)
+        return status
 
     def _read_bars(self) -> None:
         rest = ""
@@ -117,7 +126,10 @@ class Job:
 
     def _wait(self) -> None:
         assert self._process.stdout is not None
-        for line in self._process.stdout:
-            self.output += line.decode("utf-8", "replace")
-        self.status = self._process.wait()
+        with self._process.stdout as lines:
+            for line in lines:
+                self.output += line.decode("utf-8", "replace")
+        status = self._process.wait()
+        self._bars.join(GRACE)
+        self.status = status
         self._changed(self)

@@ -112,6 +112,17 @@ def disc(
     ring(radius, rim, 1.7 if kind == "edited" else 1.0)
 
 
+def padlock(painter: QPainter, x: float, y: float) -> None:
+    """Draw a small padlock centred at a point."""
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    for colour, width in ((style.INK, 3.6), (style.BRIGHT, 1.3)):
+        painter.setPen(pen(colour, width))
+        painter.drawArc(QRectF(x - 2.3, y - 5, 4.6, 6), 0, 180 * 16)
+    painter.setPen(pen(style.INK, 1.2))
+    painter.setBrush(QColor(style.BRIGHT))
+    painter.drawRect(QRectF(x - 3.6, y - 1.6, 7.2, 5.2))
+
+
 def small_font(widget: QWidget, points: float = 0.0, *, bold: bool = False) -> QFont:
     """Return the widget's font, smaller; `points` is added to its size."""
     font = QFont(widget.font())

@@ -56,8 +56,7 @@ class Grade:
     def recolourer(self) -> _core.Recolourer:
         """Return the exact recolouring."""
         palette = self.palette
-        options: Any = {} if self.bumps is None else {"bumps": self.bumps}
-        return _core.Recolourer(palette.rgb, palette.edited, palette.faces, **options)
+        return _core.Recolourer(palette.rgb, palette.edited, palette.faces, bumps=self.bumps)
 
 
 @dataclass(frozen=True)
@@ -153,7 +152,7 @@ class Preview:
     """
 
     def __init__(self, ready: Callable[[Picture], object]) -> None:
-        self._ready = ready
+        self._tell = ready
         self._small = ByteCache[tuple[int, Region], F32](SMALL_BYTES)
         self._befores = ByteCache[tuple[Any, ...], U8](BEFORE_BYTES)
         self._reel = ByteCache[tuple[Any, ...], Picture](REEL_BYTES)
@@ -231,6 +230,10 @@ class Preview:
             size = sum(side.nbytes for side in sides if side is not None)
             self._reel.put(request.film_key, picture, size)
             self._ready(picture)
+
+    def _ready(self, picture: Picture) -> None:
+        if not self._closed:
+            self._tell(picture)
 
     def _check(self) -> None:
         if self._waiting is not None or self._closed:
@@ -313,9 +316,14 @@ class Preview:
         key = (request.frame, request.region, request.look, exact, request.key)
         found = self._befores.get(key)
         if found is None:
-            colours = self._source(request)
-            if request.before is not None:
-                colours = _quick(colours, request.before, request.premultiplied)
+            grade = request.before
+            if grade is None:
+                colours = self._source(request)
+            elif exact:
+                whole = self.exact(request.pixels, grade, request.premultiplied, check)
+                colours = resampled(whole, request.region)
+            else:
+                colours = _quick(self._source(request), grade, request.premultiplied)
             found = _painted(painter, colours, request.premultiplied, exact, check)
             self._befores.put(key, found, found.nbytes)
         return found

@@ -59,7 +59,7 @@ DISC, ORIGIN = 6.5, 3.6
 #: How far edited colours shrink the view, in radii of the others.
 FARTHEST = 1.35
 #: A face is drawn in this many strips, for a smooth gradient.
-STRIPS = 6
+STRIPS = 5
 
 
 def _pieces() -> F64:

@@ -31,6 +31,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QMenu, QToolTip, QWidget
 
 from palette4d.grade.document import Document
+from palette4d.grade.edits import RAMPS, Ramp
 from palette4d.grade.follow import Progress
 from palette4d.grade.picks import Pick
 from palette4d.plotting import style
@@ -608,6 +609,11 @@ class TimelineView(QWidget):
             menu.addAction(go, lambda: self.session.go(frame))
             reset = texts.REMOVE_STOP if hit.stop else texts.RESET
             menu.addAction(reset, self.reset_selected)
+            self._add_ramps(menu)
+            menu.addAction(texts.LOCK_ENTRY, self.lock_selected)
+            menu.addSeparator()
+        elif hit.what == "pick":
+            menu.addAction(texts.REMOVE, self.remove_picks)
             menu.addSeparator()
         elif hit.what == "band":
             time = self.frame_at(x)
@@ -617,7 +623,55 @@ class TimelineView(QWidget):
         menu.addActions(self.menu_actions[VIEW])
         return menu
 
+    def _add_ramps(self, menu: QMenu) -> None:
+        """Add the ramps of the selected handles that are edited."""
+        document = self.session.document
+        ids = [
+            id_
+            for id_ in self.session.selection
+            if document is not None and id_ in document.settings
+        ]
+        ramps = menu.addMenu(texts.RAMP)
+        ramps.setEnabled(bool(ids))
+        for ramp in RAMPS:
+            entry = ramps.addAction(texts.RAMPS[ramp])
+            entry.triggered.connect(lambda _=False, ramp=ramp: self._set_ramp(ids, ramp))
+            entry.setCheckable(True)
+            if document is not None and ids:
+                entry.setChecked(all(document.settings[id_].ramp == ramp for id_ in ids))
+
+    def _set_ramp(self, ids: list[str], ramp: Ramp) -> None:
+        def change(document: Document) -> None:
+            with document.one_step(texts.RAMP_STEP.format(ramp=ramp)):
+                for id_ in ids:
+                    document.set_ramp(ramp, id_)
+
+        self.session.edit(change, texts.RAMP_SET.format(ramp=texts.RAMPS[ramp]))
+
     # ----------------------------------------------------------------------------------- gestures
+
+    def lock_selected(self) -> None:
+        """Lock the selected handles, or unlock them if all are locked."""
+        document = self.session.document
+        content = self._content
+        if document is None or content is None:
+            return
+        handles = {*content.ids, *(stop[0] for stop in content.stops)}
+        ids = [id_ for id_ in self.session.selection if id_ in handles]
+        if not ids:
+            return
+        if set(ids) <= set(document.locks):
+            self.session.edit(lambda document: document.unlock(*ids), texts.LOCK)
+        else:
+            new = [id_ for id_ in ids if id_ not in document.locks]
+            self.session.edit(lambda document: document.lock(*new), texts.LOCK)
+
+    def remove_picks(self) -> None:
+        """Remove the selected picks and holds."""
+        ids = [pick.id for pick, _ in self.lanes() if pick.id in self.session.selection]
+        if ids:
+            text = texts.REMOVED.format(ids=", ".join(ids))
+            self.session.edit(lambda document: document.unpick(*ids), text)
 
     def add_stop(self, edge: str, frame: float) -> None:
         """Add a stop of the colour that the edge has at a frame."""
@@ -869,6 +923,7 @@ class TimelineView(QWidget):
         columns = np.arange(left, max(right, left + wide), wide, dtype=np.float64)
         times = np.asarray(scale.frame(columns + wide / 2)).reshape(-1)
         before, after = palette.sampled(times)
+        seen = on_screen(self.session, np.stack([before, after]))
         selected = set(self.session.selection)
         moved = np.nan_to_num(np.linalg.norm(after - before, axis=-1))
         for edge, (_, line) in layout.paths.items():
@@ -877,12 +932,12 @@ class TimelineView(QWidget):
                 continue
             upper, lower = half_bands(line, BAND * layout.row_height)
             touched = palette.touched(edge)
-            parts = [(upper, line if touched else lower, before)]
-            parts += [(line, lower, after)] if touched else []
+            parts = [(upper, line if touched else lower, seen[0])]
+            parts += [(line, lower, seen[1])] if touched else []
             painter.setPen(Qt.PenStyle.NoPen)
             for above, below, colours in parts:
-                seen = on_screen(self.session, colours[edge, inside])
-                painter.setBrush(paint.texture(seen, float(columns[inside[0]]), float(wide)))
+                start = float(columns[inside[0]])
+                painter.setBrush(paint.texture(colours[edge, inside], start, float(COLUMN)))
                 painter.drawPolygon(paint.polygon(np.concatenate([above, below[::-1]])))
             painter.setBrush(Qt.BrushStyle.NoBrush)
             chosen = palette.edge_ids[edge] in selected
@@ -914,14 +969,16 @@ class TimelineView(QWidget):
         self._into_rows(painter)
         shown = [d for d in discs if GUTTER - 30 < d.x < self.width() + 30]
         selected = set(self.session.selection)
-        for each in sorted(shown, key=lambda disc: disc.kind == "stop"):
+        shown.sort(key=lambda disc: disc.kind == "stop")
+        colours = np.array([[each.before, each.after] for each in shown]).reshape(-1, 2, 3)
+        seen = on_screen(self.session, colours)
+        for each, (before, after) in zip(shown, seen, strict=True):
             if abs(each.x - each.home) > 2.5:
                 foot = each.y + BAND * layout.row_height + 3.5
                 bent = [(each.home, each.y), (each.home, foot), (each.x, each.y + each.radius)]
                 painter.setBrush(Qt.BrushStyle.NoBrush)
                 painter.setPen(paint.pen(style.RING, 0.8))
                 painter.drawPolyline(paint.polygon(np.array(bent)))
-            before, after = on_screen(self.session, np.stack([each.before, each.after]))
             paint.disc(
                 painter,
                 each.x,
@@ -932,6 +989,10 @@ class TimelineView(QWidget):
                 each.kind,
                 selected=each.id in selected,
             )
+        locks = set() if self.session.document is None else set(self.session.document.locks)
+        for each in shown:
+            if each.id in locks:
+                paint.padlock(painter, each.x + each.radius, each.y + each.radius)
         font = paint.small_font(self, -1.5)
         painter.setFont(font)
         metrics = painter.fontMetrics()
@@ -1123,6 +1184,7 @@ class TimelineView(QWidget):
         layout, top = found[0], self._top
         palette, frame = layout.palette, float(self.session.frame)
         before, after = palette.sampled(np.array([frame]))
+        seen = on_screen(self.session, np.stack([before[:, 0], after[:, 0]], axis=1))
         probe = self.session.probe
         weights = {} if probe is None else probe.weights
         caption = texts.WEIGHT if weights else ""
@@ -1132,7 +1194,7 @@ class TimelineView(QWidget):
         for edge, y in self._edges_at(layout, x):
             if np.isnan(before[edge, 0]).any():
                 continue
-            two = on_screen(self.session, np.stack([before[edge, 0], after[edge, 0]]))
+            two = seen[edge]
             box = QRectF(8, y + top - 7, 14, 14)
             painter.setPen(Qt.PenStyle.NoPen)
             painter.setBrush(paint.colour_of(two[0]))

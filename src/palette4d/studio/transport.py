@@ -1,7 +1,7 @@
 """The bar below the picture: playing, the frame, what is compared, and the display."""
 
+import functools
 import time
-from collections.abc import Callable
 
 from PySide6.QtCore import QObject, QPointF, QRectF, QSize, Qt, QTimer
 from PySide6.QtGui import QColor, QIcon, QPainter, QPixmap, QPolygonF
@@ -11,13 +11,14 @@ from PySide6.QtWidgets import (
     QDoubleSpinBox,
     QHBoxLayout,
     QLabel,
+    QSizePolicy,
     QSpinBox,
     QToolButton,
     QWidget,
 )
 
 from palette4d.studio import texts, theme
-from palette4d.studio.preview import Request
+from palette4d.studio.preview import Picture, Request
 from palette4d.studio.session import Session
 from palette4d.studio.viewer import Viewer
 
@@ -27,6 +28,8 @@ AHEAD = 16
 READY, PATIENCE = 4, 0.6
 #: Milliseconds between two looks at the clock while playing.
 CLOCK = 4
+#: Seconds between two requests for frames that are late.
+ASK_EVERY = 0.03
 
 
 class Playback(QObject):
@@ -38,7 +41,8 @@ class Playback(QObject):
         self.session, self.viewer = session, viewer
         self.dropped = self.shown = 0
         self.rate = 0.0  #: frames a second that were shown lately
-        self._asked_from: tuple[int, int] | None = None
+        self._asked = 0.0
+        self._lead = 0  #: frames after the playhead that cannot be made in time
         self._started: float | None = None
         self._began = self._count_from = 0.0
         self._from = session.frame
@@ -75,9 +79,9 @@ class Playback(QObject):
                     self.session.go(low if self.session.playing > 0 else high)
             self._from, self._step, self._started = self.session.frame, 0, None
             self._began = time.perf_counter()
-            self.dropped = self.shown = 0
+            self.dropped = self.shown = self._lead = 0
             self._timer.start()
-            self._ask(self.session.frame)
+            self._ask()
         else:
             self._timer.stop()
             self.viewer.preview.roll(())
@@ -85,7 +89,7 @@ class Playback(QObject):
 
     def _pixels(self) -> None:
         if self.session.playing:
-            self._ask(self.session.frame)
+            self._ask()
 
     def nth(self, count: int) -> int | None:
         """Return the frame so many steps after the start; None after the end."""
@@ -96,24 +100,25 @@ class Playback(QObject):
             return None
         return low + at % total * step
 
-    def _ask(self, frame: int) -> None:
+    def _ask(self) -> None:
         """Have the next frames read and made."""
+        self._asked = time.perf_counter()
         viewer, player, region = self.viewer, self.session.player, self.viewer.region()
         if player is None or region is None:
             return
-        nexts = [self.nth(self._step + k) for k in range(AHEAD)]
+        # What would come too late is left out.
+        start = self._step + 1 + self._lead
+        nexts = [self.nth(start + k) for k in range(AHEAD)]
         frames = list(dict.fromkeys(n for n in nexts if n is not None))
-        film: list[Callable[[], Request | None]] = []
-        missing = []
-        for number in frames:
-            request = viewer.film(number)
-            if request is None or viewer.preview.played(request.film_key) is not None:
-                continue
-            missing.append(number)
-            if player.has_small(number, region):
-                film.append(lambda r=request: viewer.with_pixels(r))  # type: ignore[misc]
+        missing = [n for n in frames if self._picture(n) is None]
         player.want(missing, region)
-        viewer.preview.roll(film)
+        ready = [n for n in missing if player.has_small(n, region)]
+        viewer.preview.roll([functools.partial(self._scene, n) for n in ready])
+
+    def _scene(self, frame: int) -> Request | None:
+        """Return what the preview's thread makes for a frame."""
+        request = self.viewer.film(frame)
+        return None if request is None else self.viewer.with_pixels(request)
 
     def _tick(self) -> None:
         now = time.perf_counter()
@@ -143,6 +148,8 @@ class Playback(QObject):
             if picture is not None:
                 self.dropped += count - self._step - 1
                 self.shown += 1
+                late = count - self._step - 1
+                self._lead = min(self._lead + 2, AHEAD) if late else max(self._lead - 1, 0)
                 self._step = count
                 viewer.show_picture(picture)
                 if session.frame != frame:
@@ -151,15 +158,17 @@ class Playback(QObject):
                 self.rate = self.shown / max(now - self._count_from, 1e-3)
                 break
         else:
-            if due - self._step > 2 * self.frames_per_second:
-                # Nothing came for two seconds: the clock waits.
+            if now - self._asked < ASK_EVERY:
+                return
+            if due - self._step > self._lead:
+                # Nothing comes in time: these frames are dropped, and later ones are made.
                 self.dropped += due - self._step
                 self._step = due
-        self._ask(session.frame)
+                self._lead = min(self._lead + 2, AHEAD)
+        self._ask()
 
-    def _picture(self, frame: int):  # type: ignore[no-untyped-def]
-        request = self.viewer.film(frame)
-        return None if request is None else self.viewer.preview.played(request.film_key)
+    def _picture(self, frame: int) -> Picture | None:
+        return self.viewer.preview.played(self.viewer.film_key(frame))
 
 
 class Transport(QWidget):
@@ -193,8 +202,9 @@ class Transport(QWidget):
         row.addWidget(self.frame)
         self.facts = QLabel()
         self.facts.setStyleSheet(f"color: {theme.FAINT}")
-        row.addWidget(self.facts)
-        row.addStretch(1)
+        self.facts.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.facts.setMinimumWidth(96)
+        row.addWidget(self.facts, 2)
         self.compare: dict[str, QToolButton] = {}
         group = QButtonGroup(self)
         for key, text in texts.COMPARE.items():
@@ -206,16 +216,19 @@ class Transport(QWidget):
             group.addButton(button)
             self.compare[key] = button
             row.addWidget(button)
-        row.addStretch(1)
+        row.addSpacing(6)
         self.look = QComboBox()
         self.look.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.look.setSizeAdjustPolicy(
             QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )
-        self.look.setMinimumContentsLength(22)
+        self.look.setMinimumContentsLength(8)
+        self.look.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self.look.setMinimumWidth(90)
+        self.look.setMaximumWidth(230)
         self.look.setAccessibleName(texts.DISPLAY)
         self.look.activated.connect(self._chosen)
-        row.addWidget(self.look)
+        row.addWidget(self.look, 2)
         row.addSpacing(6)
         self.exposure = self._number(row, texts.EXPOSURE, -10, 10, 0.25, "exposure", "+0.00")
         self.gamma = self._number(row, texts.GAMMA, 0.2, 5, 0.05, "gamma", "0.00")

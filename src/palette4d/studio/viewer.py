@@ -94,6 +94,8 @@ class Viewer(QWidget):
         self.on_hold: Any = None  #: the same with Alt
         session.on("clip", self._clip_changed)
         session.on("document", self.refresh)
+        session.on("document", self._probe_again)
+        session.on("pixels", self._probe_again)
         session.on("trial", self.refresh)
         session.on("playing", self.refresh)
         session.on("frame", self._frame_changed)
@@ -123,6 +125,7 @@ class Viewer(QWidget):
         if not session.playing:
             session.player.want(frames_around(session))
             self.refresh()
+        self._probe_again()
 
     def refresh(self) -> None:
         """Ask for the picture of now; while playing, the playback chooses the pictures."""
@@ -164,6 +167,16 @@ class Viewer(QWidget):
             return None
         return self._request_of(frame, region, NO_PIXELS, settled=False, scaled=True)
 
+    def film_key(self, frame: int) -> tuple[Any, ...]:
+        """Return `Request.film_key` of the request for a frame to play."""
+        session = self.session
+        sides = frozenset(self.sides)
+        return frame, self.region(), session.looked, sides, self._before_key(), session.revision
+
+    def _before_key(self) -> str:
+        version = self.session.view.version
+        return f"{version} {self.session.revision}" if version else ""
+
     def with_pixels(self, request: Request) -> Request | None:
         """Return a request to play with its pixels; None if they are gone."""
         player = self.session.player
@@ -172,14 +185,14 @@ class Viewer(QWidget):
 
     def _request_of(self, frame: int, region: Region, pixels: F32, **more: Any) -> Request:
         session, view = self.session, self.session.view
+        revision = session.revision  # first: another thread may make pictures to play
         document = session.document
         assert session.clip is not None
         assert session.display is not None
         grade = None if document is None else Grade.of(document, frame)
-        before, key = None, ""
+        before = None
         if view.version and document is not None:
             before = version_grade(document, view.version, frame)
-            key = f"{view.version} {session.revision}"
         return Request(
             frame=frame,
             pixels=pixels,
@@ -189,8 +202,8 @@ class Viewer(QWidget):
             region=region,
             display=session.display,
             look=session.looked,
-            key=key,
-            revision=session.revision,
+            key=self._before_key(),
+            revision=revision,
             sides=frozenset(self.sides),
             **more,
         )
@@ -603,6 +616,11 @@ class Viewer(QWidget):
             return None
         mean = colours.mean(axis=0).tolist()
         return Place(session.frame, x, y, side, (mean[0], mean[1], mean[2]))
+
+    def _probe_again(self) -> None:
+        """Probe the same pixel of another frame or grade."""
+        if self._pointer is not None:
+            self._probe(self._pointer)
 
     def _probe(self, point: QPointF) -> None:
         at = self.pixel_at(point)

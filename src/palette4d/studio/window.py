@@ -67,7 +67,7 @@ class Window(QMainWindow):
         self.session = session
         self.settings = settings if settings is not None else QSettings("palette4d", "studio")
         session.post = _Post(self).called.emit
-        self.setWindowTitle(texts.TITLE)
+        self.setWindowTitle(f"{texts.TITLE}[*]")
         self.setAcceptDrops(True)
         self.setDockNestingEnabled(True)
         self.viewer = Viewer(session)
@@ -139,7 +139,8 @@ class Window(QMainWindow):
             [solid, max(200, height - solid)],
             both.Vertical,
         )
-        self.resizeDocks([self.docks["timeline"]], [height * 3 // 10], both.Vertical)
+        low = max(height * 3 // 10, min(300, height * 2 // 5))
+        self.resizeDocks([self.docks["timeline"]], [low], both.Vertical)
 
     def _dock(self, title: str, view: QWidget, area: Qt.DockWidgetArea) -> QDockWidget:
         dock = QDockWidget(title, self)
@@ -251,7 +252,7 @@ class Window(QMainWindow):
         self.view_facts.setText(shown)
         name = session.path.name if session.path is not None else ""
         title = name or (session.clip.name if session.clip is not None else "")
-        self.setWindowTitle(f"{title} — {texts.TITLE}" if title else texts.TITLE)
+        self.setWindowTitle(f"{title}[*] — {texts.TITLE}" if title else texts.TITLE)
         self.setWindowModified(not session.saved)
         checks = {
             **{f"show_{each}": view.compare == each for each in texts.COMPARE},
