@@ -970,7 +970,7 @@ class Document:
         if pixel is not None:
             rgb = self.colour_of_pixel(frame, pixel, box, clip)
             return Pick("", "hold", frame, rgb, pixel=pixel, box=box)
-        return Pick("", "hold", frame, self._checked(colour or (), any_value))
+        return Pick("", "hold", frame, self._checked(() if colour is None else colour, any_value))
 
     def _add_pick(
         self,
