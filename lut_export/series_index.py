@@ -116,19 +116,19 @@ def read_index(path: Path, header: dict[str, Any], force: bool) -> dict[int, Ent
 
 
 def _is_entry(entry: Any) -> bool:
-    """Whether a value has the members of an entry that are used again."""
+    """Whether a value has the members of an entry that are used again, with their types."""
     try:
-        numbers = [entry["error"], *([] if entry["size"] is None else [entry["size"]])]
-        if entry["clip"] is not None:
-            numbers.append(entry["clip"]["delta_e_largest"])
+        clip = entry["clip"]
+        numbers = [entry["frame"], entry["error"], 0 if entry["size"] is None else entry["size"]]
+        numbers += [] if clip is None else [clip["delta_e_largest"]]
         texts = [entry["file"], entry["sha256"], entry["shaper"]["kind"]]
-        flags = [entry["identity"]]
-        frame = entry["frame"]
+        flags = [entry["identity"], entry["visible"]]
     except (KeyError, TypeError):
         return False
     return (
-        type(frame) is int
-        and all(type(number) in (int, float) for number in numbers)
+        type(entry["frame"]) is int
+        and all(type(number) in (int, float) and abs(number) < 1e12 for number in numbers)
         and all(isinstance(text, str) for text in texts)
         and all(isinstance(flag, bool) for flag in flags)
+        and not (entry["visible"] and clip is None)
     )

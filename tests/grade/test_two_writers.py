@@ -1,5 +1,7 @@
 """Several processes edit one sidecar at once; no acknowledged edit is lost."""
 
+import errno
+import fcntl
 import json
 import subprocess
 import sys
@@ -133,3 +135,21 @@ def test_a_lock_that_was_taken_away_stops_the_write(
         with pytest.raises(Palette4dError):
             held()
     assert (tmp_path / ".clip.p4d.json.lock").read_text() == "another 1 abc"
+
+
+@pytest.mark.parametrize("content", ["", "computer 1", "computer 1 0123"])
+def test_a_half_written_lock_file_stops_nobody(
+    content: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A program was killed while it wrote the lock file, where flock does not work."""
+
+    def refuse(handle: int, operation: int) -> None:
+        raise OSError(errno.ENOLCK, "no locks")
+
+    monkeypatch.setattr(fcntl, "flock", refuse)
+    monkeypatch.setattr(locking, "UNFINISHED_SECONDS", 0.05)
+    (tmp_path / ".clip.p4d.json.lock").write_text(content, encoding="utf-8")
+    start = time.monotonic()
+    with locking.locked(tmp_path / "clip.p4d.json"):
+        assert time.monotonic() - start < locking.LOCK_SECONDS / 2
+    assert list(tmp_path.iterdir()) == []

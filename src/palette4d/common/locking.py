@@ -10,6 +10,7 @@ import errno
 import os
 import platform
 import random
+import re
 import secrets
 import sys
 import time
@@ -23,6 +24,11 @@ if sys.platform != "win32":
 
 #: Seconds to wait while another program holds the lock.
 LOCK_SECONDS = 10.0
+
+#: Seconds after which a half-written lock file is that of a program that was killed.
+UNFINISHED_SECONDS = 2.0
+
+_OWNER = re.compile(r"\S+ [0-9]+ [0-9a-f]{16}")
 
 
 @contextlib.contextmanager
@@ -70,7 +76,7 @@ def _lock_file(target: Path, deadline: float) -> Iterator[Callable[[], None]]:
     mine = f"{_computer()} {os.getpid()} {secrets.token_hex(8)}"
     while not _created(path, mine):
         owner = _content(path)
-        if owner is not None and _is_dead(owner):
+        if owner is not None and (_is_dead(owner) or _is_unfinished(path, owner)):
             _remove(path, owner)
         elif time.monotonic() > deadline:
             raise Palette4dError(
@@ -108,6 +114,10 @@ def _created(path: Path, content: str) -> bool:
         raise _cannot(path) from None
     try:
         os.write(handle, content.encode())
+    except OSError:
+        with contextlib.suppress(OSError):
+            path.unlink(missing_ok=True)
+        raise _cannot(path) from None
     finally:
         os.close(handle)
     return True
@@ -147,6 +157,15 @@ def _is_dead(owner: str) -> bool:
     except (OSError, OverflowError):
         return False
     return False
+
+
+def _is_unfinished(path: Path, owner: str) -> bool:
+    """Whether a lock file was created some time ago, and its owner never written completely."""
+    try:
+        age = time.time() - path.stat().st_mtime
+    except OSError:
+        return False
+    return age > UNFINISHED_SECONDS and not _OWNER.fullmatch(owner)
 
 
 def _remove(path: Path, owner: str) -> None:

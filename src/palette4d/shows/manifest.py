@@ -166,19 +166,19 @@ def _entry(row: dict[str, Any]) -> Entry:
         place = Place(str(edit["track"]), str(edit["record"]), tuple(map(int, edit["path"])))
     first, last = map(int, row["asked"])
     used_first, used_last = map(int, row["used"])
-    if row["status"] not in (DONE, FAILED, TO_DO) or (row["status"] == DONE) != ("frames" in row):
+    frames, step = row.get("frames"), int(row["step"])
+    if row["status"] not in (DONE, FAILED, TO_DO) or (row["status"] == DONE) != bool(frames):
         raise ValueError(f"status {row['status']!r}")
+    if step < 1:
+        raise ValueError(f"step {step}")
     name = str(row["name"])
     if row["sidecar"] != f"{name}.p4d.json" or not _NAME.fullmatch(name):
         raise ValueError(f"sidecar {row['sidecar']!r} of the shot {name!r}")
-    shot = Shot(
-        name, str(row["clip"]), first, last, (used_first, used_last), int(row["step"]), place
-    )
-    frames = row.get("frames")
+    shot = Shot(name, str(row["clip"]), first, last, (used_first, used_last), step, place)
     return Entry(
         shot=shot,
         status=row["status"],
-        frames=None if frames is None else (int(frames[0]), int(frames[1])),
+        frames=(int(frames[0]), int(frames[1])) if frames else None,
         error=str(row.get("error", "")),
     )
 

@@ -127,7 +127,10 @@ class _Reader:
                 return
             place = Place(track, self.record_of(shown[0]), path)
             self.shots.append(self.shot(clip, place, shown[1]))
-        except (Palette4dError, OSError, ValueError) as error:  # also of names no disk can hold
+        except (
+            *(Palette4dError, self.otio.exceptions.OTIOError),
+            *(OSError, ValueError, ArithmeticError),  # names and times that cannot be
+        ) as error:
             name = file_safe(clip.name or "shot")
             self.shots.append(Shot(name, "", 0, 0, (0, 0), place=place, problem=in_words(error)))
 

@@ -68,16 +68,29 @@ def read(path: Path, rate: Fraction | None = None) -> Document:
     try:
         read_regular(regular, LARGEST_FILE)
         with Child(SECONDS, MEGABYTES) as child:
-            text = child.call(_as_json, str(path), arguments)
-        found = otio.adapters.read_from_string(text, "otio_json")
+            text = child.call(as_json, str(path), arguments)
     except OSError as error:
         raise Palette4dError(in_words(error)) from error
     except Palette4dError as error:
-        raise Palette4dError(
-            f"{path}: it cannot be read as a timeline ({_first_line(error)}); expected a whole "
-            f".{extension} file"
-            + (", and its timecodes' rate as rate=…" if extension == "edl" else "")
-        ) from error
+        raise _unreadable(path, error) from error
+    return document_of(path, text)
+
+
+def _unreadable(path: Path, error: Exception) -> Palette4dError:
+    extension = path.suffix.lower()
+    return Palette4dError(
+        f"{path}: it cannot be read as a timeline ({_first_line(error)}); expected a whole "
+        f"{extension} file" + (", and its timecodes' rate as rate=…" if extension == ".edl" else "")
+    )
+
+
+def document_of(path: Path, text: str) -> Document:
+    """Return the only timeline of a file, from its `as_json`; `Palette4dError` if there is none."""
+    otio = library()
+    try:
+        found = otio.adapters.read_from_string(text, "otio_json")
+    except Exception as error:  # it does not read back everything that it writes
+        raise _unreadable(path, error) from error
     if isinstance(found, otio.schema.SerializableCollection):
         timelines = [one for one in found if isinstance(one, otio.schema.Timeline)]
         if len(timelines) != 1:
@@ -91,12 +104,12 @@ def read(path: Path, rate: Fraction | None = None) -> Document:
             f"{path}: found a {type(found).__name__}, expected a timeline; write the edit to a "
             "file as a whole"
         )
-    if extension == "edl":
+    if path.suffix.lower() == ".edl":
         _rebase(found)
     return Document(path, found)
 
 
-def _as_json(path: str, arguments: dict[str, float]) -> str:
+def as_json(path: str, arguments: dict[str, float]) -> str:
     """Return a timeline file as OpenTimelineIO's JSON, which it has read without harm."""
     otio = library()
     found = otio.adapters.read_from_file(path, **arguments)

@@ -1,0 +1,71 @@
+"""Runs verbs with faults, each in a fork of this process, which has imported everything.
+
+It reads trials as lines of JSON and answers each with a line: the exit status (negative: the
+signal), how many calls changed files, and what was printed.
+"""
+
+import ctypes
+import importlib
+import json
+import os
+import pkgutil
+import sys
+import tempfile
+import traceback
+from pathlib import Path
+from typing import Any
+
+import palette4d
+from palette4d.cli.main import main
+
+for found in pkgutil.walk_packages(palette4d.__path__, "palette4d."):
+    if not found.name.startswith(("palette4d.studio", "palette4d.__main__")):
+        importlib.import_module(found.name)
+for name in ("OpenImageIO", "PyOpenColorIO", "scipy.optimize", "matplotlib.figure"):
+    importlib.import_module(name)
+
+SHIM: Any = ctypes.CDLL(None)
+KILL, KILL_HALFWAY, NOTHING = 0, -1, -2
+
+
+def trial(
+    folder: str, arguments: list[str], at: int, action: int, lasting: bool, locks: bool
+) -> Any:
+    """Run a verb in a fork, with the working folder `folder`."""
+    with tempfile.TemporaryFile() as printed:
+        counted, count = os.pipe()
+        child = os.fork()
+        if not child:
+            for handle in (1, 2):
+                os.dup2(printed.fileno(), handle)
+            os.chdir(folder)
+            SHIM.faults_begin(folder.encode(), ctypes.c_long(at), action, lasting, not locks)
+            status = 70
+            try:
+                status = main(arguments)
+            except SystemExit as error:
+                status = int(error.code or 0)
+            except BaseException:
+                traceback.print_exc()
+            sys.stdout.flush()
+            sys.stderr.flush()
+            calls = SHIM.faults_count()
+            SHIM.faults_begin(b"", ctypes.c_long(0), NOTHING, 0, 0)
+            os.write(count, str(calls).encode())
+            os._exit(status)
+        os.close(count)
+        calls = os.read(counted, 32)
+        os.close(counted)
+        status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        printed.seek(0)
+        return {
+            "status": status,
+            "calls": int(calls or 0),
+            "printed": printed.read().decode("utf-8", "replace"),
+        }
+
+
+if __name__ == "__main__":
+    sys.path[:] = [entry for entry in sys.path if Path(entry) != Path(__file__).parent]
+    for line in sys.stdin:
+        print(json.dumps(trial(**json.loads(line))), flush=True)
