@@ -801,16 +801,16 @@ class Document:
             A value is out of range, or the clip does not fit.
         """
         at = self._picked(frame, colour, pixel, box, clip, any_value)
-        if (to is None) == (by is None):
+        if to is not None and by is None:
+            new = self._checked(to, any_value)
+        elif by is not None and to is None:
+            change = as_colour(by, "change")
+            new = as_colour([a + b for a, b in zip(at.rgb, change, strict=True)])
+        else:
             raise Palette4dError(
-                f"found {'both' if to is not None else 'neither'} of the new colour (to) and the "
+                f"found {'neither' if to is None else 'both'} of the new colour (to) and the "
                 "change (by), expected one of them"
             )
-        if to is not None:
-            new = self._checked(to, any_value)
-        else:
-            change = as_colour(by or (), "change")
-            new = as_colour([a + b for a, b in zip(at.rgb, change, strict=True)])
         found = replace(at, kind="pick", to=new, toward=toward, start=start, until=until)
         found = replace(found, fade=fade, radius=radius, global_only=global_only)
         return self._add_pick(found, clip, follow, progress)
@@ -962,15 +962,15 @@ class Document:
     ) -> Pick:
         """Return a hold of a colour at a frame."""
         self.check_frame(frame)
-        if (colour is None) == (pixel is None):
-            raise Palette4dError(
-                f"found {'both' if colour is not None else 'neither'} of a colour and a pixel, "
-                "expected one of them"
-            )
-        if pixel is not None:
+        if colour is not None and pixel is None:
+            return Pick("", "hold", frame, self._checked(colour, any_value))
+        if colour is None and pixel is not None:
             rgb = self.colour_of_pixel(frame, pixel, box, clip)
             return Pick("", "hold", frame, rgb, pixel=pixel, box=box)
-        return Pick("", "hold", frame, self._checked(colour or (), any_value))
+        raise Palette4dError(
+            f"found {'neither' if colour is None else 'both'} of a colour and a pixel, expected "
+            "one of them"
+        )
 
     def _add_pick(
         self,

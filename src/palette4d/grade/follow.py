@@ -29,6 +29,9 @@ NEAR = 0.08
 ROUNDS, ARRIVED = 8, 1e-4
 #: A colour moves at most so far from one frame to the next; what jumps is another object.
 MOST_STEP = 0.08
+#: Weight of the path's bends: what is shorter than some 2 pi STIFF^(1/4) frames is jitter, which
+#: would be flicker of the grade. And the weight of colours that the user gave.
+STIFF, PINNED = 12.0, 1e6
 #: How strongly a colour that is still there is kept there, per frame; it is still there while the
 #: pixels near it are not 1 / SAME fewer or more than at first.
 HOME, SAME = 0.5, 4
@@ -99,7 +102,7 @@ def paths(
             raise Palette4dError(
                 f"frame {frame} of {clip.source} has no pixel that can be followed"
             )
-    found = _joined(frames, colours, known)
+    found = _smoothed(_joined(frames, colours, known), [frames.index(frame) for frame in known])
     kept = _few(np.array(frames, float), found, {frames.index(frame) for frame in known})
     return tuple(
         PathKey(frames[i], as_colour(np.round(found[i], DIGITS)), frames[i] in known) for i in kept
@@ -164,6 +167,16 @@ def _followed(colours: Sequence[tuple[F64, F64]], start: F64) -> F64:
             there = there + HOME * max(0.0, 1 - (1 - same) * SAME) * (still - there)
         path.append(there)
     return np.array(path)
+
+
+def _smoothed(path: F64, fixed: Sequence[int]) -> F64:
+    """Return the path without its jitter (Whittaker's smoothing); fixed places stay."""
+    weight = np.ones(len(path))
+    weight[list(fixed)] = PINNED
+    bend = np.diff(np.eye(len(path)), 2, axis=0)
+    smooth = np.linalg.solve(np.diag(weight) + STIFF * bend.T @ bend, weight[:, None] * path)
+    smooth[list(fixed)] = path[list(fixed)]
+    return np.asarray(smooth, np.float64)
 
 
 def _shifted(here: F64, before: tuple[F64, F64], after: tuple[F64, F64]) -> F64:

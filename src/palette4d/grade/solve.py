@@ -43,20 +43,23 @@ F64 = NDArray[np.float64]
 
 # A pick or a hold weighs 1; the weights of the guard sum to GUARD, or less if less than the share
 # LEAST_GUARDED of the picture is guarded at all.
-GUARD, LEAST_GUARDED = 3.7, 0.2
+GUARD, LEAST_GUARDED = 3.0, 0.2
 # A colour of few pixels counts in the guard as if it had this share of them: a lamp.
 LEAST_SHARE = 5e-4
+# A guarded colour that would change by more than LARGE times the largest change that is asked for
+# counts as if it had up to this share of the picture: few pixels must not overshoot either.
+OVERSHOOT, LARGE = 0.02, 1.1
 # The guard is off within NEAR_0 + NEAR_1 |change| of a pick, and full at NEAR_END times that.
-NEAR_0, NEAR_1, NEAR_END = 0.045, 0.4, 4.5
+NEAR_0, NEAR_1, NEAR_END = 0.03, 0.3, 5.0
 # The radius of a pick's bump is RADIUS_0 + RADIUS_1 |change|; that of a hold's is HOLD_RADIUS.
-RADIUS_0, RADIUS_1, HOLD_RADIUS = 0.1, 0.7, 0.16
+RADIUS_0, RADIUS_1, HOLD_RADIUS = 0.08, 0.9, 0.16
 # Costs of a palette colour's displacement and of a bump, beside the weights above.
-RIDGE, BUMP = 6e-4, 0.4
+RIDGE, BUMP = 1e-4, 0.3
 # Reweighting: rounds, and the sizes, as shares of the largest change, below which a palette
 # colour's displacement and a guarded colour's change no longer cost more per size. A changed
 # colour's weight falls with the power ROBUST; a displacement below FEW of the
 # largest change is none.
-ROUNDS, SMALL_MOVE, SMALL_CHANGE, ROBUST, FEW = 5, 0.05, 0.02, 0.5, 0.1
+ROUNDS, SMALL_MOVE, SMALL_CHANGE, ROBUST, FEW = 5, 0.03, 0.017, 0.6, 0.1
 # Picks that nearly coincide and ask for different things: the bumps' sizes stay bounded by
 # 1 / (2 TIKHONOV) times the difference. A lone pick's residual is TIKHONOV^2 of its remainder.
 TIKHONOV = 0.1
@@ -223,9 +226,11 @@ class _Problem:
         moving = np.array([pick.to is not None for pick in picks])
         guard = np.maximum(guarded[:, 3], LEAST_SHARE)
         far = _far(guarded[:, :3], centres[moving], reach[moving], share[moving])
-        guard *= GUARD * far / max(float(guard @ far), LEAST_GUARDED * float(guard.sum()))
+        unit = GUARD / max(float(guard @ far), LEAST_GUARDED * float(guard.sum()))
         count = len(free)
-        found = _least_squares(rows, share, wanted, guard_rows, guard, count, scale)
+        found = _least_squares(
+            rows, share, wanted, guard_rows, (unit * far * guard, unit * far), count, scale
+        )
         moves = found[:count] * free[:, None]
         sizes = found[count:] * local[:, None]
         left = (wanted - _gathered(weights, places) @ moves - bumps @ sizes) * share[:, None]
@@ -355,29 +360,39 @@ def _gathered(weights: F64, places: Sequence[tuple[str, int]]) -> F64:
 
 
 def _least_squares(
-    rows: F64, pick: F64, wanted: F64, guard_rows: F64, guard: F64, moves: int, scale: float
+    rows: F64,
+    pick: F64,
+    wanted: F64,
+    guard_rows: F64,
+    guard: tuple[F64, F64],
+    moves: int,
+    scale: float,
 ) -> F64:
-    """Return the displacements of the first `moves` columns and the sizes of the others, (n, 3)."""
+    """Return the displacements of the first `moves` columns and the sizes of the others, (n, 3).
+
+    `guard` has each guarded colour's weight, and its weight if it were the whole picture.
+    """
     picked = rows.T @ (pick[:, None] * rows)
     target = rows.T @ (pick[:, None] * wanted)
-    total = float(guard.sum())
+    weights, whole = guard
     cost = np.full(rows.shape[1], BUMP)
     cost[:moves] = RIDGE
-    weight: F64 = guard
+    weight: F64 = weights
     normal: NDArray[np.floating[Any]] = picked
-    found = target
+    found: NDArray[np.floating[Any]] = target
     for _ in range(ROUNDS):
         normal = picked + guard_rows.T @ (weight[:, None] * guard_rows) + np.diag(cost)
         found = np.linalg.solve(normal, target)
         cost[:moves] = RIDGE / (np.linalg.norm(found[:moves], axis=1) / scale + SMALL_MOVE)
         changed = np.linalg.norm(guard_rows @ found, axis=1) / scale
-        weight = guard * np.power(SMALL_CHANGE / (changed + SMALL_CHANGE), ROBUST)
-        weight *= total / max(float(weight.sum()), 1e-9)
+        weights = np.maximum(weights, whole * OVERSHOOT * np.clip(changed - LARGE, 0, 1))
+        weight = weights * np.power(SMALL_CHANGE / (changed + SMALL_CHANGE), ROBUST)
+        weight *= float(weights.sum()) / max(float(weight.sum()), 1e-9)
     few = np.linalg.norm(found, axis=1) > FEW * scale
     few[moves:] = True
     found[~few] = 0.0
     found[few] = np.linalg.solve(normal[np.ix_(few, few)], target[few])
-    return found
+    return found.astype(np.float64)
 
 
 def _interpolated(bumps: F64, left: F64) -> F64:

@@ -1,0 +1,103 @@
+"""Following a colour: a fountain that turns to red and back, still pictures, given colours."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from palette4d.common.errors import Palette4dError
+from palette4d.grade import follow
+from palette4d.grade.picks import PathKey
+from palette4d.media.array_clip import ArrayClip
+
+FRAMES = 43
+MINT, YELLOW, RED = np.array([[0.55, 0.95, 0.75], [0.95, 0.85, 0.3], [0.9, 0.2, 0.2]])
+
+
+def fountain(frame: float) -> NDArray[np.float64]:
+    """Mint, by yellow to red at the middle, and back."""
+    u = 1 - np.cos(2 * np.pi * frame / (FRAMES - 1))
+    colour: NDArray[np.float64] = (
+        MINT + u * (YELLOW - MINT) if u < 1 else YELLOW + (u - 1) * (RED - YELLOW)
+    )
+    return colour
+
+
+@pytest.fixture(scope="module")
+def clip() -> ArrayClip:
+    """The fountain before a still sky and meadow, all with grain."""
+    rng = np.random.default_rng(0)
+    still = np.empty((90, 160, 3))
+    still[:50] = np.array([0.45, 0.6, 0.85]) + rng.normal(size=(50, 160, 3)) * [0.1, 0.1, 0.05]
+    still[50:] = np.array([0.3, 0.5, 0.2]) + 0.08 * rng.normal(size=(40, 160, 1))
+    frames = np.empty((FRAMES, 90, 160, 3), np.float32)
+    for frame in range(FRAMES):
+        picture = still + 0.01 * rng.normal(size=still.shape)
+        picture[30:60, 60:100] = fountain(frame) + 0.04 * rng.normal(size=(30, 40, 1))
+        frames[frame] = np.clip(picture, 0, 1)
+    return ArrayClip(frames)
+
+
+def at(path: tuple[PathKey, ...], frame: float) -> NDArray[np.float64]:
+    frames = [key.frame for key in path]
+    return np.array([np.interp(frame, frames, c) for c in np.transpose([k.rgb for k in path])])
+
+
+def start(frame: int) -> tuple[int, tuple[float, float, float]]:
+    r, g, b = fountain(frame).tolist()
+    return frame, (r, g, b)
+
+
+@pytest.mark.parametrize("frame", [0, 10, 21, 42])
+def test_the_fountain_is_followed_both_ways(clip: ArrayClip, frame: int) -> None:
+    path = follow.paths(clip, [start(frame)], (0, FRAMES - 1))
+    assert (path[0].frame, path[-1].frame) == (0, FRAMES - 1)
+    off = [np.linalg.norm(at(path, t) - fountain(t)) for t in range(FRAMES)]
+    assert max(off) < 0.12
+    np.testing.assert_allclose(at(path, frame), fountain(frame), atol=1e-4)
+    assert [key.frame for key in path if key.given] == [frame]
+
+
+@pytest.mark.parametrize("colour", [(0.3, 0.5, 0.2), (0.45, 0.6, 0.85), (0.36, 0.56, 0.26)])
+def test_a_still_colour_stays(clip: ArrayClip, colour: tuple[float, float, float]) -> None:
+    path = follow.paths(clip, [(20, colour)], (0, FRAMES - 1))
+    assert max(np.linalg.norm(np.array(key.rgb) - colour) for key in path) < 0.05
+
+
+def test_only_the_range_is_read(clip: ArrayClip) -> None:
+    seen: list[tuple[int, int]] = []
+    path = follow.paths(
+        clip, [start(10)], (8, 14), progress=lambda done, total: seen.append((done, total))
+    )
+    assert (path[0].frame, path[-1].frame) == (8, 14)
+    assert seen == [(done, 7) for done in range(1, 8)]
+
+
+def test_given_colours_are_met_and_joined(clip: ArrayClip) -> None:
+    wrong = (0.3, 0.5, 0.2)  # another object, so that the ways differ
+    path = follow.paths(clip, [start(0), (20, wrong)], (0, 30))
+    np.testing.assert_allclose(at(path, 0), fountain(0), atol=1e-4)
+    np.testing.assert_allclose(at(path, 20), wrong, atol=1e-4)
+    np.testing.assert_allclose(at(path, 30), wrong, atol=0.05)
+    between = np.linalg.norm(at(path, 10) - (fountain(10) + wrong) / 2)
+    assert between < 0.1
+    assert [key.frame for key in path if key.given] == [0, 20]
+
+
+def test_few_keys_and_little_memory(clip: ArrayClip, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(follow, "MOST_FRAMES", 15)
+    seen: list[tuple[int, int]] = []
+    path = follow.paths(
+        clip,
+        [start(21)],
+        (0, FRAMES - 1),
+        progress=lambda done, total: seen.append((done, total)),
+    )
+    assert seen[-1][1] <= 17
+    assert len(path) <= follow.MOST_KEYS + 1
+
+
+def test_a_frame_that_the_clip_lacks_is_an_error(clip: ArrayClip) -> None:
+    with pytest.raises(Palette4dError, match="no frame 99"):
+        follow.paths(clip, [(99, (0.5, 0.5, 0.5))], (0, 42))

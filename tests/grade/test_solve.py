@@ -1,0 +1,182 @@
+"""The solver of picks: met, guarded, local in time and colour, bounded, and the same every time."""
+
+from __future__ import annotations
+
+import copy
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from palette4d.common.errors import Palette4dError
+from palette4d.grade import solve
+from palette4d.grade.document import Document
+from palette4d.grade.picks import MOST_PICKS, Pick, unmet
+from palette4d.grade.sidecar import Fields
+
+GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
+
+
+@pytest.fixture
+def fields() -> Fields:
+    """v1_split: frames 0 to 18, four colours, of which one splits."""
+    found: Fields = json.loads((GOLDEN / "v1_split.p4d.json").read_text())
+    return found
+
+
+def pick(id_: str, rgb: Any, to: Any = None, frame: float = 5, **more: Any) -> Fields:
+    kind = "hold" if to is None else "pick"
+    found = {"id": id_, "kind": kind, "frame": frame, "rgb": list(rgb), **more}
+    return found if to is None else found | {"to": list(to)}
+
+
+def solved(fields: Fields, *picks: Fields, **edits: Any) -> tuple[Document, dict[str, Fields]]:
+    """Solve picks; return the document with their solution, and what was measured."""
+    found = copy.deepcopy(fields)
+    found["edits"] |= {"picks": list(picks), **edits}
+    solution, measured = solve.solve(found)
+    found["edits"]["solution"] = solution
+    return Document(found), measured
+
+
+def moved(document: Document, rgb: Any, frame: float) -> Any:
+    colour = np.array(rgb, np.float32).reshape(1, 1, 3)
+    return (document.recolour(colour, frame) - colour)[0, 0]
+
+
+MIDDLE = (0.4, 0.4, 0.4)
+OTHER = (0.3, 0.5, 0.35)
+
+
+def test_a_pick_and_a_hold_are_met_at_all_frames(fields: Fields) -> None:
+    document, measured = solved(
+        fields, pick("p1", MIDDLE, (0.5, 0.35, 0.4)), pick("p2", (0.25, 0.4, 0.3))
+    )
+    first, last, _ = document.frames
+    for frame in np.linspace(first, last, 13):
+        np.testing.assert_allclose(moved(document, MIDDLE, frame), (0.1, -0.05, 0), atol=0.006)
+        np.testing.assert_allclose(moved(document, (0.25, 0.4, 0.3), frame), 0, atol=0.006)
+    assert measured["p1"]["residual"] < 0.006
+    assert 0 <= measured["p1"]["global"] <= 1
+
+
+def test_nothing_changes_outside_of_a_range(fields: Fields) -> None:
+    document, _ = solved(
+        fields, pick("p1", MIDDLE, (0.6, 0.3, 0.4), **{"from": 6, "until": 9, "fade": 2})
+    )
+    np.testing.assert_allclose(moved(document, MIDDLE, 7), (0.2, -0.1, 0), atol=0.006)
+    np.testing.assert_allclose(moved(document, MIDDLE, 5), (0.1, -0.05, 0), atol=0.01)
+    for frame in (0, 2.5, 4, 11, 11.5, 18):
+        palette = document.palette(frame)
+        np.testing.assert_array_equal(palette.edited, palette.rgb)
+        assert (
+            not document.core.bumps_at(frame).any() or (moved(document, MIDDLE, frame) == 0).all()
+        )
+
+
+def test_a_second_range_leaves_the_frames_of_the_first_alone(fields: Fields) -> None:
+    early = pick("p1", MIDDLE, (0.6, 0.3, 0.4), **{"from": 1, "until": 4})
+    late = pick("p2", OTHER, (0.2, 0.5, 0.6), frame=14, **{"from": 12, "until": 16})
+    alone, _ = solved(fields, early)
+    both, _ = solved(fields, early, late)
+    for frame in (0, 1, 3, 5):
+        np.testing.assert_allclose(
+            moved(both, MIDDLE, frame), moved(alone, MIDDLE, frame), atol=1e-6
+        )
+    np.testing.assert_allclose(moved(both, OTHER, 14), (-0.1, 0, 0.25), atol=0.006)
+
+
+def test_a_path_is_followed_by_shift_or_by_colour(fields: Fields) -> None:
+    path = [{"frame": 0, "rgb": [0.3, 0.3, 0.3]}, {"frame": 18, "rgb": [0.5, 0.4, 0.4]}]
+    asked = pick("p1", (0.3, 0.3, 0.3), (0.4, 0.3, 0.3), frame=0, path=path)
+    shift, _ = solved(fields, asked)
+    np.testing.assert_allclose(moved(shift, (0.5, 0.4, 0.4), 18), (0.1, 0, 0), atol=0.006)
+    colour, _ = solved(fields, asked | {"toward": "colour"})
+    np.testing.assert_allclose(moved(colour, (0.5, 0.4, 0.4), 18), (-0.1, -0.1, -0.1), atol=0.006)
+
+
+def test_the_users_handles_are_counted_in(fields: Fields) -> None:
+    vertex = {"vertex": "v4", "rgb": [0.9, 0.1, 0.1]}
+    document, _ = solved(
+        fields, pick("p1", MIDDLE, (0.5, 0.4, 0.4)), pick("p2", OTHER), vertices=[vertex]
+    )
+    np.testing.assert_allclose(moved(document, MIDDLE, 5), (0.1, 0, 0), atol=0.006)
+    np.testing.assert_allclose(moved(document, OTHER, 5), 0, atol=0.006)
+
+
+def test_a_locked_handle_does_not_move(fields: Fields) -> None:
+    asked = pick("p1", MIDDLE, (0.6, 0.3, 0.4))
+    free, _ = solved(fields, asked)
+    by = {entry["vertex"]: entry["by"] for entry in free.fields()["edits"]["solution"]["vertices"]}
+    most = max(by, key=lambda id_: max(map(abs, by[id_])))
+    locked, measured = solved(fields, asked, locks=[most])
+    assert most not in {v["vertex"] for v in locked.fields()["edits"]["solution"]["vertices"]}
+    assert measured["p1"]["residual"] < 0.006
+
+
+def test_a_global_pick_has_no_bump(fields: Fields) -> None:
+    document, measured = solved(fields, pick("p1", MIDDLE, (0.6, 0.3, 0.4), global_only=True))
+    assert document.fields()["edits"]["solution"]["bumps"] == []
+    assert measured["p1"]["residual"] > 0
+
+
+def test_guarded_colours_stay(fields: Fields) -> None:
+    asked = pick("p1", MIDDLE, (0.55, 0.4, 0.4))
+    lamp = [0.75, 0.7, 0.2]
+    rows = [[0.4, 0.4, 0.4, 0.6], [0.3, 0.3, 0.6, 0.3997], [*lamp, 0.0003]]
+    document, _ = solved({**fields, "colours": [{"frame": 0, "rgbw": rows}]}, asked)
+    assert np.abs(moved(document, (0.3, 0.3, 0.6), 5)).max() < 0.02
+    assert np.abs(moved(document, lamp, 5)).max() < 1.2 * 0.15
+
+
+def test_two_targets_of_one_colour_are_named_and_stay_bounded(fields: Fields) -> None:
+    document, measured = solved(
+        fields,
+        pick("p1", MIDDLE, (0.7, 0.3, 0.4)),
+        pick("p2", (0.405, 0.4, 0.4), (0.2, 0.6, 0.4)),
+    )
+    picks = [
+        Pick.from_fields(entry | measured[entry["id"]])
+        for entry in document.fields()["edits"]["picks"]
+    ]
+    lines = unmet(picks, 1)
+    assert len(lines) == 2
+    assert all("p1" in line and "p2" in line for line in lines)
+    for bump in document.fields()["edits"]["solution"]["bumps"]:
+        assert np.abs([key["by"] for key in bump["keys"]]).max() < 2
+
+
+def test_the_solution_is_the_same_every_time(fields: Fields) -> None:
+    asked = [pick("p1", MIDDLE, (0.6, 0.3, 0.4)), pick("p2", OTHER)]
+    first, second = (solved(fields, *asked)[0].fields() for _ in range(2))
+    assert first == second
+
+
+def test_a_thousand_picks_are_bounded_in_time(fields: Fields) -> None:
+    rng = np.random.default_rng(4)
+    many = [
+        pick(f"p{i}", rng.random(3).tolist(), rng.random(3).tolist(), frame=int(rng.integers(18)))
+        for i in range(1, 1001)
+    ]
+    start = time.perf_counter()
+    document, measured = solved(fields, *many)
+    assert time.perf_counter() - start < 30
+    assert measured["p1000"]["residual"] > 0
+    lines = unmet(document.picks, 1)
+    assert sum("not solved" in line for line in lines) == 1000 - MOST_PICKS
+    with pytest.raises(Palette4dError, match=str(MOST_PICKS)):
+        document.pick(5, colour=MIDDLE, by=(0.1, 0, 0), follow=False)
+
+
+@pytest.mark.parametrize("name", ["v1_one_colour", "v1_two_colours", "v1_flat", "v1_scene_linear"])
+def test_palettes_of_few_colours(name: str) -> None:
+    document = Document(json.loads((GOLDEN / f"{name}.p4d.json").read_text()))
+    rgb = document.palette(document.frames[0]).rgb.mean(axis=0)
+    found = document.pick(
+        document.frames[0], colour=rgb, by=(0.1, 0, 0), follow=False, any_value=True
+    )
+    assert found.residual is not None
+    assert found.residual < 0.02
