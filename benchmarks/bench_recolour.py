@@ -167,6 +167,27 @@ def against_peers(
         print(f"{'':34} {rates(part.size // 3, runs, {name: run})[name]:7.1f} with {name}")
 
 
+def bumps_in(image: F32, count: int = 5, radius: float = 0.07, seed: int = 3) -> F64:
+    """Make (count, 7) bumps, as of picks and holds, at colours of a picture."""
+    rng = np.random.default_rng(seed)
+    centres = rng.choice(image.reshape(-1, image.shape[2])[:, :3], count)
+    return np.column_stack([centres, np.full(count, radius), rng.uniform(-0.2, 0.2, (count, 3))])
+
+
+def with_picks(what: str, palette: Palette, image: F32, runs: int) -> None:
+    """Print what bumps cost on one thread, in turn with the same edit without them."""
+    ways = {
+        "none": _core.Recolourer(*palette),
+        "five": _core.Recolourer(*palette, bumps=bumps_in(image)),
+        "five wide": _core.Recolourer(*palette, bumps=bumps_in(image, radius=0.3)),
+        "alone": _core.Recolourer(palette[0], palette[0], palette[2], bumps=bumps_in(image)),
+    }
+    works = {name: exact(recolourer, image, 1) for name, recolourer in ways.items()}
+    found = rates(image.size // 3, runs, works)
+    times = ", ".join(f"{name} {found['none'] / found[name]:.3f}" for name in list(ways)[1:])
+    print(f"{what:34} time with bumps, of that without: {times}")
+
+
 def growth(runs: int, plot: Path | None) -> None:
     """Print how cost grows with palettes, pictures and threads; draw it when asked."""
     processors = os.cpu_count() or 1
@@ -224,6 +245,7 @@ def main() -> None:
         peer = compiled_peer(Path(folder))
         palette = hull(8)
         against_peers("8 vertices, inside, HD", palette, inside(palette, *HD), peer, args.runs)
+        with_picks("8 vertices, inside, HD", palette, inside(palette, *HD), args.runs)
         if args.sidecar and args.clip:
             from palette4d.media.clip import open_clip
 
@@ -235,6 +257,7 @@ def main() -> None:
             image = np.ascontiguousarray(image[:, :, :3])
             what = f"{args.sidecar.name} at {args.frame}, {image.shape[1]}x{image.shape[0]}"
             against_peers(what, (cut.rgb, edited, cut.faces), image, peer, args.runs)
+            with_picks(what, (cut.rgb, edited, cut.faces), image, args.runs)
         growth(args.runs, args.plot)
 
 

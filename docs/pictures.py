@@ -4,6 +4,7 @@
 
 docs/images/demo.jpg is the demo's own plot without its polyhedra. docs/images/timeline.jpg shows
 one colour of the same palette through time, with the parts that an edit is made of named.
+docs/images/tools.jpg shows what the tools make of one frame, docs/images/ramps.jpg the three ramps.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import json
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +25,8 @@ from matplotlib.patches import Ellipse
 from numpy.typing import NDArray
 from PIL import Image
 
+import palette4d as p4d
+
 IMAGES = Path(__file__).resolve().parent / "images"
 PAGE, PANEL, TEXT, DIM = "#202020", "#2a2a2a", "#eeeeee", "#9a9a9a"
 GOLD, ROSE = (0.86, 0.58, 0.07), (0.9, 0.42, 0.62)
@@ -30,6 +34,10 @@ SHOWN = (4, 12, 20, 28, 36, 44)
 """The frames of timeline.jpg: each picture stands above its frame on the time axis."""
 HELD = 19
 """The frame of the stop that holds the colour."""
+
+TOOLS_AT, HOUSE, TREES = 20, (0.8, 0.14, 0.12), (0.6, 0.28, 0.05)
+"""The frame of tools.jpg, and the red of its house and of its trees."""
+GOLDEN = Path(__file__).resolve().parents[1] / "tests/golden/sidecars/v1_split.p4d.json"
 
 Image8 = NDArray[np.uint8]
 
@@ -153,9 +161,7 @@ def draw_timeline(demo: Path, folder: Path) -> None:
         axes.annotate("", (left, 1.6), (right, 1.6), arrowprops={"arrowstyle": "<->", "color": DIM})
         axes.text((left + right) / 2, 1.25, text, color=TEXT, ha="center", va="top", fontsize=12)
 
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    save(np.asarray(canvas.buffer_rgba())[..., :3].copy(), "timeline.jpg")
+    _save_figure(figure, "timeline.jpg")
 
 
 def _disc(axes: Any, x: float, y: float, size: float, ratio: float, top: Any, bottom: Any,
@@ -172,12 +178,77 @@ def _disc(axes: Any, x: float, y: float, size: float, ratio: float, top: Any, bo
         axes.fill(*points, color=np.clip(colour, 0, 1), zorder=5)
 
 
+def draw_tools(demo: Path) -> None:
+    """Draw one frame before and after each tool."""
+    sidecar, clip = demo / "sample.p4d.json", p4d.open_clip(str(demo / "clip/sample.####.png"))
+    plain = p4d.load(sidecar)
+    plain.reset()
+    gold = plain.near(GOLD, frame=TOOLS_AT).id
+
+    def pick(document: p4d.Document) -> None:
+        document.pick(frame=TOOLS_AT, colour=HOUSE, to=(0.2, 0.35, 0.7), clip=clip.source)
+        document.hold(frame=TOOLS_AT, colour=TREES, clip=clip.source)
+
+    tools: list[tuple[str, Callable[[p4d.Document], object]]] = [
+        ("the clip", lambda document: None),
+        ("track --hue 60", lambda document: document.adjust(gold, track=True, hue=60)),
+        ("palette --chroma 0.4", lambda document: document.adjust(chroma=0.4)),
+        ("pick the red house, hold the trees", pick),
+    ]
+    image = clip.read(TOOLS_AT)[..., :3]
+    height, width = image.shape[:2]
+    figure = Figure(figsize=(14, 14 * 2 * (height / width / 2 + 0.03)), facecolor=PAGE)
+    for index, (title, tool) in enumerate(tools):
+        document = plain.trial()
+        tool(document)
+        axes = figure.add_subplot(2, 2, index + 1)
+        axes.imshow(np.clip(document.recolour(image, TOOLS_AT), 0, 1), interpolation="bicubic")
+        axes.set_title(title, color=TEXT, fontsize=15, loc="left")
+        axes.set_axis_off()
+    figure.subplots_adjust(0.01, 0.01, 0.99, 0.95, wspace=0.02, hspace=0.1)
+    _save_figure(figure, "tools.jpg")
+
+
+def draw_ramps() -> None:
+    """Draw how an edit goes through four handles with each ramp."""
+    document = p4d.load(GOLDEN)
+    original = p4d.load(GOLDEN)
+    for frame, amount in ((2, 0.0), (4, 0.5), (6, 0.6), (8, 0.0)):
+        colour = original.colour("e1", frame=frame)
+        document.stop("e1", frame=frame, rgb=(colour[0] + amount, *colour[1:]))
+    frames = np.linspace(1, 8.9, 400)
+    figure = Figure(figsize=(14, 3.6), facecolor=PAGE)
+    for index, ramp in enumerate(("linear", "smooth", "hold")):
+        document.set_ramp(ramp)
+        moved = [
+            document.colour("e1", frame=t)[0] - original.colour("e1", frame=t)[0] for t in frames
+        ]
+        axes = figure.add_subplot(1, 3, index + 1, facecolor=PANEL)
+        axes.plot(frames, moved, color="#f2a5c4", lw=2.5)
+        axes.plot([2, 4, 6, 8], [0, 0.5, 0.6, 0], "o", color=TEXT, ms=9)
+        axes.set_title(ramp, color=TEXT, fontsize=15)
+        axes.set(xticks=[], yticks=[], ylim=(-0.1, 0.75))
+        axes.set_xlabel("time; discs are handles", color=DIM, fontsize=11)
+        if index == 0:
+            axes.set_ylabel("how far the edit\nmoves the colour", color=DIM, fontsize=11)
+    figure.subplots_adjust(0.06, 0.13, 0.99, 0.88, wspace=0.06)
+    _save_figure(figure, "ramps.jpg")
+
+
+def _save_figure(figure: Figure, name: str) -> None:
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    save(np.asarray(canvas.buffer_rgba())[..., :3].copy(), name)
+
+
 def main() -> None:
-    """Draw both pictures from the folder of a demo."""
+    """Draw the pictures from the folder of a demo."""
     demo = Path(sys.argv[1])
     crop_demo(demo / "palette_edited.png")
     with tempfile.TemporaryDirectory() as folder:
         draw_timeline(demo, Path(folder))
+    draw_tools(demo)
+    draw_ramps()
 
 
 if __name__ == "__main__":

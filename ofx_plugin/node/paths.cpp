@@ -66,6 +66,8 @@ std::string unpasted(std::string path) {
     return plain;
 }
 
+constexpr const char* kProject = "[Project]/";
+
 /// Natron prefixes every path that does not start with a slash with its project's folder. Removes
 /// that prefix where the whole is no file and the rest is one of our forms.
 std::string without_project(const std::string& path) {
@@ -76,6 +78,8 @@ std::string without_project(const std::string& path) {
     for (std::size_t at = path.find('/', 1); at != std::string::npos; at = path.find('/', at + 1)) {
         const std::string rest = path.substr(at + 1);
         const auto starts = [&](const char* with) { return rest.rfind(with, 0) == 0; };
+        // Natron's own variable, chosen before the project had a folder.
+        if (starts(kProject)) return path.substr(0, at + 1) + rest.substr(std::strlen(kProject));
         name.clear();
         if (starts("$") || starts("%")) variable_at(rest, 0, name);
         if (!name.empty() || rest == "~" || starts("~/") || starts("file:/") || starts("\"") ||

@@ -261,3 +261,17 @@ def test_targets_that_cannot_be_written(tmp_path: Path) -> None:
         locked.mkdir(mode=0o500)
         with pytest.raises(WriteError), replacing(locked / "new.cube"):
             raise AssertionError("the body must not run")
+
+
+def test_a_pipe_or_device_is_never_replaced(tmp_path: Path) -> None:
+    pipe, link = tmp_path / "pipe", tmp_path / "link"
+    os.mkfifo(pipe)
+    link.symlink_to(pipe)
+    for path in (pipe, link):
+        with (
+            pytest.raises(Palette4dError, match="device or a pipe"),
+            replacing(path, force=True) as temporary,
+        ):
+            temporary.write_text("x")
+    assert pipe.is_fifo()
+    assert [each.name for each in tmp_path.iterdir() if each not in (pipe, link)] == []

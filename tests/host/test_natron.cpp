@@ -165,7 +165,7 @@ TEST(paths_survive_a_project_that_is_saved) {
          {std::string("~/clip.p4d.json"), std::string("$P4D_SHOW/clip.p4d.json"),
           std::string("${P4D_SHOW}/clip.p4d.json"), std::string("%P4D_SHOW%/clip.p4d.json"),
           "file://" + path, "\"" + path + "\"", "'" + path + "'", std::string("near.p4d.json"),
-          path}) {
+          std::string("[Project]/near.p4d.json"), path}) {
         window.node->set("sidecar", given);
         EXPECT(window.render() == window.edited(), given);
     }

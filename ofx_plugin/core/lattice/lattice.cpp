@@ -113,12 +113,18 @@ private:
 
     /// Moves the block's interpolated pixels by bumped_.
     void add_bumps(float* to, int count) const {
-        for (int i = 0; i < count; ++i, to += channels_) {
-            if ((block_.state[i] & kLatticeKind) != kLatticeGood) continue;
-            const float by = premultiplied_ ? to[3] * strength_ : strength_;
+        int chosen[kSize], chosen_count = 0;  // no branch: it would be mispredicted
+        for (int i = 0; i < count; ++i) {
+            const bool moves = (bumped_[0][i] != 0) | (bumped_[1][i] != 0) | (bumped_[2][i] != 0);
+            chosen[chosen_count] = i;
+            chosen_count += moves & ((block_.state[i] & kLatticeKind) == kLatticeGood);
+        }
+        for (int k = 0; k < chosen_count; ++k) {
+            float* const pixel = to + chosen[k] * channels_;
+            const float by = premultiplied_ ? pixel[3] * strength_ : strength_;
             for (int c = 0; c < 3; ++c) {
-                const float moved = bumped_[c][i];
-                if (moved != 0) to[c] += by * moved;
+                const float moved = bumped_[c][chosen[k]];
+                if (moved != 0) pixel[c] += by * moved;
             }
         }
     }

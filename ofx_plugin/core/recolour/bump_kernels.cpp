@@ -11,55 +11,73 @@ using palette4d::BumpPlan;
 template <class T>
 using Channels = BumpKernels::Channels<T>;
 
-/// sum += max(0, 1 - |v|^2 / radius^2)^3 by, for v = centre - colour. False when no lane moves.
+/// 1 - |v|^2 / radius^2 for v = centre - colour.
 template <class T>
-PALETTE4D_INLINE bool add_one(const typename BumpPlan<T>::One& bump, const Lanes<T> (&v)[3],
-                              Lanes<T> (&sum)[3]) {
+PALETTE4D_INLINE Lanes<T> within(const typename BumpPlan<T>::One& bump, const Lanes<T> (&v)[3]) {
+    return all(T(1)) - (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) * all(bump.inverse_radius2);
+}
+
+/// Adds to `moved` bump by bump. `low` may be null. False when no colour is within a bump.
+template <class T>
+PALETTE4D_INLINE bool add_all(const BumpPlan<T>& plan, Channels<const T> high,
+                              Channels<const T> low, Channels<T> moved, int count) {
+    constexpr int n = Lanes<T>::kCount;
     const Lanes<T> zero = all(T(0));
-    const Lanes<T> within =
-        all(T(1)) - (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) * all(bump.inverse_radius2);
-    if (!any(within > zero)) return false;
-    const Lanes<T> t = max(within, zero), weight = t * t * t;
-    for (int c = 0; c < 3; ++c) sum[c] = sum[c] + weight * all(bump.by[c]);
-    return true;
+    const auto away = [&](const typename BumpPlan<T>::One& bump, int c, Lanes<T> colour,
+                          Lanes<T> rest) __attribute__((always_inline)) {
+        return (all(bump.high[c]) - colour) + (all(bump.low[c]) - rest);
+    };
+    // The box of each lane's colours: colours in a picture's row are alike, and most bumps are far
+    // from all of them. Rounding is monotonic, so that no colour is nearer to a centre than its box
+    // is. A box with NaN counts as near to all.
+    Lanes<T> least[3], most[3], least_rest[3], most_rest[3];
+    for (int c = 0; c < 3; ++c) {
+        least[c] = most[c] = load(high[c]);
+        least_rest[c] = most_rest[c] = low ? load(low[c]) : zero;
+        for (int at = n; at < count; at += n) {
+            least[c] = min(load(high[c] + at), least[c]);
+            most[c] = max(load(high[c] + at), most[c]);
+            if (!low) continue;
+            least_rest[c] = min(load(low[c] + at), least_rest[c]);
+            most_rest[c] = max(load(low[c] + at), most_rest[c]);
+        }
+    }
+    bool moves = false;
+    for (int b = 0; b < plan.count; ++b) {
+        const typename BumpPlan<T>::One& bump = plan.bumps[b];
+        Lanes<T> v[3];
+        for (int c = 0; c < 3; ++c) {
+            const Lanes<T> above = away(bump, c, most[c], most_rest[c]),
+                           below = zero - away(bump, c, least[c], least_rest[c]);
+            v[c] = max(max(above, below), zero);
+        }
+        if (!any(within(bump, v) > zero)) continue;
+        for (int at = 0; at < count; at += n) {
+            for (int c = 0; c < 3; ++c) {
+                v[c] = away(bump, c, load(high[c] + at), low ? load(low[c] + at) : zero);
+            }
+            const Lanes<T> t = max(within(bump, v), zero), weight = t * t * t;
+            for (int c = 0; c < 3; ++c) {
+                store(moved[c] + at, load(moved[c] + at) + weight * all(bump.by[c]));
+            }
+        }
+        moves = true;
+    }
+    return moves;
 }
 
 template <class T>
 void add(const BumpPlan<T>& plan, Channels<const T> high, Channels<const T> low, Channels<T> moved,
          int count) {
-    for (int at = 0; at < count; at += Lanes<T>::kCount) {
-        Lanes<T> sum[3] = {all(T(0)), all(T(0)), all(T(0))};
-        bool moves = false;
-        for (int b = 0; b < plan.count; ++b) {
-            const typename BumpPlan<T>::One& bump = plan.bumps[b];
-            Lanes<T> v[3];
-            for (int c = 0; c < 3; ++c) {
-                v[c] = (all(bump.high[c]) - load(high[c] + at)) +
-                       (all(bump.low[c]) - load(low[c] + at));
-            }
-            moves |= add_one(bump, v, sum);
-        }
-        if (!moves) continue;
-        for (int c = 0; c < 3; ++c) store(moved[c] + at, load(moved[c] + at) + sum[c]);
-    }
+    add_all(plan, high, low, moved, count);
 }
 
 bool set(const BumpPlan<float>& plan, Channels<const float> colour, Channels<float> moved,
          int count) {
-    bool moves = false;
-    for (int at = 0; at < count; at += Lanes<float>::kCount) {
-        Lanes<float> sum[3] = {all(0.0f), all(0.0f), all(0.0f)};
-        for (int b = 0; b < plan.count; ++b) {
-            const BumpPlan<float>::One& bump = plan.bumps[b];
-            Lanes<float> v[3];
-            for (int c = 0; c < 3; ++c) {
-                v[c] = (all(bump.high[c]) - load(colour[c] + at)) + all(bump.low[c]);
-            }
-            moves |= add_one(bump, v, sum);
-        }
-        for (int c = 0; c < 3; ++c) store(moved[c] + at, sum[c]);
+    for (int c = 0; c < 3; ++c) {
+        for (int at = 0; at < count; at += Lanes<float>::kCount) store(moved[c] + at, all(0.0f));
     }
-    return moves;
+    return add_all<float>(plan, colour, nullptr, moved, count);
 }
 
 constexpr BumpKernels kKernels = {&add<float>, &add<double>, &set};

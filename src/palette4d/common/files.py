@@ -28,6 +28,11 @@ def refuse_existing(path: Path, force: bool) -> None:
     """Check that a file may be written to `path`."""
     if path.is_dir():
         raise Palette4dError(f"{path}: found a folder, expected a file name for the output")
+    if path.exists() and not path.is_file():
+        # As root, a rename would replace even /dev/null.
+        raise Palette4dError(
+            f"{path}: found a device or a pipe, expected a file name for the output"
+        )
     if not path.parent.is_dir():
         raise Palette4dError(f"{path}: there is no folder {path.parent}; create it first")
     if path.exists() and not force:

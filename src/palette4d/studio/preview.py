@@ -65,6 +65,8 @@ class Request:
 
     Attributes
     ----------
+    clip : int
+        Changes with the clip.
     frame, pixels
         The frame's number and its (h, w, 3 or 4) code values.
     premultiplied : bool
@@ -91,6 +93,7 @@ class Request:
         The pixels are the region's at its size, not the frame's.
     """
 
+    clip: int
     frame: int
     pixels: F32
     premultiplied: bool
@@ -110,7 +113,7 @@ class Request:
     @property
     def film_key(self) -> tuple[Any, ...]:
         """What a picture to play depends on."""
-        return self.frame, self.region, self.look, self.sides, self.key, self.revision
+        return self.clip, self.frame, self.region, self.look, self.sides, self.key, self.revision
 
 
 @dataclass(frozen=True)
@@ -153,7 +156,7 @@ class Preview:
 
     def __init__(self, ready: Callable[[Picture], object]) -> None:
         self._tell = ready
-        self._small = ByteCache[tuple[int, Region], F32](SMALL_BYTES)
+        self._small = ByteCache[tuple[int, int, Region], F32](SMALL_BYTES)
         self._befores = ByteCache[tuple[Any, ...], U8](BEFORE_BYTES)
         self._reel = ByteCache[tuple[Any, ...], Picture](REEL_BYTES)
         self._film: deque[Callable[[], Request | None]] = deque()
@@ -305,7 +308,7 @@ class Preview:
     def _source(self, request: Request) -> F32:
         if request.scaled:
             return request.pixels
-        key = (request.frame, request.region)
+        key = (request.clip, request.frame, request.region)
         found = self._small.get(key)
         if found is None:
             found = resampled(request.pixels, request.region)
@@ -313,7 +316,7 @@ class Preview:
         return found
 
     def _before(self, request: Request, painter: Any, exact: bool, check: Callable[[], None]) -> U8:
-        key = (request.frame, request.region, request.look, exact, request.key)
+        key = (request.clip, request.frame, request.region, request.look, exact, request.key)
         found = self._befores.get(key)
         if found is None:
             grade = request.before

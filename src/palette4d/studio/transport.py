@@ -85,7 +85,7 @@ class Playback(QObject):
         else:
             self._timer.stop()
             self.viewer.preview.roll(())
-            self.viewer._frame_changed()
+            self.viewer.read_frame()
 
     def _pixels(self) -> None:
         if self.session.playing:

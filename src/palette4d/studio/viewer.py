@@ -86,6 +86,7 @@ class Viewer(QWidget):
         self.problem = ""
         self.comparing = False  #: the key of hold-to-compare is down
         self._before: tuple[Any, ...] = ()
+        self._clips = 0  # how many were opened
         self._press: QPointF | None = None
         self._doing = ""
         self._pan_from = QPointF()
@@ -98,7 +99,7 @@ class Viewer(QWidget):
         session.on("pixels", self._probe_again)
         session.on("trial", self.refresh)
         session.on("playing", self.refresh)
-        session.on("frame", self._frame_changed)
+        session.on("frame", self.read_frame)
         session.on("pixels", self.refresh)
         session.on("view", self.refresh)
         session.on("hover", self.refresh)
@@ -114,10 +115,12 @@ class Viewer(QWidget):
     def _clip_changed(self) -> None:
         self.picture, self.images, self.shown_frame, self.problem = None, {}, None, ""
         self.zoom = None
+        self._clips += 1
         self.preview.forget()
-        self._frame_changed()
+        self.read_frame()
 
-    def _frame_changed(self) -> None:
+    def read_frame(self) -> None:
+        """Read the frame and its neighbours, and show it."""
         session = self.session
         if session.player is None:
             self.update()
@@ -171,7 +174,8 @@ class Viewer(QWidget):
         """Return `Request.film_key` of the request for a frame to play."""
         session = self.session
         sides = frozenset(self.sides)
-        return frame, self.region(), session.looked, sides, self._before_key(), session.revision
+        before = self._before_key()
+        return self._clips, frame, self.region(), session.looked, sides, before, session.revision
 
     def _before_key(self) -> str:
         version = self.session.view.version
@@ -194,6 +198,7 @@ class Viewer(QWidget):
         if view.version and document is not None:
             before = version_grade(document, view.version, frame)
         return Request(
+            clip=self._clips,
             frame=frame,
             pixels=pixels,
             premultiplied=session.clip.premultiplied,

@@ -5,17 +5,20 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QObject, QSettings, Qt, QTimer, Signal
+from PySide6.QtCore import QMimeData, QObject, QSettings, Qt, QTimer, QUrl, Signal
 from PySide6.QtGui import (
     QAction,
     QActionGroup,
     QCloseEvent,
+    QDrag,
     QDragEnterEvent,
     QDropEvent,
     QKeyEvent,
     QKeySequence,
+    QMouseEvent,
 )
 from PySide6.QtWidgets import (
+    QApplication,
     QDockWidget,
     QFileDialog,
     QLabel,
@@ -56,6 +59,26 @@ class _Post(QObject):
     def __init__(self, parent: QObject) -> None:
         super().__init__(parent)
         self.called.connect(lambda call: call(), Qt.ConnectionType.QueuedConnection)
+
+
+class FileLabel(QLabel):
+    """The file's name and state; the sidecar can be dragged out of it, into a host for example."""
+
+    def __init__(self, session: Session) -> None:
+        super().__init__()
+        self.session = session
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Drag the sidecar out."""
+        path = self.session.path
+        if path is None or not event.buttons() & Qt.MouseButton.LeftButton:
+            return
+        self.session.save()
+        data = QMimeData()
+        data.setUrls([QUrl.fromLocalFile(str(path.absolute()))])
+        drag = QDrag(self)
+        drag.setMimeData(data)
+        drag.exec(Qt.DropAction.CopyAction)
 
 
 class Window(QMainWindow):
@@ -157,7 +180,7 @@ class Window(QMainWindow):
         self.says = QLabel()
         self.says.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.says.setMinimumWidth(100)
-        self.file_facts, self.view_facts = QLabel(), QLabel()
+        self.file_facts, self.view_facts = FileLabel(self.session), QLabel()
         bar.addWidget(self.file_facts)
         bar.addWidget(self.says, 1)
         bar.addPermanentWidget(self.view_facts)
@@ -281,10 +304,13 @@ class Window(QMainWindow):
 
     def open_path(self, path: str, clip: str | None = None) -> None:
         """Open a sidecar, a manifest, or a clip; a clip without a palette is offered to analyse."""
+        QApplication.setOverrideCursor(Qt.CursorShape.WaitCursor)
         try:
             self._open(path, clip)
         except (Palette4dError, OSError) as error:
             self.session.report(error)
+        finally:
+            QApplication.restoreOverrideCursor()
 
     def _open(self, path: str, clip: str | None) -> None:
         found = Path(path)
@@ -363,8 +389,11 @@ class Window(QMainWindow):
             self.remember(path)
 
     def do_revert(self) -> None:
-        """Load the file again."""
+        """Load the file again, and try frames again that could not be read."""
         self.session.revert()
+        if self.session.player is not None:
+            self.session.player.forget_errors()
+            self.viewer.read_frame()
 
     def do_quit(self) -> None:
         """Close the window."""
