@@ -167,3 +167,28 @@ def test_a_new_analysis_with_another_palette_gets_the_grade(tmp_path: Path) -> N
     again = Document(members("split"))
     again.save(path, on_edits="keep")
     assert (tmp_path / "clip.former2.p4d.json").exists()
+
+
+def test_picks_are_copied_and_solved_again() -> None:
+    source = Document(members("split"))
+    seen = source.palette(8).rgb.mean(axis=0).tolist()
+    source.pick(frame=8, colour=seen, by=(0.2, 0, 0), follow=False, start=4, until=10, fade=2)
+    target = Document(stretched(members("split"), 2, 100))
+    fit = target.copy_from(source)
+    (pick,) = target.picks
+    assert (pick.frame, pick.start, pick.until, pick.fade) == (116, 108, 120, 4)
+    assert pick.residual is not None
+    assert not target.settings
+    image = np.array(seen, dtype=np.float32)[None, None]
+    changed = target.recolour(image, 116)[0, 0] - image[0, 0]
+    assert changed == pytest.approx([0.2, 0, 0], abs=0.02)
+    assert target.recolour(image, 130).tobytes() == image.tobytes()
+    assert fit.mean < 0.02
+    target.unpick(pick.id)
+    assert not target.edited
+    still = Document(members("split"))
+    still.copy_from(source, time=15)
+    assert not still.picks
+    still.copy_from(source, time=8)
+    (pick,) = still.picks
+    assert (pick.start, pick.until) == (None, None)

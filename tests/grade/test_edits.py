@@ -108,11 +108,11 @@ def test_two_new_stops_of_one_id_are_two_stops() -> None:
 
 
 def test_two_new_picks_of_one_id_are_two_picks() -> None:
-    mine: State = {("pick", "p1"): {"frame": 1}}
-    theirs: State = {("pick", "p1"): {"frame": 2}}
+    mine: State = {("pick", "p1"): {"id": "p1", "frame": 1}}
+    theirs: State = {("pick", "p1"): {"id": "p1", "frame": 2}}
     assert merged({}, mine, theirs, ())[0] == {
-        ("pick", "p1"): {"frame": 2},
-        ("pick", "p2"): {"frame": 1},
+        ("pick", "p1"): {"id": "p1", "frame": 2},
+        ("pick", "p2"): {"id": "p2", "frame": 1},
     }
 
 
@@ -146,7 +146,7 @@ def test_old_steps_are_folded() -> None:
     for step in kept:
         found = step.apply(found)
     assert found == now
-    big: State = {("pick", f"p{i}"): {"text": "x" * 1000} for i in range(1000)}
+    big: State = {("pick", f"p{i}"): {"id": f"p{i}", "text": "x" * 1000} for i in range(1000)}
     kept = bounded([difference({}, {key: pick}) for key, pick in big.items()])
     assert len(json.dumps([step_to_fields(step) for step in kept[1:]])) < 300_000
     assert folded(kept).apply({}) == big

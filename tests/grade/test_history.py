@@ -287,3 +287,47 @@ def test_any_edits_can_be_undone_and_done_again(plain: Path, acts: list[Any]) ->
         undone += 1
     if not document.undone and not any(name == "undo" for name, *_ in acts):
         assert {**document.fields(), "history": None} == last
+
+
+def test_undo_beside_another_writer(plain: Path) -> None:
+    document = Document.load(plain)
+    document.set("v1", rgb=(1, 0, 0))
+    document.save()
+    mine, theirs = Document.load(plain), Document.load(plain)
+    theirs.set("v2", rgb=(0, 1, 0))
+    theirs.save()
+    mine.undo()
+    mine.set("v3", rgb=(0, 0, 1))
+    mine.save()
+    found = Document.load(plain)
+    assert set(found.settings) == {"v2", "v3"}
+    assert [step.label for step in found.history] == [
+        "set v1 to 1 0 0",
+        "set v2 to 0 1 0",
+        "undo: set v1 to 1 0 0",
+        "set v3 to 0 0 1",
+    ]
+    for _ in found.history:
+        found.undo()
+    assert not found.settings
+
+
+def test_picks_are_undone_and_merged(plain: Path) -> None:
+    first = plain.read_bytes()
+    mine, theirs = Document.load(plain), Document.load(plain)
+    seen = mine.palette(4).rgb.mean(axis=0)
+    mine.pick(frame=4, colour=seen, by=(0.1, 0, 0), follow=False)
+    mine.save()
+    theirs.pick(frame=12, colour=seen, by=(0, 0.1, 0), follow=False)
+    theirs.lock("v1")
+    theirs.save()
+    found = Document.load(plain)
+    assert [pick.id for pick in found.picks] == ["p1", "p2"]
+    assert found.locks == ("v1",)
+    assert found.fields() == theirs.fields()
+    assert all(pick.residual is not None for pick in found.picks)
+    while found.history:
+        found.undo()
+    found.forget_history()
+    found.save()
+    assert plain.read_bytes() == first

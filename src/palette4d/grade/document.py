@@ -186,7 +186,8 @@ class Document:
         """The core's view of the document, for this package."""
         if self._core is None:
             fields = self._members()
-            fields.pop("history", None)  # the core does not read it
+            for member in ("history", "colours"):  # the core needs neither
+                fields.pop(member, None)
             self._core = _core.parse_sidecar(sidecar.encoded(fields), self._name)
         return self._core
 

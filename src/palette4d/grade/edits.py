@@ -121,6 +121,14 @@ class Change:
         """The value's key in the state."""
         return self.kind, self.id
 
+    def renamed(self, names: Mapping[Key, str]) -> "Change":
+        """Return the same change with a new id; picks hold their id."""
+        id_ = names.get(self.key, self.id)
+        values = [self.before, self.after]
+        if self.kind == "pick":
+            values = [None if value is None else {**value, "id": id_} for value in values]
+        return Change(self.kind, id_, *values)
+
 
 @dataclass(frozen=True)
 class Edit:
@@ -166,9 +174,7 @@ class Edit:
 
     def renamed(self, names: Mapping[Key, str]) -> "Edit":
         """Return the same edit with new ids."""
-        return replace(
-            self, changes=tuple(replace(c, id=names.get(c.key, c.id)) for c in self.changes)
-        )
+        return replace(self, changes=tuple(change.renamed(names) for change in self.changes))
 
 
 def difference(before: State, after: State, label: str = "") -> Edit:
@@ -258,7 +264,8 @@ def merged(
             renamed[key] = new_id(change.id[0], {*taken, *used})
             if change.kind == "handle":
                 renamed["lock", change.id] = renamed[key]
-        _put(result, (change.kind, renamed.get(key, change.id)), change.after)
+        mine_renamed = change.renamed(renamed)
+        _put(result, mine_renamed.key, mine_renamed.after)
     places: dict[tuple[str, float], str] = {}
     for (kind, id_), value in result.items():
         place = _place(value) if kind == "handle" else None

@@ -936,8 +936,10 @@ class TimelineView(QWidget):
             parts += [(line, lower, seen[1])] if touched else []
             painter.setPen(Qt.PenStyle.NoPen)
             for above, below, colours in parts:
-                start = float(columns[inside[0]])
-                painter.setBrush(paint.texture(colours[edge, inside], start, float(COLUMN)))
+                # The first and last column twice: a texture begins again where it ends.
+                own = np.pad(colours[edge, inside], ((1, 1), (0, 0)), mode="edge")
+                start = float(columns[inside[0]]) - wide
+                painter.setBrush(paint.texture(own, start, float(wide)))
                 painter.drawPolygon(paint.polygon(np.concatenate([above, below[::-1]])))
             painter.setBrush(Qt.BrushStyle.NoBrush)
             chosen = palette.edge_ids[edge] in selected
