@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import time
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -511,3 +512,17 @@ def test_copy_to_the_shots_of_a_show(
     (show / "b_1.p4d.json").write_text("{}")
     assert run(str(path), f"copy {source}") == 1
     assert "1 shot of 2" in capsys.readouterr().out
+
+
+def test_resetting_many_stops_takes_linear_time(plain: str) -> None:
+    document = sidecar.load(plain)
+    count = 20_000
+    document["edits"]["stops"] = [
+        {"id": f"t{i}", "edge": "e1", "frame": 9 * (i + 1) / (count + 1), "rgb": [0.5, 0.5, 0.5]}
+        for i in range(count)
+    ]
+    sidecar.save(document, plain, on_edits="drop")
+    start = time.process_time()
+    assert main.main(["edit", plain, "reset"]) == 0
+    assert time.process_time() - start < 5  # about a second; quadratic time took 11 s
+    assert edits_of(plain)["stops"] == []

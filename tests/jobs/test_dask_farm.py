@@ -66,6 +66,16 @@ def start(*words: object) -> subprocess.Popen[str]:
     )
 
 
+def test_an_open_address_is_warned_of(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(farms, "ANSWERS_WITHIN", 0.1)
+    for address, warned in (("tcp://gone.invalid:8786", True), ("tcp://127.0.0.1:9", False)):
+        with pytest.raises(Palette4dError):
+            farms.run(address, piece, {0: 1}, lambda key, found: None)
+        assert ("has no authentication" in capsys.readouterr().err) == warned
+
+
 def busy(client: Client, made: Farm, name: str) -> bool:
     """Whether a worker has work."""
     workers = client.scheduler_info(n_workers=-1)["workers"]

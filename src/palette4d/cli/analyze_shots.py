@@ -27,7 +27,7 @@ EPILOG = """\
   palette4d analyze rushes.mov --detect-shots -o shots
   palette4d analyze edit.otio --media plates/ --handles 8 -o shots
   palette4d analyze edit.edl --rate 25 --media plates/ -o shots --only sh010,sh020
-  palette4d analyze edit.otio --media plates/ -o shots --cluster tcp://farm:8786
+  palette4d analyze edit.otio --media plates/ -o shots --cluster tls://farm:8786
 """
 
 MOST_LISTED = 40

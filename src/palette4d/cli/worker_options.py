@@ -22,5 +22,5 @@ def add_worker_options(
         metavar="ADDRESS",
         type=checked(str, check_address),
         help=f"work on the {what} on a Dask farm instead: its scheduler's address "
-        "(tcp://farm:8786)",
+        "(tls://farm:8786)",
     )

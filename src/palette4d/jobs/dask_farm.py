@@ -45,8 +45,19 @@ def check_address(text: str) -> str:
     if re.fullmatch(r"([a-z]+://)?[^/:\s]+:[0-9]+", text):
         return text
     raise Palette4dError(
-        f"found {text!r}, expected a Dask scheduler's address such as tcp://farm.example:8786"
+        f"found {text!r}, expected a Dask scheduler's address such as tls://farm.example:8786"
     )
+
+
+def is_open(address: str) -> bool:
+    """Whether others can run code through a scheduler: `tcp://` to another machine.
+
+    >>> is_open("tcp://farm:8786"), is_open("tls://farm:8786"), is_open("127.0.0.1:8786")
+    (True, False, False)
+    """
+    protocol, _, place = address.rpartition("://")
+    host = place.rpartition(":")[0]
+    return protocol in ("", "tcp") and host not in ("localhost", "127.0.0.1")
 
 
 def run(
@@ -66,7 +77,12 @@ def run(
     """
     if not tasks:
         return
-    with _connected(check_address(address)) as client:
+    if is_open(check_address(address)):
+        _say(
+            f"palette4d: warning: {address} has no authentication: whoever reaches it can run code "
+            "as you on the farm. Use tls:// with your certificates (docs/shots.md)"
+        )
+    with _connected(address) as client:
         from distributed import as_completed
 
         _check_scheduler(client, address)
@@ -162,10 +178,15 @@ def _without_log() -> Iterator[None]:
             logger.setLevel(level)
 
 
-def _check_workers(client: Any, address: str) -> None:
-    """Wait for the first worker that answers, and refuse workers with another palette4d."""
+def _say(text: str) -> None:
+    """Print a line on standard error, above a progress bar."""
     from tqdm import tqdm
 
+    tqdm.write(text, file=sys.stderr)
+
+
+def _check_workers(client: Any, address: str) -> None:
+    """Wait for the first worker that answers, and refuse workers with another palette4d."""
     started = time.monotonic()
     told = False
     while (waited := time.monotonic() - started) < WORKERS_WITHIN:
@@ -178,10 +199,9 @@ def _check_workers(client: Any, address: str) -> None:
             return
         if not told and waited >= TOLD_AFTER:
             told = True
-            tqdm.write(
+            _say(
                 f"palette4d: note: the scheduler at {address} has no worker yet; start one with "
-                f"`dask worker {address}` (waiting for {WORKERS_WITHIN - waited:.0f} more seconds)",
-                file=sys.stderr,
+                f"`dask worker {address}` (waiting for {WORKERS_WITHIN - waited:.0f} more seconds)"
             )
         time.sleep(ASKED_EVERY)
     raise Palette4dError(
