@@ -234,8 +234,7 @@ def run_change(args: argparse.Namespace) -> int:
         elif args.colour is not None:
             changes |= {"rgb": args.colour, "pixel": None, "box": None}
         if args.by is not None:
-            base = changes.get("rgb", old.rgb if old else (0.0, 0.0, 0.0))
-            changes["to"] = tuple(a + b for a, b in zip(base, args.by, strict=True))
+            changes["by"] = args.by
         if not changes:
             raise Palette4dError("found nothing to change, expected at least one option")
         found = document.change_pick(
