@@ -330,6 +330,9 @@ def _print_notes(document: Document) -> None:
     print(f"{moved} of {counted(among, 'handle')} move")
     for line in unmet(enabled, document.frames[2]):
         print(f"not met: {line}")
+    for pick in () if document.scene_linear else enabled:
+        if pick.to is not None and not all(-0.05 <= value <= 1.05 for value in pick.to):
+            print(f"note: the new colour of {pick.id} lies far outside 0..1; most files clip it")
     if not document.has_clip_colours:
         print(
             "note: this sidecar has no colours of its clip, so that only the palette's colours "

@@ -88,6 +88,8 @@ def run(
     hidden = screenshot is not None or until_shown
     if hidden:
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
+        # The platform without a screen warns that it has no window manager.
+        os.environ.setdefault("QT_LOGGING_RULES", "default.warning=false")
     elif not has_screen():
         raise Palette4dError(
             f"found no screen (DISPLAY={os.environ.get('DISPLAY', '')!r}, no WAYLAND_DISPLAY), "
