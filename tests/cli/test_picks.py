@@ -180,6 +180,13 @@ def test_conflicts_and_old_sidecars_are_told(path: str, run: Run) -> None:
     assert re.search(r"not met: p2 .*p1", out)
 
 
+def test_a_target_far_outside_is_told(run: Run) -> None:
+    words = ("--frame", "2", "--colour", "0.36,0.6,0.2", "--no-follow")
+    status, out, _ = run("pick", *words, "--to", "1.4,0.2,-0.3")
+    assert status == 0
+    assert "far outside 0..1" in out
+
+
 @pytest.mark.parametrize(
     ("words", "status", "says"),
     [
