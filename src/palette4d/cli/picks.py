@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 
     Action = Callable[[str, str, str], argparse.ArgumentParser]
 
+#: The share of the picture above which it is said what else a pick changes.
+MANY = 0.1
+
 _WHERE = "--frame T (--colour C | --pixel X,Y [--box N])"
 _WHEN = "[--from A] [--until B] [--fade N]"
 
@@ -327,7 +330,15 @@ def _print_notes(document: Document) -> None:
     if not enabled:
         return
     moved, among = document.moved_by_picks()
-    print(f"{moved} of {counted(among, 'handle')} move")
+    print(f"{moved} of {counted(among, 'palette colour')} move")
+    for frame in sorted({pick.frame for pick in enabled if pick.to is not None}):
+        share, most = document.side_effect(frame)
+        if share > MANY:
+            print(
+                f"note: at frame {frame:g} {share:.0%} of the picture change too, by more than 10 "
+                f"of 255, most {shown(most)}. A hold keeps it: hold --frame {frame:g} --colour "
+                + ",".join(f"{value:.4f}" for value in most)
+            )
     for line in unmet(enabled, document.frames[2]):
         print(f"not met: {line}")
     for pick in () if document.scene_linear else enabled:

@@ -931,14 +931,31 @@ class Document:
         return bool(self._fields.get("colours"))
 
     def moved_by_picks(self) -> tuple[int, int]:
-        """Return how many vertices picks move by more than 1/255, and how many there are."""
+        """Return how many tracks picks move by more than 1/255, and how many there are."""
         solution = self._members()["edits"].get("solution", {"vertices": [], "keys": []})
         moved = {
-            entry["vertex"]
-            for entry in solution["vertices"]
+            entry.get("vertex") or entry["edge"]
+            for entry in (*solution["vertices"], *solution["keys"])
             if max(map(abs, entry["by"])) > 1 / 255
         }
-        return len(moved), len(self._handles.vertices)
+        tracks = [{*track.vertices, *track.edges} for track in self.tracks]
+        return sum(not moved.isdisjoint(track) for track in tracks), len(tracks)
+
+    def side_effect(self, frame: float, *, least: float = 10 / 255) -> tuple[float, Colour]:
+        """Return what picks do to other colours at a frame.
+
+        Returns
+        -------
+        share : float
+            Share, 0..1, of the pixels that are not near a picked colour and change by more than
+            `least` in a channel.
+        most : tuple of float
+            The colour for which this matters most: one to hold.
+        """
+        from palette4d.grade import solve
+
+        self.check_frame(frame)
+        return solve.side_effect(self._members(), frame, least)
 
     def colour_of_pixel(
         self,

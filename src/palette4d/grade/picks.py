@@ -55,7 +55,8 @@ class Pick:
     to : 3 floats or None
         The new colour; None for a hold.
     toward : {"shift", "colour"}
-        At other frames: the same change as at `frame`, or the same new colour.
+        At other frames: the same change as at `frame`, less where the colour would leave 0..1, or
+        the same new colour.
     start, until : float or None
         First and last frame with the full change; None: the clip's first and last.
     fade : float
@@ -162,7 +163,17 @@ class Pick:
         """Return the full change that is asked for at a frame, (3,)."""
         if self.to is None:
             return np.zeros(3)
-        return np.array(self.to) - (self.colour_at(frame) if self.toward == "colour" else self.rgb)
+        new, old, colour = np.array(self.to), np.array(self.rgb), self.colour_at(frame)
+        if self.toward == "colour":
+            return new - colour
+        # The change that makes a wall blue by day would make its night black a bright blue.
+        ends = np.stack([old, new, *(np.array(key.rgb) for key in self.path)])
+        high = np.maximum(1.0, ends[:2].max(axis=0)) if ends.max() <= 1 else np.inf
+        low = np.minimum(0.0, ends.min(axis=0))
+        change: F64 = new - old
+        room = np.where(change < 0, colour - low, high - colour)
+        part = room / np.maximum(np.abs(change), 1e-9)
+        return change * min(1.0, max(0.0, float(part.min())))
 
     def knots(self, step: float) -> tuple[float, float, float, float]:
         """Return where the change begins, is full, is full for the last time, and ends.
@@ -216,13 +227,13 @@ def _cause(pick: Pick, others: Sequence[Pick], step: float) -> str:
         away, id_, frame, apart = min(rivals)
         return (
             f": at frame {frame:g} the colour of {id_} is only {away:.3f} away, and the two ask "
-            f"for changes that differ by {apart:.3f}. Move or disable one of {pick.id} and {id_}"
+            f"for changes that differ by {apart:.3f}. Change or disable one of {pick.id} and {id_}"
         )
     if pick.global_only:
-        return ": the palette alone cannot express it. Leave out global_only=True"
+        return ": the palette alone cannot express it; its neighbourhood is left out"
     if pick.to is not None and any(not -0.05 <= value <= 1.05 for value in pick.to):
         return ": its new colour lies far outside 0..1"
-    return ": the colour's surroundings or locked handles stand in its way"
+    return ": picks and holds nearby, or locked handles, stand in its way"
 
 
 def _together(a: Pick, b: Pick, step: float) -> list[float]:

@@ -34,6 +34,7 @@ from numpy.typing import NDArray
 
 from palette4d import _core
 from palette4d.grade import sidecar
+from palette4d.grade.edits import Colour, as_colour
 from palette4d.grade.picks import MOST_PICKS, Pick, all_picks
 from palette4d.grade.sidecar import Fields
 
@@ -71,6 +72,8 @@ TIKHONOV = 0.1
 STEP, MOST_TIMES = 4, 40
 # Keys that a straight line between their neighbours meets within this are left out.
 STRAIGHT = 4e-4
+# A colour that is guarded by at least this is none of those that the user wants to change.
+OTHER = 0.5
 # Displacements below this (a quarter of an 8-bit step) are none.
 NONE = 1e-3
 # Stored numbers are rounded, so that the last bits of a LAPACK never show.
@@ -99,6 +102,37 @@ def solve(fields: Mapping[str, Any]) -> tuple[Fields, dict[str, Fields]]:
     solved = [problem.at(time) for time in problem.times]
     solution = problem.solution(solved)
     return solution, _measured(fields, solution, enabled, problem.times)
+
+
+def side_effect(fields: Mapping[str, Any], frame: float, least: float) -> tuple[float, Colour]:
+    """Return what the picks' solution does to other colours of the clip at a frame.
+
+    Returns
+    -------
+    share : float
+        Share, 0..1, of the pixels that are not near a picked colour and change by more than
+        `least` in a channel.
+    most : 3 floats
+        The colour for which this matters most; its share of the pixels counts.
+    """
+    clip = _ClipAtTimes(fields)
+    both = _parsed(fields, fields["edits"].get("solution", {}))
+    cut = _core.slice_at(clip.polytope, frame)
+    solved = _core.edited_colours(clip.polytope, both.edits, cut)
+    user = _core.edited_colours(clip.polytope, clip.core.edits, cut)
+    guarded = clip.guarded(cut.rgb, cut.faces, frame)
+    rgb, shares = guarded[:, :3], guarded[:, 3]
+    bumps = both.bumps_at(frame)
+    changes = _core.palette_weights(rgb, cut.rgb, cut.faces)[0] @ (solved - user)
+    changes += _bump(rgb, bumps[:, :3], bumps[:, 3]) @ bumps[:, 4:]
+    size = np.abs(changes).max(axis=1)
+    picks = [p for p in all_picks(fields["edits"]) if p.enabled and p.to is not None]
+    centres = np.array([pick.colour_at(frame) for pick in picks]).reshape(-1, 3)
+    reach = np.array([np.linalg.norm(pick.change_at(frame)) for pick in picks])
+    other = _far(rgb, centres, reach, np.ones(len(picks))) > OTHER
+    share = float(shares[other & (size > least)].sum() / max(float(shares.sum()), 1e-9))
+    worst = int(np.argmax(np.where(other, size * np.sqrt(shares), 0.0)))
+    return share, as_colour(rgb[worst])
 
 
 class _ClipAtTimes:
@@ -165,10 +199,7 @@ class _Problem:
 
     def __init__(self, clip: _ClipAtTimes, picks: Sequence[Pick]) -> None:
         self.clip, self.picks = clip, picks
-        self.reach = np.array([np.linalg.norm(pick.change_at(pick.frame)) for pick in picks])
-        self.radii = np.array(
-            [_radius(p, reach) for p, reach in zip(picks, self.reach, strict=True)]
-        )
+        self.radii = np.array([_radius(pick) for pick in picks])
         #: Frames where the effect of a pick begins or ends: nothing may pass them.
         self.borders = sorted(
             {
@@ -205,7 +236,8 @@ class _Problem:
         most = strengths[active].max()
         share = strengths[active] / most
         picks = [self.picks[i] for i in active.tolist()]
-        radii, reach = self.radii[active], self.reach[active]
+        radii = self.radii[active]
+        reach = np.array([np.linalg.norm(pick.change_at(time)) for pick in picks])
         centres = np.array([pick.colour_at(time) for pick in picks])
         cut = _core.slice_at(clip.polytope, time)
         edited = _core.edited_colours(clip.polytope, clip.core.edits, cut)
@@ -328,10 +360,12 @@ class _Problem:
         return bumps
 
 
-def _radius(pick: Pick, reach: float) -> float:
+def _radius(pick: Pick) -> float:
     if pick.radius is not None:
         return pick.radius
-    return HOLD_RADIUS if pick.to is None else RADIUS_0 + RADIUS_1 * min(float(reach), 1.0)
+    if pick.to is None:
+        return HOLD_RADIUS
+    return RADIUS_0 + RADIUS_1 * min(float(np.linalg.norm(pick.change_at(pick.frame))), 1.0)
 
 
 def _bump(colours: F64, centres: F64, radii: F64) -> F64:
