@@ -39,7 +39,9 @@ def clip_colours(frames: Sequence[FrameStatistics]) -> list[dict[str, Any]]:
     return [
         {
             "frame": frames[centre].frame,
-            "rgbw": _reduced([frames[i] for i in np.flatnonzero(nearest == part)], gamut),
+            "rgbw": _reduced(
+                [one for one, p in zip(frames, nearest, strict=True) if p == part], gamut
+            ),
         }
         for part, centre in enumerate(at.tolist())
     ]
@@ -49,7 +51,8 @@ def _reduced(frames: Sequence[FrameStatistics], gamut: Gamut) -> list[list[float
     rgb = np.concatenate([one.coarse.rgb for one in frames])
     shares = np.concatenate([one.coarse.counts / one.coarse.total for one in frames]) / len(frames)
     cells = np.floor((rgb - gamut.low) * (CELLS / gamut.scale)).astype(np.int64)
-    rgb, shares = _grouped(rgb, shares, cells @ [(CELLS + 1) ** 2, CELLS + 1, 1])
+    keys = cells @ np.array([(CELLS + 1) ** 2, CELLS + 1, 1], np.int64)
+    rgb, shares = _grouped(rgb, shares, keys)
     chosen = [int(shares.argmax())]
     distance = np.linalg.norm(rgb - rgb[chosen[0]], axis=1)
     worth = np.maximum(shares, LEAST_SHARE) ** ROOT
@@ -67,4 +70,4 @@ def _grouped(rgb: F64, shares: F64, keys: NDArray[np.int64]) -> tuple[F64, F64]:
     _, group = np.unique(keys, return_inverse=True)
     total = np.bincount(group, shares)
     means = [np.bincount(group, shares * rgb[:, channel]) / total for channel in range(3)]
-    return np.column_stack(means), total
+    return np.column_stack(means), np.asarray(total, np.float64)

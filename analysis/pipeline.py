@@ -47,17 +47,6 @@ from palette4d.media.array_clip import ArrayClip
 from palette4d.media.clip_base import Clip, describe, even_step
 from palette4d.media.colour_space import SpaceOptions
 
-#: The stages that report their progress, in order.
-STAGES = (
-    "colour_statistics",
-    "static_hull",
-    "rgbt_hull",
-    "frame_hulls",
-    "glue",
-    "block_merging",
-    "vertex_removal",
-    "vertex_refinement",
-)
 # A palette has at least this many colours, whatever `vertices` is.
 LEAST_COLOURS = 4
 # The factor of `convexity` in a second search, after a non-convex first result.

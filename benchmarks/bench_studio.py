@@ -193,7 +193,9 @@ class Bench:
             frame = self.session.frame
             start = time.perf_counter()
             self.session.drag(
-                lambda document, f=frame, c=colour, q=to: document.pick(f, colour=c, to=q)
+                lambda document, f=frame, c=colour, q=to: document.pick(
+                    f, colour=c, to=q, follow=False
+                )
             )
             self.wait(self.current)
             viewer.repaint()
@@ -256,9 +258,16 @@ def cold(path: Path, clip: str) -> float:
     return time.perf_counter() - start
 
 
-def memory() -> float:
-    """Return the most memory that was used so far, in bytes."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024.0
+def show_memory(app: QApplication, sidecar: Path, size: tuple[int, int]) -> None:
+    """Play a clip twice, and print the most memory that was used."""
+    bench = Bench(app, sidecar, None, size)
+    passes = bench.playback()
+    used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+    verdict = "goal" if used <= 1.5 else "bar" if used <= 2 else "MISSED"
+    first, last, _ = bench.session.frames
+    print(f"{last - first + 1} frames, shown and dropped: {[each[:2] for each in passes]}")
+    print(f"{'memory':<42} {used:7.2f} GB   2 / 1.5 GB   {verdict}", flush=True)
+    bench.close()
 
 
 def main() -> None:
@@ -270,21 +279,25 @@ def main() -> None:
     parser.add_argument("--size", default="1400x1000")
     parser.add_argument("--hd", type=Path, default=Path("build/bench_hd.mov"))
     parser.add_argument("--long", type=Path, default=Path("build/bench_long.mp4"))
+    parser.add_argument("--memory", action="store_true", help="only play CLIP, and show the memory")
     args = parser.parse_args()
+    size = tuple(map(int, args.size.split("x")))
+    app = QApplication.instance() or QApplication([])
+    assert isinstance(app, QApplication)
+    theme.dress(app)
+    if args.memory:
+        show_memory(app, args.sidecar, size)
+        return
     for path, count in ((args.hd, 120), (args.long, 800)):
         if not path.exists():
             print(f"making {path}", flush=True)
             path.parent.mkdir(parents=True, exist_ok=True)
             make_movie(args.clip, path, count)
-    size = tuple(map(int, args.size.split("x")))
     folder = Path(tempfile.mkdtemp(prefix="palette4d-bench-"))
     small = folder / "small.p4d.json"
     small.write_bytes(args.sidecar.read_bytes())
     hd = stretched(args.sidecar, str(args.hd), folder / "hd.p4d.json")
     long = stretched(args.sidecar, str(args.long), folder / "long.p4d.json")
-    app = QApplication.instance() or QApplication([])
-    assert isinstance(app, QApplication)
-    theme.dress(app)
     print(f"{'action':<42} {'95 % (median)':>20}   bar / goal")
     show("first window, cold", [cold(small, args.clip) for _ in range(3)], 3000, 2000)
     bench = Bench(app, small, args.clip, (1290, size[1]))
@@ -312,13 +325,9 @@ def main() -> None:
             f"   {verdict}"
         )
     bench.close()
-    bench = Bench(app, long, None, size)
-    passes = bench.playback()
-    print(f"800 frames: {passes}")
-    used = memory() / 2**30
-    verdict = "goal" if used <= 1.5 else "bar" if used <= 2 else "MISSED"
-    print(f"{'memory, 800 frames of 1080p':<42} {used:7.2f} GB   2 / 1.5 GB   {verdict}")
-    bench.close()
+    # In a process of its own: memory that was used once is not always given back.
+    words = [sys.executable, __file__, str(long), str(args.long), "--size", args.size]
+    subprocess.run([*words, "--memory"], check=True)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,5 @@
 
     sidecar -> frame_edit -> shaper, lut3d (or cdl) -> formats, writers -> file -> bake_error
 
-`bake` writes one file, `series` many frames, `config` the shots of a show. Sidecars are read
-through `palette4d._core` only.
+`bake` writes one file, `series` many frames, `config` the shots of a show.
 """

@@ -1,7 +1,6 @@
 """The edit of a sidecar at one time, as a function of colours.
 
-In `lut_export`, only this module calls the core. Sampling, fitting and measuring take a
-`FrameEdit`.
+Sampling, fitting and measuring take a `FrameEdit`; they know no sidecar.
 """
 
 from dataclasses import dataclass

@@ -149,13 +149,10 @@ def demo(out: Path) -> None:
     before_after(clip, graded, sheet)
     window = ""
     if importlib.util.find_spec("PySide6") is not None:
-        run(
-            "The window, drawn without a screen",
-            *("studio", str(sidecar), "--frame", str(GOLD), "--screenshot", str(studio)),
-        )
-        window = f"""
-  {studio}
-        the window with the sidecar"""
+        words = ["studio", str(sidecar), "--frame", str(GOLD), "--screenshot", str(studio)]
+        say(f"\n== The window, drawn without a screen\n$ {shlex.join([shown(COMMAND), *words])}")
+        if subprocess.run([COMMAND, *words], check=False).returncode == 0:
+            window = f"\n  {studio}\n        the window with the sidecar"
 
     command = shown(COMMAND)
     say(f"""

@@ -166,9 +166,13 @@ void report(const Suites& suites, OfxImageEffectHandle effect, const std::string
         if (!problem.empty()) show(suites, effect, problem, true);
         return;
     }
-    const std::lock_guard<std::mutex> lock(instance->mutex);
-    const bool is_new = instance->message != problem;
-    instance->message = problem;
+    bool is_new = false;
+    {
+        const std::lock_guard<std::mutex> lock(instance->mutex);
+        is_new = instance->message != problem;
+        instance->message = problem;
+    }
+    // Not under the lock: a host may wait for its main thread, which may be in the node.
     if (!problem.empty()) {
         show(suites, effect, problem, is_new);
     } else if (is_new && suites.message2 && suites.message2->clearPersistentMessage) {

@@ -72,20 +72,20 @@ constexpr const char* kProject = "[Project]/";
 /// that prefix where the whole is no file and the rest is one of our forms.
 std::string without_project(const std::string& path) {
     std::error_code error;
-    const fs::path whole = fs::u8path(path);
-    if (whole.is_relative() || fs::exists(whole, error)) return path;
-    std::string name;
+    if (fs::u8path(path).is_relative() || fs::exists(fs::u8path(expanded(path)), error)) {
+        return path;
+    }
     for (std::size_t at = path.find('/', 1); at != std::string::npos; at = path.find('/', at + 1)) {
         const std::string rest = path.substr(at + 1);
         const auto starts = [&](const char* with) { return rest.rfind(with, 0) == 0; };
         // Natron's own variable, chosen before the project had a folder.
         if (starts(kProject)) return path.substr(0, at + 1) + rest.substr(std::strlen(kProject));
-        name.clear();
-        if (starts("$") || starts("%")) variable_at(rest, 0, name);
-        if (!name.empty() || rest == "~" || starts("~/") || starts("file:/") || starts("\"") ||
-            starts("'")) {
-            return rest;
-        }
+        const bool quoted = (starts("\"") || starts("'")) && rest.size() > 1 &&
+                            rest.find(rest[0], 1) == rest.size() - 1;
+        // A variable further inside a path of the user's own is a folder's name.
+        const bool variable =
+            (starts("$") || starts("%")) && fs::u8path(expanded(rest)).is_absolute();
+        if (variable || rest == "~" || starts("~/") || starts("file:/") || quoted) return rest;
     }
     return path;
 }

@@ -100,6 +100,21 @@ TEST(files_are_found_where_they_are_and_where_they_went) {
     CHECK(find_file("/old/b.p4d.json", "") == deep);
 }
 
+TEST(a_variable_inside_a_path_names_a_folder) {
+    const std::string file = sidecar();
+    const Variable shot("P4D_SHOT", "sh01"), search("PALETTE4D_PATH", in_folder("decoy"));
+    for (const char* name : {"sh01", "decoy"}) {
+        fs::create_directories(folder() / name);
+        fs::copy_file(file, folder() / name / "g.p4d.json", fs::copy_options::overwrite_existing);
+    }
+    fs::copy_file(file, folder() / "sh01" / "h.p4d.json", fs::copy_options::overwrite_existing);
+    CHECK(find_file(in_folder("$P4D_SHOT/g.p4d.json"), "") == in_folder("sh01/g.p4d.json"));
+    CHECK(find_file("h.p4d.json", in_folder("$P4D_SHOT")) == in_folder("sh01/h.p4d.json"));
+    CHECK(palette4d::node::meant(in_folder("$P4D_SHOT/none.json")) ==
+          in_folder("$P4D_SHOT/none.json"));
+    CHECK(palette4d::node::meant(in_folder("'gone'/none.json")) == in_folder("'gone'/none.json"));
+}
+
 TEST(the_folder_of_a_clip) {
     fs::create_directories(folder() / "frames");
     const std::string path = in_folder("s.p4d.json");

@@ -158,3 +158,22 @@ def test_versions_are_kept_and_used(qtbot: Any, opened: Window) -> None:
     assert session.document.colour(id_) == before
     assert versions.buttons["A"].isChecked()
     assert not versions.buttons["B"].isChecked()
+
+
+def test_the_menu_of_a_range_changes_the_pick(qtbot: Any, opened: Window) -> None:
+    pick(qtbot, opened, 40, 30)
+    timeline = opened.timeline
+    place = QPointF(timeline.x_of(6.5), timeline._lane_y(0))
+
+    def choose(text: str) -> None:
+        menu = timeline.menu_for(timeline.hit(place), place.x())
+        entries = [*menu.actions()]
+        entries += [e for a in menu.actions() if a.menu() is not None for e in a.menu().actions()]
+        next(entry for entry in entries if text in entry.text()).trigger()
+
+    choose("palette alone")
+    qtbot.waitUntil(lambda: picks(opened)[0].global_only, timeout=20_000)
+    choose("5 frames")
+    qtbot.waitUntil(lambda: picks(opened)[0].fade == 5, timeout=20_000)
+    choose("same new colour")
+    qtbot.waitUntil(lambda: picks(opened)[0].toward == "colour", timeout=20_000)

@@ -283,3 +283,23 @@ def test_every_kind_of_palette_is_drawn(qapp: QApplication, tmp_path: Path, name
     session.close()
     for view in views:
         view.deleteLater()
+
+
+def test_bands_show_the_cores_colours_also_while_something_is_dragged(view: TimelineView) -> None:
+    document = view.session.document
+    assert document is not None
+    view.session.go(20)
+    for dragged in (False, True):
+        if dragged:
+            view.session.drag(lambda d: d.set("v1", rgb=(0.3, 0.2, 0.4)))
+        content = view._content
+        assert content is not None
+        for edge, frame in (("e3", 3), ("e7", 17), ("e1", 6), ("e4", 4)):
+            index = content.edge_ids.index(edge)
+            at = on_band(view, edge, frame)
+            # Near the upper rim is the colour before, near the lower rim the colour after.
+            half = round(timeline_view.BAND * view.timeline[0].row_height) - 2  # type: ignore[index]
+            for offset, edited in ((-half, False), (half, content.touched(index))):
+                wanted = content.colours(index, np.array([float(frame)]), edited=edited)[0]
+                found = seen(view, at + QPoint(0, offset))
+                assert np.abs(found - np.clip(wanted, 0, 1) * 255).max() <= 9, (edge, edited)

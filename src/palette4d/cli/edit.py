@@ -15,7 +15,6 @@ from palette4d.common.errors import Palette4dError
 
 if TYPE_CHECKING:
     from palette4d.grade.document import Document, How
-    from palette4d.grade.edits import State
 
 #: The words of `palette4d.grade.edits.RAMPS`, which would be slow to import for the help.
 RAMPS = ("linear", "smooth", "hold")
@@ -254,7 +253,7 @@ def run_set(args: argparse.Namespace) -> int:
     if args.frame is None:
         raise Palette4dError("found --near without --frame, expected the frame where it is seen")
     document = _load(args)
-    before = document.state
+    before = _without_picks(document)
     found = document.set_near(
         args.near, frame=args.frame, anyway=args.anyway, any_value=args.float, **_how(args)
     )
@@ -275,7 +274,7 @@ def run_set(args: argparse.Namespace) -> int:
 def run_adjust(args: argparse.Namespace) -> int:
     """Change a handle, a track or the palette."""
     document = _load(args)
-    before = document.state
+    before = _without_picks(document)
     document.adjust(args.id, track=args.track, frame=args.frame, any_value=args.float, **_how(args))
     document.save()
     _report(document, before)
@@ -311,10 +310,13 @@ def run_ramp(args: argparse.Namespace) -> int:
     return 0
 
 
-def _report(document: Document, before: State) -> None:
+def _without_picks(document: Document) -> Document:
+    """Return the document as it is now, with the user's own colours only."""
+    return document.at({k: value for k, value in document.state.items() if k[0] != "pick"})
+
+
+def _report(document: Document, old: Document) -> None:
     """Print the handles that have changed, with their colours before and after."""
-    # The colours are the user's own; the solution of picks comes on top.
-    old = document.at({key: value for key, value in before.items() if key[0] != "pick"})
     changed = [
         id_
         for id_ in {**old.settings, **document.settings}
@@ -335,7 +337,7 @@ def _report(document: Document, before: State) -> None:
     if len(changed) > MOST_LINES:
         print(f"and {len(changed) - MOST_LINES} more handles")
     if not changed:
-        print("nothing to reset" if document.state == before else "done")
+        print("done")
 
 
 def run_move(args: argparse.Namespace) -> int:
@@ -360,10 +362,13 @@ def run_move(args: argparse.Namespace) -> int:
 def run_reset(args: argparse.Namespace) -> int:
     """Reset a vertex, remove a stop, or reset everything."""
     document = _load(args)
-    before = document.state
+    state, before = document.state, _without_picks(document)
     document.reset(args.id)
     document.save()
-    _report(document, before)
+    if document.state == state:
+        print("nothing to reset")
+    else:
+        _report(document, before)
     return 0
 
 

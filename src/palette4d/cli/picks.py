@@ -234,8 +234,7 @@ def run_change(args: argparse.Namespace) -> int:
         elif args.colour is not None:
             changes |= {"rgb": args.colour, "pixel": None, "box": None}
         if args.by is not None:
-            base = changes.get("rgb", old.rgb if old else (0.0, 0.0, 0.0))
-            changes["to"] = tuple(a + b for a, b in zip(base, args.by, strict=True))
+            changes["by"] = args.by
         if not changes:
             raise Palette4dError("found nothing to change, expected at least one option")
         found = document.change_pick(
@@ -331,6 +330,9 @@ def _print_notes(document: Document) -> None:
     print(f"{moved} of {counted(among, 'handle')} move")
     for line in unmet(enabled, document.frames[2]):
         print(f"not met: {line}")
+    for pick in () if document.scene_linear else enabled:
+        if pick.to is not None and not all(-0.05 <= value <= 1.05 for value in pick.to):
+            print(f"note: the new colour of {pick.id} lies far outside 0..1; most files clip it")
     if not document.has_clip_colours:
         print(
             "note: this sidecar has no colours of its clip, so that only the palette's colours "

@@ -38,8 +38,8 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     add("--clip", metavar="CLIP", help="the sidecar's clip (default: where the sidecar says)")
     add("--frame", metavar="T", type=number(), help="go to this frame")
     add("--screenshot", metavar="OUT.png", type=Path, help="draw the window into a file, and end")
-    size = "the window's size in pixels (default 1600x1000)"
-    add("--size", metavar="WxH", type=_size, default=(1600, 1000), help=size)
+    size = "the window's size in pixels (default: as it was left, 1600x1000 at first)"
+    add("--size", metavar="WxH", type=_size, help=size)
     parser.set_defaults(run=run)
 
 

@@ -186,7 +186,8 @@ class Document:
         """The core's view of the document, for this package."""
         if self._core is None:
             fields = self._members()
-            fields.pop("history", None)  # the core does not read it
+            for member in ("history", "colours"):  # the core needs neither
+                fields.pop(member, None)
             self._core = _core.parse_sidecar(sidecar.encoded(fields), self._name)
         return self._core
 
@@ -866,6 +867,7 @@ class Document:
         self,
         id: str,
         *,
+        by: Iterable[float] | None = None,
         any_value: bool = False,
         clip: str | os.PathLike[str] | None = None,
         progress: Callable[[int, int], object] | None = None,
@@ -873,9 +875,13 @@ class Document:
     ) -> Pick:
         """Change a pick or hold: any of the attributes of `Pick` but id, kind and path.
 
-        A new `frame`, `rgb` or range is followed again, if the pick was followed.
+        `by` gives the new colour as offsets from the picked colour. A new `frame`, `rgb` or range
+        is followed again, if the pick was followed.
         """
         old = self._pick(id)
+        if by is not None:
+            base = as_colour(changes.get("rgb", old.rgb))
+            changes["to"] = [a + b for a, b in zip(base, as_colour(by, "offset"), strict=True)]
         for name in ("rgb", "to"):
             if name in changes:
                 changes[name] = self._checked(changes[name], any_value)
@@ -1104,8 +1110,10 @@ class Document:
     def at(self, state: State) -> "Document":
         """Return a document with another state of the user's edits, not bound to the file."""
         found = copy.copy(self)
-        found._become(state)
-        found._disk, found._core, found._solved = None, None, None
+        found._disk = None
+        if state != self._state:
+            found._become(state)
+            found._core, found._solved = None, None
         found.forget_history()
         return found
 

@@ -243,15 +243,15 @@ def check_range(pick: Pick, frames: tuple[int, int, int]) -> None:
     first, last, _ = frames
     start = first if pick.start is None else pick.start
     until = last if pick.until is None else pick.until
-    if not start <= until:
-        raise Palette4dError(
-            f"found the range from frame {start:g} until {until:g}, expected a first frame that is "
-            "not after the last one"
-        )
     if start > last or until < first:
         raise Palette4dError(
             f"the range from frame {start:g} until {until:g} lies outside the clip; choose frames "
             f"from {first} to {last}"
+        )
+    if not start <= until:
+        raise Palette4dError(
+            f"found the range from frame {start:g} until {until:g}, expected a first frame that is "
+            "not after the last one"
         )
     if not 0 <= pick.fade <= 1e9:
         raise Palette4dError(f"found a fade of {pick.fade:g} frames, expected 0 or more")

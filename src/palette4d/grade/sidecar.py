@@ -380,6 +380,8 @@ def write(
 
 def _canonical(value: Any, where: str) -> Any:
     """Return plain JSON values, with the file's member order and number formats."""
+    if where == "/history" or type(value) is str:
+        return value  # steps are plain values in their order already, and many
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, Mapping):

@@ -48,11 +48,14 @@ GUARD, LEAST_GUARDED = 3.0, 0.2
 LEAST_SHARE = 5e-4
 # A guarded colour that would change by more than LARGE times the largest change that is asked for
 # counts as if it had up to this share of the picture: few pixels must not overshoot either.
-OVERSHOOT, LARGE = 0.02, 1.1
+OVERSHOOT, LARGE = 0.03, 1.1
 # The guard is off within NEAR_0 + NEAR_1 |change| of a pick, and full at NEAR_END times that.
 NEAR_0, NEAR_1, NEAR_END = 0.03, 0.3, 5.0
 # The radius of a pick's bump is RADIUS_0 + RADIUS_1 |change|; that of a hold's is HOLD_RADIUS.
-RADIUS_0, RADIUS_1, HOLD_RADIUS = 0.08, 0.9, 0.16
+RADIUS_0, RADIUS_1, HOLD_RADIUS = 0.08, 0.8, 0.16
+# Cost of a slope: of a displacement that changes along an edge of the palette by as much as the
+# colour. Near greys, where colours are close together, the palette would tear them apart.
+SLOPE = 2.5e-4
 # Costs of a palette colour's displacement and of a bump, beside the weights above.
 RIDGE, BUMP = 1e-4, 0.3
 # Reweighting: rounds, and the sizes, as shares of the largest change, below which a palette
@@ -223,13 +226,14 @@ class _Problem:
                 _bump(guarded[:, :3], centres, radii) * local,
             ]
         )
+        slopes = _gathered(_slopes(cut.rgb, cut.faces), places) * free
         moving = np.array([pick.to is not None for pick in picks])
         guard = np.maximum(guarded[:, 3], LEAST_SHARE)
         far = _far(guarded[:, :3], centres[moving], reach[moving], share[moving])
         unit = GUARD / max(float(guard @ far), LEAST_GUARDED * float(guard.sum()))
         count = len(free)
         found = _least_squares(
-            rows, share, wanted, guard_rows, (unit * far * guard, unit * far), count, scale
+            rows, share, wanted, guard_rows, (unit * far * guard, unit * far), slopes, scale
         )
         moves = found[:count] * free[:, None]
         sizes = found[count:] * local[:, None]
@@ -348,6 +352,17 @@ def _far(colours: F64, centres: F64, reach: F64, share: F64) -> F64:
     return far
 
 
+def _slopes(palette: F64, faces: NDArray[np.int32]) -> F64:
+    """Return the rows (edges, palette colours) of how steeply displacements change along edges."""
+    edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    lengths = np.linalg.norm(palette[edges[:, 0]] - palette[edges[:, 1]], axis=1)
+    rows = np.zeros((len(edges), len(palette)))
+    each = np.arange(len(edges))
+    rows[each, edges[:, 0]] = 1 / np.maximum(lengths, NONE)
+    rows[each, edges[:, 1]] = -1 / np.maximum(lengths, NONE)
+    return rows
+
+
 def _gathered(weights: F64, places: Sequence[tuple[str, int]]) -> F64:
     """Return weights (n, palette colours) as weights of the distinct places, in order."""
     order = {place: at for at, place in enumerate(dict.fromkeys(places))}
@@ -365,14 +380,16 @@ def _least_squares(
     wanted: F64,
     guard_rows: F64,
     guard: tuple[F64, F64],
-    moves: int,
+    slopes: F64,
     scale: float,
 ) -> F64:
-    """Return the displacements of the first `moves` columns and the sizes of the others, (n, 3).
+    """Return the displacements of the palette colours, then the sizes of the bumps, (n, 3).
 
     `guard` has each guarded colour's weight, and its weight if it were the whole picture.
     """
+    moves = slopes.shape[1]
     picked = rows.T @ (pick[:, None] * rows)
+    picked[:moves, :moves] += SLOPE * slopes.T @ slopes
     target = rows.T @ (pick[:, None] * wanted)
     weights, whole = guard
     cost = np.full(rows.shape[1], BUMP)

@@ -141,7 +141,7 @@ GESTURES = (
     ("timeline", "double-click a disc", "go to its frame"),
     ("timeline", "drag a stop", "move it to another frame; with Alt between frames"),
     ("timeline", "drag an end of a pick's range", "change when the pick acts"),
-    ("timeline", "right-click", "the menu of what is there"),
+    ("timeline", "right-click", "the menu of what is there: ramps, locks, fades, …"),
     ("timeline", "click or drag in the ruler or the strip", "move the playhead"),
     ("timeline", "wheel over the ruler, Ctrl-wheel", "zoom at the pointer"),
     ("timeline", "Shift-wheel, middle button", "pan"),

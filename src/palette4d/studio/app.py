@@ -1,7 +1,10 @@
 """Starting the window, with or without a screen."""
 
+import contextlib
 import functools
 import os
+import re
+import socket
 import sys
 import time
 import traceback
@@ -9,16 +12,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from palette4d.common.errors import Palette4dError, WriteError
+from palette4d.common.files import replacing
 from palette4d.studio import texts
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from PySide6.QtGui import QPixmap
     from PySide6.QtWidgets import QApplication
 
     from palette4d.studio.session import Session
     from palette4d.studio.window import Window
 
+#: The size of a window that was never opened before.
+USUAL_SIZE = (1600, 1000)
 #: Seconds after which a screenshot is taken even if something is still being computed.
 LONGEST_WAIT = 60.0
 
@@ -27,7 +34,26 @@ def has_screen() -> bool:
     """Whether there is a screen to open a window on."""
     if os.environ.get("QT_QPA_PLATFORM") or not sys.platform.startswith("linux"):
         return True
-    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+    if os.environ.get("WAYLAND_DISPLAY"):
+        return True
+    return answers(os.environ.get("DISPLAY", ""))
+
+
+def answers(display: str) -> bool:
+    """Whether an X server answers at a display such as ":0" or "host:10.0"; Qt aborts without."""
+    match = re.fullmatch(r"(?:unix)?([^:]*):(\d+)(?:\.\d+)?", display)
+    if match is None:
+        return False
+    host, number = match[1], int(match[2])
+    path = f"/tmp/.X11-unix/X{number}"
+    places: list[Any] = [(host, 6000 + number)] if host else [path, f"\0{path}"]
+    kind = socket.AF_INET if host else socket.AF_UNIX
+    for place in places:
+        with contextlib.suppress(OSError), socket.socket(kind) as found:
+            found.settimeout(2)
+            found.connect(place)
+            return True
+    return False
 
 
 def run(
@@ -36,7 +62,7 @@ def run(
     clip: str | None = None,
     frame: float | None = None,
     screenshot: Path | None = None,
-    size: tuple[int, int] = (1600, 1000),
+    size: tuple[int, int] | None = None,
     until_shown: bool = False,
     prepare: "Callable[[Window], object] | None" = None,
 ) -> int:
@@ -52,8 +78,8 @@ def run(
         The frame to go to.
     screenshot : Path, optional
         Draw the window into this file and return; needs no screen.
-    size : (int, int)
-        The window's size in pixels.
+    size : (int, int), optional
+        The window's size in pixels; default: as it was left.
     until_shown : bool
         Return when the first picture is drawn, without a screen: for benchmarks.
     prepare : callable, optional
@@ -62,13 +88,15 @@ def run(
     hidden = screenshot is not None or until_shown
     if hidden:
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
+        # The platform without a screen warns that it has no window manager.
+        os.environ.setdefault("QT_LOGGING_RULES", "default.warning=false")
     elif not has_screen():
         raise Palette4dError(
-            "found no screen ($DISPLAY and $WAYLAND_DISPLAY are empty), expected one for the "
-            "window. `palette4d studio PATH --screenshot OUT.png` draws it without a screen; for "
-            "the window itself use a remote screen (ssh -X, VNC)"
+            f"found no screen (DISPLAY={os.environ.get('DISPLAY', '')!r}, no WAYLAND_DISPLAY), "
+            "expected one for the window. `palette4d studio PATH --screenshot OUT.png` draws it "
+            "without a screen; for the window itself use a remote screen (ssh -X, VNC)"
         )
-    from PySide6.QtCore import QSettings, Qt
+    from PySide6.QtCore import QByteArray, QSettings, Qt
     from PySide6.QtWidgets import QApplication
 
     from palette4d.studio import theme
@@ -88,8 +116,14 @@ def run(
     if hidden:  # a picture does not depend on who draws it
         settings = QSettings(os.devnull, QSettings.Format.IniFormat)
     window = Window(session, settings)
-    window.resize(*size)
+    kept = settings.value("geometry") if size is None else None
+    window.resize(*(size or USUAL_SIZE))
     window.arrange()
+    if isinstance(kept, QByteArray):
+        window.restoreGeometry(kept)
+        state = settings.value("state")
+        if isinstance(state, QByteArray):
+            window.restoreState(state)
     if path is not None:
         window.open_path(path, clip)
     if frame is not None:
@@ -102,12 +136,27 @@ def run(
         if prepare is not None:
             prepare(window)
             wait_until_shown(app, window)
-        saved = screenshot is None or window.grab().save(str(screenshot))
+        picture = window.grab()
         window.shut()
-        if not saved:
-            raise WriteError(f"{screenshot}: cannot be written; expected a folder that exists")
+        if screenshot is not None:
+            save(picture, screenshot)
         return 0
     return int(app.exec())
+
+
+def save(picture: "QPixmap", path: Path) -> None:
+    """Write a picture of the window; a file that is there is replaced.
+
+    Raises
+    ------
+    Palette4dError
+        It cannot be written.
+    """
+    if path.suffix.lower() not in (".png", ".jpg"):
+        raise Palette4dError(f"{path}: found another extension, expected .png or .jpg")
+    with replacing(path, force=True) as temporary:
+        if not picture.save(str(temporary)):
+            raise WriteError(f"{path}: cannot be written; choose another folder")
 
 
 def _unexpected(

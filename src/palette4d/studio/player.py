@@ -24,9 +24,9 @@ F32 = NDArray[np.float32]
 F16 = NDArray[np.float16]
 
 #: Bytes of whole frames that are kept; one frame is kept whatever its size.
-CACHE_BYTES = 300 << 20
+CACHE_BYTES = 250 << 20
 #: Bytes of scaled frames that are kept.
-SMALL_BYTES = 300 << 20
+SMALL_BYTES = 200 << 20
 
 K = TypeVar("K", bound=Hashable)
 V = TypeVar("V")

@@ -27,7 +27,7 @@ F32 = NDArray[np.float32]
 U8 = NDArray[np.uint8]
 
 #: Bytes of scaled frames, of pictures before the edits, and of pictures to play, that are kept.
-SMALL_BYTES, BEFORE_BYTES, REEL_BYTES = 100 << 20, 50 << 20, 400 << 20
+SMALL_BYTES, BEFORE_BYTES, REEL_BYTES = 80 << 20, 40 << 20, 320 << 20
 #: Pixels that are recoloured between two looks for a newer request.
 STRIP = 300_000
 #: Pixels in which colours outside of the palette are looked for.

@@ -53,5 +53,6 @@ def _painted(display: Display | None, look: Look, colours: F32) -> U8:
     if display is None:
         return np.rint(np.clip(colours, 0, 1) * 255).astype(np.uint8)
     flat = np.ascontiguousarray(colours).reshape(1, -1, 3)
-    shown = display.painter(look).paint(flat, exact=flat.size < 1000, threads=False)
+    # The LUT of pictures that move covers less than some palettes reach.
+    shown = display.painter(look).paint(flat, threads=False)
     return np.ascontiguousarray(shown[0, :, :3]).reshape(colours.shape)

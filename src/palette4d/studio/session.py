@@ -44,8 +44,9 @@ T = TypeVar("T")
 
 #: Seconds between the last edit and its save, and the most while edits go on.
 SAVE_AFTER, SAVE_AT_MOST = 0.4, 1.5
-#: Seconds between two events "document" while something is dragged.
-PANELS_EVERY = 0.04
+#: Seconds between two events "document" while something is dragged: the least, or twice what the
+#: panels take to paint; and the most.
+PANELS_EVERY, PANELS_AT_LEAST = 0.04, 0.3
 #: Seconds until a save that failed is tried again.
 TRY_AGAIN = 5.0
 
@@ -154,6 +155,7 @@ class Session:
         self._edited_at: float | None = None  # the first edit that is not on disk
         self._last_edit = self._next_try = 0.0
         self._untold, self._told = False, 0.0  # of a drag, by `tell`
+        self._painting, self._gap = False, PANELS_EVERY
         self.clip: Clip | None = None
         self.player: Player | None = None
         self.display: Display | None = None
@@ -356,6 +358,10 @@ class Session:
         """Show an edit without doing it; each call replaces the last."""
         if self._document is None:
             return
+        if self._painting:  # what the panels took since they were told, at most
+            took = time.monotonic() - self._told
+            self._gap = min(max(PANELS_EVERY, 2 * took), PANELS_AT_LEAST)
+            self._painting = False
         trial = self._document.trial()
         try:
             operation(trial)
@@ -372,9 +378,9 @@ class Session:
     def tell(self) -> None:
         """Tell the panels of a drag; the viewer calls it when it has painted the picture."""
         now = time.monotonic()
-        late = now - self._told >= PANELS_EVERY or not self._callbacks.get("trial")
+        late = now - self._told >= self._gap or not self._callbacks.get("trial")
         if self._untold and late:
-            self._told, self._untold = now, False
+            self._told, self._untold, self._painting = now, False, True
             self.emit("document")
 
     def drop(self) -> None:

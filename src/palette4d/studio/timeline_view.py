@@ -10,7 +10,7 @@ import contextlib
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +60,8 @@ U8 = NDArray[np.uint8]
 GUTTER, RULER, STRIP, FOOT = 84, 24, 46, 12
 #: The height of a pick's range, and the most that are drawn above each other.
 LANE, MOST_LANES = 13, 5
+#: Fades of picks in the menu, in frames.
+FADES = (0.0, 2.0, 5.0, 10.0, 25.0)
 #: Space for the block names above the rows, below them, and beside the first and last frame.
 HEAD, TAIL, SIDE = 22.0, 10.0, 26.0
 #: The heights of a row, and the largest radius of a disc, in rows.
@@ -613,6 +615,7 @@ class TimelineView(QWidget):
             menu.addAction(texts.LOCK_ENTRY, self.lock_selected)
             menu.addSeparator()
         elif hit.what == "pick":
+            self._add_pick(menu, next(p for p, _ in self.lanes() if p.id == hit.id))
             menu.addAction(texts.REMOVE, self.remove_picks)
             menu.addSeparator()
         elif hit.what == "band":
@@ -622,6 +625,36 @@ class TimelineView(QWidget):
             menu.addSeparator()
         menu.addActions(self.menu_actions[VIEW])
         return menu
+
+    def _add_pick(self, menu: QMenu, pick: Pick) -> None:
+        """Add what can be changed of a pick or hold."""
+
+        def entry(where: QMenu, text: str, on: bool, **changes: Any) -> None:
+            made = where.addAction(text)
+            made.setCheckable(True)
+            made.setChecked(on)
+            made.triggered.connect(lambda _=False: self._change_pick(pick.id, changes))
+
+        go = texts.GO_THERE.format(frame=style.number(pick.frame))
+        menu.addAction(go, lambda: self.session.go(pick.frame))
+        entry(menu, texts.COUNTS, pick.enabled, enabled=not pick.enabled)
+        entry(menu, texts.PALETTE_ONLY, pick.global_only, global_only=not pick.global_only)
+        if pick.kind == "pick":
+            same = pick.toward == "colour"
+            entry(menu, texts.SAME_COLOUR, same, toward="shift" if same else "colour")
+        fades = menu.addMenu(texts.FADE)
+        for fade in sorted({*FADES, pick.fade}):
+            name = texts.FADE_OF.format(frames=style.number(fade))
+            entry(fades, name, fade == pick.fade, fade=float(fade))
+
+    def _change_pick(self, id_: str, changes: dict[str, Any]) -> None:
+        clip = None if self.session.clip is None else self.session.clip.source
+
+        def change(document: Document, progress: Progress) -> None:
+            document.change_pick(id_, clip=clip, progress=progress, **changes)
+
+        text = texts.PICK_CHANGED.format(id=id_)
+        self.session.edit_later(change, text, lambda _: self.update())
 
     def _add_ramps(self, menu: QMenu) -> None:
         """Add the ramps of the selected handles that are edited."""
@@ -936,8 +969,10 @@ class TimelineView(QWidget):
             parts += [(line, lower, seen[1])] if touched else []
             painter.setPen(Qt.PenStyle.NoPen)
             for above, below, colours in parts:
-                start = float(columns[inside[0]])
-                painter.setBrush(paint.texture(colours[edge, inside], start, float(COLUMN)))
+                # The first and last column twice: a texture begins again where it ends.
+                own = np.pad(colours[edge, inside], ((1, 1), (0, 0)), mode="edge")
+                start = float(columns[inside[0]]) - wide
+                painter.setBrush(paint.texture(own, start, float(wide)))
                 painter.drawPolygon(paint.polygon(np.concatenate([above, below[::-1]])))
             painter.setBrush(Qt.BrushStyle.NoBrush)
             chosen = palette.edge_ids[edge] in selected

@@ -126,7 +126,8 @@ class Viewer(QWidget):
             self.update()
             return
         if not session.playing:
-            session.player.want(frames_around(session))
+            # Its neighbours are read when its picture is shown.
+            session.player.want([session.frame])
             self.refresh()
         self._probe_again()
 
@@ -223,8 +224,12 @@ class Viewer(QWidget):
             self.session.say(picture.error, "error")
             self.update()
             return
-        if self.session.clip is not None and not self.session.playing:
-            self._take(picture)
+        session = self.session
+        if session.clip is None or session.playing or session.player is None:
+            return
+        self._take(picture)
+        if picture.exact and picture.request.frame == session.frame:
+            session.player.want(frames_around(session))
 
     def _take(self, picture: Picture) -> None:
         self.picture, self.shown_frame = picture, picture.request.frame

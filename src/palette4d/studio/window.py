@@ -457,6 +457,7 @@ class Window(QMainWindow):
         self._listener.listen(None)
         self.session.play(0)
         self.viewer.preview.close()
+        self.viewer.preview.forget()
         self.session.close()
 
     # ------------------------------------------------------------------------------------ editing
