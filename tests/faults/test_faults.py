@@ -149,7 +149,9 @@ def check(driver: Driver, material: Path, folder: Path, verb: Verb, *, full: boo
     shutil.move(folder, start)
     old = state_of(start)
     trials = 0
-    for locks in (True, False) if full else (True,):
+    # Only sidecars are locked against other writers.
+    lockless = full and verb.arguments.startswith(("edit", "analyze"))
+    for locks in (True, False) if lockless else (True,):
         fresh()
         whole = run(locks=locks)
         assert whole["status"] == 0, whole
@@ -211,4 +213,4 @@ def test_killed_or_refused_at_each_call(
 def test_every_verb_with_every_fault(
     name: str, driver: Driver, material: Path, tmp_path: Path
 ) -> None:
-    assert check(driver, material, tmp_path / "work", VERBS[name], full=True) >= 28
+    assert check(driver, material, tmp_path / "work", VERBS[name], full=True) >= 14
