@@ -13,8 +13,10 @@ from typing import Any
 import numpy as np
 import OpenImageIO as oiio
 import pytest
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
+from PySide6.QtGui import QDropEvent
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QFileDialog
 
 import palette4d
 from palette4d.cli.main import main
@@ -459,6 +461,94 @@ def test_another_start_with_the_same_sidecar_brings_this_window_to_the_frame(
     assert other.returncode == 0
     qtbot.waitUntil(lambda: opened.session.frame == 9, timeout=5000)
     assert not bring_forward(sidecar.with_name("other.p4d.json"), None)
+
+
+@pytest.mark.parametrize("dropped", [False, True])
+def test_one_image_of_a_sequence_opens_the_sequence(
+    window: Window, analysed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, dropped: bool
+) -> None:
+    folder = tmp_path / "beach"
+    folder.mkdir()
+    for number, frame in enumerate(sorted((analysed / "clip").glob("*.png"))):
+        shutil.copy(frame, folder / f"t{number:03d}.png")
+    shutil.copy(folder / "t000.png", folder / "still.png")
+    chosen = str(folder / "t003.png")
+    if dropped:
+        drop(window, chosen)
+    else:
+        monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (chosen, ""))
+        window.do_open()
+    assert window.session.clip is not None
+    assert list(window.session.clip.frames) == list(range(12))
+    offered = window._dialogs[-1]
+    assert offered.value("") == str(folder / "t###.png")
+    out = folder / f"{window.session.clip.name}.p4d.json"
+    assert out.name == "beach.p4d.json"
+    assert offered.value("-o") == str(out)
+    offered.close()
+    # The next time that sidecar is found; an image without numbered neighbours stays alone.
+    out.write_bytes((analysed / "clip.p4d.json").read_bytes())
+    drop(window, chosen)
+    assert window.session.path == out
+    drop(window, str(folder / "still.png"))
+    assert window.session.clip is not None
+    assert len(window.session.clip.frames) == 1
+
+
+def test_a_dropped_folder_opens_its_sequence(window: Window, sidecar: Path) -> None:
+    drop(window, str(sidecar.with_name("clip")))
+    assert window.session.path == sidecar
+    sidecar.unlink()
+    drop(window, str(sidecar.with_name("clip")))
+    assert window.session.clip is not None
+    assert len(window.session.clip.frames) == 12
+    assert window.session.document is None
+
+
+def drop(window: Window, path: str) -> None:
+    """Drop a file on the window."""
+    data = QMimeData()
+    data.setUrls([QUrl.fromLocalFile(path)])
+    copy, left, none = (
+        Qt.DropAction.CopyAction,
+        Qt.MouseButton.LeftButton,
+        Qt.KeyboardModifier.NoModifier,
+    )
+    window.dropEvent(QDropEvent(QPointF(50, 50), copy, data, left, none))
+
+
+@pytest.mark.parametrize("name", ["hex", "L"])
+def test_a_field_gives_the_keyboard_back(opened: Window, name: str) -> None:
+    session, panel = opened.session, opened.inspector
+    assert session.document is not None
+    id_ = busiest(opened)
+    session.select(id_)
+    before = session.document.colour(id_)
+    field = panel.hex if name == "hex" else panel.boxes[name]
+    text = "#3366ff" if name == "hex" else "0.4"
+
+    def press(key: Qt.Key, modifier: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier) -> None:
+        QTest.keyClick(opened.windowHandle(), key, modifier)
+
+    field.setFocus()
+    field.selectAll()
+    QTest.keyClicks(field, text)
+    QTest.keyClick(field, Qt.Key.Key_Return)
+    after = session.document.colour(id_)
+    assert after != before
+    assert not field.hasFocus()
+    control, shift = Qt.KeyboardModifier.ControlModifier, Qt.KeyboardModifier.ShiftModifier
+    press(Qt.Key.Key_Z, control)
+    assert session.document.colour(id_) == before
+    # So it is in a field that has the keyboard, but no text that waits for Enter.
+    field.setFocus()
+    press(Qt.Key.Key_Z, control | shift)
+    assert session.document.colour(id_) == after
+    QTest.keyClick(field, Qt.Key.Key_Return)
+    press(Qt.Key.Key_Space)
+    assert session.playing
+    press(Qt.Key.Key_Space)
+    assert not session.playing
 
 
 def test_every_action_has_a_method_and_no_key_twice(window: Window) -> None:

@@ -1,11 +1,12 @@
 """The main window: viewer, timeline, solid and inspector of one session, and its menus."""
 
+import contextlib
 import functools
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QMimeData, QObject, QSettings, Qt, QTimer, QUrl, Signal
+from PySide6.QtCore import QEvent, QMimeData, QObject, QSettings, Qt, QTimer, QUrl, Signal
 from PySide6.QtGui import (
     QAction,
     QActionGroup,
@@ -18,10 +19,12 @@ from PySide6.QtGui import (
     QMouseEvent,
 )
 from PySide6.QtWidgets import (
+    QAbstractSpinBox,
     QApplication,
     QDockWidget,
     QFileDialog,
     QLabel,
+    QLineEdit,
     QMainWindow,
     QMessageBox,
     QVBoxLayout,
@@ -29,6 +32,9 @@ from PySide6.QtWidgets import (
 )
 
 from palette4d.common.errors import Palette4dError
+from palette4d.media import clip_sequence
+from palette4d.media.clip import ClipError
+from palette4d.media.clip_sequence import ImageSequence
 from palette4d.shows import manifest
 from palette4d.studio import actions, texts, theme
 from palette4d.studio.actions import ACTIONS, Action
@@ -41,7 +47,7 @@ from palette4d.studio.solid_view import SolidView
 from palette4d.studio.timeline_view import TimelineView
 from palette4d.studio.transport import Playback, Transport
 from palette4d.studio.viewer import Viewer
-from palette4d.studio.work import Field, WorkDialog, beside
+from palette4d.studio.work import Field, WorkDialog, beside, sequence_of
 
 #: Milliseconds between two looks at the file.
 TICK = 200
@@ -110,6 +116,7 @@ class Window(QMainWindow):
         column.addWidget(self.transport)
         self.setCentralWidget(middle)
         self._make_docks()
+        self._make_fields()
         self._make_status()
         self.actions_by_name: dict[str, QAction] = {}
         self._make_menus()
@@ -147,6 +154,36 @@ class Window(QMainWindow):
         self.docks["shots"].hide()
         # The timeline needs no title: it is told by what it shows.
         self.docks["timeline"].setTitleBarWidget(QWidget())
+
+    def _make_fields(self) -> None:
+        """Let a field that was entered give the keyboard back to the picture."""
+        fields: list[QAbstractSpinBox | QLineEdit] = [
+            *self.findChildren(QAbstractSpinBox),
+            *self.findChildren(QLineEdit),
+        ]
+        for field in fields:
+            if not isinstance(field.parent(), QAbstractSpinBox):
+                field.editingFinished.connect(functools.partial(self._entered, field))
+                field.installEventFilter(self)
+
+    def _entered(self, field: QAbstractSpinBox | QLineEdit) -> None:
+        line_of(field).setModified(False)
+        if field.hasFocus():  # by Enter, not because the keyboard went elsewhere
+            self.viewer.setFocus()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Leave undo and redo to the document, unless text was typed that is not entered yet."""
+        if (
+            event.type() == QEvent.Type.ShortcutOverride
+            and isinstance(event, QKeyEvent)
+            and isinstance(watched, QAbstractSpinBox | QLineEdit)
+        ):
+            keys = QKeySequence.StandardKey
+            undoes = event.matches(keys.Undo) or event.matches(keys.Redo)
+            if undoes and not line_of(watched).isModified():
+                event.ignore()
+                return True
+        return super().eventFilter(watched, event)
 
     def arrange(self) -> None:
         """Give the panels their usual sizes."""
@@ -368,7 +405,7 @@ class Window(QMainWindow):
         folder = str(self.session.path.parent) if self.session.path is not None else ""
         path, _ = QFileDialog.getOpenFileName(self, texts.OPEN_TITLE, folder, texts.OPEN_FILTER)
         if path:
-            self.open_path(path)
+            self.open_path(sequence_of(path))
 
     def do_find_clip(self) -> None:
         """Ask for the document's clip."""
@@ -776,8 +813,10 @@ class Window(QMainWindow):
         out = ""
         if source:
             path = Path(source)
-            stem = path.name.split("#")[0].rstrip("._-") or path.absolute().parent.name
-            stem = Path(stem).stem if "#" not in source else stem
+            stem = path.stem
+            if "#" in path.name:
+                with contextlib.suppress(ClipError):
+                    stem = clip_sequence.of_pattern(source)[0].name
             out = str(path.with_name(f"{stem}.p4d.json"))
         return self._analyze(texts.ANALYZE, source, out, "--drop-edits" if out else "")
 
@@ -964,28 +1003,24 @@ def _as_one(document: Any, what: str, ids: tuple[str, ...], change: Callable[[An
         change(document)
 
 
+def line_of(field: QAbstractSpinBox | QLineEdit) -> QLineEdit:
+    """Return the line of text of a field."""
+    return field if isinstance(field, QLineEdit) else field.lineEdit()
+
+
 def sidecar_of(path: str) -> Path | None:
     """Return the sidecar beside a clip, if it was analysed before."""
     found = Path(path)
     names = [found.name.split("#")[0].split("%")[0].rstrip("._-"), found.stem, found.name]
+    if "#" in found.name:
+        with contextlib.suppress(ClipError):
+            names.append(clip_sequence.of_pattern(path)[0].name)
     for name in dict.fromkeys(names):
         candidate = found.absolute().with_name(f"{name}.p4d.json")
         if name and candidate.is_file():
             return candidate
+    if found.is_dir():  # or in the folder, beside its frames
+        with contextlib.suppress(ClipError):
+            inside = clip_sequence.in_folder(found)
+            return sidecar_of(inside.pattern if isinstance(inside, ImageSequence) else str(inside))
     return None
-
-
-def sequence_of(path: str) -> str:
-    """Return the sequence that a dropped or chosen image belongs to; other paths stay."""
-    from palette4d.media import clip_sequence
-
-    found = Path(path)
-    if not found.is_file() or clip_sequence.extension(found) not in clip_sequence.IMAGE_EXTENSIONS:
-        return path
-    digits = found.stem[len(found.stem.rstrip("0123456789")) :]
-    if not digits:
-        return path
-    stem = found.stem.removesuffix(digits)
-    pattern = found.with_name(f"{stem}{'#' * len(digits)}{found.suffix}")
-    siblings = found.parent.glob(f"{stem}{'[0-9]' * len(digits)}{found.suffix}")
-    return str(pattern) if sum(1 for _ in siblings) > 1 else path

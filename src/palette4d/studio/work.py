@@ -23,6 +23,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from palette4d.media import clip_sequence
 from palette4d.studio import texts, theme
 from palette4d.studio.jobs import Job, command_line
 
@@ -180,7 +181,7 @@ class WorkDialog(QDialog):
         elif field.kind == "save":
             found = QFileDialog.getSaveFileName(self, field.text, line.text())[0]
         else:
-            found = QFileDialog.getOpenFileName(self, field.text, line.text())[0]
+            found = sequence_of(QFileDialog.getOpenFileName(self, field.text, line.text())[0])
         if found:
             line.setText(found)
 
@@ -268,3 +269,17 @@ def beside(path: Path, ending: str) -> str:
     """Return a file's name with another ending, in the same folder."""
     stem = path.name.removesuffix(".p4d.json")
     return str(path.with_name(stem + ending))
+
+
+def sequence_of(path: str) -> str:
+    """Return the pattern of the sequence that a dropped or chosen image belongs to.
+
+    Other paths stay as they are: a folder, a movie, an image without numbered neighbours.
+    """
+    found = Path(path)
+    if not found.is_file() or clip_sequence.extension(found) not in clip_sequence.IMAGE_EXTENSIONS:
+        return path
+    for sequence in clip_sequence.sequences_in(found.parent):
+        if len(sequence.files) > 1 and found in sequence.files.values():
+            return sequence.pattern
+    return path
