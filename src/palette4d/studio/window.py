@@ -813,10 +813,9 @@ class Window(QMainWindow):
         out = ""
         if source:
             path = Path(source)
-            stem = path.stem
-            if "#" in path.name:
-                with contextlib.suppress(ClipError):
-                    stem = clip_sequence.of_pattern(source)[0].name
+            # The name by which the node finds it, see docs/node.md.
+            stem = path.name.split("#")[0].rstrip("._-") or path.absolute().parent.name
+            stem = Path(stem).stem if "#" not in source else stem
             out = str(path.with_name(f"{stem}.p4d.json"))
         return self._analyze(texts.ANALYZE, source, out, "--drop-edits" if out else "")
 
