@@ -223,7 +223,7 @@ def test_light_above_one_and_below_zero(analysed):
     assert found.polytope.vertices[:, :3].max() <= 50.1
     # Beside a sun of 50 the picture's own colours weigh little, and the user is told so.
     (text,) = found.analysis.notes
-    assert "--input-space" in text
+    assert "colour space" in text
 
 
 def test_pq_is_named_and_fits_as_display_colours_do(analysed):

@@ -59,6 +59,6 @@ def test_patches_of_colour_still_reach_the_terminal(
 ) -> None:
     monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
     monkeypatch.delenv("NO_COLOR", raising=False)
-    assert main(["info", str(EDITED)]) == 0
+    assert main(["info", str(EDITED), "--handles"]) == 0
     assert row([0.1, 0.8, 0.1]) in capsys.readouterr().out
     assert "\x1b[48;2;26;204;26m" in row([0.1, 0.8, 0.1])
