@@ -96,7 +96,7 @@ def run(
             "expected one for the window. `palette4d studio PATH --screenshot OUT.png` draws it "
             "without a screen; for the window itself use a remote screen (ssh -X, VNC)"
         )
-    from PySide6.QtCore import QByteArray, QSettings, Qt
+    from PySide6.QtCore import QByteArray, QSettings, Qt, QTemporaryDir
     from PySide6.QtWidgets import QApplication
 
     from palette4d.studio import theme
@@ -113,8 +113,9 @@ def run(
     sys.setswitchinterval(0.001)
     session = Session()
     settings = QSettings("palette4d", "studio")
+    nowhere = QTemporaryDir()
     if hidden:  # a picture does not depend on who draws it
-        settings = QSettings(os.devnull, QSettings.Format.IniFormat)
+        settings = QSettings(nowhere.filePath("studio.ini"), QSettings.Format.IniFormat)
     window = Window(session, settings)
     kept = settings.value("geometry") if size is None else None
     window.resize(*(size or USUAL_SIZE))
@@ -138,6 +139,7 @@ def run(
             wait_until_shown(app, window)
         picture = window.grab()
         window.shut()
+        settings.sync()  # while its folder is there
         if screenshot is not None:
             save(picture, screenshot)
         return 0
