@@ -49,7 +49,8 @@ def test_a_click_begins_a_pick_and_shows_its_pixel(qtbot: Any, opened: Window) -
     qtbot.mouseClick(opened.viewer, LEFT, pos=at(opened, 40, 30).toPoint())
     inspector = opened.inspector
     assert "40, 30" in inspector.title.text()
-    frame = opened.session.player.frame(opened.session.frame)  # type: ignore[union-attr]
+    assert opened.session.player is not None
+    frame = opened.session.player.frame(opened.session.frame)
     assert frame is not None
     shown = [inspector.boxes[name].value() for name in "RGB"]
     np.testing.assert_allclose(shown, frame[30, 40, :3], atol=6e-5)
@@ -136,7 +137,8 @@ def test_the_pipette_takes_a_colour_of_the_picture(qtbot: Any, opened: Window) -
     opened.session.select(id_)
     qtbot.mouseClick(opened.inspector.dropper, LEFT)
     qtbot.mouseClick(opened.viewer, LEFT, pos=at(opened, 40, 30).toPoint())
-    frame = opened.session.player.frame(opened.session.frame)  # type: ignore[union-attr]
+    assert opened.session.player is not None
+    frame = opened.session.player.frame(opened.session.frame)
     assert frame is not None
     assert opened.session.document is not None
     np.testing.assert_allclose(opened.session.document.colour(id_), frame[30, 40, :3], atol=1e-6)

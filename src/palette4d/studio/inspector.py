@@ -191,7 +191,7 @@ class Inspector(QWidget):
         row = QHBoxLayout()
         row.setSpacing(0)
         group = QButtonGroup(self)
-        self.scopes: dict[str, QToolButton] = {}
+        self.scopes: dict[Scope, QToolButton] = {}
         for name, text in texts.SCOPES.items():
             button = QToolButton()
             button.setText(text)
@@ -445,10 +445,9 @@ class Inspector(QWidget):
 
     # --------------------------------------------------------------------------------- what it does
 
-    def set_scope(self, scope: str) -> None:
+    def set_scope(self, scope: Scope) -> None:
         """Choose what a new colour changes."""
-        assert scope in ("handle", "track", "palette")
-        self.scope = scope  # type: ignore[assignment]
+        self.scope = scope
         self.scopes[scope].setChecked(True)
 
     def operation(

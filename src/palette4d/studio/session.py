@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
 from palette4d.common.errors import Palette4dError, in_words
 from palette4d.grade.document import Document
@@ -473,9 +473,9 @@ class Session:
             self.probe = probe
             self.emit("probe")
 
-    def look(self, **changes: object) -> None:
+    def look(self, **changes: Any) -> None:
         """Change how the picture is shown: the attributes of `View`."""
-        after = dataclasses.replace(self.view, **changes)  # type: ignore[arg-type]
+        after = dataclasses.replace(self.view, **changes)
         if after != self.view:
             self.view = after
             self.emit("view")

@@ -1,5 +1,7 @@
 """All texts of the window, in one place for translation."""
 
+from typing import Literal
+
 TITLE = "palette4d Studio"
 
 # ------------------------------------------------------------------------------------ the session
@@ -186,7 +188,11 @@ NOTHING_SELECTED = "Nothing is selected"
 SELECT_HINT = "Click a disc, a row, or a colour of the solid."
 EDGE = "row"
 AND_MORE = " and {count} more"
-SCOPES = {"handle": "Handle", "track": "Track", "palette": "Palette"}
+SCOPES: dict[Literal["handle", "track", "palette"], str] = {
+    "handle": "Handle",
+    "track": "Track",
+    "palette": "Palette",
+}
 SCOPE_TIPS = {
     "handle": "A new colour changes the selected handles",
     "track": "A new colour changes the whole track of the selected colour",

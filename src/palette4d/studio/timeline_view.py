@@ -14,10 +14,11 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QEvent, QPoint, QPointF, QRectF, QSize, Qt
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import (
     QColor,
     QContextMenuEvent,
+    QHelpEvent,
     QImage,
     QKeyEvent,
     QMouseEvent,
@@ -50,7 +51,7 @@ from palette4d.studio.actions import TIMELINE_ACTIONS, VIEW
 from palette4d.studio.menus import view_actions
 from palette4d.studio.player import Region
 from palette4d.studio.screen_colours import on_screen, thumbnail
-from palette4d.studio.session import Session
+from palette4d.studio.session import Event, Session
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -141,7 +142,7 @@ class TimelineView(QWidget):
         self._press: Press | None = None
         self._band: QRectF | None = None
         self.menu_actions = view_actions(self, TIMELINE_ACTIONS)
-        for event, call in (
+        calls: tuple[tuple[Event, Callable[[], object]], ...] = (
             ("document", self._changed),
             ("clip", self._new_clip),
             ("frame", self._frame_moved),
@@ -151,8 +152,9 @@ class TimelineView(QWidget):
             ("range", self.update),
             ("view", self.update),
             ("pixels", self.update),
-        ):
-            session.on(event, call)  # type: ignore[arg-type]
+        )
+        for event, call in calls:
+            session.on(event, call)
 
     def sizeHint(self) -> QSize:
         """Return the size that shows a common palette whole."""
@@ -563,11 +565,10 @@ class TimelineView(QWidget):
 
     def event(self, event: QEvent) -> bool:
         """Show a tip about what is under the pointer."""
-        if event.type() == QEvent.Type.ToolTip:
-            at: QPoint = event.pos()  # type: ignore[attr-defined]
-            tip = self.tip(self.hit(QPointF(at)))
+        if isinstance(event, QHelpEvent) and event.type() == QEvent.Type.ToolTip:
+            tip = self.tip(self.hit(QPointF(event.pos())))
             if tip:
-                QToolTip.showText(event.globalPos(), tip, self)  # type: ignore[attr-defined]
+                QToolTip.showText(event.globalPos(), tip, self)
             else:
                 QToolTip.hideText()
             return True

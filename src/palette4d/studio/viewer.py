@@ -698,7 +698,7 @@ def image_of(pixels: NDArray[np.uint8]) -> QImage:
     """Return an image that shares the (h, w, 4) pixels."""
     height, width = pixels.shape[:2]
     image = QImage(pixels.data, width, height, 4 * width, QImage.Format.Format_RGBX8888)
-    image._pixels = pixels  # type: ignore[attr-defined]  # keeps them as long as the image
+    image._pixels = pixels  # type: ignore[attr-defined]  # Qt does not keep the memory that it shows
     return image
 
 
