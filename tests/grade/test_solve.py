@@ -89,6 +89,32 @@ def test_a_second_range_leaves_the_frames_of_the_first_alone(fields: Fields) -> 
     np.testing.assert_allclose(moved(both, OTHER, 14), (-0.1, 0, 0.25), atol=0.006)
 
 
+def test_a_shift_stays_in_range_where_the_colour_is_dark(fields: Fields) -> None:
+    path = [{"frame": 0, "rgb": [0.4, 0.3, 0.3]}, {"frame": 18, "rgb": [0.15, 0.2, 0.2]}]
+    asked = pick("p1", (0.4, 0.3, 0.3), (0.1, 0.4, 0.4), frame=0, path=path)
+    document, _ = solved(fields, asked)
+    np.testing.assert_allclose(moved(document, (0.4, 0.3, 0.3), 0), (-0.3, 0.1, 0.1), atol=0.01)
+    # 0.15 of the 0.3 of red that the whole change would take.
+    np.testing.assert_allclose(
+        moved(document, (0.15, 0.2, 0.2), 18), (-0.15, 0.05, 0.05), atol=0.01
+    )
+
+
+def test_what_else_changes_is_measured_as_the_picture_changes(fields: Fields) -> None:
+    colours = [[*MIDDLE, 0.5], [0.2, 0.15, 0.3, 0.3], [0.15, 0.15, 0.6, 0.2]]
+    found = {**fields, "colours": [{"frame": 5, "rgbw": colours}]}
+    document, _ = solved(found, pick("p1", MIDDLE, (0.6, 0.3, 0.4)))
+    changes = [np.abs(moved(document, colour[:3], 5)).max() for colour in colours]
+    least = (changes[1] + changes[2]) / 2
+    share, most = document.side_effect(5, least=float(least))
+    large = 1 if changes[1] > changes[2] else 2
+    assert share == pytest.approx(colours[large][3])
+    sizes = [change * np.sqrt(colour[3]) for change, colour in zip(changes, colours, strict=True)]
+    assert list(most) == colours[1 if sizes[1] > sizes[2] else 2][:3]
+    # The picked colour itself is none of the others, however much it changes.
+    assert document.side_effect(5, least=0.0)[0] == pytest.approx(0.5)
+
+
 def test_a_path_is_followed_by_shift_or_by_colour(fields: Fields) -> None:
     path = [{"frame": 0, "rgb": [0.3, 0.3, 0.3]}, {"frame": 18, "rgb": [0.5, 0.4, 0.4]}]
     asked = pick("p1", (0.3, 0.3, 0.3), (0.4, 0.3, 0.3), frame=0, path=path)

@@ -101,7 +101,7 @@ def solve(fields: Mapping[str, Any]) -> tuple[Fields, dict[str, Fields]]:
     problem = _Problem(clip, enabled[:MOST_PICKS])
     solved = [problem.at(time) for time in problem.times]
     solution = problem.solution(solved)
-    return solution, _measured(fields, solution, enabled, problem.times)
+    return solution, _measured(fields, solution, enabled, problem.times, clip.core)
 
 
 def side_effect(fields: Mapping[str, Any], frame: float, least: float) -> tuple[float, Colour]:
@@ -477,11 +477,17 @@ def _few(times: Sequence[float], values: F64, kept: Iterable[float]) -> list[flo
 
 
 def _measured(
-    fields: Mapping[str, Any], solution: Fields, picks: Sequence[Pick], times: Sequence[float]
+    fields: Mapping[str, Any],
+    solution: Fields,
+    picks: Sequence[Pick],
+    times: Sequence[float],
+    own: _core.Sidecar,
 ) -> dict[str, Fields]:
-    """Return the residual and the palette's share of each pick, from the stored solution."""
+    """Return the residual and the palette's share of each pick, from the stored solution.
+
+    `own` is the sidecar without a solution.
+    """
     core = _parsed(fields, solution)
-    own = _parsed(fields, {})
     step = fields["clip"]["frames"]["step"]
     first, last = core.polytope.first_frame, core.polytope.last_frame
     between = [(a + b) / 2 for a, b in itertools.pairwise(times)]
