@@ -108,9 +108,11 @@ void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const P
     const std::shared_ptr<Instance> instance = find(effect);
     ShownHandles handles;
     std::optional<double> source_less_time;
+    bool rendered = false;
     if (instance) {
         const std::lock_guard<std::mutex> lock(instance->mutex);
         handles = instance->shown;
+        rendered = instance->rendered;
         source_less_time = instance->source_less_time;
     }
     notice_undone(params, handles);
@@ -128,7 +130,7 @@ void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const P
         const TimeSettings settings = time_settings_at(params, *time);
         // Before the first render, assume that media frame and time are equal, as on Resolve's
         // pages.
-        if (!source_less_time && !chosen.media.empty()) source_less_time = 0;
+        if (!rendered && !chosen.media.empty()) source_less_time = 0;
         std::optional<double> source_frame;
         if (source_less_time) source_frame = *time + *source_less_time;
         const FrameAt at =
@@ -153,11 +155,12 @@ void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const P
 
 void note_source_frame(OfxImageEffectHandle effect, OfxTime time,
                        std::optional<double> source_frame) {
-    if (!source_frame) return;
     const std::shared_ptr<Instance> instance = find(effect);
     if (!instance) return;
     const std::lock_guard<std::mutex> lock(instance->mutex);
-    instance->source_less_time = *source_frame - time;
+    instance->rendered = true;
+    instance->source_less_time.reset();
+    if (source_frame) instance->source_less_time = *source_frame - time;
 }
 
 void report(const Suites& suites, OfxImageEffectHandle effect, const std::string& problem) {

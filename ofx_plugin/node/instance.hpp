@@ -15,6 +15,7 @@ struct Instance {
     std::mutex mutex;
     std::string message;  ///< the last problem or note; empty for none
     ShownHandles shown;
+    bool rendered = false;
     std::optional<double> source_less_time;  ///< media frame minus time, at the last render
 };
 

@@ -162,6 +162,7 @@ std::vector<std::string> faults_of(const std::string& action, Breach breach,
         Picture source(layout), output(layout);
         test::fill(source);
         node->render(0, &source, output, test::rect(4, 4, 12, 12));
+        node->sync();
     }
     node->destroy();
     return Host::get().take_faults();

@@ -167,6 +167,20 @@ TEST(trims_compounds_and_retimes_show_the_medias_frame) {
     }
 }
 
+TEST(the_status_has_the_frame_of_a_host_that_tells_the_file_alone) {
+    Page page;
+    write("box.p4d.json", text_of("box.####.exr"));
+    const auto node = page.clip((folder() / "box.0005.exr").u8string());
+    node->effect().clips.at("Source")->properties.put_all(kOfxImageEffectPropFrameRange,
+                                                          {0.0, 500.0});
+    Picture output(page.layout);
+    CHECK(node->render(2, &page.source, output, page.layout.bounds) == kOfxStatOK);
+    CHECK(output.pixels(page.layout.bounds) == page.at(12));
+    node->shown_time = 2;
+    CHECK(node->changed("", "", kOfxChangeTime) == kOfxStatOK);
+    EXPECT(node->text("status").find("is frame 12") != std::string::npos, node->text("status"));
+}
+
 TEST(properties_that_are_absent_or_wrong_are_ignored) {
     Page page;
     write("box.p4d.json", text_of("box.####.exr"));

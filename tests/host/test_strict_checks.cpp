@@ -185,8 +185,9 @@ TEST(calls_in_the_wrong_place_are_noticed) {
           }}});
     const Breach remove_keys = [](Now& n) { g.param->paramDeleteAllKeys(handle_of(n, "number")); };
     for (const char* action :
-         {kCreate, kOfxActionBeginInstanceChanged, kOfxActionEndInstanceChanged, kRender,
-          kOfxImageEffectActionIsIdentity, kOfxImageEffectActionGetClipPreferences}) {
+         {kCreate, kOfxActionSyncPrivateData, kOfxActionBeginInstanceChanged,
+          kOfxActionEndInstanceChanged, kRender, kOfxImageEffectActionIsIdentity,
+          kOfxImageEffectActionGetClipPreferences}) {
         expect("paramGetValue: not allowed", faults_of(action, get_number));
         expect("paramSetValue: not allowed", faults_of(action, set_number));
         expect("paramDeleteAllKeys: not allowed", faults_of(action, remove_keys));
