@@ -166,9 +166,17 @@ OUTPUTS: list[tuple[dict[str, Any], list[str]]] = [
 ]
 
 
-@pytest.mark.parametrize(("channels", "premultiplied"), SHAPES)
 @pytest.mark.parametrize("name", ["v1_edited", "v1_scene_linear", "v1_picks"])
-@pytest.mark.parametrize(("given", "parameters"), OUTPUTS)
+@pytest.mark.parametrize(
+    ("channels", "premultiplied", "given", "parameters"),
+    [
+        (channels, premultiplied, given, parameters)
+        for channels, premultiplied in SHAPES
+        for given, parameters in OUTPUTS
+        # For a matte in alpha the node asks its host for RGBA.
+        if channels == 4 or given.get("matte_in") != "alpha"
+    ],
+)
 def test_every_output_of_the_node_is_the_documents(
     node: Node,
     name: str,
@@ -181,8 +189,6 @@ def test_every_output_of_the_node_is_the_documents(
     document = Document.load(path)
     stops = [stop["id"] for stop in document.core.edits.stops]
     ids = {"vertex": document.core.polytope.vertex_ids[1], "stop": stops[0] if stops else "v1"}
-    if given.get("matte_in") == "alpha" and channels == 3:
-        pytest.skip("the node asks its host for alpha")
     image = picture(channels)
     if premultiplied:
         image[..., :3] *= image[..., 3:]
