@@ -18,21 +18,31 @@ JOBS ?= $(shell nproc 2>/dev/null || echo 2)
 # The slow tests too: make test-py SLOW=1
 SLOW ?=
 
-# How long libFuzzer may look: make test-fuzz FUZZ_SECONDS=3600
+# How long each reader is fuzzed: make test-fuzz FUZZ_SECONDS=3600
 FUZZ_SECONDS ?= 60
+# Which readers are fuzzed: make test-fuzz FUZZ="sidecar edl"
+FUZZ ?= sidecar copy node program manifest index correction otio edl
 
 # An OpenFX SDK whose headers the C++ tests are to be built with: make test OPENFX_ROOT=/path/to/openfx
 OPENFX_ROOT ?=
 
 # A Python path or an active environment of the caller must not leak into what is tested.
 unexport PYTHONPATH PYTHONHOME VIRTUAL_ENV
+# Else each of the tests' processes would compile anew what it imports.
+unexport PYTHONDONTWRITEBYTECODE
 
 VENV := .venv
 TOOLS := build/tools
 TEST_VENV := build/test-venv
 WHEELS := build/wheels
 TEST_WHEELS := build/test-wheels
+NATIVE := build/native
+SUPPLY := build/supply
+RELEASE := build/release
+BUNDLES := $(RELEASE)/bundles
 PIP := -m pip --quiet --disable-pip-version-check
+# What make downloads is pinned in locks/, with hashes: $(PYTHON_OF_AN_ENVIRONMENT) $(PINNED)NAME.txt
+PINNED := $(PIP) install --require-hashes --only-binary :all: -r locks/
 
 # Folders are listed too, so that a removed file counts as a change.
 SOURCES := pyproject.toml README.md LICENSE $(shell find src ofx_plugin analysis lut_export \
@@ -41,13 +51,13 @@ CXX_FILES = $(shell find ofx_plugin tests -name '*.cpp' -o -name '*.hpp' -o -nam
 
 .PHONY: help demo studio docs-images test test-all install dev wheel lint style types build-cpp build-sanitize build-threads \
 	build-fuzz test-cpp test-sanitize test-threads test-threads-short test-fuzz test-py format clean \
-	compiler fuzz-compiler
+	compiler fuzz-compiler sbom lock test-reproducible bundles bundles-again test-bundles wheels
 
 help: ## this list
 	@echo "make demo            from nothing to results in demo_output/"
 	@echo "make studio          the window, with the demo's result"
 	@echo "make test            lint, C++ tests (plain and sanitized), the wheel, host tests; no slow tests"
-	@echo "make test-all        the same with the slow tests, ThreadSanitizer and libFuzzer, before a release"
+	@echo "make test-all        the same with the slow tests, ThreadSanitizer, libFuzzer, the bundles and wheels"
 	@echo
 	@echo "make install         .venv with palette4d in it (.venv/bin/palette4d)"
 	@echo "make dev             .venv with an editable palette4d and every tool"
@@ -56,7 +66,14 @@ help: ## this list
 	@echo "make test-cpp        C++ tests, warnings as errors"
 	@echo "make test-sanitize   the same under AddressSanitizer and UndefinedBehaviorSanitizer"
 	@echo "make test-threads    the node's tests in the strict host under ThreadSanitizer (not part of make test)"
-	@echo "make test-fuzz       libFuzzer over the sidecar's reader for FUZZ_SECONDS (needs Clang; not part of make test)"
+	@echo "make test-fuzz       each reader with any bytes for FUZZ_SECONDS, or those of FUZZ (needs Clang; not part of make test)"
+	@echo "make test-reproducible  two builds of the wheel in different folders: the bytes must be equal"
+	@echo "make sbom            what stands in .venv, with versions and licences (CycloneDX)"
+	@echo "make lock            the newest versions of all that make downloads, pinned in locks/"
+	@echo "make bundles         the OpenFX bundle for Linux, Windows and macOS, in $(BUNDLES)/"
+	@echo "make bundles-again   the same in another folder: the bytes must be equal"
+	@echo "make test-bundles    its libraries, natively, under Wine and qemu"
+	@echo "make wheels          wheels for each Python 3.11 to 3.13 on PATH, with that bundle, in $(RELEASE)/wheels/"
 	@echo "make test-py         pytest on the wheel in a fresh environment (PYTEST_ARGS=... is passed on)"
 	@echo "make format          rewrite the sources as ruff and clang-format want them"
 	@echo "make docs-images     draw the pictures of the docs again, from the demo"
@@ -89,16 +106,27 @@ $(VENV)/.created:
 	$(call new-venv,$(VENV))
 	@touch $@
 
-build/wheel.stamp: $(SOURCES) | $(VENV)/.created compiler
+$(NATIVE)/.installed: locks/build.txt
+	$(call new-venv,$(NATIVE))
+	$(NATIVE)/bin/python $(PINNED)build.txt
+	@touch $@
+
+# $(call build-wheel,TREE,WHEELS)
+define build-wheel
+	@rm -rf $(2)
+	@cd $(1) && PATH="$(CURDIR)/$(NATIVE)/bin:$$PATH" "$(CURDIR)/$(NATIVE)/bin/python" $(PIP) wheel . \
+		--no-deps --no-build-isolation --wheel-dir "$(CURDIR)/$(2)"
+endef
+
+build/wheel.stamp: $(SOURCES) $(NATIVE)/.installed | compiler
 	@echo "== the wheel (compiles the core, the bindings and the OpenFX bundle; takes 1 to 3 minutes)"
-	@rm -rf $(WHEELS)
-	$(VENV)/bin/python $(PIP) wheel . --no-deps --wheel-dir $(WHEELS)
+	$(call build-wheel,.,$(WHEELS))
 	@touch $@
 
 ifeq ($(wildcard $(VENV)/.editable),)
-$(VENV)/.installed: build/wheel.stamp
+$(VENV)/.installed: build/wheel.stamp locks/run.txt | $(VENV)/.created
 	@echo "== palette4d and what it needs into $(VENV) (takes 1 to 3 minutes the first time)"
-	$(VENV)/bin/python $(PIP) install $(WHEELS)/*.whl
+	$(VENV)/bin/python $(PINNED)run.txt
 	$(VENV)/bin/python $(PIP) install --no-deps --force-reinstall $(WHEELS)/*.whl
 	@touch $@
 else
@@ -111,17 +139,14 @@ endif
 install: $(VENV)/.installed ## .venv with palette4d in it
 
 dev: $(VENV)/.created compiler ## .venv with an editable palette4d and every tool
-	@mkdir -p build
-	$(VENV)/bin/python tools/requirements.py native > build/native.txt
-	$(VENV)/bin/python $(PIP) install -r build/native.txt
-	$(VENV)/bin/python $(PIP) install --no-build-isolation --editable '.[dev]'
+	$(VENV)/bin/python $(PINNED)tools.txt -r locks/test.txt
+	$(VENV)/bin/python $(PIP) install --no-build-isolation --no-deps --editable .
 	@touch $(VENV)/.editable $(VENV)/.installed
 	@echo "An editable palette4d and its tools are in $(VENV); C++ changes are compiled by: make dev"
 
-$(TOOLS)/.installed: pyproject.toml tools/requirements.py
+$(TOOLS)/.installed: locks/tools.txt
 	$(call new-venv,$(TOOLS))
-	$(TOOLS)/bin/python tools/requirements.py native lint > $(TOOLS)/requirements.txt
-	$(TOOLS)/bin/python $(PIP) install -r $(TOOLS)/requirements.txt
+	$(TOOLS)/bin/python $(PINNED)tools.txt --no-compile
 	@touch $@
 
 # The wheel that is tested, and with it the C++ tests, from one build: what pytest, the strict host and
@@ -130,17 +155,66 @@ build/test-wheel.stamp: $(SOURCES) $(shell find tests/core tests/host tests/fuzz
 		| $(TOOLS)/.installed compiler
 	@echo "== C++: core, bindings, OpenFX bundle and their tests (takes 2 to 4 minutes)"
 	@rm -rf $(TEST_WHEELS)
-	@PATH="$(CURDIR)/$(TOOLS)/bin:$$PATH" $(TOOLS)/bin/python $(PIP) wheel . --no-deps --no-build-isolation \
-		--wheel-dir $(TEST_WHEELS) -C build-dir=build/cmake/test -C cmake.define.PALETTE4D_BUILD_TESTS=ON \
+	@unset MAKEFLAGS && PATH="$(CURDIR)/$(TOOLS)/bin:$$PATH" $(TOOLS)/bin/python $(PIP) wheel . \
+		--no-deps --no-build-isolation --wheel-dir $(TEST_WHEELS) -C build-dir=build/cmake/test -C cmake.define.PALETTE4D_BUILD_TESTS=ON \
 		-C cmake.define.PALETTE4D_WERROR=ON -C cmake.define.OPENFX_ROOT="$(abspath $(OPENFX_ROOT))"
 	@touch $@
 
-# A fresh environment for every new wheel: nothing but the wheel, its dependencies and the tests'.
-$(TEST_VENV)/.installed: build/test-wheel.stamp
+# Nothing but the wheel, its dependencies and the tests'. A fresh environment for every change of them.
+# Python compiles what it imports; pip would compile all.
+$(TEST_VENV)/.requirements: locks/test.txt
 	$(call new-venv,$(TEST_VENV))
-	@wheel=$$(echo $(TEST_WHEELS)/*.whl) && set -x && \
-		$(TEST_VENV)/bin/python $(PIP) install "$$wheel[test]"
+	$(TEST_VENV)/bin/python $(PINNED)test.txt --no-compile
 	@touch $@
+
+# `pip check` fails where the wheel needs what the list lacks.
+$(TEST_VENV)/.installed: build/test-wheel.stamp $(TEST_VENV)/.requirements
+	$(TEST_VENV)/bin/python $(PIP) install --no-compile --force-reinstall --no-deps $(TEST_WHEELS)/*.whl
+	$(TEST_VENV)/bin/python $(PIP) check
+	@touch $@
+
+# ---------------------------------------------------------------------------- where all comes from
+
+$(SUPPLY)/.installed: locks/supply.txt
+	$(call new-venv,$(SUPPLY))
+	$(SUPPLY)/bin/python $(PINNED)supply.txt
+	@touch $@
+
+# For every Python and system that palette4d supports. uv asks the index of UV_DEFAULT_INDEX.
+lock: $(SUPPLY)/.installed ## the newest versions of all that make downloads, pinned
+	@compile() { \
+		to=locks/$$1.txt; shift; echo "== $$to"; \
+		$(SUPPLY)/bin/uv pip compile --quiet --upgrade --universal --python-version 3.11 \
+			--generate-hashes --no-annotate --no-emit-index-url --no-emit-find-links \
+			--custom-compile-command "make lock" "$$@" -o $$to; }; \
+	of() { $(SUPPLY)/bin/python tools/requirements.py "$$@" > $(SUPPLY)/in.txt; }; \
+	set -e; \
+	compile test --extra test pyproject.toml; \
+	compile studio --extra studio pyproject.toml -c locks/test.txt; \
+	compile run pyproject.toml -c locks/test.txt; \
+	of native; compile build $(SUPPLY)/in.txt -c locks/test.txt; \
+	of native lint; compile tools $(SUPPLY)/in.txt -c locks/test.txt; \
+	of native release; compile release $(SUPPLY)/in.txt -c locks/build.txt; \
+	of bundle-test; compile bundle-test $(SUPPLY)/in.txt; \
+	of supply; compile supply $(SUPPLY)/in.txt
+
+# What is compiled into the wheel stands in its own list, palette4d-*.dist-info/sboms/.
+sbom: $(SUPPLY)/.installed $(VENV)/.installed ## what stands in .venv, with versions and licences
+	@$(SUPPLY)/bin/cyclonedx-py environment $(VENV)/bin/python --pyproject pyproject.toml \
+		--mc-type library --output-reproducible --of JSON -o build/palette4d.cdx.json
+	@echo "build/palette4d.cdx.json"
+
+# The same tree in two folders with other names gives the same bytes.
+test-reproducible: $(NATIVE)/.installed compiler
+	@rm -rf build/reproducible
+	@for tree in a another/folder; do \
+		mkdir -p build/reproducible/$$tree && \
+		tar -c $(wildcard *.toml README.md LICENSE src ofx_plugin analysis lut_export) | \
+			tar -x -C build/reproducible/$$tree || exit; \
+	done
+	$(call build-wheel,build/reproducible/a,build/reproducible/first)
+	$(call build-wheel,build/reproducible/another/folder,build/reproducible/second)
+	cmp build/reproducible/first/*.whl build/reproducible/second/*.whl
 
 # ---------------------------------------------------------------------------- demo
 
@@ -150,10 +224,9 @@ demo: $(VENV)/.installed ## from nothing to results in demo_output/
 demo_output/sample.p4d.json:
 	$(MAKE) demo
 
-$(VENV)/.studio: $(VENV)/.installed pyproject.toml
+$(VENV)/.studio: $(VENV)/.installed locks/studio.txt
 	@echo "== the window's toolkit into $(VENV)"
-	$(VENV)/bin/python tools/requirements.py studio > $(VENV)/studio.txt
-	$(VENV)/bin/python $(PIP) install -r $(VENV)/studio.txt
+	$(VENV)/bin/python $(PINNED)studio.txt
 	@touch $@
 
 studio: $(VENV)/.studio demo_output/sample.p4d.json ## the window, with the demo's result
@@ -166,14 +239,19 @@ docs-images: $(VENV)/.studio demo_output/sample.p4d.json ## draw the pictures of
 
 # ---------------------------------------------------------------------------- tests
 
-test: lint test-cpp test-sanitize test-py ## what a change must pass: all but the slow tests
+# Packages are installed and types are checked by one process each: the other cores compile meanwhile.
+test: ## what a change must pass: all but the slow tests
+	@$(MAKE) --no-print-directory -j2 --output-sync=line style build/test-wheel.stamp $(TEST_VENV)/.requirements
+	@$(MAKE) --no-print-directory -j2 --output-sync=line types build-sanitize
+	@$(MAKE) --no-print-directory test-cpp test-sanitize test-py
 	@echo "== all of make test passed"
 
 # Before a release: the slow tests too, ThreadSanitizer over all tests of the node, ten minutes of
-# libFuzzer, and a wheel built as pip builds it for users.
+# libFuzzer, a wheel built as pip builds it for users, and what a release holds.
 test-all: ## everything, before a release
-	$(MAKE) SLOW=1 test test-threads wheel
+	$(MAKE) SLOW=1 test test-threads wheel test-reproducible
 	$(MAKE) FUZZ_SECONDS=600 test-fuzz
+	$(MAKE) bundles-again test-bundles wheels
 	@echo "== all of make test-all passed"
 
 wheel: build/wheel.stamp ## the wheel
@@ -201,8 +279,10 @@ types: $(TOOLS)/.installed $(TEST_VENV)/.installed
 		$(TOOLS)/bin/lint-imports --no-cache --config pyproject.toml
 
 # $(call preset,NAME,COMMAND): run a command of CMake's with our tools, where the presets are
+# (ninja cannot take part in this make's job server)
 define preset
-	@PATH="$(CURDIR)/$(TOOLS)/bin:$$PATH" && export PATH && cd ofx_plugin && $(2) --preset $(1)
+	@unset MAKEFLAGS && PATH="$(CURDIR)/$(TOOLS)/bin:$$PATH" && export PATH && \
+		cd ofx_plugin && $(2) --preset $(1)
 endef
 
 build-cpp: build/test-wheel.stamp
@@ -224,13 +304,26 @@ CTEST_PRESET_sanitize := sanitize
 CTEST_PRESET_threads := threads
 CTEST_PRESET_threads-short := threads-short
 
-# What it finds new goes on from run to run in build/fuzz/; a crash leaves its input there.
-test-fuzz: build-fuzz
-	@echo "== libFuzzer, $(FUZZ_SECONDS) s"
-	@mkdir -p build/fuzz/found
-	build/cmake/fuzz/tests/fuzz/fuzz_sidecar -max_total_time=$(FUZZ_SECONDS) -max_len=16384 -timeout=30 \
-		-verbosity=0 -print_final_stats=1 -artifact_prefix=build/fuzz/ \
-		build/fuzz/found tests/fuzz/corpus tests/golden/sidecars
+# What libFuzzer finds new goes on from run to run in build/fuzz/; a crash leaves its input there.
+FUZZ_SIDECARS := tests/fuzz/corpus tests/golden/sidecars
+FUZZ_CORPUS_sidecar := $(FUZZ_SIDECARS)
+FUZZ_CORPUS_copy := $(FUZZ_SIDECARS)
+FUZZ_CORPUS_node := $(FUZZ_SIDECARS)
+FUZZ_CORPUS_program := tests/fuzz/readers/program
+FUZZ_NATIVE := $(filter sidecar copy node program,$(FUZZ))
+
+.PHONY: $(addprefix fuzz-,$(FUZZ))
+test-fuzz: $(addprefix fuzz-,$(FUZZ)) ## each reader with any bytes, for FUZZ_SECONDS
+$(addprefix fuzz-,$(FUZZ_NATIVE)): fuzz-%: build-fuzz
+	@echo "== $* with any bytes (libFuzzer), $(FUZZ_SECONDS) s"
+	@mkdir -p build/fuzz/$*
+	build/cmake/fuzz/tests/fuzz/fuzz_$* -max_total_time=$(FUZZ_SECONDS) -max_len=16384 -timeout=5 \
+		-rss_limit_mb=1024 -verbosity=0 -print_final_stats=1 -artifact_prefix=build/fuzz/$*- \
+		build/fuzz/$* $(FUZZ_CORPUS_$*)
+$(addprefix fuzz-,$(filter-out $(FUZZ_NATIVE),$(FUZZ))): fuzz-%: $(TEST_VENV)/.installed
+	@echo "== $* with any bytes, $(FUZZ_SECONDS) s"
+	@PALETTE4D_REQUIRE_HOST= PALETTE4D_FUZZ_SECONDS=$(FUZZ_SECONDS) PALETTE4D_FUZZ_SEED="$$(date +%s)" \
+		$(TEST_VENV)/bin/python -P -m pytest -q -s tests/fuzz -k $* -m "not slow"
 
 # From a folder of its own, so that no file of the tree can stand in for the installed package.
 test-py: $(TEST_VENV)/.installed
@@ -241,8 +334,64 @@ test-py: $(TEST_VENV)/.installed
 		qt="-p no:pytest-qt"; }; \
 	wheel=$$(echo "$(CURDIR)"/$(TEST_WHEELS)/*.whl) && cd build/test-run && \
 		PALETTE4D_WHEEL="$$wheel" "$(CURDIR)/$(TEST_VENV)/bin/python" -P -m pytest \
-		-c "$(CURDIR)/pyproject.toml" --rootdir "$(CURDIR)" "$(CURDIR)/tests" -n $(JOBS) --durations 10 $$qt \
+		-c "$(CURDIR)/pyproject.toml" --rootdir "$(CURDIR)" "$(CURDIR)/tests" -n $(JOBS) --dist worksteal --durations 10 $$qt \
 		$(if $(SLOW),,-m "not slow") $(PYTEST_ARGS)
+
+# ---------------------------------------------------------------------------- releases
+
+# One compiler for all systems: zig, which PyPI has.
+$(RELEASE)/.installed: locks/release.txt
+	$(call new-venv,$(RELEASE)/env)
+	$(RELEASE)/env/bin/python $(PINNED)release.txt
+	@touch $@
+
+# zig's own cache, for compiled files and its run-time libraries.
+ZIG_CACHE ?= $(CURDIR)/$(RELEASE)/zig
+RELEASE_PYTHON = $(CURDIR)/$(RELEASE)/env/bin/python
+# No time of the build in what is built: 1 January 1980, where zip files begin.
+RELEASE_ENVIRONMENT = PATH="$(CURDIR)/$(RELEASE)/env/bin:$$PATH" SOURCE_DATE_EPOCH=315532800 \
+	ZIG_GLOBAL_CACHE_DIR="$(ZIG_CACHE)" ZIG_LOCAL_CACHE_DIR="$(ZIG_CACHE)" \
+	PALETTE4D_ZIG="$$($(RELEASE_PYTHON) -c 'import pathlib, ziglang; print(pathlib.Path(ziglang.__file__).with_name("zig"))')"
+SYSTEMS := linux-x86_64 linux-aarch64 windows macos-x86_64 macos-arm64
+
+# $(call release-build,CONFIGURE_PRESETS,BUILD_PRESETS)
+define release-build
+	@export $(RELEASE_ENVIRONMENT) && cd ofx_plugin && \
+		for preset in $(1); do \
+			echo "== $$preset" && cmake --preset $$preset -DPython_EXECUTABLE="$(RELEASE_PYTHON)" || exit; \
+		done && \
+		for preset in $(2); do cmake --build --preset $$preset --parallel $(JOBS) || exit; done
+endef
+
+$(BUNDLES)/SHA256SUMS: $(SOURCES) $(RELEASE)/.installed tools/assemble_bundle.py
+	@echo "== the OpenFX bundle for every system (takes 10 to 20 minutes the first time)"
+	$(call release-build,$(SYSTEMS),$(SYSTEMS))
+	@$(RELEASE_PYTHON) tools/assemble_bundle.py build/cmake $(BUNDLES)
+
+bundles: $(BUNDLES)/SHA256SUMS ## the OpenFX bundle for every system
+
+# The tree once more, in another folder and with an empty cache, must give the same bytes.
+bundles-again: $(BUNDLES)/SHA256SUMS
+	@echo "== the bundle once more, elsewhere"
+	@rm -rf $(RELEASE)/again && mkdir -p $(RELEASE)/again/tree
+	@tar -c --exclude=./build --exclude=./.venv --exclude=./.git --exclude=./demo_output . | \
+		tar -x -C $(RELEASE)/again/tree
+	$(MAKE) -C $(RELEASE)/again/tree ZIG_CACHE="$(CURDIR)/$(RELEASE)/again/zig" bundles
+	cmp $(BUNDLES)/SHA256SUMS $(RELEASE)/again/tree/$(BUNDLES)/SHA256SUMS
+
+# Wine and qemu run what is for other systems; the tests say which package is missing.
+test-bundles: $(BUNDLES)/SHA256SUMS $(TEST_VENV)/.installed
+	$(call release-build,,windows-tests linux-aarch64-tests)
+	$(TEST_VENV)/bin/python $(PINNED)bundle-test.txt
+	@rm -rf build/test-run && mkdir -p build/test-run && cd build/test-run && \
+		PALETTE4D_BUNDLE="$(CURDIR)/$(BUNDLES)/Palette4D.ofx.bundle" PALETTE4D_REQUIRE_HOST=1 \
+		"$(CURDIR)/$(TEST_VENV)/bin/python" -P -m pytest -c "$(CURDIR)/pyproject.toml" \
+		--rootdir "$(CURDIR)" $(addprefix "$(CURDIR)"/tests/,bundles host/test_melt.py host/test_parity_node.py) \
+		-n $(JOBS) $(PYTEST_ARGS)
+
+# A wheel for each Python on PATH, repaired, checked, and run through the demo in a bare environment.
+wheels: $(BUNDLES)/SHA256SUMS ## wheels that need no compiler
+	@export $(RELEASE_ENVIRONMENT) && tools/wheels.sh $(RELEASE) "$(CURDIR)/$(BUNDLES)/Palette4D.ofx.bundle"
 
 format: $(TOOLS)/.installed ## rewrite the sources as ruff and clang-format want them
 	$(TOOLS)/bin/ruff check --fix .

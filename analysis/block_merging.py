@@ -178,3 +178,37 @@ def merge_sequence(
         current[i : i + 2] = [best.finish()]
         total += change
         yield total, list(current)
+
+
+def placed(
+    blocks: Sequence[Block],
+    few: Sequence[FrameStatistics],
+    frames: Sequence[FrameStatistics],
+    options: AnalysisOptions,
+) -> tuple[list[Block], list[FrameStatistics]]:
+    """Return blocks of `few` frames with their ends at neighbours of all `frames`; their frames.
+
+    Between the last frame of a block and the first of the next, both keep their palettes up to the
+    boundary of the least loss.
+    """
+    index = {frame.frame: i for i, frame in enumerate(frames)}
+    out, kept = [blocks[0]], [few[i] for i in range(len(blocks[0].palettes))]
+    for block in blocks[1:]:
+        start, before, own = block.first, out[-1], list(few[block.first :][: len(block.palettes)])
+        gap = frames[index[few[start - 1].frame] + 1 : index[few[start].frame]]
+        if gap:
+            early, late = before.palettes[-1], block.palettes[0]
+            first = [palette_loss(f.coarse, early.rgb, options) for f in gap]
+            second = [palette_loss(f.coarse, late.rgb, options) for f in gap]
+            at = int(np.argmin([sum(first[:n]) + sum(second[n:]) for n in range(len(gap) + 1)]))
+            if at > 0:
+                kept.append(gap[at - 1])
+                out[-1] = Block(
+                    before.first, (*before.palettes, early), (*before.losses, first[at - 1])
+                )
+            if at < len(gap):
+                own.insert(0, gap[at])
+                block = Block(start, (late, *block.palettes), (second[at], *block.losses))
+        out.append(dataclasses.replace(block, first=len(kept)))
+        kept += own
+    return out, kept

@@ -30,6 +30,9 @@ STOPPED = (
 # A pixel farther outside than this is lost: edits of the palette do not reach it. A smaller share
 # of a frame counts as hot pixels or glints.
 LOST, LOST_SHARE = 0.25, 1e-4
+# `descend`: the longest step, in colour or in parts of the clip; how much of the mean and of the
+# mean square of the gradient a step keeps; a square of the gradient that counts as zero.
+STEP, MEAN, SQUARE, TINY = 0.02, 0.9, 0.99, 1e-18
 NO_FACES: I32 = np.zeros((0, 3), np.int32)
 
 
@@ -193,4 +196,30 @@ def minimise(
         solver.optimize(np.clip(x, low, high))
     if failures:
         raise failures[0]
+    return best
+
+
+def descend(
+    objective: ValueAndGradient,
+    x: F64,
+    low: F64,
+    high: F64,
+    evaluations: int,
+    longest: float = STEP,
+) -> F64:
+    """Minimise a function inside a box by so many gradient steps; return the best point of all.
+
+    Steps follow Adam (Kingma and Ba 2015) and shrink to nothing. No line search can fail at a kink,
+    where `minimise` ends early: with many colours there are kinks everywhere.
+    """
+    best_value, best = np.inf, x
+    mean, square = np.zeros_like(x), np.zeros_like(x)
+    for k in range(1, evaluations + 1):
+        value, slope = objective(x)
+        if value < best_value:
+            best_value, best = value, x
+        mean += (1 - MEAN) * (slope - mean)
+        square += (1 - SQUARE) * (slope**2 - square)
+        length = longest * (1 - k / evaluations) / (1 - MEAN**k)
+        x = np.clip(x - length * mean / np.sqrt(square / (1 - SQUARE**k) + TINY), low, high)
     return best

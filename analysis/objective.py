@@ -7,13 +7,17 @@ the core's exact gradient.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+import functools
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
 from palette4d.analysis.losses import (
+    STEP,
     Losses,
+    ValueAndGradient,
+    descend,
     loss_weights,
     minimise,
     shaped_weights,
@@ -27,6 +31,7 @@ from palette4d.analysis.polytope import SkewPolytope
 from palette4d import _core
 
 F64 = NDArray[np.float64]
+Minimiser = Callable[[ValueAndGradient, F64, F64, F64, int], F64]
 
 # Least distance in frames between two vertices of a track: a steeper change would be a cut.
 LEAST_GAP = 0.5
@@ -80,6 +85,7 @@ def refine_jointly(
     most_evaluations: int,
     coarse: bool,
     brief: Collection[int] = (),
+    step: float = STEP,
 ) -> tuple[SkewPolytope, float]:
     """Move all vertices together in their boxes; return the polytope and the value of `Objective`.
 
@@ -91,7 +97,14 @@ def refine_jointly(
     vertices = polytope.vertices.copy()
     vertices[:, :3] = gamut.clip(vertices[:, :3])
     evaluate.fixed[list(brief)] = True
-    vertices = move_all(evaluate, vertices, most_evaluations)
+    box = evaluate.box(vertices, range(len(vertices)), share=0.5)
+    moving = np.arange(len(vertices))
+    for by in (functools.partial(descend, longest=step), minimise_closely):
+        # Near a minimum the first steps of `descend` may lead away for good.
+        moved = move(evaluate, vertices, moving, evaluate.everything, box, most_evaluations, by)
+        if not np.array_equal(moved, vertices):
+            break
+    vertices = moved
     return polytope.with_vertices(vertices), evaluate(vertices, evaluate.everything)[0]
 
 
@@ -103,6 +116,11 @@ def move_all(evaluate: Objective, vertices: F64, most_evaluations: int) -> F64:
     return move(evaluate, vertices, moving, evaluate.everything, box, most_evaluations)
 
 
+def minimise_closely(objective: ValueAndGradient, x: F64, low: F64, high: F64, most: int) -> F64:
+    """Minimise with NLopt until little changes: the paper's refinement."""
+    return minimise(objective, x, low, high, most, tolerance=1e-5)
+
+
 def move(
     evaluate: Objective,
     vertices: F64,
@@ -110,6 +128,7 @@ def move(
     which: list[int],
     box: tuple[F64, F64],
     most_evaluations: int,
+    by: Minimiser = minimise_closely,
 ) -> F64:
     """Return the vertices with those in `moving` at their best place in the box."""
 
@@ -121,7 +140,7 @@ def move(
 
     start = (vertices[moving] / evaluate.scale).ravel()
     lower, upper = ((bound / evaluate.scale).ravel() for bound in box)
-    best = minimise(objective, start, lower, upper, most_evaluations, tolerance=1e-5)
+    best = by(objective, start, lower, upper, most_evaluations)
     out = vertices.copy()
     # Scaling rounds; the clip keeps a vertex at the edge of its box inside its block.
     out[moving] = np.clip(best.reshape(-1, 4) * evaluate.scale, *box)

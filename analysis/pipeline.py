@@ -3,7 +3,7 @@
 clip -> colour_statistics -> frame_hulls -> glue -> block_merging -> vertex_removal
 -> structure_search -> stop_insertion -> vertex_refinement -> polytope -> sidecar document
 
-`baselines` holds three other methods for comparison.
+`baselines` holds the other methods; the static hull is also a start of the search.
 """
 
 from __future__ import annotations
@@ -46,11 +46,6 @@ from palette4d.media import colour_space, cuts
 from palette4d.media.array_clip import ArrayClip
 from palette4d.media.clip_base import Clip, describe, even_step
 from palette4d.media.colour_space import SpaceOptions
-
-# A palette has at least this many colours, whatever `vertices` is.
-LEAST_COLOURS = 4
-# The factor of `convexity` in a second search, after a non-convex first result.
-STIFFER = 10.0
 
 T = TypeVar("T")
 Progress = Callable[[str, int, int], object]
@@ -285,10 +280,10 @@ class _Run:
         """Measure a polytope on all colours of all frames."""
         return losses_of(polytope, self.frames, self.options)
 
-    def result(self, stage: str, polytope: SkewPolytope, blocks: int | None = None) -> StageResult:
+    def result(self, stage: str, polytope: SkewPolytope) -> StageResult:
         """Return the vertices, blocks and losses after a stage."""
-        count = len(polytope.blocks) if blocks is None else blocks
-        return StageResult(stage, len(polytope.vertices), count, self.losses(polytope))
+        losses = self.losses(polytope)
+        return StageResult(stage, len(polytope.vertices), len(polytope.blocks), losses)
 
     def record(self, stage: str, polytope: SkewPolytope) -> None:
         """Record the vertices, blocks and losses after a stage."""
@@ -298,26 +293,11 @@ class _Run:
 def _skew(run: _Run) -> SkewPolytope:
     """Sections 5.2 to 5.5. Each handle of the result is worth its cost (the default method)."""
     options = run.options
-    if most := options.vertices:  # a colour has a vertex at both ends of the clip
-        size = min(options.palette_size, max(LEAST_COLOURS, most // 2))
-        run.options = options = dataclasses.replace(options, palette_size=size)
     hulls = [_static(run), *static_hull.plain_hulls(run.frames, run.gamut, options)]
     convex = [h for h in hulls if h is hulls[0] or not _is_concave(h, run)]
-    simple = min(convex, key=lambda hull: run.losses(hull).L_prime)
-    bound = run.bound = run.losses(simple).L_prime
-    found = _searched(run, options, simple, bound)
-    if options.convexity and _is_concave(found.polytope, run):
-        stiffer = dataclasses.replace(options, convexity=STIFFER * options.convexity)
-        again = _searched(run, stiffer, simple, bound)
-        if not _is_concave(again.polytope, run):
-            found = again
-            run.notes.append(
-                "the palette was not convex: it was searched again with "
-                f"convexity={stiffer.convexity:g}"
-            )
-    polytope = found.polytope
-    run.stages += found.stages
-    run.notes += found.notes if len(polytope.blocks) > 1 else ()
+    simple = min(convex, key=lambda hull: _price(hull, run))
+    run.bound = run.losses(simple).L_prime
+    polytope = _searched(run, options, simple)
     run.record("vertex_refinement", polytope)
     run.report("vertex_refinement", 1, 1)
     if 0 < options.vertices < len(polytope.vertices):
@@ -328,62 +308,73 @@ def _skew(run: _Run) -> SkewPolytope:
     return polytope
 
 
+def _price(polytope: SkewPolytope, run: _Run, free: int = 0) -> float:
+    """Return L' and the cost of the handles but for those that are `free`."""
+    handles = len(polytope.vertices) - free
+    return run.losses(polytope).L_prime + run.options.handle_cost * handles
+
+
 def _is_concave(polytope: SkewPolytope, run: _Run) -> bool:
     return deepest_concavity(polytope, run.frames) > CONCAVE
 
 
-@dataclasses.dataclass(frozen=True)
-class _Searched:
-    polytope: SkewPolytope
-    stages: tuple[StageResult, ...]
-    notes: tuple[str, ...]
-
-
-def _searched(run: _Run, options: AnalysisOptions, simple: SkewPolytope, bound: float) -> _Searched:
-    """Run the stages from frame hulls to refinement.
-
-    L' of the result is at most `bound`, the L' of the static hull `simple`.
-    """
+def _searched(run: _Run, options: AnalysisOptions, simple: SkewPolytope) -> SkewPolytope:
+    """Run the stages from frame hulls to refinement; the result is never dearer than `simple`."""
     frames, gamut = run.frames, run.gamut
-    blocks, first = _consistent_blocks(run, options)
-    sequence = block_merging.merge_sequence(blocks, frames, gamut, options)
+    few = structure_search.key_frames(simple, frames, options, structure_search.KEY_FRAMES)
+    blocks, first = _consistent_blocks(run, few)
+    sequence = block_merging.merge_sequence(blocks, few, gamut, options)
     configurations = [merged for _, merged in run.counted("block_merging", sequence, len(blocks))]
-    starts, merged, notes = [], [], []
-    for configuration in reversed(configurations):  # fewer blocks are searched faster
+    starts, notes = [], []
+    for configuration in reversed(configurations):
         if len(configuration) <= options.blocks:
-            dense, remarks = _glued(frames, configuration)
-            merged.append(dense.polytope())
+            apart, these = block_merging.placed(configuration, few, frames, options)
+            dense, remarks = _glued(these, apart)
             notes.append(remarks)
-            losses = vertex_removal.thin_out(dense, frames, options)
-            starts.append(structure_search.Start(dense.polytope(), losses))
+            vertex_removal.thin_out(dense, these, options)
+            starts.append(dense.polytope())
     progress = run.counter("vertex_removal")
-    at, found = structure_search.search(starts, simple, frames, gamut, options, progress)
+    at, found = structure_search.search(starts, simple, few, frames, gamut, options, progress)
     with_stops = stop_insertion.insert_stops(found, frames, gamut, options)
-    stages = (
+    run.stages += [
         first,
-        run.result("block_merging", simple if at is None else merged[at]),
+        run.result("block_merging", simple if at is None else starts[at]),
         run.result("vertex_removal", with_stops[-1].polytope),
-    )
-    for one in dict.fromkeys((with_stops[-1], with_stops[0])):
-        polytope = vertex_refinement.refine(one.polytope, frames, gamut, options, one.brief)
-        if run.losses(polytope).L_prime <= bound:
-            return _Searched(polytope, stages, () if at is None else notes[at])
-    polytope = vertex_refinement.relax(simple, frames, gamut, options, bound)
-    return _Searched(polytope, stages, ())
+    ]
+    if at is not None and len(found.blocks) > 1:
+        run.notes += notes[at]
+    fits = not options.vertices or len(simple.vertices) <= options.vertices
+    bound = run.losses(simple).L_prime
+
+    def tries() -> Iterator[list[stop_insertion.WithStops]]:
+        yield with_stops
+        relaxed = vertex_refinement.relax(simple, frames, gamut, options, bound)
+        yield stop_insertion.insert_stops(relaxed, frames, gamut, options)
+
+    for tried in tries():
+        for one in dict.fromkeys((tried[-1], tried[0])):
+            polytope = vertex_refinement.refine(one.polytope, frames, gamut, options, one.brief)
+            stops = len(one.polytope.vertices) - len(tried[0].polytope.vertices)
+            # Stops need not be worth their cost.
+            if not fits or _price(polytope, run, stops) <= _price(simple, run):
+                return polytope
+    return tried[0].polytope
 
 
-def _consistent_blocks(run: _Run, options: AnalysisOptions) -> tuple[list[Block], StageResult]:
+def _consistent_blocks(
+    run: _Run, frames: Sequence[FrameStatistics]
+) -> tuple[list[Block], StageResult]:
     """Return blocks of topologically consistent frames (sections 5.2 and 5.3.1)."""
-    frames = run.frames
-    hulls = (frame_hulls.frame_palette(f.coarse, run.gamut, options) for f in frames)
+    hulls = (frame_hulls.frame_palette(f.coarse, run.gamut, run.options) for f in frames)
     palettes = list(run.counted("frame_hulls", hulls, len(frames)))
     pairs = (glue.glue(a, b) for a, b in itertools.pairwise(palettes))
     glued = list(run.counted("glue", pairs, len(frames) - 1))
     links = [g.links if g.consistent else None for g in glued]
-    blocks = block_merging.initial_blocks(frames, palettes, links, options)
+    blocks = block_merging.initial_blocks(frames, palettes, links, run.options)
     times = [f.frame for f in frames]
-    dense = DensePolytope(times, [[p] for p in palettes], [g.links for g in glued])
-    return blocks, run.result("frame_hulls", dense.polytope(), len(blocks))
+    dense = DensePolytope(times, [[p] for p in palettes], [g.links for g in glued]).polytope()
+    losses = losses_of(dense, frames, run.options)
+    return blocks, StageResult("frame_hulls", len(dense.vertices), len(blocks), losses)
 
 
 def _glued(
@@ -416,7 +407,7 @@ def _glued(
 def _paper(run: _Run) -> SkewPolytope:
     """Sections 5.2 to 5.5 with the thresholds of the paper."""
     frames, gamut, options = run.frames, run.gamut, run.options
-    blocks, first = _consistent_blocks(run, options)
+    blocks, first = _consistent_blocks(run, frames)
     run.stages.append(first)
     blocks = paper_thresholds.merge_blocks(
         blocks, frames, gamut, options, run.counter("block_merging")

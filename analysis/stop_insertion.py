@@ -7,10 +7,10 @@ median's, and those with lost pixels (`LOST`).
 
 The colours outside the palette of such a frame get a stop on a track near them, with or without
 stops before and after that keep the rest of the track where it is. In the clip's first and last
-frame the vertex of the track itself takes the colour. A stop need not be worth `handle_cost`, which
-judges the mean. It stays if it removes most of the frame's misfit at little cost elsewhere: where
-pixels are lost, the value of `Objective` may rise by `WORTH`. Its edges count little in eq. 11,
-which would otherwise rather lose the colour than let it change quickly.
+frame the vertex of the track itself takes the colour. A stop stays if it removes most of the
+frame's misfit and is worth its `handle_cost`. Where pixels are lost it need not be, as the cost
+judges the mean: the value of `Objective` may even rise by `WORTH`. Its edges count little in
+eq. 11, which would otherwise rather lose the colour than let it change quickly.
 """
 
 from __future__ import annotations
@@ -72,9 +72,9 @@ def insert_stops(
             if options.vertices and len(trial.polytope.vertices) > options.vertices:
                 continue
             moved, change = _settled(now, trial, frames, gamut, options)
-            if change > (WORTH if trial.share else 0):
-                continue
             price = change + options.handle_cost * len(trial.new)
+            if change > WORTH if trial.share else price > 0:
+                continue
             rest = _Misfit.of(moved.polytope, [frames[i] for i in trial.span], gamut, options)
             removed = [misfit.removed(i, rest, at, trial.share) for at, i in enumerate(trial.span)]
             left = removed.count(False)

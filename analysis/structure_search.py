@@ -1,46 +1,49 @@
-"""Structure search: the vertices that are worth their cost.
+"""Structure search: the handles that are worth their cost.
 
 Input: polytopes to start from (the configurations of block merging, thinned out) and a static hull.
-Output: the polytope of the least price, refined on coarse colours. From each start vertices are
-removed one by one, and after each removal all others move jointly to take over. The price is what
-is minimised, eq. 12 with the terms for shape, plus `handle_cost` a vertex: a vertex stays only if
-the value would rise by more without it. The paper's rule, a multiple of the loss before removal
-(section 5.4.2), does not measure the use of a vertex. A clip that starts with a small loss keeps
-handles that nobody sees, and others lose handles that they need.
+Output: the polytope of the least price, refined on coarse colours. The price is what is minimised,
+eq. 12 with the terms for shape, plus `handle_cost` a vertex.
+
+From each start a walk goes down from rich to poor. Each step takes away the vertex whose loss costs
+least, and all others move jointly to take over. Then the walk goes back to its best palette, takes
+a whole colour away (`moves`), and goes down again, until no poorer palette can be the best. The
+walks do not depend on `handle_cost`, `vertices` and `blocks`, which only choose among the palettes
+found. So a dearer handle never means more handles, and more of what is allowed nothing worse.
+
+The paper's rule, a multiple of the loss before removal (section 5.4.2), does not measure the use of
+a vertex.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from palette4d.analysis import moves
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
-from palette4d.analysis.losses import shaped_weights, smoothness
+from palette4d.analysis.losses import loss_weights, shaped_weights, smoothness
 from palette4d.analysis.objective import frame_losses, refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import SkewPolytope
 
 F64 = NDArray[np.float64]
 
-# Evaluations of joint moves: at the start, after each removal, and before results are compared.
+# Evaluations of joint moves: at the start of a walk, after each step, before palettes are compared.
 FIRST_EVALUATIONS, EVALUATIONS, COMPARE_EVALUATIONS = 50, 20, 40
-# Above this many vertices a tenth of them is removed at once.
-SINGLY = 40
-# The search ends when the price is this far above the least price so far.
-PATIENCE = 0.02
-# Removal measures these evenly spaced frames, and those with the largest losses.
-EVEN_FRAMES, WORST_FRAMES = 24, 8
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Start:
-    """A polytope to start from, and the loss of each frame of the clip with it."""
-
-    polytope: SkewPolytope
-    losses: F64
+STEP = 0.01
+# The palettes of a walk are compared at this cost, whatever `handle_cost` is.
+USUAL_COST = AnalysisOptions().handle_cost
+# A walk ends at a price this share above the least so far.
+PATIENCE = 0.08
+# Palettes whose price is this share above the least are refined before they are compared.
+CLOSE = 0.05
+# Of the colours that may go, those that cost least at once are tried.
+COLOURS_TRIED = 3
+# The search looks at these evenly spaced frames, and those with the largest losses.
+KEY_FRAMES, EVEN_FRAMES, WORST_FRAMES = 48, 24, 8
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -50,14 +53,20 @@ class Priced:
     polytope: SkewPolytope
     value: float
 
-    def price(self, options: AnalysisOptions) -> float:
+    @property
+    def handles(self) -> int:
+        """The number of vertices."""
+        return len(self.polytope.vertices)
+
+    def price(self, cost: float) -> float:
         """Return the value plus the cost of the vertices."""
-        return self.value + options.handle_cost * len(self.polytope.vertices)
+        return self.value + cost * self.handles
 
 
 def search(
-    starts: Sequence[Start],
+    starts: Sequence[SkewPolytope],
     static: SkewPolytope,
+    few: Sequence[FrameStatistics],
     frames: Sequence[FrameStatistics],
     gamut: Gamut,
     options: AnalysisOptions,
@@ -65,80 +74,183 @@ def search(
 ) -> tuple[int | None, SkewPolytope]:
     """Return which start the best polytope comes from (None: the static hull), and the polytope.
 
-    The starts come in the order of their cost: the first results shorten the search of the others.
+    The starts come in the order of their blocks. A start with more blocks than one that did not
+    pay is not searched.
     """
+    some = few if len(few) <= EVEN_FRAMES else key_frames(static, few, options, EVEN_FRAMES)
+    ends = {time for start in starts for b in start.blocks for time in (b.first, b.last)}
+    ends |= {frame.frame for frame in some}
+    some = [frame for frame in frames if frame.frame in ends]
+    found: list[tuple[Priced, int | None]]
+    found = [(one, None) for one in walk(static, some, gamut, options, [])]
+    least = math.inf
+    for at, start in enumerate(starts):
+        known = [one for one, _ in found]
+        steps = walk(start, some, gamut, options, known)
+        best = min(steps, key=_usual_price)
+        if _usual_price(best) < (1 + CLOSE) * min(map(_usual_price, known)):
+            steps += walk(moves.enriched(best.polytope), some, gamut, options, [*known, *steps])
+        found += [(one, at) for one in steps]
+        progress(at + 1, len(starts))
+        usual = min(map(_usual_price, steps))
+        if usual > least:
+            break
+        least = usual
+    return _best(found, frames, gamut, options)
 
-    def compared(polytope: SkewPolytope) -> Priced:
-        refined = refine_jointly(polytope, frames, gamut, options, COMPARE_EVALUATIONS, True)
-        return Priced(*refined)
 
-    bound, found = math.inf, list[Priced]()
-    for at, start in enumerate(starts, start=1):
-        some = [frames[i] for i in search_frames(start, frames)]
-        best = choose(remove_singly(start.polytope, some, gamut, options, bound), options)
-        bound = min(bound, best.price(options))
-        found.append(compared(best.polytope))
-        progress(at, len(starts))
-    found.append(compared(static))
-    chosen = choose(found, options)
-    at = found.index(chosen)
-    return (at if at < len(starts) else None), chosen.polytope
+def _usual_price(one: Priced) -> float:
+    return one.price(USUAL_COST)
 
 
-def search_frames(start: Start, frames: Sequence[FrameStatistics]) -> list[int]:
-    """Return indices of frames that stand for all: evenly spaced, the worst, the blocks' ends."""
+def _best(
+    found: Sequence[tuple[Priced, int | None]],
+    frames: Sequence[FrameStatistics],
+    gamut: Gamut,
+    options: AnalysisOptions,
+) -> tuple[int | None, SkewPolytope]:
+    """Return the best of all that was found, measured on all frames, and its start."""
+    everything = [one for one, _ in found]
+    bound = (1 + CLOSE) * choose(everything, options).price(options.handle_cost)
+    close: dict[tuple[int | None, tuple[int, ...]], Priced] = {}
+    for one, at in found:
+        if one.price(options.handle_cost) <= bound and allowed(one, everything, options):
+            topology = at, tuple(len(block.tracks) for block in one.polytope.blocks)
+            other = close.setdefault(topology, one)
+            if one.price(options.handle_cost) < other.price(options.handle_cost):
+                close[topology] = one
+    best: tuple[float, int | None, SkewPolytope] | None = None
+    for (at, _), one in close.items():
+        refined = Priced(
+            *refine_jointly(one.polytope, frames, gamut, options, COMPARE_EVALUATIONS, True)
+        )
+        price = refined.price(options.handle_cost)
+        if best is None or price < best[0]:
+            best = price, at, refined.polytope
+    assert best is not None  # the static hull is always found
+    return best[1], best[2]
+
+
+def key_frames(
+    static: SkewPolytope,
+    frames: Sequence[FrameStatistics],
+    options: AnalysisOptions,
+    even: int,
+) -> list[FrameStatistics]:
+    """Return frames that stand for all: evenly spaced, and those that one palette fits worst."""
     count = len(frames)
-    ends = {time for block in start.polytope.blocks for time in (block.first, block.last)}
-    chosen = set(range(0, count, max(1, -(-count // EVEN_FRAMES))))
-    chosen |= {i for i, frame in enumerate(frames) if frame.frame in ends}
-    chosen |= set(np.argsort(-start.losses, kind="stable")[:WORST_FRAMES].tolist())
-    return sorted(chosen)
+    chosen = set(range(0, count, max(1, -(-count // even)))) | {count - 1}
+    rows = frame_losses(static, frames, range(count), loss_weights(options), options, coarse=True)
+    losses = options.lambda_ * rows[:, 0] + rows[:, 1]
+    chosen |= set(np.argsort(-losses, kind="stable")[:WORST_FRAMES].tolist())
+    return [frames[i] for i in sorted(chosen)]
 
 
-def remove_singly(
+def walk(
     polytope: SkewPolytope,
     frames: Sequence[FrameStatistics],
     gamut: Gamut,
     options: AnalysisOptions,
-    bound: float = math.inf,
+    known: Sequence[Priced],
 ) -> list[Priced]:
-    """Return the polytope with fewer and fewer vertices, most vertices first.
+    """Return the palettes on the way down from a polytope, all its colours first.
 
-    Ends when no vertex can go, or when the price is unlikely to fall below the best so far, or
-    below `bound`, the price from another start. `frames` may be a choice of the clip's frames.
+    Ends when no colour can go, or when poorer palettes cannot be the best of these and of those
+    `known`. `frames` may be a choice of the clip's frames.
     """
-    found = [Priced(*refine_jointly(polytope, frames, gamut, options, FIRST_EVALUATIONS, True))]
-    fewest = len(polytope.vertices) - len(polytope.removable())
+    found: list[Priced] = []
+    first = Priced(*refine_jointly(polytope, frames, gamut, options, FIRST_EVALUATIONS, True))
     while True:
+        steps = remove_singly(first, frames, gamut, options, [*known, *found])
+        found += steps
+        best = min(steps, key=lambda one: one.price(USUAL_COST))
+        poorer = [
+            moves.without_chain(best.polytope, chain)
+            for chain in _dispensable(best.polytope, frames, gamut, options)
+        ]
+        if not poorer:
+            return found
+        first = min(
+            (Priced(*refine_jointly(p, frames, gamut, options, EVALUATIONS, True)) for p in poorer),
+            key=lambda one: one.value,
+        )
+        if hopeless(first, found, [*known, *found], options):
+            return [*found, first]
+
+
+def remove_singly(
+    first: Priced,
+    frames: Sequence[FrameStatistics],
+    gamut: Gamut,
+    options: AnalysisOptions,
+    known: Sequence[Priced] = (),
+) -> list[Priced]:
+    """Return a palette with fewer and fewer vertices, most vertices first.
+
+    Ends when no vertex can go, or when poorer palettes cannot be the best.
+    """
+    found = [first]
+    while not hopeless(found[-1], found, [*known, *found], options):
         last = found[-1]
-        count = len(last.polytope.vertices)
-        best = min(one.price(options) for one in found)
-        if options.vertices == 0 or count <= options.vertices:
-            if last.price(options) > best + PATIENCE:
-                break
-            # Values rarely fall as vertices go.
-            least = last.value + options.handle_cost * fewest
-            if options.vertices == 0 and least > bound + PATIENCE:
-                break
         cheapest = _cheapest(last.polytope, frames, gamut, options)
         if not cheapest:
             break
         rest = last.polytope
-        for vertex in sorted(cheapest[: count // 10 if count > SINGLY else 1], reverse=True):
+        for vertex in sorted(cheapest[: max(1, len(cheapest) // 3)], reverse=True):
             rest = rest.without(vertex)
-        found.append(Priced(*refine_jointly(rest, frames, gamut, options, EVALUATIONS, True)))
+        found.append(
+            Priced(*refine_jointly(rest, frames, gamut, options, EVALUATIONS, True, step=STEP))
+        )
     return found
 
 
+def hopeless(
+    one: Priced, found: Iterable[Priced], known: Iterable[Priced], options: AnalysisOptions
+) -> bool:
+    """Return whether palettes with fewer vertices are unlikely to be the best.
+
+    They are not when prices have risen far since the best one `found` on this walk, or when the
+    value alone, which rises as vertices go, is too much beside what is `known`.
+    """
+
+    def least(of: Iterable[Priced]) -> float:
+        prices = (x.price(options.handle_cost) for x in of if allowed(x, (), options))
+        return min(prices, default=math.inf)
+
+    fewest = 2 * min(len(block.tracks) for block in one.polytope.blocks)
+    floor = one.value + options.handle_cost * min(fewest, one.handles)
+    risen = one.price(options.handle_cost) > (1 + PATIENCE) * least(found)
+    return risen or floor > least(known)
+
+
+def allowed(one: Priced, found: Sequence[Priced], options: AnalysisOptions) -> bool:
+    """Return whether a palette has at most `vertices`, or is the smallest there is."""
+    most = options.vertices or math.inf
+    return one.handles <= max(most, min((x.handles for x in found), default=0))
+
+
 def choose(found: Sequence[Priced], options: AnalysisOptions) -> Priced:
-    """Return the one of the least price; with `vertices`, the best of those with so few vertices,
-    else the smallest."""
-    if not options.vertices:
-        return min(found, key=lambda one: one.price(options))
-    few = [one for one in found if len(one.polytope.vertices) <= options.vertices]
-    if few:
-        return min(few, key=lambda one: one.value)
-    return min(found, key=lambda one: len(one.polytope.vertices))
+    """Return the allowed one of the least price."""
+    few = [one for one in found if allowed(one, found, options)]
+    return min(few, key=lambda one: one.price(options.handle_cost))
+
+
+def _dispensable(
+    polytope: SkewPolytope,
+    frames: Sequence[FrameStatistics],
+    gamut: Gamut,
+    options: AnalysisOptions,
+) -> list[tuple[int, ...]]:
+    """Return chains whose loss costs least before the others take over."""
+    weights = shaped_weights(options, gamut.scale, faces=False)
+    few = range(0, len(frames), max(1, len(frames) // WORST_FRAMES))
+    rises = []
+    for chain in moves.chains(polytope):
+        rest = moves.without_chain(polytope, chain)
+        rows = frame_losses(rest, frames, few, weights, options, coarse=True)
+        rise = float((options.lambda_ * rows[:, 0] + rows[:, 1] + rows[:, 2]).sum())
+        rises.append((rise, chain))
+    return [chain for _, chain in sorted(rises)[:COLOURS_TRIED]]
 
 
 def _cheapest(

@@ -18,7 +18,9 @@ from palette4d.analysis.objective import losses_of, refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import SkewPolytope
 
-EVALUATIONS = 150
+EVALUATIONS = 25
+# The longest step of a palette that is nearly right.
+GENTLE = 0.005
 # Distance to which look-alikes are pushed apart in a static hull that hardly moves.
 APART = 0.07
 # The factor of `convexity` for slices that are not convex.
@@ -36,12 +38,12 @@ def refine(
 
     The second result is taken if its deepest concavity is less. `brief` as in `Objective`.
     """
-    found, _ = refine_jointly(polytope, frames, gamut, options, EVALUATIONS, False, brief)
+    found, _ = refine_jointly(polytope, frames, gamut, options, EVALUATIONS, False, brief, GENTLE)
     deepest = deepest_concavity(found, frames)
     if not options.convexity or deepest <= CONCAVE:
         return found
     stiffer = dataclasses.replace(options, convexity=STIFFER * options.convexity)
-    again, _ = refine_jointly(found, frames, gamut, stiffer, EVALUATIONS, False, brief)
+    again, _ = refine_jointly(found, frames, gamut, stiffer, EVALUATIONS, False, brief, GENTLE)
     return again if deepest_concavity(again, frames) < deepest else found
 
 

@@ -2,7 +2,7 @@
 
 Analyses each clip, or piece of one, with the defaults and as static palettes: `--method static` as
 it is, and the plain hulls of `palette_size` colours that the default holds itself to, without the
-terms for shape. All of them are measured on every pixel.
+terms for shape, by L' and the cost of the handles. All of them are measured on every pixel.
 
     python benchmarks/bench_never_worse.py CLIP[:A-B[xN]] ... [--evaluator PROGRAM]
 
@@ -51,6 +51,11 @@ def measured(clip: str, frames: str | None, program: Path | None) -> dict[str, F
         return evaluator.measure(clip, palettes, program, frames)
 
 
+def price(x: Figures) -> float:
+    """L' and the cost of the handles: what the default is held to."""
+    return x.L_prime + AnalysisOptions().handle_cost * x.vertices
+
+
 def piece(text: str) -> tuple[str, str | None]:
     """Argparse type: a clip, with or without the frames of a piece."""
     clip, colon, frames = text.rpartition(":")
@@ -75,9 +80,9 @@ def main() -> None:
         figures = measured(clip, frames, args.evaluator)
         own = figures.pop("")
         convex = {way: x for way, x in figures.items() if x.concavity <= CONCAVE}
-        best = min(convex or figures, key=lambda way: figures[way].L_prime)
+        best = min(convex or figures, key=lambda way: price(figures[way]))
         bound = figures[best].L_prime
-        worse |= own.L_prime > bound + SAMPLED
+        worse |= price(own) > price(figures[best]) + SAMPLED
         concavity = evaluator.share(figures[best].concavity)
         rows.append([name, f"{bound:.4f}", concavity, f"{own.L_prime:.4f}", own.vertices, best])
         say(f"{name}: " + ", ".join(f"{way}: {x.L_prime:.4f}" for way, x in figures.items()))

@@ -6,9 +6,10 @@
 SIDECAR and CLIP are a small clip (SEASONS). `--hd` and `--long` name movies of 1920x1080 with 120
 and 800 frames; where they do not exist they are made from CLIP (some minutes). Each figure is the
 95th percentile, with the median in brackets and the processor time of all threads a step, beside
-the bar and the goal of the design. A drag counts from the gesture until the window has painted the
-picture of that colour. Others who use the machine make all figures worse, the processor time the
-least.
+the bar and the goal of the design. The peer is OpenImageIO's `ociodisplay` of the picture at the
+size of the viewer, one thread: what any viewer does for a frame. A drag counts from the gesture
+until the window has painted the picture of that colour. Others who use the machine make all
+figures worse, the peer's too.
 """
 
 from __future__ import annotations
@@ -27,15 +28,18 @@ from pathlib import Path
 os.environ["QT_QPA_PLATFORM"] = "offscreen"
 
 import numpy as np
+import OpenImageIO as oiio
 from PySide6.QtCore import QSettings
 from PySide6.QtWidgets import QApplication
 
+from palette4d.colour.ocio_config import BUILT_IN
 from palette4d.grade.document import Document
 from palette4d.media.clip import open_clip
 from palette4d.media.movie_writer import movie_writer
 from palette4d.studio import theme
+from palette4d.studio.pixels import probe_at
+from palette4d.studio.player import resampled
 from palette4d.studio.session import Session
-from palette4d.studio.viewer import probe_at
 from palette4d.studio.window import Window
 
 HD = (1920, 1080)
@@ -124,6 +128,27 @@ class Bench:
         """Paint all that has to be painted."""
         self.app.processEvents()
         self.window.viewer.repaint()
+
+    def peer(self, times: int) -> Iterator[float]:
+        """Have OpenImageIO show the frame's picture; yield the seconds of each time."""
+        viewer, session = self.window.viewer, self.session
+        assert session.player is not None
+        region = viewer.region()
+        assert region is not None
+        source = oiio.ImageBuf(resampled(session.player.read(session.frame), region))
+        for _ in range(times):
+            start = time.perf_counter()
+            shown = oiio.ImageBufAlgo.ociodisplay(
+                source,
+                "sRGB - Display",
+                "Un-tone-mapped",
+                "sRGB - Texture",
+                nthreads=1,
+                colorconfig=BUILT_IN,
+            )
+            assert not shown.has_error, shown.geterror()
+            shown.get_pixels(oiio.UINT8)
+            yield time.perf_counter() - start
 
     def drags(self, times: int) -> Iterator[float]:
         """Drag a colour; yield the seconds of each step."""
@@ -303,6 +328,7 @@ def main() -> None:
     bench = Bench(app, small, args.clip, (1290, size[1]))
     viewer = bench.window.viewer
     print(f"  viewer {viewer.width()}x{viewer.height()}")
+    show("peer, small clip", bench.peer(args.times), 33, 16)
     show("drag a colour, small clip", bench.drags(args.times), 33, 16)
     show("jump, cached, small clip", bench.jumps(args.times, cached=True), 50, 33)
     show("weights under the pointer, small clip", bench.probes(args.times), 50, 33)
@@ -312,6 +338,7 @@ def main() -> None:
     bench = Bench(app, hd, None, (2400, 1350))
     viewer = bench.window.viewer
     print(f"  viewer {viewer.width()}x{viewer.height()}")
+    show("peer, 1080p fitted", bench.peer(args.times), 50, 33)
     show("drag a colour, 1080p fitted", bench.drags(args.times), 50, 33)
     show("jump, cached, 1080p", bench.jumps(args.times, cached=True), 50, 33)
     show("jump, not decoded, 1080p", bench.jumps(args.times, cached=False), 200, 150)

@@ -4,7 +4,8 @@
 
 docs/images/demo.jpg is the demo's own plot without its polyhedra. docs/images/timeline.jpg shows
 one colour of the same palette through time, with the parts that an edit is made of named.
-docs/images/tools.jpg shows what the tools make of one frame, docs/images/ramps.jpg the three ramps.
+docs/images/tools.jpg shows what the tools make of one frame, docs/images/picks.jpg what picks make
+of several, docs/images/ramps.jpg the three ramps.
 """
 
 from __future__ import annotations
@@ -209,6 +210,42 @@ def draw_tools(demo: Path) -> None:
     _save_figure(figure, "tools.jpg")
 
 
+def draw_picks(demo: Path) -> None:
+    """Draw what picks make of frames, and of the night at the end of the clip."""
+    sidecar, clip = demo / "sample.p4d.json", p4d.open_clip(str(demo / "clip/sample.####.png"))
+    plain = p4d.load(sidecar)
+    plain.reset()
+    house: dict[str, object] = {"frame": 5, "pixel": (258, 111), "box": 5, "to": (0.1, 0.3, 0.9)}
+    sky: dict[str, object] = {"frame": 5, "by": (0.2, -0.1, -0.15)}
+
+    def picked(**how: object) -> p4d.Document:
+        document = plain.trial()
+        document.pick(clip=clip.source, **how)
+        return document
+
+    shown: list[tuple[str, int, Callable[[], p4d.Document]]] = [
+        ("the clip, frame 5", 5, lambda: plain),
+        ("pick: the red house becomes blue", 5, lambda: picked(**house)),
+        ("pick of a box: the whole sky", 5, lambda: picked(pixel=(60, 30), box=41, **sky)),
+        ("the clip, frame 28", 28, lambda: plain),
+        ("the same pick: red trees follow", 28, lambda: picked(**house)),
+        ("until frame 18, ramp of 4: they stay", 28, lambda: picked(until=18, fade=4, **house)),
+        ("the clip, frame 42", 42, lambda: plain),
+        ("night: the red is lost, the pick has ended", 42, lambda: picked(**house)),
+        ("the sky's pick: less in the dark", 42, lambda: picked(pixel=(60, 30), box=41, **sky)),
+    ]
+    first = clip.read(5)
+    figure = Figure(figsize=(16, 16 * (first.shape[0] / first.shape[1] + 0.035)), facecolor=PAGE)
+    for index, (title, frame, make) in enumerate(shown):
+        image = clip.read(frame)[..., :3]
+        axes = figure.add_subplot(3, 3, index + 1)
+        axes.imshow(np.clip(make().recolour(image, frame), 0, 1), interpolation="bicubic")
+        axes.set_title(title, color=TEXT, fontsize=13, loc="left")
+        axes.set_axis_off()
+    figure.subplots_adjust(0.01, 0.01, 0.99, 0.96, wspace=0.02, hspace=0.1)
+    _save_figure(figure, "picks.jpg")
+
+
 def draw_ramps() -> None:
     """Draw how an edit goes through four handles with each ramp."""
     document = p4d.load(GOLDEN)
@@ -248,6 +285,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         draw_timeline(demo, Path(folder))
     draw_tools(demo)
+    draw_picks(demo)
     draw_ramps()
 
 

@@ -8,7 +8,8 @@ import sys
 from itertools import groupby
 from pathlib import Path
 
-from palette4d.studio.actions import ACTIONS, GESTURES, SOLID_ACTIONS, TIMELINE_ACTIONS
+from palette4d.studio import texts
+from palette4d.studio.actions import ACTIONS, PALETTE, SOLID_ACTIONS, TIMELINE_ACTIONS
 
 PAGE = Path(__file__).resolve().parent / "studio.md"
 BEGIN = "<!-- begin: written by python docs/studio_keys.py -->"
@@ -18,24 +19,23 @@ END = "<!-- end: written by python docs/studio_keys.py -->"
 def tables() -> str:
     """Return the tables of gestures and of keys in Markdown."""
     lines = ["| where | do this | and |", "|---|---|---|"]
-    for where, gestures in groupby(GESTURES, key=lambda row: row[0]):
+    for where, gestures in groupby(texts.GESTURES, key=lambda row: row[0]):
         shown = where
         for _, gesture, what in gestures:
             lines.append(f"| {shown} | {gesture} | {what} |")
             shown = ""
     lines += ["", "| menu | action | keys |", "|---|---|---|"]
     listed = [(action, "") for action in ACTIONS]
-    listed += [(action, " (in the timeline)") for action in TIMELINE_ACTIONS]
-    listed += [(action, " (in the solid)") for action in SOLID_ACTIONS]
-    menus = list(dict.fromkeys(action.menu for action in ACTIONS))
-    for menu in menus:
-        shown = menu
+    listed += [(action, f" {texts.IN_TIMELINE}") for action in TIMELINE_ACTIONS]
+    listed += [(action, f" {texts.IN_SOLID}") for action in SOLID_ACTIONS]
+    for menu, shown in texts.MENUS.items():
         for action, where in listed:
             if action.menu == menu:
                 keys = ", ".join(f"`{key}`" for key in action.keys)
                 lines.append(f"| {shown} | {action.text} | {keys + where if keys else ''} |")
                 shown = ""
-    lines.append("|  | Use a version | `1` to `9` |")
+        if menu == PALETTE:
+            lines.append(f"|  | {texts.USE_A_VERSION} | `1` to `9` |")
     return "\n".join(lines)
 
 

@@ -82,7 +82,7 @@ def main() -> None:
 
 def whole(window: Any) -> None:
     """Select the rose of autumn."""
-    window.session.select("v14")
+    window.session.select("v13")
 
 
 def wipe(window: Any) -> None:
@@ -97,7 +97,7 @@ def timeline(window: Any) -> None:
 
 def solid(window: Any) -> None:
     """Select the rose of autumn, seen from the side."""
-    window.session.select("v14")
+    window.session.select("v13")
     window.solid.azimuth, window.solid.elevation = 24.0, 14.0
 
 

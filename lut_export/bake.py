@@ -1,8 +1,8 @@
 """Bake an edit at one time into a file, and state the error of that file.
 
 `frame_edit` is the edit. `shaper` and `lut3d` sample it, or `cdl` fits it. `formats` and `writers`
-write the file. `bake_error` reads the file back and compares it with the edit. `bake_job` repeats
-this with larger LUTs until the error is small enough.
+write the file. `bake_error` reads the file back and compares it with the edit. `measured_write`
+repeats this with larger LUTs until the error is small enough.
 """
 
 import hashlib
@@ -18,9 +18,16 @@ from palette4d.lut_export import cdl as cdls
 from palette4d.lut_export import lut3d
 from palette4d.lut_export import shaper as shapers
 from palette4d.lut_export.bake_error import SEEN, Measure, load
-from palette4d.lut_export.bake_job import BakeSettings, Job, check_same, describe, grow, judged
 from palette4d.lut_export.formats import LutFormat, format_of, with_shaper
 from palette4d.lut_export.frame_edit import frame_edit
+from palette4d.lut_export.measured_write import (
+    BakeSettings,
+    Job,
+    check_same,
+    describe,
+    grow,
+    judged,
+)
 from palette4d.lut_export.shaper import UNSHAPED, Choice, Kind, Shaper
 from palette4d.lut_export.spaces import INPUT, space_of
 

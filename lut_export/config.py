@@ -18,8 +18,6 @@ from typing import Any
 
 from palette4d.lut_export import series
 from palette4d.lut_export.bake_error import stated
-from palette4d.lut_export.bake_job import BakeSettings
-from palette4d.lut_export.between import LARGEST_DELTA_E, BetweenError, between_error, nearest
 from palette4d.lut_export.config_base import (
     ANY_SHOT,
     LUTS,
@@ -28,7 +26,9 @@ from palette4d.lut_export.config_base import (
     relocate,
     space_of_sidecar,
 )
+from palette4d.lut_export.config_error import LARGEST_DELTA_E, BetweenError, between_error, nearest
 from palette4d.lut_export.formats import LutFormat, format_named
+from palette4d.lut_export.measured_write import BakeSettings
 from palette4d.lut_export.spaces import PALETTE
 
 from palette4d import _core

@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from palette4d.lut_export.bake import bake, check_settings, check_target
-from palette4d.lut_export.bake_job import BakeSettings
 from palette4d.lut_export.formats import format_named
 from palette4d.lut_export.frame_edit import frame_text
+from palette4d.lut_export.measured_write import BakeSettings
 from palette4d.lut_export.series_index import (
     Entry,
     document_of,

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from palette4d.lut_export.bake import BakeResult
-from palette4d.lut_export.bake_job import BakeSettings
+from palette4d.lut_export.measured_write import BakeSettings
 
 from palette4d import _core
 from palette4d.common.errors import Palette4dError

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palette4d import _core
-from palette4d.colour.conversion import conversion
+from palette4d.colour.conversion_chain import conversion
 from palette4d.colour.conversion_steps import Step
 from palette4d.colour.ocio_config import (
     chosen_config,

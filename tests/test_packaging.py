@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import importlib.resources
+import json
 import os
 import re
 import subprocess
@@ -13,6 +14,8 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 import palette4d
 
@@ -125,6 +128,56 @@ def test_wheel_lays_down_nothing_else(wheel_names: list[str]) -> None:
     ]
     stray = [name for name in package if not expected.fullmatch(name)]
     assert not stray, f"not meant to be in the wheel: {stray}"
+
+
+def test_wheel_lists_what_is_compiled_into_it(wheel: Path, project_version: str) -> None:
+    """A CycloneDX list where PEP 770 has its place."""
+    with zipfile.ZipFile(wheel) as archive:
+        lists = [name for name in archive.namelist() if "/sboms/" in name]
+        assert lists == [f"palette4d-{project_version}.dist-info/sboms/palette4d.cdx.json"]
+        bill = json.loads(archive.read(lists[0]))
+    assert (bill["bomFormat"], bill["specVersion"]) == ("CycloneDX", "1.6")
+    assert bill["metadata"]["component"]["version"] == project_version
+    assert "@_" not in json.dumps(bill)
+    found = {part["name"]: part["version"] for part in bill["components"]}
+    assert {"nlohmann-json", "pybind11"} < set(found)
+    assert all(re.fullmatch(r"\d+(\.\d+)+", version) for version in found.values()), found
+
+
+LOCKED = {
+    "run": [],
+    "studio": ["studio"],
+    "test": ["test"],
+    "build": ["native"],
+    "tools": ["native", "lint"],
+    "supply": ["supply"],
+}
+
+
+@pytest.mark.parametrize("name", LOCKED)
+def test_what_make_downloads_is_pinned_with_hashes(name: str, repo_root: Path) -> None:
+    """Each requirement has one version that fits, and hashes; `make lock` mends it."""
+    text = (repo_root / "locks" / f"{name}.txt").read_text(encoding="utf-8")
+    assert "://" not in text, "the name of an index"
+    pinned: dict[str, list[Requirement]] = {}
+    for entry in re.sub(r"\\\n|^#.*\n", "", text, flags=re.MULTILINE).splitlines():
+        assert " --hash=sha256:" in entry, entry
+        one = Requirement(entry.partition(" --hash")[0])
+        pinned.setdefault(canonicalize_name(one.name), []).append(one)
+    project = tomllib.loads((repo_root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = project["optional-dependencies"]
+    asked = [] if name in ("build", "tools", "supply") else list(project["dependencies"])
+    for extra in LOCKED[name]:
+        for requirement in map(Requirement, extras[extra]):
+            if requirement.name == "palette4d":
+                asked += [line for more in requirement.extras for line in extras[more]]
+            else:
+                asked.append(str(requirement))
+    for requirement in map(Requirement, asked):
+        for one in pinned[canonicalize_name(requirement.name)]:
+            (exact,) = one.specifier
+            assert exact.operator == "=="
+            assert requirement.specifier.contains(exact.version), (requirement, one)
 
 
 def test_every_source_is_in_the_wheel(wheel_names: list[str], repo_root: Path) -> None:

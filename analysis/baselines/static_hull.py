@@ -2,7 +2,7 @@
 
 Input: the colours of all frames. Output: `SkewPolytope`s of one block whose colours do not change.
 Each colour has one vertex at the first and one at the last frame, the keyframes of section 6.2.
-Refinement uses the loss of every frame (eq. 8).
+Refinement uses the loss of evenly spaced frames (eq. 8).
 """
 
 from __future__ import annotations
@@ -21,7 +21,9 @@ from palette4d.analysis.polytope import Palette, Section, SkewPolytope
 
 F64 = NDArray[np.float64]
 
-EVALUATIONS = 100
+EVALUATIONS = 50
+# The colours of these evenly spaced frames decide.
+EVEN_FRAMES = 24
 # All frames together keep this many times the coarse colours of one frame.
 POOLED = 2
 # Static hulls start from all of these colours, a half, a quarter.
@@ -82,7 +84,8 @@ def static_polytope(
     still = polytope(
         np.column_stack([palette.rgb, np.full(count, first)]), [(i,) for i in range(count)]
     )
-    still, _ = refine_jointly(still, frames, gamut, options, EVALUATIONS, coarse=True)
+    some = [*frames[: -1 : -(-len(frames) // EVEN_FRAMES)], frames[-1]]
+    still, _ = refine_jointly(still, some, gamut, options, EVALUATIONS, coarse=True)
     faces = _unfolded(still.vertices[:, :3], faces)
     if first == last:
         return polytope(still.vertices, still.blocks[0].tracks)

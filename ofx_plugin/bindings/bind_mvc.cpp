@@ -2,7 +2,7 @@
 #include "arrays.hpp"
 #include "binders.hpp"
 #include "model/slice.hpp"
-#include "recolour/palette_body.hpp"
+#include "recolour/mvc.hpp"
 
 using namespace palette4d;
 using namespace palette4d::bindings;

@@ -1,4 +1,4 @@
-// The progressive hull in RGB and time (palette4d.analysis.rgbt_hull).
+// The progressive hull in RGB and time (palette4d.analysis.baselines.rgbt_hull).
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "convert/colour_spaces.hpp"
-#include "outputs.hpp"
+#include "output_params.hpp"
 #include "sidecar_choice.hpp"
 
 namespace palette4d::node {

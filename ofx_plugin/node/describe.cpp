@@ -1,7 +1,7 @@
 #include "describe.hpp"
 
 #include "colour_management.hpp"
-#include "outputs.hpp"
+#include "output_params.hpp"
 #include "params.hpp"
 #include "sidecar_choice.hpp"
 

@@ -4,6 +4,7 @@
 #include <memory>
 #include <new>
 
+#include "analyse_effect.hpp"
 #include "colour_management.hpp"
 #include "describe.hpp"
 #include "host.hpp"
@@ -20,20 +21,9 @@
 namespace palette4d::node {
 namespace {
 
-OfxStatus dispatch(const char* action, OfxImageEffectHandle effect, OfxPropertySetHandle in_args,
-                   OfxPropertySetHandle out_args) {
+OfxStatus grade_action(const Suites& host, const char* action, OfxImageEffectHandle effect,
+                       const Properties& in, const Properties& out) {
     const auto is = [action](const char* name) { return std::strcmp(action, name) == 0; };
-    if (is(kOfxActionLoad)) return load_suites() ? kOfxStatOK : kOfxStatErrMissingHostFeature;
-    if (is(kOfxActionUnload) || is(kOfxActionPurgeCaches)) {
-        purge_sidecars();
-        return kOfxStatOK;
-    }
-    const std::shared_ptr<const Suites> held = suites();
-    if (!held) return kOfxStatErrMissingHostFeature;
-    const Suites& host = *held;
-    const Properties in(host, in_args);
-    const Properties out(host, out_args);
-
     if (is(kOfxImageEffectActionRender)) return render(host, effect, in);
     if (is(kOfxImageEffectActionIsIdentity)) return is_identity(host, effect, in, out);
     if (is(kOfxImageEffectActionGetClipPreferences)) {
@@ -57,13 +47,31 @@ OfxStatus dispatch(const char* action, OfxImageEffectHandle effect, OfxPropertyS
     return kOfxStatReplyDefault;
 }
 
+using Action = OfxStatus (*)(const Suites& host, const char* action, OfxImageEffectHandle effect,
+                             const Properties& in, const Properties& out);
+
+template <Action act>
+OfxStatus dispatch(const char* action, OfxImageEffectHandle effect, OfxPropertySetHandle in_args,
+                   OfxPropertySetHandle out_args) {
+    const auto is = [action](const char* name) { return std::strcmp(action, name) == 0; };
+    if (is(kOfxActionLoad)) return load_suites() ? kOfxStatOK : kOfxStatErrMissingHostFeature;
+    if (is(kOfxActionUnload) || is(kOfxActionPurgeCaches)) {
+        purge_sidecars();
+        return kOfxStatOK;
+    }
+    const std::shared_ptr<const Suites> host = suites();
+    if (!host) return kOfxStatErrMissingHostFeature;
+    return act(*host, action, effect, Properties(*host, in_args), Properties(*host, out_args));
+}
+
+template <Action act>
 OfxStatus main_entry(const char* action, const void* handle, OfxPropertySetHandle in_args,
                      OfxPropertySetHandle out_args) {
     if (!action) return kOfxStatReplyDefault;
     // The standard passes effects as const pointers, but its suites take them as non-const.
     const auto effect = static_cast<OfxImageEffectHandle>(const_cast<void*>(handle));
     try {
-        return dispatch(action, effect, in_args, out_args);
+        return dispatch<act>(action, effect, in_args, out_args);
     } catch (const std::bad_alloc&) {
         return kOfxStatErrMemory;
     } catch (...) {
@@ -73,22 +81,22 @@ OfxStatus main_entry(const char* action, const void* handle, OfxPropertySetHandl
 
 void remember_host(OfxHost* host) { set_host(host); }
 
-// Raise the version when parameters change: hosts cache the description under it.
-OfxPlugin g_plugin = {kOfxImageEffectPluginApi,
-                      kOfxImageEffectPluginApiVersion,
-                      "org.palette4d.Palette4D",
-                      1,
-                      3,
-                      &remember_host,
-                      &main_entry};
+// Raise a version when its parameters change: hosts cache the description under it.
+OfxPlugin g_plugins[] = {
+    {kOfxImageEffectPluginApi, kOfxImageEffectPluginApiVersion, "org.palette4d.Palette4D", 1, 4,
+     &remember_host, &main_entry<&grade_action>},
+    {kOfxImageEffectPluginApi, kOfxImageEffectPluginApiVersion, "org.palette4d.Analyse", 1, 0,
+     &remember_host, &main_entry<&analyse_action>}};
+constexpr int kPlugins = sizeof g_plugins / sizeof *g_plugins;
 
 }  // namespace
 }  // namespace palette4d::node
 
-PALETTE4D_ENTRY int OfxGetNumberOfPlugins(void) { return 1; }
+PALETTE4D_ENTRY int OfxGetNumberOfPlugins(void) { return palette4d::node::kPlugins; }
 
 PALETTE4D_ENTRY OfxPlugin* OfxGetPlugin(int nth) {
-    return nth == 0 ? &palette4d::node::g_plugin : nullptr;
+    using namespace palette4d::node;
+    return nth >= 0 && nth < kPlugins ? &g_plugins[nth] : nullptr;
 }
 
 PALETTE4D_ENTRY OfxStatus OfxSetHost(const OfxHost* host) {

@@ -6,10 +6,12 @@
 #include <tuple>
 #include <utility>
 
+#include "analysis.hpp"
 #include "convert/colour_spaces.hpp"
 #include "handle_params.hpp"
 #include "host_time.hpp"
 #include "model/handles.hpp"
+#include "output_params.hpp"
 #include "params.hpp"
 #include "sidecar_cache.hpp"
 #include "sidecar_choice.hpp"
@@ -94,7 +96,8 @@ FrameSetup frame_setup_at(const Suites& suites, OfxImageEffectHandle effect, Ofx
     const SidecarResult& result = chosen.result;
     const std::string& path = chosen.path;
     if (!result.loaded) {
-        setup.problem = result.problem;
+        const AnalysisState analysis = analysis_state(path);
+        setup.problem = analysis.words.empty() ? result.problem : analysis.words;
         return setup;
     }
     setup.note = chosen.broken;

@@ -4,8 +4,8 @@
 #include <optional>
 #include <string>
 
+#include "draw_images.hpp"
 #include "host.hpp"
-#include "outputs.hpp"
 #include "sidecar/sidecar.hpp"
 
 namespace palette4d::node {

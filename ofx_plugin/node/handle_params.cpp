@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "model/handles.hpp"
-#include "outputs.hpp"
+#include "output_params.hpp"
 
 namespace palette4d::node {
 namespace {

@@ -31,6 +31,7 @@ bool load_suites() {
     found->thread = fetch<OfxMultiThreadSuiteV1>(*host, kOfxMultiThreadSuite, 1);
     found->message2 = fetch<OfxMessageSuiteV2>(*host, kOfxMessageSuite, 2);
     found->message = fetch<OfxMessageSuiteV1>(*host, kOfxMessageSuite, 1);
+    found->progress = fetch<OfxProgressSuiteV1>(*host, kOfxProgressSuite, 1);
     if (!found->property || !found->parameter || !found->effect) return false;
     found->is_natron = Properties(*found, found->host).get_int("NatronOfxHostIsNatron") == 1;
     std::atomic_store(&g_suites, std::shared_ptr<const Suites>(std::move(found)));

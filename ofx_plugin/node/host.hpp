@@ -19,6 +19,7 @@ struct Suites {
     const OfxMultiThreadSuiteV1* thread = nullptr;  ///< optional
     const OfxMessageSuiteV1* message = nullptr;     ///< optional
     const OfxMessageSuiteV2* message2 = nullptr;    ///< optional
+    const OfxProgressSuiteV1* progress = nullptr;   ///< optional
     /// Detected by a property of Natron's own, because the user can change the host's name.
     bool is_natron = false;
 };

@@ -1,13 +1,16 @@
 #include "instance.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <memory>
 #include <optional>
 
+#include "analysis.hpp"
+#include "buttons.hpp"
 #include "handle_params.hpp"
 #include "host_time.hpp"
-#include "outputs.hpp"
+#include "output_params.hpp"
 #include "params.hpp"
 #include "sidecar_choice.hpp"
 #include "speed_mode.hpp"
@@ -61,6 +64,7 @@ void show(const Suites& suites, OfxImageEffectHandle effect, const std::string& 
 const char* step_after(const std::string& param) {
     if (param == kParamSidecar) return "Show the sidecar's handles";
     if (param == kParamResetHandles) return "Reset handles";
+    if (param == kParamAnalyse) return "Analyse the clip";
     return param.rfind("handle", 0) == 0 ? "Use the handle" : "Follow the sidecar";
 }
 
@@ -103,6 +107,9 @@ void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const P
     // Natron holds a mutex while paramEditEnd calls the plugin back, which then deadlocks.
     if (!suites.is_natron) params.one_undo_step(step_after(param));
     Chosen chosen = chosen_sidecar(params);
+    std::string pushed;
+    if (param == kParamReload) forget_failed_analyses();
+    if (param == kParamAnalyse) pushed = push_analyse(params, chosen);
     const std::string copy = keep_files(params, chosen, param);
     // Not under the instance's lock: setting a parameter may make the host wait for a render.
     const std::shared_ptr<Instance> instance = find(effect);
@@ -126,6 +133,7 @@ void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const P
     std::string shown;
     const Sidecar* sidecar = chosen.sidecar();
     const std::optional<OfxTime> time = args.get_double(kOfxPropTime);
+    std::optional<double> frame;
     if (sidecar && time) {
         const TimeSettings settings = time_settings_at(params, *time);
         // Before the first render, assume that media frame and time are equal, as on Resolve's
@@ -136,12 +144,17 @@ void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const P
         const FrameAt at =
             frame_at(sidecar->clip, settings, host_clip(suites, effect, source_frame), *time);
         shown = words_of(*time, at);
+        if (std::isfinite(at.frame)) {
+            frame = std::clamp(at.frame, static_cast<double>(sidecar->clip.first),
+                               static_cast<double>(sidecar->clip.last));
+        }
         if (mode_at(params, *time) != Mode::kExact && std::isfinite(at.frame)) {
             const auto lattice = chosen.result.loaded->ready_lattice_at(
                 at.frame, edits_at(params, *sidecar, *time).edits);
             if (lattice && lattice->largest_error() > 0) shown += "\n" + words_of(*lattice);
         }
     }
+    if (param == kParamOpenInStudio) pushed = push_open_in_studio(params, chosen, frame);
     std::string expects;
     if (sidecar) {
         const bool in_palette_space = params.int_now(kParamPictureIn).value_or(0) == 1;
@@ -149,7 +162,11 @@ void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const P
                                                  ? "scene-linear light"
                                                  : encoding_of(*sidecar, in_palette_space));
     }
-    const std::string text = status_of(chosen, handles_in_use(params), expects, copy, shown);
+    const AnalysisState analysis = analysis_state(analysis_target(params, chosen));
+    // The file that an analysis will write is not missing.
+    if (analysis.running && !chosen.result.loaded) chosen.result.problem.clear();
+    const std::string text =
+        status_of(chosen, {pushed, analysis.words}, handles_in_use(params), {expects, copy, shown});
     if (params.string_now(kParamStatus) != text) params.note_string(kParamStatus, text);
 }
 

@@ -6,6 +6,7 @@
 #include "ofxMessage.h"
 #include "ofxMultiThread.h"
 #include "ofxParam.h"
+#include "ofxProgress.h"
 #include "ofxProperty.h"
 
 // From OFX 1.4 (in ofxGPURender.h, which we do not need otherwise) and OFX 1.5.1.

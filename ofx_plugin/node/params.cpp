@@ -4,16 +4,13 @@
 
 #include "handle_params.hpp"
 #include "host_time.hpp"
-#include "outputs.hpp"
+#include "output_params.hpp"
 #include "param_define.hpp"
 #include "sidecar_choice.hpp"
 #include "speed_mode.hpp"
 
 namespace palette4d::node {
-void define_params(const Suites& suites, OfxParamSetHandle params) {
-    ParamDefiner define(suites, params);
-    define_file_params(define);
-
+void define_status(ParamDefiner& define, const Suites& suites) {
     const Properties status =
         define.text({kParamStatus, "Status",
                      "The loaded sidecar and the frame shown, or what is wrong with the sidecar."},
@@ -22,6 +19,13 @@ void define_params(const Suites& suites, OfxParamSetHandle params) {
     status.set_int(kOfxParamPropEnabled, suites.is_natron);
     status.set_int(kOfxParamPropEvaluateOnChange, 0);
     status.set_int(kOfxParamPropCanUndo, 0);
+}
+
+void define_params(const Suites& suites, OfxParamSetHandle params) {
+    ParamDefiner define(suites, params);
+    define_file_params(define);
+
+    define_status(define, suites);
     define.number({kParamStrength, "Strength",
                    "How much of the edit applies: 0 is the original picture, 1 the full edit."},
                   {1, 0, 1, 0, 1}, 0.01, 3, true);

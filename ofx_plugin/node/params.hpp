@@ -6,6 +6,7 @@
 #include <string>
 
 #include "host.hpp"
+#include "param_define.hpp"
 
 namespace palette4d::node {
 
@@ -13,6 +14,9 @@ inline constexpr const char* kParamSidecar = "sidecar";
 inline constexpr const char* kParamStrength = "strength";
 inline constexpr const char* kParamFrameOffset = "frameOffset";
 inline constexpr const char* kParamStatus = "status";
+
+/// The line that says what was loaded, or what is wrong.
+void define_status(ParamDefiner& define, const Suites& suites);
 
 /// Defines them in a context's descriptor. What the host refuses keeps the host's default.
 void define_params(const Suites& suites, OfxParamSetHandle params);

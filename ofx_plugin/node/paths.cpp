@@ -5,11 +5,34 @@
 #include <cstdlib>
 #include <cstring>
 #include <vector>
+#if defined(_WIN32)
+#if !defined(NOMINMAX)
+#define NOMINMAX
+#endif
+#include <windows.h>
+#endif
 
 namespace palette4d::node {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// A variable of the environment, in UTF-8.
+std::optional<std::string> variable(const std::string& name) {
+#if defined(_WIN32)
+    const fs::path wide = native(name);
+    std::wstring value(32768, L'\0');  // the most that Windows allows
+    SetLastError(ERROR_SUCCESS);
+    const DWORD length =
+        GetEnvironmentVariableW(wide.c_str(), value.data(), static_cast<DWORD>(value.size()));
+    if (length == 0 && GetLastError() == ERROR_ENVVAR_NOT_FOUND) return std::nullopt;
+    value.resize(length);
+    return fs::path(value).u8string();
+#else
+    const char* value = std::getenv(name.c_str());
+    return value ? std::optional<std::string>(value) : std::nullopt;
+#endif
+}
 
 #if defined(_WIN32)
 constexpr char kSeparator = ';';
@@ -63,6 +86,10 @@ std::string unpasted(std::string path) {
             plain += path[at];
         }
     }
+#if defined(_WIN32)
+    // file:///C:/… leaves /C:/….
+    if (plain.size() > 2 && plain[0] == '/' && plain[2] == ':') plain.erase(0, 1);
+#endif
     return plain;
 }
 
@@ -72,7 +99,7 @@ constexpr const char* kProject = "[Project]/";
 /// that prefix where the whole is no file and the rest is one of our forms.
 std::string without_project(const std::string& path) {
     std::error_code error;
-    if (fs::u8path(path).is_relative() || fs::exists(fs::u8path(expanded(path)), error)) {
+    if (native(path).is_relative() || fs::exists(native(expanded(path)), error)) {
         return path;
     }
     for (std::size_t at = path.find('/', 1); at != std::string::npos; at = path.find('/', at + 1)) {
@@ -83,8 +110,7 @@ std::string without_project(const std::string& path) {
         const bool quoted = (starts("\"") || starts("'")) && rest.size() > 1 &&
                             rest.find(rest[0], 1) == rest.size() - 1;
         // A variable further inside a path of the user's own is a folder's name.
-        const bool variable =
-            (starts("$") || starts("%")) && fs::u8path(expanded(rest)).is_absolute();
+        const bool variable = (starts("$") || starts("%")) && native(expanded(rest)).is_absolute();
         if (variable || rest == "~" || starts("~/") || starts("file:/") || quoted) return rest;
     }
     return path;
@@ -92,12 +118,11 @@ std::string without_project(const std::string& path) {
 
 std::vector<fs::path> search_folders(const std::string& folder) {
     std::vector<fs::path> folders;
-    if (!folder.empty()) folders.push_back(fs::u8path(expanded(folder)));
-    const char* list = std::getenv(kSearchPath);
-    std::string rest = list ? list : "";
+    if (!folder.empty()) folders.push_back(native(expanded(folder)));
+    std::string rest = variable(kSearchPath).value_or("");
     while (!rest.empty()) {
         const std::size_t end = std::min(rest.find(kSeparator), rest.size());
-        if (end > 0) folders.push_back(fs::u8path(expanded(rest.substr(0, end))));
+        if (end > 0) folders.push_back(native(expanded(rest.substr(0, end))));
         rest.erase(0, end + 1);
     }
     return folders;
@@ -125,29 +150,70 @@ std::size_t without_number(const std::string& stem) {
 
 /// A clip's name without extension and, for a sequence, without frame number.
 std::string clip_name(const std::string& path) {
-    const fs::path file = fs::u8path(path);
+    const fs::path file = native(path);
     const std::string stem = file.stem().u8string();
     return is_still(file) ? stem.substr(0, without_number(stem)) : stem;
 }
 
 }  // namespace
 
+fs::path native(const std::string& utf8) {
+#if defined(_WIN32)
+    // The standard library throws where bytes are no UTF-8.
+    const auto convert = [&](wchar_t* to, int most) {
+        return MultiByteToWideChar(CP_UTF8, 0, utf8.data(), static_cast<int>(utf8.size()), to,
+                                   most);
+    };
+    std::wstring wide(static_cast<std::size_t>(convert(nullptr, 0)), L'\0');
+    convert(wide.data(), static_cast<int>(wide.size()));
+    return wide;
+#else
+    return fs::u8path(utf8);
+#endif
+}
+
 std::optional<std::string> find_beside(const std::string& media, const std::string& folder) {
-    const fs::path file = fs::u8path(media);
+    const fs::path file = native(media);
     if (!file.has_filename()) return std::nullopt;
     std::vector<fs::path> folders = search_folders(meant(folder));
     folders.insert(folders.begin(), file.parent_path());
     for (const fs::path& base : folders) {
         for (const std::string& name : {file.stem().u8string(), clip_name(media)}) {
-            const fs::path path = base / fs::u8path(name + kEnding);
+            const fs::path path = base / native(name + kEnding);
             if (is_file(path)) return path.u8string();
         }
     }
     return std::nullopt;
 }
 
+std::string sidecar_beside(const std::string& clip) {
+    return (native(clip).parent_path() / native(clip_name(clip) + kEnding)).u8string();
+}
+
+std::string clip_spec(const std::string& media) {
+    const fs::path file = native(media);
+    if (!is_still(file)) return media;
+    std::string stem = file.stem().u8string();
+    std::size_t begin = stem.find_first_of("0123456789", without_number(stem));
+    if (begin == std::string::npos) return media;
+    const std::size_t digits = stem.find_first_not_of("0123456789", begin);
+    const std::size_t width = std::min(digits, stem.size()) - begin;
+    std::size_t end = begin + width;
+    if (begin > 0 && stem[begin - 1] == '[') {
+        const std::size_t close = stem.find(']', begin);
+        if (close != std::string::npos) {
+            --begin;
+            end = close + 1;
+        }
+    } else if (begin > 0 && stem[begin - 1] == '%') {
+        return media;
+    }
+    stem.replace(begin, end - begin, width, '#');
+    return (file.parent_path() / native(stem + file.extension().u8string())).u8string();
+}
+
 std::optional<double> first_number(const std::string& media) {
-    const fs::path file = fs::u8path(media);
+    const fs::path file = native(media);
     if (!is_still(file)) return std::nullopt;
     const std::string stem = file.stem().u8string();
     const std::string rest = stem.substr(without_number(stem));
@@ -168,8 +234,8 @@ std::string expanded(const std::string& path) {
     std::size_t at = 0;
     if (!path.empty() && path[0] == '~' &&
         (path.size() == 1 || path[1] == '/' || path[1] == '\\')) {
-        if (const char* home = std::getenv(kHome)) {
-            result = home;
+        if (const auto home = variable(kHome)) {
+            result = *home;
             at = 1;
         }
     }
@@ -181,9 +247,9 @@ std::string expanded(const std::string& path) {
             continue;
         }
         const std::size_t end = variable_at(path, at, name);
-        const char* value = name.empty() ? nullptr : std::getenv(name.c_str());
+        const auto value = name.empty() ? std::nullopt : variable(name);
         if (value) {
-            result += value;
+            result += *value;
             at = end;
         } else {
             result += c;
@@ -198,7 +264,7 @@ std::optional<std::string> find_file(const std::string& path, const std::string&
     if (plain != path) {
         if (const auto found = find_file(plain, folder)) return found;
     }
-    const fs::path given = fs::u8path(expanded(path));
+    const fs::path given = native(expanded(path));
     if (given.empty()) return std::nullopt;
     if (given.is_absolute() && is_file(given)) return given.u8string();
     const std::vector<fs::path> folders = search_folders(meant(folder));
@@ -220,14 +286,14 @@ std::string words_of_missing(const std::string& given_path) {
     for (std::size_t at = 0; at < path.size(); ++at) {
         if (path[at] != '$' && path[at] != '%') continue;
         const std::size_t end = variable_at(path, at, name);
-        if (!name.empty() && !std::getenv(name.c_str())) {
+        if (!name.empty() && !variable(name)) {
             return "the host's environment has no variable " + name +
                    "; set it and restart the host, or write its value into the path";
         }
         at = end - 1;
     }
     std::error_code error;
-    const fs::path given = fs::u8path(expanded(path));
+    const fs::path given = native(expanded(path));
     if (fs::exists(given, error)) return "";
     const bool relative = given.is_relative();
     std::string words = "the file does not exist";
@@ -240,9 +306,9 @@ std::string words_of_missing(const std::string& given_path) {
 
 std::string clip_folder(const std::string& path, const std::string& source) {
     std::error_code error;
-    const fs::path sidecar = fs::absolute(fs::u8path(path), error);
+    const fs::path sidecar = fs::absolute(native(path), error);
     if (error || source.empty()) return "";
-    const fs::path frames = (sidecar.parent_path() / fs::u8path(source)).lexically_normal();
+    const fs::path frames = (sidecar.parent_path() / native(source)).lexically_normal();
     const fs::path folder = frames.parent_path();
     return fs::is_directory(folder, error) ? folder.u8string() : "";
 }

@@ -10,6 +10,9 @@ namespace palette4d::node {
 /// Folders in which the node searches sidecars, separated as in PATH.
 inline constexpr const char* kSearchPath = "PALETTE4D_PATH";
 
+/// The path that a host gives in UTF-8. On Windows bytes that are no UTF-8 become U+FFFD.
+std::filesystem::path native(const std::string& utf8);
+
 /// The path (UTF-8) with a leading ~ and $NAME, ${NAME} and %NAME% replaced from the environment.
 /// Unknown names stay as they are.
 std::string expanded(const std::string& path);
@@ -26,6 +29,13 @@ std::string meant(const std::string& path);
 /// The sidecar of a media file by its name: `shot.mov` and `shot.1001.exr` have `shot.p4d.json`.
 /// Searched beside the media, in `folder` and in PALETTE4D_PATH. Empty when there is none.
 std::optional<std::string> find_beside(const std::string& media, const std::string& folder);
+
+/// Where the sidecar of a clip's name belongs: beside the clip.
+std::string sidecar_beside(const std::string& clip);
+
+/// A media file as palette4d names clips: the number of a still (or a range, `[1-9]`) becomes one #
+/// for each digit.
+std::string clip_spec(const std::string& media);
 
 /// The number of a sequence's first frame, from that frame's path or a range (`[1-9]`); empty for a
 /// movie.

@@ -4,6 +4,7 @@
 #include <new>
 #include <optional>
 
+#include "clip_image.hpp"
 #include "describe.hpp"
 #include "frame_setup.hpp"
 #include "instance.hpp"
@@ -13,43 +14,6 @@
 
 namespace palette4d::node {
 namespace {
-
-/// One clip of an instance and its image at a time; always releases the image.
-class ClipImage {
-public:
-    ClipImage(const Suites& suites, OfxImageEffectHandle effect, const char* name, OfxTime time)
-        : suites_(suites) {
-        const OfxImageEffectSuiteV1& suite = *suites.effect;
-        OfxImageClipHandle clip = nullptr;
-        OfxPropertySetHandle clip_set = nullptr;
-        if (!suite.clipGetHandle || !suite.clipGetImage ||
-            suite.clipGetHandle(effect, name, &clip, &clip_set) != kOfxStatOK || !clip) {
-            return;
-        }
-        const OfxStatus status = suite.clipGetImage(clip, time, nullptr, &handle_);
-        if (status != kOfxStatOK) handle_ = nullptr;
-        absent_ = !handle_ && (status == kOfxStatOK || status == kOfxStatFailed);
-        if (handle_) {
-            pixels_ = read_image(Properties(suites, handle_), Properties(suites, clip_set));
-        }
-    }
-    ~ClipImage() {
-        if (handle_ && suites_.effect->clipReleaseImage) suites_.effect->clipReleaseImage(handle_);
-    }
-    ClipImage(const ClipImage&) = delete;
-    ClipImage& operator=(const ClipImage&) = delete;
-
-    /// The host has no picture here: the standard then asks for transparent black.
-    bool absent() const { return absent_; }
-    /// Also empty for a picture that cannot be read.
-    const std::optional<Image>& pixels() const { return pixels_; }
-
-private:
-    const Suites& suites_;
-    OfxPropertySetHandle handle_ = nullptr;
-    bool absent_ = false;
-    std::optional<Image> pixels_;
-};
 
 /// In this context the host's brush is a mask for the result.
 bool is_paint(const Suites& suites, OfxImageEffectHandle effect) {

@@ -23,6 +23,7 @@
 #include <utility>
 
 #include "model/lineage.hpp"
+#include "paths.hpp"
 
 namespace palette4d::node {
 namespace {
@@ -392,7 +393,7 @@ std::shared_ptr<const Recolourer> LoadedSidecar::prepare(const Key& key) const {
 
 SidecarResult load_sidecar(const std::string& path) {
     try {
-        const fs::path given = fs::u8path(path);
+        const fs::path given = native(path);
         std::error_code error;
         fs::path canonical = fs::weakly_canonical(given, error);
         if (error) canonical = given;
@@ -427,7 +428,7 @@ SidecarResult load_sidecar_text(const std::string& text, const std::string& name
 
 std::optional<std::string> sidecar_text(const std::string& path) {
     std::string problem;
-    const fs::path file = fs::u8path(path);
+    const fs::path file = native(path);
     const std::optional<Stamp> stamp = stamp_of(file, problem);
     return stamp ? text_of(file, stamp->bytes) : std::nullopt;
 }

@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <utility>
 
+#include "buttons.hpp"
 #include "paths.hpp"
 #include "sidecar/sidecar.hpp"
 
@@ -140,6 +141,7 @@ void define_file_params(ParamDefiner& define) {
                  "shot.mov it searches shot.p4d.json beside the clip, in Clip's folder and in "
                  "PALETTE4D_PATH. Works in hosts that report the clip's file: DaVinci Resolve."},
                 true);
+    define_buttons(define);
     define.button({kParamReload, "Reload",
                    "Reloads the sidecar's file and makes the host render its frames again."});
     define.flag({kParamEmbed, "Embed",

@@ -24,6 +24,10 @@ std::string describe(const Sidecar& sidecar) {
          << static_cast<double>(clip.rate_num) / static_cast<double>(clip.rate_den) << " fps, "
          << counted(sidecar.polytope.vertices().size(), "palette vertex", "palette vertices")
          << ", " << counted(edits, "edit", "edits");
+    const Solution& picks = sidecar.edits.solution;
+    if (!picks.vertex_by.empty() || !picks.keys.empty() || !picks.bumps.empty()) {
+        text << " and picks";
+    }
     return text.str();
 }
 
@@ -44,8 +48,8 @@ std::pair<unsigned, std::size_t> code_point(const std::string& text, std::size_t
 
 bool acts_on_terminals(unsigned code, std::size_t length) {
     const bool control = code < 0x20 || code == 0x7f || (length == 2 && code < 0xa0);
-    return (control && code != '\n') || (code >= 0x2028 && code <= 0x202e) ||
-           (code >= 0x2066 && code <= 0x2069);
+    return (control && code != '\n') || code == 0x61c || code == 0x200e || code == 0x200f ||
+           (code >= 0x2028 && code <= 0x202e) || (code >= 0x2066 && code <= 0x2069);
 }
 
 }  // namespace
@@ -72,26 +76,34 @@ std::string words_of_picture(const Sidecar& sidecar, const std::string& picture)
     return text;
 }
 
-std::string status_of(const Chosen& chosen, int handles, const std::string& expects,
-                      const std::string& copy, const std::string& shown) {
+std::string status_of(const Chosen& chosen, const std::vector<std::string>& first, int handles,
+                      const std::vector<std::string>& last) {
+    std::vector<std::string> lines = first;
     if (!chosen.any) {
-        return chosen.media.empty()
-                   ? "No sidecar chosen"
-                   : printable("No sidecar chosen, and none found for " + chosen.media);
+        lines.push_back(chosen.media.empty()
+                            ? "No sidecar chosen"
+                            : "No sidecar chosen, and none found for " + chosen.media);
+    } else if (!chosen.result.loaded) {
+        lines.push_back(chosen.result.problem);
+    } else {
+        const Sidecar& sidecar = chosen.result.loaded->sidecar();
+        std::string text = describe(sidecar);
+        if (!chosen.version.empty()) text += " in version '" + chosen.version + "'";
+        if (handles > 0) {
+            text += ", " + counted(static_cast<std::size_t>(handles), "handle", "handles") +
+                    " in use here";
+        }
+        lines.push_back(text);
+        if (!chosen.embedded) lines.push_back("file " + chosen.path);
+        if (!chosen.media.empty() && !same_clip(chosen.media, sidecar.clip.source)) {
+            lines.push_back("note: this sidecar is of " + sidecar.clip.source +
+                            ", and the host's clip is " + chosen.media);
+        }
+        lines.insert(lines.end(), last.begin(), last.end());
     }
-    if (!chosen.result.loaded) return printable(chosen.result.problem);
-    std::string text = describe(chosen.result.loaded->sidecar());
-    if (!chosen.version.empty()) text += " in version '" + chosen.version + "'";
-    if (handles > 0) {
-        text +=
-            ", " + counted(static_cast<std::size_t>(handles), "handle", "handles") + " in use here";
-    }
-    const std::string& source = chosen.result.loaded->sidecar().clip.source;
-    if (!chosen.media.empty() && !same_clip(chosen.media, source)) {
-        text += "\nnote: this sidecar is of " + source + ", and the host's clip is " + chosen.media;
-    }
-    for (const std::string& line : {expects, copy, shown}) {
-        if (!line.empty()) text += "\n" + line;
+    std::string text;
+    for (const std::string& line : lines) {
+        if (!line.empty()) text += (text.empty() ? "" : "\n") + line;
     }
     return printable(text);
 }

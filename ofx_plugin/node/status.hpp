@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "sidecar_choice.hpp"
 
@@ -10,11 +11,11 @@ namespace palette4d::node {
 /// Which encoding the node's picture must have.
 std::string words_of_picture(const Sidecar& sidecar, const std::string& picture);
 
-/// What was loaded, or what is wrong. `handles` counts the host's handles in use. The others are
-/// one line each, omitted when empty: `expects` the picture's encoding, `copy` the project's copy,
-/// `shown` the frame.
-std::string status_of(const Chosen& chosen, int handles, const std::string& expects,
-                      const std::string& copy, const std::string& shown);
+/// What was loaded with its file, version and edits, or what is wrong. `handles` counts the host's
+/// handles in use. The others are lines, omitted when empty: `first` those that come before, and
+/// `last` the expected encoding, the project's copy and the frame.
+std::string status_of(const Chosen& chosen, const std::vector<std::string>& first, int handles,
+                      const std::vector<std::string>& last);
 
 /// The text (UTF-8) without what acts on a terminal: control characters but line breaks, and marks
 /// that turn the direction of writing, become escapes such as \u001b.

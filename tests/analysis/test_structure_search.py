@@ -1,4 +1,4 @@
-"""The structure search removes vertices on straight paths and keeps those worth their cost."""
+"""The structure search keeps the vertices and colours that are worth their cost."""
 
 from __future__ import annotations
 
@@ -6,27 +6,28 @@ import itertools
 
 import numpy as np
 import pytest
-from analysis_frames import constant, mixture, stats
+from analysis_frames import in_core, mixture, stats
+from palette4d.analysis import moves, pipeline
 from palette4d.analysis.convex_hulls import hull_mesh
 from palette4d.analysis.dense_polytope import DensePolytope
 from palette4d.analysis.frame_statistics import Gamut
 from palette4d.analysis.objective import Objective
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Palette, SkewPolytope
-from palette4d.analysis.structure_search import Priced, Start, choose, remove_singly, search_frames
+from palette4d.analysis.structure_search import Priced, choose, key_frames, walk
 
 FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
-FACES = hull_mesh(FOUR).faces
+SIX = np.vstack([FOUR, [[0.8, 0.8, 0.1], [0.7, 0.7, 0.8]]])
 GAMUT = Gamut(np.zeros(3), np.ones(3))
 
 
-def bend(count, size, at):
+def bend(count, size, at, colours=FOUR):
     """Palettes a frame, colour 1 bending by `size` at frame `at`; and their frames."""
     palettes = []
     for i in range(count):
-        rgb = FOUR + 0.01 * i
+        rgb = colours + 0.01 * i
         rgb[1, 2] += size * max(0, 1 - abs(i - at) / at)
-        palettes.append(Palette(rgb, FACES))
+        palettes.append(Palette(rgb, hull_mesh(colours).faces))
     return palettes, stats([mixture(p.rgb, i) for i, p in enumerate(palettes)])
 
 
@@ -37,8 +38,8 @@ def full(palettes):
 def test_every_step_has_fewer_vertices_and_its_own_value():
     palettes, frames = bend(7, 0.4, 3)
     options = AnalysisOptions(handle_cost=0.1)  # fewer is always better: down to the end
-    steps = remove_singly(full(palettes), frames, GAMUT, options)
-    counts = [len(s.polytope.vertices) for s in steps]
+    steps = walk(full(palettes), frames, GAMUT, options, [])
+    counts = [s.handles for s in steps]
     assert counts == sorted(set(counts), reverse=True)
     assert counts[0] == 28
     assert counts[-1] == 8
@@ -53,7 +54,7 @@ def test_a_handle_that_pays_stays_and_one_that_does_not_goes():
     best = {}
     for cost in (0.002, 10.0):
         options = AnalysisOptions(handle_cost=cost)
-        steps = remove_singly(full(palettes), frames, GAMUT, options)
+        steps = walk(full(palettes), frames, GAMUT, options, [])
         best[cost] = choose(steps, options).polytope
     inner = [v for v in best[0.002].vertices if 0 < v[3] < 8]
     assert len(inner) == 1
@@ -62,13 +63,12 @@ def test_a_handle_that_pays_stays_and_one_that_does_not_goes():
     assert len(best[10.0].vertices) == 8
 
 
-def test_a_number_of_vertices_may_be_asked_for():
-    palettes, frames = bend(7, 0.4, 3)
-    for wanted, expected in ((12, 12), (9, 9), (8, 8), (3, 8)):
-        options = AnalysisOptions(vertices=wanted)
-        steps = remove_singly(full(palettes), frames, GAMUT, options)
-        count = len(choose(steps, options).polytope.vertices)
-        assert count <= max(expected, 8)
+def test_a_colour_that_does_not_pay_goes():
+    palettes, frames = bend(7, 0.0, 3, SIX)
+    for cost, colours in ((0.0, 6), (10.0, 4)):
+        options = AnalysisOptions(handle_cost=cost)
+        found = choose(walk(full(palettes), frames, GAMUT, options, []), options).polytope
+        assert len(found.blocks[0].tracks) == colours
 
 
 def test_the_choice_weighs_vertices_against_the_loss():
@@ -77,10 +77,22 @@ def test_the_choice_weighs_vertices_against_the_loss():
 
     steps = [step(20, 0.100), step(15, 0.105), step(10, 0.150)]
     for cost, count in ((0.0, 20), (0.0005, 20), (0.002, 15), (0.02, 10)):
-        chosen = choose(steps, AnalysisOptions(handle_cost=cost))
-        assert len(chosen.polytope.vertices) == count
-    for most, count in ((30, 20), (19, 15), (10, 10), (4, 10)):
-        assert len(choose(steps, AnalysisOptions(vertices=most)).polytope.vertices) == count
+        assert choose(steps, AnalysisOptions(handle_cost=cost)).handles == count
+    for most, count in ((30, 15), (14, 10), (10, 10), (4, 10)):
+        assert choose(steps, AnalysisOptions(vertices=most)).handles == count
+
+
+def check(polytope):
+    """Every section is covered by its tracks, and every vertex is on one."""
+    covered = []
+    for section in (*polytope.blocks, *polytope.transitions):
+        for track in section.tracks:
+            times = polytope.vertices[list(track), 3]
+            assert (np.diff(times) > 0).all()
+            assert times[0] <= section.first
+            assert times[-1] >= section.last
+            covered += list(track)
+    assert set(covered) == set(range(len(polytope.vertices)))
 
 
 def test_removed_vertices_leave_their_neighbours_joined():
@@ -89,28 +101,93 @@ def test_removed_vertices_leave_their_neighbours_joined():
     polytope = DensePolytope(range(5), [palettes[:2], palettes[2:]], [links]).polytope()
     while vertices := polytope.removable():
         polytope = polytope.without(vertices[0])
-        covered = []
-        for section in (*polytope.blocks, *polytope.transitions):
-            for track in section.tracks:
-                times = polytope.vertices[list(track), 3]
-                assert (np.diff(times) > 0).all()
-                assert times[0] <= section.first
-                assert times[-1] >= section.last
-                covered += list(track)
-        assert set(covered) == set(range(len(polytope.vertices)))
+        check(polytope)
     assert len(polytope.vertices) == 8
     assert len(polytope.edges()) == 4
     assert len(set(itertools.chain(*polytope.transitions[0].tracks))) == 8
 
 
-def test_search_frames_hold_the_ends_the_worst_and_the_blocks():
-    frames = stats([constant([0.5, 0.5, 0.5])] * 100)
-    palette = hull_mesh(FOUR)
-    links = tuple((i, i) for i in range(4))
-    dense = DensePolytope(range(100), [[palette] * 70, [palette] * 30], [links])
-    losses = np.full(100, 0.1)
-    losses[37] = 0.5
-    chosen = search_frames(Start(dense.polytope(), losses), frames)
-    assert {0, 99, 37, 69, 70} <= set(chosen)
-    assert len(chosen) <= 40
+def splitting():
+    """Six colours, of which the last splits into two for the second block."""
+    seven = np.vstack([SIX, [[0.75, 0.65, 0.95]]])
+    early, late = hull_mesh(SIX), hull_mesh(seven)
+    assert len(late.rgb) == 7
+    links = tuple((min(i, 5), i) for i in range(7))
+    first, second = Palette(SIX, early.faces), Palette(seven, late.faces)
+    return DensePolytope(range(8), [[first] * 4, [second] * 4], [links], [late.faces]).polytope()
+
+
+def test_a_colour_goes_from_every_section_and_leaves_closed_meshes():
+    polytope = splitting()
+    frames = stats([mixture(SIX, i) for i in range(8)])
+    chains = moves.chains(polytope)
+    # Five colours of the whole clip, and both that the sixth splits into, but not their stem.
+    assert sorted(len(chain) for chain in chains) == [4, 4, 8, 8, 8, 8, 8]
+    for chain in chains:
+        rest = moves.without_chain(polytope, chain)
+        check(rest)
+        assert len(rest.vertices) == len(polytope.vertices) - len(chain)
+        in_core(rest, frames)  # which refuses meshes that are not closed
+    while chains := moves.chains(polytope):
+        polytope = moves.without_chain(polytope, chains[0])
+    assert min(len(block.tracks) for block in polytope.blocks) == moves.LEAST_COLOURS
+
+
+def test_new_stops_lie_on_their_edges():
+    polytope = splitting()
+    while vertices := polytope.removable():
+        polytope = polytope.without(vertices[0])
+    richer = moves.enriched(polytope)
+    assert len(richer.vertices) > len(polytope.vertices)
+    check(richer)
+    for before, after in zip(polytope.blocks, richer.blocks, strict=True):
+        for t in np.linspace(before.first, before.last, 5):
+            expected = polytope.colours_at(before, t)
+            np.testing.assert_allclose(richer.colours_at(after, t), expected, atol=1e-12)
+
+
+def test_key_frames_hold_the_ends_and_the_worst():
+    pictures = [mixture(FOUR, i) for i in range(100)]
+    pictures[37] = mixture(np.eye(4)[:, :3], 37)
+    frames = stats(pictures)
+    palettes = [Palette(FOUR, hull_mesh(FOUR).faces)] * 2
+    static = DensePolytope((0, 99), [palettes], []).polytope()
+    chosen = [frame.frame for frame in key_frames(static, frames, AnalysisOptions(), 24)]
+    assert {0, 37, 99} <= set(chosen)
+    assert len(chosen) <= 34
     assert max(b - a for a, b in itertools.pairwise(chosen)) <= 5
+
+
+def moving():
+    images = []
+    for i in range(12):
+        rgb = SIX.copy()
+        rgb[1, 1] += 0.6 * (1 - abs(2 * i / 11 - 1))
+        rgb[4, 0] -= 0.5 * (i > 6)
+        images.append(mixture(rgb, i))
+    return stats(images)
+
+
+@pytest.fixture(scope="module")
+def clip():
+    return moving()
+
+
+def found(clip, **options):
+    last = pipeline.find_polytope(clip, AnalysisOptions(**options)).stages[-1]
+    return last.losses.L_prime + 0.0025 * last.vertices, last.vertices
+
+
+def test_a_dearer_handle_never_means_more_handles(clip):
+    counts = [found(clip, handle_cost=cost)[1] for cost in (0.0005, 0.0025, 0.05)]
+    assert counts == sorted(counts, reverse=True)
+    assert counts[0] > counts[-1]
+
+
+@pytest.mark.parametrize("name", ["blocks", "vertices"])
+def test_more_of_what_is_allowed_is_never_worse(clip, name):
+    allowed = {"blocks": (1, 3), "vertices": (8, 12, 40)}[name]
+    prices = [found(clip, **{name: most})[0] for most in allowed]
+    for less, more in itertools.pairwise(prices):
+        assert more <= 1.005 * less
+    assert found(clip)[0] <= 1.005 * min(prices)

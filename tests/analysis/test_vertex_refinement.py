@@ -14,7 +14,7 @@ from palette4d.analysis.frame_statistics import Gamut
 from palette4d.analysis.objective import losses_of, refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Section, SkewPolytope
-from palette4d.analysis.vertex_refinement import EVALUATIONS, refine, relax
+from palette4d.analysis.vertex_refinement import EVALUATIONS, GENTLE, refine, relax
 
 CUBE = np.array(list(itertools.product((0.1, 0.9), repeat=3)))
 FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
@@ -23,9 +23,9 @@ LIMP = AnalysisOptions(convexity=0.01, separation=0.0, reach=0.0, refinement_box
 
 
 def cube_with_apex():
-    """A cube at rest for three frames, with a ninth colour in its top face."""
+    """A cube at rest for three frames, with a ninth colour just below its top face."""
     mesh = hull_mesh(np.vstack([CUBE, [0.5, 0.5, 0.95]]))
-    rgb = np.minimum(mesh.rgb, 0.9)
+    rgb = np.where(mesh.rgb > 0.9, 0.82, mesh.rgb)
     n = len(rgb)
     vertices = np.array([[*c, t] for t in (0.0, 2.0) for c in rgb])
     tracks = tuple((i, n + i) for i in range(n))
@@ -43,10 +43,10 @@ def frames():
 
 def test_slices_that_are_not_convex_are_refined_again(frames):
     start = cube_with_apex()
-    once, _ = refine_jointly(start, frames, GAMUT, LIMP, EVALUATIONS, coarse=False)
+    once, _ = refine_jointly(start, frames, GAMUT, LIMP, EVALUATIONS, False, (), GENTLE)
     assert deepest_concavity(once, frames) > CONCAVE
     free = dataclasses.replace(LIMP, convexity=0.0)
-    once, _ = refine_jointly(start, frames, GAMUT, free, EVALUATIONS, coarse=False)
+    once, _ = refine_jointly(start, frames, GAMUT, free, EVALUATIONS, False, (), GENTLE)
     assert deepest_concavity(once, frames) > CONCAVE
     # Without `convexity` nobody asks for it.
     found = refine(start, frames, GAMUT, free)

@@ -526,3 +526,20 @@ def test_resetting_many_stops_takes_linear_time(plain: str) -> None:
     assert main.main(["edit", plain, "reset"]) == 0
     assert time.process_time() - start < 5  # about a second; quadratic time took 11 s
     assert edits_of(plain)["stops"] == []
+
+
+def test_the_help_of_an_action_needs_no_sidecar(capsys: pytest.CaptureFixture[str]) -> None:
+    helps = []
+    for words in (["clip.p4d.json", "undo"], ["undo"]):
+        with pytest.raises(SystemExit):
+            main.main(["edit", *words, "--help"])
+        helps.append(capsys.readouterr().out)
+    assert helps[0] == helps[1]
+    assert "--steps" in helps[0]
+
+
+def test_more_steps_than_there_are_change_nothing(plain: str) -> None:
+    assert main.main(["edit", plain, "set", "v1", "--rgb", "0.1", "0.2", "0.3"]) == 0
+    before = Path(plain).read_bytes()
+    assert main.main(["edit", plain, "undo", "--steps", "2"]) == 1
+    assert Path(plain).read_bytes() == before

@@ -47,7 +47,8 @@ def test_info_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert info["block_ranges"] == [[0, 9], [10, 20]]
     by_id = {row["id"]: row for row in info["palette"]}
     assert by_id["v4"] == {
-        "id": "v4", "frame": 0, "rgb": [0.1, 0.1, 0.9], "hex": "#1a1ae6", "edited": [0.9, 0.1, 0.1]
+        "id": "v4", "frame": 0, "rgb": [0.1, 0.1, 0.9], "hex": "#1a1ae6",
+        "called": "blue, 0", "edited": [0.9, 0.1, 0.1],
     }  # fmt: skip
     assert by_id["v5"]["edited"] is None
     assert info["palette_edges"][2] == {"id": "e3", "from": "v3", "to": "v7", "stops": ["s1", "s3"]}

@@ -11,8 +11,8 @@ from palette4d.cli.swatches import row
 
 EDITED = Path(__file__).resolve().parents[1] / "golden" / "sidecars" / "v1_edited.p4d.json"
 
-#: Sets the window's title, clears the screen, overwrites the line, turns the writing around.
-HOSTILE = "a\x1b]0;owned\x07\x1b[2J\rb\x9b31m\u202ec\u2066d"
+#: Overwrites a line, sets the window's title, clears the screen, turns the writing around.
+HOSTILE = "\r\x1b[Aa\u200eb\u061c\x1b]0;owned\x07\x1b[2J\rb\x9b31m\u202ec\u2066d"
 
 
 @pytest.fixture

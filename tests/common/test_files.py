@@ -145,6 +145,24 @@ def test_a_link_stays_a_link(old: Path) -> None:
     assert names(folder) == ["link.cube"]
 
 
+def test_a_link_of_another_user_is_not_followed(old: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shared = old.parent / "shared"
+    shared.mkdir()
+    link = shared / "out.cube"
+    link.symlink_to(old)
+    real = Path.lstat
+
+    class Stranger:
+        st_uid = 4711
+        st_mode = stat.S_IFLNK
+
+    monkeypatch.setattr(Path, "lstat", lambda self: Stranger() if self == link else real(self))
+    with pytest.raises(Palette4dError, match="link of another user"):
+        replace(link, lambda: None)
+    assert old.read_bytes() == b"old"
+    assert names(shared) == ["out.cube"]
+
+
 def test_a_link_that_leads_nowhere_is_replaced(tmp_path: Path) -> None:
     link = tmp_path / "link.cube"
     link.symlink_to("gone")

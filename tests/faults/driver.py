@@ -1,12 +1,14 @@
 """Runs verbs with faults, each in a fork of this process, which has imported everything.
 
 It reads trials as lines of JSON and answers each with a line: the exit status (negative: the
-signal), how many calls changed files, and what was printed.
+signal), the names of the calls that changed files, and what was printed. The verb `autosave` is an
+edit in the window, and what the window then does by itself.
 """
 
 import ctypes
 import importlib
 import json
+import math
 import os
 import pkgutil
 import sys
@@ -17,6 +19,8 @@ from typing import Any
 
 import palette4d
 from palette4d.cli.main import main
+from palette4d.grade.document import Document
+from palette4d.studio.session import Session, recovery_file
 
 for found in pkgutil.walk_packages(palette4d.__path__, "palette4d."):
     if not found.name.startswith(("palette4d.studio", "palette4d.__main__")):
@@ -25,7 +29,20 @@ for name in ("OpenImageIO", "PyOpenColorIO", "scipy.optimize", "matplotlib.figur
     importlib.import_module(name)
 
 SHIM: Any = ctypes.CDLL(None)
+SHIM.faults_names.restype = ctypes.c_char_p
 KILL, KILL_HALFWAY, NOTHING = 0, -1, -2
+
+
+def autosave(path: Path) -> int:
+    session = Session()
+    session.open_sidecar(path)
+    session.edit(lambda document: document.set("v4", rgb=(1, 0, 0)))
+    session.tick(math.inf)
+    if not session.saved:
+        assert session.document
+        assert Document.load(recovery_file(path)).settings == session.document.settings
+        print(f"palette4d: error: {session.status.text}", file=sys.stderr)
+    return 0 if session.saved else 1
 
 
 def trial(
@@ -33,7 +50,7 @@ def trial(
 ) -> Any:
     """Run a verb in a fork, with the working folder `folder`."""
     with tempfile.TemporaryFile() as printed:
-        counted, count = os.pipe()
+        names_of, told = os.pipe()
         child = os.fork()
         if not child:
             for handle in (1, 2):
@@ -42,25 +59,26 @@ def trial(
             SHIM.faults_begin(folder.encode(), ctypes.c_long(at), action, lasting, not locks)
             status = 70
             try:
-                status = main(arguments)
+                verb, *rest = arguments
+                status = autosave(Path(*rest)) if verb == "autosave" else main(arguments)
             except SystemExit as error:
                 status = int(error.code or 0)
             except BaseException:
                 traceback.print_exc()
             sys.stdout.flush()
             sys.stderr.flush()
-            calls = SHIM.faults_count()
+            names = SHIM.faults_names()
             SHIM.faults_begin(b"", ctypes.c_long(0), NOTHING, 0, 0)
-            os.write(count, str(calls).encode())
+            os.write(told, names)
             os._exit(status)
-        os.close(count)
-        calls = os.read(counted, 32)
-        os.close(counted)
+        os.close(told)
+        names = os.read(names_of, 65536).decode().split()
+        os.close(names_of)
         status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
         printed.seek(0)
         return {
             "status": status,
-            "calls": int(calls or 0),
+            "calls": names,
             "printed": printed.read().decode("utf-8", "replace"),
         }
 

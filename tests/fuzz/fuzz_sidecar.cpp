@@ -1,12 +1,10 @@
-// Any bytes at all as a sidecar, and what the node does with those that pass for one. Built with
-// Clang's -fsanitize=fuzzer (PALETTE4D_LIBFUZZER) it is a libFuzzer target; otherwise mutate.cpp
-// drives it, with any compiler.
+// Any bytes at all as a sidecar, and what the node does with those that pass for one.
 #include <cstdint>
 #include <new>
 #include <stdexcept>
 #include <string>
 
-#include "fuzz_sidecar.hpp"
+#include "fuzz.hpp"
 #include "model/handles.hpp"
 #include "model/lineage.hpp"
 #include "recolour/recolour.hpp"
@@ -54,17 +52,6 @@ std::string outcome_of(const std::uint8_t* data, std::size_t size) {
         }
         return "accepted";
     } catch (const SidecarError& error) {
-        // Which check it was: what was expected, without its numbers and names.
-        std::string kind;
-        for (const char c : error.expected().substr(0, 24)) {
-            if (c == '"') break;
-            if (c < '0' || c > '9') kind += c;
-        }
-        return kind;
+        return kind_of(error.expected());
     }
-}
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-    outcome_of(data, size);
-    return 0;
 }

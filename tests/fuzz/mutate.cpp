@@ -1,4 +1,4 @@
-// fuzz_sidecar --inputs N [--seed S] [--keep FOLDER] CORPUS…: N mutations of the files in the
+// TARGET --inputs N [--seed S] [--keep FOLDER] CORPUS…: N mutations of the files in the
 // folders, the same for the same seed. An input whose outcome is new joins those that are mutated,
 // and is kept in a file where asked for. A crash says which input it was: --only N makes it anew.
 #include <algorithm>
@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "fuzz_sidecar.hpp"
+#include "fuzz.hpp"
 
 #if !defined(_WIN32)
 #include <unistd.h>
@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 volatile unsigned long long g_input = 0;
 
 extern "C" void crashed(int signal) {
-    char text[64] = "fuzz_sidecar: crashed at input ";
+    char text[64] = "crashed at input ";
     char digits[24];
     int count = 0;
     for (unsigned long long n = g_input; n || !count; n /= 10) {

@@ -1,11 +1,12 @@
 """Any bytes at all for the readers written in Python: a refusal, or something that can be used.
 
-The inputs are mutations of tests/fuzz/readers/, the same in every run. PALETTE4D_FUZZ_INPUTS=N
-makes N inputs for each reader instead.
+The inputs are mutations of tests/fuzz/readers/, the same in every run. PALETTE4D_FUZZ_SECONDS=N
+makes others for N seconds, by PALETTE4D_FUZZ_SEED.
 """
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import random
@@ -27,7 +28,7 @@ TOKENS = (
 )
 VALUES: tuple[Any, ...] = (
     *(None, True, 0, -1, 0.5, 2**31, 10**30, -(10**400), 1e308, "", "a", "../x", "\0", "x" * 400),
-    *([], {}, [1], [[]], {"a": 1}, "\ud800", ["a", "b"], [24, 0], [1e300, 1]),
+    *([], {}, [1], [[]], {"a": 1}, "\ud800", ["a", "b"], [24, 0], [1e300, 1], ["1e9999999"]),
 )
 
 
@@ -74,12 +75,15 @@ def corpus_of(kind: str) -> list[bytes]:
 
 
 def fuzz(kind: str, suffix: str, target: Callable[[Path], str], folder: Path, inputs: int) -> None:
-    inputs = int(os.environ.get("PALETTE4D_FUZZ_INPUTS") or inputs)
     corpus = corpus_of(kind)
-    choose = random.Random(kind)
+    seconds = float(os.environ.get("PALETTE4D_FUZZ_SECONDS") or 0)
+    ends = time.monotonic() + seconds
+    choose = random.Random(kind + os.environ.get("PALETTE4D_FUZZ_SEED", ""))
     path = folder / f"input{suffix}"
     outcomes: set[str] = set()
-    for number in range(-len(corpus), inputs):
+    for number in itertools.count(-len(corpus)):
+        if time.monotonic() > ends if seconds else number >= inputs:
+            break
         data = corpus[number] if number < 0 else mutated(choose, corpus)
         path.write_bytes(data)
         start = time.process_time()
@@ -91,6 +95,7 @@ def fuzz(kind: str, suffix: str, target: Callable[[Path], str], folder: Path, in
         assert time.process_time() - start < 5, f"input {number} took too long: {data!r}"
         outcomes.add(outcome)
     assert "accepted" in outcomes
+    print(f"{kind}: {number} inputs")
 
 
 LENGTHS = [400, pytest.param(100_000, marks=pytest.mark.slow)]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from palette4d.colour.between import between
+from palette4d.colour.encoding_conversion import between
 from palette4d.common.errors import Palette4dError
 from palette4d.grade import sidecar
 from palette4d.grade.document import Document

@@ -101,3 +101,18 @@ def test_few_keys_and_little_memory(clip: ArrayClip, monkeypatch: pytest.MonkeyP
 def test_a_frame_that_the_clip_lacks_is_an_error(clip: ArrayClip) -> None:
     with pytest.raises(Palette4dError, match="no frame 99"):
         follow.paths(clip, [(99, (0.5, 0.5, 0.5))], (0, 42))
+
+
+def test_a_path_ends_where_all_is_dark() -> None:
+    picture = np.full((60, 80, 3), (0.5, 0.6, 0.7))
+    picture[20:26, 30:36] = (0.8, 0.15, 0.1)
+    light = np.clip(np.linspace(1.5, -0.5, 40), 0, 1)[:, None, None, None]
+    grain = 0.01 * np.random.default_rng(3).normal(size=(40, *picture.shape))
+    clip = ArrayClip(np.clip(light * picture + grain, 0, 1).astype(np.float32))
+    path = follow.paths(clip, [(2, (0.8, 0.15, 0.1))], (0, 39))
+    frames, there = [key.frame for key in path], [key.there for key in path]
+    assert np.interp(15, frames, there) > 0.98  # still to be seen
+    assert np.interp([34, 39], frames, there).max() == 0
+    assert np.abs(np.diff(np.interp(range(40), frames, there))).max() < 0.3  # a fade
+    sky = follow.paths(clip, [(2, (0.5, 0.6, 0.7))], (0, 39))
+    assert all(key.there == 1 for key in sky)  # most of the picture, and still is

@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -156,7 +157,7 @@ def test_versions(plain: Path) -> None:
     document.save()
     document = Document.load(plain)
     assert document.versions == ("blue", "red")
-    assert document.same_edits("blue")
+    assert document.same_edits() == ("blue",)
     assert document.use_version("red") is None
     assert document.colour("v1") == (1, 0, 0)
     document.set("v2", rgb=(0, 1, 0))
@@ -198,12 +199,22 @@ def test_names_of_versions(plain: Path, name: str) -> None:
         document.save_version(name)
 
 
-@pytest.mark.parametrize("method", ["use_version", "remove_version", "version", "same_edits"])
+@pytest.mark.parametrize("method", ["use_version", "remove_version", "version"])
 def test_a_version_that_is_not_there(plain: Path, method: str) -> None:
     document = Document.load(plain)
     document.save_version("warm")
     with pytest.raises(Palette4dError, match="warm"):
         getattr(document, method)("cold")
+
+
+def test_many_versions_are_listed_in_linear_time(plain: Path) -> None:
+    fields = sidecar.load(plain)
+    nothing = {"vertices": [], "stops": []}
+    fields["versions"] = [{"name": f"n{i}", "edits": nothing} for i in range(10_000)]
+    document = Document(fields)
+    start = time.process_time()
+    assert len(document.same_edits()) == 10_000
+    assert time.process_time() - start < 3
 
 
 def test_a_new_analysis_keeps_steps_and_versions(plain: Path) -> None:

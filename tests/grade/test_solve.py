@@ -133,6 +133,88 @@ def test_the_users_handles_are_counted_in(fields: Fields) -> None:
     np.testing.assert_allclose(moved(document, OTHER, 5), 0, atol=0.006)
 
 
+def cluster(rgb: Any, share: float, wide: float = 0.05) -> list[list[float]]:
+    """Some colours around one, which share its part of the picture."""
+    around = np.random.default_rng(1).normal(size=(8, 3)) * wide + rgb
+    return [[*colour, share / 8] for colour in around.tolist()]
+
+
+def test_a_rare_colour_changes_alone(fields: Fields) -> None:
+    sign, hair, street = (0.7, 0.5, 0.2), (0.45, 0.4, 0.3), (0.35, 0.35, 0.4)
+    rows = cluster(sign, 0.002, 0.01) + cluster(hair, 0.1) + cluster(street, 0.898)
+    found = {**fields, "colours": [{"frame": 0, "rgbw": rows}]}
+    document, measured = solved(found, pick("p1", sign, (0.2, 0.3, 0.8)))
+    np.testing.assert_allclose(moved(document, sign, 5), (-0.5, -0.2, 0.6), atol=0.006)
+    for other in (hair, street):
+        assert np.abs(moved(document, other, 5)).max() < 3 / 255
+    assert measured["p1"]["global"] < 0.1
+    # The same change of what fills the picture moves the palette.
+    document, measured = solved(found, pick("p1", street, (0.45, 0.3, 0.4)))
+    assert measured["p1"]["global"] > 0.1
+
+
+def test_a_wide_box_changes_as_a_whole(fields: Fields) -> None:
+    ends = [[0.14, 0.0, -0.14], [-0.14, 0.0, 0.14]]
+    narrow, _ = solved(fields, pick("p1", MIDDLE, (0.3, 0.4, 0.4), radius=0.15))
+    wide, _ = solved(fields, pick("p1", MIDDLE, (0.3, 0.4, 0.4), radius=0.15, spread=ends))
+    for end in ends:
+        colour = np.add(MIDDLE, end)
+        np.testing.assert_allclose(moved(wide, colour, 5), (-0.1, 0, 0), atol=0.006)
+        assert moved(narrow, colour, 5)[0] > -0.09
+    steps = [moved(wide, np.add(MIDDLE, np.multiply(ends[0], t)), 5)[0] for t in np.linspace(0, 1)]
+    assert max(np.abs(np.diff(steps))) < 0.005  # no steps between them
+    held, _ = solved(fields, pick("p1", OTHER, (0.5, 0.3, 0.3)), pick("p2", MIDDLE, spread=ends))
+    for end in ends:
+        np.testing.assert_allclose(moved(held, np.add(MIDDLE, end), 5), 0, atol=0.006)
+
+
+def test_a_path_that_ends_ends_the_change(fields: Fields) -> None:
+    path = [
+        {"frame": 0, "rgb": list(MIDDLE)},
+        {"frame": 8, "rgb": list(MIDDLE)},
+        {"frame": 12, "rgb": list(MIDDLE), "there": 0},
+        {"frame": 18, "rgb": list(MIDDLE), "there": 0},
+    ]
+    document, _ = solved(fields, pick("p1", MIDDLE, (0.6, 0.3, 0.4), path=path))
+    np.testing.assert_allclose(moved(document, MIDDLE, 8), (0.2, -0.1, 0), atol=0.006)
+    assert 0.04 < moved(document, MIDDLE, 10)[0] < 0.16
+    for frame in (12, 15, 18):
+        np.testing.assert_array_equal(moved(document, MIDDLE, frame), 0)
+
+
+def test_the_frame_that_is_farthest_off_is_named(fields: Fields) -> None:
+    path = [{"frame": f, "rgb": [0.3, 0.3, 0.3]} for f in (0, 18)]
+    late = {"from": 10, "until": 18}
+    _, measured = solved(
+        fields,
+        pick("p1", (0.3, 0.3, 0.3), (0.4, 0.3, 0.3), frame=2, path=path),
+        pick("p2", (0.3, 0.305, 0.3), (0.2, 0.4, 0.3), frame=14, **late),
+    )
+    assert measured["p1"]["residual"] < 0.01
+    assert measured["p1"]["worst"] > 0.05
+    assert measured["p1"]["worst_frame"] >= 10
+
+
+def test_many_picks_are_solved_once(fields: Fields, monkeypatch: pytest.MonkeyPatch) -> None:
+    count = 0
+    solver = solve.solve
+
+    def counting(found: Fields) -> Any:
+        nonlocal count
+        count += 1
+        return solver(found)
+
+    monkeypatch.setattr(solve, "solve", counting)
+    document = Document(fields)
+    for level in np.linspace(0.2, 0.5, 20):
+        document.pick(5, colour=[level] * 3, by=(0.02, 0, 0), follow=False)
+    document.hold(5, colour=OTHER, follow=False)
+    document.change_pick("p3", by=(0, 0.02, 0))
+    assert count == 0
+    assert all(pick.residual is not None for pick in document.picks)
+    assert count == 1
+
+
 def test_a_locked_handle_does_not_move(fields: Fields) -> None:
     asked = pick("p1", MIDDLE, (0.6, 0.3, 0.4))
     free, _ = solved(fields, asked)
@@ -187,9 +269,9 @@ def test_a_thousand_picks_are_bounded_in_time(fields: Fields) -> None:
         pick(f"p{i}", rng.random(3).tolist(), rng.random(3).tolist(), frame=int(rng.integers(18)))
         for i in range(1, 1001)
     ]
-    start = time.perf_counter()
+    start = time.process_time()
     document, measured = solved(fields, *many)
-    assert time.perf_counter() - start < 30
+    assert time.process_time() - start < 30
     assert measured["p1000"]["residual"] > 0
     lines = unmet(document.picks, 1)
     assert sum("not solved" in line for line in lines) == 1000 - MOST_PICKS
@@ -201,8 +283,19 @@ def test_a_thousand_picks_are_bounded_in_time(fields: Fields) -> None:
 def test_palettes_of_few_colours(name: str) -> None:
     document = Document(json.loads((GOLDEN / f"{name}.p4d.json").read_text()))
     rgb = document.palette(document.frames[0]).rgb.mean(axis=0)
-    found = document.pick(
-        document.frames[0], colour=rgb, by=(0.1, 0, 0), follow=False, any_value=True
-    )
+    document.pick(document.frames[0], colour=rgb, by=(0.1, 0, 0), follow=False, any_value=True)
+    [found] = document.picks
     assert found.residual is not None
     assert found.residual < 0.02
+
+
+def test_a_long_path_is_solved_in_linear_time() -> None:
+    """The keys of a path are those of a file, which may have many."""
+    fields = json.loads((GOLDEN / "v1_picks.p4d.json").read_text())
+    path = [{"frame": i / 250, "rgb": [0.4, 0.3, 0.25]} for i in range(3000)]
+    fields["edits"]["picks"] = [{**fields["edits"]["picks"][0], "path": path}]
+    document = Document(fields)
+    start = time.process_time()
+    document.set("v4", rgb=(1, 0, 0))
+    document.fields()
+    assert time.process_time() - start < 12

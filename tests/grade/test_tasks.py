@@ -124,7 +124,7 @@ def pick(
 ) -> Callable[..., Document]:
     """Pick the mean of a box of the sample clip; return the document."""
     clip: Clip = ArrayClip(pictures)
-    monkeypatch.setattr("palette4d.grade.picking.find_clip", lambda *_: clip)
+    monkeypatch.setattr("palette4d.grade.clip_of_picks.find_clip", lambda *_: clip)
 
     def made(frame: int, box: Box, by: tuple[float, float, float], **how: Any) -> Document:
         document = Document(sample)

@@ -13,8 +13,9 @@ from palette4d.hosts.bundle import find_bundle
 
 @pytest.fixture(scope="session")
 def bundle() -> Path:
-    """The OpenFX bundle inside the installed package."""
-    return find_bundle()
+    """The OpenFX bundle inside the installed package, or the one that PALETTE4D_BUNDLE names."""
+    given = os.environ.get("PALETTE4D_BUNDLE")
+    return Path(given) if given else find_bundle()
 
 
 @pytest.fixture(scope="session")

@@ -3,12 +3,18 @@
 // pixels without gaps: float32 of this machine or bytes.
 // strict_host describe BUNDLE
 // The node's parameters as it describes them, a JSON object of names.
+// strict_host push BUNDLE BUTTON [--effect N] [--set NAME=VALUE] [--width W --height H FRAMES.raw]
+// Pushes a button and waits, as long as the status speaks of an analysis. The frames, RGBA in
+// float32, are the clip's from time 1 on.
+#include <chrono>
 #include <cstring>
 #include <exception>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <map>
 #include <stdexcept>
+#include <thread>
 
 #include "describe_json.hpp"
 #include "sidecar/sidecar.hpp"
@@ -18,6 +24,8 @@ namespace {
 
 constexpr const char* kUsage =
     "usage: strict_host describe BUNDLE\n"
+    "       strict_host push BUNDLE BUTTON [--set NAME=VALUE] [--effect N]\n"
+    "                        [--width W --height H FRAMES.raw]\n"
     "       strict_host render BUNDLE SIDECAR [options] IN.raw OUT.raw\n"
     "  --width W --height H     size of the picture\n"
     "  --frame T                frame of the sidecar (or --time T: the host's, 0 at the clip's "
@@ -41,7 +49,7 @@ using Options = std::map<std::string, std::string>;
 using Settings = std::vector<std::string>;
 
 std::vector<char> read(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
+    std::ifstream file(std::filesystem::u8path(path), std::ios::binary);
     if (!file) throw std::runtime_error(path + ": cannot be read");
     return {std::istreambuf_iterator<char>(file), {}};
 }
@@ -84,6 +92,47 @@ int describe(const std::string& bundle) {
     plugin.unload();
     if (!descriptor) throw std::runtime_error(bundle + ": the plugin does not describe itself");
     std::cout << strict::described_json(*descriptor) << "\n";
+    return faulty() ? 3 : 0;
+}
+
+int push(const std::vector<std::string>& names, const Options& options, const Settings& settings) {
+    const auto number = [&](const char* name) {
+        const auto found = options.find(name);
+        return found == options.end() ? 0 : std::stoi(found->second);
+    };
+    strict::Layout layout;
+    layout.bounds = {0, 0, number("width"), number("height")};
+    std::vector<strict::Picture> pictures;
+    if (names.size() > 2) {
+        const std::vector<char> pixels = read(names[2]);
+        const auto row = static_cast<std::size_t>(layout.width() * layout.pixel_bytes());
+        const std::size_t size = row * static_cast<std::size_t>(layout.height());
+        for (std::size_t at = 0; size > 0 && at + size <= pixels.size(); at += size) {
+            strict::Picture& picture = pictures.emplace_back(layout);
+            for (int y = 0; y < layout.height(); ++y) {
+                std::memcpy(picture.at(0, y), &pixels[at + row * static_cast<std::size_t>(y)], row);
+            }
+        }
+    }
+    strict::Config config;
+    if (!pictures.empty()) config.frame_range = {1, static_cast<double>(pictures.size())};
+    strict::Host::get().configure(config);
+    {
+        strict::Plugin plugin(names[0], number("effect"));
+        const auto instance = plugin.create();
+        if (!pictures.empty()) {
+            instance->frames = [&](double time) {
+                return &pictures.at(static_cast<std::size_t>(time) - 1);
+            };
+        }
+        for (const std::string& setting : settings) set(*instance, setting);
+        instance->changed(names[1]);
+        while (instance->text("status").rfind("analysing ", 0) == 0) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(100));
+            instance->changed("", "", kOfxChangeTime);
+        }
+        std::cout << instance->text("status") << "\n";
+    }
     return faulty() ? 3 : 0;
 }
 
@@ -151,7 +200,7 @@ int render(const std::vector<std::string>& names, const Options& options,
             std::cout << "message: " << instance->effect().persistent_message << "\n";
         }
     }
-    std::ofstream file(names[3], std::ios::binary);
+    std::ofstream file(std::filesystem::u8path(names[3]), std::ios::binary);
     const auto result = output.pixels(layout.bounds);
     file.write(reinterpret_cast<const char*>(result.data()),
                static_cast<std::streamsize>(result.size()));
@@ -166,23 +215,28 @@ int main(int argc, char** argv) {
     std::vector<std::string> names;
     Options options;
     Settings settings;
-    for (int i = 2; i < argc; ++i) {
-        if (std::strcmp(argv[i], "--set") == 0 && i + 1 < argc) {
-            settings.emplace_back(argv[++i]);
-        } else if (std::strncmp(argv[i], "--", 2) == 0 && i + 1 < argc) {
-            options[argv[i] + 2] = argv[i + 1];
+    const std::vector<std::string> words = strict::arguments(argc, argv);
+    for (std::size_t i = 2; i < words.size(); ++i) {
+        const bool more = i + 1 < words.size();
+        if (words[i] == "--set" && more) {
+            settings.push_back(words[++i]);
+        } else if (words[i].rfind("--", 0) == 0 && more) {
+            options[words[i].substr(2)] = words[i + 1];
             ++i;
         } else {
-            names.emplace_back(argv[i]);
+            names.push_back(words[i]);
         }
     }
-    const std::string verb = argc < 2 ? "" : argv[1];
-    if (!(verb == "render" && names.size() == 4) && !(verb == "describe" && names.size() == 1)) {
+    const std::string verb = words.size() < 2 ? "" : words[1];
+    if (!(verb == "render" && names.size() == 4) &&
+        !(verb == "push" && (names.size() == 2 || names.size() == 3)) &&
+        !(verb == "describe" && names.size() == 1)) {
         std::cerr << kUsage;
         return 2;
     }
     try {
         if (verb == "describe") return describe(names[0]);
+        if (verb == "push") return push(names, options, settings);
         return render(names, options, settings);
     } catch (const std::exception& error) {
         std::cerr << "strict_host: " << error.what() << "\n";

@@ -275,17 +275,18 @@ std::vector<unsigned char> stored(const strict::Layout& layout, const std::vecto
 /// palette4d_host_tests BUNDLE FOLDER [NAME …] [-NAME …]: runs the tests whose names contain one of
 /// NAME (all without one), and none of -NAME.
 int main(int argc, char** argv) {
-    if (argc < 3) {
-        std::cerr << "usage: " << argv[0] << " BUNDLE FOLDER [NAME ...]\n";
+    const std::vector<std::string> words = strict::arguments(argc, argv);
+    if (words.size() < 3) {
+        std::cerr << "usage: palette4d_host_tests BUNDLE FOLDER [NAME ...]\n";
         return 2;
     }
-    test::g_bundle = argv[1];
+    test::g_bundle = words[1];
     int failed_cases = 0, run = 0;
     for (const test::Case& test_case : test::cases()) {
         bool any = false, wanted = false, unwanted = false;
-        for (int i = 3; i < argc; ++i) {
-            const bool minus = argv[i][0] == '-';
-            const bool holds = std::strstr(test_case.name, argv[i] + minus) != nullptr;
+        for (std::size_t i = 3; i < words.size(); ++i) {
+            const bool minus = words[i][0] == '-';
+            const bool holds = std::strstr(test_case.name, words[i].c_str() + minus) != nullptr;
             any |= !minus;
             (minus ? unwanted : wanted) |= holds;
         }
@@ -293,7 +294,7 @@ int main(int argc, char** argv) {
         ++run;
         // Whole: what the node is given and what it says are compared as texts.
         test::g_folder =
-            std::filesystem::absolute(std::filesystem::u8path(argv[2])) / test_case.name;
+            std::filesystem::absolute(std::filesystem::u8path(words[2])) / test_case.name;
         std::filesystem::remove_all(test::g_folder);
         std::filesystem::create_directories(test::g_folder);
         const auto began = std::chrono::steady_clock::now();

@@ -81,7 +81,7 @@ void put_rect(OfxPropertySetStruct& set, const char* name, const OfxRectI& rect)
     set.put_all(name, {rect.x1, rect.y1, rect.x2, rect.y2});
 }
 
-OfxStatus get_image(OfxImageClipHandle clip, OfxTime, const OfxRectD*,
+OfxStatus get_image(OfxImageClipHandle clip, OfxTime time, const OfxRectD*,
                     OfxPropertySetHandle* image) {
     const Call call("clipGetImage");
     if (call.refused()) return kOfxStatFailed;
@@ -91,8 +91,17 @@ OfxStatus get_image(OfxImageClipHandle clip, OfxTime, const OfxRectD*,
         host.fault("clipGetImage: not while rendering, or without a clip");
         return kOfxStatErrBadHandle;
     }
+    if (time != now.time && clip->properties.number(kTemporal) == 0) {
+        host.fault("clipGetImage: another time's, without temporal access to " + clip->name);
+        return kOfxStatFailed;
+    }
     const bool is_output = clip->name == kOfxImageEffectOutputClipName;
-    const Picture* picture = is_output                                           ? now.output
+    if (now.frames && is_output) {
+        host.fault("clipGetImage: there is no output beside a render");
+        return kOfxStatFailed;
+    }
+    const Picture* picture = now.frames  ? (*now.frames)(time)
+                             : is_output ? now.output
                              : clip->name == kOfxImageEffectSimpleSourceClipName ? now.source
                                                                                  : now.brush;
     *image = nullptr;

@@ -3,6 +3,8 @@
 
 #if defined(_WIN32)
 #include <windows.h>
+// After windows.h, which it needs.
+#include <shellapi.h>
 #else
 #include <dlfcn.h>
 #endif
@@ -92,6 +94,7 @@ const void* Host::suite(const std::string& name, int version) {
     if (key == std::string(kOfxMultiThreadSuite) + "/1") table = thread_suite();
     if (key == std::string(kOfxMessageSuite) + "/1") table = message_suite_v1();
     if (key == std::string(kOfxMessageSuite) + "/2") table = message_suite_v2();
+    if (key == std::string(kOfxProgressSuite) + "/1") table = progress_suite();
     if (!table.data) {
         fault("fetchSuite: this host knows no suite " + key);
         return nullptr;
@@ -182,20 +185,49 @@ std::vector<bool> Picture::mask(const OfxRectI& area) const {
 
 namespace {
 
-std::string binary_of(const std::string& bundle) {
-    namespace fs = std::filesystem;
-    for (const auto& entry : fs::recursive_directory_iterator(fs::u8path(bundle))) {
-        if (entry.path().extension() == ".ofx") return entry.path().u8string();
+namespace fs = std::filesystem;
+
+fs::path binary_of(const std::string& bundle) {
+    const fs::path folder = fs::u8path(bundle) / "Contents" / PALETTE4D_ARCHITECTURE;
+    for (const auto& entry : fs::directory_iterator(folder)) {
+        if (entry.path().extension() == ".ofx") return entry.path();
     }
-    throw std::runtime_error(bundle + ": no .ofx file inside");
+    throw std::runtime_error(folder.u8string() + ": no .ofx file inside");
 }
 
 }  // namespace
 
-Plugin::Plugin(const std::string& bundle) {
-    const std::string binary = binary_of(bundle);
+std::vector<std::string> arguments(int argc, char** argv) {
+    std::vector<std::string> all(argv, argv + argc);
 #if defined(_WIN32)
-    library_ = LoadLibraryA(binary.c_str());
+    int count = 0;
+    wchar_t** const wide = CommandLineToArgvW(GetCommandLineW(), &count);
+    if (!wide) throw std::runtime_error("no command line");
+    all.clear();
+    for (int i = 0; i < count; ++i) all.push_back(fs::path(wide[i]).u8string());
+    LocalFree(wide);
+#endif
+    return all;
+}
+
+void set_variable(const std::string& name, const std::optional<std::string>& value) {
+#if defined(_WIN32)
+    const std::wstring text = fs::u8path(value.value_or("")).wstring();
+    SetEnvironmentVariableW(fs::u8path(name).c_str(), value ? text.c_str() : nullptr);
+#else
+    if (value) {
+        setenv(name.c_str(), value->c_str(), 1);
+    } else {
+        unsetenv(name.c_str());
+    }
+#endif
+}
+
+Plugin::Plugin(const std::string& bundle, int which) {
+    const fs::path path = binary_of(bundle);
+    const std::string binary = path.u8string();
+#if defined(_WIN32)
+    library_ = LoadLibraryW(path.c_str());
     if (!library_) throw std::runtime_error(binary + ": cannot be loaded");
     const auto symbol = [this](const char* name) {
         return reinterpret_cast<void*>(GetProcAddress(static_cast<HMODULE>(library_), name));
@@ -210,8 +242,8 @@ Plugin::Plugin(const std::string& bundle) {
     const auto set_host = reinterpret_cast<OfxStatus (*)(const OfxHost*)>(symbol("OfxSetHost"));
     if (!count || !plugin || !set_host) throw std::runtime_error(binary + ": no entry points");
     if (set_host(Host::get().ofx()) != kOfxStatOK) Host::get().fault("OfxSetHost refused");
-    if (count() != 1 || plugin(1) || plugin(-1)) Host::get().fault("not exactly one plugin");
-    plugin_ = plugin(0);
+    if (count() != 2 || plugin(2) || plugin(-1)) Host::get().fault("not exactly two plugins");
+    plugin_ = plugin(which);
     plugin_->setHost(Host::get().ofx());
 }
 

@@ -25,6 +25,7 @@
 #include "ofxMessage.h"
 #include "ofxMultiThread.h"
 #include "ofxParam.h"
+#include "ofxProgress.h"
 #include "ofxProperty.h"
 
 namespace strict {
@@ -122,6 +123,8 @@ struct OfxImageEffectStruct {
     std::vector<std::string> messages;  ///< of both kinds, in order
     std::atomic<int> abort_after{-1};   ///< polls until abort() says 1; -1: never
     std::atomic<int> abort_polls{0};
+    bool in_progress = false;      ///< between progressStart and progressEnd
+    std::vector<double> progress;  ///< that the plugin has told so far
 };
 
 namespace strict {
@@ -186,8 +189,10 @@ struct Config {
     std::vector<double> frame_range{};   ///< of the source, as instances report it; empty: not
     double frame_rate = 0;               ///< likewise; 0: not
     OfxStatus edit_answer = kOfxStatOK;  ///< of paramEditBegin and its End
+    int cancel_after = -1;               ///< updates of the progress until the user cancels
     /// What Natron's source does: paramEditEnd asks for clip preferences under a lock that every
-    /// action takes, and a message's arguments are lost.
+    /// action takes, a message's arguments are lost, each render begins with no message shown, and
+    /// the numbers of a colour parameter are linear light.
     bool natron = false;
     /// The folder that file and folder parameters get put before them where they do not start with
     /// a slash; empty: as they are.
@@ -244,6 +249,9 @@ struct Activity {
     const Picture* brush = nullptr;
     std::set<OfxPropertySetHandle>* images = nullptr;
     std::string context{};  ///< that is being described
+    double time = 0;        ///< of the action
+    /// Where the plugin may fetch images beside a render: the source's.
+    const std::function<const Picture*(double time)>* frames = nullptr;
 };
 Activity& activity();
 
@@ -275,6 +283,7 @@ SuiteTable memory_suite();
 SuiteTable thread_suite();
 SuiteTable message_suite_v1();
 SuiteTable message_suite_v2();
+SuiteTable progress_suite();
 
 // ---------------------------------------------------------------- plugins and instances
 
@@ -283,12 +292,21 @@ void check_descriptor(const OfxImageEffectStruct& effect);
 /// The parameters after whose changes a host asks for the clip preferences again.
 std::set<std::string> slave_params(const OfxImageEffectStruct& descriptor);
 
+/// Not a property of the standard, so that nobody can ask for it: an instance's clip, whether both
+/// it and its effect were described with temporal access.
+inline constexpr const char* kTemporal = " temporal";
+
 class Instance;
 
-/// A bundle's binary and its first plugin.
+/// The program's arguments in UTF-8; on Windows main() gets them in the code page.
+std::vector<std::string> arguments(int argc, char** argv);
+/// Sets a variable of the environment (UTF-8), or removes it.
+void set_variable(const std::string& name, const std::optional<std::string>& value);
+
+/// A bundle's binary for this system and one of its two plugins.
 class Plugin {
 public:
-    explicit Plugin(const std::string& bundle);
+    explicit Plugin(const std::string& bundle, int which = 0);
     /// One that lives in this program: the host's own tests have such.
     explicit Plugin(OfxPlugin& resident);
     ~Plugin();
@@ -338,6 +356,10 @@ public:
     /// each reported as the user's edit, and then all of them once more.
     void restore_defaults() { restore_defaults(effect_.params.order); }
     void restore_defaults(const std::vector<std::string>& names);
+    /// A colour parameter as the host's panel displays it, in the display's sRGB.
+    Colour swatch(const std::string& param);
+    /// The user picks a displayed colour for it, from the panel or from the picture.
+    OfxStatus pick(const std::string& param, const Colour& displayed);
     /// How often the plugin has set a parameter.
     int settings(const std::string& param) { return settings_[param]; }
     OfxStatus sync();
@@ -363,6 +385,8 @@ public:
     const Picture* brush = nullptr;
     /// Every render is done twice, and a difference is a fault.
     bool twice = false;
+    /// The source's pictures for a plugin that fetches them after a user's edit; empty: it may not.
+    std::function<const Picture*(double time)> frames;
 
 private:
     Plugin& plugin_;
@@ -381,6 +405,8 @@ private:
     /// parameters named for it. That they differ after any other change is a fault: no host would
     /// have heard of it.
     void check_preferences();
+    /// What the plugin has fetched must be released.
+    static void check_released(const std::set<OfxPropertySetHandle>& images, const char* action);
     OfxStatus render_once(double time, const Picture* source, Picture& output,
                           const OfxRectI& window);
 };

@@ -1,4 +1,5 @@
 // One instance of a plugin: the actions that the host sends it, and what it says to each.
+#include <cmath>
 #include <stdexcept>
 #include <utility>
 
@@ -18,6 +19,20 @@ Value initial_value(const OfxParamStruct& param) {
     return static_cast<int>(p.number(kOfxParamPropDefault));
 }
 
+double srgb_of(double linear) {
+    return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
+}
+double linear_of(double srgb) {
+    return srgb <= 0.04045 ? srgb / 12.92 : std::pow((srgb + 0.055) / 1.055, 2.4);
+}
+
+/// Hosts show the numbers of a colour as they are, Natron as linear light.
+Colour through(double (*curve)(double), Colour colour) {
+    if (!Host::get().config().natron) return colour;
+    for (double& component : colour) component = curve(component);
+    return colour;
+}
+
 }  // namespace
 
 Instance::Instance(Plugin& plugin, const OfxImageEffectStruct& descriptor,
@@ -29,6 +44,10 @@ Instance::Instance(Plugin& plugin, const OfxImageEffectStruct& descriptor,
         auto copy =
             std::make_unique<OfxImageClipStruct>(OfxImageClipStruct{name, clip->properties});
         copy->properties.kind = kClip;
+        const char* const temporal = kOfxImageEffectPropTemporalClipAccess;
+        copy->properties.put(kTemporal,
+                             static_cast<int>(clip->properties.number(temporal) != 0 &&
+                                              descriptor.properties.number(temporal) != 0));
         copy->properties.put(kOfxImageClipPropConnected, 1);
         copy->properties.put(kOfxImageEffectPropPixelDepth, std::string(kOfxBitDepthFloat));
         copy->properties.put(kOfxImageEffectPropComponents, std::string(kOfxImageComponentRGBA));
@@ -119,8 +138,18 @@ OfxStatus Instance::changed(const std::string& type, const std::string& name,
     in.put(kOfxPropChangeReason, reason);
     in.put(kOfxPropTime, shown_time);
     in.put_all(kOfxImageEffectPropRenderScale, {1.0, 1.0});
+    std::set<OfxPropertySetHandle> images;
+    const Activity before = activity();
+    activity().time = shown_time;
+    if (frames && reason == kOfxChangeUserEdited) {
+        activity().images = &images;
+        activity().frames = &frames;
+    }
     const OfxStatus status = plugin_.call(kOfxActionInstanceChanged, &effect_, &in, nullptr);
+    activity() = before;
+    check_released(images, "instanceChanged");
     if (telling_) return status;
+    if (effect_.in_progress) Host::get().fault("progressStart without its End");
     if (effect_.params.open_step) {
         Host::get().fault("paramEditBegin without its End");
         effect_.params.open_step.reset();
@@ -225,6 +254,15 @@ void Instance::tell(const std::string& param, const Value& before) {
     telling_ = false;
 }
 
+Colour Instance::swatch(const std::string& param) {
+    return through(srgb_of, std::get<Colour>(value(param)));
+}
+
+OfxStatus Instance::pick(const std::string& param, const Colour& displayed) {
+    set(param, through(linear_of, displayed));
+    return changed(param);
+}
+
 OfxStatus Instance::sync() {
     return plugin_.call(kOfxActionSyncPrivateData, &effect_, nullptr, nullptr);
 }
@@ -289,25 +327,35 @@ OfxStatus Instance::render(double time, const Picture* source, Picture& output,
     return status;
 }
 
+void Instance::check_released(const std::set<OfxPropertySetHandle>& images, const char* action) {
+    Host& host = Host::get();
+    if (!images.empty() && !host.config().null_functions.count("clipReleaseImage")) {
+        host.fault(std::string(action) + ": " + std::to_string(images.size()) +
+                   " images were not released");
+    }
+    for (OfxPropertySetHandle image : images) delete image;
+}
+
 OfxStatus Instance::render_once(double time, const Picture* source, Picture& output,
                                 const OfxRectI& window) {
     Host& host = Host::get();
     const std::vector<unsigned char> source_before =
         source ? source->storage() : std::vector<unsigned char>();
     const std::vector<unsigned char> output_before = output.storage();
+    if (host.config().natron) {
+        const std::lock_guard<std::mutex> lock(effect_.mutex);
+        effect_.persistent_message.clear();
+    }
     std::set<OfxPropertySetHandle> images;
     const Activity before = activity();
-    activity() = {"", false, false, &output, source, brush, &images};
+    activity() = {"", false, false, &output, source, brush, &images, "", time};
     OfxPropertySetStruct in = render_arguments(time, window);
     in.put_all(kOfxImageEffectPropRenderScale, {output.layout().scale, output.layout().scale});
     for (const auto& [name, value] : extra_arguments) in.put(name, value);
     const OfxStatus status = plugin_.call(kOfxImageEffectActionRender, &effect_, &in, nullptr);
     activity() = before;
 
-    if (!images.empty() && !host.config().null_functions.count("clipReleaseImage")) {
-        host.fault("render: " + std::to_string(images.size()) + " images were not released");
-    }
-    for (OfxPropertySetHandle image : images) delete image;
+    check_released(images, "render");
     if (source && source->storage() != source_before) host.fault("render: the source was written");
     const std::vector<bool> inside = output.mask(window);
     for (std::size_t i = 0; i < inside.size(); ++i) {

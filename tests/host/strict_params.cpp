@@ -1,5 +1,6 @@
 // The parameter suite: values with their exact types, by time in most actions.
 #include <cstdarg>
+#include <filesystem>
 #include <iterator>
 #include <utility>
 
@@ -37,7 +38,8 @@ std::string path_of(const OfxParamStruct& param) {
     const std::string mode = param.properties.text(kOfxParamPropStringMode);
     const bool is_path =
         mode == kOfxParamStringIsFilePath || mode == kOfxParamStringIsDirectoryPath;
-    if (project.empty() || !is_path || text.empty() || text[0] == '/') return text;
+    if (project.empty() || !is_path || text.empty()) return text;
+    if (std::filesystem::u8path(text).has_root_directory()) return text;
     return project + "/" + text;
 }
 

@@ -144,8 +144,48 @@ OfxStatus clear(void* handle) {
 const OfxMessageSuiteV1 kMessages = {message};
 const OfxMessageSuiteV2 kMessages2 = {message, persistent, clear};
 
+// ---------------------------------------------------------------- progress
+
+OfxStatus progress(const char* function, void* handle, bool starts, double share) {
+    const Call call(function);
+    if (call.refused()) return kOfxStatFailed;
+    auto* effect = static_cast<OfxImageEffectStruct*>(handle);
+    if (!effect || effect->in_progress == starts || !(share >= 0 && share <= 1)) {
+        Host::get().fault(std::string(function) + ": no instance, out of turn, or beyond 0 to 1");
+        return kOfxStatErrBadHandle;
+    }
+    return kOfxStatOK;
+}
+OfxStatus progress_start(void* handle, const char*) {
+    const OfxStatus status = progress("progressStart", handle, true, 0);
+    if (status == kOfxStatOK) static_cast<OfxImageEffectStruct*>(handle)->in_progress = true;
+    return status;
+}
+OfxStatus progress_update(void* handle, double share) {
+    const OfxStatus status = progress("progressUpdate", handle, false, share);
+    if (status != kOfxStatOK) return status;
+    auto& told = static_cast<OfxImageEffectStruct*>(handle)->progress;
+    told.push_back(share);
+    const int after = Host::get().config().cancel_after;
+    return after >= 0 && static_cast<int>(told.size()) > after ? kOfxStatReplyNo : kOfxStatReplyYes;
+}
+OfxStatus progress_end(void* handle) {
+    const OfxStatus status = progress("progressEnd", handle, false, 0);
+    if (handle) static_cast<OfxImageEffectStruct*>(handle)->in_progress = false;
+    return status;
+}
+const OfxProgressSuiteV1 kProgress = {progress_start, progress_update, progress_end};
+
 }  // namespace
 
+SuiteTable progress_suite() {
+    using S = OfxProgressSuiteV1;
+    return {&kProgress,
+            sizeof kProgress,
+            {{"progressStart", offsetof(S, progressStart)},
+             {"progressUpdate", offsetof(S, progressUpdate)},
+             {"progressEnd", offsetof(S, progressEnd)}}};
+}
 SuiteTable memory_suite() { return {&kMemory, sizeof kMemory, {}}; }
 SuiteTable thread_suite() {
     using S = OfxMultiThreadSuiteV1;

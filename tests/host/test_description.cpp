@@ -11,7 +11,7 @@ TEST(node_describes_itself) {
     CHECK(plugin.ofx().pluginApi == std::string(kOfxImageEffectPluginApi));
     CHECK(plugin.ofx().apiVersion == 1);
     CHECK(plugin.ofx().pluginIdentifier == std::string("org.palette4d.Palette4D"));
-    CHECK(plugin.ofx().pluginVersionMajor == 1 && plugin.ofx().pluginVersionMinor == 3);
+    CHECK(plugin.ofx().pluginVersionMajor == 1 && plugin.ofx().pluginVersionMinor == 4);
     CHECK(plugin.load() == kOfxStatOK);
     for (const char* context : {kOfxImageEffectContextFilter, kOfxImageEffectContextGeneral,
                                 kOfxImageEffectContextPaint}) {
@@ -90,11 +90,15 @@ TEST(status_says_what_was_loaded) {
     Plugin plugin(bundle());
     const auto instance = plugin.create();
     CHECK(instance->text("status") == "No sidecar chosen");
-    instance->set("sidecar", sidecar());
+    const std::string path = sidecar();
+    instance->set("sidecar", path);
     CHECK(instance->changed("sidecar") == kOfxStatOK);
     CHECK(instance->text("status") ==
           "box: frames 10-20 at 24 fps, 16 palette vertices, 3 edits\n"
-          "expects the picture in linear\ntime 0 is frame 10");
+          "file " +
+              path +
+              "\n"
+              "expects the picture in linear\ntime 0 is frame 10");
     instance->set("sidecar", (folder() / "gone.p4d.json").u8string());
     CHECK(instance->changed("sidecar") == kOfxStatOK);
     CHECK(instance->text("status").find("gone.p4d.json") != std::string::npos);
@@ -115,11 +119,12 @@ TEST(names_from_a_sidecar_do_not_act_on_terminals) {
     const std::string name = "\"box\"";
     const std::string hostile =
         "\"\\u001b[2J\xc2\x9b"
-        "31m\xe2\x80\xae\xc3\xa9\"";
+        "31m\xe2\x80\xae\xd8\x9c\xe2\x80\x8f\xc3\xa9\"";
     text.replace(text.find(name), name.size(), hostile);
     instance->set("sidecar", write("hostile.p4d.json", text));
     CHECK(instance->changed("sidecar") == kOfxStatOK);
-    CHECK(instance->text("status").find("\\u001b[2J\\u009b31m\\u202e\xc3\xa9: frames") == 0);
+    CHECK(instance->text("status").find(
+              "\\u001b[2J\\u009b31m\\u202e\\u061c\\u200f\xc3\xa9: frames") == 0);
     instance->set("sidecar", (folder() / "gone\x1b[2J.p4d.json").u8string());
     CHECK(instance->changed("sidecar") == kOfxStatOK);
     CHECK(instance->text("status").find('\x1b') == std::string::npos);

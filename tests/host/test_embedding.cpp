@@ -48,7 +48,7 @@ TEST(an_embedded_sidecar_travels_with_the_project) {
     CHECK(project.says("a copy is in the project"));
     CHECK(project.render(*project.node) == project.edited());
     // On another machine: the project's parameters, and no file.
-    fs::remove(path);
+    fs::remove(fs::u8path(path));
     const auto there = project.plugin.create();
     for (const char* name : {"sidecar", "embedded", "embed", "clipFolder"}) {
         there->set(name, project.node->value(name));
@@ -68,7 +68,7 @@ TEST(an_embedded_sidecar_travels_with_the_project) {
     there->set("embed", 0);
     CHECK(there->changed("embed") == kOfxStatOK);
     CHECK(there->text("embedded").empty());
-    fs::remove(path);
+    fs::remove(fs::u8path(path));
     CHECK(project.render(*there) == project.unchanged());
     CHECK(!there->effect().persistent_message.empty());
 }
@@ -79,7 +79,7 @@ TEST(the_copy_that_goes_last_is_missed_at_once) {
     project.choose(path);
     project.node->set("embed", 1);
     CHECK(project.node->changed("embed") == kOfxStatOK);
-    fs::remove(path);
+    fs::remove(fs::u8path(path));
     CHECK(project.render(*project.node) == project.edited());
     project.node->set("embed", 0);
     CHECK(project.node->changed("embed") == kOfxStatOK);
@@ -176,7 +176,7 @@ TEST(the_revision_names_what_is_shown) {
     write("clip.p4d.json", "no JSON");
     CHECK(node.changed("strength") == kOfxStatOK);
     expect_new("a file that broke");
-    fs::remove(path);
+    fs::remove(fs::u8path(path));
     CHECK(node.changed("strength") == kOfxStatOK);
     expect_new("a file that went away");
     CHECK(node.changed("strength") == kOfxStatOK);

@@ -21,7 +21,7 @@ NAMESPACE = "{https://www.kdenlive.org}"
 
 #: What hosts that tell a node nothing have no use for, and the handles' ids, which are texts.
 LEFT_OUT = re.compile(
-    r"version|clipFolder|findByName|reload|embed|embedded|revision|status|resetHandles|handle\d\dId|"
+    r"version|clipFolder|clipFile|analyse|openInStudio|findByName|reload|embed|embedded|revision|status|resetHandles|handle\d\dId|"
     r"outputs|handles|handleIds|time"
 )
 

@@ -12,8 +12,7 @@ namespace {
 namespace fs = std::filesystem;
 using palette4d::Vec3;
 
-/// Its display of a colour parameter, and its picker: both take the numbers as linear light.
-double swatch(double linear) {
+double srgb_of(double linear) {
     return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
 }
 double linear_of(double encoded) {
@@ -90,6 +89,23 @@ TEST(a_message_is_its_text_whatever_is_in_it) {
     EXPECT(said.find("/nowhere/100%s %d.p4d.json: ") == 0, "said '" + said + "'");
 }
 
+TEST(a_message_that_the_host_cleared_comes_back) {
+    // The strict host clears it before each render.
+    Window window;
+    const std::string whole = sidecar_text();
+    const std::string& said = window.node->effect().persistent_message;
+    for (int round = 0; round < 2; ++round) {
+        write("clip.p4d.json", "no JSON");
+        for (const double time : {4.0, 4.0, 5.0}) {
+            CHECK(window.render(time) == window.unchanged());
+            EXPECT(said.find(window.path) == 0, "said '" + said + "'");
+        }
+        write("clip.p4d.json", whole);
+        CHECK(window.render() == window.edited());
+        CHECK(said.empty());
+    }
+}
+
 TEST(restored_defaults_leave_no_handle_on) {
     Window window;
     window.change("handle02", Colour{1, 1, 0});
@@ -127,7 +143,7 @@ TEST(a_cache_keyed_by_the_parameters_is_never_stale) {
         EXPECT(node.cached(4, window.source) == expected, words);
     };
     shows(edited, "chosen");
-    fs::remove(window.path);
+    fs::remove(fs::u8path(window.path));
     shows(unchanged, "gone");
     write("clip.p4d.json", whole);
     shows(edited, "back");
@@ -151,15 +167,9 @@ TEST(a_cache_keyed_by_the_parameters_is_never_stale) {
 TEST(paths_survive_a_project_that_is_saved) {
     const std::string path = sidecar();
     const std::string in = folder().u8string();
-    for (const char* name : {"HOME", "P4D_SHOW"}) {
-#if defined(_WIN32)
-        _putenv_s(name, in.c_str());
-#else
-        setenv(name, in.c_str(), 1);
-#endif
-    }
+    for (const char* name : {"HOME", "USERPROFILE", "P4D_SHOW"}) set_variable(name, in);
     fs::create_directories(folder() / "a project");
-    fs::copy_file(path, folder() / "a project" / "near.p4d.json");
+    fs::copy_file(fs::u8path(path), folder() / "a project" / "near.p4d.json");
     Window window(path, in + "/a project");
     for (const std::string& given :
          {std::string("~/clip.p4d.json"), std::string("$P4D_SHOW/clip.p4d.json"),
@@ -169,7 +179,7 @@ TEST(paths_survive_a_project_that_is_saved) {
         window.node->set("sidecar", given);
         EXPECT(window.render() == window.edited(), given);
     }
-    fs::rename(path, folder() / "moved.p4d.json");
+    fs::rename(fs::u8path(path), folder() / "moved.p4d.json");
     window.node->set("sidecar", std::string("/elsewhere/moved.p4d.json"));
     window.node->set("clipFolder", std::string());
     CHECK(window.render() == window.unchanged());
@@ -258,7 +268,7 @@ TEST(a_display_palette_on_a_linear_graph) {
     for (const auto& [name, own] :
          {std::pair("handle02", Vec3{0.2, 0.7, 0.1}), std::pair("handle17", Vec3{0.5, 0.5, 0.9})}) {
         for (std::size_t c = 0; c < 3; ++c) {
-            CHECK(std::abs(swatch(window.colour(name)[c]) - own[c]) < 1e-12);
+            CHECK(std::abs(node.swatch(name)[c] - own[c]) < 1e-12);
         }
     }
     // The picture is what the palette makes of it in sRGB.
@@ -272,7 +282,7 @@ TEST(a_display_palette_on_a_linear_graph) {
                     float& value = window.source.floats(x, y)[c];
                     value = 0.03f * static_cast<float>((3 * x + 7 * y + 5 * c) % 29) + 0.01f;
                     encoded.floats(x, y)[c] =
-                        c < 3 ? static_cast<float>(swatch(static_cast<double>(value))) : value;
+                        c < 3 ? static_cast<float>(srgb_of(static_cast<double>(value))) : value;
                 }
             }
         }
@@ -287,8 +297,7 @@ TEST(a_display_palette_on_a_linear_graph) {
         EXPECT(worst < 1e-5, std::string(words) + ": off by " + std::to_string(worst));
     };
     compare("the sidecar's edit");
-    // A colour as the host's picker reads it from its linear picture.
-    window.change("handle03", Colour{linear_of(0.8), linear_of(0.3), linear_of(0.2)});
+    CHECK(node.pick("handle03", {0.8, 0.3, 0.2}) == kOfxStatOK);
     other.edits.vertex_rgb[2] = Vec3{0.8, 0.3, 0.2};
     compare("a handle");
     // Of a log there is no such curve, and the user hears of it.

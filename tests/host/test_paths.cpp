@@ -7,8 +7,9 @@
 using namespace strict;
 using namespace test;
 using palette4d::node::clip_folder;
+using palette4d::node::clip_spec;
 using palette4d::node::expanded;
-using palette4d::node::find_file;
+using palette4d::node::sidecar_beside;
 using palette4d::node::words_of_missing;
 
 namespace {
@@ -21,29 +22,35 @@ public:
     Variable(const char* name, const std::string& value) : name_(name) {
         const char* before = std::getenv(name);
         if (before) before_ = before;
-        set(value.c_str());
+        set_variable(name, value);
     }
-    ~Variable() { set(before_ ? before_->c_str() : nullptr); }
+    ~Variable() { set_variable(name_, before_); }
     Variable(const Variable&) = delete;
     Variable& operator=(const Variable&) = delete;
 
 private:
-    void set(const char* value) {
-#if defined(_WIN32)
-        _putenv_s(name_, value ? value : "");
-#else
-        if (value) {
-            setenv(name_, value, 1);
-        } else {
-            unsetenv(name_);
-        }
-#endif
-    }
     const char* name_;
     std::optional<std::string> before_;
 };
 
-std::string in_folder(const std::string& name) { return (folder() / name).u8string(); }
+#if defined(_WIN32)
+const std::string kSeparator = ";", kDrive = "C:";
+#else
+const std::string kSeparator = ":", kDrive = "";
+#endif
+
+/// As the system writes it.
+std::string preferred(const std::string& path) {
+    return fs::u8path(path).make_preferred().u8string();
+}
+std::string in_folder(const std::string& name) {
+    return preferred((folder() / fs::u8path(name)).u8string());
+}
+
+std::optional<std::string> find_file(const std::string& path, const std::string& in) {
+    const std::optional<std::string> found = palette4d::node::find_file(path, in);
+    return found ? std::optional<std::string>(preferred(*found)) : std::nullopt;
+}
 
 }  // namespace
 
@@ -67,13 +74,13 @@ TEST(files_are_found_where_they_are_and_where_they_went) {
     const Variable search("PALETTE4D_PATH", "");
     fs::create_directories(folder() / "clip" / "sub");
     fs::create_directories(folder() / "other");
-    const std::string beside = write("clip/a.p4d.json", "x"),
-                      deep = write("clip/sub/b.p4d.json", "");
+    const std::string beside = preferred(write("clip/a.p4d.json", "x")),
+                      deep = preferred(write("clip/sub/b.p4d.json", ""));
     CHECK(find_file(beside, "") == beside);
     CHECK(find_file(beside, in_folder("other")) == beside);
     CHECK(find_file("sub/b.p4d.json", in_folder("clip")) == deep);
     // As people paste them.
-    const std::string spaced = write("clip/c d%20.p4d.json", "x");
+    const std::string spaced = preferred(write("clip/c d%20.p4d.json", "x"));
     const std::string clip = in_folder("clip");
     for (const std::string& pasted : {beside + "\n", " " + beside + "\t", '"' + beside + '"',
                                       "'" + beside + "' ", "file://" + beside}) {
@@ -95,7 +102,8 @@ TEST(files_are_found_where_they_are_and_where_they_went) {
     CHECK(find_file("$P4D_SHOW/clip/a.p4d.json", "") == beside);
     CHECK(find_file("a.p4d.json", "${P4D_SHOW}/clip") == beside);
     CHECK(!find_file("b.p4d.json", ""));
-    const Variable two("PALETTE4D_PATH", in_folder("other") + ":" + in_folder("clip/sub") + ":");
+    const Variable two("PALETTE4D_PATH",
+                       in_folder("other") + kSeparator + in_folder("clip/sub") + kSeparator);
     CHECK(find_file("b.p4d.json", "") == deep);
     CHECK(find_file("/old/b.p4d.json", "") == deep);
 }
@@ -105,9 +113,11 @@ TEST(a_variable_inside_a_path_names_a_folder) {
     const Variable shot("P4D_SHOT", "sh01"), search("PALETTE4D_PATH", in_folder("decoy"));
     for (const char* name : {"sh01", "decoy"}) {
         fs::create_directories(folder() / name);
-        fs::copy_file(file, folder() / name / "g.p4d.json", fs::copy_options::overwrite_existing);
+        fs::copy_file(fs::u8path(file), folder() / name / "g.p4d.json",
+                      fs::copy_options::overwrite_existing);
     }
-    fs::copy_file(file, folder() / "sh01" / "h.p4d.json", fs::copy_options::overwrite_existing);
+    fs::copy_file(fs::u8path(file), folder() / "sh01" / "h.p4d.json",
+                  fs::copy_options::overwrite_existing);
     CHECK(find_file(in_folder("$P4D_SHOT/g.p4d.json"), "") == in_folder("sh01/g.p4d.json"));
     CHECK(find_file("h.p4d.json", in_folder("$P4D_SHOT")) == in_folder("sh01/h.p4d.json"));
     CHECK(palette4d::node::meant(in_folder("$P4D_SHOT/none.json")) ==
@@ -156,7 +166,25 @@ TEST(the_node_finds_its_sidecar) {
     node->set("sidecar", std::string("$P4D_SHOW/none.p4d.json"));
     Picture output(layout);
     CHECK(node->render(3, &source, output, layout.bounds) == kOfxStatOK);
-    CHECK(node->effect().persistent_message.find(in_folder("none.p4d.json")) != std::string::npos);
+    CHECK(node->effect().persistent_message.find(folder().u8string() + "/none.p4d.json") !=
+          std::string::npos);
+}
+
+TEST(a_still_stands_for_its_sequence) {
+    const std::pair<const char*, const char*> names[] = {
+        {"/a/shot.1001.exr", "/a/shot.####.exr"},
+        {"/a/shot_01.PNG", "/a/shot_##.PNG"},
+        {"/a/shot.[1001-1100].exr", "/a/shot.####.exr"},
+        {"/a/shot.####.exr", "/a/shot.####.exr"},
+        {"/a/shot.%04d.exr", "/a/shot.%04d.exr"},
+        {"/a/v2/plate.exr", "/a/v2/plate.exr"},
+        {"/a/take3.mov", "/a/take3.mov"},
+    };
+    for (const auto& [media, spec] : names) {
+        EXPECT(preferred(clip_spec(media)) == preferred(spec), clip_spec(media));
+    }
+    CHECK(preferred(sidecar_beside("/a/shot.####.exr")) == preferred("/a/shot.p4d.json"));
+    CHECK(preferred(sidecar_beside("/a/take3.mov")) == preferred("/a/take3.p4d.json"));
 }
 
 TEST(a_missing_file_is_said_with_where_it_was_looked_for) {
@@ -165,7 +193,8 @@ TEST(a_missing_file_is_said_with_where_it_was_looked_for) {
         const std::string said = words_of_missing(path);
         EXPECT(said.find(words) != std::string::npos, path + ": " + said);
     };
-    says("/nowhere/a.p4d.json", "does not exist, and no file with its name is in Clip's folder");
+    says(kDrive + "/nowhere/a.p4d.json",
+         "does not exist, and no file with its name is in Clip's folder");
     says("$P4D_SHOW/a.p4d.json", "does not exist, and no file with its name");
     says("a.p4d.json", "PALETTE4D_PATH or " + fs::current_path().u8string());
     for (const char* path : {"$P4D_NONE/a.json", "$P4D_SHOW/${P4D_NONE}.json", "%P4D_NONE%/100%"}) {

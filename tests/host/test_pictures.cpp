@@ -49,6 +49,20 @@ TEST(every_layout_gives_the_cores_bytes) {
     }
 }
 
+TEST(every_layout_in_the_general_context) {
+    Ready node;
+    node.instance = node.plugin.create(kOfxImageEffectContextGeneral);
+    node.set("sidecar", node.path);
+    for (const Layout& layout : layouts()) {
+        const Picture source = source_of(layout);
+        Picture output(layout);
+        const OfxRectI& b = layout.bounds;
+        CHECK(node.instance->render(4, &source, output, b) == kOfxStatOK);
+        CHECK(output.pixels(b) == recoloured(node.parsed, 14, source, b));
+        CHECK(output.pixels(b) != source.pixels(b));
+    }
+}
+
 TEST(opaque_and_unknown_premultiplication_leave_alpha_aside) {
     Ready node;
     for (const char* name : {kOfxImageOpaque, "OfxImageSomethingNew", ""}) {

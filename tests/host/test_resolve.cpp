@@ -123,7 +123,7 @@ TEST(an_embedded_copy_outlives_a_restart_and_stays_with_its_clip) {
     std::map<std::string, Value> saved;
     for (const std::string& param : node->effect().params.order) saved[param] = node->value(param);
     node->destroy();
-    fs::remove(path);
+    fs::remove(fs::u8path(path));
     CHECK(page.plugin.unload() == kOfxStatOK);
     CHECK(page.plugin.load() == kOfxStatOK);
     for (const bool same : {true, false}) {

@@ -196,15 +196,29 @@ TEST(calls_in_the_wrong_place_are_noticed) {
         expect("paramEditBegin: only while an instance changes",
                faults_of(action, [](Now& n) { g.param->paramEditBegin(n.params, "x"); }));
     }
-    expect_each(kRender,
-                {{"paramGetDerivative: not expected",
-                  [&](Now& n) { g.param->paramGetDerivative(handle_of(n, "number"), 0, &value); }},
-                 {"called in a spawned thread", [](Now& n) {
-                      const auto ask = [](unsigned, unsigned, void* data) {
-                          handle_of(*static_cast<Now*>(data), "number");
-                      };
-                      g.thread->multiThread(ask, 2, &n);
-                  }}});
+    expect_each(
+        kOfxActionInstanceChanged,
+        {{"clipGetImage: not while rendering",
+          [&](Now& n) { g.effect->clipGetImage(clip_of(n, "Source"), 0, nullptr, &image); }},
+         {"progressStart without its End",
+          [](Now& n) {
+              fetch<OfxProgressSuiteV1>(kOfxProgressSuite)->progressStart(n.effect, "x");
+          }},
+         {"progressUpdate: no instance, out of turn", [](Now& n) {
+              fetch<OfxProgressSuiteV1>(kOfxProgressSuite)->progressUpdate(n.effect, 0);
+          }}});
+    expect_each(
+        kRender,
+        {{"another time's, without temporal access",
+          [&](Now& n) { g.effect->clipGetImage(clip_of(n, "Source"), 5, nullptr, &image); }},
+         {"paramGetDerivative: not expected",
+          [&](Now& n) { g.param->paramGetDerivative(handle_of(n, "number"), 0, &value); }},
+         {"called in a spawned thread", [](Now& n) {
+              const auto ask = [](unsigned, unsigned, void* data) {
+                  handle_of(*static_cast<Now*>(data), "number");
+              };
+              g.thread->multiThread(ask, 2, &n);
+          }}});
 }
 
 TEST(preferences_that_change_unasked_are_noticed) {

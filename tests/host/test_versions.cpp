@@ -59,6 +59,8 @@ TEST(the_node_applies_the_solution_of_the_picks) {
         CHECK(found == scene.expected(scene.parsed.edits, 10 + time));
         CHECK(found != scene.expected(without, 10 + time));
     }
+    CHECK(scene.instance->changed("reload") == kOfxStatOK);
+    CHECK(scene.instance->text("status").find("3 edits and picks\n") != std::string::npos);
     // Rewritten with another solution.
     std::string other = kSolution;
     other.replace(other.find("0.25, -0.125"), 12, "0.50, -0.125");
@@ -117,7 +119,7 @@ TEST(the_user_chooses_a_version) {
     scene.set("version", std::string());
     CHECK(scene.render() == active);
     CHECK(scene.instance->changed("version") == kOfxStatOK);
-    CHECK(scene.instance->text("status").find("version") == std::string::npos);
+    CHECK(scene.instance->text("status").find("in version") == std::string::npos);
 }
 
 TEST(a_version_that_is_not_there_is_said) {

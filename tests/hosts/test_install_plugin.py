@@ -5,13 +5,24 @@ from __future__ import annotations
 import argparse
 import os
 import shutil
+import stat
+import sys
 from pathlib import Path
 
 import pytest
 
+from palette4d import _core
 from palette4d.cli import install_plugin
 from palette4d.common.errors import Palette4dError
-from palette4d.hosts.bundle import BUNDLE, default_destination, find_bundle, install_bundle
+from palette4d.hosts.bundle import (
+    BUNDLE,
+    PROGRAM,
+    architecture,
+    default_destination,
+    find_bundle,
+    install_bundle,
+    system_destination,
+)
 
 
 def make_bundle(root: Path, content: bytes = b"code") -> Path:
@@ -24,10 +35,11 @@ def make_bundle(root: Path, content: bytes = b"code") -> Path:
 
 
 def files(root: Path) -> dict[str, bytes]:
+    """What is in a bundle, but for the file that its installation adds."""
     return {
         str(path.relative_to(root)): path.read_bytes()
         for path in sorted(root.rglob("*"))
-        if path.is_file()
+        if path.is_file() and path != root / PROGRAM
     }
 
 
@@ -44,6 +56,20 @@ def test_copies_the_whole_bundle_and_leaves_nothing_else(bundle: Path, tmp_path:
     assert files(target) == files(bundle)
     assert os.access(target / "Contents/Linux-x86-64/Palette4D.ofx", os.X_OK)
     assert [path.name for path in destination.iterdir()] == [BUNDLE]
+
+
+@pytest.mark.parametrize("link", [False, True])
+def test_the_bundle_knows_which_python_has_palette4d(
+    bundle: Path, tmp_path: Path, link: bool
+) -> None:
+    old = os.umask(0)
+    try:
+        target = install_bundle(bundle, tmp_path / "OFX", link=link)
+    finally:
+        os.umask(old)
+    assert (target / PROGRAM).read_text() == f"{sys.executable}\n"
+    # The node believes no file that everybody may change.
+    assert stat.S_IMODE((target / PROGRAM).stat().st_mode) == 0o644
 
 
 def test_replaces_an_earlier_version(bundle: Path, tmp_path: Path) -> None:
@@ -131,11 +157,36 @@ def test_a_failed_rename_puts_the_old_bundle_back(
     assert files(destination / BUNDLE) == {"Contents/Linux-x86-64/Palette4D.ofx": b"old code"}
 
 
-def test_default_destinations() -> None:
+def test_default_destinations(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    for name in ("OFX_PLUGIN_PATH", "COMMONPROGRAMW6432", "COMMONPROGRAMFILES"):
+        monkeypatch.delenv(name, raising=False)
     assert default_destination("linux") == Path("/usr/OFX/Plugins")
     assert default_destination("darwin") == Path("/Library/OFX/Plugins")
     windows = default_destination("win32")
     assert windows.as_posix() == "C:/Program Files/Common Files/OFX/Plugins"
+    monkeypatch.setenv("COMMONPROGRAMFILES", "D:/Gemeinsame Dateien")
+    assert default_destination("win32").as_posix() == "D:/Gemeinsame Dateien/OFX/Plugins"
+    # Where hosts look first.
+    monkeypatch.setenv("OFX_PLUGIN_PATH", f":{tmp_path}:/elsewhere")
+    assert default_destination("linux") == tmp_path
+    assert system_destination("linux") == Path("/usr/OFX/Plugins")
+
+
+def test_each_system_has_its_folder_in_the_bundle() -> None:
+    assert architecture("linux", "x86_64") == "Linux-x86-64"
+    assert architecture("linux", "aarch64") == "Linux-aarch64"
+    assert architecture("darwin", "arm64") == architecture("darwin", "x86_64") == "MacOS"
+    assert architecture("win32", "AMD64") == "Win64"
+
+
+def test_says_which_systems_a_bundle_is_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    library = make_bundle(tmp_path / "_ofx") / "Contents" / "Linux-x86-64"
+    library.rename(library.with_name("Linux-riscv64"))
+    monkeypatch.setattr(_core, "__file__", str(tmp_path / "_core.so"))
+    with pytest.raises(Palette4dError, match=r"Linux-riscv64, expected .*pip install"):
+        find_bundle()
 
 
 def test_the_verb_installs_the_packaged_node(

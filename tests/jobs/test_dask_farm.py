@@ -10,7 +10,9 @@ import threading
 import time
 from pathlib import Path
 
+import dask
 import pytest
+import trustme
 from any_clips import landscape
 from distributed import Client
 from edits import clip, external, movie, save, timeline
@@ -70,10 +72,60 @@ def test_an_open_address_is_warned_of(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(farms, "ANSWERS_WITHIN", 0.1)
-    for address, warned in (("tcp://gone.invalid:8786", True), ("tcp://127.0.0.1:9", False)):
+    for address, warned in (
+        ("tcp://gone.invalid:8786", True),
+        ("ws://gone.invalid:8786", True),
+        ("tcp://127.0.0.1:9", False),
+    ):
         with pytest.raises(Palette4dError):
             farms.run(address, piece, {0: 1}, lambda key, found: None)
         assert ("has no authentication" in capsys.readouterr().err) == warned
+
+
+def certificates(folder: Path, authority: trustme.CA) -> dict[str, str]:
+    """Dask's settings for a certificate of an authority, as docs/shots.md shows them."""
+    folder.mkdir()
+    paths = {name: str(folder / f"{name}.pem") for name in ("ca", "cert", "key")}
+    own = authority.issue_cert("127.0.0.1")
+    authority.cert_pem.write_to_path(paths["ca"])
+    own.cert_chain_pems[0].write_to_path(paths["cert"])
+    own.private_key_pem.write_to_path(paths["key"])
+    settings = {
+        f"distributed.comm.tls.{role}.{kind}": paths[kind]
+        for role in ("scheduler", "worker", "client")
+        for kind in ("cert", "key")
+    }
+    return settings | {"distributed.comm.tls.ca-file": paths["ca"]}
+
+
+def test_with_certificates_nobody_else_gets_in(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    owner = certificates(tmp_path / "owner", trustme.CA())
+    stranger = certificates(tmp_path / "stranger", trustme.CA())
+    on_farm = {"distributed.comm.require-encryption": "True", **owner}
+    on_farm["distributed.comm.default-scheme"] = "tls"
+    variables = {
+        "DASK_" + name.upper().replace(".", "__").replace("-", "_"): value
+        for name, value in on_farm.items()
+    }
+    path = os.pathsep.join([str(TESTS), os.environ.get("PYTHONPATH", "")])
+    monkeypatch.setattr(farms, "ANSWERS_WITHIN", 5)
+    with farm(tmp_path / "farm", workers=1, PYTHONPATH=path, **variables) as made:
+        assert made.address.startswith("tls://")
+        plain = made.address.replace("tls://", "tcp://")
+        for settings, address, words in (
+            ({}, made.address, "found no certificates"),
+            (stranger, made.address, "no Dask scheduler answers"),
+            ({}, plain, "no Dask scheduler answers"),
+        ):
+            with dask.config.set(settings), pytest.raises(Palette4dError, match=words):
+                farms.run(address, piece, {1: 1}, lambda key, result: None)
+        found: dict[int, object] = {}
+        monkeypatch.setattr(farms, "ANSWERS_WITHIN", 60)
+        with dask.config.set(owner):
+            farms.run(made.address, piece, {2: 2}, found.__setitem__)
+    assert found == {2: (4, 1)}
 
 
 def busy(client: Client, made: Farm, name: str) -> bool:

@@ -12,9 +12,9 @@ import PyOpenColorIO as ocio
 import pytest
 from numpy.typing import NDArray
 from palette4d.lut_export import series
-from palette4d.lut_export.bake_job import BakeSettings
 from palette4d.lut_export.config import WrittenConfig, write_config
 from palette4d.lut_export.frame_edit import frame_edit
+from palette4d.lut_export.measured_write import BakeSettings
 
 from palette4d import Palette4dError, _core
 from palette4d.colour.difference import delta_e_2000, viewing_of

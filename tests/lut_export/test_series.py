@@ -20,8 +20,8 @@ import PyOpenColorIO as ocio
 import pytest
 from numpy.typing import NDArray
 from palette4d.lut_export import series
-from palette4d.lut_export.bake_job import BakeSettings
 from palette4d.lut_export.frame_edit import frame_edit
+from palette4d.lut_export.measured_write import BakeSettings
 from palette4d.lut_export.series import Request, Series
 from parity.cases import bump, edited, solution, split_merge_document
 

@@ -10,6 +10,7 @@ from av.video.reformatter import ColorRange, Colorspace
 from clip_files import damage, write_movie
 
 from palette4d.media.clip import ClipError, FrameError, open_clip
+from palette4d.media.clip_movie import MovieClip
 
 HEIGHT, WIDTH = 48, 64
 
@@ -150,6 +151,30 @@ def test_compressed_movie_with_reordered_frames(tmp_path):
     with pytest.raises(ClipError, match="the movie has 0-23"):
         open_clip(str(path), frames="20-24")
     assert clip.notes == []
+
+
+def test_a_jump_decodes_from_the_key_frame_before(tmp_path, monkeypatch):
+    path = write_movie(
+        tmp_path / "a.mp4",
+        "libx264",
+        "yuv420p",
+        flat([(5 * v, 5 * v, 5 * v) for v in range(48)]),
+        "rgb24",
+        options={"g": "8"},
+    )
+    decoded = []
+    decode = MovieClip._decode
+
+    def counted(clip, start):
+        for number, picture in decode(clip, start):
+            decoded.append(number)
+            yield number, picture
+
+    monkeypatch.setattr(MovieClip, "_decode", counted)
+    clip = open_clip(str(path))
+    for frame in (0, 44, 45):
+        assert float(clip.read(frame).mean()) * 51 == pytest.approx(frame, abs=1)
+    assert len(decoded) <= 1 + 8 + 1
 
 
 def test_variable_rate_is_noted(tmp_path):

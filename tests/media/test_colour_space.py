@@ -14,7 +14,7 @@ from clip_files import write_image, write_movie
 from palette4d import _core
 from palette4d.cli.main import main
 from palette4d.colour import ocio_config
-from palette4d.colour.conversion import TOLERANCE, Comparison, conversion
+from palette4d.colour.conversion_chain import TOLERANCE, Comparison, conversion
 from palette4d.colour.conversion_steps import ConversionError
 from palette4d.common.errors import Palette4dError
 from palette4d.grade import sidecar as sidecars

@@ -359,9 +359,6 @@ def frames_of(name: str) -> list[float]:
     return times + between + beside + outside
 
 
-SLICES = [(name, frame) for name in DOCUMENTS for frame in frames_of(name)]
-
-
 @dataclass(frozen=True)
 class Body:
     """A palette, points to weigh, and how closely float64 implementations must agree."""

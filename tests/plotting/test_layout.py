@@ -74,6 +74,20 @@ def test_names_do_not_cover_discs_or_each_other() -> None:
             assert apart or abs(one.y - other.y) >= 8.5
 
 
+def test_names_of_the_first_and_last_frame_are_beside_their_discs_where_they_fit() -> None:
+    layout = timeline("v1_edited", 300.0, 24.0)
+    discs = layout.discs(-20.0, 320.0)
+    ends = layout.scale.left, layout.scale.right
+    outer = {disc.id: disc for disc in discs if disc.home in ends}
+    assert outer
+    for space in (60.0, 12.0):
+        names = disc_names(
+            discs, 9.0, lambda text: 7.0 * len(text), layout.height, beside=(*ends, space)
+        )
+        seen = {name.text for name in names if name.x < ends[0] or name.x > ends[1]}
+        assert seen == (set(outer) if space > 30 else set())
+
+
 def test_ticks_are_round_and_have_room() -> None:
     layout = timeline("v1_split", 800.0)
     first, last = layout.palette.first, layout.palette.last

@@ -70,6 +70,11 @@ def test_the_sidecars_of_shots_that_are_done(tmp_path: Path) -> None:
         lambda d: d.pop("shots"),
         lambda d: d.update(rate=[24, 0]),
         lambda d: d.update(rate=24),
+        lambda d: d.update(rate=["1e9999999"]),  # a fraction of ten million digits
+        lambda d: d.update(rate=[-24, 1]),
+        lambda d: d["shots"][0].update(used=[0, 1e308]),
+        lambda d: d["shots"][0].update(asked=[0, 10**300]),
+        lambda d: d["shots"][0].update(clip=["m.mov"]),
         lambda d: d["shots"][0].update(status="ready"),
         lambda d: d["shots"][0].pop("frames"),
         lambda d: d["shots"][0].update(frames=None),

@@ -18,9 +18,9 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QApplication
 
 from palette4d.cli.main import main
+from palette4d.colour.oklch import Lch
 from palette4d.studio import theme
 from palette4d.studio.inspector import Inspector
-from palette4d.studio.lch import Lch
 from palette4d.studio.session import Session
 
 GOLDEN = Path(__file__).resolve().parent.parent / "golden" / "sidecars"

@@ -46,7 +46,8 @@ def test_every_entry_of_the_menus_is_in_the_table(window: Window, repo_root: Pat
         table[menu, text] = re.findall(r"`([^`]+)`", listed)
     docks = {dock.windowTitle() for dock in window.docks.values()}
     shown = 0
-    for title, entries in window.menus.items():
+    for entries in window.menus.values():
+        title = entries.title()
         for action in entries.actions():
             if action.isSeparator() or action.menu() is not None or action.text() in docks:
                 continue
@@ -57,6 +58,16 @@ def test_every_entry_of_the_menus_is_in_the_table(window: Window, repo_root: Pat
             ]
             shown += 1
     assert shown > 60
+
+
+def test_the_table_of_the_help_is_searched(window: Window) -> None:
+    manual = window.help.manual()
+    assert len(list(manual.items())) > 90
+    manual.search.setText("wipe")
+    seen = [item for item in manual.items() if not item.isHidden()]
+    assert 0 < len(seen) < 6
+    assert all(item.text(0) or k for k, item in enumerate(seen))
+    manual.close()
 
 
 def keys_of(action: QAction, seen: str) -> list[str]:

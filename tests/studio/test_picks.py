@@ -114,9 +114,9 @@ def test_the_end_of_a_range_is_dragged(qtbot: Any, opened: Window) -> None:
     pick(qtbot, opened, 40, 30)
     timeline, session = opened.timeline, opened.session
     _, last, _ = session.frames
-    y = timeline._lane_y(0)
-    start, end = QPointF(timeline.x_of(last), y), QPointF(timeline.x_of(last - 3), y)
-    assert timeline.hit(start).grip == "until"
+    y = timeline.places.lane_y(0)
+    start, end = QPointF(timeline.places.x_of(last), y), QPointF(timeline.places.x_of(last - 3), y)
+    assert timeline.places.hit(start).grip == "until"
     qtbot.mousePress(timeline, LEFT, pos=start.toPoint())
     send(timeline, end)
     qtbot.mouseRelease(timeline, LEFT, pos=end.toPoint())
@@ -165,10 +165,10 @@ def test_versions_are_kept_and_used(qtbot: Any, opened: Window) -> None:
 def test_the_menu_of_a_range_changes_the_pick(qtbot: Any, opened: Window) -> None:
     pick(qtbot, opened, 40, 30)
     timeline = opened.timeline
-    place = QPointF(timeline.x_of(6.5), timeline._lane_y(0))
+    place = QPointF(timeline.places.x_of(6.5), timeline.places.lane_y(0))
 
     def choose(text: str) -> None:
-        menu = timeline.menu_for(timeline.hit(place), place.x())
+        menu = timeline.menu_for(timeline.places.hit(place), place.x())
         entries = [*menu.actions()]
         entries += [e for a in menu.actions() if a.menu() is not None for e in a.menu().actions()]
         next(entry for entry in entries if text in entry.text()).trigger()

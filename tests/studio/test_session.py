@@ -4,19 +4,10 @@ from __future__ import annotations
 
 import json
 import shutil
-import tempfile
 from collections.abc import Generator
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
-from hypothesis import strategies as st
-from hypothesis.stateful import (
-    RuleBasedStateMachine,
-    invariant,
-    rule,
-    run_state_machine_as_test,
-)
 
 import palette4d
 from palette4d.cli.main import main
@@ -120,85 +111,3 @@ def test_edits_that_fail_become_the_status(session: Session) -> None:
     assert session.status.level == "error"
     assert "nowhere" in session.status.text
     assert session.saved
-
-
-def test_random_edits_undone_are_the_first_bytes(tmp_path: Path) -> None:
-    source = GOLDEN / "v1_merge.p4d.json"
-    first = json.loads(source.read_text())
-    ids = [each["id"] for each in first["polytope"]["vertices"]]
-    edges = [each["id"] for each in first["polytope"]["edges"]]
-    colour = st.tuples(*[st.floats(-0.5, 1.5, width=32)] * 3)
-
-    class Grading(RuleBasedStateMachine):
-        """A person who edits, drags, undoes and redoes, while the session saves."""
-
-        def __init__(self) -> None:
-            super().__init__()
-            self.path = Path(tempfile.mkdtemp(dir=tmp_path)) / "a.p4d.json"
-            self.path.write_bytes(source.read_bytes())
-            self.session = Session()
-            self.session.open_sidecar(self.path)
-            self.now = 0.0
-
-        @rule(id_=st.sampled_from(ids), rgb=colour)
-        def set(self, id_: str, rgb: tuple[float, float, float]) -> None:
-            self.session.edit(lambda document: document.set(id_, rgb=rgb, any_value=True))
-
-        @rule(edge=st.sampled_from(edges), frame=st.integers(0, 20), rgb=colour)
-        def stop(self, edge: str, frame: int, rgb: tuple[float, float, float]) -> None:
-            self.session.edit(
-                lambda document: document.stop(edge, frame=frame, rgb=rgb, any_value=True)
-            )
-
-        @rule(id_=st.sampled_from(ids), colours=st.lists(colour, max_size=4), kept=st.booleans())
-        def drag(self, id_: str, colours: list[tuple[float, float, float]], kept: bool) -> None:
-            for rgb in colours:
-                self.session.drag(lambda document, c=rgb: document.set(id_, rgb=c, any_value=True))
-            if kept:
-                self.session.drop()
-            else:
-                self.session.cancel()
-
-        @rule(id_=st.sampled_from([None, *ids]))
-        def reset(self, id_: str | None) -> None:
-            self.session.edit(lambda document: document.reset(id_))
-
-        @rule()
-        def undo(self) -> None:
-            self.session.undo()
-
-        @rule()
-        def redo(self) -> None:
-            self.session.redo()
-
-        @rule()
-        def wait(self) -> None:
-            self.now += LATER
-            self.session.tick(self.now)
-
-        @invariant()
-        def nothing_is_dragged(self) -> None:
-            assert not self.session.dragging
-
-        def teardown(self) -> None:
-            document = self.session.document
-            assert document is not None
-            state = document.state
-            steps = len(document.history)
-            for _ in range(steps):
-                self.session.undo()
-            assert document.fields()["edits"] == first["edits"]
-            for _ in range(steps):
-                self.session.redo()
-            assert document.state == state
-            for _ in range(steps):
-                self.session.undo()
-            assert self.session.save()
-            self.session.close()
-            saved = json.loads(self.path.read_text())
-            saved.pop("history", None)
-            assert saved == first
-
-    run_state_machine_as_test(
-        Grading, settings=settings(max_examples=12, stateful_step_count=40, deadline=None)
-    )

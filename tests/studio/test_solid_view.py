@@ -20,7 +20,8 @@ from PySide6.QtWidgets import QApplication
 
 from palette4d.studio import theme
 from palette4d.studio.session import Session
-from palette4d.studio.solid_view import SolidView, troubles
+from palette4d.studio.solid_paint import troubles
+from palette4d.studio.solid_view import SolidView
 
 GOLDEN = Path(__file__).resolve().parent.parent / "golden" / "sidecars"
 LEFT = Qt.MouseButton.LeftButton

@@ -144,7 +144,7 @@ def test_a_wipe_is_dragged_and_shows_both_sides(opened: Window, settle: Settle) 
     settle(opened)
     viewer = opened.viewer
     height = viewer.height() // 2
-    start = QPoint(round(viewer._wipe_x()), height)
+    start = QPoint(round(viewer.wipe_x()), height)
     QTest.mousePress(viewer, Qt.MouseButton.LeftButton, pos=start)
     QTest.mouseMove(viewer, start + QPoint(-150, 0))
     QTest.mouseRelease(viewer, Qt.MouseButton.LeftButton, pos=start + QPoint(-150, 0))
@@ -154,7 +154,7 @@ def test_a_wipe_is_dragged_and_shows_both_sides(opened: Window, settle: Settle) 
     opened.session.look(compare="before")
     settle(opened)
     before = seen(opened)
-    x = round(viewer._wipe_x())
+    x = round(viewer.wipe_x())
     assert np.array_equal(both[60:, 20 : x - 8], before[60:, 20 : x - 8])
     assert not np.array_equal(both[60:, x + 8 :], before[60:, x + 8 :])
 
@@ -226,17 +226,17 @@ def test_versions_are_kept_used_and_compared(opened: Window, settle: Settle) -> 
     QTest.keyClick(opened, Qt.Key.Key_V)
     session.edit(lambda document: document.set(id_, rgb=(0.0, 0.0, 1.0)))
     QTest.keyClick(opened, Qt.Key.Key_V)
-    assert opened.version_names() == ["A", "B"]
+    assert session.versions == ("A", "B")
     QTest.keyClick(opened, Qt.Key.Key_1)
     assert session.document is not None
     assert session.document.colour(id_) == (1.0, 0.0, 0.0)
-    opened.do_compare_version()
+    opened.commands.compare_version()
     assert session.view.version == "A"
     settle(opened)
     picture = opened.viewer.picture
     assert picture is not None
     assert np.array_equal(picture.before, picture.after)
-    opened.do_compare_version()
+    opened.commands.compare_version()
     settle(opened)
     picture = opened.viewer.picture
     assert picture is not None
@@ -346,6 +346,52 @@ def test_a_sidecar_that_cannot_be_written_is_kept_elsewhere(
     assert not recovery_file(sidecar).exists()
 
 
+@pytest.mark.slow
+def test_fifty_thousand_frames(
+    window: Window, analysed: Path, settle: Settle, repo_root: Path, tmp_path: Path
+) -> None:
+    golden = repo_root / "tests" / "golden" / "sidecars" / "v1_split.p4d.json"  # frames 0 to 20
+    fields = json.loads(golden.read_text())
+    for part in (fields["polytope"]["vertices"], fields["polytope"]["blocks"]):
+        for entry in part:
+            entry.update({k: 2500 * entry[k] for k in ("frame", "first", "last") if k in entry})
+    last = fields["clip"]["frames"]["last"] = 50_000
+    (tmp_path / "many").mkdir()
+    image = next((analysed / "clip").glob("*.png"))
+    for frame in range(last + 1):
+        (tmp_path / "many" / f"f.{frame:05d}.png").symlink_to(image)
+    fields["clip"]["source"] = str(tmp_path / "many" / "f.#####.png")
+    sidecar = tmp_path / "many.p4d.json"
+    sidecar.write_text(json.dumps(fields))
+    window.open_path(str(sidecar))
+    window.session.go(last)
+    settle(window)
+    id_ = busiest(window)
+    for _ in range(30):
+        window.timeline.zoom_in()
+    window.session.edit(lambda document: document.set(id_, rgb=(0.9, 0.3, 0.1)))
+    settle(window)
+    start, end = window.timeline.places.span
+    assert (round(end), round(end - start)) == (last, 4)
+    assert window.session.save()
+
+
+def test_panels_follow_the_picture_of_a_drag(opened: Window, settle: Settle, qtbot: Any) -> None:
+    id_ = busiest(opened)
+    opened.session.select(id_)
+    for red in (0.2, 0.4, 0.6):
+        opened.session.drag(lambda document, red=red: document.set(id_, rgb=(red, 0.1, 0.2)))
+        assert opened.inspector.boxes["R"].value() != red  # later, when the picture is shown
+    qtbot.waitUntil(lambda: opened.turns.settled, timeout=10_000)
+    assert opened.inspector.boxes["R"].value() == pytest.approx(0.6)
+    assert opened.timeline.places.revision == opened.session.revision
+    picture = opened.viewer.picture
+    assert picture is not None
+    assert picture.request.revision == opened.session.revision
+    opened.session.cancel()
+    assert opened.inspector.boxes["R"].value() != pytest.approx(0.6)
+
+
 def test_a_palette_of_one_colour_and_a_clip_of_another_size(
     window: Window, tmp_path: Path, settle: Settle
 ) -> None:
@@ -359,7 +405,7 @@ def test_a_palette_of_one_colour_and_a_clip_of_another_size(
     assert main(["analyze", str(clip), "-o", str(out), "--quiet"]) == 0
     window.open_path(str(out))
     settle(window)
-    window.do_outside()
+    window.commands.outside()
     settle(window)
     other = tmp_path / "other"
     assert main(["sample-clip", "-o", str(other / "f.####.png"), "--frames", "3", "--quiet"]) == 0
@@ -439,7 +485,7 @@ def test_a_clip_without_a_palette_is_offered_to_be_analysed(
     shutil.copytree(analysed / "clip", tmp_path / "new")
     window.open_path(str(tmp_path / "new" / "frame.####.png"))
     assert window.session.document is None
-    (dialog,) = window._dialogs
+    (dialog,) = window.tasks.dialogs
     assert dialog.command.text().startswith("palette4d analyze ")
     dialog.start()
     qtbot.waitUntil(lambda: window.session.document is not None, timeout=120_000)
@@ -477,10 +523,10 @@ def test_one_image_of_a_sequence_opens_the_sequence(
         drop(window, chosen)
     else:
         monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (chosen, ""))
-        window.do_open()
+        window.files.open()
     assert window.session.clip is not None
     assert list(window.session.clip.frames) == list(range(12))
-    offered = window._dialogs[-1]
+    offered = window.tasks.dialogs[-1]
     assert offered.value("") == str(folder / "t###.png")
     out = folder / "t.p4d.json"
     assert offered.value("-o") == str(out)
@@ -554,7 +600,7 @@ def test_every_action_has_a_method_and_no_key_twice(window: Window) -> None:
     keys = [key for action in actions.ACTIONS for key in action.keys]
     assert len(keys) == len(set(keys))
     for action in actions.ACTIONS:
-        assert callable(getattr(window, f"do_{action.name}"))
+        assert callable(window.action(action.name))
 
 
 def test_a_screenshot_is_drawn_without_a_screen(sidecar: Path, tmp_path: Path) -> None:

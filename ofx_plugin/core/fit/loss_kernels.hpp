@@ -1,5 +1,5 @@
 // The reconstruction loss' inner loops: boxes and leaves of a ColourTree against the facets of a
-// convex palette. Plain data and pointers only, as in block_kernels.hpp.
+// convex palette. Plain data and pointers only, as in mvc_kernels.hpp.
 #pragma once
 
 namespace palette4d {

@@ -70,7 +70,7 @@ Lattice::Store::Builder::Builder(Store& store, InstructionSet instructions) : st
     options.instructions = instructions;
     exact_ = float_worker(store.recolourer_, options, 3, false);
     if (store.regions_) {
-        mean_value_ = std::make_unique<MeanValueWorker>(store.recolourer_, instructions);
+        mean_value_ = std::make_unique<MvcWorker>(store.recolourer_, instructions);
     }
 }
 

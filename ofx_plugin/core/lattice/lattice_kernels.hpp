@@ -1,5 +1,5 @@
 // Applies a lattice of displacements to 64 pixels at a time. Plain data and pointers only, as in
-// block_kernels.hpp.
+// mvc_kernels.hpp.
 #pragma once
 
 #include <cstddef>

@@ -12,7 +12,7 @@
 
 #include "lattice/lattice.hpp"
 #include "lattice/lattice_kernels.hpp"
-#include "lattice/mean_value_worker.hpp"
+#include "lattice/mvc_worker.hpp"
 #include "lattice/palette_regions.hpp"
 
 namespace palette4d {
@@ -34,7 +34,7 @@ public:
     }
 
 private:
-    std::size_t size_;
+    [[maybe_unused]] std::size_t size_;  ///< of the mapping, on Linux
     char* data_;
     std::size_t taken_ = 0;
 };
@@ -170,7 +170,7 @@ private:
 
     Store& store_;
     std::unique_ptr<RowWorker> exact_;
-    std::unique_ptr<MeanValueWorker> mean_value_;  ///< only with PaletteRegions
+    std::unique_ptr<MvcWorker> mean_value_;  ///< only with PaletteRegions
     std::vector<Group> groups_;
     std::vector<int> taken_;
     std::vector<Job> jobs_, to_look_at_;

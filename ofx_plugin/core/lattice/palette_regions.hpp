@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "recolour/palette_body.hpp"
+#include "recolour/mvc.hpp"
 
 namespace palette4d {
 

@@ -1,5 +1,5 @@
 // Adds the displacements of bumps to 64 colours at a time. Plain data and pointers only, as in
-// block_kernels.hpp.
+// mvc_kernels.hpp.
 #pragma once
 
 namespace palette4d {

@@ -33,11 +33,10 @@ public:
         : divide_(options.premultiplied),
           channels_(channels),
           one_by_one_(recolourer, options, channels, bumps),
-          twofold_(recolourer.plan().twofold,
-                   kernels_of<BlockKernels>(options.instructions).twofold,
+          twofold_(recolourer.plan().twofold, kernels_of<MvcKernels>(options.instructions).twofold,
                    bumps ? kernels_of<BumpKernels>(options.instructions).add_twofold : nullptr,
                    options, one_by_one_),
-          single_(recolourer.plan().single, kernels_of<BlockKernels>(options.instructions).single,
+          single_(recolourer.plan().single, kernels_of<MvcKernels>(options.instructions).single,
                   bumps ? kernels_of<BumpKernels>(options.instructions).add_single : nullptr,
                   options, twofold_) {}
 

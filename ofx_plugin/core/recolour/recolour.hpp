@@ -6,7 +6,7 @@
 
 #include "model/edits.hpp"
 #include "recolour/colour_map.hpp"
-#include "recolour/palette_body.hpp"
+#include "recolour/mvc.hpp"
 
 namespace palette4d {
 

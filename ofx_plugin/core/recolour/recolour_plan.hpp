@@ -1,13 +1,13 @@
-// A palette and its edit in the form that block_kernels.hpp needs.
+// A palette and its edit in the form that mvc_kernels.hpp needs.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
 #include "model/edits.hpp"
-#include "recolour/block_kernels.hpp"
 #include "recolour/bump_kernels.hpp"
-#include "recolour/palette_body.hpp"
+#include "recolour/mvc.hpp"
+#include "recolour/mvc_kernels.hpp"
 
 namespace palette4d {
 

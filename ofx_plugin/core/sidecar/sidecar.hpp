@@ -1,4 +1,4 @@
-// Reads and fully validates the sidecar file. Its only writer is Python's analysis/sidecar.py.
+// Reads and fully validates the sidecar file. Its only writer is Python's grade/sidecar.py.
 #pragma once
 
 #include <cstdint>

@@ -8,12 +8,13 @@ import shlex
 import time
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from palette4d import analyze
 from palette4d.analysis.options import METHODS, OPTIONS, check_methods, parse_setting
 from palette4d.cli import analysis_report, analyze_shots
 from palette4d.cli.messages import as_options, tell
+from palette4d.cli.progress import progress_bar
 from palette4d.common.arguments import checked, frame_range, whole
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import counted
@@ -172,6 +173,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("--json", action="store_true", help="print the report as JSON")
     parser.add_argument("--quiet", action="store_true", help="no progress, no report")
+    parser.add_argument(
+        "--progress",
+        metavar="FILE",
+        type=Path,
+        help="write progress into FILE, line by line; the last is 'done' or 'error: …'",
+    )
     analyze_shots.add_options(parser)
     parser.add_argument("-h", "--help", action="help", help="show this help")
     parser.add_argument("--help-all", dest="all", nargs=0, action=_HelpAll, help="all options")
@@ -195,6 +202,11 @@ def _rate(text: str) -> Fraction:
 
 def run(args: argparse.Namespace) -> int:
     """Run `palette4d analyze`."""
+    with _ProgressFile(args.progress) as progress:
+        return _run(args, progress)
+
+
+def _run(args: argparse.Namespace, progress: _ProgressFile) -> int:
     settings = _settings(args)
     if analyze_shots.is_show(args):
         return analyze_shots.run(args, settings)
@@ -204,7 +216,12 @@ def run(args: argparse.Namespace) -> int:
     sidecar.check_target(args.output, on_edits=on_edits)
     bars = _Bars(hidden=args.quiet or args.json)
     try:
-        document = analyze(args.clip, frames=args.frames, progress=bars, **settings)
+
+        def tell_both(stage: str, done: int, total: int) -> None:
+            bars(stage, done, total)
+            progress(stage, done, total)
+
+        document = analyze(args.clip, frames=args.frames, progress=tell_both, **settings)
     finally:
         bars.close()
     document.save(args.output, on_edits=on_edits)
@@ -235,6 +252,44 @@ def _settings(args: argparse.Namespace) -> dict[str, Any]:
     return {name: vars(args)[name] for name in names} | given
 
 
+class _ProgressFile:
+    """Lines for a program that waits: `STAGE: DONE of TOTAL`, then `done` or `error: MESSAGE`."""
+
+    def __init__(self, path: Path | None) -> None:
+        self.path = path
+        self.file: IO[str] | None = None
+        self.last = 0.0
+
+    def __enter__(self) -> _ProgressFile:
+        if self.path is not None:
+            try:
+                self.file = self.path.open("w", encoding="utf-8", errors="backslashreplace")
+            except OSError as error:
+                raise Palette4dError(
+                    f"{self.path}: cannot be written: {error.strerror}; choose another file"
+                ) from error
+        return self
+
+    def __call__(self, stage: str, done: int, total: int) -> None:
+        # Not too often: some stages have thousands of short steps.
+        if self.file is not None and (done == total or time.monotonic() - self.last > 0.2):
+            self.last = time.monotonic()
+            self._write(f"{stage.replace('_', ' ')}: {done} of {total}")
+
+    def _write(self, line: str) -> None:
+        if self.file is not None:
+            print(line, file=self.file, flush=True)
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: object
+    ) -> None:
+        if self.file is None:
+            return
+        words = " ".join(as_options(str(error) or type(error).__name__).split())
+        self._write(f"error: {words}" if kind else "done")
+        self.file.close()
+
+
 class _Bars:
     """One progress bar per stage, and the seconds of each stage."""
 
@@ -246,12 +301,10 @@ class _Bars:
         self.since = self.last = time.perf_counter()
 
     def __call__(self, stage: str, done: int, total: int) -> None:
-        from tqdm import tqdm
-
         if stage != self.stage:
             self.close()
             self.stage, self.since = stage, self.last
-            self.bar = tqdm(total=total, desc=f"{stage:<18}", unit="", disable=self.hidden or None)
+            self.bar = progress_bar(f"{stage:<18}", total=total, unit="", hidden=self.hidden)
         self.bar.update(done - self.bar.n)
         self.last = time.perf_counter()
         self.seconds[stage] = round(self.last - self.since, 3)

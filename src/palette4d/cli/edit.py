@@ -6,7 +6,7 @@ import argparse
 import functools
 import shlex
 import textwrap
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from palette4d.cli import edit_copy, edit_history, picks
 from palette4d.cli.swatches import shown
@@ -14,7 +14,10 @@ from palette4d.common.arguments import ColourAction, accept_negative_values, num
 from palette4d.common.errors import Palette4dError
 
 if TYPE_CHECKING:
-    from palette4d.grade.document import Document, How
+    from collections.abc import Mapping
+
+    from palette4d.grade.document import Document
+    from palette4d.grade.handle_edits import How
 
 #: The words of `palette4d.grade.edits.RAMPS`, which would be slow to import for the help.
 RAMPS = ("linear", "smooth", "hold")
@@ -22,8 +25,7 @@ RAMPS = ("linear", "smooth", "hold")
 #: The most handles that an action reports one by one.
 MOST_LINES = 12
 
-EPILOG = """\
-example:
+EXAMPLES = """\
   palette4d edit clip.p4d.json set --near 0.9,0.5,0.2 --frame 40 --rgb '#b23aee'
   palette4d edit clip.p4d.json set v12 --rgb 0.8 0.1 0.1
   palette4d edit clip.p4d.json set e4 --frame 23.5 --rgb 0.2 0.4 0.9
@@ -33,12 +35,14 @@ example:
   palette4d edit clip.p4d.json move s1 --frame 30
   palette4d edit clip.p4d.json ramp smooth
   palette4d edit clip.p4d.json reset v12
-  palette4d edit clip.p4d.json pick --frame 40 --pixel 320,180 --box 5 --by 0.1,0,-0.05
+  palette4d edit clip.p4d.json pick --frame 40 --pixel 320,180 --box 5 --to '#3359b3'
   palette4d edit clip.p4d.json hold --frame 40 --colour '#7a6b5c'
   palette4d edit clip.p4d.json undo
   palette4d edit clip.p4d.json version save warm
   palette4d edit other.p4d.json copy clip.p4d.json
+"""
 
+COLOURS = """\
 Colours are R G B, R,G,B or #rrggbb, in the palette's own code values; they may
 lie outside 0..1. `palette4d info` lists the ids.
 """
@@ -51,11 +55,19 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="change the colours of a palette",
         description="Change the colours of a palette: of its vertices, and of colour stops on its\n"
         "edges. The sidecar is replaced as a whole or not at all.",
-        epilog=EPILOG,
+        epilog=_epilog("") + "\n`palette4d edit SIDECAR ACTION --help` explains an action.\n",
         formatter_class=argparse.RawDescriptionHelpFormatter,
+        add_help=False,
     )
     edit.add_argument("sidecar", metavar="SIDECAR", help="the sidecar file to edit (*.p4d.json)")
     actions = edit.add_subparsers(title="actions", metavar="ACTION", dest="action", required=True)
+    edit.add_argument(
+        "-h",
+        "--help",
+        action=_Help,
+        actions=actions.choices,
+        help="show this help message and exit",
+    )
     _add_set(actions)
     _add_move(actions)
     _add_track(actions)
@@ -64,6 +76,31 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     for module in (picks, edit_history, edit_copy):
         module.add_actions(functools.partial(_action, actions))
     accept_negative_values(actions)
+
+
+class _Help(argparse.Action):
+    """Print the help; of an action where its name stands in the sidecar's place."""
+
+    def __init__(self, *, actions: Mapping[str, argparse.ArgumentParser], **given: Any) -> None:
+        super().__init__(nargs=0, **given)
+        self._actions = actions
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: object,
+        option_string: str | None = None,
+    ) -> None:
+        self._actions.get(namespace.sidecar, parser).print_help()
+        parser.exit()
+
+
+def _epilog(action: str) -> str:
+    """Return the examples of an action, and how colours are written."""
+    shown = [line for line in EXAMPLES.splitlines() if f"json {action}" in line]
+    colours = any("#" in line for line in shown)
+    return "\n".join(["example:", *shown, ""]) + ("\n" + COLOURS if colours else "")
 
 
 def _action(
@@ -77,7 +114,7 @@ def _action(
         help=description.split(".")[0],
         description=textwrap.fill(description, 79),
         usage=f"palette4d edit [-h] SIDECAR {name} {usage}",
-        epilog=EPILOG,
+        epilog=_epilog(name) if f"json {name}" in EXAMPLES else COLOURS,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
 
@@ -338,6 +375,11 @@ def _report(document: Document, old: Document) -> None:
         print(f"and {len(changed) - MOST_LINES} more handles")
     if not changed:
         print("done")
+    if met := [pick.id for pick in document.picks if pick.enabled]:
+        print(
+            f"note: {', '.join(met)} {'is' if len(met) == 1 else 'are'} met as before: picked and "
+            "held colours do not move with the palette. `change` or `disable` does that"
+        )
 
 
 def run_move(args: argparse.Namespace) -> int:

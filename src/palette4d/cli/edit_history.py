@@ -7,6 +7,7 @@ import json
 from typing import TYPE_CHECKING
 
 from palette4d.common.arguments import whole
+from palette4d.common.errors import Palette4dError
 from palette4d.common.text import counted
 
 if TYPE_CHECKING:
@@ -62,9 +63,17 @@ def _add_version(action: Action) -> None:
     parser.set_defaults(run=run_version)
 
 
+def _check_steps(wanted: int, there: int, what: str) -> None:
+    if 0 < there < wanted:
+        raise Palette4dError(
+            f"found {counted(there, 'step')} to {what}, expected {wanted}; nothing was changed"
+        )
+
+
 def run_undo(args: argparse.Namespace) -> int:
     """Revert the last steps."""
     document = _load(args)
+    _check_steps(args.steps, len(document.history), "undo")
     steps = [document.undo() for _ in range(args.steps)]
     document.save()
     for step in steps:
@@ -75,6 +84,7 @@ def run_undo(args: argparse.Namespace) -> int:
 def run_redo(args: argparse.Namespace) -> int:
     """Apply the last undone steps again."""
     document = _load(args)
+    _check_steps(args.steps, len(document.undone), "redo")
     steps = [document.redo() for _ in range(args.steps)]
     document.save()
     for step in steps:
@@ -109,8 +119,9 @@ def run_version(args: argparse.Namespace) -> int:
     """Save, list, use or remove a version."""
     document = _load(args)
     if args.what == "list":
+        active = set(document.same_edits())
         for name in document.versions:
-            mark = "*" if document.same_edits(name) else " "
+            mark = "*" if name in active else " "
             print(f"{mark} {name}")
         if not document.versions:
             print("no versions")

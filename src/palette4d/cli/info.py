@@ -4,8 +4,8 @@ import argparse
 import json
 from typing import TYPE_CHECKING, Any
 
-from palette4d.cli.swatches import hex_of, row, swatch
-from palette4d.common.text import counted
+from palette4d.cli.swatches import row, swatch
+from palette4d.common.text import counted, hex_of
 
 if TYPE_CHECKING:
     from palette4d.grade.document import Document
@@ -62,12 +62,16 @@ def run(args: argparse.Namespace) -> int:
 
 def info_of(document: "Document") -> dict[str, Any]:
     """Return the output of ``palette4d info --json``; docs/sidecar.md explains the names."""
+    from palette4d.colour.names import colour_names
+
     fields = document.fields()
     clip, polytope = fields["clip"], fields["polytope"]
     frames = clip["frames"]
     edited = {entry["vertex"]: entry["rgb"] for entry in fields["edits"]["vertices"]}
     stops = fields["edits"]["stops"]
     stages = fields["quality"]["stages"]
+    vertices = polytope["vertices"]
+    names = colour_names([vertex["rgb"] for vertex in vertices], clip["encoding"])
     return {
         "name": clip["name"],
         "source": clip["source"],
@@ -90,12 +94,17 @@ def info_of(document: "Document") -> dict[str, Any]:
         "locks": fields["edits"].get("locks", []),
         "versions": list(document.versions),
         "steps": len(document.history),
-        "tracks": [_track(document, track) for track in document.tracks],
+        "tracks": _named([_track(document, track) for track in document.tracks], clip["encoding"]),
         "losses": stages[-1] if stages else {},
         "stages": stages,
         "palette": [
-            {**vertex, "hex": hex_of(vertex["rgb"]), "edited": edited.get(vertex["id"])}
-            for vertex in polytope["vertices"]
+            {
+                **vertex,
+                "hex": hex_of(vertex["rgb"]),
+                "called": f"{name}, {vertex['frame']:.6g}",
+                "edited": edited.get(vertex["id"]),
+            }
+            for vertex, name in zip(vertices, names, strict=True)
         ],
         "palette_edges": [
             {**edge, "stops": [stop["id"] for stop in stops if stop["edge"] == edge["id"]]}
@@ -104,6 +113,18 @@ def info_of(document: "Document") -> dict[str, Any]:
         "palette_stops": stops,
         "block_ranges": [[block["first"], block["last"]] for block in polytope["blocks"]],
     }
+
+
+def _named(tracks: list[dict[str, Any]], encoding: str) -> list[dict[str, Any]]:
+    """Return tracks with what people call them: their colour in the clip, and their frames."""
+    from palette4d.colour.names import colour_names
+
+    colours = colour_names([track["rgb"] for track in tracks], encoding)
+    spans = ["-".join(f"{frame:.6g}" for frame in track["frames"]) for track in tracks]
+    return [
+        {**track, "called": f"{colour}, {span}"}
+        for track, colour, span in zip(tracks, colours, spans, strict=True)
+    ]
 
 
 def _track(document: "Document", track: "Track") -> dict[str, Any]:
@@ -138,12 +159,14 @@ def _track(document: "Document", track: "Track") -> dict[str, Any]:
 def _print_tracks(info: dict[str, Any]) -> None:
     """Print a line for each palette colour through time, before and after."""
     wide = max([5, *(len(track["name"]) for track in info["tracks"])])
+    long = max(len(track["called"]) for track in info["tracks"])
     patch = swatch(None)
-    print(f"\n{'track':<{wide}}  {'frames':>13}  {patch}{'clip':8} {patch}{'edited':8}  handles")
+    head = f"{'track':<{wide}}  {'colour, frames':<{long}}"
+    print(f"\n{head}  {patch}{'clip':8} {patch}{'edited':8}  handles")
     for track in info["tracks"]:
-        span = "-".join(f"{frame:.6g}" for frame in track["frames"])
         before, after = track["rgb"], track["edited_rgb"]
-        line = f"{track['name']:<{wide}}  {span:>13}  {swatch(before)}{hex_of(before):8} "
+        line = f"{track['name']:<{wide}}  {track['called']:<{long}}  "
+        line += f"{swatch(before)}{hex_of(before):8} "
         changed = before != after
         line += f"{swatch(after)}{hex_of(after):8}" if changed else patch + " " * 8
         print(f"{line}  {_some(track['edited'])}".rstrip())
@@ -217,13 +240,16 @@ def _cell(value: Any) -> str:
 
 def _print_palette(info: dict[str, Any]) -> None:
     wide = max([6, *(len(entry["id"]) for entry in info["palette"] + info["palette_edges"])])
+    long = max(len(entry["called"]) for entry in info["palette"])
     patch = swatch(None)
     print(
-        f"\n{'vertex':<{wide}} {'frame':>9}  {patch}{'colour':8} {'r':>8} {'g':>8} {'b':>8}  edited"
+        f"\n{'vertex':<{wide}} {'frame':>9}  {patch}{'colour':8} {'r':>8} {'g':>8} {'b':>8}  "
+        f"{'name':<{long}}  edited".rstrip()
     )
     for vertex in sorted(info["palette"], key=lambda vertex: vertex["frame"]):
         edited = "" if vertex["edited"] is None else f"  {row(vertex['edited'])}"
-        print(f"{vertex['id']:<{wide}} {vertex['frame']:>9.6g}  {row(vertex['rgb'])}{edited}")
+        line = f"{vertex['id']:<{wide}} {vertex['frame']:>9.6g}  {row(vertex['rgb'])}  "
+        print(f"{line}{vertex['called']:<{long}}{edited}".rstrip())
     frames = {vertex["id"]: vertex["frame"] for vertex in info["palette"]}
     if info["palette_edges"]:
         print(f"\n{'edge':<{wide}} {'from':<{wide}} {'to':<{wide}} {'frames':>17}  stops")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 from palette4d.hosts.bundle import default_destination
@@ -11,6 +12,7 @@ from palette4d.hosts.install import install_plugin
 _EPILOG = """\
 examples:
   sudo palette4d install-plugin                   for every user, where all hosts look
+                                                  (on Windows: as an administrator, without sudo)
   palette4d install-plugin --dest ~/OFX           for yourself; then export OFX_PLUGIN_PATH=~/OFX
   palette4d install-plugin --dest ~/OFX --link    follows this installation when it is upgraded
   palette4d install-plugin --dest ~/OFX --kdenlive --shotcut
@@ -38,7 +40,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--dest",
         type=lambda text: Path(text).expanduser(),
         metavar="DIR",
-        help=f"folder of plugins (default here: {default_destination()})",
+        help="folder of plugins (default: the first of OFX_PLUGIN_PATH, else the system's; here "
+        f"{default_destination()})".replace("%", "%%"),
     )
     parser.add_argument("--link", action="store_true", help="make a symbolic link, not a copy")
     for program, what in (("kdenlive", "effect file"), ("shotcut", "filter")):
@@ -68,7 +71,8 @@ def run(args: argparse.Namespace) -> int:
         print(f"installed {path}")
     if args.dest or not (args.kdenlive or args.shotcut):
         if args.dest:
-            print(f"Tell your host where it is: export OFX_PLUGIN_PATH={args.dest.absolute()}")
+            say = "setx OFX_PLUGIN_PATH " if sys.platform == "win32" else "export OFX_PLUGIN_PATH="
+            print(f"Tell your host where it is: {say}{args.dest.absolute()}")
         print(
             "Restart the host (DaVinci Resolve, Nuke, Natron, Fusion, Kdenlive, …), add the node\n"
             "'Palette4D' (group Color) and choose a sidecar made by 'palette4d analyze'."

@@ -209,8 +209,7 @@ def run_pick(args: argparse.Namespace) -> int:
                 args.frame, **where, to=args.to, by=args.by, **given, progress=progress
             )
     document.save()
-    print(_told(document, found, followed=not args.no_follow))
-    _print_notes(document)
+    _print_pick(document, found.id, followed=not args.no_follow)
     return 0
 
 
@@ -244,8 +243,7 @@ def run_change(args: argparse.Namespace) -> int:
             args.id, any_value=args.float, clip=args.clip, progress=progress, **changes
         )
     document.save()
-    print(_told(document, found, followed=not args.no_follow))
-    _print_notes(document)
+    _print_pick(document, found.id, followed=not args.no_follow)
     return 0
 
 
@@ -294,6 +292,12 @@ def run_picks(args: argparse.Namespace) -> int:
     return 0
 
 
+def _print_pick(document: Document, id_: str, followed: bool) -> None:
+    found = next(pick for pick in document.picks if pick.id == id_)
+    print(_told(document, found, followed))
+    _print_notes(document)
+
+
 def _told(document: Document, pick: Pick, followed: bool = True) -> str:
     """Return a pick or hold for people: what was asked, and how it is met."""
     asked = shown(pick.rgb) + (f" -> {shown(pick.to)}" if pick.to is not None else " stays")
@@ -306,19 +310,26 @@ def _told(document: Document, pick: Pick, followed: bool = True) -> str:
     if not pick.enabled:
         return f"{lines[0]}; disabled"
     if pick.path:
-        first, last = pick.path[0].frame, pick.path[-1].frame
+        there = [key for key in pick.path if key.there > 0]
+        first, last = there[0].frame, there[-1].frame
         keys = counted(len(pick.path), "key")
         lines.append(f"  follows its colour from frame {first:g} to {last:g} ({keys})")
+        if len(there) < len(pick.path):
+            lines.append(
+                "  the change ends where the colour is lost among others; pick it there with "
+                f"--with {pick.id} if you still see it"
+            )
     else:
         source = document.core.clip["source"]
         why = f": the clip {source!r} was not found; give it with --clip" if followed else ""
         lines.append(f"  is at the same colour in all frames{why}")
     if pick.residual is not None and pick.share is not None:
         what = "the palette" if pick.kind == "pick" else "kept by the palette"
-        lines.append(
-            f"  off by {pick.residual:.4f} at most; {pick.share:.0%} {what}, "
-            f"{1 - pick.share:.0%} its neighbourhood"
-        )
+        rest = f", {1 - pick.share:.0%} its neighbourhood"
+        line = f"  off by {pick.residual:.4f}; {pick.share:.0%} {what}"
+        lines.append(line + (", its neighbourhood left out" if pick.global_only else rest))
+        if pick.worst is not None and pick.worst > max(2 * pick.residual, pick.tolerance):
+            lines.append(f"  the farthest off at frame {pick.worst_frame:g}: by {pick.worst:.4f}")
     return "\n".join(lines)
 
 
@@ -336,7 +347,7 @@ def _print_notes(document: Document) -> None:
         if share > MANY:
             print(
                 f"note: at frame {frame:g} {share:.0%} of the picture change too, by more than 10 "
-                f"of 255, most {shown(most)}. A hold keeps it: hold --frame {frame:g} --colour "
+                f"of 255, most {shown(most)}. If it must stay: hold --frame {frame:g} --colour "
                 + ",".join(f"{value:.4f}" for value in most)
             )
     for line in unmet(enabled, document.frames[2]):

@@ -1,9 +1,21 @@
-"""The progress bar of a command that works on frames."""
+"""The progress bars of commands."""
 
 from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterator
+from typing import Any
+
+from palette4d.cli.terminal import unfiltered_stderr
+from palette4d.common.text import printable
+
+
+def progress_bar(what: str, *, total: int | None, unit: str, hidden: bool) -> Any:
+    """Return a tqdm bar on standard error, if that is a terminal and it is not hidden."""
+    from tqdm import tqdm
+
+    file = unfiltered_stderr()
+    return tqdm(total=total, desc=what, unit=unit, disable=hidden or None, file=file)
 
 
 @contextlib.contextmanager
@@ -15,15 +27,13 @@ def frames_bar(
     Yields a function to call with (frames done, frames in all) and, optionally, a text instead of
     `what`.
     """
-    from tqdm import tqdm
-
-    with tqdm(total=total, desc=what, unit="frame", disable=hidden or None) as bar:
+    with progress_bar(what, total=total, unit="frame", hidden=hidden) as bar:
 
         def progress(done: int, total: int, words: str = what) -> None:
             if bar.total != total:
                 # Frames that were done before cost no time: the bar starts after them.
                 bar.total, bar.initial, bar.n = total, done, done
-            bar.set_description(words, refresh=False)
+            bar.set_description(printable(words), refresh=False)
             bar.update(done - bar.n)
             bar.refresh()
 

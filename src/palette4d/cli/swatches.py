@@ -4,12 +4,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-
-def hex_of(rgb: Sequence[float]) -> str:
-    """Return #rrggbb of a colour, with "*" for a colour outside 0..1, which #rrggbb cannot hold."""
-    outside = any(not 0 <= value <= 1 for value in rgb)
-    digits = "".join(f"{round(min(max(value, 0.0), 1.0) * 255):02x}" for value in rgb)
-    return f"#{digits}{'*' if outside else ''}"
+from palette4d.common.text import hex_of
 
 
 def swatch(rgb: Sequence[float] | None) -> str:

@@ -10,24 +10,29 @@ from typing import Any, TextIO
 
 from palette4d.common.text import printable
 
-# What the command itself sends to terminals: patches of colour (`swatches`), and a progress bar.
-_OWN = re.compile(r"(\A\r|\x1b\[48;2;[0-9]{1,3};[0-9]{1,3};[0-9]{1,3}m  \x1b\[0m |\x1b\[A)")
+# What the command itself sends to terminals: patches of colour (`swatches`).
+_OWN = re.compile(r"(\x1b\[48;2;[0-9]{1,3};[0-9]{1,3};[0-9]{1,3}m  \x1b\[0m )")
 
 
 class _Printable:
     """A text stream that makes what is written to it printable."""
 
     def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
+        self._wrapped = stream  # tqdm's name for it, by which it knows a stream again
 
     def write(self, text: str) -> int:
         parts = _OWN.split(text)
         parts[::2] = map(printable, parts[::2])
-        self._stream.write("".join(parts))
+        self._wrapped.write("".join(parts))
         return len(text)
 
     def __getattr__(self, name: str) -> Any:
-        return getattr(self._stream, name)
+        return getattr(self._wrapped, name)
+
+
+def unfiltered_stderr() -> TextIO:
+    """Return standard error for a progress bar, which moves the cursor."""
+    return sys.stderr._wrapped if isinstance(sys.stderr, _Printable) else sys.stderr
 
 
 @contextlib.contextmanager

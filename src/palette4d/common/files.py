@@ -52,9 +52,21 @@ def make_folder(folder: Path) -> None:
 
 
 def link_target(path: str | os.PathLike[str]) -> Path:
-    """Return the target of a symbolic link, or the path itself."""
+    """Return the target of a symbolic link, or the path itself.
+
+    In a folder that others may write to, their links could lead a write to any file of ours.
+    """
     path = Path(path)
-    return Path(os.path.realpath(path)) if path.is_symlink() and path.exists() else path
+    if not path.is_symlink() or not path.exists():
+        return path
+    if sys.platform != "win32":
+        owner = path.lstat().st_uid
+        if owner not in (0, os.geteuid(), path.parent.stat().st_uid):
+            raise Palette4dError(
+                f"{path}: found a symbolic link of another user, expected one of yours or of the "
+                "folder's owner; remove it, or choose another name"
+            )
+    return Path(os.path.realpath(path))
 
 
 @contextmanager

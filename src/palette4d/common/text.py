@@ -1,6 +1,7 @@
 """Counts in messages, text for terminals, and safe file names."""
 
 import re
+from collections.abc import Sequence
 
 from palette4d.common.errors import Palette4dError
 
@@ -19,7 +20,9 @@ LONGEST_NAME = 120
 
 # Control characters, line and paragraph separators, marks that turn the direction of writing, and
 # halves of characters, which no encoding can write.
-_ACTIVE = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+_ACTIVE = re.compile(
+    "[\x00-\x09\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
+)
 
 
 def printable(text: str) -> str:
@@ -52,3 +55,10 @@ def checked_name(name: str) -> str:
             f"{LONGEST_NAME}, as in {file_safe(name)!r}"
         )
     return name
+
+
+def hex_of(rgb: Sequence[float]) -> str:
+    """Return #rrggbb of a colour, with "*" for a colour outside 0..1, which #rrggbb cannot hold."""
+    outside = any(not 0 <= value <= 1 for value in rgb)
+    digits = "".join(f"{round(min(max(value, 0.0), 1.0) * 255):02x}" for value in rgb)
+    return f"#{digits}{'*' if outside else ''}"

@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palette4d import _core
-from palette4d.colour.between import between
+from palette4d.colour.encoding_conversion import between
 from palette4d.common.errors import Palette4dError
 from palette4d.grade import edits
 from palette4d.grade.edits import Key, Setting, as_colour
+from palette4d.grade.picks import Pick
 
 if TYPE_CHECKING:
     from palette4d.grade.document import Document
@@ -263,29 +264,31 @@ def _pick(match: Match, pick: dict[str, Any], into: Any) -> dict[str, Any] | Non
     found = {name: value for name, value in pick.items() if name not in left_out}
     if "to" in pick:
         found["to"] = colour(pick["to"])
-    path = [(key["frame"], key["rgb"]) for key in pick.get("path", ())]
+    if "spread" in pick:
+        base, own = np.array(pick["rgb"]), np.array(colour(pick["rgb"]))
+        ends = [np.array(colour((base + offset).tolist())) for offset in pick["spread"]]
+        found["spread"] = [list(as_colour((end - own).tolist())) for end in ends]
+    path = pick.get("path", ())
     if match.time == "relative":
         found |= {"frame": time(pick["frame"]), "rgb": colour(pick["rgb"])}
         found |= {name: time(pick[name]) for name in ("from", "until") if name in pick}
         if pick.get("fade"):
             found["fade"] = pick["fade"] * match.pace
         if path:
-            keys = {time(frame): colour(rgb) for frame, rgb in path}
-            found["path"] = [{"frame": frame, "rgb": rgb} for frame, rgb in sorted(keys.items())]
+            keys = {
+                frame: {**key, "frame": frame, "rgb": colour(key["rgb"])}
+                for key, frame in ((key, time(key["frame"])) for key in path)
+            }
+            found["path"] = [keys[frame] for frame in sorted(keys)]
         return found
     at = float(match.time)
     if not pick.get("from", at) <= at <= pick.get("until", at):
         return None
-    if path:
-        times = [frame for frame, _ in path]
-        rgb = [float(np.interp(at, times, [key[c] for _, key in path])) for c in range(3)]
-        if "to" in pick and pick.get("toward", "shift") == "shift":
-            found["to"] = colour(
-                [q + now - p for q, now, p in zip(pick["to"], rgb, pick["rgb"], strict=True)]
-            )
-    else:
-        rgb = pick["rgb"]
-    return {**found, "frame": match.target.frames[0], "rgb": colour(rgb)}
+    asked = Pick.from_fields(pick)
+    rgb = asked.colour_at(at)
+    if asked.to is not None and asked.toward == "shift":
+        found["to"] = colour((rgb + asked.change_at(at)).tolist())
+    return {**found, "frame": match.target.frames[0], "rgb": colour(rgb.tolist())}
 
 
 def _colours(target: "Document") -> Iterator[tuple[float, F64, F64]]:

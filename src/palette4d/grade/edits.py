@@ -36,7 +36,7 @@ RAMP: Key = ("ramp", "")
 LARGEST_COLOUR = 1e6
 
 #: Members of a pick that solving measures; they are no part of the state.
-MEASURED = ("residual", "global")
+MEASURED = ("residual", "worst", "worst_frame", "global")
 
 #: Limits of the history in a file: its steps, and their characters as JSON.
 MOST_STEPS, MOST_TEXT = 200, 256_000

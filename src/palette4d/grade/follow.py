@@ -1,8 +1,9 @@
 """Following: where a picked colour is at the other frames of its clip.
 
 Input: a clip, a colour at a frame, and the frames of interest. Output: a path of a few keys. From
-each frame to the next the colour moves as the mean of the pixels near it moves (mean shift). One
-pass reads the frames; memory holds at most `MOST_COLOURS` colours for at most `MOST_FRAMES` frames.
+each frame to the next the colour moves as the mean of the pixels near it moves (mean shift). The
+path ends where the colour is lost among others: where many more pixels are near it. One pass reads
+the frames; memory holds at most `MOST_COLOURS` colours for at most `MOST_FRAMES` frames.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
 from palette4d.grade.edits import Colour, as_colour
+from palette4d.grade.keyframes import needed
 from palette4d.grade.picks import PathKey
 from palette4d.media.clip_base import Clip, FrameError
 
@@ -35,6 +37,9 @@ STIFF, PINNED = 12.0, 1e6
 #: How strongly a colour that is still there is kept there, per frame; it is still there while the
 #: pixels near it are not 1 / SAME fewer or more than at first.
 HOME, SAME = 0.5, 4
+#: Where more than LOST times as many pixels as at first are near, the colour is another thing's, as
+#: in the night, where all is dark. From there on it has ended, unless it comes back to its start.
+LOST = 7.0
 #: Fewer near pixels than this share of a frame: the colour is out of sight and stays.
 LEAST_SHARE = 1e-5
 
@@ -48,6 +53,8 @@ STRAIGHT = 0.012
 #: At most so many keys; a path with more is told less exactly.
 MOST_KEYS = 48
 DIGITS = 4
+#: A smoothed path has ended, or is all there, within this share.
+BARELY = 0.05
 
 
 def paths(
@@ -78,7 +85,7 @@ def paths(
     -------
     tuple of PathKey
         Keys in order of time; linear between them. The first and the last are at the ends of the
-        span; keys at `starts` are marked as given.
+        span; keys at `starts` are marked as given. `there` falls to 0 where the path ends.
 
     Raises
     ------
@@ -103,9 +110,16 @@ def paths(
                 f"frame {frame} of {clip.source} has no pixel that can be followed"
             )
     found = _smoothed(_joined(frames, colours, known), [frames.index(frame) for frame in known])
-    kept = _few(np.array(frames, float), found, {frames.index(frame) for frame in known})
+    found[:, 3] = np.clip((found[:, 3] - BARELY) / (1 - 2 * BARELY), 0.0, 1.0)
+    kept = needed(frames, found, map(frames.index, known), STRAIGHT, MOST_KEYS)
     return tuple(
-        PathKey(frames[i], as_colour(np.round(found[i], DIGITS)), frames[i] in known) for i in kept
+        PathKey(
+            frames[i],
+            as_colour(np.round(found[i, :3], DIGITS)),
+            frames[i] in known,
+            float(np.round(found[i, 3], DIGITS)),
+        )
+        for i in kept
     )
 
 
@@ -138,10 +152,10 @@ def _read(
 def _joined(
     frames: Sequence[int], colours: Sequence[tuple[F64, F64]], known: dict[int, Colour]
 ) -> F64:
-    """Return the (n, 3) path through all known colours."""
+    """Return the (n, 4) path through all known colours, and whether the colour is there."""
     at = {frames.index(frame): np.array(rgb) for frame, rgb in known.items()}
     order = sorted(at)
-    found = np.empty((len(frames), 3))
+    found = np.empty((len(frames), 4))
     found[: order[0] + 1] = _followed(colours[: order[0] + 1][::-1], at[order[0]])[::-1]
     found[order[-1] :] = _followed(colours[order[-1] :], at[order[-1]])
     for a, b in itertools.pairwise(order):
@@ -153,9 +167,12 @@ def _joined(
 
 
 def _followed(colours: Sequence[tuple[F64, F64]], start: F64) -> F64:
-    """Return the (n, 3) path from a colour in the first frame to the last one."""
+    """Return the (n, 4) path from a colour in the first frame to the last one.
+
+    The fourth column is 1 while the colour is there, and 0 from where it is lost.
+    """
     home = _near(start, *colours[0])
-    path = [start]
+    path, seen = [start], [1.0]
     for before, after in itertools.pairwise(colours):
         there = _shifted(path[-1], before, after)
         now = _near(start, *after)
@@ -166,7 +183,11 @@ def _followed(colours: Sequence[tuple[F64, F64]], start: F64) -> F64:
             still = start + now[0] - home[0]
             there = there + HOME * max(0.0, 1 - (1 - same) * SAME) * (still - there)
         path.append(there)
-    return np.array(path)
+        found = _near(there, *after)
+        lost = home is not None and found is not None and found[1] > LOST * home[1]
+        back = float(np.linalg.norm(there - start)) < NEAR
+        seen.append(float(not lost and (back or seen[-1] > 0)))
+    return np.column_stack([path, seen])
 
 
 def _smoothed(path: F64, fixed: Sequence[int]) -> F64:
@@ -203,18 +224,3 @@ def _near(colour: F64, rgb: F64, counts: F64) -> tuple[F64, float] | None:
     weight = counts * np.exp(((rgb - colour) ** 2).sum(axis=1) / (-2 * NEAR**2))
     total, share = float(weight.sum()), float(weight.sum() / counts.sum())
     return (weight @ rgb / total, share) if share >= LEAST_SHARE else None
-
-
-def _few(frames: F64, path: F64, fixed: set[int]) -> list[int]:
-    """Return the indices of the keys that are needed, at most `MOST_KEYS` beside the fixed ones.
-
-    The key that is farthest from the straight lines between the others is added first.
-    """
-    kept = sorted({0, len(frames) - 1, *fixed})
-    while len(kept) < MOST_KEYS + len(fixed):
-        lines = np.column_stack([np.interp(frames, frames[kept], path[kept, c]) for c in range(3)])
-        off = np.abs(lines - path).max(axis=1)
-        if off.max() <= STRAIGHT:
-            break
-        kept = sorted({*kept, int(off.argmax())})
-    return kept

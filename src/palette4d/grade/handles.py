@@ -31,8 +31,12 @@ class Handles:
         if id_ in self.vertices:
             return self.vertices[id_]
         if id_ in self.edges:
-            raise self.needs_frame(id_)
-        raise unknown(id_, "vertex or stop", [*self.vertices, *others])
+            edge = self.edges[id_]
+            raise Palette4dError(
+                f"found the edge {id_}, expected a vertex or a stop; its ends are {edge['from']} "
+                f"and {edge['to']}, and between them it has a colour only at a frame"
+            )
+        raise unknown(id_, "vertex or stop", dict.fromkeys([*self.vertices, *others]))
 
     def needs_frame(self, edge: str) -> Palette4dError:
         """Return the error for an edge without a frame."""
@@ -65,13 +69,14 @@ class Handles:
             )
 
 
-def unknown(id_: str, kind: str, ids: Iterable[str]) -> Palette4dError:
-    """Return the error for an unknown id; it names similar ids."""
+def unknown(
+    id_: str, kind: str, ids: Iterable[str], lists: str = "palette4d info SIDECAR"
+) -> Palette4dError:
+    """Return the error for an unknown id; it names similar ids, and the command that lists all."""
     known = list(ids)
     near = difflib.get_close_matches(id_, known, n=5, cutoff=0.5) or known[:5]
     if not near:
         return Palette4dError(f"there is no {kind} {id_!r}; the file holds none")
     return Palette4dError(
-        f"there is no {kind} {id_!r}; did you mean {' or '.join(near)}? "
-        "`palette4d info SIDECAR` lists all ids"
+        f"there is no {kind} {id_!r}; did you mean {' or '.join(near)}? `{lists}` lists all ids"
     )

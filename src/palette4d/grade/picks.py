@@ -10,6 +10,7 @@ import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -25,8 +26,8 @@ Toward = Literal["shift", "colour"]
 #: More enabled picks and holds than this are refused: solving and recolouring would be slow.
 MOST_PICKS = 100
 
-#: A residual above this is told: 3 of 255.
-MET = 0.012
+#: A residual above this, 3 of 255, is told, and above this share of the change.
+MET, MET_PART = 0.012, 0.02
 
 #: Two picks nearer than this in colour are named together if one of them is not met.
 NEAR = 0.2
@@ -34,11 +35,21 @@ NEAR = 0.2
 
 @dataclass(frozen=True)
 class PathKey:
-    """Where a picked colour is at a frame; `given`: by the user, not found by following it."""
+    """Where a picked colour is at a frame.
+
+    Attributes
+    ----------
+    frame, rgb : float and 3 floats
+    given : bool
+        By the user, not found by following it.
+    there : float
+        How much of the change is asked for, 0..1: 0 where the colour is no longer in the picture.
+    """
 
     frame: float
     rgb: Colour
     given: bool = False
+    there: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -55,8 +66,8 @@ class Pick:
     to : 3 floats or None
         The new colour; None for a hold.
     toward : {"shift", "colour"}
-        At other frames: the same change as at `frame`, less where the colour would leave 0..1, or
-        the same new colour.
+        At other frames: the same change as at `frame`, in proportion less where the colour is
+        darker, and less where it would leave 0..1; or the same new colour.
     start, until : float or None
         First and last frame with the full change; None: the clip's first and last.
     fade : float
@@ -70,8 +81,13 @@ class Pick:
         Where the colour is at other frames, linear between the keys; empty: always `rgb`.
     pixel, box : (x, y) and int, or None
         The pixel and the side of the box around it whose mean was picked.
+    spread : tuple of 3 floats
+        Offsets from the picked colour to other colours of the box, where they differ much.
     residual : float or None
-        How far the result is from what was asked, at worst, where the change is full.
+        How far the result is from what was asked at `frame`, or at the next frame where the change
+        is full.
+    worst, worst_frame : float or None
+        The largest such distance of all frames, and where.
     share : float or None
         Share, 0..1, of the change that the palette does; the local remainder does the rest.
     """
@@ -91,7 +107,10 @@ class Pick:
     path: tuple[PathKey, ...] = ()
     pixel: tuple[float, float] | None = None
     box: int | None = None
+    spread: tuple[Colour, ...] = ()
     residual: float | None = None
+    worst: float | None = None
+    worst_frame: float | None = None
     share: float | None = None
 
     @classmethod
@@ -112,12 +131,20 @@ class Pick:
             global_only=fields.get("global_only", False),
             enabled=fields.get("enabled", True),
             path=tuple(
-                PathKey(key["frame"], as_colour(key["rgb"]), key.get("given", False))
+                PathKey(
+                    key["frame"],
+                    as_colour(key["rgb"]),
+                    key.get("given", False),
+                    key.get("there", 1.0),
+                )
                 for key in fields.get("path", ())
             ),
             pixel=None if pixel is None else (pixel[0], pixel[1]),
             box=fields.get("box"),
+            spread=tuple(as_colour(offset) for offset in fields.get("spread", ())),
             residual=fields.get("residual"),
+            worst=fields.get("worst"),
+            worst_frame=fields.get("worst_frame"),
             share=fields.get("global"),
         )
 
@@ -126,6 +153,7 @@ class Pick:
         path = [
             {"frame": _number(key.frame), "rgb": list(key.rgb)}
             | ({"given": True} if key.given else {})
+            | ({"there": key.there} if key.there < 1 else {})
             for key in self.path
         ]
         every: dict[str, Any] = {
@@ -144,6 +172,7 @@ class Pick:
             "path": path or None,
             "pixel": None if self.pixel is None else [_number(value) for value in self.pixel],
             "box": self.box,
+            "spread": [list(offset) for offset in self.spread] or None,
         }
         return {name: value for name, value in every.items() if value is not None}
 
@@ -151,12 +180,16 @@ class Pick:
         """Return where the colour is at a frame, (3,)."""
         if not self.path:
             return np.array(self.rgb)
-        frames = [key.frame for key in self.path]
-        return np.array(
-            [
-                np.interp(frame, frames, channel)
-                for channel in np.transpose([k.rgb for k in self.path])
-            ]
+        frames, colours, _ = self._keys
+        return np.array([np.interp(frame, frames, channel) for channel in colours.T])
+
+    @cached_property
+    def _keys(self) -> tuple[F64, F64, F64]:
+        """The path's frames (n,), colours (n, 3) and parts that are there (n,)."""
+        return (
+            np.array([key.frame for key in self.path], float),
+            np.array([key.rgb for key in self.path], float).reshape(-1, 3),
+            np.array([key.there for key in self.path], float),
         )
 
     def change_at(self, frame: float) -> F64:
@@ -166,14 +199,21 @@ class Pick:
         new, old, colour = np.array(self.to), np.array(self.rgb), self.colour_at(frame)
         if self.toward == "colour":
             return new - colour
+        change: F64 = new - old
         # The change that makes a wall blue by day would make its night black a bright blue.
-        ends = np.stack([old, new, *(np.array(key.rgb) for key in self.path)])
+        light = min(1.0, max(0.0, float(colour.max())) / max(float(old.max()), 1e-9))
+        ends = np.vstack([old, new, self._keys[1]])
         high = np.maximum(1.0, ends[:2].max(axis=0)) if ends.max() <= 1 else np.inf
         low = np.minimum(0.0, ends.min(axis=0))
-        change: F64 = new - old
         room = np.where(change < 0, colour - low, high - colour)
         part = room / np.maximum(np.abs(change), 1e-9)
-        return change * min(1.0, max(0.0, float(part.min())))
+        return change * min(light, max(0.0, float(part.min())))
+
+    @property
+    def tolerance(self) -> float:
+        """The largest residual of a pick that counts as met."""
+        change = np.zeros(3) if self.to is None else np.subtract(self.to, self.rgb)
+        return max(MET, MET_PART * float(np.linalg.norm(change)))
 
     def knots(self, step: float) -> tuple[float, float, float, float]:
         """Return where the change begins, is full, is full for the last time, and ends.
@@ -188,11 +228,14 @@ class Pick:
     def strength_at(self, frame: float, step: float) -> float:
         """Return how much of the change is asked for at a frame, 0..1."""
         begin, start, until, end = self.knots(step)
-        if start <= frame <= until:
-            return 1.0
         before = (frame - begin) / (start - begin) if frame < start else 1.0
         after = (end - frame) / (end - until) if frame > until else 1.0
-        return max(0.0, min(before, after))
+        return max(0.0, min(before, after)) * self._there(frame)
+
+    def _there(self, frame: float) -> float:
+        """Return how much of the colour is in the picture at a frame, 0..1."""
+        frames, _, there = self._keys
+        return float(np.interp(frame, frames, there)) if there.size else 1.0
 
 
 def all_picks(fields: Mapping[str, Any]) -> tuple[Pick, ...]:
@@ -210,8 +253,11 @@ def unmet(picks: Iterable[Pick], step: float) -> list[str]:
                 f"{pick.id} is not solved: only the first {MOST_PICKS} enabled picks and holds "
                 "are. Disable or remove some"
             )
-        elif pick.residual is not None and pick.residual > MET:
+        elif pick.residual is not None and pick.residual > pick.tolerance:
             lines.append(f"{pick.id} is off by {pick.residual:.3f}{_cause(pick, enabled, step)}")
+        elif pick.worst is not None and pick.worst > pick.tolerance:
+            at = f"at frame {pick.worst_frame:g}"
+            lines.append(f"{pick.id} is off by {pick.worst:.3f} {at}{_cause(pick, enabled, step)}")
     return lines
 
 
@@ -233,7 +279,9 @@ def _cause(pick: Pick, others: Sequence[Pick], step: float) -> str:
         return ": the palette alone cannot express it; its neighbourhood is left out"
     if pick.to is not None and any(not -0.05 <= value <= 1.05 for value in pick.to):
         return ": its new colour lies far outside 0..1"
-    return ": picks and holds nearby, or locked handles, stand in its way"
+    if len(others) > 1:
+        return ": picks and holds nearby, or locked handles, limit it"
+    return ": near colours of the clip, which want to stay, limit it; radius=… widens the change"
 
 
 def _together(a: Pick, b: Pick, step: float) -> list[float]:

@@ -316,7 +316,7 @@ def save(
     on_edits : {"refuse", "keep", "drop"}
         What to do if the file exists and holds edits that `document` lacks. "keep" copies the edits
         (and ``extra``). It needs the same polytope, because edits refer to its vertices and edges;
-        `grade.renewal` copies grades to another polytope.
+        `grade.reanalysis` copies grades to another polytope.
     replaces : bytes, optional
         The expected content of the file; another one is an error.
 

@@ -5,18 +5,22 @@ numbers every time.
 
 A palette colour's displacement moves a colour c by its mean value weight w(c) (eqs. 6, 7). So each
 frame is a linear least-squares problem for the displacements d of its palette colours and the
-sizes a of one bump around each pick and hold. At a frame, with all colours in code values:
+sizes a of the bumps around the picked and held colours. At a frame, with all colours in code
+values:
 
 - a pick at colour p wants ``w(p) d + phi(p) a = change - U(p)``, where U is what the user's own
   handles do there; a hold wants the same with no change;
-- the guard: each colour of the clip wants to stay, by its share of the pixels, unless it is near
-  a picked colour. It counts absolute, not squared changes (reweighted): the rest of the picture
-  stays, instead of changing a little everywhere;
+- the guard: each colour of the clip wants to stay, by its share of the pixels, unless it lies
+  within a pick's bump. A pixel that must stay counts as much as a pixel that has a picked colour:
+  a pick of few pixels moves no palette colour that many pixels are mixed from. Absolute, not
+  squared changes count (reweighted): the rest of the picture stays, instead of changing a little
+  everywhere;
 - few palette colours move (reweighted); bumps are small.
 
-What is left at the picks is then met by the bumps alone. How near "near" is grows with the change:
-the change must fade out over a distance of about its own length, or the grade would fold colours
-over and posterise.
+What is left at the picks is then met by the bumps alone. A bump grows with the change, else colours
+would fold over and posterise, until it takes in other things than the one that was picked: many
+more pixels than have the picked colour. A pick of a box with a wide spread of colours has a bump
+at several of them.
 
 Frames are solved one by one, at the clip's vertices, at the picks' own frames and every few frames
 between; the core interpolates linearly. So a pick that ends at a frame has no effect at all beyond.
@@ -25,7 +29,7 @@ between; the core interpolates linearly. So a pick that ends at a frame has no e
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,6 +39,7 @@ from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.grade import sidecar
 from palette4d.grade.edits import Colour, as_colour
+from palette4d.grade.keyframes import needed
 from palette4d.grade.picks import MOST_PICKS, Pick, all_picks
 from palette4d.grade.sidecar import Fields
 
@@ -42,28 +47,31 @@ F64 = NDArray[np.float64]
 
 # The constants below hold for all clips. docs/lab/picks.md shows what they were chosen by.
 
-# A pick or a hold weighs 1; the weights of the guard sum to GUARD, or less if less than the share
-# LEAST_GUARDED of the picture is guarded at all.
-GUARD, LEAST_GUARDED = 3.0, 0.2
 # A colour of few pixels counts in the guard as if it had this share of them: a lamp.
 LEAST_SHARE = 5e-4
 # A guarded colour that would change by more than LARGE times the largest change that is asked for
-# counts as if it had up to this share of the picture: few pixels must not overshoot either.
-OVERSHOOT, LARGE = 0.03, 1.1
-# The guard is off within NEAR_0 + NEAR_1 |change| of a pick, and full at NEAR_END times that.
-NEAR_0, NEAR_1, NEAR_END = 0.03, 0.3, 5.0
-# The radius of a pick's bump is RADIUS_0 + RADIUS_1 |change|; that of a hold's is HOLD_RADIUS.
-RADIUS_0, RADIUS_1, HOLD_RADIUS = 0.08, 0.8, 0.16
+# weighs up to so much, however few pixels have it: they must not overshoot either.
+OVERSHOOT, LARGE = 0.3, 1.1
+# The radius of a pick's bump is RADIUS_0 + RADIUS_1 |change|, at most LARGEST. It is less if other
+# things begin there: if beyond OWN the number of pixels within grows faster than the bump's volume,
+# and ever faster or much faster. That of a hold's is HOLD_RADIUS.
+RADIUS_0, RADIUS_1, LARGEST, OWN, HOLD_RADIUS = 0.08, 0.8, 0.48, 0.12, 0.16
+# A colour of a pick's spread has a bump of its own if the pick's bump would leave more than this of
+# its change undone. A hold's change counts as 1.
+UNDONE = 0.04
+# A stored colour stands for colours around it, about so far.
+CELL = 0.06
 # Cost of a slope: of a displacement that changes along an edge of the palette by as much as the
 # colour. Near greys, where colours are close together, the palette would tear them apart.
 SLOPE = 2.5e-4
-# Costs of a palette colour's displacement and of a bump, beside the weights above.
-RIDGE, BUMP = 1e-4, 0.3
+# Costs of a palette colour's displacement and of a bump, beside the weight 1 of a pick. A bump
+# costs less if it had to stay small, or if hardly any colour lies at its slope: the picked colour
+# stands alone, and the palette need not change all others.
+RIDGE, BUMP = 1e-4, 0.4
 # Reweighting: rounds, and the sizes, as shares of the largest change, below which a palette
-# colour's displacement and a guarded colour's change no longer cost more per size. A changed
-# colour's weight falls with the power ROBUST; a displacement below FEW of the
-# largest change is none.
-ROUNDS, SMALL_MOVE, SMALL_CHANGE, ROBUST, FEW = 5, 0.03, 0.017, 0.6, 0.1
+# colour's displacement and a guarded colour's change no longer cost more per size. A displacement
+# below FEW of the largest change is none.
+ROUNDS, SMALL_MOVE, SMALL_CHANGE, FEW = 5, 0.03, 0.017, 0.1
 # Picks that nearly coincide and ask for different things: the bumps' sizes stay bounded by
 # 1 / (2 TIKHONOV) times the difference. A lone pick's residual is TIKHONOV^2 of its remainder.
 TIKHONOV = 0.1
@@ -94,14 +102,17 @@ def solve(fields: Mapping[str, Any]) -> tuple[Fields, dict[str, Fields]]:
     solution : dict
         The member ``edits.solution``.
     measured : dict
-        For each enabled pick, by its id: ``residual`` and ``global`` (`picks.Pick`).
+        For each enabled pick, by its id: ``residual``, ``worst``, ``worst_frame`` and ``global``
+        (`picks.Pick`).
     """
     enabled = [pick for pick in all_picks(fields["edits"]) if pick.enabled]
     clip = _ClipAtTimes(fields)
     problem = _Problem(clip, enabled[:MOST_PICKS])
     solved = [problem.at(time) for time in problem.times]
     solution = problem.solution(solved)
-    return solution, _measured(fields, solution, enabled, problem.times, clip.core)
+    if len(enabled) > MOST_PICKS:
+        problem = _Problem(clip, enabled)
+    return solution, _measured(fields, solution, problem)
 
 
 def side_effect(fields: Mapping[str, Any], frame: float, least: float) -> tuple[float, Colour]:
@@ -120,16 +131,14 @@ def side_effect(fields: Mapping[str, Any], frame: float, least: float) -> tuple[
     cut = _core.slice_at(clip.polytope, frame)
     solved = _core.edited_colours(clip.polytope, both.edits, cut)
     user = _core.edited_colours(clip.polytope, clip.core.edits, cut)
-    guarded = clip.guarded(cut.rgb, cut.faces, frame)
+    guarded = clip.colours_at(frame)
     rgb, shares = guarded[:, :3], guarded[:, 3]
     bumps = both.bumps_at(frame)
     changes = _core.palette_weights(rgb, cut.rgb, cut.faces)[0] @ (solved - user)
     changes += _bump(rgb, bumps[:, :3], bumps[:, 3]) @ bumps[:, 4:]
     size = np.abs(changes).max(axis=1)
-    picks = [p for p in all_picks(fields["edits"]) if p.enabled and p.to is not None]
-    centres = np.array([pick.colour_at(frame) for pick in picks]).reshape(-1, 3)
-    reach = np.array([np.linalg.norm(pick.change_at(frame)) for pick in picks])
-    other = _far(rgb, centres, reach, np.ones(len(picks))) > OTHER
+    problem = _Problem(clip, [pick for pick in all_picks(fields["edits"]) if pick.enabled])
+    other = problem.guard_at(rgb, frame) > OTHER
     share = float(shares[other & (size > least)].sum() / max(float(shares.sum()), 1e-9))
     worst = int(np.argmax(np.where(other, size * np.sqrt(shares), 0.0)))
     return share, as_colour(rgb[worst])
@@ -167,9 +176,14 @@ class _ClipAtTimes:
         }
         self.free_vertices = np.array([vertex["id"] not in locks for vertex in vertices], float)
 
-    def guarded(self, palette: F64, faces: NDArray[np.int32], time: float) -> F64:
-        """Return (m, 4) colours and shares to guard."""
+    def colours_at(self, time: float) -> F64:
+        """Return (m, 4) colours of the clip, and each one's share of the pixels.
+
+        Without colours of the clip: the palette's, and the middles of its faces.
+        """
         if not self.frames:
+            cut = _core.slice_at(self.polytope, time)
+            palette, faces = cut.rgb, cut.faces
             middles = palette[faces].mean(axis=1) if len(faces) else palette
             rgb = np.concatenate([palette, middles])
             return np.column_stack([rgb, np.full(len(rgb), 1 / len(rgb))])
@@ -184,7 +198,7 @@ class _ClipAtTimes:
 
 @dataclass(frozen=True)
 class _Solved:
-    """The solution at one time: displacements by place, and bumps by the number of the pick.
+    """The solution at one time: displacements by place, and bumps by the number of the point.
 
     A place is ("v", vertex index) or ("e", edge index).
     """
@@ -195,21 +209,91 @@ class _Solved:
 
 
 class _Problem:
-    """The picks of a clip, solved at one time after the other."""
+    """The picks of a clip, solved at one time after the other.
+
+    A pick has a point in colour for itself and for each colour of its spread. All have the same
+    change and a bump each.
+    """
 
     def __init__(self, clip: _ClipAtTimes, picks: Sequence[Pick]) -> None:
         self.clip, self.picks = clip, picks
-        self.radii = np.array([_radius(pick) for pick in picks])
+        sizes = [self._bump_of(pick) for pick in picks]
+        points = [
+            (number, offset, radius, cost)
+            for number, (pick, (radius, cost)) in enumerate(zip(picks, sizes, strict=True))
+            for offset in ((0.0, 0.0, 0.0), *pick.spread)
+            if not any(offset) or _undone(pick, offset, radius) > UNDONE
+        ]
+        of, offsets, radii, costs = zip(*points, strict=True) if points else ((), (), (), ())
+        self.of = np.array(of, int)
+        self.offsets = np.array(offsets).reshape(-1, 3)
+        self.radii, self.costs = np.array(radii), np.array(costs)
         #: Frames where the effect of a pick begins or ends: nothing may pass them.
         self.borders = sorted(
             {
                 float(knot)
                 for pick in picks
-                for knot in (pick.knots(clip.step)[0], pick.knots(clip.step)[3])
+                for knot in (
+                    pick.knots(clip.step)[0],
+                    pick.knots(clip.step)[3],
+                    *(key.frame for key in pick.path if key.there == 0),
+                )
                 if clip.first <= knot <= clip.last
             }
         )
         self.times = self._times()
+
+    def _bump_of(self, pick: Pick) -> tuple[float, float]:
+        """Return the radius of a pick's bumps, and what they cost."""
+        if pick.radius is not None or pick.to is None:
+            return pick.radius or HOLD_RADIUS, BUMP
+        change = min(float(np.linalg.norm(pick.change_at(pick.frame))), 1.0)
+        if not self.clip.frames:
+            return RADIUS_0 + RADIUS_1 * min(change, (LARGEST - RADIUS_0) / RADIUS_1), BUMP
+        rgb, shares = np.split(self.clip.colours_at(pick.frame), [3], axis=1)
+        # Each stored colour stands for those around it.
+        around = CELL * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
+        rgb, shares = (rgb[:, None] + around).reshape(-1, 3), np.repeat(shares, len(around))
+        centres = np.array([(0.0, 0.0, 0.0), *pick.spread]) + pick.rgb
+        away = np.linalg.norm(rgb[:, None] - centres, axis=2).min(axis=1)
+        radii = np.geomspace(RADIUS_0, RADIUS_0 + RADIUS_1 * change, 48)
+        part = np.minimum(away / radii[:, None], 1.0) ** 2
+        within = np.maximum((1 - part) ** 3 @ shares, NONE**2)
+        growth = (6 * part * (1 - part) ** 2) @ shares / within
+        faster = (growth > 4) | ((growth > 3) & (growth > np.roll(growth, 1)))
+        end = (faster & (radii > OWN)) | (radii > LARGEST)
+        chosen = max(0, int(np.argmax(end)) - 1) if end.any() else len(radii) - 1
+        alone = float(within[chosen] / within[-1]) * min(1.0, float(growth[chosen]))
+        return float(radii[chosen]), BUMP * alone**2
+
+    def guard_at(self, colours: F64, time: float) -> F64:
+        """Return how much colours are guarded at a time, 0..1: not at all at a picked one."""
+        strengths = np.array([pick.strength_at(time, self.clip.step) for pick in self.picks])
+        at = [i for i in range(len(self.of)) if self.picks[self.of[i]].to is not None]
+        share = strengths[self.of[at]] / max(float(strengths.max(initial=0)), NONE)
+        far = 1 - share * _bump(colours, self.centres(time)[at], self.radii[at])
+        found: F64 = far.prod(axis=1)
+        return found
+
+    def _counts(self, guarded: F64, of: NDArray[np.int64], within: F64) -> F64:
+        """Return how much each point counts beside the others, 0..1: by the pixels of its pick.
+
+        Else a pick of few pixels could move what many are mixed from, at the price of a large one.
+        A hold counts as the largest pick.
+        """
+        counts = np.ones(len(of))
+        for number in np.unique(of):
+            if self.clip.frames and self.picks[number].to is not None:
+                pixels = float(guarded[:, 3] @ within[:, of == number].max(axis=1))
+                counts[of == number] = max(pixels, LEAST_SHARE)
+        moving = np.array([self.picks[number].to is not None for number in of])
+        counts[moving] /= counts[moving].max(initial=0.0) or 1.0
+        return counts
+
+    def centres(self, time: float) -> F64:
+        found = np.array([pick.colour_at(time) for pick in self.picks]).reshape(-1, 3)
+        centres: F64 = found[self.of] + self.offsets
+        return centres
 
     def _times(self) -> list[float]:
         clip = self.clip
@@ -230,25 +314,25 @@ class _Problem:
     def at(self, time: float) -> _Solved:
         clip = self.clip
         strengths = np.array([pick.strength_at(time, clip.step) for pick in self.picks])
-        active = np.flatnonzero(strengths > 0)
+        active = np.flatnonzero(strengths[self.of] > 0)
         if not len(active):
             return _Solved(time, {}, {})
-        most = strengths[active].max()
-        share = strengths[active] / most
-        picks = [self.picks[i] for i in active.tolist()]
+        of = self.of[active]
+        most = strengths.max()
+        share = strengths[of] / most
         radii = self.radii[active]
-        reach = np.array([np.linalg.norm(pick.change_at(time)) for pick in picks])
-        centres = np.array([pick.colour_at(time) for pick in picks])
+        centres = self.centres(time)[active]
         cut = _core.slice_at(clip.polytope, time)
         edited = _core.edited_colours(clip.polytope, clip.core.edits, cut)
         weights = _core.palette_weights(centres, cut.rgb, cut.faces)[0]
-        wanted = np.array([pick.change_at(time) for pick in picks]) - weights @ (edited - cut.rgb)
+        changes = np.array([pick.change_at(time) for pick in self.picks])[of]
+        wanted = changes - weights @ (edited - cut.rgb)
         scale = float(np.linalg.norm(wanted, axis=1).max())
         if scale < NONE:
             return _Solved(time, {}, {})
-        guarded = clip.guarded(cut.rgb, cut.faces, time)
+        guarded = clip.colours_at(time)
         places, free = self._places(cut, time)
-        local = np.array([not pick.global_only for pick in picks])
+        local = np.array([not self.picks[i].global_only for i in of])
         bumps = _bump(centres, centres, radii) * local
         rows = np.hstack([_gathered(weights, places) * free, bumps])
         guard_rows = np.hstack(
@@ -259,13 +343,20 @@ class _Problem:
             ]
         )
         slopes = _gathered(_slopes(cut.rgb, cut.faces), places) * free
-        moving = np.array([pick.to is not None for pick in picks])
+        far = self.guard_at(guarded[:, :3], time)
         guard = np.maximum(guarded[:, 3], LEAST_SHARE)
-        far = _far(guarded[:, :3], centres[moving], reach[moving], share[moving])
-        unit = GUARD / max(float(guard @ far), LEAST_GUARDED * float(guard.sum()))
+        counts = self._counts(guarded, of, _bump(guarded[:, :3], centres, radii))
+        unit = 1 / max(float(guard @ (1 - far)), LEAST_SHARE) if clip.frames else 1.0
         count = len(free)
         found = _least_squares(
-            rows, share, wanted, guard_rows, (unit * far * guard, unit * far), slopes, scale
+            rows,
+            share * counts,
+            wanted,
+            guard_rows,
+            (unit * far * guard, far),
+            slopes,
+            scale,
+            self.costs[active] * counts,
         )
         moves = found[:count] * free[:, None]
         sizes = found[count:] * local[:, None]
@@ -322,7 +413,7 @@ class _Problem:
             }
             values = {**inside, **zeros, **ends}
             times = sorted(values)
-            kept = _few(times, np.array([values[t] for t in times]), borders)
+            kept = _kept(times, np.array([values[t] for t in times]), borders)
             keys += [
                 {"edge": polytope.edge_ids[index], "frame": _whole(t), "by": _rounded(values[t])}
                 for t in kept
@@ -332,14 +423,16 @@ class _Problem:
 
     def _bumps(self, solved: Sequence[_Solved], borders: set[float]) -> list[Fields]:
         bumps = []
-        for number, pick in enumerate(self.picks):
+        for number, pick in enumerate(self.picks[i] for i in self.of):
             begin, _, _, end = pick.knots(self.clip.step)
             keys: dict[float, F64] = {}
             for one in solved:
                 if number in one.bumps:
                     keys[one.time] = np.concatenate(one.bumps[number])
                 elif begin <= one.time <= end:
-                    keys[one.time] = np.concatenate([pick.colour_at(one.time), np.zeros(3)])
+                    keys[one.time] = np.concatenate(
+                        [pick.colour_at(one.time) + self.offsets[number], np.zeros(3)]
+                    )
             values = np.array(list(keys.values())).reshape(-1, 6)
             if not (np.linalg.norm(values[:, 3:], axis=1) >= NONE).any():
                 continue
@@ -353,19 +446,18 @@ class _Problem:
                             "rgb": _rounded(keys[t][:3]),
                             "by": _rounded(keys[t][3:]),
                         }
-                        for t in _few(times, values, borders | {times[0], times[-1]})
+                        for t in _kept(times, values, borders)
                     ],
                 }
             )
         return bumps
 
 
-def _radius(pick: Pick) -> float:
-    if pick.radius is not None:
-        return pick.radius
-    if pick.to is None:
-        return HOLD_RADIUS
-    return RADIUS_0 + RADIUS_1 * min(float(np.linalg.norm(pick.change_at(pick.frame))), 1.0)
+def _undone(pick: Pick, offset: Colour, radius: float) -> float:
+    """Return how much of a pick's change its bump leaves undone at an offset from its centre."""
+    change = 1.0 if pick.to is None else float(np.linalg.norm(pick.change_at(pick.frame)))
+    done = _bump(np.array([offset]), np.zeros((1, 3)), np.array([radius]))
+    return change * (1 - float(done[0, 0]))
 
 
 def _bump(colours: F64, centres: F64, radii: F64) -> F64:
@@ -373,17 +465,6 @@ def _bump(colours: F64, centres: F64, radii: F64) -> F64:
     away = ((colours[:, None] - centres) ** 2).sum(axis=2) / radii**2
     values: F64 = np.maximum(0.0, 1.0 - away) ** 3
     return values
-
-
-def _far(colours: F64, centres: F64, reach: F64, share: F64) -> F64:
-    """Return how much each colour is guarded, 0..1: not at all near a pick, smoothly more away."""
-    if not len(centres):
-        return np.ones(len(colours))
-    near = NEAR_0 + NEAR_1 * np.minimum(reach, 1.0)
-    away = np.linalg.norm(colours[:, None] - centres, axis=2)
-    ease = np.clip((away - near) / (near * (NEAR_END - 1)), 0.0, 1.0)
-    far: F64 = (1 - share * (1 - ease**2 * (3 - 2 * ease))).min(axis=1)
-    return far
 
 
 def _slopes(palette: F64, faces: NDArray[np.int32]) -> F64:
@@ -416,18 +497,18 @@ def _least_squares(
     guard: tuple[F64, F64],
     slopes: F64,
     scale: float,
+    bump_costs: F64,
 ) -> F64:
     """Return the displacements of the palette colours, then the sizes of the bumps, (n, 3).
 
-    `guard` has each guarded colour's weight, and its weight if it were the whole picture.
+    `guard` has each guarded colour's weight, and how much it is guarded, 0..1.
     """
     moves = slopes.shape[1]
     picked = rows.T @ (pick[:, None] * rows)
     picked[:moves, :moves] += SLOPE * slopes.T @ slopes
     target = rows.T @ (pick[:, None] * wanted)
     weights, whole = guard
-    cost = np.full(rows.shape[1], BUMP)
-    cost[:moves] = RIDGE
+    cost = np.concatenate([np.full(moves, RIDGE), bump_costs])
     weight: F64 = weights
     normal: NDArray[np.floating[Any]] = picked
     found: NDArray[np.floating[Any]] = target
@@ -437,13 +518,19 @@ def _least_squares(
         cost[:moves] = RIDGE / (np.linalg.norm(found[:moves], axis=1) / scale + SMALL_MOVE)
         changed = np.linalg.norm(guard_rows @ found, axis=1) / scale
         weights = np.maximum(weights, whole * OVERSHOOT * np.clip(changed - LARGE, 0, 1))
-        weight = weights * np.power(SMALL_CHANGE / (changed + SMALL_CHANGE), ROBUST)
+        weight = weights * SMALL_CHANGE / (changed + SMALL_CHANGE)
         weight *= float(weights.sum()) / max(float(weight.sum()), 1e-9)
     few = np.linalg.norm(found, axis=1) > FEW * scale
     few[moves:] = True
     found[~few] = 0.0
     found[few] = np.linalg.solve(normal[np.ix_(few, few)], target[few])
     return found.astype(np.float64)
+
+
+def _kept(times: Sequence[float], values: F64, borders: set[float]) -> list[float]:
+    """Return the times of the keys that are needed, all borders among them; none for zeros."""
+    fixed = [i for i, time in enumerate(times) if time in borders]
+    return [times[i] for i in needed(times, values, fixed, STRAIGHT)] if values.any() else []
 
 
 def _interpolated(bumps: F64, left: F64) -> F64:
@@ -453,70 +540,44 @@ def _interpolated(bumps: F64, left: F64) -> F64:
     return sizes
 
 
-def _few(times: Sequence[float], values: F64, kept: Iterable[float]) -> list[float]:
-    """Return the times of the keys that are needed, with both ends (Douglas and Peucker)."""
-    wanted = set(kept)
-    fixed = [0, *(i for i in range(1, len(times) - 1) if times[i] in wanted), len(times) - 1]
-    chosen = set(fixed)
-    parts = list(itertools.pairwise(fixed))
-    while parts:
-        a, b = parts.pop()
-        if b - a < 2:
-            continue
-        share = (np.array(times[a + 1 : b]) - times[a]) / (times[b] - times[a])
-        straight = values[a] + share[:, None] * (values[b] - values[a])
-        off = np.abs(values[a + 1 : b] - straight).max(axis=1)
-        if off.max() > STRAIGHT:
-            middle = a + 1 + int(off.argmax())
-            chosen.add(middle)
-            parts += [(a, middle), (middle, b)]
-    found = sorted(chosen)
-    if not np.any(values[found]):
-        return []
-    return [times[i] for i in found]
-
-
-def _measured(
-    fields: Mapping[str, Any],
-    solution: Fields,
-    picks: Sequence[Pick],
-    times: Sequence[float],
-    own: _core.Sidecar,
-) -> dict[str, Fields]:
-    """Return the residual and the palette's share of each pick, from the stored solution.
-
-    `own` is the sidecar without a solution.
-    """
+def _measured(fields: Mapping[str, Any], solution: Fields, problem: _Problem) -> dict[str, Fields]:
+    """Return the residuals and the palette's share of each pick, from the stored solution."""
     core = _parsed(fields, solution)
-    step = fields["clip"]["frames"]["step"]
-    first, last = core.polytope.first_frame, core.polytope.last_frame
-    between = [(a + b) / 2 for a, b in itertools.pairwise(times)]
-    grid = sorted({*times, *(round(t) for t in between)})
-    residual = np.zeros(len(picks))
-    share = np.ones(len(picks))
-    for time in sorted({*grid, *(pick.frame for pick in picks)}):
-        full = [i for i, pick in enumerate(picks) if pick.strength_at(time, step) == 1]
-        full = [i for i in full if first <= time <= last]
+    clip, picks = problem.clip, problem.picks
+    between = [(a + b) / 2 for a, b in itertools.pairwise(problem.times)]
+    times = {*problem.times, *(float(round(t)) for t in between), *(pick.frame for pick in picks)}
+    found: list[dict[float, tuple[float, float]]] = [{} for _ in picks]
+    for time in sorted(t for t in times if clip.first <= t <= clip.last):
+        full = [i for i, pick in enumerate(picks) if pick.strength_at(time, clip.step) == 1]
         if not full:
             continue
         cut = _core.slice_at(core.polytope, time)
         colours = np.array([picks[i].colour_at(time) for i in full])
         wanted = np.array([picks[i].change_at(time) for i in full])
         weights = _core.palette_weights(colours, cut.rgb, cut.faces)[0]
-        user = _core.edited_colours(core.polytope, own.edits, cut)
+        user = _core.edited_colours(core.polytope, clip.core.edits, cut)
         both = _core.edited_colours(core.polytope, core.edits, cut)
         active = core.bumps_at(time)
         palette = weights @ (both - cut.rgb)
         total = palette + _bump(colours, active[:, :3], active[:, 3]) @ active[:, 4:]
-        residual[full] = np.maximum(residual[full], np.linalg.norm(total - wanted, axis=1))
+        off = np.linalg.norm(total - wanted, axis=1)
         asked = wanted - weights @ (user - cut.rgb)
         largest = max(float(np.linalg.norm(asked, axis=1).max()), NONE)
         for row, i in enumerate(full):
-            if time == picks[i].frame or share[i] == 1:
-                share[i] = _share(weights[row] @ (both - user), asked[row], largest)
+            share = _share(weights[row] @ (both - user), asked[row], largest)
+            found[i][time] = float(off[row]), share
+    return {pick.id: _measures(pick, at) for pick, at in zip(picks, found, strict=True) if at}
+
+
+def _measures(pick: Pick, found: Mapping[float, tuple[float, float]]) -> Fields:
+    """Return a pick's measured members from its residual and the palette's share by time."""
+    own = min(found, key=lambda time: abs(time - pick.frame))
+    worst = max(found, key=lambda time: found[time][0])
     return {
-        pick.id: {"residual": round(float(off), DIGITS), "global": round(float(part), 4)}
-        for pick, off, part in zip(picks, residual, share, strict=True)
+        "residual": round(found[own][0], DIGITS),
+        "worst": round(found[worst][0], DIGITS),
+        "worst_frame": _whole(worst),
+        "global": round(found[own][1], 4),
     }
 
 

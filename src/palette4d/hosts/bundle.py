@@ -6,33 +6,70 @@ incomplete bundle.
 
 from __future__ import annotations
 
+import contextlib
 import os
+import platform
 import shutil
 import sys
 import tempfile
 from pathlib import Path
 
 from palette4d import _core
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Palette4dError, WriteError
+from palette4d.common.files import replacing
 
 BUNDLE = "Palette4D.ofx.bundle"
+_PLUGINS = "OFX/Plugins"
+
+#: In the bundle: the path of the Python with which the node's buttons start palette4d.
+PROGRAM = Path("Contents/Resources/program")
 
 
-def default_destination(platform: str = sys.platform) -> Path:
-    """The plugin folder of the OpenFX standard on a platform (`sys.platform`)."""
-    if platform == "win32":
-        return Path("C:/Program Files/Common Files/OFX/Plugins")
-    if platform == "darwin":
-        return Path("/Library/OFX/Plugins")
-    return Path("/usr/OFX/Plugins")
+SEARCH_PATH = "OFX_PLUGIN_PATH"
+"""The variable that names further folders of plugins, separated as in PATH."""
+
+
+def system_destination(system: str = sys.platform) -> Path:
+    """The plugin folder of the OpenFX standard on a system (`sys.platform`)."""
+    if system == "win32":
+        # The first one for 64 bits, whatever this Python has.
+        common = os.environ.get("COMMONPROGRAMW6432") or os.environ.get("COMMONPROGRAMFILES")
+        return Path(common or "C:/Program Files/Common Files", _PLUGINS)
+    if system == "darwin":
+        return Path("/Library", _PLUGINS)
+    return Path("/usr", _PLUGINS)
+
+
+def default_destination(system: str = sys.platform) -> Path:
+    """The folder that hosts look in first: of OFX_PLUGIN_PATH, else of the standard."""
+    for folder in os.environ.get(SEARCH_PATH, "").split(";" if system == "win32" else ":"):
+        if folder.strip():
+            return Path(folder.strip()).expanduser().absolute()
+    return system_destination(system)
+
+
+def architecture(system: str = sys.platform, machine: str | None = None) -> str:
+    """The folder below Contents in which hosts of a system look for the library."""
+    if system == "win32":
+        return "Win64"
+    if system == "darwin":
+        return "MacOS"
+    machine = machine or platform.machine()
+    return f"Linux-{'x86-64' if machine.lower() in ('x86_64', 'amd64') else machine}"
 
 
 def find_bundle() -> Path:
     """Return the bundle inside the installed package."""
     # It lies beside the compiled module, which in an editable installation is not in the sources.
     bundle = Path(_core.__file__).parent / "_ofx" / BUNDLE
-    if any(bundle.glob("Contents/*/*.ofx")):
+    found = sorted(library.parent.name for library in bundle.glob("Contents/*/*.ofx"))
+    if architecture() in found:
         return bundle
+    if found:
+        raise Palette4dError(
+            f"{bundle}: found libraries for {', '.join(found)}, expected one for this system, "
+            f"{architecture()}; install palette4d again from its sources (pip install .)"
+        )
     raise Palette4dError(
         f"found no {BUNDLE} in the installed package palette4d, expected it in {bundle.parent}; "
         "install palette4d again from a wheel built with PALETTE4D_BUILD_PLUGIN=ON (the default)"
@@ -63,20 +100,38 @@ def install_bundle(
             fresh = Path(temporary) / BUNDLE
             if link:
                 fresh.symlink_to(bundle, target_is_directory=True)
+                # Another's installation may be closed: then the node says what its buttons need.
+                with contextlib.suppress(WriteError):
+                    _write_program(bundle)
             else:
                 shutil.copytree(bundle, fresh)
+                _write_program(fresh)
             _replace(fresh, target, Path(temporary) / "old")
     except PermissionError as error:
+        who = (
+            "close the programs that use the node, and run the command as an administrator"
+            if sys.platform == "win32"
+            else "run the command as an administrator (sudo)"
+        )
         raise Palette4dError(
-            f"{destination}: may not be written to; run the command as an administrator (sudo), or "
-            "give a folder of your own with dest=… and name it in the environment variable "
-            "OFX_PLUGIN_PATH"
+            f"{destination}: may not be written to; {who}, or give a folder of your own with "
+            f"dest=… and name it in the environment variable {SEARCH_PATH}"
         ) from error
     except OSError as error:
         raise Palette4dError(
             f"{target}: cannot be installed ({error.strerror}); choose another folder with dest=…"
         ) from error
     return target
+
+
+def _write_program(bundle: Path) -> None:
+    """Tell the node's buttons which Python has palette4d."""
+    file = bundle / PROGRAM
+    file.parent.mkdir(exist_ok=True)
+    with replacing(file, force=True) as temporary:
+        temporary.write_text(f"{sys.executable}\n", encoding="utf-8")
+    # The node does not believe a file that everybody may change.
+    file.chmod(0o644)
 
 
 def _is_ours(target: Path) -> bool:

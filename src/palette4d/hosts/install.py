@@ -23,8 +23,9 @@ def install_plugin(
     Parameters
     ----------
     dest : path, optional
-        The folder of plugins; by default the one that all hosts look in. Without it, and with
-        `kdenlive` or `shotcut`, the node itself is not installed.
+        The folder of plugins; by default the first that hosts look in: of OFX_PLUGIN_PATH, else
+        the system's. Without `dest`, and with `kdenlive` or `shotcut`, the node itself is not
+        installed.
     link : bool
         Make a symbolic link to this installation instead of a copy.
     kdenlive, shotcut : bool or path

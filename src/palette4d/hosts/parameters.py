@@ -2,7 +2,7 @@
 
 The node describes its parameters (`ofx_plugin/node`), and the files must agree with it:
 `tests/host/test_host_ui.py` compares them. The files leave out parameters that they cannot set in
-these hosts: buttons, the version, the embedded copy and the status, and the handles' ids.
+these hosts: buttons and their clip, the version, the embedded copy, the status, the handles' ids.
 """
 
 from dataclasses import dataclass

@@ -50,14 +50,14 @@ def check_address(text: str) -> str:
 
 
 def is_open(address: str) -> bool:
-    """Whether others can run code through a scheduler: `tcp://` to another machine.
+    """Whether others can run code through a scheduler: on another machine, and without TLS.
 
     >>> is_open("tcp://farm:8786"), is_open("tls://farm:8786"), is_open("127.0.0.1:8786")
     (True, False, False)
     """
     protocol, _, place = address.rpartition("://")
     host = place.rpartition(":")[0]
-    return protocol in ("", "tcp") and host not in ("localhost", "127.0.0.1")
+    return protocol not in ("tls", "wss") and host not in ("localhost", "127.0.0.1")
 
 
 def run(
@@ -153,6 +153,12 @@ def _connected(address: str) -> Iterator[Any]:
         raise Palette4dError(
             "cluster=… needs Dask, which is not installed; run: pip install 'palette4d[farm]'"
         ) from error
+    encrypted = address.startswith(("tls://", "wss://"))
+    if encrypted and distributed.Security().get_tls_config_for_role("client")["ca_file"] is None:
+        raise Palette4dError(
+            f"found no certificates for {address}, expected them in Dask's configuration "
+            "(distributed.comm.tls); docs/shots.md shows it"
+        )
     try:
         client = distributed.Client(address, timeout=ANSWERS_WITHIN, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:

@@ -8,6 +8,7 @@ FFV1 and VP9 conceal damage.
 
 from __future__ import annotations
 
+import bisect
 import functools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -77,14 +78,20 @@ _FORMATS = (
 ONLY_FILES = {"format_whitelist": ",".join(_FORMATS), "protocol_whitelist": "file"}
 
 
+#: Pictures whose decoding takes longer than opening the file again for a seek.
+WORTH_SEEKING = 4
+
+
 @dataclass(repr=False)
 class MovieClip(Clip):
-    """A movie file. Reading in order decodes each picture once; reading backwards seeks."""
+    """A movie file. Reading in order decodes each picture once; reading elsewhere seeks."""
 
     path: Path = field(kw_only=True)
     count: int = field(kw_only=True)
     #: Presentation time stamps in order; None if the file has none and pictures are counted.
     stamps: list[int] | None = field(kw_only=True, default=None)
+    #: The numbers of the key frames, in order; empty if they are not known.
+    key_frames: list[int] = field(kw_only=True, default_factory=list)
     _decoder: Iterator[tuple[int, av.VideoFrame]] | None = field(default=None, init=False)
     _next: int = field(default=0, init=False)
     _held: tuple[int, av.VideoFrame] | None = field(default=None, init=False)
@@ -151,7 +158,7 @@ class MovieClip(Clip):
         return picture
 
     def _find(self, frame: int) -> av.VideoFrame | None:
-        if self._decoder is None or frame < self._next:
+        if self._decoder is None or frame < self._next or self._passes_key(frame):
             seek = self.stamps is not None and frame > 0
             self._start(frame if seek else 0)
             picture = self._advance(frame)
@@ -160,6 +167,11 @@ class MovieClip(Clip):
             # Some containers seek too far: then only decoding from the start is safe.
             self._start(0)
         return self._advance(frame)
+
+    def _passes_key(self, frame: int) -> bool:
+        """Whether seeking to a key frame before a frame saves decoding of the pictures between."""
+        at = bisect.bisect_right(self.key_frames, frame) - 1
+        return at >= 0 and self.key_frames[at] >= self._next + WORTH_SEEKING
 
     def _start(self, frame: int) -> None:
         self._decoder = self._decode(frame)
@@ -227,7 +239,7 @@ def open_movie(
     """Open a movie file over the given range; raises ClipError or FrameError as `open_clip`."""
     with _open(path) as container:
         stream = _video_stream(container, path)
-        first, promised, stamps, packets = _index(container, stream, path)
+        first, promised, stamps, packets, keys = _index(container, stream, path)
         own_rate = stream.average_rate or stream.guessed_rate or stream.base_rate
         base = stream.time_base
     count = max(promised, packets)
@@ -266,6 +278,7 @@ def open_movie(
         path=path,
         count=count,
         stamps=stamps,
+        key_frames=keys,
     )
 
 
@@ -294,10 +307,11 @@ def _video_stream(container: Any, path: Path) -> Any:
 
 def _index(
     container: Any, stream: Any, path: Path
-) -> tuple[av.VideoFrame, int, list[int] | None, int]:
-    """First good picture, number of frames the header promises, stamps in order, and packets."""
+) -> tuple[av.VideoFrame, int, list[int] | None, int, list[int]]:
+    """First picture, frames the header promises, stamps in order, packets, and key frames."""
     first: av.VideoFrame | None = None
     stamps: list[int | None] = []
+    keys: set[int | None] = set()
     discarded = 0
     # Old VP8 files have packets without a picture; only decoding shows this.
     by_decoding = stream.codec_context.name == "vp8"
@@ -318,6 +332,8 @@ def _index(
                 stamps += [picture.pts for picture in pictures]
             elif not packet.is_corrupt or packet.pts is not None:
                 stamps.append(packet.pts)
+                if packet.is_keyframe:
+                    keys.add(packet.pts)
     except FFmpegError:
         pass  # the file ends in the middle; the earlier packets count
     if first is None:
@@ -328,8 +344,10 @@ def _index(
     promised = 0 if by_decoding else max(stream.frames - discarded, 0)
     known = [stamp for stamp in stamps if stamp is not None]
     if len(known) == len(stamps) == len(set(known)):
-        return first, promised, sorted(known), len(stamps)
-    return first, promised, None, len(stamps)
+        known.sort()
+        numbers = [number for number, stamp in enumerate(known) if stamp in keys]
+        return first, promised, known, len(stamps), numbers
+    return first, promised, None, len(stamps), []
 
 
 def _varies(stamps: list[int], base: Fraction, rate: Fraction | None) -> bool:

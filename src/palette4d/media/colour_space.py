@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palette4d import _core
-from palette4d.colour.conversion import TOLERANCE, Comparison, Conversion, conversion
+from palette4d.colour.conversion_chain import TOLERANCE, Comparison, Conversion, conversion
 from palette4d.colour.ocio_config import chosen_config, colour_space, same_encodings
 from palette4d.common.errors import Palette4dError
 from palette4d.media.clip_base import Clip, Fill, FrameError, Image, hidden

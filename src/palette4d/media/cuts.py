@@ -38,7 +38,7 @@ F64 = NDArray[np.float64]
 
 LEAST_DIFFERENCE = 0.15
 LEAST_RATIO = 3.0
-LEAST_SHIFT = 0.012  # three steps of 8 bits
+LEAST_SHIFT = 0.01  # one step of 8 bits from black measures 0.009, others less
 # Smaller differences count as this: after a still picture any change would look large.
 NOISE = 0.01
 # Around a flash the frames agree again: they differ by at most this share of the jump.

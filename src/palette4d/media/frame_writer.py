@@ -234,24 +234,46 @@ def write_frame(
         written = target.write_image(stored)
         problem = target.geterror()  # PNG reports a full disk here, and still returns true
         closed = target.close()
-        if problem or not written or not closed or not _is_whole(temporary):
-            raise _cannot_write(path, problem or target.geterror())
+        closing = target.geterror()  # likewise; of a whole TIFF it complains about Exif data
+        problem = problem or (closing if extension != "tif" else "")
+        if problem or not written or not closed or not _is_whole(temporary, stored):
+            raise _cannot_write(path, problem)
 
 
-def _is_whole(path: Path) -> bool:
-    """Whether the file's last row can be read: a full disk is not always reported on writing."""
+def _is_whole(path: Path, stored: NDArray[Any]) -> bool:
+    """Whether a file holds the pixels: a write that fails is not always reported.
+
+    Of a TIFF all rows are read, of others the last row. Of an EXR the table of the rows' places is
+    written last: OpenEXR reads without it, others do not.
+    """
     import OpenImageIO as oiio
 
-    source = oiio.ImageInput.open(str(path))
+    raw = oiio.ImageSpec()
+    raw.attribute("oiio:UnassociatedAlpha", 1)
+    source = oiio.ImageInput.open(str(path), raw)
     if source is None:
         oiio.geterror()
         return False
-    spec = source.spec()
-    last = spec.y + spec.height - 1
-    row = source.read_scanlines(0, 0, last, last + 1, 0, 0, spec.nchannels, spec.format)
+    height, _, channels = stored.shape
+    first = 0 if path.suffix.lower().startswith(".tif") else height - 1
+    rows = source.read_scanlines(0, 0, first, height, 0, 0, channels, source.spec().format)
     problem = source.geterror()
     source.close()
-    return row is not None and not problem
+    if path.suffix.lower() == ".exr" and not _has_table(path.read_bytes(), height):
+        return False
+    whole = stored[first:].tobytes()  # NaNs are equal, too
+    return rows is not None and not problem and rows.tobytes() == whole
+
+
+def _has_table(exr: bytes, height: int) -> bool:
+    """Whether the table of an EXR with zip compression, 16 rows a block, has been filled in."""
+    at = 8
+    while exr[at]:  # attributes: name, type, size, value
+        kind = exr.index(0, at) + 1
+        size = exr.index(0, kind) + 1
+        at = size + 4 + int.from_bytes(exr[size : size + 4], "little")
+    table = np.frombuffer(exr, "<u8", -(-height // 16), at + 1)
+    return bool(table.all())
 
 
 def _cannot_write(path: Path, reason: str) -> WriteError:

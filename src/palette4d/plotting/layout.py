@@ -357,6 +357,7 @@ def disc_names(
     bottom: float,
     shorten: Callable[[str], str] = str,
     collar: float = COLLAR,
+    beside: tuple[float, float, float] | None = None,
 ) -> list[Label]:
     """Return the ids above or below their discs, edited ids first; ids without space are left out.
 
@@ -374,6 +375,8 @@ def disc_names(
         Returns the text to draw for an id.
     collar : float
         Space that a disc takes beyond its radius.
+    beside : (float, float, float), optional
+        The x of the first and last frame, and the space beyond them, where ids may be too.
     """
     taken: list[Box] = []
     for disc in discs:
@@ -383,12 +386,16 @@ def disc_names(
     for disc in sorted(discs, key=lambda disc: disc.kind == "plain"):
         text, reach = shorten(disc.id), disc.radius + collar + 0.5
         half = width(text) / 2
-        for top in (disc.y - reach - tall, disc.y + reach):
-            box = (disc.x - half, top, disc.x + half, top + tall)
-            if top + tall >= bottom or any(_meet(box, other) for other in taken):
+        places = [(disc.x, disc.y - reach - tall / 2), (disc.x, disc.y + reach + tall / 2)]
+        if beside is not None and disc.home in beside[:2] and reach + 2 * half <= beside[2]:
+            way = -1 if disc.home == beside[0] else 1
+            places.insert(0, (disc.x + way * (reach + half), disc.y))
+        for x, y in places:
+            box = (x - half, y - tall / 2, x + half, y + tall / 2)
+            if box[3] >= bottom or any(_meet(box, other) for other in taken):
                 continue
             taken.append(box)
-            labels.append(Label(text, disc.x, top + tall / 2, disc.kind != "plain"))
+            labels.append(Label(text, x, y, disc.kind != "plain"))
             break
     return labels
 

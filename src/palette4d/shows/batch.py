@@ -20,7 +20,7 @@ from palette4d.analysis.options import AnalysisOptions
 from palette4d.common.errors import Palette4dError, in_words
 from palette4d.common.files import make_folder
 from palette4d.common.text import counted
-from palette4d.grade import renewal, sidecar
+from palette4d.grade import reanalysis, sidecar
 from palette4d.jobs.workers import Failed, Workers
 from palette4d.media.clip import open_clip
 from palette4d.media.colour_space import SpaceOptions
@@ -236,7 +236,7 @@ class Show:
             document = outcome.document
             document["clip"]["source"] = entry.shot.clip
             target = self.folder / entry.sidecar
-            _, notes = renewal.save(document, target, on_edits=self.options.on_edits)
+            _, notes = reanalysis.save(document, target, on_edits=self.options.on_edits)
             frames = document["clip"]["frames"]
             self.entries[name] = Entry(entry.shot, DONE, (frames["first"], frames["last"]))
             self.analysed.append(name)

@@ -15,9 +15,9 @@ from palette4d.common.text import counted
 from palette4d.grade.document import Document
 from palette4d.jobs.workers import Workers
 from palette4d.lut_export import series
-from palette4d.lut_export.bake_job import BakeSettings
 from palette4d.lut_export.config import WrittenConfig, write_config
 from palette4d.lut_export.formats import format_named
+from palette4d.lut_export.measured_write import BakeSettings
 from palette4d.lut_export.series import Request, Series
 from palette4d.shows import manifest as manifests
 from palette4d.shows import timeline_references

@@ -22,6 +22,9 @@ from palette4d.shows.shots import Place, Shot
 SCHEMA, VERSION = "palette4d.shots", 1
 ENDING = ".shots.json"
 
+#: The largest frame number, and part of a rate.
+LARGEST_NUMBER = 2**31 - 1
+
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,199}")
 
 DONE, FAILED, TO_DO = "done", "failed", "to do"
@@ -145,9 +148,9 @@ def read(path: Path) -> Manifest:
         )
     try:
         return Manifest(
-            source=str(document["source"]["file"]),
-            source_sha256=str(document["source"]["sha256"]),
-            rate=Fraction(*document["rate"]),
+            source=_text(document["source"]["file"]),
+            source_sha256=_text(document["source"]["sha256"]),
+            rate=_rate(*document["rate"]),
             options=dict(document["options"]),
             entries=tuple(_entry(row) for row in document["shots"]),
         )
@@ -163,24 +166,44 @@ _MEND = "; move it away and run `palette4d analyze` again, which keeps the sidec
 def _entry(row: dict[str, Any]) -> Entry:
     place = None
     if edit := row.get("edit"):
-        place = Place(str(edit["track"]), str(edit["record"]), tuple(map(int, edit["path"])))
-    first, last = map(int, row["asked"])
-    used_first, used_last = map(int, row["used"])
-    frames, step = row.get("frames"), int(row["step"])
+        path = tuple(map(_whole, edit["path"]))
+        place = Place(_text(edit["track"]), _text(edit["record"]), path)
+    first, last = map(_whole, row["asked"])
+    used_first, used_last = map(_whole, row["used"])
+    frames, step = row.get("frames"), _whole(row["step"])
     if row["status"] not in (DONE, FAILED, TO_DO) or (row["status"] == DONE) != bool(frames):
         raise ValueError(f"status {row['status']!r}")
     if step < 1:
         raise ValueError(f"step {step}")
-    name = str(row["name"])
+    name = _text(row["name"])
     if row["sidecar"] != f"{name}.p4d.json" or not _NAME.fullmatch(name):
         raise ValueError(f"sidecar {row['sidecar']!r} of the shot {name!r}")
-    shot = Shot(name, str(row["clip"]), first, last, (used_first, used_last), step, place)
+    shot = Shot(name, _text(row["clip"]), first, last, (used_first, used_last), step, place)
     return Entry(
         shot=shot,
         status=row["status"],
-        frames=(int(frames[0]), int(frames[1])) if frames else None,
-        error=str(row.get("error", "")),
+        frames=(_whole(frames[0]), _whole(frames[1])) if frames else None,
+        error=_text(row.get("error", "")),
     )
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise TypeError(f"{value!r:.40} instead of a text")
+    return value
+
+
+def _whole(value: Any) -> int:
+    if type(value) is not int or abs(value) > LARGEST_NUMBER:
+        raise TypeError(f"{value!r:.40} instead of a whole number up to {LARGEST_NUMBER}")
+    return value
+
+
+def _rate(numerator: Any, denominator: Any) -> Fraction:
+    rate = Fraction(_whole(numerator), _whole(denominator))
+    if rate <= 0:
+        raise ValueError(f"the rate {rate}")
+    return rate
 
 
 def sidecars(path: Path) -> tuple[list[Path], list[str]]:

@@ -21,9 +21,9 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from palette4d.colour.oklch import Lch
 from palette4d.plotting import style
 from palette4d.studio import paint, theme
-from palette4d.studio.lch import Lch
 
 F64 = NDArray[np.float64]
 U8 = NDArray[np.uint8]

@@ -30,8 +30,8 @@ from palette4d.grade.document import Document
 F32 = NDArray[np.float32]
 U8 = NDArray[np.uint8]
 
-#: A view that takes longer for a pixel than this (seconds) gets a LUT.
-SLOW = 2e-8
+#: A view that takes longer for a pixel than this (seconds) gets a LUT, which takes half as long.
+SLOW = 4e-8
 #: Grid points of the 3D LUT along each axis.
 GRID = 49
 #: Code values that the LUT covers, for encodings that are not scene-linear.
@@ -75,9 +75,9 @@ class Painter:
         rng = np.random.default_rng(5)
         sample = rng.random((64, 256, 3), np.float32)
         self._run(self._exact, sample)
-        start = time.perf_counter()
+        start = time.thread_time()  # others who use the machine make no view slow
         self._run(self._exact, sample)
-        if (time.perf_counter() - start) / (sample.size / 3) > SLOW:
+        if (time.thread_time() - start) / (sample.size / 3) > SLOW:
             floats = exact.getDefaultCPUProcessor()
             shaper, undo = _shaper(scene_linear)
             axis = np.linspace(0, 1, GRID, dtype=np.float32)

@@ -4,10 +4,8 @@ Its wheel, bars and numbers all choose a colour; what that changes is the scope:
 handles, their tracks, or the whole palette.
 """
 
-import contextlib
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,19 +27,20 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from palette4d.colour.oklch import Adjustment
+from palette4d.colour.oklch import Adjustment, Lch
 from palette4d.common.errors import Palette4dError
 from palette4d.grade.document import Document
 from palette4d.grade.edits import RAMPS, as_colour
 from palette4d.grade.follow import Progress
 from palette4d.plotting import style
-from palette4d.studio import texts, theme
+from palette4d.studio import gestures, texts, theme
+from palette4d.studio.choice import Choice
 from palette4d.studio.colour_widgets import Bar, Swatch, Wheel
-from palette4d.studio.lch import Lch
 from palette4d.studio.pick_list import PickList, Versions
 from palette4d.studio.screen_colours import on_screen
 from palette4d.studio.session import Session
-from palette4d.studio.viewer import Place
+from palette4d.studio.states import Place
+from palette4d.studio.targets import PickTo, Recolour, RecolourMany, Target, hex_of, target_of
 
 F64 = NDArray[np.float64]
 U8 = NDArray[np.uint8]
@@ -53,77 +52,6 @@ SCROLL_BAR = 10
 SAMPLES = 24
 
 
-@dataclass(frozen=True)
-class Target:
-    """What is inspected.
-
-    Attributes
-    ----------
-    id : str
-        A vertex, a stop, or an edge at the playhead.
-    kind : str
-        "vertex", "stop" or "edge"; "pick" or "hold"; "place" is a pixel that is not picked yet.
-    frame : float
-        Where the colour is.
-    before, after : (3,) float64
-        The colour as analysed or in the clip, and as edited, in the palette's code values.
-    place : Place or None
-        The pixel.
-    """
-
-    id: str
-    kind: Literal["vertex", "stop", "edge", "pick", "hold", "place"]
-    frame: float
-    before: F64
-    after: F64
-    place: Place | None = None
-
-    @property
-    def picked(self) -> bool:
-        """Whether it is a colour of the clip, not of the palette."""
-        return self.kind in ("pick", "hold", "place")
-
-
-def target_of(document: Document, id_: str, frame: float) -> Target | None:
-    """Return a selected handle or palette colour; None if it is not there at the playhead."""
-    polytope = document.core.polytope
-    if id_ in polytope.vertex_ids:
-        at = float(np.asarray(polytope.vertices)[polytope.vertex_ids.index(id_), 3])
-        return _in_palette(document, id_, "vertex", id_, at)
-    for pick in document.picks:
-        if pick.id == id_:
-            before = np.asarray(pick.rgb)
-            after = before if pick.to is None else np.asarray(pick.to)
-            return Target(id_, pick.kind, pick.frame, before, after)
-    setting = document.settings.get(id_)
-    if setting is not None and setting.edge is not None and setting.frame is not None:
-        return _in_palette(document, id_, "stop", setting.edge, setting.frame)
-    if id_ in polytope.edge_ids:
-        found = _in_palette(document, id_, "edge", id_, frame)
-        if found is not None:
-            return found
-        # At its ends an edge is its vertex.
-        start, end = np.asarray(polytope.edges)[polytope.edge_ids.index(id_)]
-        for vertex in (start, end):
-            if float(np.asarray(polytope.vertices)[vertex, 3]) == frame:
-                return target_of(document, polytope.vertex_ids[vertex], frame)
-    return None
-
-
-def _in_palette(
-    document: Document,
-    id_: str,
-    kind: Literal["vertex", "stop", "edge"],
-    place: str,
-    frame: float,
-) -> Target | None:
-    palette = document.palette(frame)
-    if place not in palette.ids:
-        return None
-    index = palette.ids.index(place)
-    return Target(id_, kind, frame, palette.rgb[index], palette.edited[index])
-
-
 class Inspector(QWidget):
     """The inspector of a session."""
 
@@ -133,14 +61,13 @@ class Inspector(QWidget):
         self.session = session
         self.scope: Scope = "handle"
         self.target: Target | None = None
-        self._place: Place | None = None  # a pixel that is to be picked
         self._tried: tuple[float, ...] = ()  # the colour that a drag shows
         self._settled: Target | None = None  # the target without the edit of a drag
         self._lch: tuple[str, Lch] | None = None
         self._silent = False
         self._make()
         for event in ("document", "selection", "frame", "view", "clip"):
-            session.on(event, self.refresh)
+            session.on(event, self.refresh, panel=True)
         self.refresh()
 
     # ------------------------------------------------------------------------------------- layout
@@ -157,7 +84,7 @@ class Inspector(QWidget):
         column.addLayout(self._make_buttons())
         self.picks = PickList(self.session)
         column.addWidget(self.picks, 1)
-        self.versions = Versions(self.session, self.keep_version)
+        self.versions = Versions(self.session)
         column.addWidget(self.versions)
         column.addStretch(0)
         area = QScrollArea()
@@ -208,7 +135,7 @@ class Inspector(QWidget):
         label.setStyleSheet(f"color: {theme.FAINT}")
         row.addWidget(label)
         row.addSpacing(4)
-        self.ramp = QComboBox()
+        self.ramp = Choice()
         label.setBuddy(self.ramp)
         self.ramp.setSizeAdjustPolicy(
             QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
@@ -294,7 +221,7 @@ class Inspector(QWidget):
         self.dropper.setToolTip(texts.EYEDROPPER_TIP)
         self.reset = QPushButton(texts.RESET_SHORT)
         self.reset.setToolTip(texts.RESET)
-        self.reset.clicked.connect(self.reset_target)
+        self.reset.clicked.connect(lambda: gestures.reset(self.session))
         row.addWidget(self.dropper)
         row.addWidget(self.reset)
         row.addStretch(1)
@@ -318,10 +245,8 @@ class Inspector(QWidget):
         if document is not None:
             found = (target_of(document, id_, session.frame) for id_ in session.selection)
             targets = [target for target in found if target is not None]
-            if session.selection or self._place is None or self._place.frame != session.frame:
-                self._place = None
-            else:
-                targets = [self._target_at(document, self._place)]
+            if session.place is not None and session.place.frame == session.frame:
+                targets = [self._target_at(document, session.place)]
         self.target = targets[0] if targets else None
         if not session.dragging:
             self._settled = self.target
@@ -398,21 +323,25 @@ class Inspector(QWidget):
             "C": (0.0, max(0.33, float(now[1]) * 1.1)),
             "h": (0.0, 360.0),
         }
+        ranges = []
         for k, name in enumerate("LCh"):
-            low, high = limits[name]
             range_ = np.repeat(now[None], SAMPLES, axis=0)
-            range_[:, k] = np.linspace(low, high, SAMPLES)
-            colours = self.shown(lch.fitted(range_))
-            self.bars[name].show_value(float(now[k]), float(origin[k]), low, high, colours)
-            self._set_box(name, float(now[k]))
+            range_[:, k] = np.linspace(*limits[name], SAMPLES)
+            ranges.append(lch.fitted(range_))
         both = np.concatenate([target.before, target.after])
-        low, high = min(0.0, float(both.min())), max(1.0, float(both.max()))
         for k, name in enumerate("RGB"):
+            limits[name] = min(0.0, float(both.min())), max(1.0, float(both.max()))
             range_ = np.repeat(target.after[None], SAMPLES, axis=0)
-            range_[:, k] = np.linspace(low, high, SAMPLES)
-            value, origin_value = float(target.after[k]), float(target.before[k])
-            self.bars[name].show_value(value, origin_value, low, high, self.shown(range_))
-            self._set_box(name, value)
+            range_[:, k] = np.linspace(*limits[name], SAMPLES)
+            ranges.append(range_)
+        colours = self.shown(np.stack(ranges))
+        values = [
+            *zip("LCh", now, origin, strict=True),
+            *zip("RGB", target.after, target.before, strict=True),
+        ]
+        for (name, value, was), own in zip(values, colours, strict=True):
+            self.bars[name].show_value(float(value), float(was), *limits[name], own)
+            self._set_box(name, float(value))
 
     def _set_box(self, name: str, value: float) -> None:
         box = self.boxes[name]
@@ -522,9 +451,7 @@ class Inspector(QWidget):
             self.dropper.setChecked(False)
             self.set_colour(np.asarray(place.colour))
             return
-        self.session.select()
-        self._place = place
-        self.refresh()
+        self.session.begin_pick(place)
 
     def hold(self, place: Place) -> None:
         """Hold the colour of a pixel."""
@@ -611,47 +538,9 @@ class Inspector(QWidget):
         self.set_colour(self.in_palette(np.asarray(rgb)))
 
     def _ramp_chosen(self, index: int) -> None:
-        ramp, target = self.ramp.itemData(index), self.target
-        document = self.session.document
-        if document is None:
-            return
-        if ramp is None:
-            ramp = document.ramp
-        ids: tuple[str | None, ...] = (None,)
-        if target is not None:
-            ids = tuple(id_ for id_ in self.session.selection if id_ in document.settings)
-
-        def change(document: Document) -> None:
-            with document.one_step(texts.RAMP_STEP.format(ramp=ramp)):
-                for id_ in ids:
-                    document.set_ramp(ramp, id_)
-
-        self.session.edit(change, texts.RAMP_SET.format(ramp=texts.RAMPS[ramp]))
-
-    def reset_target(self) -> None:
-        """Reset the selected vertices, and remove the selected stops."""
-        document = self.session.document
-        ids = (
-            []
-            if document is None
-            else [i for i in self.session.selection if i in document.settings]
-        )
-
-        def reset(document: Document) -> None:
-            with document.one_step(texts.WAS_RESET.format(ids=", ".join(ids))):
-                for id_ in ids:
-                    document.reset(id_)
-
-        if ids:
-            self.session.edit(reset, texts.WAS_RESET.format(ids=", ".join(ids)))
-
-    def keep_version(self) -> None:
-        """Keep the edits as the next version: A, B, C…"""
         document = self.session.document
         if document is not None:
-            name = next(c for c in map(chr, range(65, 91)) if c not in document.versions)
-            text = texts.KEPT_VERSION.format(name=name)
-            self.session.edit(lambda document: document.save_version(name), text)
+            gestures.set_ramp(self.session, self.ramp.itemData(index) or document.ramp)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Escape takes a drag back."""
@@ -659,124 +548,3 @@ class Inspector(QWidget):
             self.session.cancel()
             return
         super().keyPressEvent(event)
-
-
-@dataclass(frozen=True)
-class Recolour:
-    """The edit that gives a colour to a handle, and the same offset to others, as one step.
-
-    Attributes
-    ----------
-    target : Target
-        The inspected colour, before the edit.
-    ids : tuple of str
-        All selected handles.
-    playhead : float
-        The time at which selected edges move.
-    rgb : tuple of float
-        The new colour.
-    """
-
-    target: Target
-    ids: tuple[str, ...]
-    playhead: float
-    rgb: tuple[float, ...]
-
-    def __call__(self, document: Document) -> None:
-        """Do it."""
-        first = target_of(document, self.target.id, self.target.frame)
-        if first is None:
-            return
-        by = np.asarray(self.rgb) - first.after
-        many: contextlib.AbstractContextManager[None] = contextlib.nullcontext()
-        if len(self.ids) > 1:
-            many = document.one_step(texts.SET_BY_SCOPE["handle"].format(id=", ".join(self.ids)))
-        with many:
-            for id_ in self.ids or (self.target.id,):
-                target = target_of(document, id_, self.playhead)
-                if target is None:
-                    continue
-                new = self.rgb if id_ == self.target.id else (target.after + by).tolist()
-                if target.kind == "edge":
-                    old = target.after.tolist()
-                    document.set_near(old, frame=target.frame, rgb=new, anyway=True, any_value=True)
-                else:
-                    document.set(target.id, rgb=new, any_value=True)
-
-
-@dataclass(frozen=True)
-class PickTo:
-    """The edit that gives a colour of the clip a new colour, while it is dragged.
-
-    Attributes
-    ----------
-    target : Target
-        A pick, or a pixel.
-    rgb : tuple of float
-        Its new colour.
-    """
-
-    target: Target
-    rgb: tuple[float, ...]
-
-    def __call__(self, document: Document) -> None:
-        """Do it; a new pick is not followed yet."""
-        target = self.target
-        if target.kind == "pick":
-            document.change_pick(target.id, to=self.rgb, any_value=True)
-        elif target.kind == "place":
-            rgb, colour = self.rgb, target.before.tolist()
-            document.pick(target.frame, colour=colour, to=rgb, follow=False, any_value=True)
-
-
-@dataclass(frozen=True)
-class RecolourMany:
-    """The edit of a whole track, or of the whole palette (`edit track`, `edit palette`).
-
-    Attributes
-    ----------
-    target : Target
-        The inspected colour, before the edit.
-    track : bool
-        Its track; else the palette.
-    rgb : tuple of float
-        Its new colour.
-    change : Adjustment or None
-        The change of hue, chroma and lightness; None: by as much as the inspected colour.
-    """
-
-    target: Target
-    track: bool
-    rgb: tuple[float, ...]
-    change: Adjustment | None
-
-    def __call__(self, document: Document) -> None:
-        """Do it."""
-        target = self.target
-        id_ = target.id if self.track else None
-        frame = target.frame if self.track and target.kind == "edge" else None
-        if self.change is None:
-            by = (np.asarray(self.rgb) - target.after).tolist()
-            if any(by):
-                document.adjust(id_, track=self.track, frame=frame, by=by)
-        elif self.change != Adjustment():
-            change = self.change
-            document.adjust(
-                id_,
-                track=self.track,
-                frame=frame,
-                hue=change.hue,
-                chroma=change.chroma,
-                lightness=change.lightness,
-            )
-
-
-def hex_of(rgb: Any) -> str:
-    """Return #rrggbb of code values 0..1; a note where they are outside of it.
-
-    >>> hex_of([1.0, 0.0, 0.2])
-    '#ff0033'
-    """
-    values = np.asarray(rgb, dtype=np.float64)
-    inside = np.rint(np.clip(values, 0, 1) * 255).astype(int).tolist()
-    return "#" + bytes(inside).hex()

@@ -18,6 +18,9 @@ from collections.abc import Callable, Sequence
 #: tqdm's bars: "colour_statistics:  40%|████      | 20/50 [00:01<00:02]".
 _BAR = re.compile(r"^(?P<what>[^%|\r\n]*?):?\s+(?P<percent>\d+)%\|")
 
+#: A bar whose end is not known yet: "render: 0frame [00:00, ?frame/s]".
+_OPEN_BAR = re.compile(r"\[\d+:\d\d[<,]")
+
 #: Rows and columns of the terminal that a child sees.
 TERMINAL = (24, 120)
 
@@ -120,7 +123,7 @@ class Job:
         bar = _BAR.match(line)
         if bar is not None:
             self.what, self.fraction = bar["what"].strip(), int(bar["percent"]) / 100
-        elif line.strip():
+        elif line.strip() and not _OPEN_BAR.search(line):
             self.messages += line + "\n"
         self._changed(self)
 

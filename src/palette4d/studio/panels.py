@@ -40,7 +40,7 @@ class History(QWidget):
         column.addWidget(self.list)
         self.list.itemClicked.connect(lambda item: self.go_to(self.list.row(item)))
         self.list.itemActivated.connect(lambda item: self.go_to(self.list.row(item)))
-        session.on("document", self._show)
+        session.on("document", self._show, panel=True)
         self._show()
 
     def _show(self) -> None:
@@ -82,6 +82,7 @@ class Shots(QWidget):
         """Begin empty."""
         super().__init__()
         self.session, self._open = session, open_shot
+        self.path: Path | None = None  #: the manifest
         self.folder = Path()
         self.entries: list[manifest.Entry] = []
         self._generation = 0
@@ -109,7 +110,7 @@ class Shots(QWidget):
             The manifest is unusable.
         """
         show = manifest.read(path)
-        self.folder, self.entries = path.absolute().parent, list(show.entries)
+        self.path, self.folder, self.entries = path, path.absolute().parent, list(show.entries)
         self._generation += 1
         self.list.clear()
         for entry in self.entries:

@@ -1,7 +1,5 @@
 """Lists below the inspected colour: picks, holds and locks with what they reach, and versions."""
 
-from collections.abc import Callable
-
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QIcon, QKeyEvent, QPainter, QPixmap
@@ -18,10 +16,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from palette4d.grade.document import Document
-from palette4d.grade.picks import MET, Pick
+from palette4d.grade.picks import Pick
 from palette4d.plotting import style
-from palette4d.studio import paint, texts, theme
+from palette4d.studio import gestures, paint, texts, theme
 from palette4d.studio.screen_colours import on_screen
 from palette4d.studio.session import Session
 
@@ -67,7 +64,7 @@ class PickList(QWidget):
         self.list.itemSelectionChanged.connect(self._selected)
         self.list.itemChanged.connect(self._toggled)
         for event in ("document", "selection", "view"):
-            session.on(event, self.refresh)
+            session.on(event, self.refresh, panel=True)
         self.refresh()
 
     def refresh(self) -> None:
@@ -102,7 +99,7 @@ class PickList(QWidget):
         name = f"{pick.id} {kind} · {style.number(pick.frame)}"
         if not pick.enabled or pick.residual is None:
             return [name, "–", "–"]
-        met = texts.MET if pick.residual <= MET else texts.NOT_MET
+        met = texts.MET if pick.residual <= pick.tolerance else texts.NOT_MET
         share = "–" if pick.share is None else f"{pick.share:.0%}"
         return [name, f"{met} {pick.residual:.3f}", share]
 
@@ -143,22 +140,11 @@ class PickList(QWidget):
         if self._silent:
             return
         id_, on = item.data(0, ID), item.checkState(0) == Qt.CheckState.Checked
-        text = (texts.ENABLED if on else texts.DISABLED).format(id=id_)
-        self.session.edit(lambda document: document.change_pick(id_, enabled=on), text)
+        gestures.enable(self.session, id_, on)
 
     def remove_selected(self) -> None:
         """Remove the selected picks and holds, and unlock the selected handles."""
-        ids = [item.data(0, ID) for item in self.list.selectedItems()]
-
-        def remove(document: Document) -> None:
-            with document.one_step(texts.REMOVED.format(ids=", ".join(ids))):
-                if locks := [id_ for id_ in ids if id_ in document.locks]:
-                    document.unlock(*locks)
-                if picks := [pick.id for pick in document.picks if pick.id in ids]:
-                    document.unpick(*picks)
-
-        if ids:
-            self.session.edit(remove, texts.REMOVED.format(ids=", ".join(ids)))
+        gestures.remove(self.session, [item.data(0, ID) for item in self.list.selectedItems()])
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Delete removes."""
@@ -171,8 +157,8 @@ class PickList(QWidget):
 class Versions(QWidget):
     """The versions of the grade: a button uses one."""
 
-    def __init__(self, session: Session, keep: Callable[[], object]) -> None:
-        """Listen to the session; `keep` keeps the edits as the next version."""
+    def __init__(self, session: Session) -> None:
+        """Listen to the session."""
         super().__init__()
         self.session = session
         self._shown: tuple[object, ...] = ()
@@ -187,9 +173,9 @@ class Versions(QWidget):
         self.row.addStretch(1)
         self.keep = QPushButton(texts.KEEP)
         self.keep.setToolTip(texts.KEEP_TIP)
-        self.keep.clicked.connect(keep)
+        self.keep.clicked.connect(lambda: gestures.keep_version(session))
         self.row.addWidget(self.keep)
-        session.on("document", self.refresh)
+        session.on("document", self.refresh, panel=True)
         self.refresh()
 
     def refresh(self) -> None:
@@ -199,7 +185,7 @@ class Versions(QWidget):
         if self.session.dragging:
             return
         names = () if document is None else document.versions
-        used = tuple(n for n in names if document is not None and document.same_edits(n))
+        used = () if document is None else document.same_edits()
         if (names, used) == self._shown:
             return
         self._shown = (names, used)
@@ -220,8 +206,6 @@ class Versions(QWidget):
 
     def use(self, name: str) -> None:
         """Use a version."""
-        self.session.edit(
-            lambda document: document.use_version(name), texts.USES_VERSION.format(name=name)
-        )
+        gestures.use_version(self.session, name)
         self._shown = ()
         self.refresh()

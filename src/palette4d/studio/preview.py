@@ -7,6 +7,7 @@ Of waiting requests only the newest is kept, and exact work stops for a new requ
 """
 
 import contextlib
+import dataclasses
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable
@@ -52,6 +53,19 @@ class Grade:
         steps = None if own is None else own.steps
         bumps = core.bumps_at(frame)
         return cls(document.palette(frame), steps, bumps if len(bumps) else None)
+
+    @classmethod
+    def of_version(cls, document: Document, name: str, frame: float) -> "Grade | None":
+        """Return the grade of a version at a time; None if there is no such version."""
+        core = document.core
+        edits = dict(core.versions).get(name)
+        if edits is None:
+            return None
+        edited = _core.edited_colours(core.polytope, edits, _core.slice_at(core.polytope, frame))
+        bumps = edits.bumps_at(frame)
+        own = core.conversion
+        palette = dataclasses.replace(document.palette(frame), edited=edited)
+        return cls(palette, None if own is None else own.steps, bumps if len(bumps) else None)
 
     def recolourer(self) -> _core.Recolourer:
         """Return the exact recolouring."""

@@ -12,7 +12,6 @@ import os
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -24,10 +23,10 @@ from palette4d.media.source_clip import find_clip
 from palette4d.studio import texts
 from palette4d.studio.display import Display, Look
 from palette4d.studio.player import Player
+from palette4d.studio.states import Place, Probe, Status, View
 
 Event = Literal[
-    "document",  # the palette or its edits; while something is dragged, now and then
-    "trial",  # every step of a drag, for the picture alone
+    "document",  # the palette or its edits, also of every step of a drag
     "clip",  # another clip, or none
     "frame",
     "pixels",  # the frame's pixels have arrived, or the reason why they cannot
@@ -35,6 +34,7 @@ Event = Literal[
     "hover",
     "probe",
     "view",
+    "wipe",  # the wipe alone has moved
     "playing",
     "range",
     "status",
@@ -44,70 +44,8 @@ T = TypeVar("T")
 
 #: Seconds between the last edit and its save, and the most while edits go on.
 SAVE_AFTER, SAVE_AT_MOST = 0.4, 1.5
-#: Seconds between two events "document" while something is dragged: the least, or twice what the
-#: panels take to paint; and the most.
-PANELS_EVERY, PANELS_AT_LEAST = 0.04, 0.3
 #: Seconds until a save that failed is tried again.
 TRY_AGAIN = 5.0
-
-
-@dataclass(frozen=True)
-class Status:
-    """What the last action did, or what is wrong."""
-
-    text: str = ""
-    level: Literal["info", "warning", "error"] = "info"
-
-
-@dataclass(frozen=True)
-class View:
-    """How the picture is shown; nothing of it changes the grade.
-
-    Attributes
-    ----------
-    compare : str
-        "after", "before", "wipe" or "side".
-    wipe : float
-        Where the wipe stands, 0..1 of the picture's width.
-    display, view : str
-        The OpenColorIO display and view; "" is the config's default.
-    exposure, gamma : float
-        Stops, and the power of the display, for looking only.
-    outside : bool
-        Mark the pixels outside of the palette.
-    version : str
-        The version that "before" shows instead of the source; "" is the source.
-    """
-
-    compare: Literal["after", "before", "wipe", "side"] = "after"
-    wipe: float = 0.5
-    display: str = ""
-    view: str = ""
-    exposure: float = 0.0
-    gamma: float = 1.0
-    outside: bool = False
-    version: str = ""
-
-
-@dataclass(frozen=True)
-class Probe:
-    """A pixel under the pointer.
-
-    Attributes
-    ----------
-    x, y : int
-        Its place in the clip's frame.
-    source, result : tuple of float
-        Its code values before and after the edits; three or four.
-    weights : dict of str to float
-        Its weight on each palette colour of the frame, by id.
-    """
-
-    x: int
-    y: int
-    source: tuple[float, ...]
-    result: tuple[float, ...]
-    weights: dict[str, float] = field(default_factory=dict)
 
 
 class Session:
@@ -131,6 +69,8 @@ class Session:
         The handle or palette colour under the pointer.
     probe : Probe or None
         The pixel under the pointer.
+    place : Place or None
+        The pixel or box that was clicked, and is not picked yet.
     view : View
         How the picture is shown.
     playing : int
@@ -143,6 +83,8 @@ class Session:
         What the last action did.
     post : callable
         Runs a function on the views' thread; the window sets it.
+    later : callable
+        Runs a panel's function soon, when the picture is shown; the window sets it.
     """
 
     def __init__(self) -> None:
@@ -150,12 +92,10 @@ class Session:
         self._document: Document | None = None
         self._trial: Document | None = None
         self._dragged: tuple[Edit, str] | None = None
-        self._callbacks: dict[str, list[Callable[[], object]]] = {}
+        self._callbacks: dict[str, list[tuple[Callable[[], object], bool]]] = {}
         self._stamp: tuple[int, int, int] | None = None
         self._edited_at: float | None = None  # the first edit that is not on disk
         self._last_edit = self._next_try = 0.0
-        self._untold, self._told = False, 0.0  # of a drag, by `tell`
-        self._painting, self._gap = False, PANELS_EVERY
         self.clip: Clip | None = None
         self.player: Player | None = None
         self.display: Display | None = None
@@ -163,6 +103,7 @@ class Session:
         self.selection: tuple[str, ...] = ()
         self.hover: str | None = None
         self.probe: Probe | None = None
+        self.place: Place | None = None
         self.view = View()
         self.playing = 0
         self.marks: tuple[int, int] | None = None
@@ -170,17 +111,25 @@ class Session:
         self.status = Status()
         self.revision = 0  #: rises with every change of what `document` shows
         self.post: Callable[[Callable[[], object]], object] = lambda call: call()
+        self.later: Callable[[Callable[[], object]], object] = lambda call: call()
 
     # ------------------------------------------------------------------------------------- events
 
-    def on(self, event: Event, callback: Callable[[], object]) -> None:
-        """Call a function after every event of this kind."""
-        self._callbacks.setdefault(event, []).append(callback)
+    def on(self, event: Event, callback: Callable[[], object], *, panel: bool = False) -> None:
+        """Call a function after every event of this kind.
+
+        A panel is told later while something is dragged or frames go by: the picture comes first.
+        """
+        self._callbacks.setdefault(event, []).append((callback, panel))
 
     def emit(self, event: Event) -> None:
         """Tell the views."""
-        for callback in tuple(self._callbacks.get(event, ())):
-            callback()
+        moving = event == "frame" or (event == "document" and self.dragging)
+        for callback, panel in tuple(self._callbacks.get(event, ())):
+            if panel and moving:
+                self.later(callback)
+            else:
+                callback()
 
     def say(self, text: str, level: Literal["info", "warning", "error"] = "info") -> None:
         """Set the status."""
@@ -197,6 +146,11 @@ class Session:
     def document(self) -> Document | None:
         """The document as the views show it."""
         return self._trial or self._document
+
+    @property
+    def versions(self) -> tuple[str, ...]:
+        """The names of the document's versions."""
+        return () if self._document is None else self._document.versions
 
     @property
     def path(self) -> Path | None:
@@ -289,7 +243,7 @@ class Session:
         if self.player is not None:
             self.player.close()
         self._document = self._trial = self._dragged = None
-        self.clip = self.player = self._stamp = self.probe = self.hover = None
+        self.clip = self.player = self._stamp = self.probe = self.hover = self.place = None
         self.selection, self.playing, self.marks = (), 0, None
         self._edited_at, self.view = None, dataclasses.replace(self.view, version="")
 
@@ -315,7 +269,7 @@ class Session:
         self,
         operation: Callable[[Document, Progress], T],
         text: str,
-        then: Callable[[T], object],
+        then: Callable[[T], object] = lambda _: None,
     ) -> None:
         """Do an edit that reads the clip: in a thread on a copy, and then here.
 
@@ -341,6 +295,7 @@ class Session:
 
         def fail(error: Exception) -> None:
             self.cancel()
+            self._changed()  # a view may show what was wanted
             self.report(error)
 
         def work() -> None:
@@ -358,10 +313,6 @@ class Session:
         """Show an edit without doing it; each call replaces the last."""
         if self._document is None:
             return
-        if self._painting:  # what the panels took since they were told, at most
-            took = time.monotonic() - self._told
-            self._gap = min(max(PANELS_EVERY, 2 * took), PANELS_AT_LEAST)
-            self._painting = False
         trial = self._document.trial()
         try:
             operation(trial)
@@ -369,19 +320,7 @@ class Session:
             self.report(error)
             return
         self._trial, self._dragged = trial, (operation, text)
-        self.revision += 1
-        self.emit("trial")
-        self._untold = True
-        if not self._callbacks.get("trial"):  # no picture whose painting goes first
-            self.tell()
-
-    def tell(self) -> None:
-        """Tell the panels of a drag; the viewer calls it when it has painted the picture."""
-        now = time.monotonic()
-        late = now - self._told >= self._gap or not self._callbacks.get("trial")
-        if self._untold and late:
-            self._told, self._untold, self._painting = now, False, True
-            self.emit("document")
+        self._changed()
 
     def drop(self) -> None:
         """Do the edit that was dragged last."""
@@ -411,7 +350,6 @@ class Session:
 
     def _changed(self) -> None:
         self.revision += 1
-        self._untold = False
         self.emit("document")
 
     # --------------------------------------------------------------------------------- where he is
@@ -456,10 +394,15 @@ class Session:
         self.emit("range")
 
     def select(self, *ids: str) -> None:
-        """Select handles or palette colours."""
-        if ids != self.selection:
-            self.selection = ids
+        """Select handles or palette colours; a pixel that was clicked is forgotten."""
+        if ids != self.selection or self.place is not None:
+            self.selection, self.place = ids, None
             self.emit("selection")
+
+    def begin_pick(self, place: Place) -> None:
+        """Inspect a pixel that was clicked; nothing else is selected."""
+        self.selection, self.place = (), place
+        self.emit("selection")
 
     def hover_over(self, id: str | None) -> None:
         """Tell which handle or palette colour is under the pointer."""
@@ -475,10 +418,11 @@ class Session:
 
     def look(self, **changes: Any) -> None:
         """Change how the picture is shown: the attributes of `View`."""
-        after = dataclasses.replace(self.view, **changes)
-        if after != self.view:
-            self.view = after
-            self.emit("view")
+        before, self.view = self.view, dataclasses.replace(self.view, **changes)
+        if before != self.view:
+            self.emit(
+                "wipe" if before == dataclasses.replace(self.view, wipe=before.wipe) else "view"
+            )
 
     # ------------------------------------------------------------------------------------- saving
 
@@ -496,8 +440,6 @@ class Session:
     def tick(self, now: float | None = None) -> None:
         """Save what is due, and take over what another program wrote; call it often."""
         document = self._document
-        if self._untold:
-            self.tell()
         if document is None or document.path is None or self._dragged is not None:
             return
         now = time.monotonic() if now is None else now

@@ -1,4 +1,9 @@
-"""All texts of the window, in one place for translation."""
+"""All texts of the window, in one place for translation.
+
+A translation replaces the values here, and nothing else; names in braces stay, such as {frame}.
+Two kinds of text are not here: messages of the command line, which the status line shows too, and
+labels of the history, which are part of the sidecar.
+"""
 
 from typing import Literal
 
@@ -33,6 +38,8 @@ NO_CLIP = "The clip was not found. File > Find the clip… shows the picture."
 READING = "reading…"
 BEFORE = "before"
 AFTER = "after"
+NEW_PICK = "choose its new colour"
+MATTE, MATTE_ENDS = "weight of {id}", ("0 %", "100 %")
 PROBE_IN = "in"
 PROBE_OUT = "out"
 NO_COLOUR = "there is no colour: the pixels are transparent or not finite"
@@ -74,6 +81,139 @@ RECOVERY = "edits that could not be saved are in {copy}; File > Open loads them"
 UNEXPECTED = "something went wrong in the program: {error}. Your edits are kept"
 
 # -------------------------------------------------------------------------------------- the menus
+MENUS = {
+    "file": "File",
+    "edit": "Edit",
+    "palette": "Palette",
+    "view": "View",
+    "playback": "Playback",
+    "help": "Help",
+}
+#: The entries of the menus: of the window, and of the views that have the keyboard.
+ACTIONS = {
+    "window": {
+        "open": "Open…",
+        "find_clip": "Find the clip…",
+        "save": "Save",
+        "save_as": "Save as…",
+        "revert": "Load the file again",
+        "analyze": "Analyse…",
+        "analyze_again": "Analyse again, keep edits…",
+        "render": "Render…",
+        "bake": "Bake a LUT…",
+        "export": "Export LUTs over time…",
+        "config": "OpenColorIO config…",
+        "install": "Install the node…",
+        "next_shot": "Next shot",
+        "previous_shot": "Previous shot",
+        "copy_grade": "Copy this grade to a shot…",
+        "quit": "Quit",
+        "undo": "Undo",
+        "redo": "Redo",
+        "cancel": "Cancel, select nothing",
+        "reset_selected": "Reset the selected handles",
+        "reset_all": "Reset everything",
+        "add_stop": "Add a stop at the playhead",
+        "lock": "Lock or unlock the selected",
+        "hold_pixel": "Hold the colour under the pointer",
+        "pick_pixel": "Pick the colour under the pointer",
+        "ramp_linear": "Ramp: linear",
+        "ramp_smooth": "Ramp: smooth",
+        "ramp_hold": "Ramp: hold",
+        "save_version": "Keep as a version",
+        "compare_version": "Compare with a version",
+        "show_after": "After",
+        "show_before": "Before",
+        "show_wipe": "Wipe",
+        "show_side": "Side by side",
+        "compare": "Before, while the key is down",
+        "fit": "Fit",
+        "one_to_one": "1:1",
+        "zoom_in": "Zoom in",
+        "zoom_out": "Zoom out",
+        "outside": "Mark colours outside of the palette",
+        "brighter": "Exposure up",
+        "darker": "Exposure down",
+        "plain_look": "Reset exposure and gamma",
+        "full_screen": "Full screen",
+        "play": "Play or stop",
+        "play_backwards": "Play backwards, faster",
+        "stop": "Stop",
+        "play_forwards": "Play forwards, faster",
+        "next_frame": "Next frame",
+        "previous_frame": "Previous frame",
+        "ten_on": "Ten frames on",
+        "ten_back": "Ten frames back",
+        "next_handle": "Next frame with a handle",
+        "previous_handle": "Previous frame with a handle",
+        "first_frame": "First frame",
+        "last_frame": "Last frame",
+        "mark_in": "In point here",
+        "mark_out": "Out point here",
+        "clear_marks": "Remove in and out point",
+        "loop": "Loop",
+        "first_steps": "First steps",
+        "manual": "Gestures and keys",
+        "about": "About palette4d",
+    },
+    "timeline": {
+        "select_all": "Select all handles",
+        "next_handle": "Next handle",
+        "previous_handle": "Previous handle",
+        "row_above": "Row above",
+        "row_below": "Row below",
+        "stop_earlier": "Move the stop a frame earlier",
+        "stop_later": "Move the stop a frame later",
+        "zoom_in": "Zoom the timeline in",
+        "zoom_out": "Zoom the timeline out",
+        "show_all": "Show all frames",
+    },
+    "solid": {
+        "next_colour": "Next colour of the solid",
+        "reset_view": "Look at the solid from the front",
+    },
+}
+#: What the pointer and held keys do: where, the gesture, and what it does.
+GESTURES = (
+    ("picture", "click", "pick: choose what the colour becomes"),
+    ("picture", "drag", "pick the mean colour of a box"),
+    (
+        "picture",
+        "Alt-click or Ctrl-click",
+        "hold: the colour stays; with a drag, the mean of a box",
+    ),
+    ("picture", "move the pointer", "see the pixel's values, and its weights on the rows"),
+    ("picture", "wheel", "zoom at the pointer"),
+    ("picture", "middle button, Shift-drag", "pan"),
+    ("picture", "drag the wipe's line", "move the wipe"),
+    ("timeline", "click a disc or a row", "select it; Shift or Ctrl adds"),
+    ("timeline", "drag over the ground", "select the discs in the box"),
+    ("timeline", "move over a disc or a row", "see its weight as a matte over the picture"),
+    ("timeline", "double-click a row", "add a stop there"),
+    ("timeline", "double-click a disc", "go to its frame"),
+    ("timeline", "drag a stop", "move it to another frame; with Alt between frames"),
+    ("timeline", "drag an end of a pick's range", "change when the pick acts"),
+    (
+        "timeline",
+        "drag the tip of a fade; Alt- or Ctrl-drag an end",
+        "change how long the fades are",
+    ),
+    ("timeline", "right-click", "the menu of what is there: ramps, locks, fades, …"),
+    ("timeline", "click or drag in the ruler or the strip", "move the playhead"),
+    ("timeline", "wheel over the ruler, Ctrl-wheel", "zoom at the pointer"),
+    ("timeline", "Shift-wheel, middle button", "pan"),
+    ("solid", "drag the ground", "turn the solid"),
+    ("solid", "drag a colour", "move it in the plane of the screen"),
+    ("solid", "X, Y or Z while dragging", "move along red, green or blue alone"),
+    ("solid", "Alt-arrows", "move the selected colour by a hundredth"),
+    ("solid", "arrows, wheel", "turn, zoom"),
+    ("solid", "double-click", "look from the front again"),
+    ("inspector", "drag in the wheel", "hue and chroma; Shift keeps the chroma, Ctrl the hue"),
+    ("inspector", "drag a bar, type a number", "one of L, C, h, R, G, B"),
+    ("inspector", "arrows in the wheel or on a bar", "change it by a step"),
+    ("inspector", "Pipette, then click the picture", "take the colour there"),
+    ("window", "drop a clip, a sidecar or a manifest", "open it"),
+)
 RECENT = "Recent"
 VERSIONS = "Versions"
 NOTHING_YET = "nothing yet"
@@ -85,7 +225,8 @@ SAVE_TITLE = "Save as"
 SIDECAR_FILTER = "Sidecars (*.p4d.json)"
 CLOSE_ANYWAY = "{why}\n\nClose anyway?"
 RESET_ALL = "everything is reset"
-LOCK = "lock"
+WAS_LOCKED, WAS_UNLOCKED = "locked {ids}", "unlocked {ids}"
+SELECT_A_HANDLE = "select a vertex or a stop first"
 POINT_AT = "point at a pixel first"
 KEPT_VERSION = "kept as version {name}"
 USES_VERSION = "version {name}"
@@ -115,6 +256,7 @@ COPY_GRADE = "Copy the grade"
 COPY_TITLE = "Copy this grade to"
 TO_SHOT = "To"
 FROM_SHOT = "From"
+SHOT_NAMES = "Shots with these names"
 ACTION = "Action"
 CLIP = "Clip"
 CLIP_HINT = "shot.####.exr, a folder, an image or a movie"
@@ -135,6 +277,8 @@ SKIP_BAD = "Skip bad frames"
 ALLOW_CUTS = "Allow cuts"
 COMPARE_LABEL = "With the source"
 BITS = "Bits a sample"
+BITS_HINT = "as the clip"
+NO_COMPARE = "no"
 HALF = "Half floats (EXR)"
 FORCE = "Replace existing files"
 GRID = "Grid points"
@@ -151,6 +295,10 @@ FIRST_STEPS_TEXT = (
     "4. W shows before and after. Ctrl+Z undoes. Everything is saved by itself."
 )
 MANUAL = "Gestures and keys"
+MANUAL_COLUMNS = ("where", "do this", "and")
+SEARCH = "Search"
+IN_TIMELINE, IN_SOLID = "(in the timeline)", "(in the solid)"
+USE_A_VERSION = "Use a version"
 ABOUT = "palette4d {version}\nTime-varying palettes for colour grading\n(Du et al., SIGGRAPH 2021)"
 
 # ------------------------------------------------------------------------------------ the timeline
@@ -161,11 +309,12 @@ VERTEX = "vertex"
 STOP = "stop"
 ADD_STOP_AT = "Add a stop at frame {frame}"
 REMOVE_STOP = "Remove the stop"
-LOCK_ENTRY = "Lock or unlock"
-COUNTS = "Counts"
+LOCK, UNLOCK = "Lock", "Unlock"
+ACTS = "Acts"
 PALETTE_ONLY = "By the palette alone, no local remainder"
 SAME_COLOUR = "The same new colour in all frames"
-FADE, FADE_OF = "Fade", "{frames} frames"
+FADE = "Fades, before and after the range"
+FADE_OF, NO_FADE = "{frames} frames", "none"
 PICK_CHANGED = "changed {id}"
 RESET = "Reset the selected handles"
 GO_THERE = "Go to frame {frame}"
@@ -185,7 +334,7 @@ FLIPPED_FACE, FLIPPED_FACES = "face turned inside out", "faces turned inside out
 
 # ----------------------------------------------------------------------------------- the inspector
 NOTHING_SELECTED = "Nothing is selected"
-SELECT_HINT = "Click a disc, a row, or a colour of the solid."
+SELECT_HINT = "Click a colour in the picture, a disc or a row."
 EDGE = "row"
 AND_MORE = " and {count} more"
 SCOPES: dict[Literal["handle", "track", "palette"], str] = {
@@ -202,7 +351,6 @@ RAMP = "Ramp"
 RAMP_TIP = "The way from this handle to the next; without a selection: the clip's"
 RAMP_OF_CLIP = "as the clip"
 RAMPS = {"linear": "linear", "smooth": "smooth", "hold": "hold"}
-RAMP_STEP = "ramp {ramp}"
 RAMP_SET = "ramp: {ramp}"
 WHEEL = "Hue and chroma"
 WHEEL_TIP = "Drag: hue and chroma. Shift keeps the chroma, Ctrl the hue."
@@ -234,7 +382,7 @@ MET, NOT_MET = "✓", "⚠"
 LOCKED = "{id} is locked"
 RANGE_SET = "{id} acts from frame {start} to {until}"
 PICK_TIP = "from frame {} to {}, fades of {} frames; “palette” is its share of the change"
-ENABLED, DISABLED = "{id} counts again", "{id} does not count"
+ENABLED, DISABLED = "{id} acts again", "{id} does not act"
 REMOVE = "Remove"
 REMOVED = "removed {ids}"
 KEEP = "Keep"

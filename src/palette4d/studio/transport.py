@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 from palette4d.studio import texts, theme
+from palette4d.studio.choice import Choice
 from palette4d.studio.preview import Picture, Request
 from palette4d.studio.session import Session
 from palette4d.studio.viewer import Viewer
@@ -217,7 +218,7 @@ class Transport(QWidget):
             self.compare[key] = button
             row.addWidget(button)
         row.addSpacing(6)
-        self.look = QComboBox()
+        self.look = Choice()
         self.look.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.look.setSizeAdjustPolicy(
             QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
@@ -233,7 +234,7 @@ class Transport(QWidget):
         self.exposure = self._number(row, texts.EXPOSURE, -10, 10, 0.25, "exposure", "+0.00")
         self.gamma = self._number(row, texts.GAMMA, 0.2, 5, 0.05, "gamma", "0.00")
         for event in ("clip", "document", "view", "range"):
-            session.on(event, self._show)
+            session.on(event, self._show, panel=True)
         session.on("frame", self._show_frame)
         session.on("playing", self._show_playing)
         self._clock = QTimer(self)

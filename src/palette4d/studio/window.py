@@ -1,10 +1,8 @@
 """The main window: viewer, timeline, solid and inspector of one session, and its menus."""
 
-import contextlib
 import functools
+import time
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any
 
 from PySide6.QtCore import QEvent, QMimeData, QObject, QSettings, Qt, QTimer, QUrl, Signal
 from PySide6.QtGui import (
@@ -20,9 +18,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import (
     QAbstractSpinBox,
-    QApplication,
     QDockWidget,
-    QFileDialog,
     QLabel,
     QLineEdit,
     QMainWindow,
@@ -32,25 +28,26 @@ from PySide6.QtWidgets import (
 )
 
 from palette4d.common.errors import Palette4dError
-from palette4d.media import clip_sequence
-from palette4d.media.clip import ClipError
-from palette4d.media.clip_sequence import ImageSequence
-from palette4d.shows import manifest
 from palette4d.studio import actions, texts, theme
 from palette4d.studio.actions import ACTIONS, Action
+from palette4d.studio.commands import Commands
+from palette4d.studio.files import Files
+from palette4d.studio.help import Help
 from palette4d.studio.inspector import Inspector
 from palette4d.studio.instance import Listener
-from palette4d.studio.jobs import Job
 from palette4d.studio.panels import History, Shots
-from palette4d.studio.session import Session, recovery_file
+from palette4d.studio.session import Session
 from palette4d.studio.solid_view import SolidView
+from palette4d.studio.tasks import Tasks
 from palette4d.studio.timeline_view import TimelineView
 from palette4d.studio.transport import Playback, Transport
 from palette4d.studio.viewer import Viewer
-from palette4d.studio.work import Field, WorkDialog, beside, sequence_of
+from palette4d.studio.work import sequence_of
 
 #: Milliseconds between two looks at the file.
 TICK = 200
+#: Milliseconds that a picture has before panels are told, and the longest between two panels.
+PICTURE_FIRST, LONGEST_REST = 20, 120
 #: Shows the picture before while it is down.
 COMPARE_KEY = Qt.Key.Key_C
 #: Recent files that the menu keeps.
@@ -65,6 +62,46 @@ class _Post(QObject):
     def __init__(self, parent: QObject) -> None:
         super().__init__(parent)
         self.called.connect(lambda call: call(), Qt.ConnectionType.QueuedConnection)
+
+
+class Turns(QObject):
+    """Tells panels what changed, one a turn; between two turns the picture goes first.
+
+    While something is dragged, a panel is told at most the newest state, and panels take at most a
+    third of the time.
+    """
+
+    def __init__(self, parent: QObject) -> None:
+        super().__init__(parent)
+        self._waiting: dict[Callable[[], object], None] = {}
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.timeout.connect(self._next)
+
+    def later(self, call: Callable[[], object]) -> None:
+        """Call a function soon; once, however often it is asked for until then."""
+        self._waiting[call] = None
+        if not self._timer.isActive():
+            self._timer.start(PICTURE_FIRST)
+
+    @property
+    def settled(self) -> bool:
+        """Whether all panels are told."""
+        return not self._waiting
+
+    def _next(self) -> None:
+        call = next(iter(self._waiting), None)
+        if call is None:
+            return
+        del self._waiting[call]
+        start = time.monotonic()
+        call()
+        panel = getattr(call, "__self__", None)
+        if isinstance(panel, QWidget) and not panel.isWindow():  # a window would paint all panels
+            panel.repaint()
+        took = time.monotonic() - start
+        if self._waiting:
+            self._timer.start(round(min(2000 * took, LONGEST_REST)))
 
 
 class FileLabel(QLabel):
@@ -96,6 +133,8 @@ class Window(QMainWindow):
         self.session = session
         self.settings = settings if settings is not None else QSettings("palette4d", "studio")
         session.post = _Post(self).called.emit
+        self.turns = Turns(self)
+        session.later = self.turns.later
         self.setWindowTitle(f"{texts.TITLE}[*]")
         self.setAcceptDrops(True)
         self.setDockNestingEnabled(True)
@@ -107,7 +146,8 @@ class Window(QMainWindow):
         self.inspector = Inspector(session)
         self.viewer.on_pick, self.viewer.on_hold = self.inspector.pick, self.inspector.hold
         self.history = History(session)
-        self.shots = Shots(session, self.open_shot)
+        self.files = Files(self)
+        self.shots = Shots(session, self.files.open_shot)
         middle = QWidget()
         column = QVBoxLayout(middle)
         column.setContentsMargins(0, 0, 0, 0)
@@ -118,6 +158,7 @@ class Window(QMainWindow):
         self._make_docks()
         self._make_fields()
         self._make_status()
+        self.commands, self.tasks, self.help = Commands(self), Tasks(self), Help(self)
         self.actions_by_name: dict[str, QAction] = {}
         self._make_menus()
         for name in ("first_frame", "previous_frame", "play", "next_frame", "last_frame"):
@@ -127,8 +168,7 @@ class Window(QMainWindow):
             keys = action.shortcut().toString(QKeySequence.SequenceFormat.NativeText)
             button.setToolTip(f"{action.text()} ({keys})")
         for event in ("document", "status", "clip", "selection", "view", "playing"):
-            session.on(event, self._show)
-        self._dialogs: list[WorkDialog] = []
+            session.on(event, self._show, panel=True)
         self._listener = Listener(self, self._asked_for)
         session.on("document", lambda: self._listener.listen(session.path))
         self._timer = QTimer(self)
@@ -199,7 +239,7 @@ class Window(QMainWindow):
             [solid, max(200, height - solid)],
             both.Vertical,
         )
-        low = max(height * 3 // 10, min(300, height * 2 // 5))
+        low = max(height * 32 // 100, min(330, height * 2 // 5))
         self.resizeDocks([self.docks["timeline"]], [low], both.Vertical)
 
     def _dock(self, title: str, view: QWidget, area: Qt.DockWidgetArea) -> QDockWidget:
@@ -225,8 +265,7 @@ class Window(QMainWindow):
             label.setStyleSheet(f"color: {theme.FAINT}; padding: 2px 8px")
 
     def _make_menus(self) -> None:
-        titles = dict.fromkeys(action.menu for action in ACTIONS)
-        self.menus = {title: self.menuBar().addMenu(title) for title in titles}
+        self.menus = {menu: self.menuBar().addMenu(title) for menu, title in texts.MENUS.items()}
         group = -1
         last = ""
         compares = QActionGroup(self)
@@ -241,7 +280,7 @@ class Window(QMainWindow):
                 compares.addAction(made)
             if action.name == "open":
                 self.recent = menu.addMenu(texts.RECENT)
-                self.recent.aboutToShow.connect(self._fill_recent)
+                self.recent.aboutToShow.connect(self.files.fill_recent)
         # The views' own keys work while they have the keyboard.
         for panel in (self.timeline, self.solid):
             for title, more in panel.menu_actions.items():
@@ -257,7 +296,7 @@ class Window(QMainWindow):
         for number in range(1, 10):
             shortcut = QAction(self)
             shortcut.setShortcut(QKeySequence(str(number)))
-            shortcut.triggered.connect(functools.partial(self.use_version, number))
+            shortcut.triggered.connect(functools.partial(self.commands.use_version, number))
             self.addAction(shortcut)
 
     def _action(self, action: Action) -> QAction:
@@ -272,10 +311,17 @@ class Window(QMainWindow):
         self.actions_by_name[action.name] = made
         return made
 
+    def action(self, name: str) -> Callable[[], object]:
+        """Return what does an action: a method of its name."""
+        owners: tuple[object, ...] = (self.files, self.commands, self.tasks, self.help)
+        owner = next(each for each in owners if hasattr(each, name))
+        found: Callable[[], object] = getattr(owner, name)
+        return found
+
     def _do(self, name: str, *_: object) -> None:
         """Do an action; whatever goes wrong becomes the status."""
         try:
-            getattr(self, f"do_{name}")()
+            self.action(name)()
         except (Palette4dError, OSError) as error:
             self.session.report(error)
 
@@ -305,7 +351,7 @@ class Window(QMainWindow):
             shown = texts.AS_IS_STATUS
         elif display is not None and self.viewer.picture is not None:
             error = self.viewer.picture.quick_error
-            if error:
+            if error * 255 >= 0.05:  # less is not seen
                 shown = texts.LUT_ERROR.format(error=error * 255)
         if view.outside and self.viewer.picture is not None:
             shown += "  " + texts.OUTSIDE.format(share=self.viewer.picture.share)
@@ -337,104 +383,19 @@ class Window(QMainWindow):
         for action in ("next_shot", "previous_shot"):
             self.actions_by_name[action].setEnabled(many)
 
+    def _fill_versions(self) -> None:
+        self.versions.clear()
+        for number, name in enumerate(self.session.versions, 1):
+            text = f"{name}\t{number}" if number < 10 else name
+            self.versions.addAction(text, functools.partial(self.commands.use_version, number))
+        if self.versions.isEmpty():
+            self.versions.addAction(texts.NO_VERSIONS).setEnabled(False)
+
     # -------------------------------------------------------------------------------------- files
 
     def open_path(self, path: str, clip: str | None = None) -> None:
         """Open a sidecar, a manifest, or a clip; a clip without a palette is offered to analyse."""
-        QApplication.setOverrideCursor(Qt.CursorShape.WaitCursor)
-        try:
-            self._open(path, clip)
-        except (Palette4dError, OSError) as error:
-            self.session.report(error)
-        finally:
-            QApplication.restoreOverrideCursor()
-
-    def _open(self, path: str, clip: str | None) -> None:
-        found = Path(path)
-        if manifest.is_manifest(found):
-            self.shots.load(found)
-            self.docks["shots"].show()
-            if self.shots.count():
-                self.shots.open_first()
-        elif found.name.endswith(".json"):
-            self.session.open_sidecar(found, clip)
-            self._offer_recovery(found)
-        else:
-            beside_it = sidecar_of(path)
-            if beside_it is not None:
-                self.session.open_sidecar(beside_it, path)
-            else:
-                self.session.open_clip(path)
-                self.do_analyze()
-        self.remember(path)
-
-    def _offer_recovery(self, path: Path) -> None:
-        copy = recovery_file(path)
-        if not copy.exists() or copy.stat().st_mtime < path.stat().st_mtime:
-            return
-        self.session.say(texts.RECOVERY.format(copy=copy), "warning")
-
-    def open_shot(self, path: Path) -> None:
-        """Open a shot of the list."""
-        try:
-            self.session.open_sidecar(path)
-        except (Palette4dError, OSError) as error:
-            self.session.report(error)
-
-    def remember(self, path: str) -> None:
-        """Put a file in front of the recent ones."""
-        path = str(Path(path).absolute())
-        kept = [each for each in self.recent_files() if each != path]
-        self.settings.setValue("recent", [path, *kept][:RECENT])
-
-    def recent_files(self) -> list[str]:
-        """Return the recent files, the newest first."""
-        found: Any = self.settings.value("recent", [])
-        return [found] if isinstance(found, str) else [str(each) for each in found or []]
-
-    def _fill_recent(self) -> None:
-        self.recent.clear()
-        for path in self.recent_files():
-            self.recent.addAction(path, functools.partial(self.open_path, path))
-        self.recent.setEnabled(True)
-        if self.recent.isEmpty():
-            self.recent.addAction(texts.NOTHING_YET).setEnabled(False)
-
-    def do_open(self) -> None:
-        """Ask for a file and open it."""
-        folder = str(self.session.path.parent) if self.session.path is not None else ""
-        path, _ = QFileDialog.getOpenFileName(self, texts.OPEN_TITLE, folder, texts.OPEN_FILTER)
-        if path:
-            self.open_path(sequence_of(path))
-
-    def do_find_clip(self) -> None:
-        """Ask for the document's clip."""
-        path, _ = QFileDialog.getOpenFileName(self, texts.FIND_TITLE, "", texts.CLIP_FILTER)
-        if path:
-            self.session.find_clip(sequence_of(path))
-
-    def do_save(self) -> None:
-        """Save now."""
-        if self.session.save():
-            self.session.say(texts.SAVED_NOW)
-
-    def do_save_as(self) -> None:
-        """Save under another name."""
-        start = str(self.session.path or "")
-        path, _ = QFileDialog.getSaveFileName(self, texts.SAVE_TITLE, start, texts.SIDECAR_FILTER)
-        if path and self.session.save_as(path):
-            self.remember(path)
-
-    def do_revert(self) -> None:
-        """Load the file again, and try frames again that could not be read."""
-        self.session.revert()
-        if self.session.player is not None:
-            self.session.player.forget_errors()
-            self.viewer.read_frame()
-
-    def do_quit(self) -> None:
-        """Close the window."""
-        self.close()
+        self.files.open_path(path, clip)
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         """Take files."""
@@ -485,6 +446,7 @@ class Window(QMainWindow):
             and picture.request.frame == session.frame
             and picture.request.revision == session.revision
             and session.player.idle
+            and self.turns.settled
             and (self.timeline.settled or not self.timeline.isVisible())
         )
 
@@ -496,482 +458,6 @@ class Window(QMainWindow):
         self.viewer.preview.close()
         self.viewer.preview.forget()
         self.session.close()
-
-    # ------------------------------------------------------------------------------------ editing
-
-    def do_undo(self) -> None:
-        """Undo."""
-        self.session.undo()
-
-    def do_redo(self) -> None:
-        """Redo."""
-        self.session.redo()
-
-    def do_cancel(self) -> None:
-        """Forget a drag; else select nothing."""
-        if self.session.dragging:
-            self.session.cancel()
-        elif self.isFullScreen():
-            self.showNormal()
-        else:
-            self.session.select()
-
-    def do_reset_selected(self) -> None:
-        """Reset the selected vertices, remove stops and picks."""
-        ids = self.session.selection
-        if not ids:
-            return
-
-        def reset(document: Any) -> None:
-            for id_ in ids:
-                if ("pick", id_) in document.state:
-                    document.unpick(id_)
-                else:
-                    document.reset(id_)
-
-        self.session.edit(lambda document: _as_one(document, "reset", ids, reset))
-
-    def do_reset_all(self) -> None:
-        """Reset everything."""
-        self.session.edit(lambda document: document.reset(), texts.RESET_ALL)
-
-    def do_add_stop(self) -> None:
-        """Add a stop to the selected row at the playhead."""
-        self.timeline.add_stop_at_playhead()
-
-    def do_lock(self) -> None:
-        """Lock or unlock the selected handles."""
-        ids = self.session.selection
-
-        def lock(document: Any) -> None:
-            for id_ in ids:
-                if ("lock", id_) in document.state:
-                    document.unlock(id_)
-                else:
-                    document.lock(id_)
-
-        self.session.edit(lambda document: _as_one(document, texts.LOCK, ids, lock))
-
-    def _ramp(self, ramp: str) -> None:
-        ids = self.session.selection
-
-        def change(document: Any) -> None:
-            for id_ in ids or (None,):
-                document.set_ramp(ramp, id_)
-
-        self.session.edit(lambda document: _as_one(document, f"ramp {ramp}", ids, change))
-
-    def do_ramp_linear(self) -> None:
-        """Set the ramp."""
-        self._ramp("linear")
-
-    def do_ramp_smooth(self) -> None:
-        """Set the ramp."""
-        self._ramp("smooth")
-
-    def do_ramp_hold(self) -> None:
-        """Set the ramp."""
-        self._ramp("hold")
-
-    def do_pick_pixel(self) -> None:
-        """Pick the colour under the pointer."""
-        self._at_pointer(self.viewer.on_pick)
-
-    def do_hold_pixel(self) -> None:
-        """Hold the colour under the pointer."""
-        self._at_pointer(self.viewer.on_hold)
-
-    def _at_pointer(self, act: Callable[[Any], object] | None) -> None:
-        point = self.viewer._pointer
-        if point is None or act is None:
-            self.session.say(texts.POINT_AT, "warning")
-            return
-        place = self.viewer.place(point, point)
-        if place is not None:
-            act(place)
-
-    # ----------------------------------------------------------------------------------- versions
-
-    def version_names(self) -> list[str]:
-        """Return the names of the versions."""
-        document = self.session.document
-        if document is None:
-            return []
-        return list(document.versions)
-
-    def do_save_version(self) -> None:
-        """Keep the edits as the next version: A, B, C…"""
-        names = self.version_names()
-        name = next(c for c in map(chr, range(65, 91)) if c not in names)
-        self.session.edit(
-            lambda document: document.save_version(name), texts.KEPT_VERSION.format(name=name)
-        )
-
-    def use_version(self, number: int) -> None:
-        """Use the n-th version."""
-        names = self.version_names()
-        if number > len(names):
-            self.session.say(texts.NO_VERSION.format(number=number), "warning")
-            return
-        name = names[number - 1]
-        self.session.edit(
-            lambda document: document.use_version(name), texts.USES_VERSION.format(name=name)
-        )
-
-    def do_compare_version(self) -> None:
-        """Compare with the next version; after the last with the source."""
-        names = ["", *self.version_names()]
-        now = self.session.view.version
-        at = names.index(now) if now in names else 0
-        name = names[(at + 1) % len(names)]
-        compare = self.session.view.compare
-        self.session.look(version=name, compare=compare if compare != "after" else "wipe")
-        if len(names) == 1:
-            self.session.say(texts.NO_VERSIONS, "warning")
-        else:
-            self.session.say(texts.COMPARED.format(name=name) if name else texts.COMPARED_SOURCE)
-
-    def _fill_versions(self) -> None:
-        self.versions.clear()
-        for number, name in enumerate(self.version_names(), 1):
-            text = f"{name}\t{number}" if number < 10 else name
-            self.versions.addAction(text, functools.partial(self.use_version, number))
-        if self.versions.isEmpty():
-            self.versions.addAction(texts.NO_VERSIONS).setEnabled(False)
-
-    # --------------------------------------------------------------------------------------- view
-
-    def do_show_after(self) -> None:
-        """Show the picture after."""
-        self.session.look(compare="after")
-
-    def do_show_before(self) -> None:
-        """Show the picture before."""
-        self.session.look(compare="before")
-
-    def do_show_wipe(self) -> None:
-        """Show both, divided by a line."""
-        self.session.look(compare="wipe")
-
-    def do_show_side(self) -> None:
-        """Show both."""
-        self.session.look(compare="side")
-
-    def do_compare(self) -> None:
-        """Show the other picture; the key does so while it is down."""
-        after = self.session.view.compare != "before"
-        self.session.look(compare="before" if after else "after")
-
-    def do_fit(self) -> None:
-        """Show the whole frame."""
-        self.viewer.fit()
-
-    def do_one_to_one(self) -> None:
-        """Show a pixel of the frame as a pixel of the screen."""
-        self.viewer.zoom_to(1.0, self.viewer._pointer)
-
-    def do_zoom_in(self) -> None:
-        """Zoom in."""
-        self.viewer.zoom_by(1.5, self.viewer._pointer)
-
-    def do_zoom_out(self) -> None:
-        """Zoom out."""
-        self.viewer.zoom_by(1 / 1.5, self.viewer._pointer)
-
-    def do_outside(self) -> None:
-        """Mark colours outside of the palette."""
-        self.session.look(outside=not self.session.view.outside)
-
-    def do_brighter(self) -> None:
-        """Raise the exposure."""
-        self.session.look(exposure=min(self.session.view.exposure + 0.25, 10.0))
-
-    def do_darker(self) -> None:
-        """Lower the exposure."""
-        self.session.look(exposure=max(self.session.view.exposure - 0.25, -10.0))
-
-    def do_plain_look(self) -> None:
-        """Reset exposure and gamma."""
-        self.session.look(exposure=0.0, gamma=1.0)
-
-    def do_full_screen(self) -> None:
-        """Fill the screen, or no more."""
-        self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen)
-
-    # ------------------------------------------------------------------------------------ playback
-
-    def do_play(self) -> None:
-        """Play or stop."""
-        self.session.play(0 if self.session.playing else 1)
-
-    def do_stop(self) -> None:
-        """Stop."""
-        self.session.play(0)
-
-    def _shuttle(self, way: int) -> None:
-        now = self.session.playing
-        self.session.play(way if now * way <= 0 else max(-8, min(8, now * 2)))
-
-    def do_play_forwards(self) -> None:
-        """Play forwards; again: faster."""
-        self._shuttle(1)
-
-    def do_play_backwards(self) -> None:
-        """Play backwards; again: faster."""
-        self._shuttle(-1)
-
-    def _step(self, frames: int) -> None:
-        if self.session.playing:
-            self.session.play(0)
-        self.session.step(frames)
-
-    def do_next_frame(self) -> None:
-        """Go one frame on."""
-        self._step(1)
-
-    def do_previous_frame(self) -> None:
-        """Go one frame back."""
-        self._step(-1)
-
-    def do_ten_on(self) -> None:
-        """Go ten frames on."""
-        self._step(10)
-
-    def do_ten_back(self) -> None:
-        """Go ten frames back."""
-        self._step(-10)
-
-    def handle_frames(self) -> list[int]:
-        """Return the frames of vertices and stops, in order."""
-        document = self.session.document
-        if document is None:
-            return []
-        times = {float(t) for t in document.core.polytope.vertices[:, 3]}
-        times |= {s.frame for s in document.settings.values() if s.frame is not None}
-        first, last, _ = document.frames
-        return sorted({round(min(max(time, first), last)) for time in times})
-
-    def do_next_handle(self) -> None:
-        """Go to the next frame with a handle."""
-        later = [frame for frame in self.handle_frames() if frame > self.session.frame]
-        if later:
-            self.session.go(later[0])
-
-    def do_previous_handle(self) -> None:
-        """Go to the frame with a handle before."""
-        earlier = [frame for frame in self.handle_frames() if frame < self.session.frame]
-        if earlier:
-            self.session.go(earlier[-1])
-
-    def do_first_frame(self) -> None:
-        """Go to the first frame, or to the in point."""
-        self.session.go(self.playback.span()[0])
-
-    def do_last_frame(self) -> None:
-        """Go to the last frame, or to the out point."""
-        self.session.go(self.playback.span()[1])
-
-    def do_mark_in(self) -> None:
-        """Set the in point."""
-        self.session.mark(start=self.session.frame)
-
-    def do_mark_out(self) -> None:
-        """Set the out point."""
-        self.session.mark(end=self.session.frame)
-
-    def do_clear_marks(self) -> None:
-        """Remove in and out point."""
-        self.session.mark()
-
-    def do_loop(self) -> None:
-        """Begin again at the end, or no more."""
-        self.session.loop = not self.session.loop
-
-    # --------------------------------------------------------------------------------------- work
-
-    def _work(
-        self,
-        title: str,
-        verb: str,
-        fields: list[Field],
-        done: Callable[[Job], object] | None = None,
-    ) -> WorkDialog:
-        self.session.save()
-        dialog = WorkDialog(self, title, verb, fields, self.session.post, done)
-        dialog.show()
-        self._dialogs.append(dialog)
-        dialog.destroyed.connect(lambda: self._dialogs.remove(dialog))
-        return dialog
-
-    @property
-    def _clip_source(self) -> str:
-        return "" if self.session.clip is None else self.session.clip.source
-
-    def do_analyze(self) -> WorkDialog:
-        """Find the palette of a clip."""
-        source = self._clip_source
-        out = ""
-        if source:
-            path = Path(source)
-            # The name by which the node finds it, see docs/node.md.
-            stem = path.name.split("#")[0].rstrip("._-") or path.absolute().parent.name
-            stem = Path(stem).stem if "#" not in source else stem
-            out = str(path.with_name(f"{stem}.p4d.json"))
-        return self._analyze(texts.ANALYZE, source, out, "--drop-edits" if out else "")
-
-    def do_analyze_again(self) -> WorkDialog:
-        """Find the palette of the document's clip again."""
-        return self._analyze(
-            texts.ANALYZE_AGAIN, self._clip_source, str(self.session.path or ""), "--keep-edits"
-        )
-
-    def _analyze(self, title: str, clip: str, out: str, edits: str) -> WorkDialog:
-        fields = [
-            Field("", texts.CLIP, "open", clip, hint=texts.CLIP_HINT),
-            Field("-o", texts.SIDECAR, "save", out),
-            Field("--frames", texts.FRAMES, hint=texts.FRAMES_HINT),
-            Field("--vertices", texts.VERTICES, hint=texts.VERTICES_HINT),
-            Field("--input-space", texts.INPUT_SPACE, hint=texts.SPACE_HINT),
-            Field("--palette-space", texts.PALETTE_SPACE, hint=texts.SPACE_HINT),
-            Field("--ocio-config", texts.CONFIG, "open", hint="$OCIO"),
-        ]
-        if edits == "--keep-edits":
-            fields.append(Field("--keep-edits", texts.KEEP_EDITS, "check", "yes"))
-        fields.append(Field("--skip-bad-frames", texts.SKIP_BAD, "check"))
-        fields.append(Field("--allow-cuts", texts.ALLOW_CUTS, "check"))
-
-        def done(_: Job) -> None:
-            self.open_path(dialog.value("-o"), dialog.value("") or None)
-            dialog.close()
-
-        dialog = self._work(title, "analyze", fields, done)
-        return dialog
-
-    def do_render(self) -> WorkDialog:
-        """Write the recoloured clip."""
-        path = self.session.path
-        assert path is not None
-        stem = path.name.removesuffix(".p4d.json")
-        marks = self.session.marks
-        return self._work(
-            texts.RENDER,
-            "render",
-            [
-                Field("", texts.SIDECAR, "open", str(path)),
-                Field("", texts.CLIP, "open", self._clip_source),
-                Field("-o", texts.OUTPUT, "save", str(path.with_name(f"{stem}_graded.mp4"))),
-                Field("--frames", texts.FRAMES, value="{}-{}".format(*marks) if marks else ""),
-                Field("--compare", texts.COMPARE_LABEL, "choice", "", ("", "wipe", "side"), "no"),
-                Field("--bits", texts.BITS, "choice", "", ("", "8", "16", "32"), "as the clip"),
-                Field("--half", texts.HALF, "check"),
-                Field("--force", texts.FORCE, "check"),
-            ],
-        )
-
-    def do_bake(self) -> WorkDialog:
-        """Write a LUT of this frame."""
-        path = self.session.path
-        assert path is not None
-        frame = self.session.frame
-        return self._work(
-            texts.BAKE,
-            "bake",
-            [
-                Field("", texts.SIDECAR, "open", str(path)),
-                Field("--frame", texts.FRAME_FIELD, value=str(frame)),
-                Field("-o", texts.OUTPUT, "save", beside(path, f"_{frame}.cube")),
-                Field("--size", texts.GRID, hint="33"),
-                Field("--force", texts.FORCE, "check"),
-            ],
-        )
-
-    def do_export(self) -> WorkDialog:
-        """Write LUTs over time."""
-        path = self.session.path
-        assert path is not None
-        return self._work(
-            texts.EXPORT,
-            "export",
-            [
-                Field("", texts.SIDECAR, "open", str(path)),
-                Field("--every", texts.EVERY, value="1"),
-                Field("-o", texts.FOLDER, "folder", beside(path, "_luts")),
-                Field("--format", texts.FORMAT, hint="cube"),
-                Field("--force", texts.FORCE, "check"),
-            ],
-        )
-
-    def do_config(self) -> WorkDialog:
-        """Write an OpenColorIO config with the looks."""
-        path = self.session.path
-        assert path is not None
-        return self._work(
-            texts.CONFIG_WORK,
-            "config",
-            [
-                Field("", texts.SIDECAR, "open", str(path)),
-                Field("-o", texts.FOLDER, "folder", beside(path, "_config")),
-                Field("--base", texts.BASE_CONFIG, "open"),
-                Field("--force", texts.FORCE, "check"),
-            ],
-        )
-
-    def do_install(self) -> WorkDialog:
-        """Install the OpenFX node."""
-        return self._work(
-            texts.INSTALL,
-            "install-plugin",
-            [
-                Field("--dest", texts.FOLDER, "folder", str(Path.home() / "OFX")),
-                Field("--link", texts.LINK, "check"),
-                Field("--kdenlive", "Kdenlive", "check"),
-                Field("--shotcut", "Shotcut", "check"),
-                Field("--force", texts.FORCE, "check"),
-            ],
-        )
-
-    def do_copy_grade(self) -> None:
-        """Copy this grade to another shot."""
-        path, _ = QFileDialog.getOpenFileName(self, texts.COPY_TITLE, "", texts.SIDECAR_FILTER)
-        if path and self.session.path is not None:
-            self._work(
-                texts.COPY_GRADE,
-                "edit",
-                [
-                    Field("", texts.TO_SHOT, "open", path),
-                    Field("", texts.ACTION, "choice", "copy", ("copy",)),
-                    Field("", texts.FROM_SHOT, "open", str(self.session.path)),
-                ],
-            )
-
-    def do_next_shot(self) -> None:
-        """Open the next shot of the list."""
-        self.shots.step(1)
-
-    def do_previous_shot(self) -> None:
-        """Open the shot before."""
-        self.shots.step(-1)
-
-    # --------------------------------------------------------------------------------------- help
-
-    def do_first_steps(self) -> None:
-        """Show the first steps."""
-        QMessageBox.information(self, texts.FIRST_STEPS, texts.FIRST_STEPS_TEXT)
-
-    def do_manual(self) -> None:
-        """Show the gestures and keys."""
-        rows = [f"{where}: {gesture} — {what}" for where, gesture, what in actions.GESTURES]
-        listed = (*ACTIONS, *actions.TIMELINE_ACTIONS, *actions.SOLID_ACTIONS)
-        keys = [f"{', '.join(a.keys)} — {a.text}" for a in listed if a.keys]
-        box = QMessageBox(QMessageBox.Icon.NoIcon, texts.MANUAL, "\n".join(rows), parent=self)
-        box.setDetailedText("\n".join(keys))
-        box.exec()
-
-    def do_about(self) -> None:
-        """Say what this is."""
-        from palette4d._core import __version__
-
-        QMessageBox.about(self, texts.TITLE, texts.ABOUT.format(version=__version__))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Show the picture before while the key of hold-to-compare is down."""
@@ -993,33 +479,6 @@ class Window(QMainWindow):
         return event.key() == COMPARE_KEY and plain and not event.isAutoRepeat()
 
 
-def _as_one(document: Any, what: str, ids: tuple[str, ...], change: Callable[[Any], None]) -> None:
-    """Do a change of several handles as one step; of one as the verb does it."""
-    if len(ids) == 1:
-        change(document)
-        return
-    with document.one_step(f"{what} {', '.join(ids)}"):
-        change(document)
-
-
 def line_of(field: QAbstractSpinBox | QLineEdit) -> QLineEdit:
     """Return the line of text of a field."""
     return field if isinstance(field, QLineEdit) else field.lineEdit()
-
-
-def sidecar_of(path: str) -> Path | None:
-    """Return the sidecar beside a clip, if it was analysed before."""
-    found = Path(path)
-    names = [found.name.split("#")[0].split("%")[0].rstrip("._-"), found.stem, found.name]
-    if "#" in found.name:
-        with contextlib.suppress(ClipError):
-            names.append(clip_sequence.of_pattern(path)[0].name)
-    for name in dict.fromkeys(names):
-        candidate = found.absolute().with_name(f"{name}.p4d.json")
-        if name and candidate.is_file():
-            return candidate
-    if found.is_dir():  # or in the folder, beside its frames
-        with contextlib.suppress(ClipError):
-            inside = clip_sequence.in_folder(found)
-            return sidecar_of(inside.pattern if isinstance(inside, ImageSequence) else str(inside))
-    return None

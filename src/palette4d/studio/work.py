@@ -25,6 +25,7 @@ from PySide6.QtWidgets import (
 
 from palette4d.media import clip_sequence
 from palette4d.studio import texts, theme
+from palette4d.studio.choice import Choice
 from palette4d.studio.jobs import Job, command_line
 
 FieldKind = Literal["text", "save", "open", "folder", "choice", "check"]
@@ -150,7 +151,7 @@ class WorkDialog(QDialog):
             check.setAccessibleName(field.text)
             return label, check
         if field.kind == "choice":
-            choice = QComboBox()
+            choice = Choice()
             for each in field.choices:
                 choice.addItem(each or field.hint, each)
             choice.setCurrentIndex(max(0, choice.findData(field.value)))

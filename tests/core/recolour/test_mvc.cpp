@@ -5,7 +5,6 @@
 #include <stdexcept>
 
 #include "check.hpp"
-#include "recolour/palette_body.hpp"
 #include "shapes.hpp"
 
 using namespace palette4d;
@@ -17,7 +16,8 @@ using Weights = std::vector<double>;
 
 Weights mvc(const Mesh& mesh, const Vec3& p) {
     Weights w(mesh.rgb.size());
-    mean_value_coordinates(p, mesh.rgb, mesh.faces, w.data());
+    PaletteBody::Workspace workspace;
+    PaletteBody(mesh.rgb, mesh.faces).mean_value(p, w.data(), workspace);
     return w;
 }
 
@@ -29,7 +29,8 @@ struct Projected {
 Projected project(const Mesh& mesh, const Vec3& p) {
     Projected result;
     result.w.resize(mesh.rgb.size());
-    result.at = palette_weights(p, mesh.rgb, mesh.faces, result.w.data());
+    PaletteBody::Workspace workspace;
+    result.at = PaletteBody(mesh.rgb, mesh.faces).project(p, result.w.data(), workspace);
     return result;
 }
 

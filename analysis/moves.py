@@ -1,0 +1,111 @@
+"""Moves of the structure search that take a whole colour away.
+
+A chain is a colour from its beginning to its end: the vertices between the clip's ends, or between
+a split and a merge, with one neighbour on either side in time. `without` of a polytope takes one
+vertex away; `without_chain` all of a chain. Every section keeps a closed mesh: the chain's track is
+drawn into a neighbouring one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+from palette4d.analysis.convex_hulls import concavity
+from palette4d.analysis.polytope import Section, SkewPolytope
+
+I32 = NDArray[np.int32]
+
+# A solid has at least this many colours.
+LEAST_COLOURS = 4
+# An edge of at most so many frames gets no stop.
+LONG_EDGE = 2
+# Times of a section at which the meshes after a move are compared.
+COMPARED = 5
+
+
+def chains(polytope: SkewPolytope) -> list[tuple[int, ...]]:
+    """Return the chains that may go: every section keeps enough colours."""
+    before, after = polytope.neighbours()
+
+    def inner(v: int) -> bool:
+        return len(before[v]) <= 1 and len(after[v]) <= 1
+
+    found = []
+    for v in range(len(polytope.vertices)):
+        # A chain begins with the clip or behind a splitting vertex.
+        if not inner(v) or any(inner(u) for u in before[v]):
+            continue
+        if before[v] and len(after[before[v][0]]) < 2:
+            continue  # behind a merging vertex, which would have no way on
+        chain = [v]
+        while after[chain[-1]] and inner(after[chain[-1]][0]):
+            chain.append(after[chain[-1]][0])
+        end = after[chain[-1]]
+        if not end or len(before[end[0]]) > 1:
+            found.append(tuple(chain))
+    few = {
+        v
+        for section in (*polytope.blocks, *polytope.transitions)
+        if len(section.tracks) <= LEAST_COLOURS
+        for track in section.tracks
+        for v in track
+    }
+    return [chain for chain in found if few.isdisjoint(chain)]
+
+
+def without_chain(polytope: SkewPolytope, chain: tuple[int, ...]) -> SkewPolytope:
+    """Return the polytope without a chain of `chains`."""
+    gone = set(chain)
+    place = np.cumsum([v not in gone for v in range(len(polytope.vertices))]) - 1
+
+    def rest(section: Section) -> Section:
+        faces, tracks = section.faces, list(section.tracks)
+        at = next((i for i, track in enumerate(tracks) if not gone.isdisjoint(track)), None)
+        if at is not None:
+            del tracks[at]
+            if len(faces):
+                faces = _least_concave(polytope, Section(section.first, section.last, tuple(tracks),
+                                                         faces), at)  # fmt: skip
+        renamed = tuple(tuple(int(place[v]) for v in track) for track in tracks)
+        return Section(section.first, section.last, renamed, faces)
+
+    return SkewPolytope(
+        np.delete(polytope.vertices, list(chain), axis=0),
+        tuple(rest(b) for b in polytope.blocks),
+        tuple(rest(t) for t in polytope.transitions),
+    )
+
+
+def enriched(polytope: SkewPolytope) -> SkewPolytope:
+    """Return the polytope with a stop in the middle of every edge of more than two frames."""
+    for u, v in polytope.edges().tolist():
+        middle = (polytope.vertices[u] + polytope.vertices[v]) / 2
+        inside = any(block.first < middle[3] < block.last for block in polytope.blocks)
+        if inside and polytope.vertices[v, 3] - polytope.vertices[u, 3] > LONG_EDGE:
+            polytope = polytope.with_stop((u, v), middle.tolist())
+    return polytope
+
+
+def _least_concave(polytope: SkewPolytope, section: Section, gone: int) -> I32:
+    """Return the mesh of a section's remaining tracks that lacks least of its hull."""
+    times = np.linspace(section.first, section.last, COMPARED)
+    colours = [polytope.colours_at(section, t) for t in times]
+    meshes = list(_drawn_in(section.faces, gone))
+    return min(meshes, key=lambda mesh: sum(concavity(rgb, mesh) for rgb in colours))
+
+
+def _drawn_in(faces: I32, gone: int) -> Iterator[I32]:
+    """Yield the meshes without the corner `gone`, each drawn into one of its neighbours."""
+    touches: dict[int, set[int]] = {}
+    for face in faces.tolist():
+        for v in face:
+            touches.setdefault(v, set()).update(face)
+    ring = touches[gone] - {gone}
+    for target in sorted(ring):
+        if len(touches[target] & ring - {target}) != 2:
+            continue  # the mesh would fold onto itself
+        kept = faces[~((faces == gone).any(axis=1) & (faces == target).any(axis=1))]
+        kept = np.where(kept == gone, target, kept)
+        yield (kept - (kept > gone)).astype(np.int32)

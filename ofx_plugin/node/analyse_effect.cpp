@@ -1,0 +1,296 @@
+#include "analyse_effect.hpp"
+
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "analysis.hpp"
+#include "buttons.hpp"
+#include "clip_image.hpp"
+#include "exr.hpp"
+#include "param_define.hpp"
+#include "params.hpp"
+#include "paths.hpp"
+#include "sidecar_choice.hpp"
+#include "status.hpp"
+
+namespace palette4d::node {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kSource = kOfxImageEffectSimpleSourceClipName;
+
+OfxStatus describe(const Suites& suites, OfxImageEffectHandle effect) {
+    OfxPropertySetHandle handle = nullptr;
+    if (!suites.effect->getPropertySet ||
+        suites.effect->getPropertySet(effect, &handle) != kOfxStatOK || !handle) {
+        return kOfxStatFailed;
+    }
+    const Properties node(suites, handle);
+    node.set_string(kOfxPropLabel, "Palette4D Analyse");
+    node.set_string(kOfxPropShortLabel, "P4D Analyse");
+    node.set_string(kOfxPropLongLabel, "Palette4D Analyse");
+    node.set_string(kOfxPropVersionLabel, PALETTE4D_VERSION);
+    node.set_string(kOfxPropPluginDescription,
+                    "Finds the time-varying palette of its input and writes it to a sidecar, for "
+                    "the node Palette4D. The picture passes.");
+    node.set_string(kOfxImageEffectPluginPropGrouping, "Color");
+    node.set_strings(kOfxImageEffectPropSupportedContexts,
+                     {kOfxImageEffectContextFilter, kOfxImageEffectContextGeneral});
+    node.set_strings(kOfxImageEffectPropSupportedPixelDepths,
+                     {kOfxBitDepthFloat, kOfxBitDepthByte});
+    node.set_string(kOfxImageEffectPluginRenderThreadSafety, kOfxImageEffectRenderFullySafe);
+    node.set_int(kOfxImageEffectPluginPropHostFrameThreading, 0);
+    node.set_int(kOfxImageEffectPropSupportsTiles, 1);
+    node.set_int(kOfxImageEffectPropSupportsMultiResolution, 1);
+    node.set_int(kOfxImageEffectPropTemporalClipAccess, 1);
+    return kOfxStatOK;
+}
+
+OfxStatus describe_in_context(const Suites& suites, OfxImageEffectHandle effect) {
+    for (const char* name : {kSource, kOfxImageEffectOutputClipName}) {
+        OfxPropertySetHandle handle = nullptr;
+        if (!suites.effect->clipDefine ||
+            suites.effect->clipDefine(effect, name, &handle) != kOfxStatOK) {
+            return kOfxStatFailed;
+        }
+        const Properties clip(suites, handle);
+        clip.set_strings(kOfxImageEffectPropSupportedComponents,
+                         {kOfxImageComponentRGBA, kOfxImageComponentRGB});
+        clip.set_int(kOfxImageEffectPropSupportsTiles, 1);
+        clip.set_int(kOfxImageEffectPropTemporalClipAccess, name == kSource);
+    }
+    OfxParamSetHandle params = nullptr;
+    if (!suites.effect->getParamSet || suites.effect->getParamSet(effect, &params) != kOfxStatOK) {
+        return kOfxStatFailed;
+    }
+    ParamDefiner define(suites, params);
+    define
+        .text({kParamSidecar, "Sidecar",
+               "The file to write. The frames that were analysed stay in a folder beside it, for "
+               "Studio."},
+              kOfxParamStringIsFilePath)
+        .set_int(kOfxParamPropStringFilePathExists, 0);
+    define
+        .button({kParamAnalyse, "Analyse",
+                 "Fetches all frames of the input and finds their palette in the background. Push "
+                 "again to stop."})
+        .set_int(kOfxParamPropLayoutHint, kOfxParamPropLayoutHintNoNewLine);
+    define.button(
+        {kParamOpenInStudio, "Open in Studio", "Opens the sidecar in the window of palette4d."});
+    define_status(define, suites);
+    return kOfxStatOK;
+}
+
+/// Tells the user how far it is, in hosts that have a way.
+class Progress {
+public:
+    Progress(const Suites& suites, OfxImageEffectHandle effect)
+        : suite_(suites.progress), effect_(effect) {
+        started_ = suite_ && suite_->progressStart && suite_->progressUpdate &&
+                   suite_->progressEnd &&
+                   suite_->progressStart(effect, "Palette4D fetches frames") == kOfxStatOK;
+    }
+    ~Progress() {
+        if (started_) suite_->progressEnd(effect_);
+    }
+    Progress(const Progress&) = delete;
+    Progress& operator=(const Progress&) = delete;
+
+    /// Whether to go on.
+    bool at(double share) const {
+        return !started_ || suite_->progressUpdate(effect_, share) != kOfxStatReplyNo;
+    }
+
+private:
+    const OfxProgressSuiteV1* suite_;
+    OfxImageEffectHandle effect_;
+    bool started_ = false;
+};
+
+/// The frames in a folder of their own; removed again unless all are there.
+class Frames {
+public:
+    explicit Frames(const fs::path& sidecar) {
+        std::string name = sidecar.filename().u8string();
+        for (const char* end : {".json", ".p4d"}) {
+            const std::size_t length = std::strlen(end);
+            if (name.size() > length && name.compare(name.size() - length, length, end) == 0) {
+                name.resize(name.size() - length);
+            }
+        }
+        name_ = name;
+        folder_ = sidecar.parent_path() / native(name + ".frames");
+    }
+    ~Frames() {
+        if (keep) return;
+        std::error_code error;
+        for (const fs::path& file : written_) fs::remove(file, error);
+        if (made_) fs::remove(folder_, error);
+    }
+    Frames(const Frames&) = delete;
+    Frames& operator=(const Frames&) = delete;
+
+    bool keep = false;
+    const fs::path& folder() const { return folder_; }
+    std::string pattern() const { return (folder_ / native(name_ + ".######.exr")).u8string(); }
+
+    /// Makes the folder, without the frames of an earlier time; false where other files are in it,
+    /// or where it cannot be made.
+    bool make() {
+        std::error_code error;
+        made_ = fs::create_directories(folder_, error);
+        std::vector<fs::path> old;
+        for (const auto& entry : fs::directory_iterator(folder_, error)) {
+            const std::string file = entry.path().filename().u8string();
+            const std::string start = name_ + ".", end = ".exr";
+            const bool ours =
+                file.size() == start.size() + 6 + end.size() && file.rfind(start, 0) == 0 &&
+                file.find_first_not_of("0123456789", start.size()) == start.size() + 6 &&
+                file.compare(start.size() + 6, end.size(), end) == 0;
+            if (!ours) return false;
+            old.push_back(entry.path());
+        }
+        for (const fs::path& file : old) fs::remove(file, error);
+        return !error;
+    }
+    bool write(long number, const Image& image) {
+        std::string digits = std::to_string(number);
+        digits.insert(0, 6 - std::min<std::size_t>(6, digits.size()), '0');
+        written_.push_back(folder_ / native(name_ + "." + digits + ".exr"));
+        return write_exr(written_.back(), image);
+    }
+
+private:
+    std::string name_;
+    fs::path folder_;
+    bool made_ = false;
+    std::vector<fs::path> written_;
+};
+
+/// The times of the source's first and last frame.
+std::optional<std::pair<long, long>> source_range(const Suites& suites,
+                                                  OfxImageEffectHandle effect) {
+    OfxImageClipHandle clip = nullptr;
+    OfxPropertySetHandle handle = nullptr;
+    if (!suites.effect->clipGetHandle ||
+        suites.effect->clipGetHandle(effect, kSource, &clip, &handle) != kOfxStatOK) {
+        return std::nullopt;
+    }
+    const Properties source(suites, handle);
+    const auto first = source.get_double(kOfxImageEffectPropFrameRange, 0),
+               last = source.get_double(kOfxImageEffectPropFrameRange, 1);
+    constexpr double kMost = 1e6;
+    if (!first || !last || !(*first <= *last) || !(std::abs(*first) < kMost) ||
+        !(std::abs(*last) < kMost)) {
+        return std::nullopt;
+    }
+    return std::pair(std::lround(*first), std::lround(*last));
+}
+
+/// Fetches the frames and starts the analysis; the line for the status.
+std::string analyse(const Suites& suites, OfxImageEffectHandle effect, const std::string& target) {
+    if (stop_analysis(target)) return "stopped the analysis";
+    if (target.empty()) return "enter the path of the new sidecar, such as ~/shot.p4d.json";
+    const fs::path sidecar = native(target);
+    std::error_code error;
+    if (!sidecar.is_absolute() || !fs::is_directory(sidecar.parent_path(), error)) {
+        return target + ": found no such folder; enter the path of the new sidecar in full";
+    }
+    const auto range = source_range(suites, effect);
+    if (!range) return "the host does not report the frames of the input; connect a clip";
+    const auto [first, last] = *range;
+    Frames frames(sidecar);
+    if (!frames.make()) {
+        return frames.folder().u8string() +
+               ": found other files there, or it cannot be made; expected a folder for the frames "
+               "alone; enter another name for the sidecar";
+    }
+    {
+        const Progress progress(suites, effect);
+        for (long time = first; time <= last; ++time) {
+            if (!progress.at(static_cast<double>(time - first) /
+                             static_cast<double>(last - first + 1))) {
+                return "cancelled";
+            }
+            const ClipImage image(suites, effect, kSource, static_cast<double>(time));
+            if (!image.pixels() || image.pixels()->channels < 3) {
+                return "the host has no picture at time " + std::to_string(time);
+            }
+            if (!frames.write(time - std::min(first, 0L), *image.pixels())) {
+                return frames.folder().u8string() + ": frame " + std::to_string(time) +
+                       " cannot be written; make room, or choose another folder";
+            }
+        }
+    }
+    const std::string problem = start_analysis(frames.pattern(), target);
+    frames.keep = problem.empty();
+    return problem;
+}
+
+void changed(const Suites& suites, OfxImageEffectHandle effect, const Properties& in_args) {
+    const std::string name = in_args.get_string(kOfxPropName).value_or("");
+    const std::string reason = in_args.get_string(kOfxPropChangeReason).value_or("");
+    if (name == kParamStatus || reason == kOfxChangePluginEdited) return;
+    const bool pushed = reason == kOfxChangeUserEdited;
+    const Params params(suites, effect);
+    const std::string target =
+        expanded(meant(params.string_at(kParamSidecar, Params::kAnyTime).value_or("")));
+    std::string text;
+    if (pushed && name == kParamAnalyse) text = analyse(suites, effect, target);
+    if (pushed && name == kParamOpenInStudio) {
+        const std::string problem =
+            target.empty() ? "enter the sidecar's path" : open_in_studio(target, std::nullopt);
+        text = problem.empty() ? "opened " + target + " in Studio" : problem;
+    }
+    const AnalysisState state = analysis_state(target);
+    std::error_code error;
+    if (!state.words.empty()) {
+        text += (text.empty() ? "" : "\n") + state.words;
+    } else if (text.empty() && !target.empty() && fs::is_regular_file(native(target), error)) {
+        text = target + " is there: choose it in the node Palette4D";
+    }
+    text = printable(text);
+    if (params.string_now(kParamStatus) != text) params.note_string(kParamStatus, text);
+}
+
+}  // namespace
+
+OfxStatus analyse_action(const Suites& suites, const char* action, OfxImageEffectHandle effect,
+                         const Properties& in_args, const Properties& out_args) {
+    const auto is = [action](const char* name) { return std::strcmp(action, name) == 0; };
+    if (is(kOfxActionDescribe)) return describe(suites, effect);
+    if (is(kOfxImageEffectActionDescribeInContext)) return describe_in_context(suites, effect);
+    if (is(kOfxActionCreateInstance) || is(kOfxActionDestroyInstance)) return kOfxStatOK;
+    if (is(kOfxActionInstanceChanged)) {
+        changed(suites, effect, in_args);
+        return kOfxStatOK;
+    }
+    const std::optional<double> time = in_args.get_double(kOfxPropTime);
+    if (is(kOfxImageEffectActionIsIdentity) && time) {
+        if (!out_args.set_string(kOfxPropName, kSource)) return kOfxStatReplyDefault;
+        out_args.set_double(kOfxPropTime, *time);
+        return kOfxStatOK;
+    }
+    if (is(kOfxImageEffectActionRender) && time) {
+        const ClipImage output(suites, effect, kOfxImageEffectOutputClipName, *time);
+        if (!output.pixels()) return kOfxStatFailed;
+        const Image& out = *output.pixels();
+        const OfxRectI window = intersect(
+            out.bounds, in_args.get_rect(kOfxImageEffectPropRenderWindow).value_or(out.bounds));
+        const ClipImage source(suites, effect, kSource, *time);
+        if (source.pixels() && same_format(*source.pixels(), out)) {
+            copy(*source.pixels(), out, window);
+            return kOfxStatOK;
+        }
+        clear(out, window);
+        return source.absent() ? kOfxStatOK : kOfxStatFailed;
+    }
+    return kOfxStatReplyDefault;
+}
+
+}  // namespace palette4d::node

@@ -1,0 +1,221 @@
+#include "analysis.hpp"
+
+#include <filesystem>
+#include <fstream>
+#include <locale>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <sstream>
+#include <utility>
+#include <vector>
+
+#include "paths.hpp"
+#include "process.hpp"
+#include "program_file.hpp"
+
+#if defined(_WIN32)
+#if !defined(NOMINMAX)
+#define NOMINMAX
+#endif
+#include <windows.h>
+#else
+#include <dlfcn.h>
+#include <stdlib.h>
+#include <unistd.h>
+#endif
+
+namespace palette4d::node {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// This library's own file: Palette4D.ofx in the bundle's folder of a system.
+fs::path own_file() {
+    static const char anchor = 0;
+#if defined(_WIN32)
+    HMODULE module = nullptr;
+    wchar_t name[4096] = L"";
+    if (GetModuleHandleExW(
+            GET_MODULE_HANDLE_EX_FLAG_FROM_ADDRESS | GET_MODULE_HANDLE_EX_FLAG_UNCHANGED_REFCOUNT,
+            reinterpret_cast<LPCWSTR>(&anchor), &module)) {
+        GetModuleFileNameW(module, name, 4096);
+    }
+    return name;
+#else
+    Dl_info about{};
+    if (::dladdr(&anchor, &about) == 0 || !about.dli_fname) return {};
+    std::error_code error;
+    return fs::absolute(about.dli_fname, error);
+#endif
+}
+
+/// The command line of palette4d with these arguments; empty with a problem. Hosts start in any
+/// folder: `-P` keeps Python from looking for modules there, and `-E` from the host's variables.
+std::vector<std::string> command(const std::vector<std::string>& arguments, std::string& problem) {
+    const ProgramPath python =
+        read_program(own_file().parent_path().parent_path() / "Resources" / "program");
+    problem = python.problem;
+    if (!problem.empty()) return {};
+    std::vector<std::string> all = {python.path, "-E", "-P", "-m", "palette4d"};
+    all.insert(all.end(), arguments.begin(), arguments.end());
+    return all;
+}
+
+std::string in_full(const std::string& path) {
+    std::error_code error;
+    const fs::path full = fs::absolute(native(path), error);
+    return error ? path : full.u8string();
+}
+
+struct Analysis {
+    std::string clip;
+    std::unique_ptr<Child> child;  ///< null: it has failed
+    fs::path folder;               ///< temporary
+    std::string failure;
+};
+
+struct Analyses {
+    std::mutex mutex;
+    std::map<std::string, Analysis> by_sidecar;
+};
+
+Analyses& analyses() {
+    static Analyses all;
+    return all;
+}
+
+std::string key_of(const std::string& sidecar) {
+    std::error_code error;
+    const fs::path path = fs::weakly_canonical(native(sidecar), error);
+    return error ? sidecar : path.u8string();
+}
+
+/// A new one, which others cannot enter; empty where there can be none.
+fs::path temporary_folder() {
+    std::error_code error;
+    const fs::path base = fs::temp_directory_path(error);
+    if (error) return {};
+#if defined(_WIN32)
+    for (DWORD i = 0; i < 100; ++i) {
+        const fs::path folder = base / ("palette4d-" + std::to_string(GetCurrentProcessId()) + "-" +
+                                        std::to_string(GetTickCount() + i));
+        if (fs::create_directory(folder, error)) return folder;
+    }
+    return {};
+#else
+    std::string folder = (base / "palette4d-XXXXXX").string();
+    return ::mkdtemp(&folder[0]) ? fs::path(folder) : fs::path();
+#endif
+}
+
+/// The last whole line that `palette4d analyze --progress` has written.
+std::string last_line(const fs::path& file) {
+    std::ifstream lines(file, std::ios::binary | std::ios::ate);
+    const std::streamoff size = lines ? static_cast<std::streamoff>(lines.tellg()) : 0;
+    std::string text(static_cast<std::size_t>(size < 8192 ? size : 8192), '\0');
+    lines.seekg(size - static_cast<std::streamoff>(text.size()));
+    lines.read(&text[0], static_cast<std::streamsize>(text.size()));
+    const std::size_t end = text.rfind('\n');
+    if (end == std::string::npos) return "";
+    const std::size_t before = end == 0 ? std::string::npos : text.rfind('\n', end - 1);
+    return text.substr(before + 1, end - before - 1);
+}
+
+constexpr const char* kError = "error: ";
+
+/// Takes note of an analysis that has ended; false where it has succeeded.
+bool keep(Analysis& one, const std::string& sidecar) {
+    if (!one.child || one.child->running()) return true;
+    const std::string line = last_line(one.folder / "progress");
+    one.child.reset();
+    std::error_code error;
+    fs::remove_all(one.folder, error);
+    if (line == "done") return false;
+    one.failure = "the analysis of " + one.clip + " failed: " +
+                  (line.rfind(kError, 0) == 0
+                       ? line.substr(std::char_traits<char>::length(kError))
+                       : "it ended without a word; run 'palette4d analyze' in a terminal for " +
+                             one.clip + " and " + sidecar);
+    return true;
+}
+
+}  // namespace
+
+std::string open_in_studio(const std::string& path, std::optional<double> frame) {
+    std::vector<std::string> arguments = {"studio", in_full(path)};
+    if (frame) {
+        std::ostringstream number;
+        number.imbue(std::locale::classic());
+        number.precision(10);
+        number << *frame;
+        arguments.insert(arguments.end(), {"--frame", number.str()});
+    }
+    std::string problem;
+    const std::vector<std::string> all = command(arguments, problem);
+    return all.empty() ? problem : start_detached(all);
+}
+
+std::string start_analysis(const std::string& clip, const std::string& sidecar) {
+    Analyses& all = analyses();
+    const std::string key = key_of(sidecar);
+    const std::lock_guard<std::mutex> lock(all.mutex);
+    Analysis one;
+    one.clip = clip;
+    one.folder = temporary_folder();
+    if (one.folder.empty()) return "no folder can be made for temporary files";
+    std::string problem;
+    const std::vector<std::string> line =
+        command({"analyze", in_full(clip), "-o", in_full(sidecar), "--quiet", "--progress",
+                 (one.folder / "progress").u8string()},
+                problem);
+    if (!line.empty()) one.child = Child::start(line, problem);
+    if (one.child) {
+        all.by_sidecar[key] = std::move(one);
+        return "";
+    }
+    std::error_code error;
+    fs::remove_all(one.folder, error);
+    return problem;
+}
+
+bool stop_analysis(const std::string& sidecar) {
+    Analyses& all = analyses();
+    const std::lock_guard<std::mutex> lock(all.mutex);
+    const auto found = all.by_sidecar.find(key_of(sidecar));
+    if (found == all.by_sidecar.end()) return false;
+    Analysis& one = found->second;
+    const bool ran = one.child && one.child->running();
+    if (ran) one.child->stop();
+    std::error_code error;
+    fs::remove_all(one.folder, error);
+    all.by_sidecar.erase(found);
+    return ran;
+}
+
+AnalysisState analysis_state(const std::string& sidecar) {
+    Analyses& all = analyses();
+    const std::lock_guard<std::mutex> lock(all.mutex);
+    if (all.by_sidecar.empty() || sidecar.empty()) return {};
+    const auto found = all.by_sidecar.find(key_of(sidecar));
+    if (found == all.by_sidecar.end()) return {};
+    Analysis& one = found->second;
+    if (!keep(one, sidecar)) {
+        all.by_sidecar.erase(found);
+        return {};
+    }
+    if (!one.child) return {false, one.failure};
+    const std::string line = last_line(one.folder / "progress");
+    return {true, "analysing " + one.clip + (line.empty() ? "" : ": " + line) +
+                      "; push Analyse to stop it"};
+}
+
+void forget_failed_analyses() {
+    Analyses& all = analyses();
+    const std::lock_guard<std::mutex> lock(all.mutex);
+    for (auto at = all.by_sidecar.begin(); at != all.by_sidecar.end();) {
+        at = at->second.child ? std::next(at) : all.by_sidecar.erase(at);
+    }
+}
+
+}  // namespace palette4d::node

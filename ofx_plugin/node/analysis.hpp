@@ -1,0 +1,29 @@
+// palette4d itself, started from a host: its window, and analyses in the background. Depends
+// neither on OpenFX nor on the core.
+#pragma once
+
+#include <optional>
+#include <string>
+
+namespace palette4d::node {
+
+/// Opens a sidecar or a clip in Studio, at a frame of it. Returns what went wrong, or nothing.
+std::string open_in_studio(const std::string& path, std::optional<double> frame);
+
+/// Starts `palette4d analyze CLIP -o SIDECAR`, whose rules say when a file is replaced. One runs at
+/// a time for each sidecar. Returns what went wrong, or nothing.
+std::string start_analysis(const std::string& clip, const std::string& sidecar);
+
+/// Ends it; false where none runs.
+bool stop_analysis(const std::string& sidecar);
+
+/// What an analysis does; or, until forgotten, why it failed.
+struct AnalysisState {
+    bool running = false;
+    std::string words;  ///< empty: none runs, and the last one has succeeded
+};
+/// Never waits. All instances and threads see the same; also while rendering.
+AnalysisState analysis_state(const std::string& sidecar);
+void forget_failed_analyses();
+
+}  // namespace palette4d::node

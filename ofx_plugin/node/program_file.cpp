@@ -1,0 +1,123 @@
+#include "program_file.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <cstring>
+
+#include "paths.hpp"
+
+#if defined(_WIN32)
+#if !defined(NOMINMAX)
+#define NOMINMAX
+#endif
+#include <windows.h>
+#else
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#endif
+
+namespace palette4d::node {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kRemedy = "; run 'palette4d install-plugin' again";
+
+bool absolute(const std::string& path) {
+#if defined(_WIN32)
+    return path.size() > 2 && std::isalpha(static_cast<unsigned char>(path[0])) != 0 &&
+           path[1] == ':' && (path[2] == '\\' || path[2] == '/');
+#else
+    return path[0] == '/';
+#endif
+}
+
+/// The file's text, at most one byte longer than the limit; else what is wrong with the file.
+std::string text_of(const fs::path& file, std::string& problem) {
+    std::string text(kMaxProgramBytes + 1, '\0');
+    std::size_t size = 0;
+#if defined(_WIN32)
+    const HANDLE handle = CreateFileW(file.c_str(), GENERIC_READ, FILE_SHARE_READ, nullptr,
+                                      OPEN_EXISTING, FILE_ATTRIBUTE_NORMAL, nullptr);
+    if (handle == INVALID_HANDLE_VALUE) {
+        problem = "found no such file";
+        return "";
+    }
+    DWORD got = 0;
+    if (GetFileType(handle) != FILE_TYPE_DISK ||
+        !ReadFile(handle, &text[0], static_cast<DWORD>(text.size()), &got, nullptr)) {
+        problem = "it is not a file that can be read";
+    }
+    size = got;
+    CloseHandle(handle);
+#else
+    const int handle = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
+    if (handle < 0) {
+        problem = errno == ENOENT ? "found no such file"
+                                  : std::string("it cannot be read: ") + std::strerror(errno);
+        return "";
+    }
+    struct stat about{};
+    if (::fstat(handle, &about) != 0 || !S_ISREG(about.st_mode)) {
+        problem = "it is not a file";
+    } else if (about.st_uid != 0 && about.st_uid != ::geteuid()) {
+        problem = "found a file of another user, expected one of yours or of root";
+    } else if ((about.st_mode & S_IWOTH) != 0) {
+        problem = "found a file that every user may change, expected one that only its owner may";
+    } else {
+        ssize_t got = 0;
+        while (size < text.size() && (got = ::read(handle, &text[size], text.size() - size)) > 0) {
+            size += static_cast<std::size_t>(got);
+        }
+        if (got < 0) problem = std::string("it cannot be read: ") + std::strerror(errno);
+    }
+    ::close(handle);
+#endif
+    text.resize(problem.empty() ? size : 0);
+    return text;
+}
+
+bool executable(const std::string& path) {
+    std::error_code error;
+    if (!fs::is_regular_file(native(path), error)) return false;
+#if defined(_WIN32)
+    return true;
+#else
+    return ::access(path.c_str(), X_OK) == 0;
+#endif
+}
+
+}  // namespace
+
+ProgramPath parse_program(const std::string& text) {
+    if (text.size() > kMaxProgramBytes) {
+        return {"", "found more than " + std::to_string(kMaxProgramBytes) +
+                        " bytes, expected one line with a path"};
+    }
+    std::string line = text;
+    if (!line.empty() && line.back() == '\n') line.pop_back();
+    if (!line.empty() && line.back() == '\r') line.pop_back();
+    const bool plain = std::none_of(line.begin(), line.end(), [](char c) {
+        const auto code = static_cast<unsigned char>(c);
+        return code < 0x20 || code == 0x7f;
+    });
+    if (line.empty() || !plain || !absolute(line)) {
+        return {"", "found something else than one line with an absolute path"};
+    }
+    return {line, ""};
+}
+
+ProgramPath read_program(const fs::path& file) {
+    ProgramPath found;
+    const std::string text = text_of(file, found.problem);
+    if (found.problem.empty()) found = parse_program(text);
+    if (found.problem.empty() && !executable(found.path)) {
+        found.problem = "it names " + found.path + ", which is not a program";
+    }
+    if (found.problem.empty()) return found;
+    return {"", file.u8string() + ": " + found.problem + kRemedy};
+}
+
+}  // namespace palette4d::node

@@ -1,0 +1,182 @@
+"""Making picks: the colour at a pixel, and the path of a colour through its clip."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palette4d import _core
+from palette4d.common.errors import Palette4dError
+from palette4d.grade import follow
+from palette4d.grade.edits import Colour, as_colour
+from palette4d.grade.follow import Progress
+from palette4d.grade.picks import PathKey, Pick
+from palette4d.media.clip_base import describe
+from palette4d.media.source_clip import find_clip, nearest_frame
+
+if TYPE_CHECKING:
+    from palette4d.media.clip_base import Clip
+
+Given = str | os.PathLike[str] | None
+DIGITS = 6
+
+#: A box has a spread if more than 1 - MOST_COLOURS of its pixels are farther than WIDE from the
+#: mean. It is told by at most MOST_SPREAD further colours.
+WIDE, MOST_COLOURS, MOST_SPREAD = 0.04, 0.9, 2
+
+
+class ClipOfPicks:
+    """The clip of a sidecar, opened when it is needed.
+
+    Parameters
+    ----------
+    clip : mapping
+        The sidecar's member "clip".
+    conversion : ColourConversion or None
+        From the clip's code values to the palette's.
+    sidecar : Path or None
+        The sidecar, for the path of its clip.
+    given : path, optional
+        The user's clip instead.
+    """
+
+    def __init__(
+        self,
+        clip: Mapping[str, Any],
+        conversion: _core.ColourConversion | None,
+        sidecar: Path | None,
+        given: Given = None,
+    ) -> None:
+        self._fields, self._conversion = clip, conversion
+        self._sidecar, self._given = sidecar or Path("unsaved.p4d.json"), given
+
+    def open(self) -> Clip | None:
+        """Return the clip, or None if none was given and the sidecar's clip is not there.
+
+        Raises
+        ------
+        Palette4dError
+            The given clip cannot be opened, or the clip is not the sidecar's.
+        """
+        given = None if self._given is None else os.fspath(self._given)
+        clip = find_clip(self._sidecar, self._fields, given)
+        if clip is None:
+            return None
+        width, height = self._fields["size"]
+        frames = self._fields["frames"]
+        known = range(frames["first"], frames["last"] + 1, frames["step"])
+        if (clip.width, clip.height) != (width, height):
+            raise Palette4dError(
+                f"{clip.source} has {clip.width}x{clip.height} pixels, but the palette's clip has "
+                f"{width}x{height}: it is another clip. Give the palette's clip as clip=…, or "
+                "pick by colour=… with follow=False"
+            )
+        if missing := [frame for frame in (known[0], known[-1]) if frame not in clip.frames]:
+            raise Palette4dError(
+                f"{clip.source} has the frames {describe(clip.frames)}, but not frame "
+                f"{missing[0]} of the palette's clip ({known[0]} to {known[-1]}): it is another "
+                "clip. Give the palette's clip as clip=…, or pick by colour=… with follow=False"
+            )
+        return clip
+
+    def colours(
+        self, frame: float, pixel: tuple[float, float], box: int
+    ) -> tuple[Colour, tuple[Colour, ...]]:
+        """Return the mean colour of a box around a pixel, and its spread (`Pick.spread`).
+
+        Colours are in the palette's code values.
+
+        Raises
+        ------
+        Palette4dError
+            The pixel or the frame is not there, or the box holds no colour.
+        """
+        clip = self.open()
+        if clip is None:
+            raise Palette4dError(
+                f"the clip {self._fields['source']!r} is not there, so that its pixels cannot be "
+                "read; give clip=…, or the colour itself with colour=…"
+            )
+        if frame not in clip.frames:
+            raise Palette4dError(
+                f"{clip.source} has no frame {frame:g}; expected one of {describe(clip.frames)}"
+            )
+        x, y = pixel
+        if not (0 <= x < clip.width and 0 <= y < clip.height):
+            raise Palette4dError(
+                f"the pixel {x:g},{y:g} lies outside the picture; expected 0,0 (top left) to "
+                f"{clip.width - 1},{clip.height - 1}"
+            )
+        if box < 1:
+            raise Palette4dError(f"found a box of {box} pixels, expected at least 1")
+        pixels = clip.straight_colours(clip.read(int(frame)))
+        left, top = (max(0, math.floor(at) - (box - 1) // 2) for at in (x, y))
+        right, bottom = (math.floor(at) + box // 2 + 1 for at in (x, y))
+        found = pixels[top:bottom, left:right].reshape(-1, 3).astype(np.float64)
+        found = found[np.isfinite(found).all(axis=1)]
+        if not len(found):
+            raise Palette4dError(
+                f"the pixel {x:g},{y:g} of frame {frame:g} has no colour: it is transparent or not "
+                "a finite number. Pick another pixel, or a larger box=…"
+            )
+        if self._conversion is not None:
+            found = self._conversion.to_palette(found)
+        mean = np.round(found.mean(axis=0), DIGITS)
+        return as_colour(mean), tuple(as_colour(offset) for offset in _spread(found - mean))
+
+    def path(self, pick: Pick, progress: Progress | None = None) -> tuple[PathKey, ...]:
+        """Return the path of a pick from its own colour and the given keys of its path.
+
+        Empty if the clip is not there, or if the range is a single frame.
+        """
+        frames = self._fields["frames"]
+        begin, _, _, end = pick.knots(frames["step"])
+        span = max(begin, frames["first"]), min(end, frames["last"])
+        if span[0] >= span[1] or (clip := self.open()) is None:
+            return tuple(key for key in pick.path if key.given)
+        starts = [(nearest_frame(clip, pick.frame), pick.rgb)]
+        given = [key for key in pick.path if key.given and key.frame != pick.frame]
+        starts += [(nearest_frame(clip, key.frame), key.rgb) for key in given]
+        return follow.paths(clip, starts, span, conversion=self._conversion, progress=progress)
+
+
+def _spread(offsets: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (n, 3) offsets, so that most of a box's colours are near one of them or the mean.
+
+    A box of one colour needs none; a box that spans a gradient gets its ends.
+    """
+    points = np.zeros((1, 3))
+    while len(points) <= MOST_SPREAD:
+        away = np.linalg.norm(offsets[:, None] - points, axis=2).min(axis=1)
+        far = np.quantile(away, MOST_COLOURS, method="lower")
+        if far < WIDE:
+            break
+        candidate = offsets[np.flatnonzero(away == far)[0]]
+        near = np.linalg.norm(offsets - candidate, axis=1) < away
+        points = np.vstack([points, offsets[near].mean(axis=0)])
+    return np.round(points[1:], DIGITS)
+
+
+def corrected(pick: Pick, frame: float, rgb: Colour) -> Pick:
+    """Return a pick whose path goes through a colour at another frame, before it is followed.
+
+    Raises
+    ------
+    Palette4dError
+        The frame is the pick's own.
+    """
+    if frame == pick.frame:
+        raise Palette4dError(
+            f"{pick.id} was picked at frame {frame:g} itself, expected another frame: change its "
+            "colour=… there"
+        )
+    keys = {key.frame: key for key in pick.path if key.given and key.frame != pick.frame}
+    keys[frame] = PathKey(frame, rgb, True)
+    return replace(pick, path=tuple(keys[f] for f in sorted(keys)))

@@ -1,0 +1,383 @@
+"""A palette with the user's edits: what it holds, and the steps that change it.
+
+Every change goes through `EditedPalette.apply`, which takes one `Edit`; `undo` reverts it. Handles
+are edited in `handle_edits`, picks in `pick_edits`.
+"""
+
+import contextlib
+import copy
+import math
+import re
+from collections.abc import Generator, Iterable
+from dataclasses import replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from palette4d import _core
+from palette4d.common.errors import Palette4dError
+from palette4d.grade import edits, sidecar
+from palette4d.grade.edits import (
+    RAMP,
+    Change,
+    Colour,
+    Edit,
+    Key,
+    Kind,
+    Ramp,
+    Setting,
+    Settings,
+    State,
+    as_colour,
+)
+from palette4d.grade.handles import Handles
+from palette4d.grade.palette import Near, Palette, palette_at
+from palette4d.grade.sidecar import Fields
+from palette4d.grade.tracks import Track, tracks_of
+
+#: A member `edits.solution`, and the measured members of each pick by its id.
+Solved = tuple[Fields, dict[str, Fields]]
+
+#: The kinds that recolouring uses; versions wait.
+ACTIVE: tuple[Kind, ...] = ("handle", "ramp", "pick", "lock")
+
+#: Names of scene-linear colour spaces: "Linear", "lin_rec709", "ACEScg", "ACES2065-1", ...
+_LINEAR = re.compile(r"\blin(ear)?(\b|_)|scene.linear|acescg|aces2065", re.IGNORECASE)
+
+
+class EditedPalette:
+    """A palette and its edits in memory; `Document` adds the file.
+
+    Attributes
+    ----------
+    path : Path or None
+        The sidecar; None until it is saved.
+    """
+
+    path: Path | None
+
+    def _start(self, data: bytes, core: _core.Sidecar) -> None:
+        self._fields: Fields = sidecar.fields_of(data)
+        self._core: _core.Sidecar | None = core  # of `_state`; None: parse it on demand
+        self._from_input = core.conversion
+        self._handles = Handles(self._fields["polytope"])
+        self._become(sidecar.state_of(self._fields))
+        self._solved: Solved | None = stored_solution(self._fields["edits"])
+        self._done, self._undone = sidecar.history_of(self._fields, self._name)
+        self._mark_saved()
+
+    def _become(self, state: State) -> None:
+        self._state = state
+        self._own: _core.Sidecar | None = None  # without the picks; None: parse it on demand
+        self._settings: dict[str, Setting] = {
+            id_: value for (kind, id_), value in state.items() if kind == "handle"
+        }
+
+    def _mark_saved(self) -> None:
+        self._saved = (self._state, self._done, self._undone)
+
+    # ------------------------------------------------------------------------------ what it holds
+
+    @property
+    def core(self) -> _core.Sidecar:
+        """The core's view of the document, for this package."""
+        if self._core is None:
+            fields = self._members()
+            for member in ("history", "colours"):  # the core needs neither
+                fields.pop(member, None)
+            self._core = _core.parse_sidecar(sidecar.encoded(fields), self._name)
+        return self._core
+
+    @property
+    def _name(self) -> str:
+        return "<document>" if self.path is None else str(self.path)
+
+    def fields(self) -> Fields:
+        """Return the members of the sidecar that `save` would write (docs/sidecar.md)."""
+        return copy.deepcopy(self._members())
+
+    def _members(self) -> Fields:
+        """Return the sidecar's members; they share values with the document."""
+        ids = (vertex["id"] for vertex in self._fields["polytope"]["vertices"])
+        fields = sidecar.with_state(self._fields, self._state, ids)
+        if self._solved is None:
+            self._solved = _solve(fields)
+        solution, measured = self._solved
+        found = fields["edits"]
+        if measured:
+            found["picks"] = [{**p, **measured.get(p["id"], {})} for p in found["picks"]]
+        if solution:
+            found["solution"] = solution
+        return sidecar.with_history(fields, self._done, self._undone)
+
+    @property
+    def frames(self) -> tuple[int, int, int]:
+        """First and last frame number of the clip, and the step between frames."""
+        found = self._fields["clip"]["frames"]
+        return found["first"], found["last"], found["step"]
+
+    @property
+    def encoding(self) -> str:
+        """The colour space of the palette's code values, or "unknown"."""
+        return str(self._fields["clip"]["encoding"])
+
+    @property
+    def scene_linear(self) -> bool:
+        """Whether the clip is scene-linear, or its palette reaches far above 1."""
+        clip = self._fields["clip"]
+        names = (clip["encoding"], clip.get("conversion", {}).get("input_space", ""))
+        brightest = max(max(v["rgb"]) for v in self._handles.vertices.values())
+        return any(_LINEAR.search(name) for name in names) or brightest > 2
+
+    @property
+    def settings(self) -> Settings:
+        """The settings of the edited vertices and of the stops, by id."""
+        return MappingProxyType(self._settings)
+
+    @property
+    def state(self) -> State:
+        """Everything that the user set, by kind and id (`palette4d.grade.edits`)."""
+        return MappingProxyType(dict(self._state))
+
+    @property
+    def edited(self) -> bool:
+        """Whether any handle is edited or any colour is picked."""
+        return any(kind in ("handle", "pick") for kind, _ in self._state)
+
+    @property
+    def history(self) -> tuple[Edit, ...]:
+        """The steps that `undo` reverts, oldest first; also those of earlier sessions."""
+        return tuple(self._done)
+
+    @property
+    def undone(self) -> tuple[Edit, ...]:
+        """The steps that `redo` applies again, the next one last."""
+        return tuple(self._undone)
+
+    @property
+    def ramp(self) -> Ramp:
+        """The clip's ramp between handles: "linear", "smooth" or "hold"."""
+        found: Ramp = self._state.get(RAMP, "linear")
+        return found
+
+    def check_frame(self, frame: float) -> None:
+        """Refuse a time outside the clip."""
+        first, last, _ = self.frames
+        if not first <= _finite(frame) <= last:
+            raise Palette4dError(
+                f"frame {frame:g} is outside of the clip; choose one from {first} to {last}"
+            )
+
+    def check_code_values(self, rgb: Iterable[float]) -> None:
+        """Refuse a colour that looks like integers of 8 bits or more, such as 255 128 0.
+
+        Scene-linear clips accept all colours: their code values may be large.
+        """
+        values = as_colour(rgb)
+        largest = max(values)
+        whole = largest > 1 and all(value.is_integer() for value in values)
+        if self.scene_linear or not (whole or largest > 16):
+            return
+        bits = next(n for n in (8, 10, 12, 16, 32) if largest < 2**n)
+        shown = " ".join(f"{value:g}" for value in values)
+        scaled = " ".join(f"{value / (2**bits - 1):.4g}" for value in values)
+        raise Palette4dError(
+            f"found the colour {shown}, expected code values where 1 is display white; "
+            f"{shown} in {bits} bits is {scaled}. Give that, or add any_value=True if "
+            f"{shown} is meant"
+        )
+
+    @property
+    def tracks(self) -> list[Track]:
+        """The palette's colours through time: the rows of `palette4d plot`."""
+        return tracks_of(self._handles)
+
+    def palette(self, frame: float) -> Palette:
+        """Return the palette at a time: ids, colours as analysed and as edited, faces.
+
+        Frames outside the clip give its first or last.
+        """
+        return palette_at(self.core, _finite(frame))
+
+    def colour(self, id: str, *, frame: float | None = None) -> Colour:
+        """Return the edited colour of a vertex or stop, or of an edge at a frame."""
+        if (setting := self._settings.get(id)) is not None:
+            return setting.rgb
+        if frame is None or id in self._handles.vertices:
+            return as_colour(self._handles.vertex(id, self._settings)["rgb"])
+        self.check_frame(frame)
+        self._check_inside(id, frame)
+        palette = self.palette(frame)
+        return as_colour(palette.edited[palette.ids.index(id)])
+
+    def named(self, id: str) -> str:
+        """Return a handle with its place, for people: "stop s1 (edge e3, frame 4.5)"."""
+        setting = self._settings.get(id)
+        if setting is not None and setting.edge is not None:
+            return f"stop {id} (edge {setting.edge}, frame {setting.frame:g})"
+        if id in self._handles.vertices:
+            return f"vertex {id} (frame {self._handles.vertices[id]['frame']:g})"
+        return id
+
+    def near(self, rgb: Iterable[float], *, frame: float) -> Near:
+        """Return the palette colour nearest to a given colour at a frame.
+
+        The edited palette is compared. The handle is the stop at that time, or the vertex of the
+        colour's edge within half a frame step of that time.
+        """
+        wanted = as_colour(rgb)
+        self.check_frame(frame)
+        palette = self.palette(frame)
+        index, distance = palette.nearest(wanted)
+        id_ = palette.ids[index]
+        return Near(
+            frame=frame,
+            id=id_,
+            handle=self._handle_at(id_, palette.ends[index], frame),
+            rgb=as_colour(palette.edited[index]),
+            distance=distance,
+            shares=palette.shares(wanted),
+        )
+
+    def _handle_at(self, id_: str, ends: tuple[str, str], frame: float) -> str | None:
+        if id_ == ends[0]:
+            return id_
+        if (stop := self._stop_at(id_, frame)) is not None:
+            return stop
+        away = {end: abs(self._handles.vertex(end)["frame"] - frame) for end in ends}
+        nearest = min(ends, key=lambda end: away[end])
+        return nearest if away[nearest] <= self.frames[2] / 2 else None
+
+    # -------------------------------------------------------------------------------------- steps
+
+    def apply(self, edit: Edit) -> None:
+        """Apply an edit as one step, which `undo` reverts; an edit without change is no step."""
+        edit = replace(edit, changes=tuple(c for c in edit.changes if c.before != c.after))
+        if not edit.changes:
+            return
+        self._change(edit)
+        self._done = [*self._done, edit]
+        self._undone = []
+
+    @contextlib.contextmanager
+    def one_step(self, label: str) -> Generator[None]:
+        """Make all edits in a ``with`` block one step; an error in it reverts them all."""
+        state, done, undone = self._state, self._done, self._undone
+        try:
+            yield
+        except BaseException:
+            self._become(state)
+            self._done, self._undone, self._core, self._solved = done, undone, None, None
+            raise
+        edit = edits.difference(state, self._state, label)
+        self._done, self._undone = ([*done, edit], []) if edit.changes else (done, undone)
+
+    def undo(self) -> Edit:
+        """Revert the last step, and return it. Steps of earlier sessions can be reverted too."""
+        if not self._done:
+            raise Palette4dError("there is nothing to undo: the palette has no earlier step")
+        step = self._done[-1]
+        self._change(step.inverse())
+        self._done, self._undone = self._done[:-1], [*self._undone, step]
+        return step
+
+    def redo(self) -> Edit:
+        """Apply the last undone step again, and return it."""
+        if not self._undone:
+            raise Palette4dError("there is nothing to redo: no step was undone since the last edit")
+        step = self._undone[-1]
+        self._change(step)
+        self._done, self._undone = [*self._done, step], self._undone[:-1]
+        return step
+
+    def forget_history(self) -> None:
+        """Drop all steps, done and undone; the edits stay."""
+        self._done, self._undone = [], []
+
+    def _change(self, edit: Edit) -> None:
+        self._become(edit.apply(self._state))
+        self._core = None
+        self._solved = None
+
+    def _put(self, kind: Kind, id: str, value: Any, label: str) -> None:
+        """Set one value of the state (None: remove it) as one step."""
+        self.apply(Edit((Change(kind, id, self._state.get((kind, id)), value),), label))
+
+    def _remove(self, keys: Iterable[Key], label: str) -> None:
+        changes = tuple(Change(*key, self._state[key], None) for key in keys)
+        self.apply(Edit(changes, label))
+
+    def _active(self) -> dict[Key, Any]:
+        return {key: value for key, value in self._state.items() if key[0] in ACTIVE}
+
+    # ------------------------------------------------------------------------------------ details
+
+    def _checked(self, rgb: Iterable[float] | str, any_value: bool) -> Colour:
+        colour = as_colour(rgb)
+        if not any_value:
+            self.check_code_values(colour)
+        return colour
+
+    def _conversion(self, space: str) -> _core.ColourConversion | None:
+        if space not in ("input", "palette"):
+            raise Palette4dError(f"found the space {space!r}, expected 'input' or 'palette'")
+        own = self._from_input
+        return None if own is None or space == "palette" else own.steps
+
+    def frame_of(self, id: str | None, frame: float | None = None) -> float:
+        """Return the frame of a vertex or stop; for an edge, the frame that is given."""
+        if id in self._handles.edges:
+            if frame is None:
+                raise self._handles.needs_frame(id)
+            return frame
+        setting = self._settings.get(id or "")
+        if setting is not None and setting.frame is not None:
+            return setting.frame
+        found: float = self._handles.vertex(id or "", self._settings)["frame"]
+        return found
+
+    def _taken(self) -> frozenset[str]:
+        return frozenset((*self._handles.vertices, *self._handles.edges))
+
+    def _stop_at(self, edge: str, frame: float) -> str | None:
+        for id_, setting in self._settings.items():
+            if setting.edge == edge and setting.frame == frame:
+                return id_
+        return None
+
+    def _check_inside(self, edge: str, frame: float) -> None:
+        if edge in self._settings or edge in self._handles.vertices:
+            raise Palette4dError(
+                f"{self.named(edge)} has a time of its own: leave out frame=…, which is for "
+                "edges and for near=…"
+            )
+        self._handles.check_inside(edge, frame)
+
+
+def stored_solution(found: Fields) -> Solved:
+    """Return the solution in a sidecar's member "edits", and what it measured of each pick."""
+    measured = {
+        pick["id"]: {name: pick[name] for name in edits.MEASURED if name in pick}
+        for pick in found.get("picks", ())
+    }
+    return found.get("solution", {}), measured
+
+
+def _solve(fields: Fields) -> Solved:
+    """Return the solution of the picks in a sidecar's members, and what it measured of each."""
+    if not any(pick.get("enabled", True) for pick in fields["edits"].get("picks", ())):
+        return {}, {}
+    from palette4d.grade import solve
+
+    return solve.solve(fields)
+
+
+def text_of(colour: Colour) -> str:
+    """Return three code values for people."""
+    return " ".join(f"{value:.4g}" for value in colour)
+
+
+def _finite(frame: float) -> float:
+    if not math.isfinite(frame):
+        raise Palette4dError(f"found the frame {frame}, expected a finite number")
+    return float(frame)

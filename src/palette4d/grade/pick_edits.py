@@ -1,0 +1,336 @@
+"""Picks and holds of a palette: made, changed, removed; and what they do."""
+
+import os
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from palette4d.common.errors import Palette4dError
+from palette4d.common.text import hex_of
+from palette4d.grade import edits
+from palette4d.grade.edited_palette import EditedPalette
+from palette4d.grade.edits import Colour, as_colour
+from palette4d.grade.handles import unknown
+from palette4d.grade.moves import range_text
+from palette4d.grade.picks import MOST_PICKS, Pick, Toward, all_picks, check_range
+
+if TYPE_CHECKING:
+    from palette4d.grade.clip_of_picks import ClipOfPicks
+
+
+class PickEdits(EditedPalette):
+    """The picks and locks of a palette. `solve` finds what they move."""
+
+    @property
+    def picks(self) -> tuple[Pick, ...]:
+        """The picks and holds, with their measured residuals, in the order of their ids."""
+        return all_picks(self._members()["edits"])
+
+    def pick(
+        self,
+        frame: float,
+        *,
+        colour: Iterable[float] | str | None = None,
+        pixel: tuple[float, float] | None = None,
+        box: int = 1,
+        to: Iterable[float] | str | None = None,
+        by: Iterable[float] | None = None,
+        clip: str | os.PathLike[str] | None = None,
+        follow: bool = True,
+        toward: Toward = "shift",
+        start: float | None = None,
+        until: float | None = None,
+        fade: float = 0.0,
+        radius: float | None = None,
+        global_only: bool = False,
+        any_value: bool = False,
+        progress: Callable[[int, int], object] | None = None,
+    ) -> Pick:
+        """Change a colour of the clip into another one, and little else.
+
+        All picks and holds are solved together, again after every edit (docs/grading.md).
+
+        Parameters
+        ----------
+        frame : float
+            Where the colour is picked.
+        colour : 3 floats or "#rrggbb"
+            The picked colour as it is before edits, in the palette's code values.
+        pixel : (float, float)
+            Instead of `colour`: a pixel of the clip's frame, x from the left, y from the top.
+        box : int
+            With `pixel`: the side of the box around it whose mean is picked.
+        to, by : 3 floats
+            The new colour, or the change; one of them.
+        clip : path, optional
+            The clip; default: the sidecar's.
+        follow : bool
+            Follow the colour through the clip. Without the clip, or without this, the pick is at
+            the same colour in all frames.
+        toward : {"shift", "colour"}
+            At other frames: the same change, or the same new colour.
+        start, until : float, optional
+            First and last frame with the full change; default: the clip's.
+        fade : float
+            Frames of the ramps before `start` and after `until`; beyond them nothing changes.
+        radius : float, optional
+            Where the local remainder ends, in code values.
+        global_only : bool
+            No local remainder: only palette colours move.
+        any_value : bool
+            Take colours such as 255 128 0 as they are.
+        progress : callable, optional
+            Called as progress(done, total) while frames are read.
+
+        Returns
+        -------
+        Pick
+            With its id and its path. `picks` has it with what solving measures.
+
+        Raises
+        ------
+        Palette4dError
+            A value is out of range, or the clip does not fit.
+        """
+        at = self._picked(frame, colour, pixel, box, clip, any_value)
+        if to is not None and by is None:
+            new = self._checked(to, any_value)
+        elif by is not None and to is None:
+            change = as_colour(by, "change")
+            new = as_colour([a + b for a, b in zip(at.rgb, change, strict=True)])
+        else:
+            raise Palette4dError(
+                f"found {'neither' if to is None else 'both'} of the new colour (to) and the "
+                "change (by), expected one of them"
+            )
+        found = replace(at, kind="pick", to=new, toward=toward, start=start, until=until)
+        found = replace(found, fade=fade, radius=radius, global_only=global_only)
+        return self._add_pick(found, clip, follow, progress)
+
+    def hold(
+        self,
+        frame: float,
+        *,
+        colour: Iterable[float] | str | None = None,
+        pixel: tuple[float, float] | None = None,
+        box: int = 1,
+        clip: str | os.PathLike[str] | None = None,
+        follow: bool = True,
+        start: float | None = None,
+        until: float | None = None,
+        fade: float = 0.0,
+        radius: float | None = None,
+        global_only: bool = False,
+        any_value: bool = False,
+        progress: Callable[[int, int], object] | None = None,
+    ) -> Pick:
+        """Keep a colour of the clip as it is, whatever picks and handles do; as `pick`."""
+        at = self._picked(frame, colour, pixel, box, clip, any_value)
+        found = replace(at, start=start, until=until, fade=fade, radius=radius)
+        return self._add_pick(replace(found, global_only=global_only), clip, follow, progress)
+
+    def correct_path(
+        self,
+        id: str,
+        frame: float,
+        *,
+        colour: Iterable[float] | str | None = None,
+        pixel: tuple[float, float] | None = None,
+        box: int = 1,
+        clip: str | os.PathLike[str] | None = None,
+        any_value: bool = False,
+        progress: Callable[[int, int], object] | None = None,
+    ) -> Pick:
+        """Say where the colour of a pick or hold is at another frame; it is followed again.
+
+        Between two given frames the path goes gradually from what follows the one to what follows
+        the other.
+        """
+        from palette4d.grade.clip_of_picks import corrected
+
+        at = self._picked(frame, colour, pixel, box, clip, any_value)
+        found = corrected(self._pick(id), at.frame, at.rgb)
+        found = replace(found, path=self._clip_of_picks(clip).path(found, progress))
+        self._put("pick", id, found.to_fields(), f"correct {id} at frame {frame:g}")
+        return self._pick(id)
+
+    def change_pick(
+        self,
+        id: str,
+        *,
+        by: Iterable[float] | None = None,
+        any_value: bool = False,
+        clip: str | os.PathLike[str] | None = None,
+        progress: Callable[[int, int], object] | None = None,
+        **changes: Any,
+    ) -> Pick:
+        """Change a pick or hold: any of the attributes of `Pick` but id, kind and path.
+
+        `by` gives the new colour as offsets from the picked colour. A new `frame`, `rgb` or range
+        is followed again, if the pick was followed.
+        """
+        old = self._pick(id)
+        if by is not None:
+            base = as_colour(changes.get("rgb", old.rgb))
+            changes["to"] = [a + b for a, b in zip(base, as_colour(by, "offset"), strict=True)]
+        for name in ("rgb", "to"):
+            if name in changes:
+                changes[name] = self._checked(changes[name], any_value)
+        if old.kind == "hold" and (bad := {"to", "toward"} & changes.keys()):
+            raise Palette4dError(f"{id} is a hold, which has no {' and no '.join(sorted(bad))}")
+        new = replace(old, **changes)
+        self._check_pick(new)
+        moved = {"frame", "rgb", "start", "until", "fade"} & changes.keys()
+        if moved and old.path:
+            given = tuple(key for key in old.path if key.given and key.frame != old.frame)
+            path = self._clip_of_picks(clip).path(replace(new, path=given), progress)
+            new = replace(new, path=path)
+        label = f"change {id}: {_asked(new)}"
+        if old.enabled != new.enabled:
+            label = f"{'enable' if new.enabled else 'disable'} {id}"
+        self._put("pick", id, new.to_fields(), label)
+        return self._pick(id)
+
+    def unpick(self, *ids: str) -> None:
+        """Remove picks and holds."""
+        for id_ in ids:
+            self._pick(id_)
+        self._remove([("pick", id_) for id_ in dict.fromkeys(ids)], f"remove {' '.join(ids)}")
+
+    def lock(self, *ids: str) -> None:
+        """Keep vertices and stops where they are: picks do not move them."""
+        for id_ in ids:
+            if id_ not in self._settings:
+                self._handles.vertex(id_, self._settings)
+        with self.one_step(f"lock {' '.join(ids)}"):
+            for id_ in ids:
+                self._put("lock", id_, True, "")
+
+    def unlock(self, *ids: str) -> None:
+        """Let picks move these vertices and stops again."""
+        for id_ in ids:
+            if ("lock", id_) not in self._state:
+                locked = [known for kind, known in self._state if kind == "lock"]
+                raise unknown(id_, "lock", locked, "palette4d edit SIDECAR picks")
+        self._remove([("lock", id_) for id_ in dict.fromkeys(ids)], f"unlock {' '.join(ids)}")
+
+    @property
+    def locks(self) -> tuple[str, ...]:
+        """The ids of the handles that picks do not move."""
+        return tuple(edits.to_fields(self._state, ()).get("locks", ()))
+
+    @property
+    def has_clip_colours(self) -> bool:
+        """Whether the sidecar has colours of its clip; without, picks guard the palette's only."""
+        return bool(self._fields.get("colours"))
+
+    def moved_by_picks(self) -> tuple[int, int]:
+        """Return how many tracks picks move by more than 1/255, and how many there are."""
+        solution = self._members()["edits"].get("solution", {"vertices": [], "keys": []})
+        moved = {
+            entry.get("vertex") or entry["edge"]
+            for entry in (*solution["vertices"], *solution["keys"])
+            if max(map(abs, entry["by"])) > 1 / 255
+        }
+        tracks = [{*track.vertices, *track.edges} for track in self.tracks]
+        return sum(not moved.isdisjoint(track) for track in tracks), len(tracks)
+
+    def side_effect(self, frame: float, *, least: float = 10 / 255) -> tuple[float, Colour]:
+        """Return what picks do to other colours at a frame.
+
+        Returns
+        -------
+        share : float
+            Share, 0..1, of the pixels that are not near a picked colour and change by more than
+            `least` in a channel.
+        most : tuple of float
+            The colour for which this matters most: one to hold.
+        """
+        from palette4d.grade import solve
+
+        self.check_frame(frame)
+        return solve.side_effect(self._members(), frame, least)
+
+    def colour_of_pixel(
+        self,
+        frame: float,
+        pixel: tuple[float, float],
+        box: int = 1,
+        clip: str | os.PathLike[str] | None = None,
+    ) -> Colour:
+        """Return the mean colour of a box around a pixel of the clip, in the palette's values."""
+        self.check_frame(frame)
+        return self._clip_of_picks(clip).colours(frame, pixel, box)[0]
+
+    def _clip_of_picks(self, clip: str | os.PathLike[str] | None) -> "ClipOfPicks":
+        from palette4d.grade.clip_of_picks import ClipOfPicks
+
+        conversion = self._conversion("input")
+        return ClipOfPicks(self._fields["clip"], conversion, self.path, clip)
+
+    def _picked(
+        self,
+        frame: float,
+        colour: Iterable[float] | str | None,
+        pixel: tuple[float, float] | None,
+        box: int,
+        clip: str | os.PathLike[str] | None,
+        any_value: bool,
+    ) -> Pick:
+        """Return a hold of a colour at a frame."""
+        self.check_frame(frame)
+        if colour is not None and pixel is None:
+            return Pick("", "hold", frame, self._checked(colour, any_value))
+        if colour is None and pixel is not None:
+            rgb, spread = self._clip_of_picks(clip).colours(frame, pixel, box)
+            return Pick("", "hold", frame, rgb, pixel=pixel, box=box, spread=spread)
+        raise Palette4dError(
+            f"found {'neither' if colour is None else 'both'} of a colour and a pixel, expected "
+            "one of them"
+        )
+
+    def _add_pick(
+        self,
+        found: Pick,
+        clip: str | os.PathLike[str] | None,
+        follow: bool,
+        progress: Callable[[int, int], object] | None,
+    ) -> Pick:
+        enabled = sum(
+            kind == "pick" and v.get("enabled", True) for (kind, _), v in self._state.items()
+        )
+        if enabled >= MOST_PICKS:
+            raise Palette4dError(
+                f"there are {enabled} picks and holds, and at most {MOST_PICKS} can be "
+                "solved together; remove or disable some (`unpick`, `disable`)"
+            )
+        self._check_pick(found)
+        if follow:
+            found = replace(found, path=self._clip_of_picks(clip).path(found, progress))
+        taken = (id_ for kind, id_ in self._state if kind == "pick")
+        found = replace(found, id=edits.new_id("p", taken))
+        self._put("pick", found.id, found.to_fields(), f"{found.kind} {found.id}: {_asked(found)}")
+        return self._pick(found.id)
+
+    def _check_pick(self, found: Pick) -> None:
+        self.check_frame(found.frame)
+        check_range(found, self.frames)
+
+    def _pick(self, id_: str) -> Pick:
+        """Return a pick as the user asked for it; nothing is solved."""
+        found = self._state.get(("pick", id_))
+        if found is None:
+            known = [known for kind, known in self._state if kind == "pick"]
+            raise unknown(id_, "pick or hold", known, "palette4d edit SIDECAR picks")
+        return Pick.from_fields(found)
+
+
+def _asked(pick: Pick) -> str:
+    """Return what a pick asks for, for people: "#5ca832 to #803020 at frame 30"."""
+    text = hex_of(pick.rgb)
+    if pick.to is not None:
+        text += f" to {hex_of(pick.to)}"
+    text += f" at frame {pick.frame:g}"
+    if pick.start is not None or pick.until is not None:
+        text += f", {range_text(pick.start, pick.until)}"
+    return text

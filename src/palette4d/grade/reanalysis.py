@@ -1,0 +1,60 @@
+"""A new analysis in the place of an old sidecar: what becomes of the user's work in it."""
+
+import itertools
+from pathlib import Path
+from typing import Any
+
+from palette4d.common.files import link_target, replacing
+from palette4d.grade import sidecar
+from palette4d.grade.document import Document
+from palette4d.grade.sidecar import Fields, OnEdits
+
+
+def save(fields: Fields, path: Path, *, on_edits: OnEdits = "refuse") -> tuple[Fields, list[str]]:
+    """Write the sidecar of a new analysis; return it as written, and notes for the user.
+
+    With `on_edits` "keep" and another palette than before, the grade is copied to the new palette,
+    with its versions and picks, and the old file is kept under another name.
+
+    Parameters
+    ----------
+    fields, path, on_edits
+        As for `sidecar.save`.
+
+    Raises
+    ------
+    Palette4dError
+        As `sidecar.save`; or the grade cannot be copied.
+    """
+    target = link_target(path)
+    old = sidecar.existing(target, on_edits) if on_edits == "keep" else None
+    keeps = old is not None and sidecar.has_edits(old) and not sidecar.has_edits(fields)
+    if old is None or not keeps or sidecar.same_palette(old, fields):
+        return sidecar.save(fields, target, on_edits=on_edits), []
+    read = sidecar.read_bytes(target)
+    former, new = Document.load(target), Document(fields)
+    notes = []
+    with new.one_step("copy the grade of the former analysis"):
+        for name in former.versions:
+            if (version := former.version(name)).edited:
+                new.copy_from(version)
+                new.save_version(name)
+                new.reset()
+        if former.edited:
+            fit = new.copy_from(former)
+            notes.append(f"the palette changed, so that the grade was copied: {fit}")
+    kept = _former(target, read)
+    if not kept.exists():
+        with replacing(kept, force=False) as temporary:
+            temporary.write_bytes(read)
+    notes.append(f"the former palette with its edits is kept in {kept.name}")
+    members: dict[str, Any] = {**new.fields(), "extra": fields.get("extra") or old["extra"]}
+    return sidecar.save(members, target, on_edits="drop", replaces=read), notes
+
+
+def _former(target: Path, content: bytes) -> Path:
+    """Return a name beside `target` that is free, or whose file a run that was killed kept."""
+    stem = target.name.removesuffix(".p4d.json")
+    names = itertools.chain(["former"], (f"former{number}" for number in itertools.count(2)))
+    paths = (target.with_name(f"{stem}.{name}.p4d.json") for name in names)
+    return next(p for p in paths if not p.exists() or sidecar.read_bytes(p) == content)

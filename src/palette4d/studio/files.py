@@ -1,0 +1,159 @@
+"""The menu File: opening, saving, recent files, and the shots of a show."""
+
+import contextlib
+import functools
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication, QFileDialog
+
+from palette4d.common.errors import Palette4dError
+from palette4d.media import clip_sequence
+from palette4d.media.clip import ClipError
+from palette4d.media.clip_sequence import ImageSequence
+from palette4d.shows import manifest
+from palette4d.studio import texts
+from palette4d.studio.session import recovery_file
+from palette4d.studio.work import sequence_of
+
+if TYPE_CHECKING:
+    from palette4d.studio.window import Window
+
+#: Recent files that the menu keeps.
+RECENT = 10
+
+
+class Files:
+    """The files of a window."""
+
+    def __init__(self, window: "Window") -> None:
+        self.window, self.session = window, window.session
+
+    def open_path(self, path: str, clip: str | None = None) -> None:
+        """Open a sidecar, a manifest, or a clip; a clip without a palette is offered to analyse."""
+        QApplication.setOverrideCursor(Qt.CursorShape.WaitCursor)
+        try:
+            self._open(path, clip)
+        except (Palette4dError, OSError) as error:
+            self.session.report(error)
+        finally:
+            QApplication.restoreOverrideCursor()
+
+    def _open(self, path: str, clip: str | None) -> None:
+        found = Path(path)
+        if manifest.is_manifest(found):
+            self.window.shots.load(found)
+            self.window.docks["shots"].show()
+            if self.window.shots.count():
+                self.window.shots.open_first()
+        elif found.name.endswith(".json"):
+            self.session.open_sidecar(found, clip)
+            self._offer_recovery(found)
+        else:
+            beside_it = sidecar_of(path)
+            if beside_it is not None:
+                self.session.open_sidecar(beside_it, path)
+            else:
+                self.session.open_clip(path)
+                self.window.tasks.analyze()
+        self.remember(path)
+
+    def _offer_recovery(self, path: Path) -> None:
+        copy = recovery_file(path)
+        if not copy.exists() or copy.stat().st_mtime < path.stat().st_mtime:
+            return
+        self.session.say(texts.RECOVERY.format(copy=copy), "warning")
+
+    def open_shot(self, path: Path) -> None:
+        """Open a shot of the list."""
+        try:
+            self.session.open_sidecar(path)
+        except (Palette4dError, OSError) as error:
+            self.session.report(error)
+
+    def remember(self, path: str) -> None:
+        """Put a file in front of the recent ones."""
+        path = str(Path(path).absolute())
+        kept = [each for each in self.recent_files() if each != path]
+        self.window.settings.setValue("recent", [path, *kept][:RECENT])
+
+    def recent_files(self) -> list[str]:
+        """Return the recent files, the newest first."""
+        found: Any = self.window.settings.value("recent", [])
+        return [found] if isinstance(found, str) else [str(each) for each in found or []]
+
+    def fill_recent(self) -> None:
+        """Fill the menu of the recent files."""
+        self.window.recent.clear()
+        for path in self.recent_files():
+            self.window.recent.addAction(path, functools.partial(self.open_path, path))
+        self.window.recent.setEnabled(True)
+        if self.window.recent.isEmpty():
+            self.window.recent.addAction(texts.NOTHING_YET).setEnabled(False)
+
+    def open(self) -> None:
+        """Ask for a file and open it."""
+        folder = str(self.session.path.parent) if self.session.path is not None else ""
+        path, _ = QFileDialog.getOpenFileName(
+            self.window, texts.OPEN_TITLE, folder, texts.OPEN_FILTER
+        )
+        if path:
+            self.open_path(sequence_of(path))
+
+    def find_clip(self) -> None:
+        """Ask for the document's clip."""
+        path, _ = QFileDialog.getOpenFileName(self.window, texts.FIND_TITLE, "", texts.CLIP_FILTER)
+        if path:
+            self.session.find_clip(sequence_of(path))
+
+    def save(self) -> None:
+        """Save now."""
+        if self.session.save():
+            self.session.say(texts.SAVED_NOW)
+
+    def save_as(self) -> None:
+        """Save under another name."""
+        start = str(self.session.path or "")
+        path, _ = QFileDialog.getSaveFileName(
+            self.window, texts.SAVE_TITLE, start, texts.SIDECAR_FILTER
+        )
+        if path and self.session.save_as(path):
+            self.remember(path)
+
+    def revert(self) -> None:
+        """Load the file again, and try frames again that could not be read."""
+        self.session.revert()
+        if self.session.player is not None:
+            self.session.player.forget_errors()
+            self.window.viewer.read_frame()
+
+    def quit(self) -> None:
+        """Close the window."""
+        self.window.close()
+
+    def next_shot(self) -> None:
+        """Open the next shot of the list."""
+        self.window.shots.step(1)
+
+    def previous_shot(self) -> None:
+        """Open the shot before."""
+        self.window.shots.step(-1)
+
+
+def sidecar_of(path: str) -> Path | None:
+    """Return the sidecar beside a clip, if it was analysed before."""
+    found = Path(path)
+    names = [found.name.split("#")[0].split("%")[0].rstrip("._-"), found.stem, found.name]
+    if "#" in found.name:
+        with contextlib.suppress(ClipError):
+            names.append(clip_sequence.of_pattern(path)[0].name)
+    for name in dict.fromkeys(names):
+        candidate = found.absolute().with_name(f"{name}.p4d.json")
+        if name and candidate.is_file():
+            return candidate
+    if found.is_dir():  # or in the folder, beside its frames
+        with contextlib.suppress(ClipError):
+            inside = clip_sequence.in_folder(found)
+            return sidecar_of(inside.pattern if isinstance(inside, ImageSequence) else str(inside))
+    return None

@@ -1,0 +1,163 @@
+"""What gestures do: each function is one step of the grade, with the bytes of a verb.
+
+It knows no toolkit. The verbs are those of `palette4d edit`; tests compare both.
+"""
+
+from typing import Any
+
+from palette4d.grade.document import Document
+from palette4d.grade.edits import Ramp
+from palette4d.grade.follow import Progress
+from palette4d.plotting import style
+from palette4d.studio import texts
+from palette4d.studio.session import Session
+
+
+def handles_of(document: Document, ids: tuple[str, ...]) -> list[str]:
+    """Return those ids that are vertices or stops."""
+    known = {*document.core.polytope.vertex_ids, *document.settings}
+    return [id_ for id_ in ids if id_ in known]
+
+
+def reset(session: Session) -> None:
+    """Reset the selected vertices, and remove the selected stops and picks (`reset`, `unpick`)."""
+    document = session.document
+    if document is None:
+        return
+    picks = [pick.id for pick in document.picks if pick.id in session.selection]
+    ids = [id_ for id_ in session.selection if id_ in document.settings]
+    said = texts.REMOVED if picks and not ids else texts.WAS_RESET
+
+    def change(document: Document) -> None:
+        if picks:
+            document.unpick(*picks)
+        for id_ in ids:
+            document.reset(id_)
+
+    alone = not ids or (not picks and len(ids) == 1)
+    _as_one(session, "reset", [*picks, *ids], change, said, alone=alone)
+
+
+def reset_all(session: Session) -> None:
+    """Reset everything (`reset`)."""
+    session.edit(lambda document: document.reset(), texts.RESET_ALL)
+
+
+def remove(session: Session, ids: list[str]) -> None:
+    """Remove picks and holds, and unlock handles (`unpick`, `unlock`)."""
+    document = session.document
+    if document is None:
+        return
+    locks = [id_ for id_ in ids if id_ in document.locks]
+    picks = [pick.id for pick in document.picks if pick.id in ids]
+
+    def change(document: Document) -> None:
+        if locks:
+            document.unlock(*locks)
+        if picks:
+            document.unpick(*picks)
+
+    both = bool(locks and picks)
+    _as_one(session, "remove", [*locks, *picks], change, texts.REMOVED, alone=not both)
+
+
+def lock(session: Session) -> None:
+    """Lock the selected handles, or unlock them if all are locked (`lock`, `unlock`)."""
+    document = session.document
+    ids = [] if document is None else handles_of(document, session.selection)
+    if document is None or not ids:
+        session.say(texts.SELECT_A_HANDLE, "warning")
+    elif set(ids) <= set(document.locks):
+        session.edit(lambda d: d.unlock(*ids), texts.WAS_UNLOCKED.format(ids=", ".join(ids)))
+    else:
+        new = [id_ for id_ in ids if id_ not in document.locks]
+        session.edit(lambda d: d.lock(*new), texts.WAS_LOCKED.format(ids=", ".join(new)))
+
+
+def set_ramp(session: Session, ramp: Ramp) -> None:
+    """Set the ramp of the selected handles; without a selection, the clip's (`ramp`)."""
+    document = session.document
+    if document is None:
+        return
+    ids = handles_of(document, session.selection)
+    if session.selection and not ids:
+        session.say(texts.SELECT_A_HANDLE, "warning")
+        return
+
+    def change(document: Document) -> None:
+        with document.one_step(f"ramp {ramp} {' '.join(ids)}".strip()):
+            for id_ in ids:
+                document.set_ramp(ramp, id_)
+            if not ids:
+                document.set_ramp(ramp)
+
+    session.edit(change, texts.RAMP_SET.format(ramp=texts.RAMPS[ramp]))
+
+
+def enable(session: Session, id_: str, on: bool) -> None:
+    """Switch a pick or hold on or off (`enable`, `disable`)."""
+
+    def change(document: Document) -> None:
+        with document.one_step(f"{'enable' if on else 'disable'} {id_}"):
+            document.change_pick(id_, enabled=on)
+
+    session.edit(change, (texts.ENABLED if on else texts.DISABLED).format(id=id_))
+
+
+def change_pick(session: Session, id_: str, text: str = "", **changes: Any) -> None:
+    """Change how and when a pick or hold acts; its colour is followed again (`change`)."""
+    clip = None if session.clip is None else session.clip.source
+
+    def change(document: Document, progress: Progress) -> None:
+        document.change_pick(id_, clip=clip, progress=progress, **changes)
+
+    session.edit_later(change, text or texts.PICK_CHANGED.format(id=id_))
+
+
+def set_range(session: Session, id_: str, start: float, until: float) -> None:
+    """Give a pick or hold a range; at the clip's ends it has no limit (`change`)."""
+    first, last, _ = session.frames
+    text = texts.RANGE_SET.format(id=id_, start=style.number(start), until=style.number(until))
+    begin, end = None if start <= first else start, None if until >= last else until
+    change_pick(session, id_, text, start=begin, until=end)
+
+
+def move_stop(session: Session, id_: str, frame: float, *, dragging: bool = False) -> None:
+    """Move a stop in time (`move`)."""
+    text = texts.STOP_MOVED.format(id=id_, frame=style.number(frame))
+    do = session.drag if dragging else session.edit
+    do(lambda document: document.move(id_, frame=frame), text)
+
+
+def keep_version(session: Session) -> None:
+    """Keep the edits as the next version: A, B, C…, then A2, B2… (`version save`)."""
+    document = session.document
+    if document is None:
+        return
+    rounds = ("", *map(str, range(2, len(document.versions) + 3)))
+    names = (letter + again for again in rounds for letter in map(chr, range(65, 91)))
+    name = next(each for each in names if each not in document.versions)
+    text = texts.KEPT_VERSION.format(name=name)
+    session.edit(lambda document: document.save_version(name), text)
+
+
+def use_version(session: Session, name: str) -> None:
+    """Use a version (`version use`)."""
+    text = texts.USES_VERSION.format(name=name)
+    session.edit(lambda document: document.use_version(name), text)
+
+
+def _as_one(
+    session: Session, verb: str, ids: list[str], change: Any, text: str, *, alone: bool
+) -> None:
+    """Do a change of several as one step; alone it is one step by itself."""
+
+    def whole(document: Document) -> None:
+        if alone:
+            change(document)
+            return
+        with document.one_step(f"{verb} {' '.join(ids)}"):
+            change(document)
+
+    if ids:
+        session.edit(whole, text.format(ids=", ".join(ids)))

@@ -1,0 +1,62 @@
+"""Pixels of the frame: the one under the pointer, and those that a click or a box picks.
+
+It knows no toolkit.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from palette4d import _core
+from palette4d.studio import texts
+from palette4d.studio.preview import Grade, Preview, straight
+from palette4d.studio.session import Session
+from palette4d.studio.states import Place, Probe
+
+
+def place_between(session: Session, first: tuple[int, int], last: tuple[int, int]) -> Place | None:
+    """Return the box between two pixels of the playhead's frame; None where there is no colour."""
+    if session.player is None or session.document is None:
+        return None
+    pixels = session.player.frame(session.frame)
+    if pixels is None:
+        return None
+    side = max(abs(last[0] - first[0]), abs(last[1] - first[1])) + 1
+    side += 1 - side % 2
+    x, y = (first[0] + last[0]) // 2, (first[1] + last[1]) // 2
+    half = side // 2
+    box = pixels[max(0, y - half) : y + half + 1, max(0, x - half) : x + half + 1]
+    assert session.clip is not None
+    colours = straight(box, session.clip.premultiplied).reshape(-1, 3).astype(np.float64)
+    own = session.document.core.conversion
+    if own is not None:
+        colours = own.steps.to_palette(colours)
+    colours = colours[np.isfinite(colours).all(axis=1)]
+    if not len(colours):
+        session.say(texts.NO_COLOUR, "warning")
+        return None
+    mean = colours.mean(axis=0).tolist()
+    return Place(session.frame, x, y, side, (mean[0], mean[1], mean[2]))
+
+
+def probe_at(session: Session, x: int, y: int) -> Probe | None:
+    """Return a pixel's code values before and after, and its weights."""
+    if session.player is None or session.clip is None:
+        return None
+    pixels = session.player.frame(session.frame)
+    if pixels is None or not (0 <= y < pixels.shape[0] and 0 <= x < pixels.shape[1]):
+        return None
+    pixel = np.ascontiguousarray(pixels[y : y + 1, x : x + 1])
+    source = tuple(float(v) for v in pixel[0, 0])
+    if session.document is None:
+        return Probe(x, y, source, source)
+    grade = Grade.of(session.document, session.frame)
+    result = Preview.exact(pixel, grade, session.clip.premultiplied)
+    colour: Any = straight(pixel, session.clip.premultiplied)[0]
+    if grade.conversion is not None:
+        colour = grade.conversion.to_palette(colour)
+    weights, _ = _core.palette_weights(colour, grade.palette.rgb, grade.palette.faces)
+    shares: dict[str, float] = {}
+    for id_, share in zip(grade.palette.ids, weights[0], strict=True):
+        shares[id_] = shares.get(id_, 0.0) + float(share)
+    return Probe(x, y, source, tuple(float(v) for v in result[0, 0]), shares)

@@ -1,0 +1,112 @@
+"""The menus of the timeline: what can be done with the thing under the pointer."""
+
+from collections.abc import Callable
+from typing import Any
+
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QMenu, QWidget
+
+from palette4d.grade.edits import RAMPS
+from palette4d.grade.picks import Pick
+from palette4d.plotting import style
+from palette4d.studio import gestures, texts
+from palette4d.studio.session import Session
+from palette4d.studio.timeline_places import Hit, Places
+
+#: Fades of picks in the menu, in frames.
+FADES = (0.0, 2.0, 5.0, 10.0, 25.0)
+
+
+def menu_for(
+    view: QWidget,
+    session: Session,
+    places: Places,
+    hit: Hit,
+    *,
+    add_stop: Callable[[], object],
+    frame: float,
+    views: list[QAction],
+) -> QMenu:
+    """Return the menu of something under the pointer, which gets selected.
+
+    Parameters
+    ----------
+    view, session, places
+        The timeline.
+    hit : Hit
+        What is under the pointer.
+    add_stop : callable
+        Adds a stop to the row there.
+    frame : float
+        The frame under the pointer.
+    views : list of QAction
+        Entries for every menu.
+    """
+    menu = QMenu(view)
+    if hit.id and hit.id not in session.selection:
+        session.select(hit.id)
+    disc = places.disc(hit.id) if hit.what == "disc" else None
+    if disc is not None:
+        _add_go(menu, session, disc.frame)
+        menu.addAction(
+            texts.REMOVE_STOP if hit.stop else texts.RESET, lambda: gestures.reset(session)
+        )
+        _add_ramps(menu, session)
+        locked = session.document is not None and hit.id in session.document.locks
+        menu.addAction(texts.UNLOCK if locked else texts.LOCK, lambda: gestures.lock(session))
+        menu.addSeparator()
+    elif hit.what == "pick":
+        pick = next(pick for pick, _ in places.lanes() if pick.id == hit.id)
+        _add_pick(menu, session, pick)
+        menu.addAction(texts.REMOVE, lambda: gestures.remove(session, list(session.selection)))
+        menu.addSeparator()
+    elif hit.what == "band":
+        menu.addAction(texts.ADD_STOP_AT.format(frame=style.number(frame)), add_stop)
+        menu.addSeparator()
+    menu.addActions(views)
+    return menu
+
+
+def _add_go(menu: QMenu, session: Session, frame: float) -> None:
+    menu.addAction(texts.GO_THERE.format(frame=style.number(frame)), lambda: session.go(frame))
+
+
+def _add_pick(menu: QMenu, session: Session, pick: Pick) -> None:
+    """Add what can be changed of a pick or hold."""
+
+    def entry(where: QMenu, text: str, on: bool, change: Callable[[], object]) -> None:
+        made = where.addAction(text)
+        made.setCheckable(True)
+        made.setChecked(on)
+        made.triggered.connect(lambda _=False: change())
+
+    def changed(**changes: Any) -> Callable[[], object]:
+        return lambda: gestures.change_pick(session, pick.id, **changes)
+
+    _add_go(menu, session, pick.frame)
+    switch = not pick.enabled
+    entry(menu, texts.ACTS, pick.enabled, lambda: gestures.enable(session, pick.id, switch))
+    only = changed(global_only=not pick.global_only)
+    entry(menu, texts.PALETTE_ONLY, pick.global_only, only)
+    if pick.kind == "pick":
+        same = pick.toward == "colour"
+        entry(menu, texts.SAME_COLOUR, same, changed(toward="shift" if same else "colour"))
+    fades = menu.addMenu(texts.FADE)
+    for fade in sorted({*FADES, pick.fade}):
+        name = texts.FADE_OF.format(frames=style.number(fade)) if fade else texts.NO_FADE
+        entry(fades, name, fade == pick.fade, changed(fade=float(fade)))
+
+
+def _add_ramps(menu: QMenu, session: Session) -> None:
+    """Add the ramps of the selected handles."""
+    document = session.document
+    if document is None:
+        return
+    ids = gestures.handles_of(document, session.selection)
+    ramps = menu.addMenu(texts.RAMP)
+    for ramp in RAMPS:
+        entry = ramps.addAction(texts.RAMPS[ramp])
+        entry.triggered.connect(lambda _=False, ramp=ramp: gestures.set_ramp(session, ramp))
+        entry.setCheckable(True)
+        own = [document.settings[id_].ramp for id_ in ids if id_ in document.settings]
+        entry.setChecked(bool(own) and all(each == ramp for each in own))

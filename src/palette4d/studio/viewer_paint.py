@@ -1,0 +1,321 @@
+"""How the viewer is drawn: the picture, the wipe, captions, picks and holds, and the probe."""
+
+import functools
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt
+from PySide6.QtGui import QBrush, QColor, QFontMetricsF, QImage, QLinearGradient, QPainter, QPen
+
+from palette4d.studio import texts, theme
+from palette4d.studio.preview import MATTE_GREY
+from palette4d.studio.screen_colours import on_screen
+
+if TYPE_CHECKING:
+    from palette4d.studio.viewer import Viewer
+
+#: From this zoom on pixels are squares.
+SQUARES = 2.0
+#: The most weights that the probe lists.
+WEIGHTS = 4
+
+
+class ViewerPainter:
+    """Draws a viewer."""
+
+    def __init__(self, viewer: "Viewer") -> None:
+        """Draw nothing yet."""
+        self.viewer, self.session = viewer, viewer.session
+        self._corner = 0  # of the probe
+
+    def paint(self) -> None:
+        """Draw all."""
+        painter = QPainter(self.viewer)
+        painter.fillRect(self.viewer.rect(), QColor(theme.PIT))
+        if self.session.clip is None:
+            self._say(painter, texts.EMPTY if self.session.document is None else texts.NO_CLIP)
+            return
+        if self.viewer.problem:
+            self._say(painter, self.viewer.problem, QColor(theme.ERROR))
+            return
+        if self.viewer.picture is None:
+            self._say(painter, texts.READING)
+            return
+        panes = self.viewer.panes()
+        for side, pane in panes:
+            painter.save()
+            painter.setClipRect(pane)
+            self._draw_side(painter, side, pane)
+            painter.restore()
+        if self.session.view.compare == "wipe" and not self.viewer.comparing:
+            self._draw_wipe(painter)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        self._draw_captions(painter)
+        self._draw_marks(painter)
+        if (
+            self.viewer.doing == "box"
+            and self.viewer.press is not None
+            and self.viewer.pointer is not None
+        ):
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            frame = QRectF(self.viewer.press, self.viewer.pointer).normalized()
+            _ring(painter, lambda: painter.drawRect(frame))
+        self._draw_probe(painter)
+        self._draw_legend(painter)
+
+    def _target(self, pane: QRectF) -> QRectF:
+        assert self.viewer.picture is not None
+        region = self.viewer.picture.request.region
+        origin, scale = self.viewer.origin(pane), self.viewer.scale()
+        return QRectF(
+            origin.x() + region.left * scale,
+            origin.y() + region.top * scale,
+            (region.right - region.left) * scale,
+            (region.bottom - region.top) * scale,
+        )
+
+    def _draw_side(self, painter: QPainter, side: str, pane: QRectF) -> None:
+        image = (
+            self.viewer.images.get(side)
+            or self.viewer.images.get("after")
+            or self.viewer.images.get("before")
+        )
+        if image is None:
+            return
+        dense = self.viewer.scale() * self.viewer.devicePixelRatioF()
+        smooth = dense < SQUARES
+        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, smooth)
+        painter.drawImage(self._target(pane), image)
+        outside = self.viewer.images.get("outside")
+        if outside is not None and side == "after":
+            painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, False)
+            painter.drawImage(self._target(pane), outside)
+
+    def _draw_wipe(self, painter: QPainter) -> None:
+        pane, x = self.viewer.panes()[0][1], self.viewer.wipe_x()
+        if "before" in self.viewer.images:
+            painter.save()
+            painter.setClipRect(QRectF(pane.left(), pane.top(), x - pane.left(), pane.height()))
+            self._draw_side(painter, "before", pane)
+            painter.restore()
+        picture = self._target(pane) & pane
+        for width, colour in ((3.0, QColor(0, 0, 0, 110)), (1.0, QColor(255, 255, 255, 200))):
+            painter.setPen(QPen(colour, width))
+            painter.drawLine(QPointF(x, picture.top()), QPointF(x, picture.bottom()))
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(QPen(QColor(0, 0, 0, 140), 1))
+        painter.setBrush(QColor(245, 245, 245))
+        painter.drawEllipse(QPointF(x, picture.center().y()), 5, 5)
+
+    def _draw_captions(self, painter: QPainter) -> None:
+        view = self.session.view
+        before = view.version or texts.BEFORE
+        captions: list[tuple[str, QRectF, Qt.AlignmentFlag]] = []
+        left, right = Qt.AlignmentFlag.AlignLeft, Qt.AlignmentFlag.AlignRight
+        panes = self.viewer.panes()
+        if self.viewer.comparing or view.compare == "before":
+            captions = [(before, panes[0][1], left)]
+        elif view.compare == "side":
+            captions = [(before, panes[0][1], left), (texts.AFTER, panes[1][1], left)]
+        elif view.compare == "wipe":
+            captions = [(before, panes[0][1], left), (texts.AFTER, panes[0][1], right)]
+        for text, pane, side in captions:
+            _label(painter, text, self._target(pane) & pane, side)
+
+    def _draw_marks(self, painter: QPainter) -> None:
+        """Draw the picks (rings) and holds (squares) of this frame, with their colours."""
+        session = self.session
+        place = session.place
+        if place is not None and place.frame == session.frame:
+            box = self._mark(painter, place.x, place.y, place.box, hold=False, cross=True)
+            inspected = np.array([place.colour, place.colour])
+            _flag(painter, box, texts.NEW_PICK, on_screen(session, inspected), bright=True)
+        for pick in () if session.document is None else session.document.picks:
+            if pick.pixel is None or pick.frame != session.frame:
+                continue
+            x, y = pick.pixel
+            box = self._mark(painter, x, y, pick.box or 1, hold=pick.kind == "hold")
+            both = np.array([pick.rgb, pick.rgb if pick.to is None else pick.to])
+            chosen = pick.id in session.selection
+            _flag(painter, box, pick.id, on_screen(session, both), bright=chosen)
+
+    def _mark(
+        self, painter: QPainter, x: float, y: float, side: int, *, hold: bool, cross: bool = False
+    ) -> QRectF:
+        """Draw a ring or a square around pixels; return its box."""
+        point = self.viewer.point_of(x + 0.5, y + 0.5)
+        half = max(7.0, side * self.viewer.scale() / 2)
+        box = QRectF(point.x() - half, point.y() - half, 2 * half, 2 * half)
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        _ring(painter, lambda: painter.drawRect(box) if hold else painter.drawEllipse(box))
+        if hold:
+            _ring(painter, lambda: painter.drawPoint(point))
+        if cross:
+            for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+                start = point + QPointF(dx, dy) * (half + 2)
+                end = point + QPointF(dx, dy) * (half + 9)
+                _ring(painter, functools.partial(painter.drawLine, start, end))
+        return box
+
+    def _draw_probe(self, painter: QPainter) -> None:
+        """Write what the pixel under the pointer is, in a corner that the pointer is not in."""
+        probe = self.session.probe
+        if probe is None:
+            return
+        font = theme.numbers_font(9)
+        painter.setFont(font)
+        measure = QFontMetricsF(font)
+        rows = [f"{probe.x}, {probe.y}"]
+        rows.append(f"{texts.PROBE_IN:<4}" + " ".join(_figure(v) for v in probe.source))
+        rows.append(f"{texts.PROBE_OUT:<4}" + " ".join(_figure(v) for v in probe.result))
+        shares = sorted(probe.weights.items(), key=lambda item: -abs(item[1]))[:WEIGHTS]
+        shares = [(id_, share) for id_, share in shares if abs(share) >= 0.005]
+        line = measure.height() + 1
+        width = max(measure.horizontalAdvance("in  " + " -0.0000" * len(probe.source)), 150.0)
+        # As tall as it can become: it stays as it is while the pointer moves.
+        height = line * (len(rows) + (WEIGHTS if probe.weights else 0))
+        size = QSizeF(width + 16, height + 14)
+        low = self.viewer.height() - size.height() - 12
+        corners = [QRectF(QPointF(self.viewer.width() - size.width() - 12, low), size)]
+        corners.append(QRectF(QPointF(12, low), size))
+        at = self.viewer.pointer
+        if at is not None and corners[self._corner].adjusted(-40, -40, 40, 40).contains(at):
+            self._corner = 1 - self._corner
+        box = corners[self._corner]
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(18, 18, 18, 225))
+        painter.drawRoundedRect(box, 4, 4)
+        y = box.top() + 7 + measure.ascent()
+        for k, row in enumerate(rows):
+            painter.setPen(QColor(theme.FAINT if k == 0 else theme.BRIGHT))
+            painter.drawText(QPointF(box.left() + 8, y), row)
+            y += line
+        colours = self._palette_colours()
+        for id_, share in shares:
+            painter.setPen(QColor(theme.TEXT))
+            painter.drawText(QPointF(box.left() + 8, y), f"{id_}")
+            full = QRectF(
+                box.left() + 52, y - measure.ascent() + 3, width - 88, measure.ascent() - 4
+            )
+            painter.fillRect(full, QColor(theme.RAISED))
+            part = QRectF(full)
+            part.setWidth(full.width() * min(max(share, 0), 1))
+            painter.fillRect(part, colours.get(id_, QColor(theme.FAINT)))
+            painter.drawText(QPointF(full.right() + 6, y), f"{share:.0%}")
+            y += line
+
+    def _draw_legend(self, painter: QPainter) -> None:
+        """Say what the matte shows, with its scale from grey to the picture."""
+        picture, hover = self.viewer.picture, self.session.hover
+        if picture is None or hover is None or picture.request.matte != hover:
+            return
+        painter.setFont(theme.numbers_font(9))
+        measure = painter.fontMetrics()
+        words = texts.MATTE.format(id=hover)
+        ends = texts.MATTE_ENDS
+        wide = 90.0
+        widths = [measure.horizontalAdvance(text) for text in (words, *ends)]
+        tall = measure.height() + 8
+        box = QRectF(12, 0, sum(widths) + wide + 36, tall)
+        box.moveTop(self.viewer.height() - tall - 12)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(18, 18, 18, 225))
+        painter.drawRoundedRect(box, 4, 4)
+        base = box.top() + 4 + measure.ascent()
+        x = box.left() + 8
+        for text, width in zip((words, ends[0]), widths[:2], strict=True):
+            painter.setPen(QColor(theme.BRIGHT))
+            painter.drawText(QPointF(x, base), text)
+            x += width + 8
+        colour = self._palette_colours().get(hover, QColor(theme.BRIGHT))
+        scale = QLinearGradient(x, 0, x + wide, 0)
+        scale.setColorAt(0, QColor(MATTE_GREY, MATTE_GREY, MATTE_GREY))
+        scale.setColorAt(1, colour)
+        painter.fillRect(QRectF(x, box.top() + 7, wide, tall - 14), QBrush(scale))
+        painter.drawText(QPointF(x + wide + 6, base), ends[1])
+
+    def _palette_colours(self) -> dict[str, QColor]:
+        """Return the frame's palette colours as displayed, by id."""
+        if self.session.document is None:
+            return {}
+        palette = self.session.document.palette(self.session.frame)
+        shown = on_screen(self.session, palette.edited)
+        return {id_: QColor(*rgb) for id_, rgb in zip(palette.ids, shown.tolist(), strict=True)}
+
+    def _say(self, painter: QPainter, text: str, colour: QColor | None = None) -> None:
+        painter.setPen(colour or QColor(theme.FAINT))
+        box = QRectF(self.viewer.rect()).adjusted(40, 40, -40, -40)
+        flags = Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap
+        painter.drawText(box, int(flags), text)
+
+
+def image_of(pixels: NDArray[np.uint8]) -> QImage:
+    """Return an image that shares the (h, w, 4) pixels."""
+    height, width = pixels.shape[:2]
+    image = QImage(pixels.data, width, height, 4 * width, QImage.Format.Format_RGBX8888)
+    image._pixels = pixels  # type: ignore[attr-defined]  # Qt does not keep the memory that it shows
+    return image
+
+
+def hatched(mask: NDArray[np.uint8]) -> QImage:
+    """Return an overlay with stripes where the mask is set."""
+    y, x = np.indices(mask.shape)
+    stripes = ((x + y) // 2) % 2 == 0
+    overlay = np.zeros((*mask.shape, 4), np.uint8)
+    overlay[..., 3] = np.where(mask > 0, 190, 0)
+    overlay[..., :3] = np.where((mask > 0) & stripes, 190, 0)[..., None]  # premultiplied white
+    height, width = mask.shape
+    image = QImage(
+        overlay.data, width, height, 4 * width, QImage.Format.Format_RGBA8888_Premultiplied
+    )
+    return image.copy()
+
+
+def _figure(value: float) -> str:
+    return f"{value:7.4f}" if abs(value) < 100 else f"{value:7.1f}"
+
+
+def _ring(painter: QPainter, draw: Any) -> None:
+    """Draw a line that is seen on any picture: dark below bright."""
+    for width, colour in ((4.2, QColor(0, 0, 0, 190)), (1.8, QColor(255, 255, 255, 255))):
+        painter.setPen(QPen(colour, width))
+        draw()
+
+
+def _flag(
+    painter: QPainter, box: QRectF, text: str, colours: NDArray[np.uint8], *, bright: bool
+) -> None:
+    """Write a name on a plate beside a mark, with the colour before and after."""
+    font = painter.font()
+    font.setPointSizeF(8.5)
+    font.setBold(bright)
+    painter.setFont(font)
+    measure = QFontMetricsF(font)
+    tall = measure.height() + 4
+    plate = QRectF(box.right() + 5, box.top() - 2, measure.horizontalAdvance(text) + 36, tall)
+    painter.setPen(QPen(QColor(255, 255, 255, 230) if bright else QColor(0, 0, 0, 0), 1))
+    painter.setBrush(QColor(18, 18, 18, 215))
+    painter.drawRoundedRect(plate, 3, 3)
+    for k, rgb in enumerate(colours.tolist()):
+        square = QRectF(plate.left() + 5 + 11 * k, plate.top() + 3, 11, tall - 6)
+        painter.fillRect(square, QColor(*rgb))
+    painter.setPen(QColor(255, 255, 255))
+    painter.drawText(QPointF(plate.left() + 31, plate.top() + 2 + measure.ascent()), text)
+
+
+def _label(painter: QPainter, text: str, box: QRectF, side: Qt.AlignmentFlag) -> None:
+    """Draw a caption in an upper corner of the picture."""
+    font = painter.font()
+    font.setPointSizeF(9)
+    font.setBold(False)
+    painter.setFont(font)
+    measure = QFontMetricsF(font)
+    width = measure.horizontalAdvance(text) + 14
+    left = box.left() + 8 if side == Qt.AlignmentFlag.AlignLeft else box.right() - 8 - width
+    frame = QRectF(left, box.top() + 8, width, measure.height() + 6)
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(QBrush(QColor(18, 18, 18, 190)))
+    painter.drawRoundedRect(frame, 3, 3)
+    painter.setPen(QColor(theme.BRIGHT))
+    painter.drawText(frame, int(Qt.AlignmentFlag.AlignCenter), text)

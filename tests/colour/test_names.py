@@ -1,0 +1,50 @@
+"""Names of colours are those that a person would give."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from palette4d.colour.names import colour_names
+
+NAMES = {
+    "#000000": "black",
+    "#ffffff": "white",
+    "#808080": "grey",
+    "#404040": "dark grey",
+    "#c8c8c8": "light grey",
+    "#ff0000": "red",
+    "#00ff00": "green",
+    "#0000ff": "blue",
+    "#ffff00": "yellow",
+    "#ffa500": "orange",
+    "#ff00ff": "magenta",
+    "#00e0e0": "cyan",
+    "#8000c0": "purple",
+    "#8b0000": "deep red",
+    "#1a2a6c": "deep blue",
+    "#add8e6": "pale blue",
+    "#8b4513": "brown",
+    "#808000": "olive",
+    "#ffc0cb": "pale pink",
+    "#5f7a5f": "greyish green",
+    "#1f3020": "dark green",
+}
+
+
+@pytest.mark.parametrize(("code", "name"), NAMES.items())
+def test_a_colour_has_the_name_that_people_give_it(code, name):
+    rgb = np.array([int(code[i : i + 2], 16) for i in (1, 3, 5)]) / 255
+    assert colour_names(rgb[None], "sRGB") == [name]
+
+
+def test_scene_linear_colours_are_named_as_they_are_seen():
+    display = np.array([[0.55, 0.02, 0.03], [0.2, 0.2, 0.2]])
+    linear = np.where(display > 0.04045, ((display + 0.055) / 1.055) ** 2.4, display / 12.92)
+    assert colour_names(linear, "lin_rec709_srgb") == colour_names(display, "sRGB")
+
+
+def test_any_number_has_a_name():
+    generator = np.random.default_rng(1)
+    colours = generator.uniform(-0.5, 2, (500, 3))
+    assert all(colour_names(colours, "unknown"))

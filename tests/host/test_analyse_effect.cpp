@@ -1,0 +1,142 @@
+// Palette4D Analyse, the bundle's second effect: it fetches the clip's frames from the host.
+#if !defined(_WIN32)
+#include "harness.hpp"
+#include "stand_in.hpp"
+
+using namespace strict;
+using namespace test;
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Effect {
+    Plugin plugin;
+    std::unique_ptr<Instance> node;
+    Layout layout;
+    std::vector<Picture> pictures;
+    std::vector<double> asked;
+    fs::path target = folder() / "shot.p4d.json";
+
+    explicit Effect(Config config = {}) : plugin(installed(script(kAnalyse)), 1) {
+        if (config.frame_range.empty()) config.frame_range = {-1, 2};
+        Host::get().configure(config);
+        node = plugin.create(kOfxImageEffectContextGeneral);
+        for (unsigned i = 0; i < 4; ++i) fill(pictures.emplace_back(layout), i, false);
+        node->frames = [this](double time) -> const Picture* {
+            asked.push_back(time);
+            const auto at = static_cast<std::size_t>(time + 1);
+            return at < pictures.size() ? &pictures[at] : nullptr;
+        };
+        node->set("sidecar", target.u8string());
+    }
+    void push() { CHECK(node->changed("analyse") == kOfxStatOK); }
+    std::string status() {
+        CHECK(node->changed("", "", kOfxChangeTime) == kOfxStatOK);
+        return node->text("status");
+    }
+    std::size_t files() const {
+        std::error_code error;
+        const fs::directory_iterator all(folder() / "shot.frames", error);
+        return error ? 0 : static_cast<std::size_t>(std::distance(all, fs::directory_iterator()));
+    }
+    bool started() const { return fs::exists(folder() / "started"); }
+};
+
+}  // namespace
+
+TEST(the_grading_node_asks_for_no_other_frame) {
+    Plugin grade(bundle(), 0), analyse(bundle(), 1);
+    CHECK(grade.load() == kOfxStatOK);
+    const char* const temporal = kOfxImageEffectPropTemporalClipAccess;
+    for (const bool second : {false, true}) {
+        const auto effect = (second ? analyse : grade).describe(kOfxImageEffectContextFilter);
+        CHECK(effect->properties.number(temporal) == second);
+        CHECK(effect->clips.at("Source")->properties.number(temporal) == second);
+        CHECK(effect->clips.at("Output")->properties.number(temporal) == 0);
+    }
+    CHECK(std::string(analyse.ofx().pluginIdentifier) == "org.palette4d.Analyse");
+}
+
+TEST(the_frames_of_the_host_are_analysed) {
+    Effect effect;
+    write("box.json", sidecar_text());
+    effect.push();
+    CHECK(effect.asked == (std::vector<double>{-1, 0, 1, 2}));
+    CHECK(effect.node->effect().progress == (std::vector<double>{0, 0.25, 0.5, 0.75}));
+    // Names hold no negative numbers.
+    CHECK(effect.files() == 4 && fs::exists(folder() / "shot.frames" / "shot.000003.exr"));
+    CHECK(soon(
+        [&] { return effect.status().find("structure search: 3 of 40") != std::string::npos; }));
+    CHECK(text_of(folder() / "started")
+              .find("analyze\n" + (folder() / "shot.frames" / "shot.######.exr").u8string() +
+                    "\n-o\n" + effect.target.u8string() + "\n") != std::string::npos);
+    effect.push();
+    CHECK(effect.node->text("status").find("stopped") == 0);
+    // Again, over the frames of the first time.
+    write("go", "done\n");
+    effect.push();
+    CHECK(soon([&] {
+        return effect.status().find("choose it in the node Palette4D") != std::string::npos;
+    }));
+    CHECK(effect.files() == 4);
+    // The picture passes.
+    Picture output(effect.layout);
+    effect.node->twice = true;
+    CHECK(effect.node->render(0, &effect.pictures[1], output, effect.layout.bounds) == kOfxStatOK);
+    CHECK(output.pixels(effect.layout.bounds) == effect.pictures[1].pixels(effect.layout.bounds));
+    std::string clip;
+    double time = 0;
+    CHECK(effect.node->is_identity(1, clip, time) == kOfxStatOK && clip == "Source" && time == 1);
+}
+
+TEST(a_cancelled_fetch_leaves_nothing) {
+    Config config;
+    config.cancel_after = 2;
+    Effect effect(config);
+    effect.push();
+    CHECK(effect.asked.size() == 2);
+    CHECK(effect.node->text("status") == "cancelled");
+    CHECK(!fs::exists(folder() / "shot.frames") && !effect.started());
+}
+
+TEST(a_fetch_without_the_progress_suite) {
+    Config config;
+    config.missing_suites = {std::string(kOfxProgressSuite) + "/1"};
+    Effect effect(config);
+    effect.push();
+    CHECK(effect.asked.size() == 4 && effect.files() == 4);
+    effect.push();
+}
+
+TEST(a_fetch_that_cannot_be_says_why) {
+    Effect effect;
+    const auto refused = [&](const char* words) {
+        effect.push();
+        EXPECT(effect.node->text("status").find(words) != std::string::npos,
+               effect.node->text("status"));
+        CHECK(!effect.started());
+    };
+    effect.node->set("sidecar", std::string());
+    refused("enter the path of the new sidecar");
+    effect.node->set("sidecar", std::string("relative.p4d.json"));
+    refused("found no such folder");
+    effect.node->set("sidecar", effect.target.u8string());
+    effect.pictures.pop_back();
+    refused("no picture at time 2");
+    CHECK(!fs::exists(folder() / "shot.frames"));
+    // What is not ours stays.
+    fs::create_directories(folder() / "shot.frames");
+    write("shot.frames/holiday.exr", "mine");
+    refused("found other files there");
+    CHECK(effect.files() == 1);
+    fs::remove_all(folder() / "shot.frames");
+    effect.pictures.emplace_back(effect.layout);
+    const auto alone = effect.plugin.create();  // its clip reports no range
+    Host::get().configure({});
+    const auto other = effect.plugin.create();
+    other->set("sidecar", effect.target.u8string());
+    CHECK(other->changed("analyse") == kOfxStatOK);
+    CHECK(other->text("status").find("does not report the frames") != std::string::npos);
+}
+#endif
