@@ -28,8 +28,8 @@ from palette4d.plotting.solid import (
     extent_of,
 )
 from palette4d.studio import paint, texts
-from palette4d.studio.actions import SOLID_ACTIONS
-from palette4d.studio.menus import view_actions
+from palette4d.studio.menu_entries import SOLID_ACTIONS
+from palette4d.studio.panel_menus import view_actions
 from palette4d.studio.preview import straight
 from palette4d.studio.screen_colours import on_screen
 from palette4d.studio.session import Session
