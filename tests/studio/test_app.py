@@ -97,6 +97,7 @@ def test_hostile_questions_of_another_start_are_passed_over(
 def test_a_socket_of_another_user_is_no_window(opened: Window, sidecar: Path, qtbot: Any) -> None:
     found = QLocalSocket()
     found.connectToServer(instance.name_of(sidecar))
+    assert not Path(found.fullServerName()).stat().st_mode & 0o077
     os.chown(found.fullServerName(), 12345, -1)
     assert not brought_forward(sidecar, qtbot)
     assert opened.session.frame != 9
