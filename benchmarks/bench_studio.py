@@ -210,19 +210,20 @@ class Bench:
         assert clip is not None
         rng = np.random.default_rng(7)
         viewer = self.window.viewer
-        pixels = self.session.player.read(self.session.frame)  # type: ignore[union-attr]
+        assert self.session.player is not None
+        pixels = self.session.player.read(self.session.frame)
         for _ in range(times):
             x, y = int(rng.integers(clip.width)), int(rng.integers(clip.height))
             colour = pixels[y, x, :3].tolist()
             to = rng.random(3).tolist()
-            frame = self.session.frame
+            frame, revision = self.session.frame, self.session.revision
             start = time.perf_counter()
             self.session.drag(
                 lambda document, f=frame, c=colour, q=to: document.pick(
                     f, colour=c, to=q, follow=False
                 )
             )
-            self.wait(self.current)
+            self.wait(lambda old=revision: self.session.revision > old and self.current())
             viewer.repaint()
             yield time.perf_counter() - start
         self.session.cancel()

@@ -9,7 +9,7 @@ from itertools import groupby
 from pathlib import Path
 
 from palette4d.studio import texts
-from palette4d.studio.actions import ACTIONS, PALETTE, SOLID_ACTIONS, TIMELINE_ACTIONS
+from palette4d.studio.menu_entries import ACTIONS, PALETTE, SOLID_ACTIONS, TIMELINE_ACTIONS, title
 
 PAGE = Path(__file__).resolve().parent / "studio.md"
 BEGIN = "<!-- begin: written by python docs/studio_keys.py -->"
@@ -28,7 +28,8 @@ def tables() -> str:
     listed = [(action, "") for action in ACTIONS]
     listed += [(action, f" {texts.IN_TIMELINE}") for action in TIMELINE_ACTIONS]
     listed += [(action, f" {texts.IN_SOLID}") for action in SOLID_ACTIONS]
-    for menu, shown in texts.MENUS.items():
+    for menu in texts.MENUS:
+        shown = title(menu)
         for action, where in listed:
             if action.menu == menu:
                 keys = ", ".join(f"`{key}`" for key in action.keys)

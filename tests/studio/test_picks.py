@@ -78,7 +78,7 @@ def test_the_picture_follows_the_wheel_before_anything_is_kept(
     for hue in (10.0, 60.0, 120.0):
         wheel.moved.emit((0.15, hue))
     assert session.dragging
-    assert len(picks(opened)) == 1  # of the trial
+    qtbot.waitUntil(lambda: len(picks(opened)) == 1, timeout=20_000)  # of the trial
     session.cancel()
     assert not picks(opened)
 
@@ -122,6 +122,26 @@ def test_the_end_of_a_range_is_dragged(qtbot: Any, opened: Window) -> None:
     qtbot.mouseRelease(timeline, LEFT, pos=end.toPoint())
     qtbot.waitUntil(lambda: picks(opened)[0].until == last - 3, timeout=20_000)
     assert picks(opened)[0].start is None
+
+
+def test_keys_set_the_range_at_the_playhead(qtbot: Any, opened: Window) -> None:
+    pick(qtbot, opened, 40, 30)
+    session = opened.session
+    session.select()
+    opened.commands.act_until()
+    assert session.status.level == "warning"
+    session.select("p1")
+    for key, frame, wanted in (
+        (Qt.Key.Key_BracketRight, 8, (None, 8)),
+        (Qt.Key.Key_BracketLeft, 4, (4, 8)),
+        (Qt.Key.Key_BracketRight, 2, (2, 2)),
+    ):
+        session.go(frame)
+        qtbot.keyClick(opened, key)
+        qtbot.waitUntil(
+            lambda wanted=wanted: (picks(opened)[0].start, picks(opened)[0].until) == wanted,
+            timeout=20_000,
+        )
 
 
 def send(widget: QWidget, to: QPointF) -> None:

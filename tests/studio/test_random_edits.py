@@ -13,7 +13,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, rule, run_stat
 
 from palette4d.grade.document import Document
 from palette4d.grade.edits import RAMPS
-from palette4d.studio import gestures
+from palette4d.studio import grade_steps
 from palette4d.studio.session import Session
 
 GOLDEN = Path(__file__).resolve().parent.parent / "golden" / "sidecars"
@@ -61,7 +61,7 @@ def test_random_edits_undone_are_the_first_bytes(tmp_path: Path, runs: int, step
 
         @rule(frame=st.integers(0, 20), dragging=st.booleans())
         def move(self, frame: int, dragging: bool) -> None:
-            gestures.move_stop(self.session, "s1", frame, dragging=dragging)
+            grade_steps.move_stop(self.session, "s1", frame, dragging=dragging)
             self.session.drop()
 
         @rule(id_=st.sampled_from(ids), colours=st.lists(colour, max_size=4), kept=st.booleans())
@@ -79,19 +79,19 @@ def test_random_edits_undone_are_the_first_bytes(tmp_path: Path, runs: int, step
 
         @rule(ramp=st.sampled_from(RAMPS))
         def ramp(self, ramp: str) -> None:
-            gestures.set_ramp(self.session, ramp)
+            grade_steps.set_ramp(self.session, ramp)
 
         @rule()
         def lock(self) -> None:
-            gestures.lock(self.session)
+            grade_steps.lock(self.session)
 
         @rule()
         def reset(self) -> None:
-            gestures.reset(self.session)
+            grade_steps.reset(self.session)
 
         @rule()
         def reset_all(self) -> None:
-            gestures.reset_all(self.session)
+            grade_steps.reset_all(self.session)
 
         @rule(rgb=colour, to=colour, frame=st.integers(0, 20))
         def pick(self, rgb: Colour, to: Colour, frame: int) -> None:
@@ -105,16 +105,16 @@ def test_random_edits_undone_are_the_first_bytes(tmp_path: Path, runs: int, step
         @rule(on=st.booleans())
         def switch(self, on: bool) -> None:
             if any(pick.id == "p1" for pick in self.document.picks):
-                gestures.enable(self.session, "p1", on)
+                grade_steps.enable(self.session, "p1", on)
 
         @rule()
         def keep_version(self) -> None:
-            gestures.keep_version(self.session)
+            grade_steps.keep_version(self.session)
 
         @rule(number=st.integers(0, 3))
         def use_version(self, number: int) -> None:
             if number < len(self.session.versions):
-                gestures.use_version(self.session, self.session.versions[number])
+                grade_steps.use_version(self.session, self.session.versions[number])
 
         @rule()
         def undo(self) -> None:

@@ -106,6 +106,33 @@ def test_a_file_that_another_program_broke_is_not_overwritten(
     assert palette4d.load(tmp_path / "mine.p4d.json").colour(id_) == (0, 1, 0)
 
 
+def test_saved_in_another_folder_the_sidecar_finds_its_clip(
+    session: Session, sidecar: Path, tmp_path: Path
+) -> None:
+    fields = json.loads(sidecar.read_text())
+    fields["clip"]["source"] = "plates/f.####.png"
+    sidecar.write_text(json.dumps(fields))
+    session.open_sidecar(sidecar)
+    (tmp_path / "other").mkdir()
+    assert session.save_as(tmp_path / "other" / "b.p4d.json")
+    source = palette4d.load(tmp_path / "other" / "b.p4d.json").fields()["clip"]["source"]
+    assert Path(source) == tmp_path / "plates" / "f.####.png"
+
+
+def test_another_file_is_opened_only_when_nothing_is_lost(
+    session: Session, sidecar: Path, tmp_path: Path
+) -> None:
+    other = Path(shutil.copy(sidecar, tmp_path / "other.p4d.json"))
+    id_ = vertex(sidecar)
+    session.edit(lambda document: document.set(id_, rgb=(1.0, 0.0, 0.0)))
+    sidecar.write_text("{")  # broken by another program: it is not overwritten
+    with pytest.raises(palette4d.Palette4dError, match="Not saved"):
+        session.open_sidecar(other)
+    assert session.path == sidecar
+    assert session.document is not None
+    assert session.document.colour(id_) == (1.0, 0.0, 0.0)
+
+
 def test_edits_that_fail_become_the_status(session: Session) -> None:
     assert session.edit(lambda document: document.set("nowhere", rgb=(0, 0, 0))) is None
     assert session.status.level == "error"

@@ -23,7 +23,7 @@ from palette4d.studio.window import Window
 #: and what Qt itself writes on its docks.
 DATA = re.compile(
     r"^([\W\d_]*|[A-Zh]|[vsep]\d+|#?[0-9a-f]{6}|\d+(\.\d+)?|/ \d+.*|.*(\.p4d\.json|####).*"
-    r"|Kdenlive|Shotcut|cube|side|wipe|[$]OCIO|Float|Close|Scroll (Left|Right)|Qt.*"
+    r"|Kdenlive|Shotcut|cube|side|wipe|skew|static|paper|rgbt|[$]OCIO|Float|Close|Scroll (Left|Right)|Qt.*"
     r"|.*(sRGB|ocio|P3|Rec|ACES|XYZ|palette4d ).*|/.*)$"
 )
 
@@ -77,7 +77,7 @@ def test_a_translation_replaces_every_text(
     foreign.help.manual()
     own = [
         text
-        for top in (foreign, *foreign.tasks.dialogs)
+        for top in (foreign, *foreign.verbs.dialogs)
         for text in words_of(top)
         if "«" not in text and not DATA.match(text)
     ]

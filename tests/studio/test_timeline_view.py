@@ -14,12 +14,12 @@ import pytest
 os.environ["QT_QPA_PLATFORM"] = "offscreen"
 pytest.importorskip("PySide6", reason="the extra palette4d[studio] is not installed")
 
-from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtWidgets import QApplication
 
 from palette4d.cli.main import main
 from palette4d.plotting.layout import BAND
-from palette4d.studio import gestures, theme, timeline_places
+from palette4d.studio import grade_steps, theme, timeline_places
 from palette4d.studio.session import Session
 from palette4d.studio.states import Probe
 from palette4d.studio.timeline_view import TimelineView
@@ -182,7 +182,7 @@ def test_nudge_and_reset_of_a_selected_stop(view: TimelineView) -> None:
     view.session.select(stop)
     view.nudge(1)
     assert view.session.document.settings[stop].frame == 5
-    gestures.reset(view.session)
+    grade_steps.reset(view.session)
     assert stop not in view.session.document.settings
 
 
@@ -209,7 +209,8 @@ def test_zoom_keeps_the_frame_under_the_pointer_and_pans_with_the_playhead(
 def test_weights_of_the_pixel_are_written_beside_the_rows(view: TimelineView) -> None:
     gutter = (0, timeline_places.RULER, timeline_places.GUTTER, view.height())
     before = view.grab().copy(*gutter).toImage()
-    ids = view.session.document.palette(view.session.frame).ids  # type: ignore[union-attr]
+    assert view.session.document is not None
+    ids = view.session.document.palette(view.session.frame).ids
     view.session.show_probe(Probe(0, 0, (0, 0, 0), (0, 0, 0), {ids[0]: 0.75, ids[1]: 0.25}))
     assert view.grab().copy(*gutter).toImage() != before
 
@@ -217,7 +218,7 @@ def test_weights_of_the_pixel_are_written_beside_the_rows(view: TimelineView) ->
 def test_hover_is_shared(qtbot: Any, view: TimelineView) -> None:
     view.mouseMoveEvent(_moved(QPointF(place(view, "v1"))))
     assert view.session.hover == "v1"
-    view.leaveEvent(None)  # type: ignore[arg-type]
+    view.leaveEvent(QEvent(QEvent.Type.Leave))
     assert view.session.hover is None
 
 
@@ -258,9 +259,9 @@ def test_the_menu_of_a_stop_sets_its_ramp_and_locks_it(view: TimelineView) -> No
     ramps = next(a.menu() for a in menu.actions() if a.menu() is not None)
     next(a for a in ramps.actions() if a.text() == "hold").trigger()
     assert view.session.document.settings[stop].ramp == "hold"
-    gestures.lock(view.session)
+    grade_steps.lock(view.session)
     assert view.session.document.locks == (stop,)
-    gestures.lock(view.session)
+    grade_steps.lock(view.session)
     assert view.session.document.locks == ()
     next(a for a in menu.actions() if "stop" in a.text().lower()).trigger()
     assert stop not in view.session.document.settings

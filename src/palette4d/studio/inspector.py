@@ -33,7 +33,7 @@ from palette4d.grade.document import Document
 from palette4d.grade.edits import RAMPS, as_colour
 from palette4d.grade.follow import Progress
 from palette4d.plotting import style
-from palette4d.studio import gestures, texts, theme
+from palette4d.studio import grade_steps, texts, theme
 from palette4d.studio.choice import Choice
 from palette4d.studio.colour_widgets import Bar, Swatch, Wheel
 from palette4d.studio.pick_list import PickList, Versions
@@ -221,7 +221,7 @@ class Inspector(QWidget):
         self.dropper.setToolTip(texts.EYEDROPPER_TIP)
         self.reset = QPushButton(texts.RESET_SHORT)
         self.reset.setToolTip(texts.RESET)
-        self.reset.clicked.connect(lambda: gestures.reset(self.session))
+        self.reset.clicked.connect(lambda: grade_steps.reset(self.session))
         row.addWidget(self.dropper)
         row.addWidget(self.reset)
         row.addStretch(1)
@@ -540,7 +540,7 @@ class Inspector(QWidget):
     def _ramp_chosen(self, index: int) -> None:
         document = self.session.document
         if document is not None:
-            gestures.set_ramp(self.session, self.ramp.itemData(index) or document.ramp)
+            grade_steps.set_ramp(self.session, self.ramp.itemData(index) or document.ramp)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Escape takes a drag back."""

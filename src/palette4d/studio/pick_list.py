@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 
 from palette4d.grade.picks import Pick
 from palette4d.plotting import style
-from palette4d.studio import gestures, paint, texts, theme
+from palette4d.studio import grade_steps, paint, texts, theme
 from palette4d.studio.screen_colours import on_screen
 from palette4d.studio.session import Session
 
@@ -104,9 +104,7 @@ class PickList(QWidget):
         return [name, f"{met} {pick.residual:.3f}", share]
 
     def _tip(self, pick: Pick) -> str:
-        first, last, _ = self.session.frames
-        start = first if pick.start is None else pick.start
-        until = last if pick.until is None else pick.until
+        start, until = grade_steps.range_of(self.session, pick)
         ends = style.number(start), style.number(until), style.number(pick.fade)
         return texts.PICK_TIP.format(*ends)
 
@@ -140,11 +138,11 @@ class PickList(QWidget):
         if self._silent:
             return
         id_, on = item.data(0, ID), item.checkState(0) == Qt.CheckState.Checked
-        gestures.enable(self.session, id_, on)
+        grade_steps.enable(self.session, id_, on)
 
     def remove_selected(self) -> None:
         """Remove the selected picks and holds, and unlock the selected handles."""
-        gestures.remove(self.session, [item.data(0, ID) for item in self.list.selectedItems()])
+        grade_steps.remove(self.session, [item.data(0, ID) for item in self.list.selectedItems()])
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Delete removes."""
@@ -173,7 +171,7 @@ class Versions(QWidget):
         self.row.addStretch(1)
         self.keep = QPushButton(texts.KEEP)
         self.keep.setToolTip(texts.KEEP_TIP)
-        self.keep.clicked.connect(lambda: gestures.keep_version(session))
+        self.keep.clicked.connect(lambda: grade_steps.keep_version(session))
         self.row.addWidget(self.keep)
         session.on("document", self.refresh, panel=True)
         self.refresh()
@@ -206,6 +204,6 @@ class Versions(QWidget):
 
     def use(self, name: str) -> None:
         """Use a version."""
-        gestures.use_version(self.session, name)
+        grade_steps.use_version(self.session, name)
         self._shown = ()
         self.refresh()

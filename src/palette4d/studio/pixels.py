@@ -27,8 +27,8 @@ def place_between(session: Session, first: tuple[int, int], last: tuple[int, int
     half = side // 2
     box = pixels[max(0, y - half) : y + half + 1, max(0, x - half) : x + half + 1]
     assert session.clip is not None
-    colours = _core.straight_colours(box, premultiplied=session.clip.premultiplied)
-    colours = colours.reshape(-1, 3).astype(np.float64)
+    straight = _core.straight_colours(box, premultiplied=session.clip.premultiplied)
+    colours = straight.reshape(-1, 3).astype(np.float64)
     own = session.document.core.conversion
     if own is not None:
         colours = own.steps.to_palette(colours)

@@ -13,7 +13,7 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import TypeVar
 
 from palette4d.common.errors import Palette4dError, in_words
 from palette4d.grade.document import Document
@@ -21,24 +21,11 @@ from palette4d.grade.follow import Progress
 from palette4d.media.clip import Clip, open_clip
 from palette4d.media.source_clip import find_clip
 from palette4d.studio import texts
-from palette4d.studio.display import Display, Look
+from palette4d.studio.display import Display
+from palette4d.studio.newest import Newest
 from palette4d.studio.player import Player
-from palette4d.studio.states import Place, Probe, Status, View
+from palette4d.studio.session_view import SessionView
 
-Event = Literal[
-    "document",  # the palette or its edits, also of every step of a drag
-    "clip",  # another clip, or none
-    "frame",
-    "pixels",  # the frame's pixels have arrived, or the reason why they cannot
-    "selection",
-    "hover",
-    "probe",
-    "view",
-    "wipe",  # the wipe alone has moved
-    "playing",
-    "range",
-    "status",
-]
 Edit = Callable[[Document], object]
 T = TypeVar("T")
 
@@ -48,97 +35,35 @@ SAVE_AFTER, SAVE_AT_MOST = 0.4, 1.5
 TRY_AGAIN = 5.0
 
 
-class Session:
+class Session(SessionView):
     """The state that all views share.
 
     Attributes
     ----------
     document : Document or None
         The document; while something is dragged, a copy with the drag's edit.
-    clip : Clip or None
-        The clip; None if it was not found.
     player : Player or None
         Reads the clip's frames.
     display : Display or None
         How code values of the clip become colours on the screen.
-    frame : int
-        The playhead.
-    selection : tuple of str
-        The ids of the selected vertices, stops and edges.
-    hover : str or None
-        The handle or palette colour under the pointer.
-    probe : Probe or None
-        The pixel under the pointer.
-    place : Place or None
-        The pixel or box that was clicked, and is not picked yet.
-    view : View
-        How the picture is shown.
-    playing : int
-        Frames a step of the playback: 0 stands, 1 plays, -1 plays backwards, 2 is twice as fast.
-    marks : (int, int) or None
-        In and out point.
-    loop : bool
-        Whether playing begins again at the end.
-    status : Status
-        What the last action did.
-    post : callable
-        Runs a function on the views' thread; the window sets it.
-    later : callable
-        Runs a panel's function soon, when the picture is shown; the window sets it.
+    revision : int
+        Rises with every change of what `document` shows.
     """
 
     def __init__(self) -> None:
         """Begin without a document."""
+        super().__init__()
         self._document: Document | None = None
         self._trial: Document | None = None
         self._dragged: tuple[Edit, str] | None = None
-        self._callbacks: dict[str, list[tuple[Callable[[], object], bool]]] = {}
+        self._drags = 0  # how many were begun
+        self._solver, self._guard = Newest("palette4d solver"), threading.Lock()
         self._stamp: tuple[int, int, int] | None = None
         self._edited_at: float | None = None  # the first edit that is not on disk
         self._last_edit = self._next_try = 0.0
-        self.clip: Clip | None = None
         self.player: Player | None = None
         self.display: Display | None = None
-        self.frame = 0
-        self.selection: tuple[str, ...] = ()
-        self.hover: str | None = None
-        self.probe: Probe | None = None
-        self.place: Place | None = None
-        self.view = View()
-        self.playing = 0
-        self.marks: tuple[int, int] | None = None
-        self.loop = True
-        self.status = Status()
-        self.revision = 0  #: rises with every change of what `document` shows
-        self.post: Callable[[Callable[[], object]], object] = lambda call: call()
-        self.later: Callable[[Callable[[], object]], object] = lambda call: call()
-
-    # ------------------------------------------------------------------------------------- events
-
-    def on(self, event: Event, callback: Callable[[], object], *, panel: bool = False) -> None:
-        """Call a function after every event of this kind.
-
-        A panel is told later while something is dragged or frames go by: the picture comes first.
-        """
-        self._callbacks.setdefault(event, []).append((callback, panel))
-
-    def emit(self, event: Event) -> None:
-        """Tell the views."""
-        moving = event == "frame" or (event == "document" and self.dragging)
-        for callback, panel in tuple(self._callbacks.get(event, ())):
-            if panel and moving:
-                self.later(callback)
-            else:
-                callback()
-
-    def say(self, text: str, level: Literal["info", "warning", "error"] = "info") -> None:
-        """Set the status."""
-        self.status = Status(text, level)
-        self.emit("status")
-
-    def report(self, error: Exception) -> None:
-        """Show an error as the status."""
-        self.say(in_words(error), "error")
+        self.revision = 0
 
     # -------------------------------------------------------------------------------------- files
 
@@ -163,11 +88,12 @@ class Session:
         Raises
         ------
         Palette4dError
-            The sidecar is unusable, or the clip that was named cannot be opened.
+            The sidecar is unusable, the clip that was named cannot be opened, or the edits of the
+            document before cannot be saved.
         """
         document = Document.load(path)
         found = find_clip(Path(path), document.core.clip, clip)
-        self.close()
+        self._leave()
         self._document = document
         self._stamp = _stamp(Path(path))
         first, last, step = document.frames
@@ -187,10 +113,10 @@ class Session:
         Raises
         ------
         Palette4dError
-            The clip cannot be opened.
+            The clip cannot be opened, or the edits of the document before cannot be saved.
         """
         found = open_clip(spec, frames=frames, skip_bad_frames=True)
-        self.close()
+        self._leave()
         self.frame = found.frames[0]
         self._set_clip(found)
         self._changed()
@@ -210,6 +136,15 @@ class Session:
 
         return "; ".join(mismatches(self._document, self.clip, True))
 
+    @property
+    def frames(self) -> tuple[int, int, int]:
+        """First and last frame and the step: the document's, else the clip's."""
+        if self._document is not None:
+            return self._document.frames
+        if self.clip is not None:
+            return self.clip.frames[0], self.clip.frames[-1], max(self.clip.step, 1)
+        return 0, 0, 1
+
     def _set_clip(self, clip: Clip | None) -> None:
         if self.player is not None:
             self.player.close()
@@ -226,15 +161,15 @@ class Session:
         if self.display is None or (self.display.space, self.display.asked) != found:
             self.display = Display(*found)
 
-    @property
-    def looked(self) -> Look:
-        """The display, view, exposure and gamma of `view`."""
-        view = self.view
-        return Look(view.display, view.view, view.exposure, view.gamma)
-
     def _arrived(self, frame: int) -> None:
         """Tell the views that a frame was read; called by the player's threads."""
         self.post(lambda: self.emit("pixels"))
+
+    def _leave(self) -> None:
+        """Close; what cannot be saved stays open, so that nothing is lost."""
+        if not self.saved and not self.save():
+            raise Palette4dError(self.status.text)
+        self.close()
 
     def close(self) -> None:
         """Save and close the document and the clip."""
@@ -310,7 +245,10 @@ class Session:
         threading.Thread(target=work, name="palette4d edit", daemon=True).start()
 
     def drag(self, operation: Edit, text: str = "") -> None:
-        """Show an edit without doing it; each call replaces the last."""
+        """Show an edit without doing it; each call replaces the last.
+
+        Picks are solved beside the views' thread: the views hear of it when that is done.
+        """
         if self._document is None:
             return
         trial = self._document.trial()
@@ -319,26 +257,53 @@ class Session:
         except (Palette4dError, OSError) as error:
             self.report(error)
             return
-        self._trial, self._dragged = trial, (operation, text)
+        if self._dragged is None:
+            self._drags += 1
+        self._dragged = operation, text
+        number = self._drags
+        if any(kind == "pick" for kind, _ in trial.state):
+            self._solver.ask(lambda: self._solve(trial, number))
+        else:
+            self._show_trial(trial, number)
+
+    def _solve(self, trial: Document, number: int) -> None:
+        """Solve the picks of a trial; runs in a thread."""
+        try:
+            trial.core  # noqa: B018  it is computed when it is read
+        except Exception as error:  # whatever fails, the window stays
+            failed = error
+            self.post(lambda: self.report(failed))
+        else:
+            self.post(lambda: self._show_trial(trial, number))
+
+    def _show_trial(self, trial: Document, number: int) -> None:
+        with self._guard:  # without views `post` calls in the solver's thread
+            if self._dragged is None or number != self._drags:
+                return
+            self._trial = trial
         self._changed()
+
+    def _end_drag(self) -> None:
+        with self._guard:
+            self._trial = self._dragged = None
 
     def drop(self) -> None:
         """Do the edit that was dragged last."""
         if self._dragged is not None:
             operation, text = self._dragged
-            self._trial = self._dragged = None
+            self._end_drag()
             self.edit(operation, text)
 
     def cancel(self) -> None:
         """Forget the edit that is being dragged."""
-        if self._trial is not None:
-            self._trial = self._dragged = None
+        if self._dragged is not None:
+            self._end_drag()
             self._changed()
 
     @property
     def dragging(self) -> bool:
         """Whether something is being dragged."""
-        return self._trial is not None
+        return self._dragged is not None
 
     def undo(self) -> None:
         """Take the last edit back."""
@@ -351,78 +316,6 @@ class Session:
     def _changed(self) -> None:
         self.revision += 1
         self.emit("document")
-
-    # --------------------------------------------------------------------------------- where he is
-
-    @property
-    def frames(self) -> tuple[int, int, int]:
-        """First and last frame and the step: the document's, else the clip's."""
-        if self._document is not None:
-            return self._document.frames
-        if self.clip is not None:
-            return self.clip.frames[0], self.clip.frames[-1], max(self.clip.step, 1)
-        return 0, 0, 1
-
-    def go(self, frame: float) -> None:
-        """Move the playhead to the frame nearest to a time."""
-        first, last, step = self.frames
-        nearest = first + round((min(max(frame, first), last) - first) / step) * step
-        if nearest != self.frame:
-            self.frame = min(nearest, last)
-            self.emit("frame")
-
-    def step(self, frames: int) -> None:
-        """Move the playhead by so many frames."""
-        self.go(self.frame + frames * self.frames[2])
-
-    def play(self, speed: int) -> None:
-        """Play, or stop with 0."""
-        self.playing = speed if self.clip is not None else 0
-        self.emit("playing")
-
-    def mark(self, start: int | None = None, end: int | None = None) -> None:
-        """Set the in point, the out point, or both; without either, remove them."""
-        first, last, _ = self.frames
-        before = self.marks or (first, last)
-        if start is None and end is None:
-            self.marks = None
-        elif end is None:
-            assert start is not None
-            self.marks = (start, max(before[1], start))
-        else:
-            self.marks = (min(before[0] if start is None else start, end), end)
-        self.emit("range")
-
-    def select(self, *ids: str) -> None:
-        """Select handles or palette colours; a pixel that was clicked is forgotten."""
-        if ids != self.selection or self.place is not None:
-            self.selection, self.place = ids, None
-            self.emit("selection")
-
-    def begin_pick(self, place: Place) -> None:
-        """Inspect a pixel that was clicked; nothing else is selected."""
-        self.selection, self.place = (), place
-        self.emit("selection")
-
-    def hover_over(self, id: str | None) -> None:
-        """Tell which handle or palette colour is under the pointer."""
-        if id != self.hover:
-            self.hover = id
-            self.emit("hover")
-
-    def show_probe(self, probe: Probe | None) -> None:
-        """Tell which pixel is under the pointer."""
-        if probe != self.probe:
-            self.probe = probe
-            self.emit("probe")
-
-    def look(self, **changes: Any) -> None:
-        """Change how the picture is shown: the attributes of `View`."""
-        before, self.view = self.view, dataclasses.replace(self.view, **changes)
-        if before != self.view:
-            self.emit(
-                "wipe" if before == dataclasses.replace(self.view, wipe=before.wipe) else "view"
-            )
 
     # ------------------------------------------------------------------------------------- saving
 
@@ -482,19 +375,27 @@ class Session:
         copy = recovery_file(self._document.path)
         try:
             copy.parent.mkdir(parents=True, exist_ok=True)
-            self._document.trial().save(copy, on_edits="drop")
+            self._elsewhere(self._document).save(copy, on_edits="drop")
             kept = texts.KEPT_IN.format(copy=copy)
         except (Palette4dError, OSError):
             kept = texts.KEPT_HERE
         self.say(f"{texts.NOT_SAVED} {in_words(error)}. {kept}", "error")
+
+    @staticmethod
+    def _elsewhere(document: Document) -> Document:
+        """Return a document to save in another folder: it finds its clip from there."""
+        fields = document.fields()
+        source = fields["clip"]["source"]
+        if source and document.path is not None:
+            fields["clip"]["source"] = str(document.path.absolute().parent / source)
+        return Document(fields)
 
     def save_as(self, path: str | os.PathLike[str]) -> bool:
         """Save under another name and go on with that file; return whether it worked."""
         if self._document is None:
             return False
         try:
-            document = Document(self._document.fields())
-            document.save(path, on_edits="drop")
+            self._elsewhere(self._document).save(path, on_edits="drop")
             loaded = Document.load(path)
         except (Palette4dError, OSError) as error:
             self.report(error)

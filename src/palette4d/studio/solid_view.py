@@ -29,8 +29,8 @@ from palette4d.plotting.solid import (
     extent_of,
 )
 from palette4d.studio import paint, texts
-from palette4d.studio.actions import SOLID_ACTIONS
-from palette4d.studio.menus import view_actions
+from palette4d.studio.menu_entries import SOLID_ACTIONS
+from palette4d.studio.panel_menus import view_actions
 from palette4d.studio.screen_colours import on_screen
 from palette4d.studio.session import Session
 from palette4d.studio.solid_paint import DISC, SolidPainter
@@ -150,8 +150,8 @@ class SolidView(QWidget):
             if image is None:
                 return None if self._pixels is None else self._pixels[1:]
             premultiplied = session.clip.premultiplied
-            colours = _core.straight_colours(image, premultiplied=premultiplied)
-            colours = even_sample(colours, PIXELS).astype(np.float64)
+            straight = _core.straight_colours(image, premultiplied=premultiplied)
+            colours = even_sample(straight, PIXELS).astype(np.float64)
             document = session.document
             own = None if document is None else document.core.conversion
             if own is not None:

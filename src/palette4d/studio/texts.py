@@ -81,13 +81,14 @@ RECOVERY = "edits that could not be saved are in {copy}; File > Open loads them"
 UNEXPECTED = "something went wrong in the program: {error}. Your edits are kept"
 
 # -------------------------------------------------------------------------------------- the menus
+#: The letter after & opens the menu with Alt.
 MENUS = {
-    "file": "File",
-    "edit": "Edit",
-    "palette": "Palette",
-    "view": "View",
-    "playback": "Playback",
-    "help": "Help",
+    "file": "&File",
+    "edit": "&Edit",
+    "palette": "&Palette",
+    "view": "&View",
+    "playback": "Play&back",
+    "help": "&Help",
 }
 #: The entries of the menus: of the window, and of the views that have the keyboard.
 ACTIONS = {
@@ -117,6 +118,8 @@ ACTIONS = {
         "lock": "Lock or unlock the selected",
         "hold_pixel": "Hold the colour under the pointer",
         "pick_pixel": "Pick the colour under the pointer",
+        "act_from": "The selected pick acts from here on",
+        "act_until": "The selected pick acts until here",
         "ramp_linear": "Ramp: linear",
         "ramp_smooth": "Ramp: smooth",
         "ramp_hold": "Ramp: hold",
@@ -227,6 +230,7 @@ CLOSE_ANYWAY = "{why}\n\nClose anyway?"
 RESET_ALL = "everything is reset"
 WAS_LOCKED, WAS_UNLOCKED = "locked {ids}", "unlocked {ids}"
 SELECT_A_HANDLE = "select a vertex or a stop first"
+SELECT_A_PICK = "select a pick or a hold first"
 POINT_AT = "point at a pixel first"
 KEPT_VERSION = "kept as version {name}"
 USES_VERSION = "version {name}"
@@ -260,6 +264,7 @@ SHOT_NAMES = "Shots with these names"
 ACTION = "Action"
 CLIP = "Clip"
 CLIP_HINT = "shot.####.exr, a folder, an image or a movie"
+SHOW = "Edit"
 SIDECAR = "Sidecar"
 OUTPUT = "Output"
 FOLDER = "Folder"
@@ -272,9 +277,17 @@ PALETTE_SPACE = "Palette's colour space"
 SPACE_HINT = "as the file says"
 CONFIG = "OpenColorIO config"
 BASE_CONFIG = "Config to extend"
-KEEP_EDITS = "Keep the edits"
+EDITS = "Edits of an existing sidecar"
+EDITS_NAMES = ("stop if there are any", "keep", "drop")
 SKIP_BAD = "Skip bad frames"
 ALLOW_CUTS = "Allow cuts"
+DETECT_SHOTS = "Split at cuts, a sidecar a shot"
+MEDIA = "Media of the edit"
+MEDIA_HINT = "where the edit says"
+METHOD = "Method"
+METHOD_HINT = "the best"
+SETTINGS = "Settings"
+SETTINGS_HINT = "NAME=VALUE, see palette4d analyze --help-all"
 COMPARE_LABEL = "With the source"
 BITS = "Bits a sample"
 BITS_HINT = "as the clip"

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QMenu, QWidget
 from palette4d.grade.edits import RAMPS
 from palette4d.grade.picks import Pick
 from palette4d.plotting import style
-from palette4d.studio import gestures, texts
+from palette4d.studio import grade_steps, texts
 from palette4d.studio.session import Session
 from palette4d.studio.timeline_places import Hit, Places
 
@@ -49,16 +49,16 @@ def menu_for(
     if disc is not None:
         _add_go(menu, session, disc.frame)
         menu.addAction(
-            texts.REMOVE_STOP if hit.stop else texts.RESET, lambda: gestures.reset(session)
+            texts.REMOVE_STOP if hit.stop else texts.RESET, lambda: grade_steps.reset(session)
         )
         _add_ramps(menu, session)
         locked = session.document is not None and hit.id in session.document.locks
-        menu.addAction(texts.UNLOCK if locked else texts.LOCK, lambda: gestures.lock(session))
+        menu.addAction(texts.UNLOCK if locked else texts.LOCK, lambda: grade_steps.lock(session))
         menu.addSeparator()
     elif hit.what == "pick":
         pick = next(pick for pick, _ in places.lanes() if pick.id == hit.id)
         _add_pick(menu, session, pick)
-        menu.addAction(texts.REMOVE, lambda: gestures.remove(session, list(session.selection)))
+        menu.addAction(texts.REMOVE, lambda: grade_steps.remove(session, list(session.selection)))
         menu.addSeparator()
     elif hit.what == "band":
         menu.addAction(texts.ADD_STOP_AT.format(frame=style.number(frame)), add_stop)
@@ -81,11 +81,11 @@ def _add_pick(menu: QMenu, session: Session, pick: Pick) -> None:
         made.triggered.connect(lambda _=False: change())
 
     def changed(**changes: Any) -> Callable[[], object]:
-        return lambda: gestures.change_pick(session, pick.id, **changes)
+        return lambda: grade_steps.change_pick(session, pick.id, **changes)
 
     _add_go(menu, session, pick.frame)
     switch = not pick.enabled
-    entry(menu, texts.ACTS, pick.enabled, lambda: gestures.enable(session, pick.id, switch))
+    entry(menu, texts.ACTS, pick.enabled, lambda: grade_steps.enable(session, pick.id, switch))
     only = changed(global_only=not pick.global_only)
     entry(menu, texts.PALETTE_ONLY, pick.global_only, only)
     if pick.kind == "pick":
@@ -102,11 +102,11 @@ def _add_ramps(menu: QMenu, session: Session) -> None:
     document = session.document
     if document is None:
         return
-    ids = gestures.handles_of(document, session.selection)
+    ids = grade_steps.handles_of(document, session.selection)
     ramps = menu.addMenu(texts.RAMP)
     for ramp in RAMPS:
         entry = ramps.addAction(texts.RAMPS[ramp])
-        entry.triggered.connect(lambda _=False, ramp=ramp: gestures.set_ramp(session, ramp))
+        entry.triggered.connect(lambda _=False, ramp=ramp: grade_steps.set_ramp(session, ramp))
         entry.setCheckable(True)
         own = [document.settings[id_].ramp for id_ in ids if id_ in document.settings]
         entry.setChecked(bool(own) and all(each == ramp for each in own))

@@ -308,6 +308,19 @@ class Places:
 
     # ------------------------------------------------------------------------------------ handles
 
+    def point_of(self, id_: str) -> QPointF | None:
+        """Return where a handle, a palette colour or a pick is; None if it is not shown."""
+        disc, row = self.disc(id_), self.row_of(id_)
+        if disc is not None:
+            return QPointF(disc.x, disc.y + self.top)
+        for pick, lane in self.lanes():
+            if pick.id == id_:
+                return QPointF(self.x_of(pick.frame), self.lane_y(lane))
+        if row is None or self.timeline is None:
+            return None
+        tall = self.timeline[0].row_height
+        return QPointF(self.x_of(self.session.frame), self.top + (row + 0.5) * tall)
+
     def disc(self, id_: str) -> Disc | None:
         """Return the disc of a handle."""
         found = self.timeline

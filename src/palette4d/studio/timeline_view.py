@@ -21,11 +21,12 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QMenu, QToolTip, QWidget
 
 from palette4d.plotting import style
-from palette4d.studio import gestures, texts
-from palette4d.studio.actions import TIMELINE_ACTIONS, VIEW
+from palette4d.studio import grade_steps, texts
 from palette4d.studio.frame_strip import FrameStrip
-from palette4d.studio.menus import view_actions
-from palette4d.studio.session import Event, Session
+from palette4d.studio.menu_entries import TIMELINE_ACTIONS, VIEW
+from palette4d.studio.panel_menus import view_actions
+from palette4d.studio.session import Session
+from palette4d.studio.session_events import Event
 from palette4d.studio.timeline_menu import menu_for
 from palette4d.studio.timeline_paint import TimelinePainter
 from palette4d.studio.timeline_places import (
@@ -254,7 +255,7 @@ class TimelineView(QWidget):
     def _drag_stop(self, id_: str, x: float, *, snap: bool) -> None:
         frame = self.places.place_for(id_, self.places.frame_at(x, snap=snap))
         if frame is not None:
-            gestures.move_stop(self.session, id_, frame, dragging=True)
+            grade_steps.move_stop(self.session, id_, frame, dragging=True)
 
     def _drag_range(self, hit: Hit, x: float, *, fade: bool) -> None:
         """Drag an end of a range, or of its fades."""
@@ -281,9 +282,9 @@ class TimelineView(QWidget):
         id_, start, until, fade = self.places.dragged
         pick = next((pick for pick, _ in self.places.lanes() if pick.id == id_), None)
         if pick is not None and fade != pick.fade:
-            gestures.change_pick(self.session, id_, fade=fade)
+            grade_steps.change_pick(self.session, id_, fade=fade)
         elif pick is not None:
-            gestures.set_range(self.session, id_, start, until)
+            grade_steps.set_range(self.session, id_, start, until)
 
     def _select_in(self, box: QRectF) -> None:
         found, top = self.places.timeline, self.places.top
@@ -357,7 +358,9 @@ class TimelineView(QWidget):
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
         """Show the menu of what is under the pointer."""
         at = QPointF(event.pos())
-        self.menu_for(self.places.hit(at), at.x()).exec(event.globalPos())
+        if event.reason() == QContextMenuEvent.Reason.Keyboard and self.session.selection:
+            at = self.places.point_of(self.session.selection[0]) or at
+        self.menu_for(self.places.hit(at), at.x()).exec(self.mapToGlobal(at.toPoint()))
         self._press = None
 
     def menu_for(self, hit: Hit, x: float) -> QMenu:
@@ -475,7 +478,7 @@ class TimelineView(QWidget):
                 id_, float(round(stops[id_]) + by * self.session.frames[2])
             )
             if frame is not None and frame != stops[id_]:
-                gestures.move_stop(self.session, id_, frame)
+                grade_steps.move_stop(self.session, id_, frame)
 
     def focusNextPrevChild(self, forward: bool) -> bool:
         """Tab goes through the handles, and then to the next panel."""

@@ -23,7 +23,7 @@ from palette4d.studio.player import Region
 from palette4d.studio.preview import Grade, Picture, Preview, Request
 from palette4d.studio.session import Session
 from palette4d.studio.states import Place
-from palette4d.studio.viewer_paint import ViewerPainter, hatched, image_of
+from palette4d.studio.viewer_paint import SharedImage, ViewerPainter, hatched
 
 #: Pixels of the screen within which the pointer takes the wipe's line, and a press is a click.
 NEAR_WIPE, CLICK = 6, 4
@@ -211,7 +211,7 @@ class Viewer(QWidget):
         for side in ("before", "after"):
             pixels = getattr(picture, side)
             if pixels is not None:
-                self.images[side] = image_of(pixels)
+                self.images[side] = SharedImage(pixels)
             else:
                 self.images.pop(side, None)
         if picture.outside is not None:

@@ -250,12 +250,13 @@ class ViewerPainter:
         painter.drawText(box, int(flags), text)
 
 
-def image_of(pixels: NDArray[np.uint8]) -> QImage:
-    """Return an image that shares the (h, w, 4) pixels."""
-    height, width = pixels.shape[:2]
-    image = QImage(pixels.data, width, height, 4 * width, QImage.Format.Format_RGBX8888)
-    image._pixels = pixels  # type: ignore[attr-defined]  # Qt does not keep the memory that it shows
-    return image
+class SharedImage(QImage):
+    """An image that shares (h, w, 4) pixels and keeps them: Qt alone would not."""
+
+    def __init__(self, pixels: NDArray[np.uint8]) -> None:
+        height, width = pixels.shape[:2]
+        super().__init__(pixels.data, width, height, 4 * width, QImage.Format.Format_RGBX8888)
+        self.pixels = pixels
 
 
 def hatched(mask: NDArray[np.uint8]) -> QImage:

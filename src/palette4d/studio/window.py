@@ -28,21 +28,22 @@ from PySide6.QtWidgets import (
 )
 
 from palette4d.common.errors import Palette4dError
-from palette4d.studio import actions, texts, theme
-from palette4d.studio.actions import ACTIONS, Action
-from palette4d.studio.commands import Commands
-from palette4d.studio.files import Files
-from palette4d.studio.help import Help
+from palette4d.studio import menu_entries, texts, theme
+from palette4d.studio.file_menu import FileMenu
+from palette4d.studio.help_menu import HelpMenu
+from palette4d.studio.history_list import History
 from palette4d.studio.inspector import Inspector
 from palette4d.studio.instance import Listener
-from palette4d.studio.panels import History, Shots
+from palette4d.studio.menu_actions import MenuActions
+from palette4d.studio.menu_entries import ACTIONS, Action
+from palette4d.studio.paths import sequence_of
 from palette4d.studio.session import Session
+from palette4d.studio.shot_list import Shots
 from palette4d.studio.solid_view import SolidView
-from palette4d.studio.tasks import Tasks
 from palette4d.studio.timeline_view import TimelineView
 from palette4d.studio.transport import Playback, Transport
+from palette4d.studio.verb_menu import VerbMenu
 from palette4d.studio.viewer import Viewer
-from palette4d.studio.work import sequence_of
 
 #: Milliseconds between two looks at the file.
 TICK = 200
@@ -50,8 +51,6 @@ TICK = 200
 PICTURE_FIRST, LONGEST_REST = 20, 120
 #: Shows the picture before while it is down.
 COMPARE_KEY = Qt.Key.Key_C
-#: Recent files that the menu keeps.
-RECENT = 10
 
 
 class _Post(QObject):
@@ -146,7 +145,7 @@ class Window(QMainWindow):
         self.inspector = Inspector(session)
         self.viewer.on_pick, self.viewer.on_hold = self.inspector.pick, self.inspector.hold
         self.history = History(session)
-        self.files = Files(self)
+        self.files = FileMenu(self)
         self.shots = Shots(session, self.files.open_shot)
         middle = QWidget()
         column = QVBoxLayout(middle)
@@ -158,7 +157,7 @@ class Window(QMainWindow):
         self._make_docks()
         self._make_fields()
         self._make_status()
-        self.commands, self.tasks, self.help = Commands(self), Tasks(self), Help(self)
+        self.commands, self.verbs, self.help = MenuActions(self), VerbMenu(self), HelpMenu(self)
         self.actions_by_name: dict[str, QAction] = {}
         self._make_menus()
         for name in ("first_frame", "previous_frame", "play", "next_frame", "last_frame"):
@@ -286,10 +285,10 @@ class Window(QMainWindow):
             for title, more in panel.menu_actions.items():
                 self.menus[title].addSeparator()
                 self.menus[title].addActions(more)
-        palette = self.menus[actions.PALETTE]
+        palette = self.menus[menu_entries.PALETTE]
         self.versions = palette.addMenu(texts.VERSIONS)
         self.versions.aboutToShow.connect(self._fill_versions)
-        view = self.menus[actions.VIEW]
+        view = self.menus[menu_entries.VIEW]
         view.addSeparator()
         for dock in self.docks.values():
             view.addAction(dock.toggleViewAction())
@@ -313,7 +312,7 @@ class Window(QMainWindow):
 
     def action(self, name: str) -> Callable[[], object]:
         """Return what does an action: a method of its name."""
-        owners: tuple[object, ...] = (self.files, self.commands, self.tasks, self.help)
+        owners: tuple[object, ...] = (self.files, self.commands, self.verbs, self.help)
         owner = next(each for each in owners if hasattr(each, name))
         found: Callable[[], object] = getattr(owner, name)
         return found
@@ -377,7 +376,7 @@ class Window(QMainWindow):
             self.actions_by_name[action].setEnabled(open_)
         self.actions_by_name["undo"].setEnabled(open_ and bool(document and document.history))
         self.actions_by_name["redo"].setEnabled(open_ and bool(document and document.undone))
-        for action in ("reset_selected", "lock", "add_stop"):
+        for action in ("reset_selected", "lock", "add_stop", "act_from", "act_until"):
             self.actions_by_name[action].setEnabled(open_ and bool(session.selection))
         many = self.shots.count() > 1
         for action in ("next_shot", "previous_shot"):
@@ -394,7 +393,7 @@ class Window(QMainWindow):
     # -------------------------------------------------------------------------------------- files
 
     def open_path(self, path: str, clip: str | None = None) -> None:
-        """Open a sidecar, a manifest, or a clip; a clip without a palette is offered to analyse."""
+        """Open a sidecar or a manifest; a clip without a palette, or an edit, is analysed."""
         self.files.open_path(path, clip)
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 from palette4d.grade.document import Document
 from palette4d.grade.edits import Ramp
 from palette4d.grade.follow import Progress
+from palette4d.grade.picks import Pick
 from palette4d.plotting import style
 from palette4d.studio import texts
 from palette4d.studio.session import Session
@@ -112,6 +113,13 @@ def change_pick(session: Session, id_: str, text: str = "", **changes: Any) -> N
         document.change_pick(id_, clip=clip, progress=progress, **changes)
 
     session.edit_later(change, text or texts.PICK_CHANGED.format(id=id_))
+
+
+def range_of(session: Session, pick: Pick) -> tuple[float, float]:
+    """Return the first and last frame at which a pick or hold acts fully."""
+    first, last, _ = session.frames
+    start, until = pick.start, pick.until
+    return float(first if start is None else start), float(last if until is None else until)
 
 
 def set_range(session: Session, id_: str, start: float, until: float) -> None:

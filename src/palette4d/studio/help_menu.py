@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
 )
 
 from palette4d.studio import texts
-from palette4d.studio.actions import ACTIONS, PALETTE, SOLID_ACTIONS, TIMELINE_ACTIONS
+from palette4d.studio.menu_entries import ACTIONS, PALETTE, SOLID_ACTIONS, TIMELINE_ACTIONS, title
 
 
 def rows() -> list[tuple[str, str, str]]:
@@ -27,13 +27,14 @@ def rows() -> list[tuple[str, str, str]]:
         *((action, texts.IN_SOLID) for action in SOLID_ACTIONS),
     ]
     found = list(texts.GESTURES)
-    for menu, title in texts.MENUS.items():
+    for menu in texts.MENUS:
+        name = title(menu)
         for action, where in listed:
             if action.menu == menu and action.keys:
                 keys = ", ".join(action.keys)
-                found.append((title, f"{keys} {where}" if where else keys, action.text))
+                found.append((name, f"{keys} {where}" if where else keys, action.text))
         if menu == PALETTE:
-            found.append((title, "1 – 9", texts.USE_A_VERSION))
+            found.append((name, "1 – 9", texts.USE_A_VERSION))
     return found
 
 
@@ -90,7 +91,7 @@ class Manual(QDialog):
                 last = where
 
 
-class Help:
+class HelpMenu:
     """The menu Help of a window."""
 
     def __init__(self, window: QWidget) -> None:

@@ -42,6 +42,12 @@ class Action:
 
 FILE, EDIT, PALETTE, VIEW, PLAYBACK, HELP = texts.MENUS
 
+
+def title(menu: str) -> str:
+    """Return a menu's title as it is read, without the mark of its key."""
+    return texts.MENUS[menu].replace("&", "")
+
+
 ACTIONS = (
     Action("open", FILE, ("Ctrl+O",)),
     Action("find_clip", FILE),
@@ -68,11 +74,13 @@ ACTIONS = (
     Action("lock", PALETTE, ("Ctrl+L",)),
     Action("hold_pixel", PALETTE, ("H",)),
     Action("pick_pixel", PALETTE, ("P",)),
-    Action("ramp_linear", PALETTE, (), group=1),
-    Action("ramp_smooth", PALETTE, (), group=1),
-    Action("ramp_hold", PALETTE, (), group=1),
-    Action("save_version", PALETTE, ("V",), group=2),
-    Action("compare_version", PALETTE, ("Shift+V",), group=2),
+    Action("act_from", PALETTE, ("[",), group=1),
+    Action("act_until", PALETTE, ("]",), group=1),
+    Action("ramp_linear", PALETTE, (), group=2),
+    Action("ramp_smooth", PALETTE, (), group=2),
+    Action("ramp_hold", PALETTE, (), group=2),
+    Action("save_version", PALETTE, ("V",), group=3),
+    Action("compare_version", PALETTE, ("Shift+V",), group=3),
     Action("show_after", VIEW, ("F1",), True),
     Action("show_before", VIEW, ("F2",), True),
     Action("show_wipe", VIEW, ("F3", "W"), True),

@@ -1,6 +1,5 @@
 """The menu File: opening, saving, recent files, and the shots of a show."""
 
-import contextlib
 import functools
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,13 +8,11 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QFileDialog
 
 from palette4d.common.errors import Palette4dError
-from palette4d.media import clip_sequence
-from palette4d.media.clip import ClipError
-from palette4d.media.clip_sequence import ImageSequence
 from palette4d.shows import manifest
+from palette4d.shows.timeline_files import is_timeline
 from palette4d.studio import texts
+from palette4d.studio.paths import sequence_of, sidecar_of
 from palette4d.studio.session import recovery_file
-from palette4d.studio.work import sequence_of
 
 if TYPE_CHECKING:
     from palette4d.studio.window import Window
@@ -24,14 +21,14 @@ if TYPE_CHECKING:
 RECENT = 10
 
 
-class Files:
+class FileMenu:
     """The files of a window."""
 
     def __init__(self, window: "Window") -> None:
         self.window, self.session = window, window.session
 
     def open_path(self, path: str, clip: str | None = None) -> None:
-        """Open a sidecar, a manifest, or a clip; a clip without a palette is offered to analyse."""
+        """Open a sidecar or a manifest; a clip without a palette, or an edit, is analysed."""
         QApplication.setOverrideCursor(Qt.CursorShape.WaitCursor)
         try:
             self._open(path, clip)
@@ -47,6 +44,8 @@ class Files:
             self.window.docks["shots"].show()
             if self.window.shots.count():
                 self.window.shots.open_first()
+        elif is_timeline(path):
+            self.window.verbs.analyze_show(path)
         elif found.name.endswith(".json"):
             self.session.open_sidecar(found, clip)
             self._offer_recovery(found)
@@ -56,7 +55,7 @@ class Files:
                 self.session.open_sidecar(beside_it, path)
             else:
                 self.session.open_clip(path)
-                self.window.tasks.analyze()
+                self.window.verbs.analyze()
         self.remember(path)
 
     def _offer_recovery(self, path: Path) -> None:
@@ -139,21 +138,3 @@ class Files:
     def previous_shot(self) -> None:
         """Open the shot before."""
         self.window.shots.step(-1)
-
-
-def sidecar_of(path: str) -> Path | None:
-    """Return the sidecar beside a clip, if it was analysed before."""
-    found = Path(path)
-    names = [found.name.split("#")[0].split("%")[0].rstrip("._-"), found.stem, found.name]
-    if "#" in found.name:
-        with contextlib.suppress(ClipError):
-            names.append(clip_sequence.of_pattern(path)[0].name)
-    for name in dict.fromkeys(names):
-        candidate = found.absolute().with_name(f"{name}.p4d.json")
-        if name and candidate.is_file():
-            return candidate
-    if found.is_dir():  # or in the folder, beside its frames
-        with contextlib.suppress(ClipError):
-            inside = clip_sequence.in_folder(found)
-            return sidecar_of(inside.pattern if isinstance(inside, ImageSequence) else str(inside))
-    return None

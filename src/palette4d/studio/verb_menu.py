@@ -1,35 +1,43 @@
 """The long work that the menus begin: each is a verb of the command line in a dialog."""
 
+import functools
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtWidgets import QFileDialog
+from PySide6.QtWidgets import QCheckBox, QFileDialog, QLineEdit
 
+from palette4d.analysis.options import METHODS
+from palette4d.shows.manifest import ENDING
 from palette4d.studio import texts
-from palette4d.studio.jobs import Job
-from palette4d.studio.work import Field, WorkDialog, beside
+from palette4d.studio.paths import beside
+from palette4d.studio.verb_dialog import Field, VerbDialog
 
 if TYPE_CHECKING:
     from palette4d.studio.window import Window
 
 
-class Tasks:
+KEEP_EDITS = "--keep-edits"
+#: What becomes of the edits of an existing sidecar; texts.EDITS_NAMES has their names.
+EDITS = ("", KEEP_EDITS, "--drop-edits")
+
+
+class VerbMenu:
     """The work of a window."""
 
     def __init__(self, window: "Window") -> None:
         self.window, self.session = window, window.session
-        self.dialogs: list[WorkDialog] = []
+        self.dialogs: list[VerbDialog] = []
 
-    def _work(
+    def _verb(
         self,
         title: str,
         verb: str,
         fields: list[Field],
-        done: Callable[[Job], object] | None = None,
-    ) -> WorkDialog:
+        done: Callable[[VerbDialog], object] | None = None,
+    ) -> VerbDialog:
         self.session.save()
-        dialog = WorkDialog(self.window, title, verb, fields, self.session.post, done)
+        dialog = VerbDialog(self.window, title, verb, fields, self.session.post, done)
         dialog.show()
         self.dialogs.append(dialog)
         dialog.destroyed.connect(lambda: self.dialogs.remove(dialog))
@@ -39,7 +47,7 @@ class Tasks:
     def _clip_source(self) -> str:
         return "" if self.session.clip is None else self.session.clip.source
 
-    def analyze(self) -> WorkDialog:
+    def analyze(self) -> VerbDialog:
         """Find the palette of a clip."""
         source = self._clip_source
         out = ""
@@ -49,43 +57,87 @@ class Tasks:
             stem = path.name.split("#")[0].rstrip("._-") or path.absolute().parent.name
             stem = Path(stem).stem if "#" not in source else stem
             out = str(path.with_name(f"{stem}.p4d.json"))
-        return self._analyze(texts.ANALYZE, source, out, "--drop-edits" if out else "")
+        return self._analyze(texts.ANALYZE, source, out)
 
-    def analyze_again(self) -> WorkDialog:
-        """Find the palette of the document's clip again."""
-        return self._analyze(
-            texts.ANALYZE_AGAIN, self._clip_source, str(self.session.path or ""), "--keep-edits"
+    def analyze_show(self, path: str) -> VerbDialog:
+        """Find the palettes of the shots of an edit (.otio, .edl)."""
+        return self._verb(
+            texts.ANALYZE,
+            "analyze",
+            [
+                Field("", texts.SHOW, "open", path),
+                Field("-o", texts.FOLDER, "folder", str(Path(path).with_suffix("")) + "_shots"),
+                Field("--media", texts.MEDIA, "folder", hint=texts.MEDIA_HINT),
+                *self._search_fields(),
+            ],
+            self._open_result,
         )
 
-    def _analyze(self, title: str, clip: str, out: str, edits: str) -> WorkDialog:
-        fields = [
-            Field("", texts.CLIP, "open", clip, hint=texts.CLIP_HINT),
-            Field("-o", texts.SIDECAR, "save", out),
-            Field("--frames", texts.FRAMES, hint=texts.FRAMES_HINT),
+    def analyze_again(self) -> VerbDialog:
+        """Find the palette of the document's clip again."""
+        return self._analyze(
+            texts.ANALYZE_AGAIN, self._clip_source, str(self.session.path or ""), KEEP_EDITS
+        )
+
+    def _analyze(self, title: str, clip: str, out: str, edits: str = "") -> VerbDialog:
+        dialog = self._verb(
+            title,
+            "analyze",
+            [
+                Field("", texts.CLIP, "open", clip, hint=texts.CLIP_HINT),
+                Field("-o", texts.SIDECAR, "save", out),
+                Field("--frames", texts.FRAMES, hint=texts.FRAMES_HINT),
+                *self._search_fields(),
+                Field("", texts.EDITS, "choice", edits, EDITS, names=texts.EDITS_NAMES),
+                Field("--detect-shots", texts.DETECT_SHOTS, "check"),
+            ],
+            self._open_result,
+        )
+        shots = dialog.entry("--detect-shots")
+        assert isinstance(shots, QCheckBox)
+        shots.toggled.connect(functools.partial(self._name_output, dialog, out))
+        return dialog
+
+    @staticmethod
+    def _search_fields() -> list[Field]:
+        """Return the options that a clip and an edit have in common."""
+        return [
             Field("--vertices", texts.VERTICES, hint=texts.VERTICES_HINT),
             Field("--input-space", texts.INPUT_SPACE, hint=texts.SPACE_HINT),
             Field("--palette-space", texts.PALETTE_SPACE, hint=texts.SPACE_HINT),
             Field("--ocio-config", texts.CONFIG, "open", hint="$OCIO"),
+            Field("--method", texts.METHOD, "choice", "", ("", *METHODS), texts.METHOD_HINT),
+            Field("--set", texts.SETTINGS, "words", hint=texts.SETTINGS_HINT),
+            Field("--skip-bad-frames", texts.SKIP_BAD, "check"),
+            Field("--allow-cuts", texts.ALLOW_CUTS, "check"),
         ]
-        if edits == "--keep-edits":
-            fields.append(Field("--keep-edits", texts.KEEP_EDITS, "check", "yes"))
-        fields.append(Field("--skip-bad-frames", texts.SKIP_BAD, "check"))
-        fields.append(Field("--allow-cuts", texts.ALLOW_CUTS, "check"))
 
-        def done(_: Job) -> None:
-            self.window.open_path(dialog.value("-o"), dialog.value("") or None)
-            dialog.close()
+    @staticmethod
+    def _name_output(dialog: VerbDialog, sidecar: str, shots: bool) -> None:
+        """Name the sidecar, or the folder for the sidecars of many shots."""
+        folder = sidecar.removesuffix(".p4d.json") + "_shots"
+        wanted, other = (folder, sidecar) if shots else (sidecar, folder)
+        output = dialog.entry("-o")
+        if isinstance(output, QLineEdit) and sidecar and output.text() == other:
+            output.setText(wanted)
 
-        dialog = self._work(title, "analyze", fields, done)
-        return dialog
+    def _open_result(self, dialog: VerbDialog) -> None:
+        """Open the sidecar or the manifest that was written."""
+        out = Path(dialog.value("-o"))
+        if out.is_dir():
+            written = max(out.glob(f"*{ENDING}"), key=lambda path: path.stat().st_mtime)
+            self.window.open_path(str(written))
+        else:
+            self.window.open_path(str(out), dialog.value("") or None)
+        dialog.close()
 
-    def render(self) -> WorkDialog:
+    def render(self) -> VerbDialog:
         """Write the recoloured clip."""
         path = self.session.path
         assert path is not None
         stem = path.name.removesuffix(".p4d.json")
         marks = self.session.marks
-        return self._work(
+        return self._verb(
             texts.RENDER,
             "render",
             [
@@ -107,12 +159,12 @@ class Tasks:
             ],
         )
 
-    def bake(self) -> WorkDialog:
+    def bake(self) -> VerbDialog:
         """Write a LUT of this frame."""
         path = self.session.path
         assert path is not None
         frame = self.session.frame
-        return self._work(
+        return self._verb(
             texts.BAKE,
             "bake",
             [
@@ -124,11 +176,11 @@ class Tasks:
             ],
         )
 
-    def export(self) -> WorkDialog:
+    def export(self) -> VerbDialog:
         """Write LUTs over time."""
         path = self.session.path
         assert path is not None
-        return self._work(
+        return self._verb(
             texts.EXPORT,
             "export",
             [
@@ -140,11 +192,11 @@ class Tasks:
             ],
         )
 
-    def config(self) -> WorkDialog:
+    def config(self) -> VerbDialog:
         """Write an OpenColorIO config with the looks."""
         path = self.session.path
         assert path is not None
-        return self._work(
+        return self._verb(
             texts.CONFIG_WORK,
             "config",
             [
@@ -155,9 +207,9 @@ class Tasks:
             ],
         )
 
-    def install(self) -> WorkDialog:
+    def install(self) -> VerbDialog:
         """Install the OpenFX node."""
-        return self._work(
+        return self._verb(
             texts.INSTALL,
             "install-plugin",
             [
@@ -169,7 +221,7 @@ class Tasks:
             ],
         )
 
-    def copy_grade(self) -> WorkDialog | None:
+    def copy_grade(self) -> VerbDialog | None:
         """Copy this grade to another shot, or to all shots of the list."""
         own = self.session.path
         show = self.window.shots.path
@@ -186,4 +238,4 @@ class Tasks:
         ]
         if show is not None:
             fields.append(Field("--shots", texts.SHOT_NAMES, value="*"))
-        return self._work(texts.COPY_GRADE, "edit", fields)
+        return self._verb(texts.COPY_GRADE, "edit", fields)

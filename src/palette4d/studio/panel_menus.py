@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import QWidget
 
-from palette4d.studio.actions import Action
+from palette4d.studio.menu_entries import Action
 
 #: Keys that the view sees itself: at the last handle, Tab goes on to the next panel.
 OWN_KEYS = ("Tab", "Shift+Tab")

@@ -33,7 +33,7 @@ def command_line(words: Sequence[str]) -> str:
     return shlex.join(["palette4d", *words])
 
 
-class Job:
+class VerbProcess:
     """A verb of the command line that runs.
 
     Parameters
@@ -55,7 +55,7 @@ class Job:
         The exit status; None while it runs.
     """
 
-    def __init__(self, words: Sequence[str], changed: Callable[["Job"], object]) -> None:
+    def __init__(self, words: Sequence[str], changed: Callable[["VerbProcess"], object]) -> None:
         """Start it."""
         self.words = tuple(words)
         self.what, self.fraction = "", None  # type: tuple[str, float | None]

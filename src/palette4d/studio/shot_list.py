@@ -1,4 +1,4 @@
-"""Lists beside the picture: the history of the edits, and the shots of a show."""
+"""The list of a show's shots, with thumbnails and states."""
 
 import functools
 import threading
@@ -24,55 +24,6 @@ U8 = NDArray[np.uint8]
 
 #: The thumbnails' size in pixels.
 THUMB = QSize(112, 63)
-
-
-class History(QWidget):
-    """The steps of the grade; a click goes back or forward to one."""
-
-    def __init__(self, session: Session) -> None:
-        """Listen to the session."""
-        super().__init__()
-        self.session = session
-        self.list = QListWidget()
-        self.list.setAccessibleName(texts.HISTORY)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self.list)
-        self.list.itemClicked.connect(lambda item: self.go_to(self.list.row(item)))
-        self.list.itemActivated.connect(lambda item: self.go_to(self.list.row(item)))
-        session.on("document", self._show, panel=True)
-        self._show()
-
-    def _show(self) -> None:
-        document = self.session.document
-        if self.session.dragging:
-            return
-        rows = [texts.BEGINNING] if document is not None else []
-        done = 0
-        if document is not None:
-            rows += [edit.label for edit in document.history]
-            done = len(document.history)
-            rows += [edit.label for edit in reversed(document.undone)]
-        self.list.clear()
-        for k, text in enumerate(rows):
-            item = QListWidgetItem(text)
-            if k > done:
-                item.setText(f"{text}  {texts.UNDONE_STEP}")
-                item.setForeground(self.palette().placeholderText())
-            self.list.addItem(item)
-        if rows:
-            self.list.setCurrentRow(done)
-            self.list.scrollToItem(self.list.item(done))
-
-    def go_to(self, row: int) -> None:
-        """Undo or redo up to a row; row 0 is before the first step."""
-        document = self.session.document
-        if document is None:
-            return
-        for _ in range(len(document.history) - row):
-            self.session.undo()
-        for _ in range(row - len(document.history)):
-            self.session.redo()
 
 
 class Shots(QWidget):

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
 from PySide6.QtCore import Qt
@@ -23,12 +22,12 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from palette4d.media import clip_sequence
 from palette4d.studio import texts, theme
 from palette4d.studio.choice import Choice
-from palette4d.studio.jobs import Job, command_line
+from palette4d.studio.paths import sequence_of
+from palette4d.studio.verb_process import VerbProcess, command_line
 
-FieldKind = Literal["text", "save", "open", "folder", "choice", "check"]
+FieldKind = Literal["text", "words", "save", "open", "folder", "choice", "check"]
 
 
 @dataclass(frozen=True)
@@ -42,13 +41,15 @@ class Field:
     text : str
         Its label.
     kind : str
-        How it is entered.
+        How it is entered; "words" repeats the option for each word.
     value : str
         Its first value; "yes" ticks a check box.
     choices : tuple of str
         The choices; "" leaves the option out.
     hint : str
         Shown where the field is empty.
+    names : tuple of str
+        What the choices are called, if not by their values.
     """
 
     flag: str
@@ -57,9 +58,10 @@ class Field:
     value: str = ""
     choices: tuple[str, ...] = ()
     hint: str = ""
+    names: tuple[str, ...] = ()
 
 
-class WorkDialog(QDialog):
+class VerbDialog(QDialog):
     """Runs one verb.
 
     Parameters
@@ -73,7 +75,7 @@ class WorkDialog(QDialog):
     post : callable
         Runs a function on the window's thread.
     done : callable, optional
-        Called with the finished job after a success.
+        Called with the dialog after a success.
     """
 
     def __init__(
@@ -83,7 +85,7 @@ class WorkDialog(QDialog):
         verb: str,
         fields: Sequence[Field],
         post: Callable[[Callable[[], object]], object],
-        done: Callable[[Job], object] | None = None,
+        done: Callable[["VerbDialog"], object] | None = None,
     ) -> None:
         """Make the form."""
         super().__init__(parent)
@@ -91,7 +93,7 @@ class WorkDialog(QDialog):
         self.setMinimumWidth(620)
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self.verb, self.fields = verb, tuple(fields)
-        self.job: Job | None = None
+        self.job: VerbProcess | None = None
         self._post, self._done = post, done
         self.inputs: list[QLineEdit | QComboBox | QCheckBox] = []
         column = QVBoxLayout(self)
@@ -152,8 +154,8 @@ class WorkDialog(QDialog):
             return label, check
         if field.kind == "choice":
             choice = Choice()
-            for each in field.choices:
-                choice.addItem(each or field.hint, each)
+            for name, each in zip(field.names or field.choices, field.choices, strict=True):
+                choice.addItem(name or field.hint, each)
             choice.setCurrentIndex(max(0, choice.findData(field.value)))
             choice.currentIndexChanged.connect(self._show_command)
             self.inputs.append(choice)
@@ -164,7 +166,7 @@ class WorkDialog(QDialog):
         line.textChanged.connect(self._show_command)
         line.setAccessibleName(field.text)
         self.inputs.append(line)
-        if field.kind == "text":
+        if field.kind in ("text", "words"):
             return label, line
         box = QWidget()
         row = QHBoxLayout(box)
@@ -197,16 +199,19 @@ class WorkDialog(QDialog):
                 value = str(widget.currentData())
             else:
                 value = widget.text().strip()
-            if value:
-                words += [field.flag, value] if field.flag else [value]
+            for each in value.split() if field.kind == "words" else [value] if value else []:
+                words += [field.flag, each] if field.flag else [each]
         return words
 
+    def entry(self, flag: str) -> QLineEdit | QComboBox | QCheckBox:
+        """Return where an option is entered, the first of those with this flag."""
+        pairs = zip(self.fields, self.inputs, strict=True)
+        return next(widget for field, widget in pairs if field.flag == flag)
+
     def value(self, flag: str) -> str:
-        """Return what was entered for an option."""
-        for field, widget in zip(self.fields, self.inputs, strict=True):
-            if field.flag == flag and isinstance(widget, QLineEdit):
-                return widget.text().strip()
-        return ""
+        """Return the text that was entered for an option."""
+        entry = self.entry(flag)
+        return entry.text().strip() if isinstance(entry, QLineEdit) else ""
 
     def _show_command(self) -> None:
         self.command.setText(command_line(self.words()))
@@ -223,9 +228,9 @@ class WorkDialog(QDialog):
         self.stop.setText(texts.STOP_JOB)
         for entry in self.inputs:
             entry.setEnabled(False)
-        self.job = Job(self.words(), lambda job: self._post(lambda: self._changed(job)))
+        self.job = VerbProcess(self.words(), lambda job: self._post(lambda: self._changed(job)))
 
-    def _changed(self, job: Job) -> None:
+    def _changed(self, job: VerbProcess) -> None:
         if job is not self.job:
             return
         try:
@@ -250,7 +255,7 @@ class WorkDialog(QDialog):
             return
         self.job = None
         if job.status == 0 and self._done is not None:
-            self._done(job)
+            self._done(self)
 
     def _stop_or_close(self) -> None:
         if self.job is not None:
@@ -264,23 +269,3 @@ class WorkDialog(QDialog):
             self.job.stop()
             self.job = None
         super().reject()
-
-
-def beside(path: Path, ending: str) -> str:
-    """Return a file's name with another ending, in the same folder."""
-    stem = path.name.removesuffix(".p4d.json")
-    return str(path.with_name(stem + ending))
-
-
-def sequence_of(path: str) -> str:
-    """Return the pattern of the sequence that a dropped or chosen image belongs to.
-
-    Other paths stay as they are: a folder, a movie, an image without numbered neighbours.
-    """
-    found = Path(path)
-    if not found.is_file() or clip_sequence.extension(found) not in clip_sequence.IMAGE_EXTENSIONS:
-        return path
-    for sequence in clip_sequence.sequences_in(found.parent):
-        if len(sequence.files) > 1 and found in sequence.files.values():
-            return sequence.pattern
-    return path

@@ -1,6 +1,7 @@
 """The actions of the menus Edit, Palette, View and Playback.
 
-Each action of `actions.ACTIONS` is a method of its name here, of `tasks.Tasks`, or of the window.
+Each action of `menu_entries.ACTIONS` is a method of its name here, or in `file_menu`, `verb_menu`
+or `help_menu`.
 """
 
 from collections.abc import Callable
@@ -8,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import Qt
 
-from palette4d.studio import gestures, texts
+from palette4d.studio import grade_steps, texts
 
 if TYPE_CHECKING:
     from palette4d.studio.window import Window
@@ -21,7 +22,7 @@ ZOOM = 1.5
 FASTEST = 8
 
 
-class Commands:
+class MenuActions:
     """What the menus do with the session and the views of a window."""
 
     def __init__(self, window: "Window") -> None:
@@ -48,11 +49,11 @@ class Commands:
 
     def reset_selected(self) -> None:
         """Reset the selected vertices, remove stops and picks."""
-        gestures.reset(self.session)
+        grade_steps.reset(self.session)
 
     def reset_all(self) -> None:
         """Reset everything."""
-        gestures.reset_all(self.session)
+        grade_steps.reset_all(self.session)
 
     def add_stop(self) -> None:
         """Add a stop to the selected row at the playhead."""
@@ -60,19 +61,40 @@ class Commands:
 
     def lock(self) -> None:
         """Lock or unlock the selected handles."""
-        gestures.lock(self.session)
+        grade_steps.lock(self.session)
+
+    def act_from(self) -> None:
+        """Have the selected pick or hold begin at the playhead."""
+        self._set_range(start=float(self.session.frame))
+
+    def act_until(self) -> None:
+        """Have the selected pick or hold end at the playhead."""
+        self._set_range(until=float(self.session.frame))
+
+    def _set_range(self, start: float | None = None, until: float | None = None) -> None:
+        document, chosen = self.session.document, self.session.selection
+        picks = () if document is None else document.picks
+        pick = next((pick for pick in picks if pick.id in chosen), None)
+        if pick is None:
+            self.session.say(texts.SELECT_A_PICK, "warning")
+            return
+        begin, end = grade_steps.range_of(self.session, pick)
+        begin, end = begin if start is None else start, end if until is None else until
+        if until is not None:
+            begin = min(begin, end)
+        grade_steps.set_range(self.session, pick.id, begin, max(begin, end))
 
     def ramp_linear(self) -> None:
         """Set the ramp."""
-        gestures.set_ramp(self.session, "linear")
+        grade_steps.set_ramp(self.session, "linear")
 
     def ramp_smooth(self) -> None:
         """Set the ramp."""
-        gestures.set_ramp(self.session, "smooth")
+        grade_steps.set_ramp(self.session, "smooth")
 
     def ramp_hold(self) -> None:
         """Set the ramp."""
-        gestures.set_ramp(self.session, "hold")
+        grade_steps.set_ramp(self.session, "hold")
 
     def pick_pixel(self) -> None:
         """Pick the colour under the pointer."""
@@ -95,7 +117,7 @@ class Commands:
 
     def save_version(self) -> None:
         """Keep the edits as the next version: A, B, C…"""
-        gestures.keep_version(self.session)
+        grade_steps.keep_version(self.session)
 
     def use_version(self, number: int) -> None:
         """Use the n-th version."""
@@ -103,7 +125,7 @@ class Commands:
         if number > len(names):
             self.session.say(texts.NO_VERSION.format(number=number), "warning")
         else:
-            gestures.use_version(self.session, names[number - 1])
+            grade_steps.use_version(self.session, names[number - 1])
 
     def compare_version(self) -> None:
         """Compare with the next version; after the last with the source."""

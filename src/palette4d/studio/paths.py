@@ -1,0 +1,46 @@
+"""What a dropped or chosen path stands for, and the names of files beside it."""
+
+import contextlib
+from pathlib import Path
+
+from palette4d.media import clip_sequence
+from palette4d.media.clip import ClipError
+from palette4d.media.clip_sequence import ImageSequence
+
+
+def beside(path: Path, ending: str) -> str:
+    """Return a file's name with another ending, in the same folder."""
+    stem = path.name.removesuffix(".p4d.json")
+    return str(path.with_name(stem + ending))
+
+
+def sequence_of(path: str) -> str:
+    """Return the pattern of the sequence that a dropped or chosen image belongs to.
+
+    Other paths stay as they are: a folder, a movie, an image without numbered neighbours.
+    """
+    found = Path(path)
+    if not found.is_file() or clip_sequence.extension(found) not in clip_sequence.IMAGE_EXTENSIONS:
+        return path
+    for sequence in clip_sequence.sequences_in(found.parent):
+        if len(sequence.files) > 1 and found in sequence.files.values():
+            return sequence.pattern
+    return path
+
+
+def sidecar_of(path: str) -> Path | None:
+    """Return the sidecar beside a clip, if it was analysed before."""
+    found = Path(path)
+    names = [found.name.split("#")[0].split("%")[0].rstrip("._-"), found.stem, found.name]
+    if "#" in found.name:
+        with contextlib.suppress(ClipError):
+            names.append(clip_sequence.of_pattern(path)[0].name)
+    for name in dict.fromkeys(names):
+        candidate = found.absolute().with_name(f"{name}.p4d.json")
+        if name and candidate.is_file():
+            return candidate
+    if found.is_dir():  # or in the folder, beside its frames
+        with contextlib.suppress(ClipError):
+            inside = clip_sequence.in_folder(found)
+            return sidecar_of(inside.pattern if isinstance(inside, ImageSequence) else str(inside))
+    return None

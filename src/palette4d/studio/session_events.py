@@ -1,0 +1,73 @@
+"""How the views of a session hear what changed. It knows no toolkit."""
+
+from collections.abc import Callable
+from typing import Literal
+
+from palette4d.common.errors import in_words
+from palette4d.studio.states import Status
+
+Event = Literal[
+    "document",  # the palette or its edits, also of every step of a drag
+    "clip",  # another clip, or none
+    "frame",
+    "pixels",  # the frame's pixels have arrived, or the reason why they cannot
+    "selection",
+    "hover",
+    "probe",
+    "view",
+    "wipe",  # the wipe alone has moved
+    "playing",
+    "range",
+    "status",
+]
+
+
+class Events:
+    """The events of a session, and the status, which is one of them.
+
+    Attributes
+    ----------
+    status : Status
+        What the last action did.
+    post : callable
+        Runs a function on the views' thread; the window sets it.
+    later : callable
+        Runs a panel's function soon, when the picture is shown; the window sets it.
+    """
+
+    def __init__(self) -> None:
+        """Begin without listeners."""
+        self._callbacks: dict[str, list[tuple[Callable[[], object], bool]]] = {}
+        self.status = Status()
+        self.post: Callable[[Callable[[], object]], object] = lambda call: call()
+        self.later: Callable[[Callable[[], object]], object] = lambda call: call()
+
+    @property
+    def dragging(self) -> bool:
+        """Whether something is being dragged."""
+        return False
+
+    def on(self, event: Event, callback: Callable[[], object], *, panel: bool = False) -> None:
+        """Call a function after every event of this kind.
+
+        A panel is told later while something is dragged or frames go by: the picture comes first.
+        """
+        self._callbacks.setdefault(event, []).append((callback, panel))
+
+    def emit(self, event: Event) -> None:
+        """Tell the views."""
+        moving = event == "frame" or (event == "document" and self.dragging)
+        for callback, panel in tuple(self._callbacks.get(event, ())):
+            if panel and moving:
+                self.later(callback)
+            else:
+                callback()
+
+    def say(self, text: str, level: Literal["info", "warning", "error"] = "info") -> None:
+        """Set the status."""
+        self.status = Status(text, level)
+        self.emit("status")
+
+    def report(self, error: Exception) -> None:
+        """Show an error as the status."""
+        self.say(in_words(error), "error")

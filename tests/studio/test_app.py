@@ -1,0 +1,99 @@
+"""Starting the window with and without a screen."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import OpenImageIO as oiio
+import pytest
+from PySide6.QtNetwork import QLocalServer, QLocalSocket
+
+from palette4d.studio import instance
+from palette4d.studio.window import Window
+
+
+def test_a_screenshot_is_drawn_without_a_screen(sidecar: Path, tmp_path: Path) -> None:
+    out = tmp_path / "window.png"
+    words = ["studio", str(sidecar), "--frame", "4", "--screenshot", str(out), "--size", "1400x700"]
+    done = subprocess.run(
+        [sys.executable, "-m", "palette4d", *words],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+        env={"PATH": "/usr/bin:/bin", "HOME": str(tmp_path)},
+    )
+    assert done.returncode == 0, done.stderr
+    spec = oiio.ImageBuf(str(out)).spec()
+    assert (spec.width, spec.height) == (1400, 700)
+
+
+def test_without_a_screen_it_says_how_to_do_without(sidecar: Path, tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "palette4d", "studio", str(sidecar)],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+        env={"PATH": "/usr/bin:/bin", "HOME": str(tmp_path)},
+    )
+    assert done.returncode == 1
+    assert "--screenshot" in done.stderr
+
+
+def test_another_start_with_the_same_sidecar_brings_this_window_to_the_frame(
+    opened: Window, sidecar: Path, qtbot: Any
+) -> None:
+    program = (
+        "import sys\n"
+        "from palette4d.studio.instance import bring_forward\n"
+        "sys.exit(0 if bring_forward(sys.argv[1], 9.0) else 1)\n"
+    )
+    other = subprocess.Popen([sys.executable, "-c", program, str(sidecar)])
+    qtbot.waitUntil(lambda: other.poll() is not None, timeout=20_000)
+    assert other.returncode == 0
+    qtbot.waitUntil(lambda: opened.session.frame == 9, timeout=5000)
+    assert not instance.bring_forward(sidecar.with_name("other.p4d.json"), None)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"[" * 4000,
+        b'{"frame": NaN}',
+        b'{"frame": 1e999}',
+        b'{"frame": ' + b"9" * 400 + b"}",
+        b"\xff",
+    ],
+    ids=["deep", "NaN", "infinite", "too large", "no text"],
+)
+def test_hostile_questions_of_another_start_are_passed_over(
+    opened: Window, sidecar: Path, qtbot: Any, line: bytes
+) -> None:
+    socket = QLocalSocket()
+    socket.connectToServer(instance.name_of(sidecar))
+    assert socket.waitForConnected(5000)
+    socket.write(line + b"\n")
+    socket.write(b'{"frame": 8}\n')
+    qtbot.waitUntil(lambda: socket.bytesToWrite() == 0, timeout=5000)
+    socket.write(b'{"frame": 9}\n')
+    qtbot.waitUntil(lambda: opened.session.frame in (8, 9), timeout=5000)
+    socket.disconnectFromServer()
+
+
+@pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root gives a file to another user"
+)
+def test_a_socket_of_another_user_is_no_window(tmp_path: Path, qapp: Any) -> None:
+    sidecar = tmp_path / "a.p4d.json"
+    server = QLocalServer()
+    assert server.listen(instance.name_of(sidecar))
+    asked: list[object] = []
+    server.newConnection.connect(lambda: asked.append(server.nextPendingConnection().write(b"ok")))
+    os.chown(server.fullServerName(), 12345, -1)
+    assert not instance.bring_forward(sidecar, None)
+    server.close()

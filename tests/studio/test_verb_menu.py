@@ -1,0 +1,44 @@
+"""Dialogs that run a verb: what they enter is the command line that they show."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtWidgets import QCheckBox, QComboBox, QLineEdit
+
+from palette4d.studio.verb_dialog import VerbDialog
+from palette4d.studio.window import Window
+
+
+def enter(dialog: VerbDialog, flag: str, value: str) -> None:
+    """Enter an option as a person does."""
+    entry = dialog.entry(flag)
+    if isinstance(entry, QLineEdit):
+        entry.setText(value)
+    elif isinstance(entry, QComboBox):
+        entry.setCurrentIndex(entry.findData(value))
+    else:
+        entry.setChecked(bool(value))
+
+
+def test_the_options_of_an_analysis(opened: Window, sidecar: Path) -> None:
+    dialog = opened.verbs.analyze_again()
+    clip = str(opened.session.clip.source) if opened.session.clip is not None else ""
+    assert dialog.words() == ["analyze", clip, "-o", str(sidecar), "--keep-edits"]
+    enter(dialog, "--vertices", "9")
+    enter(dialog, "--method", "paper")
+    enter(dialog, "--set", "a=1  b=2")
+    added = ["--vertices", "9", "--method", "paper", "--set", "a=1", "--set", "b=2"]
+    assert dialog.words() == ["analyze", clip, "-o", str(sidecar), *added, "--keep-edits"]
+    assert dialog.command.text().endswith("--set b=2 --keep-edits")
+
+
+def test_shots_go_to_a_folder(opened: Window, sidecar: Path) -> None:
+    dialog = opened.verbs.analyze_again()
+    shots = dialog.entry("--detect-shots")
+    assert isinstance(shots, QCheckBox)
+    shots.setChecked(True)
+    assert dialog.value("-o") == str(sidecar.with_name("clip_shots"))
+    assert dialog.words()[-1] == "--detect-shots"
+    shots.setChecked(False)
+    assert dialog.value("-o") == str(sidecar)

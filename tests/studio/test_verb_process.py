@@ -1,0 +1,27 @@
+"""Verbs that run beside the window."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import palette4d
+from palette4d.studio.verb_process import VerbProcess
+
+
+def test_a_job_does_what_the_command_does_and_reports(tmp_path: Path, analysed: Path) -> None:
+    out = tmp_path / "by_job.p4d.json"
+    words = ["analyze", str(analysed / "clip"), "-o", str(out)]
+    heard: list[float | None] = []
+    job = VerbProcess(words, lambda job: heard.append(job.fraction))
+    assert job.wait(120) == 0
+    assert job.command == " ".join(["palette4d", *words])
+    assert any(fraction is not None for fraction in heard)
+    assert palette4d.load(out).frames == (1, 12, 1)
+
+
+def test_a_stopped_job_leaves_nothing(tmp_path: Path, analysed: Path) -> None:
+    out = tmp_path / "stopped.p4d.json"
+    job = VerbProcess(["analyze", str(analysed / "clip"), "-o", str(out)], lambda job: None)
+    job.stop()
+    assert job.wait(30) != 0
+    assert not out.exists()

@@ -1,0 +1,206 @@
+"""The picture: before and after, probe, matte and zoom, driven by mouse and keyboard."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+from windows import FRAME, Settle, busiest, seen
+
+from palette4d.cli.main import main
+from palette4d.studio.window import Window
+
+
+def test_the_exact_picture_has_the_bits_of_render(
+    opened: Window, sidecar: Path, settle: Settle, tmp_path: Path
+) -> None:
+    id_ = busiest(opened)
+    opened.session.edit(lambda document: document.set(id_, rgb=(0.9, 0.3, 0.1)))
+    settle(opened)
+    opened.session.save()
+    out = tmp_path / "out.0006.tif"
+    clip = str(tmp_path / "clip")
+    words = ["render", str(sidecar), clip, "-o", str(tmp_path / "out.####.tif"), "--bits", "32"]
+    assert main([*words, "--frames", str(FRAME), "--quiet"]) == 0
+    rendered = oiio.ImageBuf(str(out)).get_pixels(oiio.FLOAT)
+    picture = opened.viewer.picture
+    assert picture is not None
+    assert picture.exact
+    assert picture.result is not None
+    assert np.array_equal(picture.result, rendered[..., : picture.result.shape[2]])
+    assert not np.array_equal(picture.result, picture.request.pixels)
+
+
+def test_a_picked_colour_has_the_bits_of_render(
+    opened: Window, sidecar: Path, settle: Settle, tmp_path: Path
+) -> None:
+    at = opened.viewer.point_of(60.5, 60.5).toPoint()
+    QTest.mouseClick(opened.viewer, Qt.MouseButton.LeftButton, pos=at)
+    session = opened.session
+    assert session.document is not None
+    place = opened.viewer.place(at.toPointF(), at.toPointF())
+    assert place is not None
+    session.edit(
+        lambda document: document.pick(FRAME, colour=place.colour, to=(0.9, 0.1, 0.5), follow=False)
+    )
+    settle(opened)
+    session.save()
+    clip, out = str(tmp_path / "clip"), str(tmp_path / "picked.####.tif")
+    words = ["render", str(sidecar), clip, "-o", out, "--bits", "32", "--frames", str(FRAME)]
+    assert main([*words, "--quiet"]) == 0
+    rendered = oiio.ImageBuf(str(tmp_path / "picked.0006.tif")).get_pixels(oiio.FLOAT)
+    picture = opened.viewer.picture
+    assert picture is not None
+    assert picture.result is not None
+    assert np.array_equal(picture.result, rendered[..., : picture.result.shape[2]])
+    y, x = place.y, place.x
+    assert np.abs(picture.result[y, x] - (0.9, 0.1, 0.5)).max() < 0.05
+
+
+def test_alt_click_is_a_hold_as_the_verb_makes_it(
+    opened: Window, sidecar: Path, tmp_path: Path, qtbot: Any
+) -> None:
+    twin = Path(shutil.copy(sidecar, tmp_path / "twin.p4d.json"))
+    at = opened.viewer.point_of(60.5, 60.5).toPoint()
+    place = opened.viewer.place(at.toPointF(), at.toPointF())
+    assert place is not None
+    alt = Qt.KeyboardModifier.AltModifier
+    QTest.mouseClick(opened.viewer, Qt.MouseButton.LeftButton, alt, at)
+    session = opened.session
+    qtbot.waitUntil(
+        lambda: session.document is not None and len(session.document.picks) == 1, timeout=30_000
+    )
+    assert session.save()
+    words = ["edit", str(twin), "hold", "--frame", str(FRAME), "--pixel", f"{place.x},{place.y}"]
+    assert main(words) == 0
+    assert sidecar.read_bytes() == twin.read_bytes()
+
+
+def test_the_picture_of_a_drag_is_near_the_exact_one(opened: Window, settle: Settle) -> None:
+    id_ = busiest(opened)
+    opened.session.edit(lambda document: document.set(id_, rgb=(0.9, 0.3, 0.1)))
+    settle(opened)
+    exact = opened.viewer.picture
+    assert exact is not None
+    quick = opened.viewer.preview.make(exact.request, exact=False)
+    assert exact.after is not None
+    assert quick.after is not None
+    assert quick.after.shape == exact.after.shape
+    assert np.abs(quick.after.astype(int) - exact.after.astype(int)).mean() < 1.5
+
+
+def test_the_view_is_not_clamped_before_the_display(opened: Window, settle: Settle) -> None:
+    opened.session.look(exposure=-3.0)
+    settle(opened)
+    before = int(seen(opened).max())
+    id_ = busiest(opened)
+    opened.session.edit(lambda document: document.set(id_, rgb=(3.1, 3.2, 3.3)))
+    settle(opened)
+    assert seen(opened).max() > before + 10
+
+
+def test_a_wipe_is_dragged_and_shows_both_sides(opened: Window, settle: Settle) -> None:
+    id_ = busiest(opened)
+    opened.session.edit(lambda document: document.set(id_, rgb=(1.0, 0.0, 0.0)))
+    QTest.keyClick(opened, Qt.Key.Key_W)
+    settle(opened)
+    viewer = opened.viewer
+    height = viewer.height() // 2
+    start = QPoint(round(viewer.wipe_x()), height)
+    QTest.mousePress(viewer, Qt.MouseButton.LeftButton, pos=start)
+    QTest.mouseMove(viewer, start + QPoint(-150, 0))
+    QTest.mouseRelease(viewer, Qt.MouseButton.LeftButton, pos=start + QPoint(-150, 0))
+    assert opened.session.view.wipe < 0.45
+    settle(opened)
+    both = seen(opened)
+    opened.session.look(compare="before")
+    settle(opened)
+    before = seen(opened)
+    x = round(viewer.wipe_x())
+    assert np.array_equal(both[60:, 20 : x - 8], before[60:, 20 : x - 8])
+    assert not np.array_equal(both[60:, x + 8 :], before[60:, x + 8 :])
+
+
+def test_holding_the_key_shows_the_picture_before(opened: Window, settle: Settle) -> None:
+    id_ = busiest(opened)
+    opened.session.edit(lambda document: document.set(id_, rgb=(1.0, 0.0, 0.0)))
+    settle(opened)
+    after = seen(opened)
+    QTest.keyPress(opened, Qt.Key.Key_C)
+    settle(opened)
+    during = seen(opened)
+    QTest.keyRelease(opened, Qt.Key.Key_C)
+    settle(opened)
+    assert not np.array_equal(during, after)
+    assert np.array_equal(seen(opened)[60:], after[60:])
+
+
+def test_the_probe_says_what_the_frame_has(opened: Window, settle: Settle) -> None:
+    id_ = busiest(opened)
+    opened.session.edit(lambda document: document.set(id_, rgb=(0.9, 0.3, 0.1)))
+    settle(opened)
+    QTest.mouseMove(opened.viewer, opened.viewer.point_of(100.5, 40.5).toPoint())
+    probe = opened.session.probe
+    picture = opened.viewer.picture
+    assert probe is not None
+    assert picture is not None
+    assert picture.result is not None
+    x, y = probe.x, probe.y
+    assert abs(x - 100) <= 1
+    assert abs(y - 40) <= 1
+    assert probe.source == tuple(float(v) for v in picture.request.pixels[y, x])
+    assert probe.result == tuple(float(v) for v in picture.result[y, x])
+    assert sum(probe.weights.values()) == pytest.approx(1, abs=1e-6)
+
+
+def test_hovering_over_a_handle_shows_its_matte(opened: Window, settle: Settle) -> None:
+    plain = seen(opened)
+    opened.session.hover_over(busiest(opened))
+    settle(opened)
+    opened.viewer.repaint()
+    matte = seen(opened)
+    assert not np.array_equal(matte, plain)
+    opened.session.hover_over(None)
+    settle(opened)
+
+
+def test_zoom_keeps_the_point_and_one_to_one_has_the_frames_pixels(
+    opened: Window, settle: Settle
+) -> None:
+    viewer = opened.viewer
+    at = viewer.point_of(40, 30)
+    viewer.zoom_by(1.5, at)
+    after = viewer.point_of(40, 30)
+    assert (after - at).manhattanLength() < 0.01
+    QTest.keyClick(opened, Qt.Key.Key_1, Qt.KeyboardModifier.ControlModifier)
+    settle(opened)
+    region = viewer.region()
+    assert region is not None
+    assert region.whole
+    viewer.fit()
+    assert viewer.zoom is None
+
+
+def test_a_frame_that_does_not_decode_is_a_message(
+    window: Window, sidecar: Path, analysed: Path, qtbot: Any, settle: Settle
+) -> None:
+    (sidecar.parent / "clip").unlink()
+    shutil.copytree(analysed / "clip", sidecar.parent / "clip")
+    broken = sidecar.parent / "clip" / "frame.0005.png"
+    window.open_path(str(sidecar), str(sidecar.parent / "clip"))
+    settle(window)
+    broken.write_bytes(b"no picture")
+    assert window.session.player is not None
+    window.session.player._frames.clear()
+    window.session.go(5)
+    qtbot.waitUntil(lambda: "0005" in window.viewer.problem, timeout=20_000)
+    window.viewer.repaint()
+    window.session.go(7)
+    settle(window)
+    assert not window.viewer.problem
