@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from palette4d.common.errors import Palette4dError, WriteError
+from palette4d.common.locking import remove_left_over
 
 if sys.platform != "win32":
     import fcntl
@@ -179,12 +180,13 @@ def _new_temporary(path: Path) -> tuple[Path, int]:
 
 
 def _remove_leftovers(folder: Path) -> None:
-    """Remove the temporary files and folders of killed processes, once for each folder."""
+    """Remove what killed processes left, once for each folder: temporary files, folders, locks."""
     if folder in _swept:
         return
     _swept.add(folder)
     with contextlib.suppress(OSError), os.scandir(folder) as entries:
-        for entry in entries:
+        for entry in list(entries):
+            remove_left_over(Path(entry))
             if _TEMPORARY.fullmatch(entry.name):
                 with contextlib.suppress(OSError):
                     if not _is_left_over(entry):
