@@ -327,7 +327,7 @@ $(addprefix fuzz-,$(FUZZ_NATIVE)): fuzz-%: build-fuzz
 $(addprefix fuzz-,$(filter-out $(FUZZ_NATIVE),$(FUZZ))): fuzz-%: $(TEST_VENV)/.installed
 	@echo "== $* with any bytes, $(FUZZ_SECONDS) s"
 	@PALETTE4D_REQUIRE_HOST= PALETTE4D_FUZZ_SECONDS=$(FUZZ_SECONDS) PALETTE4D_FUZZ_SEED="$$(date +%s)" \
-		$(TEST_VENV)/bin/python -P -m pytest -q -s tests/fuzz -k $* -m "not slow"
+		$(TEST_VENV)/bin/python -P -m pytest -q -s tests/fuzz -k $* -m "not slow" -o faulthandler_timeout=0
 
 # From a folder of its own, so that no file of the tree can stand in for the installed package.
 test-py: $(TEST_VENV)/.installed
@@ -339,7 +339,7 @@ test-py: $(TEST_VENV)/.installed
 	wheel=$$(echo "$(CURDIR)"/$(TEST_WHEELS)/*.whl) && cd build/test-run && \
 		PALETTE4D_WHEEL="$$wheel" "$(CURDIR)/$(TEST_VENV)/bin/python" -P -m pytest \
 		-c "$(CURDIR)/pyproject.toml" --rootdir "$(CURDIR)" "$(CURDIR)/tests" -n $(JOBS) --dist worksteal --durations 10 $$qt \
-		$(if $(SLOW),,-m "not slow") $(PYTEST_ARGS)
+		$(if $(SLOW),-o faulthandler_timeout=3600,-m "not slow") $(PYTEST_ARGS)
 
 # ---------------------------------------------------------------------------- releases
 

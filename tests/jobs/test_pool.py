@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from farm_processes import wait_for
+from farm_processes import running, wait_for
 from pieces import piece
 
 from palette4d.jobs import pool
@@ -75,14 +75,6 @@ def test_a_parent_that_is_killed_leaves_no_process(tmp_path: Path) -> None:
     parent.wait(timeout=60)
     for file in tmp_path.glob("*.pid"):
         wait_for(lambda file=file: not running(int(file.stem)), "a process to end")
-
-
-def running(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    return True
 
 
 def test_ctrl_c_waits_until_an_outcome_is_taken() -> None:

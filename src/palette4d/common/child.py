@@ -129,7 +129,7 @@ class Child:
             resource_tracker.ensure_running()
         with _without_interrupts():
             self._pipe, theirs = context.Pipe()
-            arguments = (theirs, self.megabytes)
+            arguments = (theirs, self.seconds, self.megabytes)
             self._process = context.Process(target=_serve, args=arguments, daemon=True)
             self._process.start()
             theirs.close()
@@ -154,7 +154,7 @@ def _without_interrupts() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _serve(pipe: Connection, megabytes: int | None) -> None:
+def _serve(pipe: Connection, seconds: float | None, megabytes: int | None) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends this process
     if megabytes is not None:
         _limit(megabytes)
@@ -163,6 +163,8 @@ def _serve(pipe: Connection, megabytes: int | None) -> None:
             function, arguments = pipe.recv()
         except EOFError:
             return
+        if seconds is not None and hasattr(signal, "alarm"):
+            signal.alarm(int(seconds + GRACE))  # where the parent was killed, nobody else ends it
         try:
             answer = pickle.dumps((function(*arguments), None))
         except MemoryError:
@@ -172,6 +174,8 @@ def _serve(pipe: Connection, megabytes: int | None) -> None:
         except Exception as error:  # anything may come of a hostile file
             problem = Palette4dError(in_words(error) or type(error).__name__)
             answer = pickle.dumps((None, problem))
+        if hasattr(signal, "alarm"):
+            signal.alarm(0)
         pipe.send_bytes(answer)
 
 
