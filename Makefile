@@ -173,6 +173,10 @@ $(TEST_VENV)/.installed: build/test-wheel.stamp $(TEST_VENV)/.requirements
 	$(TEST_VENV)/bin/python $(PIP) check
 	@touch $@
 
+# A host for the tests, fetched while the compiler has the cores. Without it they skip, or say why.
+.cache/melt: | $(TOOLS)/.installed
+	-@$(TOOLS)/bin/python tests/host/melt.py >/dev/null
+
 # ---------------------------------------------------------------------------- where all comes from
 
 $(SUPPLY)/.installed: locks/supply.txt
@@ -241,7 +245,7 @@ docs-images: $(VENV)/.studio demo_output/sample.p4d.json ## draw the pictures of
 
 # Packages are installed and types are checked by one process each: the other cores compile meanwhile.
 test: ## what a change must pass: all but the slow tests
-	@$(MAKE) --no-print-directory -j2 --output-sync=line style build/test-wheel.stamp $(TEST_VENV)/.requirements
+	@$(MAKE) --no-print-directory -j2 --output-sync=line style build/test-wheel.stamp $(TEST_VENV)/.requirements .cache/melt
 	@$(MAKE) --no-print-directory -j2 --output-sync=line types build-sanitize
 	@$(MAKE) --no-print-directory test-cpp test-sanitize test-py
 	@echo "== all of make test passed"
