@@ -508,7 +508,16 @@ def test_show_writes_a_matte_into_alpha(tmp_path):
 def test_the_palette_and_the_lightness_are_the_documents(tmp_path):
     pixels = colours(32, 13, 3)
     source = write_image(tmp_path / "c.0005.exr", pixels)
-    words = ("--output", "palette", "--keep-lightness", 1, "--lightness-of", "rec2020", "--mix", 0.5)
+    words = (
+        "--output",
+        "palette",
+        "--keep-lightness",
+        1,
+        "--lightness-of",
+        "rec2020",
+        "--mix",
+        0.5,
+    )
     assert run(EDITED, source, "-o", tmp_path / "o.exr", *words, "--strength", 0.75) == 0
     expected = Document.load(EDITED).recolour(
         pixels, 5, show="palette", keep_lightness=1, lightness_of="rec2020", mix=0.5, strength=0.75
