@@ -275,22 +275,26 @@ class _Problem:
         return np.asarray(guarded[:, 3] @ near, np.float64)
 
     def strengths(self, time: float) -> F64:
-        """Return how much of its change each point asks for, 0..1.
+        """Return how much of its change each point asks for, 0..1."""
+        found = np.array([pick.strength_at(time, self.clip.step) for pick in self.picks])
+        return np.asarray(found[self.of], np.float64)
+
+    def certain(self, time: float) -> F64:
+        """Return how certain it is that each point belongs to what was picked, 0..1.
 
         A colour of a box's spread that twice as many pixels have at another frame is another
         thing's there: gaps between leaves have the sky's colour.
         """
-        found = np.array([pick.strength_at(time, self.clip.step) for pick in self.picks])[self.of]
         spread = self.offsets.any(axis=1) & self.moving[self.of]
-        if self.clip.frames and spread.any():
-            more = self._pixels(time) / np.maximum(self.pixels, LEAST_SHARE)
-            found = np.where(spread, found * np.clip(2 - more, 0, 1), found)
-        return np.asarray(found, np.float64)
+        if not (self.clip.frames and spread.any()):
+            return np.ones(len(self.of))
+        more = self._pixels(time) / np.maximum(self.pixels, LEAST_SHARE)
+        return np.where(spread, np.clip(2 - more, 0.0, 1.0), 1.0)
 
     def guard_at(self, colours: F64, time: float) -> F64:
         """Return how much colours are guarded at a time, 0..1: not at all at a picked one."""
         at = np.flatnonzero(self.moving[self.of])
-        strengths = self.strengths(time)[at]
+        strengths = (self.strengths(time) * self.certain(time))[at]
         share = strengths / max(float(strengths.max(initial=0)), NONE)
         far = 1 - share * _shade(colours, self.centres(time)[at], np.minimum(self.radii[at], NEAR))
         found: F64 = far.prod(axis=1)
@@ -333,13 +337,13 @@ class _Problem:
 
     def at(self, time: float) -> _Solved:
         clip = self.clip
-        strengths = self.strengths(time)
-        active = np.flatnonzero(strengths > 0)
+        strengths, certain = self.strengths(time), self.certain(time)
+        active = np.flatnonzero(strengths * certain > 0)
         if not len(active):
             return _Solved(time, {}, {})
         of = self.of[active]
-        strengths = strengths[active]
-        share = strengths / strengths.max()
+        strengths, certain = strengths[active], certain[active]
+        share = certain * strengths / strengths.max()
         radii = self.radii[active]
         centres = self.centres(time)[active]
         cut = _core.slice_at(clip.polytope, time)
@@ -385,7 +389,7 @@ class _Problem:
                 scale,
                 BUMP * costs,
             )
-            solved[len(free) :] += _interpolated(bumps, wanted - rows @ solved)
+            solved[len(free) :] += _interpolated(bumps, certain[:, None] * (wanted - rows @ solved))
             return solved
 
         best = found(counts)
