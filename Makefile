@@ -173,6 +173,10 @@ $(TEST_VENV)/.installed: build/test-wheel.stamp $(TEST_VENV)/.requirements
 	$(TEST_VENV)/bin/python $(PIP) check
 	@touch $@
 
+# A host for the tests, fetched while the compiler has the cores. Without it they skip, or say why.
+.cache/melt: | $(TOOLS)/.installed
+	-@$(TOOLS)/bin/python tests/host/melt.py >/dev/null
+
 # ---------------------------------------------------------------------------- where all comes from
 
 $(SUPPLY)/.installed: locks/supply.txt
@@ -241,7 +245,7 @@ docs-images: $(VENV)/.studio demo_output/sample.p4d.json ## draw the pictures of
 
 # Packages are installed and types are checked by one process each: the other cores compile meanwhile.
 test: ## what a change must pass: all but the slow tests
-	@$(MAKE) --no-print-directory -j2 --output-sync=line style build/test-wheel.stamp $(TEST_VENV)/.requirements
+	@$(MAKE) --no-print-directory -j2 --output-sync=line style build/test-wheel.stamp $(TEST_VENV)/.requirements .cache/melt
 	@$(MAKE) --no-print-directory -j2 --output-sync=line types build-sanitize
 	@$(MAKE) --no-print-directory test-cpp test-sanitize test-py
 	@echo "== all of make test passed"
@@ -323,7 +327,7 @@ $(addprefix fuzz-,$(FUZZ_NATIVE)): fuzz-%: build-fuzz
 $(addprefix fuzz-,$(filter-out $(FUZZ_NATIVE),$(FUZZ))): fuzz-%: $(TEST_VENV)/.installed
 	@echo "== $* with any bytes, $(FUZZ_SECONDS) s"
 	@PALETTE4D_REQUIRE_HOST= PALETTE4D_FUZZ_SECONDS=$(FUZZ_SECONDS) PALETTE4D_FUZZ_SEED="$$(date +%s)" \
-		$(TEST_VENV)/bin/python -P -m pytest -q -s tests/fuzz -k $* -m "not slow"
+		$(TEST_VENV)/bin/python -P -m pytest -q -s tests/fuzz -k $* -m "not slow" -o faulthandler_timeout=0
 
 # From a folder of its own, so that no file of the tree can stand in for the installed package.
 test-py: $(TEST_VENV)/.installed
@@ -335,7 +339,7 @@ test-py: $(TEST_VENV)/.installed
 	wheel=$$(echo "$(CURDIR)"/$(TEST_WHEELS)/*.whl) && cd build/test-run && \
 		PALETTE4D_WHEEL="$$wheel" "$(CURDIR)/$(TEST_VENV)/bin/python" -P -m pytest \
 		-c "$(CURDIR)/pyproject.toml" --rootdir "$(CURDIR)" "$(CURDIR)/tests" -n $(JOBS) --dist worksteal --durations 10 $$qt \
-		$(if $(SLOW),,-m "not slow") $(PYTEST_ARGS)
+		$(if $(SLOW),-o faulthandler_timeout=3600,-m "not slow") $(PYTEST_ARGS)
 
 # ---------------------------------------------------------------------------- releases
 

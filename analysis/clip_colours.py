@@ -53,13 +53,13 @@ def _reduced(frames: Sequence[FrameStatistics], gamut: Gamut) -> list[list[float
     cells = np.floor((rgb - gamut.low) * (CELLS / gamut.scale)).astype(np.int64)
     keys = cells @ np.array([(CELLS + 1) ** 2, CELLS + 1, 1], np.int64)
     rgb, shares = _grouped(rgb, shares, keys)
-    chosen = [int(shares.argmax())]
-    distance = np.linalg.norm(rgb - rgb[chosen[0]], axis=1)
     worth = np.maximum(shares, LEAST_SHARE) ** ROOT
-    while len(chosen) < min(MOST_COLOURS, len(rgb)):
-        chosen.append(int((distance * worth).argmax()))
-        distance = np.minimum(distance, np.linalg.norm(rgb - rgb[chosen[-1]], axis=1))
-    nearest = np.linalg.norm(rgb[:, None] - rgb[chosen], axis=2).argmin(axis=1)
+    distance = np.linalg.norm(rgb - rgb[shares.argmax()], axis=1)
+    nearest = np.zeros(len(rgb), np.int64)
+    for one in range(1, min(MOST_COLOURS, len(rgb))):
+        there = np.linalg.norm(rgb - rgb[(distance * worth).argmax()], axis=1)
+        nearest[there < distance] = one
+        distance = np.minimum(distance, there)
     rgb, shares = _grouped(rgb, shares, nearest)
     rows: list[list[float]] = np.column_stack([rgb, shares]).round(DIGITS).tolist()
     return sorted(rows, key=lambda row: (-row[3], row))

@@ -82,29 +82,41 @@ def beyond_planes(points: F64, planes: F64) -> F64:
 
 def concavity(rgb: F64, faces: I32) -> float:
     """Return the share of its convex hull that a mesh lacks; 0 for a hull that is nearly flat."""
-    if len(rgb) < 4 or len(faces) == 0:
+    volume = hull_volume(rgb)
+    if volume == 0 or len(faces) == 0:
         return 0.0
-    a, b, c = (rgb[faces[:, i]] for i in range(3))
-    volume = float(np.einsum("ij,ij->i", a - rgb[0], np.cross(b - a, c - a)).sum()) / 6
+    # A mesh turned inside out has a negative volume, so it lacks its whole hull.
+    return float(np.clip(1 - mesh_volume(rgb, faces) / volume, 0.0, 1.0))
+
+
+def hull_volume(rgb: F64) -> float:
+    """Return the volume of the convex hull of (n, 3) colours; 0 if it is nearly flat."""
+    if len(rgb) < 4:
+        return 0.0
     try:
         hull = ConvexHull(rgb)
     except QhullError:
         return 0.0
-    if hull.volume <= FLAT * hull.area / 2:  # the mean thickness of the hull
-        return 0.0
-    # A mesh turned inside out has a negative volume, so it lacks its whole hull.
-    return float(np.clip(1 - volume / hull.volume, 0.0, 1.0))
+    flat = hull.volume <= FLAT * hull.area / 2  # the mean thickness of the hull
+    return 0.0 if flat else float(hull.volume)
+
+
+def mesh_volume(rgb: F64, faces: I32) -> float:
+    """Return the volume inside a closed mesh, negative if it is turned inside out."""
+    a, b, c = (rgb[faces[:, i]] for i in range(3))
+    return float(np.einsum("ij,ij->i", a - rgb[0], np.cross(b - a, c - a)).sum()) / 6
 
 
 def deepest_concavity(polytope: SkewPolytope, frames: Iterable[FrameStatistics]) -> float:
     """Return the largest share of its hull that a slice lacks; `narrow` frames are skipped."""
-    found = (
-        concavity(polytope.colours_at(block, frame.frame), block.faces)
+    slices = {
+        (at, rgb.tobytes()): (rgb, block.faces)  # a static palette has one
         for frame in frames
-        for block in polytope.blocks
+        for at, block in enumerate(polytope.blocks)
         if block.first <= frame.frame <= block.last and not narrow(frame)
-    )
-    return max(found, default=0.0)
+        for rgb in (polytope.colours_at(block, frame.frame),)
+    }
+    return max((concavity(rgb, faces) for rgb, faces in slices.values()), default=0.0)
 
 
 def narrow(frame: FrameStatistics) -> bool:

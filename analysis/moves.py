@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d.analysis.convex_hulls import concavity
+from palette4d.analysis.convex_hulls import hull_volume, mesh_volume
 from palette4d.analysis.polytope import Section, SkewPolytope
 
 I32 = NDArray[np.int32]
@@ -92,8 +92,9 @@ def _least_concave(polytope: SkewPolytope, section: Section, gone: int) -> I32:
     """Return the mesh of a section's remaining tracks that lacks least of its hull."""
     times = np.linspace(section.first, section.last, COMPARED)
     colours = [polytope.colours_at(section, t) for t in times]
+    solid = [(rgb, volume) for rgb in colours if (volume := hull_volume(rgb)) > 0]
     meshes = list(_drawn_in(section.faces, gone))
-    return min(meshes, key=lambda mesh: sum(concavity(rgb, mesh) for rgb in colours))
+    return max(meshes, key=lambda mesh: sum(mesh_volume(rgb, mesh) / v for rgb, v in solid))
 
 
 def _drawn_in(faces: I32, gone: int) -> Iterator[I32]:

@@ -22,6 +22,17 @@ def wait_for(what: Callable[[], object], why: str) -> None:
         time.sleep(0.05)
 
 
+def running(pid: int) -> bool:
+    """Whether a process runs; one that ended may stay in the list until somebody asks for it."""
+    try:
+        os.kill(pid, 0)
+        return ") Z " not in Path(f"/proc/{pid}/stat").read_text()
+    except ProcessLookupError:
+        return False
+    except FileNotFoundError:  # a system without /proc, or just gone
+        return not Path("/proc/self").exists()
+
+
 class Farm:
     """A scheduler, on a port that the system chose, and its workers."""
 

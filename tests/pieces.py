@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import time
+from pathlib import Path
 
 from palette4d.common.errors import Palette4dError
 
@@ -17,3 +19,9 @@ def piece(value: int, threads: int) -> tuple[int, int]:
     if value == 5:
         os.kill(os.getpid(), signal.SIGKILL)
     return value * value, threads
+
+
+def noted(folder: str, threads: int) -> None:
+    """Leave a file with this process's number in a folder, and take a while."""
+    Path(folder, f"{os.getpid()}.pid").touch()
+    time.sleep(0.2)

@@ -86,6 +86,23 @@ py::array apply(const Map& self, const py::array& image, double strength, bool p
     return result;
 }
 
+/// The straight colours of an image.
+py::array_t<float> straight_colours(const py::array& image, bool premultiplied) {
+    require_image(image, "image");
+    py::array_t<float> result({image.shape(0), image.shape(1), py::ssize_t{3}});
+    const auto from = image.unchecked<float, 3>();
+    float* to = result.mutable_data();
+    const bool divide = premultiplied && image.shape(2) == 4;
+    const py::gil_scoped_release unlocked;
+    for (py::ssize_t y = 0; y < from.shape(0); ++y) {
+        for (py::ssize_t x = 0; x < from.shape(1); ++x) {
+            const float alpha = divide ? from(y, x, 3) : 1;
+            for (py::ssize_t c = 0; c < 3; ++c) *to++ = straight(from(y, x, c), alpha);
+        }
+    }
+    return result;
+}
+
 }  // namespace
 
 void bind_recolour(py::module_& module) {
@@ -134,6 +151,10 @@ void bind_recolour(py::module_& module) {
             },
             "Counts of what the lattice holds now.");
     module.attr("LATTICE_TOLERANCE") = Lattice::kTolerance;
+    module.def("straight_colours", &straight_colours, py::arg("image"), py::kw_only(),
+               py::arg("premultiplied"),
+               "(h, w, 3) float32 of (h, w, 3 or 4): divided by alpha where premultiplied.");
+    module.attr("LEAST_ALPHA") = kLeastAlpha;
     module.def(
         "instruction_sets",
         [] {

@@ -12,7 +12,7 @@ using namespace palette4d::bindings;
 
 namespace {
 
-IntArray edges_of(const Slice& self) {
+IntArray edge_of_each(const Slice& self) {
     IntArray array(static_cast<py::ssize_t>(self.where.size()));
     int* out = array.mutable_data();
     for (const SlicePoint& point : self.where) *out++ = point.edge;
@@ -63,7 +63,7 @@ void bind_slice(py::module_& module) {
             "faces", [](const Slice& self) { return to_array(self.faces); },
             "(f, 3) int32, anticlockwise from outside; (0, 3) for one or two colours.")
         .def_property_readonly(
-            "edges", &edges_of,
+            "edges", &edge_of_each,
             "(n,) int32 edge of each vertex, -1 when it lies on a polytope vertex.")
         .def_property_readonly("ends", &ends_of, "(n, 2) int32 polytope vertices from, to.")
         .def_property_readonly("weights", &weights_of, "(n,) float64 weight of `to` (eq. 6).");

@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kSource = kOfxImageEffectSimpleSourceClipName;
 
-OfxStatus describe(const Suites& suites, OfxImageEffectHandle effect) {
+OfxStatus describe_analyse(const Suites& suites, OfxImageEffectHandle effect) {
     OfxPropertySetHandle handle = nullptr;
     if (!suites.effect->getPropertySet ||
         suites.effect->getPropertySet(effect, &handle) != kOfxStatOK || !handle) {
@@ -263,7 +263,7 @@ void changed(const Suites& suites, OfxImageEffectHandle effect, const Properties
 OfxStatus analyse_action(const Suites& suites, const char* action, OfxImageEffectHandle effect,
                          const Properties& in_args, const Properties& out_args) {
     const auto is = [action](const char* name) { return std::strcmp(action, name) == 0; };
-    if (is(kOfxActionDescribe)) return describe(suites, effect);
+    if (is(kOfxActionDescribe)) return describe_analyse(suites, effect);
     if (is(kOfxImageEffectActionDescribeInContext)) return describe_in_context(suites, effect);
     if (is(kOfxActionCreateInstance) || is(kOfxActionDestroyInstance)) return kOfxStatOK;
     if (is(kOfxActionInstanceChanged)) {

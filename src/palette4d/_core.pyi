@@ -249,6 +249,16 @@ def luminance_weights(encoding: str) -> list[float]:
 LATTICE_TOLERANCE: float
 """What `Lattice.largest_error` is held against."""
 
+def straight_colours(image: NDArray[np.float32], *, premultiplied: bool) -> F32:
+    """Return the (h, w, 3) float32 colours of an image (h, w, 3 or 4), not multiplied by alpha.
+
+    Premultiplied colours are divided by alpha, also by a negative or a tiny one. They are NaN where
+    alpha is 0 or not finite: recolouring lets such pixels pass. Other colours are copied.
+    """
+
+LEAST_ALPHA: float
+"""Pixels with less alpha (1/255) are invisible in 8 bits: the analysis leaves them out."""
+
 def instruction_sets() -> list[str]:
     """Return the instruction sets that `Recolourer.apply` can use here, slowest first."""
 

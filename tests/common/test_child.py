@@ -1,9 +1,15 @@
 """A child process with limits: whatever happens in it, the parent says so and goes on."""
 
+import os
+import subprocess
+import sys
+import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 from child_calls import crash, fault, grow, hang, refuse, well
+from farm_processes import running, wait_for
 
 from palette4d.common.child import Child, ChildError
 from palette4d.common.errors import Palette4dError, SidecarError
@@ -35,6 +41,36 @@ def test_a_call_that_goes_wrong_costs_one_call(
 def test_a_call_without_end_is_ended() -> None:
     with Child(0.5, 2048) as child, pytest.raises(ChildError, match=r"longer than 0\.5 seconds"):
         child.call(hang)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+def test_a_call_without_end_ends_after_a_parent_that_was_killed(tmp_path: Path) -> None:
+    program = tmp_path / "program.py"
+    program.write_text(
+        "import child_calls\n"
+        "from palette4d.common.child import Child\n"
+        "if __name__ == '__main__':\n"
+        "    child = Child(1, 2048)\n"
+        "    print(child.call(child_calls.well, 1, 2)[2], flush=True)\n"
+        "    child.begin(child_calls.hang)\n"
+        "    print('begun', flush=True)\n"
+        "    input()\n"
+    )
+    path = os.pathsep.join([str(Path(__file__).parents[1]), os.environ.get("PYTHONPATH", "")])
+    with subprocess.Popen(
+        [sys.executable, str(program)],
+        env={**os.environ, "PYTHONPATH": path},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as parent:
+        assert parent.stdout
+        pid = int(parent.stdout.readline())
+        assert parent.stdout.readline() == "begun\n"
+        parent.kill()
+    started = time.monotonic()
+    wait_for(lambda: not running(pid), "the child to end")
+    assert time.monotonic() - started < 30  # alone the call takes a minute
 
 
 def test_errors_come_back(child: Child) -> None:

@@ -11,6 +11,7 @@ import json
 import math
 import os
 import pkgutil
+import signal
 import sys
 import tempfile
 import traceback
@@ -31,6 +32,8 @@ for name in ("OpenImageIO", "PyOpenColorIO", "scipy.optimize", "matplotlib.figur
 SHIM: Any = ctypes.CDLL(None)
 SHIM.faults_names.restype = ctypes.c_char_p
 KILL, KILL_HALFWAY, NOTHING = 0, -1, -2
+#: A verb that takes longer hangs; SIGALRM ends it.
+SECONDS = 120
 
 
 def autosave(path: Path) -> int:
@@ -55,6 +58,7 @@ def trial(
         names_of, told = os.pipe()
         child = os.fork()
         if not child:
+            signal.alarm(SECONDS)
             for handle in (1, 2):
                 os.dup2(printed.fileno(), handle)
             os.chdir(folder)

@@ -165,7 +165,7 @@ OfxStatus memory_free(OfxImageMemoryHandle) { return kOfxStatErrBadHandle; }
 OfxStatus memory_lock(OfxImageMemoryHandle, void**) { return kOfxStatErrBadHandle; }
 OfxStatus memory_unlock(OfxImageMemoryHandle) { return kOfxStatErrBadHandle; }
 
-const OfxImageEffectSuiteV1 kSuite = {
+const OfxImageEffectSuiteV1 kEffectSuite = {
     properties, param_set, define,       get_handle,  clip_properties, get_image,    release_image,
     region,     abort,     memory_alloc, memory_free, memory_lock,     memory_unlock};
 
@@ -173,8 +173,8 @@ const OfxImageEffectSuiteV1 kSuite = {
 
 SuiteTable effect_suite() {
     using S = OfxImageEffectSuiteV1;
-    return {&kSuite,
-            sizeof kSuite,
+    return {&kEffectSuite,
+            sizeof kEffectSuite,
             {{"getPropertySet", offsetof(S, getPropertySet)},
              {"getParamSet", offsetof(S, getParamSet)},
              {"clipDefine", offsetof(S, clipDefine)},

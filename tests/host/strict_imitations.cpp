@@ -3,7 +3,7 @@
 namespace strict {
 namespace {
 
-const std::string kMessages2 = std::string(kOfxMessageSuite) + "/2";
+const std::string kMessageSuite2 = std::string(kOfxMessageSuite) + "/2";
 
 /// Properties of later versions of the standard than a host's own.
 std::set<std::string> later_than(int minor) {
@@ -90,7 +90,7 @@ Imitation fusion() {
     host.config.api_minor = 0;
     host.config.missing_properties = later_than(0);
     host.config.missing_properties.insert(kOfxImagePropRegionOfDefinition);
-    host.config.missing_suites = {kMessages2};
+    host.config.missing_suites = {kMessageSuite2};
     host.config.tiles = host.config.multi_resolution = false;
     host.layouts = {picture(0, 0, 33, 21, Depth::kFloat, kOfxImagePreMultiplied),
                     picture(0, 0, 33, 21, Depth::kByte, kOfxImagePreMultiplied)};

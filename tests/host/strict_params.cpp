@@ -266,7 +266,7 @@ OfxStatus edit_end(OfxParamSetHandle set) {
     return kOfxStatOK;
 }
 
-const OfxParameterSuiteV1 kSuite = {
+const OfxParameterSuiteV1 kParameterSuite = {
     define,      get_handle, set_properties, param_properties, get_value, get_value_at, derivative,
     integral,    set_value,  set_at,         num_keys,         key_time,  key_index,    delete_key,
     delete_keys, copy,       edit_begin,     edit_end};
@@ -275,8 +275,8 @@ const OfxParameterSuiteV1 kSuite = {
 
 SuiteTable parameter_suite() {
     using S = OfxParameterSuiteV1;
-    return {&kSuite,
-            sizeof kSuite,
+    return {&kParameterSuite,
+            sizeof kParameterSuite,
             {{"paramDefine", offsetof(S, paramDefine)},
              {"paramGetHandle", offsetof(S, paramGetHandle)},
              {"paramGetPropertySet", offsetof(S, paramGetPropertySet)},

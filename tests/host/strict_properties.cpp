@@ -404,7 +404,7 @@ OfxStatus dimension(OfxPropertySetHandle set, const char* name, int* count) {
     return kOfxStatOK;
 }
 
-const OfxPropertySuiteV1 kSuite = {
+const OfxPropertySuiteV1 kPropertySuite = {
     set_pointer,  set_string,  set_double,  set_int,    set_pointers, set_strings,
     set_doubles,  set_ints,    get_pointer, get_string, get_double,   get_int,
     get_pointers, get_strings, get_doubles, get_ints,   reset,        dimension};
@@ -413,8 +413,8 @@ const OfxPropertySuiteV1 kSuite = {
 
 SuiteTable property_suite() {
     using S = OfxPropertySuiteV1;
-    return {&kSuite,
-            sizeof kSuite,
+    return {&kPropertySuite,
+            sizeof kPropertySuite,
             {{"propSetPointer", offsetof(S, propSetPointer)},
              {"propSetString", offsetof(S, propSetString)},
              {"propSetDouble", offsetof(S, propSetDouble)},

@@ -33,8 +33,9 @@ std::string with_conversion(bool edited = true) {
     return text;
 }
 
-struct Node : Ready {
-    explicit Node(bool edited = true) : Ready(write("light.p4d.json", with_conversion(edited))) {}
+struct ConvertingNode : Ready {
+    explicit ConvertingNode(bool edited = true)
+        : Ready(write("light.p4d.json", with_conversion(edited))) {}
 };
 
 Layout layout_of(Depth depth, int channels, const char* premultiplication) {
@@ -66,7 +67,7 @@ Picture light(const Layout& layout) {
 }  // namespace
 
 TEST(the_picture_goes_to_the_palettes_space_and_back) {
-    Node node;
+    ConvertingNode node;
     palette4d::Sidecar plain = node.parsed;
     plain.conversion = nullptr;
     for (const Depth depth : kDepths) {
@@ -96,7 +97,7 @@ TEST(the_picture_goes_to_the_palettes_space_and_back) {
 }
 
 TEST(an_unedited_palette_in_another_space_returns_every_bit) {
-    Node node(false);
+    ConvertingNode node(false);
     const Layout layout = layout_of(Depth::kFloat, 4, kOfxImagePreMultiplied);
     const Picture source = light(layout);
     Picture output(layout);
@@ -118,7 +119,7 @@ TEST(without_a_conversion_the_choice_changes_nothing) {
 }
 
 TEST(mattes_and_mix_see_the_palettes_numbers) {
-    Node node;
+    ConvertingNode node;
     const auto& steps = node.parsed.conversion->steps;
     const Layout layout = layout_of(Depth::kFloat, 3, kOfxImageOpaque);
     const Picture source = light(layout);
@@ -156,7 +157,7 @@ TEST(mattes_and_mix_see_the_palettes_numbers) {
 }
 
 TEST(the_lattice_lies_in_the_palettes_space) {
-    Node node;
+    ConvertingNode node;
     const auto& steps = node.parsed.conversion->steps;
     Layout layout = layout_of(Depth::kFloat, 3, kOfxImageOpaque);
     layout.bounds = rect(-7, 3, 150, 90);
@@ -196,7 +197,7 @@ TEST(the_lattice_lies_in_the_palettes_space) {
 }
 
 TEST(auto_is_exact_where_the_picture_needs_a_conversion) {
-    Node node;
+    ConvertingNode node;
     Layout layout = layout_of(Depth::kFloat, 4, kOfxImagePreMultiplied);
     layout.definition = rect(-100, 0, 3740, 2160);
     const Picture source = light(layout);
@@ -217,7 +218,7 @@ TEST(auto_is_exact_where_the_picture_needs_a_conversion) {
 }
 
 TEST(the_palette_at_the_foot_has_the_pictures_numbers) {
-    Node node;
+    ConvertingNode node;
     node.instance->set("output", 2);
     Layout layout;
     layout.bounds = rect(0, 0, 64, 48);  // eight colours of 8 by 6
@@ -233,7 +234,7 @@ TEST(the_palette_at_the_foot_has_the_pictures_numbers) {
 }
 
 TEST(the_status_names_both_spaces) {
-    Node node;
+    ConvertingNode node;
     CHECK(node.instance->changed("sidecar") == kOfxStatOK);
     const std::string status = node.instance->text("status");
     EXPECT(status.find("the picture in ACEScg; the palette is in ACEScct") != std::string::npos,
@@ -242,7 +243,7 @@ TEST(the_status_names_both_spaces) {
 
 TEST(a_host_that_negotiates_colour_is_asked_for_what_the_picture_is_to_be_in) {
     constexpr const char* kWanted = "OfxImageClipPropPreferredColourspaces_Source";
-    Node node;
+    ConvertingNode node;
     node.instance->effect().properties.put(kOfxImageEffectPropColourManagementStyle,
                                            std::string(kOfxImageEffectColourManagementFull));
     for (const bool palette : {false, true}) {

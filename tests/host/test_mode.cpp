@@ -15,7 +15,7 @@ using palette4d::Lattice;
 
 namespace {
 
-struct Node : Ready {
+struct NodeInRows : Ready {
     /// A render in windows of so many rows.
     std::vector<unsigned char> render(const Picture& source, double time, int rows = 1000) {
         Picture output(source.layout());
@@ -31,7 +31,7 @@ struct Node : Ready {
 enum { kAuto, kExact, kLattice };
 
 /// What the two modes make of a picture; not the same.
-auto exact_and_lattice(Node& node, const Picture& source) {
+auto exact_and_lattice(NodeInRows& node, const Picture& source) {
     node.instance->set("mode", kExact);
     auto exact = node.render(source, 2);
     node.instance->set("mode", kLattice);
@@ -67,7 +67,7 @@ double difference(const std::vector<unsigned char>& a, const std::vector<unsigne
 }  // namespace
 
 TEST(the_lattice_is_near_the_exact_picture_and_the_same_in_every_tile) {
-    Node node;
+    NodeInRows node;
     for (const int channels : {3, 4}) {
         Picture source(layout(channels));
         fill(source);
@@ -97,7 +97,7 @@ TEST(the_lattice_is_near_the_exact_picture_and_the_same_in_every_tile) {
 }
 
 TEST(bytes_are_a_level_off_at_most) {
-    Node node;
+    NodeInRows node;
     Picture source(layout(4, Depth::kByte));
     fill(source);
     node.instance->set("mode", kExact);
@@ -113,7 +113,7 @@ TEST(bytes_are_a_level_off_at_most) {
 }
 
 TEST(auto_interpolates_only_where_the_host_tells_that_somebody_watches) {
-    Node node;
+    NodeInRows node;
     Layout tile = layout(4);
     tile.definition = rect(-960, 0, 960, 1080);
     Picture source(tile);
@@ -147,7 +147,7 @@ TEST(auto_interpolates_only_where_the_host_tells_that_somebody_watches) {
 }
 
 TEST(auto_is_exact_for_pictures_that_the_lattice_is_not_faster_for) {
-    Node node;
+    NodeInRows node;
     node.instance->extra_arguments = {{kOfxImageEffectPropInteractiveRenderStatus, 1}};
     const auto interpolates = [&](const Layout& shape) {
         Picture source(shape);
@@ -185,7 +185,7 @@ TEST(auto_is_exact_for_pictures_that_the_lattice_is_not_faster_for) {
 }
 
 TEST(handles_keyframes_and_a_change_of_mode_meet_their_own_lattices) {
-    Node node;
+    NodeInRows node;
     Picture source(layout(4));
     fill(source);
     const auto each_mode = [&](double time) {
@@ -225,7 +225,7 @@ TEST(handles_keyframes_and_a_change_of_mode_meet_their_own_lattices) {
 }
 
 TEST(the_status_says_the_largest_error_of_the_frame_that_is_shown) {
-    Node node;
+    NodeInRows node;
     Picture source(layout(4));
     fill(source);
     const auto error_said = [&](double time) {

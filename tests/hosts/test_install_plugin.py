@@ -6,6 +6,7 @@ import argparse
 import os
 import shutil
 import stat
+import subprocess
 import sys
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import pytest
 from palette4d import _core
 from palette4d.cli import install_plugin
 from palette4d.common.errors import Palette4dError
+from palette4d.common.files import temporary_folder
 from palette4d.hosts.bundle import (
     BUNDLE,
     PROGRAM,
@@ -147,7 +149,7 @@ def test_a_failed_rename_puts_the_old_bundle_back(
     rename = Path.rename
 
     def fail_on_the_fresh_one(self: Path, target: Path) -> Path:
-        if self.name == BUNDLE and self.parent.name.startswith(".palette4d-"):
+        if self.name == BUNDLE and self.parent.name.endswith(".p4d-tmp"):
             raise OSError(28, "No space left on device")
         return rename(self, target)
 
@@ -155,6 +157,34 @@ def test_a_failed_rename_puts_the_old_bundle_back(
     with pytest.raises(Palette4dError, match="No space left"):
         install_bundle(bundle, destination)
     assert files(destination / BUNDLE) == {"Contents/Linux-x86-64/Palette4D.ofx": b"old code"}
+
+
+INSTALL = """
+import os, shutil, sys
+from pathlib import Path
+from palette4d.hosts.bundle import install_bundle
+if sys.argv[3] == "killed":
+    shutil.copytree = lambda _, to: (to.mkdir(), os.kill(os.getpid(), 9))
+install_bundle(Path(sys.argv[1]), Path(sys.argv[2]))
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="folders cannot be locked there")
+def test_the_next_run_removes_what_a_killed_one_left(bundle: Path, tmp_path: Path) -> None:
+    destination = tmp_path / "OFX"
+
+    def install(how: str) -> int:
+        words = [sys.executable, "-c", INSTALL, bundle, destination, how]
+        return subprocess.run(words, check=False, timeout=120).returncode
+
+    assert install("killed") == -9
+    (left,) = destination.iterdir()
+    assert (left / BUNDLE).is_dir()
+    with temporary_folder(destination) as used:  # by a run that goes on
+        assert [path.name for path in destination.iterdir()] == [used.name]
+        assert install("whole") == 0
+        assert {path.name for path in destination.iterdir()} == {used.name, BUNDLE}
+    assert [path.name for path in destination.iterdir()] == [BUNDLE]
 
 
 def test_default_destinations(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

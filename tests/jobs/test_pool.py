@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
+from farm_processes import running, wait_for
 from pieces import piece
 
 from palette4d.jobs import pool
@@ -41,6 +45,36 @@ def test_a_process_that_is_ended_fails_only_its_piece() -> None:
     failed = {key for key, outcome in found.items() if isinstance(outcome, Failed)}
     assert failed == {1, 3}
     assert all("ended from outside" in str(found[key]) for key in failed)
+
+
+def test_processes_that_end_while_others_start() -> None:
+    found = outcomes([5, 1, 5, 5, 2, 5, 5, 6], 2)
+    threads = max(1, (os.cpu_count() or 1) // 2)
+    whole = {key: it for key, it in found.items() if not isinstance(it, Failed)}
+    assert whole == {1: (1, threads), 4: (4, threads), 7: (36, threads)}
+    assert len(found) == 8
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+def test_a_parent_that_is_killed_leaves_no_process(tmp_path: Path) -> None:
+    program = tmp_path / "program.py"
+    program.write_text(
+        "from pieces import noted\n"
+        "from palette4d.jobs import pool\n"
+        "if __name__ == '__main__':\n"
+        f"    pool.run(noted, {{i: {str(tmp_path)!r} for i in range(100)}}, print, 2)\n"
+    )
+    path = os.pathsep.join([str(Path(__file__).parents[1]), os.environ.get("PYTHONPATH", "")])
+    parent = subprocess.Popen(
+        [sys.executable, str(program)],
+        env={**os.environ, "PYTHONPATH": path},
+        stdout=subprocess.DEVNULL,
+    )
+    wait_for(lambda: len(list(tmp_path.glob("*.pid"))) == 2, "both processes")
+    parent.kill()
+    parent.wait(timeout=60)
+    for file in tmp_path.glob("*.pid"):
+        wait_for(lambda file=file: not running(int(file.stem)), "a process to end")
 
 
 def test_ctrl_c_waits_until_an_outcome_is_taken() -> None:

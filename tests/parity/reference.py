@@ -377,6 +377,13 @@ def polytope_weights(points: ArrayLike, document: Document, frame: float) -> F64
 # Recolouring -------------------------------------------------------------------------------------
 
 
+def straight(colour: F64, alpha: float) -> F64:
+    """A premultiplied colour divided by its alpha; NaN where alpha is 0 or not finite."""
+    if alpha == 0 or not np.isfinite(alpha):
+        return np.full_like(colour, np.nan)
+    return colour / alpha
+
+
 def recolour(
     image: NDArray[np.float32],
     original: ArrayLike,
@@ -395,12 +402,13 @@ def recolour(
             alpha = 1.0
             if premultiplied and image.shape[2] == 4:
                 alpha = float(image[y, x, 3])
-            if not np.isfinite(p).all() or not np.isfinite(alpha) or alpha == 0:
+            own = straight(p, alpha)
+            if not np.isfinite(own).all():
                 continue
-            weights, _ = palette_weights([p / alpha], original, faces)
+            weights, _ = palette_weights([own], original, faces)
             moved = weights[0] @ displacement
             for centre, radius, by in bumps:
-                within = 1 - float(((p / alpha - centre) ** 2).sum()) / radius**2
+                within = 1 - float(((own - centre) ** 2).sum()) / radius**2
                 moved = moved + max(within, 0.0) ** 3 * by
             moved = alpha * strength * moved
             for channel in range(3):

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
 import OpenImageIO as oiio
+import pytest
+from PySide6.QtNetwork import QLocalSocket
 
+from palette4d.studio import instance
 from palette4d.studio.window import Window
 
 
@@ -41,11 +45,8 @@ def test_without_a_screen_it_says_how_to_do_without(sidecar: Path, tmp_path: Pat
     assert "--screenshot" in done.stderr
 
 
-def test_another_start_with_the_same_sidecar_brings_this_window_to_the_frame(
-    opened: Window, sidecar: Path, qtbot: Any
-) -> None:
-    from palette4d.studio.instance import bring_forward
-
+def brought_forward(sidecar: Path, qtbot: Any) -> bool:
+    """Whether another program finds this window, which answers meanwhile."""
     program = (
         "import sys\n"
         "from palette4d.studio.instance import bring_forward\n"
@@ -53,6 +54,50 @@ def test_another_start_with_the_same_sidecar_brings_this_window_to_the_frame(
     )
     other = subprocess.Popen([sys.executable, "-c", program, str(sidecar)])
     qtbot.waitUntil(lambda: other.poll() is not None, timeout=20_000)
-    assert other.returncode == 0
+    assert other.returncode in (0, 1)
+    return other.returncode == 0
+
+
+def test_another_start_with_the_same_sidecar_brings_this_window_to_the_frame(
+    opened: Window, sidecar: Path, qtbot: Any
+) -> None:
+    assert brought_forward(sidecar, qtbot)
     qtbot.waitUntil(lambda: opened.session.frame == 9, timeout=5000)
-    assert not bring_forward(sidecar.with_name("other.p4d.json"), None)
+    assert not instance.bring_forward(sidecar.with_name("other.p4d.json"), None)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"[" * 4000,
+        b'{"frame": NaN}',
+        b'{"frame": 1e999}',
+        b'{"frame": ' + b"9" * 400 + b"}",
+        b"\xff",
+    ],
+    ids=["deep", "NaN", "infinite", "too large", "no text"],
+)
+def test_hostile_questions_of_another_start_are_passed_over(
+    opened: Window, sidecar: Path, qtbot: Any, line: bytes
+) -> None:
+    socket = QLocalSocket()
+    socket.connectToServer(instance.name_of(sidecar))
+    assert socket.waitForConnected(5000)
+    socket.write(line + b"\n")
+    socket.write(b'{"frame": 8}\n')
+    qtbot.waitUntil(lambda: socket.bytesToWrite() == 0, timeout=5000)
+    socket.write(b'{"frame": 9}\n')
+    qtbot.waitUntil(lambda: opened.session.frame in (8, 9), timeout=5000)
+    socket.disconnectFromServer()
+
+
+@pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root gives a file to another user"
+)
+def test_a_socket_of_another_user_is_no_window(opened: Window, sidecar: Path, qtbot: Any) -> None:
+    found = QLocalSocket()
+    found.connectToServer(instance.name_of(sidecar))
+    assert not Path(found.fullServerName()).stat().st_mode & 0o077
+    os.chown(found.fullServerName(), 12345, -1)
+    assert not brought_forward(sidecar, qtbot)
+    assert opened.session.frame != 9

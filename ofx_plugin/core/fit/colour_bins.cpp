@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "model/alpha.hpp"
 #include "model/vec3.hpp"
 
 namespace palette4d {
@@ -20,7 +21,6 @@ constexpr std::uint32_t kMiddle = 0b111000000;  // of a block: cell 4 of 8 in al
 constexpr int kCodeBits = 24;
 constexpr std::size_t kCodes = std::size_t{1} << kCodeBits;
 constexpr std::size_t kMostMeans = std::size_t{1} << 20;
-constexpr float kLeastAlpha = 1.0f / 255;
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 // Cell numbers have 16 bits. Zero is in the middle, and numbers 0 to 255 (8-bit colours) share
 // their upper bits.
@@ -208,7 +208,8 @@ void ColourBinner::add_planar(const Rows<Sample>& rows, int bits, bool premultip
             const float alpha = value(p[3]);
             if (alpha >= kLeastAlpha) {
                 if (premultiplied)
-                    for (std::vector<float>& channel : row_) channel[x] /= alpha;
+                    for (std::vector<float>& channel : row_)
+                        channel[x] = straight(channel[x], alpha);
             } else {
                 row_[0][x] = kNone;
                 ++transparent_;

@@ -1,6 +1,7 @@
 // The kernels of lattice_kernels.hpp, compiled for the vector width that lanes.hpp has here.
 #include "lattice/lattice_kernels.hpp"
 
+#include "model/alpha.hpp"
 #include "simd/four.hpp"
 #include "simd/lanes.hpp"
 
@@ -36,8 +37,9 @@ void locate(const LatticeDomain& domain, LatticeBlock& block, const float* from,
     if (premultiplied) {
         for (int i = 0; i < count; ++i) {
             const float alpha = from[i * 4 + 3];
-            const float bad = 0 * alpha;  // NaN where it is not finite
-            for (int c = 0; c < 3; ++c) block.colour[c][i] = block.colour[c][i] / alpha + bad;
+            for (int c = 0; c < 3; ++c) {
+                block.colour[c][i] = palette4d::straight(block.colour[c][i], alpha);
+            }
         }
     }
     constexpr float kSide = palette4d::kLatticeSide + 1, kCells = palette4d::kLatticeSide;

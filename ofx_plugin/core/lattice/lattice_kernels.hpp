@@ -62,7 +62,7 @@ struct LatticeBlock {
 /// The kernels of one instruction set. Each pixel's result depends on that pixel only.
 struct LatticeKernels {
     /// Finds the cells of `count` pixels of 3 or 4 channels: sets colour, within, first, cut,
-    /// number. Premultiplied colours are divided by alpha; an alpha of 0 or NaN puts the pixel
+    /// number. Premultiplied colours are straight(); those without colour are
     /// outside.
     void (*locate)(const LatticeDomain& domain, LatticeBlock& block, const float* from,
                    int channels, int count, bool premultiplied);

@@ -22,7 +22,7 @@ double dot(const Vec3& weights, const float* rgb) {
     return weights[0] * rgb[0] + weights[1] * rgb[1] + weights[2] * rgb[2];
 }
 
-bool finite(const float* rgb) {
+bool finite_pixel(const float* rgb) {
     return std::isfinite(rgb[0]) && std::isfinite(rgb[1]) && std::isfinite(rgb[2]);
 }
 
@@ -39,7 +39,7 @@ void keep_lightness(const Pixels& pixels, const DrawingOptions& options) {
     for (std::size_t i = 0; i < pixels.count; ++i) {
         const float* from = pixels.source + i * pixels.channels;
         float* to = pixels.result + i * pixels.channels;
-        if (!finite(to)) continue;
+        if (!finite_pixel(to)) continue;
         const double lost =
             options.keep * (dot(options.lightness, from) - dot(options.lightness, to));
         if (lost == 0) continue;
@@ -47,18 +47,15 @@ void keep_lightness(const Pixels& pixels, const DrawingOptions& options) {
     }
 }
 
-/// Unpremultiplied colours in the palette's code values: (pixels, 3); NaN where alpha is 0.
+/// Straight colours in the palette's code values: (pixels, 3).
 std::vector<float> straight_colours(const Pixels& pixels, const ColourConversion* conversion) {
     std::vector<float> straight(pixels.count * 3);
     for (std::size_t i = 0; i < pixels.count; ++i) {
         const float* from = pixels.source + i * pixels.channels;
         const Vec3 seen = straight_colour(from, pixels.premultiplied);
         float* colour = &straight[i * 3];
-        for (std::size_t c = 0; c < 3; ++c) {
-            const bool transparent = pixels.premultiplied && from[3] == 0;
-            colour[c] = transparent ? std::nanf("") : static_cast<float>(seen[c]);
-        }
-        if (!conversion || !finite(colour)) continue;
+        for (std::size_t c = 0; c < 3; ++c) colour[c] = static_cast<float>(seen[c]);
+        if (!conversion || !finite_pixel(colour)) continue;
         const Vec3 converted = conversion->to_palette({colour[0], colour[1], colour[2]});
         for (std::size_t c = 0; c < 3; ++c) colour[c] = static_cast<float>(converted[c]);
     }
@@ -79,7 +76,7 @@ double weight_of(const float* colour, const float* read, const Recolourer& reade
 double matte_of(const float* colour, const float* read, const Drawing& drawing) {
     const DrawingOptions& options = drawing.options;
     if (options.output == Output::kOutside && infinite(colour)) return 1;
-    if (!finite(colour) || !finite(read)) return 0;
+    if (!finite_pixel(colour) || !finite_pixel(read)) return 0;
     if (options.output == Output::kWeight) {
         return std::clamp(weight_of(colour, read, *drawing.reader), 0.0, 1.0);
     }

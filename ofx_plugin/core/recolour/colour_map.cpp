@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "model/alpha.hpp"
 #include "model/vec3.hpp"
 #include "recolour/share_rows.hpp"
 
@@ -158,7 +159,8 @@ private:
 
 Vec3 straight_colour(const float* pixel, bool premultiplied) {
     const double alpha = premultiplied ? pixel[3] : 1.0;
-    return {pixel[0] / alpha, pixel[1] / alpha, pixel[2] / alpha};
+    return {straight<double>(pixel[0], alpha), straight<double>(pixel[1], alpha),
+            straight<double>(pixel[2], alpha)};
 }
 
 RecolourCounts ColourMap::apply(const ConstImageView& in, const ImageView& out,

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "convert/colour_conversion.hpp"
+#include "model/alpha.hpp"
 #include "simd/instruction_set.hpp"
 
 namespace palette4d {
@@ -96,10 +97,9 @@ public:
 /// Whether the pixel can be recoloured: finite colours, and an alpha that can divide them.
 inline bool recolourable(const float* pixel, bool premultiplied) {
     // NaN where a channel is not finite: 0 times infinity is NaN.
-    return 0 * pixel[0] + 0 * pixel[1] + 0 * pixel[2] == 0 &&
-           (!premultiplied || (pixel[3] != 0 && 0 * pixel[3] == 0));
+    return 0 * pixel[0] + 0 * pixel[1] + 0 * pixel[2] == 0 && (!premultiplied || divides(pixel[3]));
 }
-/// The pixel's colour, divided by alpha where it is premultiplied.
+/// The pixel's colour, straight() where it is premultiplied.
 Vec3 straight_colour(const float* pixel, bool premultiplied);
 
 }  // namespace palette4d

@@ -187,8 +187,8 @@ private:
                 block.alpha[at] = by;
                 for (int c = 0; c < 3; ++c) {
                     block.seen[c][at] = block.high[c][at];
-                    const double straight = static_cast<double>(block.seen[c][at]) / by;
-                    split(straight, block.high[c][at], block.low[c][at]);
+                    const double colour = straight<double>(block.seen[c][at], by);
+                    split(colour, block.high[c][at], block.low[c][at]);
                 }
             }
         };

@@ -7,15 +7,21 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
+import pickle
 import signal
-from collections.abc import Callable
-from multiprocessing.connection import Connection
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from multiprocessing import resource_tracker
+from multiprocessing.connection import Connection, wait
 from types import TracebackType
 from typing import Any, TypeVar
 
 from palette4d.common.errors import Palette4dError, in_words
 
 Result = TypeVar("Result")
+
+#: Seconds in which a process that has closed its pipe may end.
+GRACE = 5.0
 
 
 class ChildError(Palette4dError):
@@ -27,13 +33,13 @@ class Child:
 
     Parameters
     ----------
-    seconds : float
+    seconds : float, optional
         The longest time for a call.
-    megabytes : int
+    megabytes : int, optional
         The most memory for all calls, where the system can limit it.
     """
 
-    def __init__(self, seconds: float, megabytes: int) -> None:
+    def __init__(self, seconds: float | None = None, megabytes: int | None = None) -> None:
         self.seconds, self.megabytes = seconds, megabytes
         self._process: Any = None
         self._pipe: Connection | None = None
@@ -66,17 +72,33 @@ class Child:
         Palette4dError
             Any error of the function.
         """
+        self.begin(function, *arguments)
+        found: Result = self.finish()
+        return found
+
+    def begin(self, function: Callable[..., object], *arguments: object) -> None:
+        """Begin a call; `finish` returns its result."""
         if self._pipe is None:
             self._start()
         assert self._pipe is not None
         try:
             self._pipe.send((function, arguments))
+        except (BrokenPipeError, ConnectionResetError):
+            pass  # `finish` says so
+        except BaseException:
+            self.close()
+            raise
+
+    def finish(self) -> Any:
+        """Wait for the call that was begun; return its result, or raise as `call`."""
+        assert self._pipe is not None
+        try:
             if not self._pipe.poll(self.seconds):
                 self.close()
                 raise ChildError(f"reading it takes longer than {self.seconds:g} seconds")
             result, problem = self._pipe.recv()
         except (EOFError, BrokenPipeError, ConnectionResetError) as error:
-            self._process.join()
+            self._process.join(GRACE)
             status = self._process.exitcode
             self.close()
             raise ChildError(f"the library that reads it crashed ({_cause(status)})") from error
@@ -88,8 +110,7 @@ class Child:
             raise ChildError(f"reading it takes more than {self.megabytes} MB of memory")
         if problem is not None:
             raise problem
-        found: Result = result
-        return found
+        return result
 
     def close(self) -> None:
         """End the process."""
@@ -103,31 +124,59 @@ class Child:
     def _start(self) -> None:
         # Spawned, not forked: the libraries run threads, which a fork would break.
         context = multiprocessing.get_context("spawn")
-        self._pipe, theirs = context.Pipe()
-        self._process = context.Process(target=_serve, args=(theirs, self.megabytes), daemon=True)
-        self._process.start()
-        theirs.close()
+        if sys.platform != "win32":
+            # Its start ends the block of Ctrl-C.
+            resource_tracker.ensure_running()
+        with _without_interrupts():
+            self._pipe, theirs = context.Pipe()
+            arguments = (theirs, self.seconds, self.megabytes)
+            self._process = context.Process(target=_serve, args=arguments, daemon=True)
+            self._process.start()
+            theirs.close()
 
 
-def _serve(pipe: Connection, megabytes: int) -> None:
+def done(children: Iterable[Child]) -> list[Child]:
+    """Wait until calls that were begun have ended; return the children of these."""
+    pipes = {child._pipe: child for child in children if child._pipe is not None}
+    return [pipes[pipe] for pipe in wait(list(pipes)) if isinstance(pipe, Connection)]
+
+
+@contextlib.contextmanager
+def _without_interrupts() -> Iterator[None]:
+    """Block Ctrl-C for this thread and for processes that start meanwhile."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _serve(pipe: Connection, seconds: float | None, megabytes: int | None) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends this process
-    _limit(megabytes)
+    if megabytes is not None:
+        _limit(megabytes)
     while True:
         try:
             function, arguments = pipe.recv()
         except EOFError:
             return
-        result: Any = None
-        problem: Any = None
+        if seconds is not None and hasattr(signal, "alarm"):
+            signal.alarm(int(seconds + GRACE))  # where the parent was killed, nobody else ends it
         try:
-            result = function(*arguments)
+            answer = pickle.dumps((function(*arguments), None))
         except MemoryError:
-            problem = MemoryError
+            answer = pickle.dumps((None, MemoryError))
         except Palette4dError as error:
-            problem = error
+            answer = pickle.dumps((None, error))
         except Exception as error:  # anything may come of a hostile file
             problem = Palette4dError(in_words(error) or type(error).__name__)
-        pipe.send((result, problem))
+            answer = pickle.dumps((None, problem))
+        if hasattr(signal, "alarm"):
+            signal.alarm(0)
+        pipe.send_bytes(answer)
 
 
 def _limit(megabytes: int) -> None:

@@ -4,6 +4,7 @@ import contextlib
 import os
 import re
 import secrets
+import shutil
 import stat
 import sys
 import time
@@ -132,6 +133,34 @@ def replace_by_link(path: Path, target: str) -> None:
         temporary.unlink(missing_ok=True)
 
 
+@contextmanager
+def temporary_folder(parent: Path) -> Generator[Path]:
+    """Yield a new folder in `parent`; it is gone after the body, or in the next run after a kill.
+
+    Raises
+    ------
+    OSError
+        The folder cannot be made.
+    """
+    _remove_leftovers(parent)
+    while True:
+        folder = _temporary_name(parent / "palette4d")
+        folder.mkdir(0o700)
+        lock = None if sys.platform == "win32" else os.open(folder, os.O_RDONLY)
+        if lock is None:
+            break
+        _lock(lock, wait=True)
+        if os.fstat(lock).st_nlink:
+            break
+        os.close(lock)  # another process removed it before it was locked
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        if lock is not None:
+            os.close(lock)
+
+
 def _temporary_name(path: Path) -> Path:
     # File names have at most 250 bytes; 40 characters are enough to recognise the file.
     return path.with_name(f".{path.stem[:40]}.{secrets.token_hex(8)}.p4d-tmp{path.suffix}")
@@ -150,7 +179,7 @@ def _new_temporary(path: Path) -> tuple[Path, int]:
 
 
 def _remove_leftovers(folder: Path) -> None:
-    """Remove the temporary files of killed processes, once for each folder."""
+    """Remove the temporary files and folders of killed processes, once for each folder."""
     if folder in _swept:
         return
     _swept.add(folder)
@@ -158,15 +187,20 @@ def _remove_leftovers(folder: Path) -> None:
         for entry in entries:
             if _TEMPORARY.fullmatch(entry.name):
                 with contextlib.suppress(OSError):
-                    if _is_left_over(entry):
+                    if not _is_left_over(entry):
+                        continue
+                    if entry.is_dir(follow_symlinks=False):
+                        shutil.rmtree(entry)
+                    else:
                         Path(entry).unlink()
 
 
 def _is_left_over(entry: os.DirEntry[str]) -> bool:
-    """Whether no process writes a temporary file any more: its lock ends with the process."""
+    """Whether no process uses a temporary file any more: its lock ends with the process."""
     if entry.is_symlink():
         return True
-    handle = os.open(entry.path, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0))
+    access = os.O_RDONLY if entry.is_dir() else os.O_RDWR
+    handle = os.open(entry.path, access | getattr(os, "O_NOFOLLOW", 0))
     try:
         locked = _lock(handle, wait=False)
         if locked is None:

@@ -11,12 +11,11 @@ import os
 import platform
 import shutil
 import sys
-import tempfile
 from pathlib import Path
 
 from palette4d import _core
 from palette4d.common.errors import Palette4dError, WriteError
-from palette4d.common.files import replacing
+from palette4d.common.files import replacing, temporary_folder
 
 BUNDLE = "Palette4D.ofx.bundle"
 _PLUGINS = "OFX/Plugins"
@@ -96,8 +95,8 @@ def install_bundle(
                 "expected nothing or an earlier version; replace it with force=True"
             )
         # Beside the target, so that the rename stays on one file system.
-        with tempfile.TemporaryDirectory(prefix=".palette4d-", dir=destination) as temporary:
-            fresh = Path(temporary) / BUNDLE
+        with temporary_folder(destination) as temporary:
+            fresh = temporary / BUNDLE
             if link:
                 fresh.symlink_to(bundle, target_is_directory=True)
                 # Another's installation may be closed: then the node says what its buttons need.
@@ -106,7 +105,7 @@ def install_bundle(
             else:
                 shutil.copytree(bundle, fresh)
                 _write_program(fresh)
-            _replace(fresh, target, Path(temporary) / "old")
+            _replace(fresh, target, temporary / "old")
     except PermissionError as error:
         who = (
             "close the programs that use the node, and run the command as an administrator"

@@ -1,17 +1,16 @@
 """Many tasks on this machine, in separate processes."""
 
 import contextlib
-import multiprocessing
 import os
 import signal
 import threading
+import traceback
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import TypeVar
 
+from palette4d.common.child import Child, ChildError, done
 from palette4d.common.errors import Palette4dError, in_words
 
 Key = TypeVar("Key")
@@ -24,6 +23,13 @@ class Failed:
     """The reason why a task failed, in words for the user."""
 
     text: str
+
+
+@dataclass(frozen=True)
+class _Fault:
+    """An error of the program itself."""
+
+    error: Exception
 
 
 def run(
@@ -62,70 +68,59 @@ def run(
         for key, task in tasks.items():
             told(key, outcome(work, task, threads))
         return
-    pool = _new_pool(jobs)
-    left = deque(tasks)
-    # The tasks that ran when a process crashed. Each is run again alone, so that only the task
-    # that crashes its process fails.
-    suspects: set[Key] = set()
+    # Not `concurrent.futures`: its pool waits for ever if a process ends while another starts
+    # (Python 3.11 to 3.13), and its processes outlive a parent that was killed.
     order = {key: i for i, key in enumerate(tasks)}
-    running: dict[Future[Result], Key] = {}
-    others = set(multiprocessing.active_children())
+    busy: dict[Child, Key] = {}
+
+    def finish(child: Child, failed: Callable[[Key], object]) -> None:
+        key = busy.pop(child)
+        try:
+            found = child.finish()
+        except ChildError:
+            failed(key)
+            return
+        if isinstance(found, _Fault):
+            raise found.error
+        told(key, found)
+
+    def run_all(keys: Iterable[Key], idle: list[Child], failed: Callable[[Key], object]) -> None:
+        left = deque(keys)
+        try:
+            while left or busy:
+                while left and idle:
+                    child, key = idle.pop(), left.popleft()
+                    child.begin(_attempt, work, tasks[key], threads)
+                    busy[child] = key
+                for child in sorted(done(busy), key=lambda child: order[busy[child]]):
+                    finish(child, failed)
+                    idle.append(child)
+        except KeyboardInterrupt:
+            for child in list(busy) if patient else ():
+                finish(child, lambda key: None)
+            raise
+
+    with contextlib.ExitStack() as stack:
+        children = [stack.enter_context(Child()) for _ in range(jobs)]
+        crashed: list[Key] = []
+        run_all(tasks, children, crashed.append)
+        # Once more, alone: beside others there may have been too little memory.
+        run_all(crashed, children[:1], lambda key: told(key, Failed(_CRASHED)))
+
+
+_CRASHED = (
+    "its process crashed or was ended from outside (too little memory?); run the same command again"
+)
+
+
+def _attempt(
+    work: Callable[[Task, int], Result], task: Task, threads: int
+) -> Result | Failed | _Fault:
     try:
-        while True:
-            # Submit only as many tasks as can run: Ctrl-C waits for these. It reaches all
-            # processes, but the workers inherit the block and finish their task.
-            with without_interrupts():
-                while left and len(running) < (1 if suspects else jobs):
-                    key = left.popleft()
-                    running[_submitted(pool, work, tasks[key], threads)] = key
-            if not running:
-                break
-            done, _ = wait(running, return_when=FIRST_COMPLETED)
-            broken = any(_is_broken(future) for future in done)
-            if broken:  # all other futures break, too
-                done, _ = wait(running)
-            for future in sorted(done, key=lambda f: order[running[f]], reverse=broken):
-                key = running.pop(future)
-                if _is_broken(future) and key not in suspects:
-                    suspects.add(key)
-                    left.appendleft(key)
-                else:
-                    suspects.discard(key)
-                    told(key, outcome(future.result))
-            if broken:
-                pool.shutdown()
-                pool = _new_pool(jobs)
-    except KeyboardInterrupt:
-        if not patient:
-            for process in set(multiprocessing.active_children()) - others:
-                process.terminate()
-        raise
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-        # After Ctrl-C: the tasks that have finished meanwhile.
-        for future, key in running.items():
-            if not future.cancelled() and (patient or not future.exception()):
-                told(key, outcome(future.result))
-
-
-def _new_pool(jobs: int) -> ProcessPoolExecutor:
-    # Spawned, not forked: the libraries run threads, which a fork would break.
-    return ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"))
-
-
-def _is_broken(future: Future[Any]) -> bool:
-    return isinstance(future.exception(), BrokenProcessPool)
-
-
-def _submitted(
-    pool: ProcessPoolExecutor, work: Callable[[Task, int], Result], task: Task, threads: int
-) -> Future[Result]:
-    try:
-        return pool.submit(work, task, threads)
-    except BrokenProcessPool as error:
-        broken: Future[Result] = Future()
-        broken.set_exception(error)
-        return broken
+        return outcome(work, task, threads)
+    except Exception as error:
+        error.add_note(traceback.format_exc())
+        return _Fault(error)
 
 
 def outcome(call: Callable[..., Result], *arguments: object) -> Result | Failed:
@@ -134,11 +129,6 @@ def outcome(call: Callable[..., Result], *arguments: object) -> Result | Failed:
         return call(*arguments)
     except (Palette4dError, OSError) as error:
         return Failed(in_words(error))
-    except BrokenProcessPool:
-        return Failed(
-            "its process crashed or was ended from outside (too little memory?); run the same "
-            "command again"
-        )
 
 
 @contextlib.contextmanager
@@ -155,16 +145,3 @@ def later_interrupts() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
         if held and callable(before):
             before(held[0], None)
-
-
-@contextlib.contextmanager
-def without_interrupts() -> Iterator[None]:
-    """Block Ctrl-C for this thread and for processes that start meanwhile."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)

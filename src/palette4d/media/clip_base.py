@@ -27,9 +27,6 @@ Fill = Callable[[_core.ColourBinner], bool]
 """Adds a frame's pixels to a binner; FrameError if the frame is bad. Returns whether the frame is
 `hidden`; then its colours were added without regard to alpha."""
 
-LEAST_ALPHA = np.float32(1 / 255)
-"""A pixel with less alpha is invisible in 8 bits."""
-
 DEFAULT_RATE = Fraction(24)
 
 COUNTED_PIXELS = 4_000_000
@@ -188,21 +185,18 @@ class Clip(abc.ABC):
     def straight_colours(self, pixels: F32) -> F32:
         """(h, w, 3) float32 straight colours, the input of a recolouring.
 
-        Premultiplied colours are divided by alpha, as in the node. Pixels with an alpha below 1/255
-        are invisible, and the division would turn their noise into extreme colours. They become
-        NaN, which the analysis leaves out. If a frame has no other pixels (`hidden`), its colours
-        stay unchanged: if all frames are hidden, alpha is not used.
+        Premultiplied colours are divided by alpha, as in the node (`_core.straight_colours`).
+        Pixels with an alpha below 1/255 are invisible, and the division would turn their noise into
+        extreme colours. They become NaN, which the analysis leaves out. If a frame has no other
+        pixels (`hidden`), its colours stay unchanged: if all frames are hidden, alpha is not used.
         """
         if pixels.shape[2] == 3:
             return pixels
-        if hidden(pixels):
-            return np.ascontiguousarray(pixels[..., :3])
-        alpha = pixels[..., 3:]
-        seen = alpha >= LEAST_ALPHA
-        divisor = alpha if self.premultiplied else np.float32(1)
-        colours = np.full_like(pixels[..., :3], np.nan)
-        with np.errstate(over="ignore", invalid="ignore"):
-            np.divide(pixels[..., :3], divisor, out=colours, where=seen)
+        unused = hidden(pixels)
+        divided = self.premultiplied and not unused
+        colours = _core.straight_colours(pixels, premultiplied=divided)
+        if not unused:
+            colours[~_visible(pixels)] = np.nan
         return colours
 
     def skip(self, frame: int) -> None:
@@ -221,7 +215,12 @@ class Clip(abc.ABC):
 
 def hidden(pixels: F32) -> bool:
     """Whether all pixels (h, w, 3 or 4) are invisible: alpha is below 1/255 everywhere."""
-    return pixels.shape[2] == 4 and not (pixels[..., 3] >= LEAST_ALPHA).any()
+    return pixels.shape[2] == 4 and not _visible(pixels).any()
+
+
+def _visible(pixels: F32) -> NDArray[np.bool_]:
+    """Whether each of the pixels (h, w, 4) is visible in 8 bits; NaN is not."""
+    return pixels[..., 3] >= np.float32(_core.LEAST_ALPHA)
 
 
 def all_hidden(binner: _core.ColourBinner) -> bool:

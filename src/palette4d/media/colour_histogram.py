@@ -32,12 +32,12 @@ def histogram(rgb: F64, counts: F64) -> F64:
     places = np.clip(CELLS_TO_ONE * _eased(rgb), 0, CELLS - 1)
     cells = np.minimum(places.astype(np.int64), CELLS - 2)
     upper = places - cells
-    shares = np.stack([1 - upper, upper])  # (2, n, 3)
+    red, green, blue = np.stack([1 - upper, upper]).transpose(2, 0, 1)  # (2, n) each
+    lowest = cells @ np.array([CELLS**2, CELLS, 1])
     out = np.zeros(CELLS**3)
-    for corner in itertools.product((0, 1), repeat=3):
-        weight = counts * np.prod([shares[c, :, i] for i, c in enumerate(corner)], axis=0)
-        r, g, b = (cells[:, i] + c for i, c in enumerate(corner))
-        out += np.bincount((r * CELLS + g) * CELLS + b, weight, minlength=CELLS**3)
+    for r, g, b in itertools.product((0, 1), repeat=3):
+        weight = counts * red[r] * green[g] * blue[b]
+        out += np.bincount(lowest + (r * CELLS + g) * CELLS + b, weight, minlength=CELLS**3)
     shares_of_cells: F64 = out / out.sum()
     return shares_of_cells
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from palette4d import _core
 from palette4d.common.errors import Palette4dError, WriteError
 from palette4d.common.files import EXISTS, replacing
 
@@ -169,16 +170,18 @@ def quantised(pixels: NDArray[np.float32], samples: str) -> NDArray[Any]:
 def with_alpha_of(
     extension: str, pixels: NDArray[np.float32], premultiplied: bool
 ) -> tuple[NDArray[np.float32], bool]:
-    """(pixels, premultiplied) in the format's kind of alpha; unchanged if it already fits."""
+    """(pixels, premultiplied) in the format's kind of alpha; unchanged if it already fits.
+
+    Premultiplied pixels without a straight colour (`_core.straight_colours`) keep their values.
+    """
     if pixels.shape[2] != 4 or extension == "tif" or premultiplied == (extension == "exr"):
         return pixels, premultiplied
-    alpha = pixels[..., 3:]
     out = pixels.copy()
     if premultiplied:
-        with np.errstate(over="ignore", invalid="ignore"):
-            np.divide(pixels[..., :3], alpha, out=out[..., :3], where=alpha != 0)
+        straight = _core.straight_colours(pixels, premultiplied=True)
+        np.copyto(out[..., :3], straight, where=~np.isnan(straight))
         return out, False
-    out[..., :3] *= alpha
+    out[..., :3] *= pixels[..., 3:]
     return out, True
 
 

@@ -12,8 +12,13 @@ from pathlib import Path
 from PySide6.QtCore import QObject
 from PySide6.QtNetwork import QLocalServer, QLocalSocket
 
+from palette4d.common.json_files import parse
+
 #: Milliseconds that a window has for its answer.
 PATIENCE = 1000
+
+#: The longest question.
+BYTES = 4096
 
 
 def name_of(sidecar: str | os.PathLike[str]) -> str:
@@ -27,13 +32,23 @@ def bring_forward(sidecar: str | os.PathLike[str], frame: float | None) -> bool:
     """Ask the window of a sidecar to come to the front and go to a frame; False without one."""
     socket = QLocalSocket()
     socket.connectToServer(name_of(sidecar))
-    if not socket.waitForConnected(PATIENCE):
+    if not socket.waitForConnected(PATIENCE) or not _ours(socket.fullServerName()):
         return False
     socket.write(json.dumps({"frame": frame}).encode() + b"\n")
     socket.flush()
     heard = socket.waitForReadyRead(PATIENCE)
     socket.disconnectFromServer()
     return heard
+
+
+def _ours(socket: str) -> bool:
+    """Whether a socket is this user's: in the folder of temporary files, anyone can make one."""
+    if not hasattr(os, "getuid"):
+        return True
+    try:
+        return Path(socket).stat().st_uid == os.getuid()
+    except OSError:
+        return False
 
 
 class Listener(QObject):
@@ -78,6 +93,8 @@ class Listener(QObject):
     def _connected(self) -> None:
         assert self._server is not None
         socket = self._server.nextPendingConnection()
+        socket.setReadBufferSize(BYTES)
+        socket.disconnected.connect(socket.deleteLater)
         socket.readyRead.connect(lambda: self._read(socket))
         if socket.bytesAvailable():
             self._read(socket)
@@ -86,9 +103,9 @@ class Listener(QObject):
         if not socket.canReadLine():
             return
         try:
-            frame = json.loads(bytes(socket.readLine(4096).data()))["frame"]
+            frame = parse(bytes(socket.readLine(BYTES).data()))["frame"]
             wanted = None if frame is None else float(frame)
-        except (ValueError, KeyError, TypeError):
+        except (ValueError, KeyError, TypeError, OverflowError):
             return
         socket.write(b"ok\n")
         socket.flush()

@@ -9,7 +9,7 @@ import numpy as np
 
 from palette4d import _core
 from palette4d.studio import texts
-from palette4d.studio.preview import Grade, Preview, straight
+from palette4d.studio.preview import Grade, Preview
 from palette4d.studio.session import Session
 from palette4d.studio.states import Place, Probe
 
@@ -27,7 +27,8 @@ def place_between(session: Session, first: tuple[int, int], last: tuple[int, int
     half = side // 2
     box = pixels[max(0, y - half) : y + half + 1, max(0, x - half) : x + half + 1]
     assert session.clip is not None
-    colours = straight(box, session.clip.premultiplied).reshape(-1, 3).astype(np.float64)
+    straight = _core.straight_colours(box, premultiplied=session.clip.premultiplied)
+    colours = straight.reshape(-1, 3).astype(np.float64)
     own = session.document.core.conversion
     if own is not None:
         colours = own.steps.to_palette(colours)
@@ -52,7 +53,7 @@ def probe_at(session: Session, x: int, y: int) -> Probe | None:
         return Probe(x, y, source, source)
     grade = Grade.of(session.document, session.frame)
     result = Preview.exact(pixel, grade, session.clip.premultiplied)
-    colour: Any = straight(pixel, session.clip.premultiplied)[0]
+    colour: Any = _core.straight_colours(pixel, premultiplied=session.clip.premultiplied)[0]
     if grade.conversion is not None:
         colour = grade.conversion.to_palette(colour)
     weights, _ = _core.palette_weights(colour, grade.palette.rgb, grade.palette.faces)

@@ -378,10 +378,7 @@ def _painted(
     alpha = None
     if colours.shape[2] == 4:
         alpha = np.clip(np.nan_to_num(colours[..., 3:]), 0, 1)
-        straight = colours[..., :3]
-        if premultiplied:
-            straight = np.divide(straight, alpha, out=np.zeros_like(straight), where=alpha > 0)
-        colours = np.ascontiguousarray(straight)
+        colours = _core.straight_colours(colours, premultiplied=premultiplied)
     rows = max(1, STRIP // colours.shape[1])
     if exact and painter.error and rows < len(colours):
         parts = []
@@ -394,15 +391,6 @@ def _painted(
     if alpha is not None:
         result[..., :3] = np.rint(result[..., :3] * alpha).astype(np.uint8)
     return result
-
-
-def straight(pixels: F32, premultiplied: bool) -> F32:
-    """Return (h, w, 3) colours that are not multiplied by alpha; NaN where alpha is 0."""
-    if pixels.shape[2] == 3 or not premultiplied:
-        return np.ascontiguousarray(pixels[..., :3])
-    alpha = pixels[..., 3:]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.ascontiguousarray(pixels[..., :3] / alpha, np.float32)
 
 
 def shares_of(palette: Palette, id_: str) -> NDArray[np.float64]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from palette4d import _core
 from palette4d.studio.display import Display, Look
 
 if TYPE_CHECKING:
@@ -40,9 +41,8 @@ def thumbnail(session: "Session", frame: float, premultiplied: bool) -> Callable
             pixels = document.recolour(
                 np.ascontiguousarray(pixels), frame, premultiplied=premultiplied, threads=1
             )
-        colours, alpha = pixels[..., :3], pixels[..., 3:]
-        if alpha.size and premultiplied:
-            colours = np.divide(colours, alpha, out=np.zeros_like(colours), where=alpha > 0)
+        alpha = pixels[..., 3:]
+        colours = _core.straight_colours(pixels, premultiplied=premultiplied)
         shown = _painted(display, look, np.nan_to_num(colours))
         return np.rint(shown * np.clip(alpha, 0, 1)).astype(np.uint8) if alpha.size else shown
 

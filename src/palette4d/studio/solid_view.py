@@ -17,6 +17,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QWidget
 
+from palette4d import _core
 from palette4d.grade.document import Document
 from palette4d.grade.palette import Palette
 from palette4d.plotting.solid import (
@@ -30,7 +31,6 @@ from palette4d.plotting.solid import (
 from palette4d.studio import paint, texts
 from palette4d.studio.menu_entries import SOLID_ACTIONS
 from palette4d.studio.panel_menus import view_actions
-from palette4d.studio.preview import straight
 from palette4d.studio.screen_colours import on_screen
 from palette4d.studio.session import Session
 from palette4d.studio.solid_paint import DISC, SolidPainter
@@ -149,7 +149,9 @@ class SolidView(QWidget):
             image = session.player.frame(session.frame)
             if image is None:
                 return None if self._pixels is None else self._pixels[1:]
-            colours = even_sample(straight(image, session.clip.premultiplied), PIXELS)
+            premultiplied = session.clip.premultiplied
+            straight = _core.straight_colours(image, premultiplied=premultiplied)
+            colours = even_sample(straight, PIXELS).astype(np.float64)
             document = session.document
             own = None if document is None else document.core.conversion
             if own is not None:

@@ -56,7 +56,7 @@ std::vector<Vec3> places_of(const ColourCells& cells) {
     return places;
 }
 
-double sum(const std::vector<double>& x) { return std::accumulate(x.begin(), x.end(), 0.0); }
+double total(const std::vector<double>& x) { return std::accumulate(x.begin(), x.end(), 0.0); }
 
 }  // namespace
 
@@ -77,7 +77,7 @@ TEST(a_sample_is_bounded_nearly_fills_its_bound_and_keeps_all_pixels) {
         CHECK(sample.chosen.size() <= most);
         CHECK(static_cast<double>(sample.chosen.size()) > 0.85 * static_cast<double>(most) - 1);
         CHECK_EQUAL(sample.counts.size(), sample.chosen.size());
-        CHECK_EQUAL(sum(sample.counts), sum(cells.counts));
+        CHECK_EQUAL(total(sample.counts), total(cells.counts));
         for (std::size_t i = 1; i < sample.chosen.size(); ++i)
             CHECK(sample.chosen[i - 1] < sample.chosen[i]);
     }
@@ -151,5 +151,5 @@ TEST(colours_on_a_point_a_line_and_far_away) {
     line.counts.assign(line.keys.size(), 2);
     const ColourSample sample = sample_colours(line, places_of(line), 100);
     CHECK(sample.chosen.size() <= 100 && sample.chosen.size() > 30);
-    CHECK_EQUAL(sum(sample.counts), sum(line.counts));
+    CHECK_EQUAL(total(sample.counts), total(line.counts));
 }

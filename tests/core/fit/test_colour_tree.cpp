@@ -14,8 +14,8 @@ using namespace palette4d;
 
 namespace {
 
-const double kNan = std::numeric_limits<double>::quiet_NaN();
-const double kInf = std::numeric_limits<double>::infinity();
+const double kNoNumber = std::numeric_limits<double>::quiet_NaN();
+const double kInfinite = std::numeric_limits<double>::infinity();
 
 double squared(const Vec3& a, const Vec3& b) {
     double sum = 0;
@@ -50,7 +50,7 @@ void check_node(const ColourTree& tree, int index) {
     const ColourTree::Node& node = tree.nodes()[static_cast<std::size_t>(index)];
     CHECK(node.begin < node.end);
     for (int c = 0; c < 3; ++c) {
-        double low = kInf, high = -kInf;
+        double low = kInfinite, high = -kInfinite;
         for (int i = node.begin; i < node.end; ++i) {
             low = std::min(low, tree.rgb(i)[c]);
             high = std::max(high, tree.rgb(i)[c]);
@@ -165,7 +165,7 @@ TEST(the_wide_tree_has_the_same_leaves_and_a_box_around_each_group) {
             std::vector<std::pair<Vec3, Vec3>> around;
             std::size_t next = 0;
             for (const ColourTree::Boxes& group : level) {
-                Vec3 low{kInf, kInf, kInf}, high{-kInf, -kInf, -kInf};
+                Vec3 low{kInfinite, kInfinite, kInfinite}, high{-kInfinite, -kInfinite, -kInfinite};
                 CHECK(group.count > 0);
                 for (int i = 0; i < group.count; ++i, ++next)
                     for (std::size_t c = 0; c < 3; ++c) {
@@ -194,9 +194,9 @@ TEST(many_times_the_same_colour) {
 TEST(a_tree_refuses_bad_arguments) {
     CHECK_THROWS(std::invalid_argument, ColourTree({}, {}));
     CHECK_THROWS(std::invalid_argument, ColourTree({{0, 0, 0}}, {1, 1}));
-    for (const double bad : {0.0, -1.0, kNan, kInf})
+    for (const double bad : {0.0, -1.0, kNoNumber, kInfinite})
         CHECK_THROWS(std::invalid_argument, ColourTree({{0, 0, 0}}, {bad}));
-    for (const double bad : {kNan, kInf, -kInf})
+    for (const double bad : {kNoNumber, kInfinite, -kInfinite})
         for (std::size_t c = 0; c < 3; ++c) {
             Vec3 colour{0, 0, 0};
             colour[c] = bad;
@@ -205,6 +205,6 @@ TEST(a_tree_refuses_bad_arguments) {
             CHECK_THROWS(std::invalid_argument, tree.nearest_mean(colour, 50));
         }
     const ColourTree tree({{0, 0, 0}}, {1});
-    for (const double bad : {0.0, -1.0, kNan})
+    for (const double bad : {0.0, -1.0, kNoNumber})
         CHECK_THROWS(std::invalid_argument, tree.nearest_mean({0, 0, 0}, bad));
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "check.hpp"
+#include "model/vec3.hpp"
 #include "shapes.hpp"
 
 using namespace palette4d;
@@ -18,24 +19,20 @@ FrameLoss loss_of(const std::vector<Vec3>& colours, const std::vector<Vec3>& pal
     return palette_loss(tree, palette, {}, {50, 1, 0}, nullptr);
 }
 
-double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
-Vec3 minus(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-
 double determinant(const Vec3& a, const Vec3& b, const Vec3& c) {
     return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
            a[2] * (b[0] * c[1] - b[1] * c[0]);
 }
 
 double to_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
-    const Vec3 d = minus(b, a), r = minus(p, a);
+    const Vec3 d = b - a, r = p - a;
     const double s = std::min(1.0, std::max(0.0, dot(r, d) / dot(d, d)));
     const Vec3 rest{r[0] - s * d[0], r[1] - s * d[1], r[2] - s * d[2]};
     return std::sqrt(dot(rest, rest));
 }
 
 double to_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
-    const Vec3 u = minus(b, a), v = minus(c, a), r = minus(p, a);
+    const Vec3 u = b - a, v = c - a, r = p - a;
     // Least squares: r is near s u + t v.
     const double uu = dot(u, u), uv = dot(u, v), vv = dot(v, v), ru = dot(r, u), rv = dot(r, v);
     const double gram = uu * vv - uv * uv;
@@ -49,7 +46,7 @@ double to_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
 }
 
 bool in_tetrahedron(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
-    const Vec3 u = minus(b, a), v = minus(c, a), w = minus(d, a), r = minus(p, a);
+    const Vec3 u = b - a, v = c - a, w = d - a, r = p - a;
     const double whole = determinant(u, v, w);
     const double x = determinant(r, v, w) / whole, y = determinant(u, r, w) / whole,
                  z = determinant(u, v, r) / whole;

@@ -7,16 +7,15 @@
 #include <vector>
 
 #include "check.hpp"
+#include "model/vec3.hpp"
 #include "shapes.hpp"
 
 using namespace palette4d;
 
 namespace {
 
-Vec3 minus(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 Vec3 normal_of(const Vec3& a, const Vec3& b, const Vec3& c) {
-    const Vec3 u = minus(b, a), v = minus(c, a);
+    const Vec3 u = b - a, v = c - a;
     return {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
 }
 
@@ -33,10 +32,10 @@ double farthest_outside(const std::vector<Vec3>& inner, const std::vector<Vec3>&
                 if (length < 1e-12) continue;
                 for (double& x : n) x /= length;
                 bool supports = true;
-                for (const Vec3& v : outer) supports &= dot(n, minus(v, outer[i])) < 1e-9;
+                for (const Vec3& v : outer) supports &= dot(n, v - outer[i]) < 1e-9;
                 if (!supports) continue;
                 ++planes;
-                for (const Vec3& v : inner) worst = std::max(worst, dot(n, minus(v, outer[i])));
+                for (const Vec3& v : inner) worst = std::max(worst, dot(n, v - outer[i]));
             }
     CHECK(planes > 0);
     return worst;
@@ -65,8 +64,7 @@ TEST(a_cut_corner_grows_back) {
     CHECK_EQUAL(hull.size(), std::size_t{4});
     for (const Vec3& corner : shapes::tetrahedron().rgb) {
         double nearest = std::numeric_limits<double>::infinity();
-        for (const Vec3& v : hull)
-            nearest = std::min(nearest, dot(minus(v, corner), minus(v, corner)));
+        for (const Vec3& v : hull) nearest = std::min(nearest, dot(v - corner, v - corner));
         CHECK_NEAR(std::sqrt(nearest), 0, 1e-8);
     }
 }

@@ -6,10 +6,12 @@
 #include <stdexcept>
 
 #include "check.hpp"
+#include "images.hpp"
 #include "recolour/recolour.hpp"
 #include "shapes.hpp"
 
 using namespace palette4d;
+using namespace images;
 using namespace shapes;
 
 namespace {
@@ -166,10 +168,6 @@ double worst(const std::vector<float>& found, const std::vector<float>& expected
         most = std::max(most, apart - 6e-8 * std::abs(expected[i]));
     }
     return most;
-}
-
-bool same_bits(const std::vector<float>& a, const std::vector<float>& b) {
-    return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
 }
 
 }  // namespace
