@@ -237,6 +237,25 @@ def test_files_that_are_being_written_are_no_leftovers(
     assert other.read_bytes() == b"slow"
 
 
+def test_nobody_waits_for_a_lock_on_a_new_file(old: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another user sees the new file first, and keeps a lock on it."""
+    real, kept = os.open, []
+
+    def opened(path: Path, flags: int, *mode: int) -> int:
+        handle = real(path, flags, *mode)
+        if flags & os.O_EXCL and not kept:
+            kept.append(real(path, os.O_RDONLY))
+            fcntl.flock(kept[0], fcntl.LOCK_EX)
+        return handle
+
+    monkeypatch.setattr(os, "open", opened)
+    with replacing(old, force=True) as temporary:
+        temporary.write_bytes(b"new")
+    os.close(kept[0])
+    assert old.read_bytes() == b"new"
+    assert names(old.parent) == [old.name]
+
+
 def test_without_locks_only_old_files_are_leftovers(
     old: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

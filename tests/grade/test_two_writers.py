@@ -3,6 +3,7 @@
 import errno
 import fcntl
 import json
+import os
 import subprocess
 import sys
 import time
@@ -109,9 +110,15 @@ def test_a_lock_file_of_a_dead_process_is_removed(
     assert left.returncode == 0
     lock = tmp_path / ".clip.p4d.json.lock"
     assert lock.exists()
+    # Also one of a file that nobody writes again; those of other programs stay.
+    lock.with_name(".other.p4d.json.lock").write_text(lock.read_text())
+    foreign = lock.with_name(".foreign.lock")
+    foreign.touch()
+    os.utime(foreign, (0, 0))
     document = Document.load(path)
     document.set("v1", rgb=(0.5, 0.5, 0.5))
     document.save()
+    foreign.unlink()
     assert [file.name for file in tmp_path.iterdir()] == ["clip.p4d.json"]
     # The lock of a computer that cannot be asked is respected.
     lock.write_text("elsewhere 1 abc")
@@ -153,3 +160,16 @@ def test_a_half_written_lock_file_stops_nobody(
     with locking.locked(tmp_path / "clip.p4d.json"):
         assert time.monotonic() - start < locking.LOCK_SECONDS / 2
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_pipe_in_the_place_of_the_lock_file_holds_nobody_for_ever(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(locking, "_flocked", lambda *_: False)
+    monkeypatch.setattr(locking, "LOCK_SECONDS", 0.2)
+    os.mkfifo(tmp_path / ".clip.p4d.json.lock")
+    with (
+        pytest.raises(Palette4dError, match="has held"),
+        locking.locked(tmp_path / "clip.p4d.json"),
+    ):
+        raise AssertionError("the body must not run")

@@ -1,5 +1,7 @@
 // Sidecars that are missing, broken, replaced, truncated and rewritten.
 #include <atomic>
+#include <chrono>
+#include <cstdlib>
 #include <fstream>
 #include <thread>
 
@@ -395,4 +397,72 @@ TEST(a_sidecar_rewritten_while_rendering) {
     CHECK(seen_swapped > 0);
     CHECK(seen_unchanged > 0);
     CHECK(seen_told > 0);
+}
+
+// Bytes of memory that this process uses; 0 where the system does not tell, or with a sanitizer,
+// which keeps what was freed.
+std::size_t used_memory() {
+#if defined(__linux__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+    std::size_t all = 0, resident = 0;
+    std::ifstream("/proc/self/statm") >> all >> resident;
+    return resident * 4096;
+#else
+    return 0;
+#endif
+}
+
+TEST(sixteen_instances_in_eight_threads_while_the_sidecar_is_swapped) {
+    // For PALETTE4D_LOAD_SECONDS (2) the file changes 100 times a second.
+    const char* const given = std::getenv("PALETTE4D_LOAD_SECONDS");
+    const auto length = std::chrono::seconds(given ? std::atoi(given) : 2);
+    Scene scene;
+    const std::string path = sidecar();
+    const std::string texts[] = {sidecar_text(), sidecar_text(false)};
+    const auto edited =
+        recoloured(palette4d::read_sidecar(path), 12, scene.source, scene.layout.bounds);
+    const auto unchanged = scene.unchanged();
+    CHECK(edited != unchanged);
+    std::vector<std::unique_ptr<Instance>> instances;
+    for (int i = 0; i < 16; ++i) {
+        instances.push_back(scene.plugin.create());
+        instances.back()->set("sidecar", path);
+    }
+    std::atomic<bool> done{false};
+    std::atomic<int> wrong{0}, seen_edited{0}, seen_unchanged{0};
+    std::vector<std::thread> threads;
+    for (std::size_t t = 0; t < 8; ++t) {
+        threads.emplace_back([&, t] {
+            Picture output(scene.layout);
+            for (std::size_t round = t; !done; round += 3) {
+                Instance& instance = *instances[round % instances.size()];
+                wrong +=
+                    instance.render(2, &scene.source, output, scene.layout.bounds) != kOfxStatOK;
+                const auto pixels = output.pixels(scene.layout.bounds);
+                ++(pixels == edited ? seen_edited : pixels == unchanged ? seen_unchanged : wrong);
+            }
+        });
+    }
+    const auto started = std::chrono::steady_clock::now();
+    std::size_t early = 0;
+    int swaps = 0;
+    const auto elapsed = [&] { return std::chrono::steady_clock::now() - started; };
+    // Sanitizers make renders slow.
+    const auto enough = [&] { return seen_edited > 0 && seen_unchanged > 0; };
+    for (; elapsed() < length || (!enough() && swaps < 10000); ++swaps) {
+        write("next.p4d.json", texts[swaps % 2]);
+        std::error_code refused;  // by Windows, while somebody reads the old file
+        std::filesystem::rename(folder() / "next.p4d.json", folder() / "clip.p4d.json", refused);
+        if (!early && elapsed() > length / 4) early = used_memory();
+        std::this_thread::sleep_until(started + (swaps + 1) * std::chrono::milliseconds(10));
+    }
+    const std::size_t late = used_memory();
+    done = true;
+    for (std::thread& thread : threads) thread.join();
+    figure(std::to_string(seen_edited + seen_unchanged) + " pictures, " + std::to_string(swaps) +
+           " swaps in " + std::to_string(length.count()) + " s, " + std::to_string(wrong) +
+           " wrong, memory " + std::to_string(early >> 20) + " to " + std::to_string(late >> 20) +
+           " MB");
+    CHECK(wrong == 0);
+    CHECK(enough());
+    CHECK(late < early + (32u << 20));
 }

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from palette4d.common.errors import Palette4dError, WriteError
+from palette4d.common.locking import remove_left_over
 
 if sys.platform != "win32":
     import fcntl
@@ -147,12 +148,10 @@ def temporary_folder(parent: Path) -> Generator[Path]:
         folder = _temporary_name(parent / "palette4d")
         folder.mkdir(0o700)
         lock = None if sys.platform == "win32" else os.open(folder, os.O_RDONLY)
-        if lock is None:
+        if lock is None or _is_locked(lock):
             break
-        _lock(lock, wait=True)
-        if os.fstat(lock).st_nlink:
-            break
-        os.close(lock)  # another process removed it before it was locked
+        os.close(lock)
+        shutil.rmtree(folder, ignore_errors=True)
     try:
         yield folder
     finally:
@@ -172,19 +171,25 @@ def _new_temporary(path: Path) -> tuple[Path, int]:
         temporary = _temporary_name(path)
         # 0o666 less the umask, as for any new file.
         handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
-        _lock(handle, wait=True)
-        if os.fstat(handle).st_nlink:
+        if _is_locked(handle):
             return temporary, handle
-        os.close(handle)  # another process removed it before it was locked
+        os.close(handle)
+        temporary.unlink(missing_ok=True)
+
+
+def _is_locked(handle: int) -> bool:
+    """Lock a new file; False if another process, which removes what is left over, was faster."""
+    return _lock(handle) is not False and bool(os.fstat(handle).st_nlink)
 
 
 def _remove_leftovers(folder: Path) -> None:
-    """Remove the temporary files and folders of killed processes, once for each folder."""
+    """Remove what killed processes left, once for each folder: temporary files, folders, locks."""
     if folder in _swept:
         return
     _swept.add(folder)
     with contextlib.suppress(OSError), os.scandir(folder) as entries:
-        for entry in entries:
+        for entry in list(entries):
+            remove_left_over(Path(entry))
             if _TEMPORARY.fullmatch(entry.name):
                 with contextlib.suppress(OSError):
                     if not _is_left_over(entry):
@@ -202,7 +207,7 @@ def _is_left_over(entry: os.DirEntry[str]) -> bool:
     access = os.O_RDONLY if entry.is_dir() else os.O_RDWR
     handle = os.open(entry.path, access | getattr(os, "O_NOFOLLOW", 0))
     try:
-        locked = _lock(handle, wait=False)
+        locked = _lock(handle)
         if locked is None:
             return time.time() - os.fstat(handle).st_mtime > _LEFT_OVER_AFTER
         return locked
@@ -210,12 +215,15 @@ def _is_left_over(entry: os.DirEntry[str]) -> bool:
         os.close(handle)
 
 
-def _lock(handle: int, *, wait: bool) -> bool | None:
-    """Lock a file; return whether that worked, None where files cannot be locked."""
+def _lock(handle: int) -> bool | None:
+    """Lock a file; return whether that worked, None where files cannot be locked.
+
+    Nobody waits: another user may hold a lock for ever.
+    """
     if sys.platform == "win32":
         return None
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         return False
     except OSError:

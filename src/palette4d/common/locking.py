@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from palette4d.common.errors import Palette4dError
+from palette4d.common.json_files import UnusableFile, read_regular
 
 if sys.platform != "win32":
     import fcntl
@@ -28,6 +29,8 @@ LOCK_SECONDS = 10.0
 #: Seconds after which a half-written lock file is that of a program that was killed.
 UNFINISHED_SECONDS = 2.0
 
+_LOCK = re.compile(r"\..*\.lock(\.[0-9a-f]{16})?", re.DOTALL)
+_LONGEST = 4096
 _OWNER = re.compile(r"\S+ [0-9]+ [0-9a-f]{16}")
 
 
@@ -101,6 +104,14 @@ def _lock_file(target: Path, deadline: float) -> Iterator[Callable[[], None]]:
                 path.unlink(missing_ok=True)
 
 
+def remove_left_over(path: Path) -> None:
+    """Remove the lock file of a program that was killed, and no other file."""
+    if _LOCK.fullmatch(path.name):
+        owner = _content(path)
+        if owner is not None and _OWNER.fullmatch(owner) and _is_dead(owner):
+            _remove(path, owner)
+
+
 def _created(path: Path, content: str) -> bool:
     try:
         handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
@@ -131,8 +142,8 @@ def _cannot(path: Path) -> Palette4dError:
 
 def _content(path: Path) -> str | None:
     try:
-        return path.read_text(encoding="utf-8", errors="replace")
-    except OSError:
+        return read_regular(path, _LONGEST).decode("utf-8", "replace")
+    except (OSError, UnusableFile):
         return None
 
 
