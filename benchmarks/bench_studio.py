@@ -58,8 +58,13 @@ def make_movie(clip: str, out: Path, count: int) -> None:
 
 
 def stretched(sidecar: Path, clip: str, out: Path) -> Path:
-    """Write the sidecar with its times stretched to another clip's frames."""
-    fields = Document.load(sidecar).fields()
+    """Write the sidecar, without edits, with its times stretched to another clip's frames."""
+    document = Document.load(sidecar)
+    document.reset()
+    for name in document.versions:
+        document.remove_version(name)
+    document.forget_history()
+    fields = document.fields()
     opened = open_clip(clip)
     was = fields["clip"]["frames"]
     scale = (opened.frames[-1] - opened.frames[0]) / (was["last"] - was["first"])
