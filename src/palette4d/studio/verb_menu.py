@@ -240,9 +240,8 @@ class VerbMenu:
         ]
         if show is not None:
             fields.append(Field("--shots", texts.SHOT_NAMES, value="*"))
-        return self._verb(
-            texts.COPY_GRADE,
-            "edit",
-            fields,
-            lambda _: show is not None and self.window.shots.draw(),
-        )
+
+        def done(_: VerbDialog) -> None:
+            self.window.shots.draw()
+
+        return self._verb(texts.COPY_GRADE, "edit", fields, done)
