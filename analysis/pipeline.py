@@ -3,7 +3,7 @@
 clip -> colour_statistics -> frame_hulls -> glue -> block_merging -> vertex_removal
 -> structure_search -> stop_insertion -> vertex_refinement -> polytope -> sidecar document
 
-`baselines` holds the other methods; the static hull is also a start of the search.
+`static_hull` is a start of the search and a method; `baselines` holds the other methods.
 """
 
 from __future__ import annotations
@@ -21,12 +21,13 @@ from palette4d.analysis import (
     colour_statistics,
     frame_hulls,
     glue,
+    static_hull,
     stop_insertion,
     structure_search,
     vertex_refinement,
     vertex_removal,
 )
-from palette4d.analysis.baselines import paper_thresholds, rgbt_hull, static_hull
+from palette4d.analysis.baselines import paper_thresholds, rgbt_hull
 from palette4d.analysis.block_merging import Block
 from palette4d.analysis.convex_hulls import CONCAVE, deepest_concavity
 from palette4d.analysis.dense_polytope import DensePolytope

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import evaluator
 from evaluator import Figures, Runs, say, table
-from palette4d.analysis.baselines import static_hull
+from palette4d.analysis import static_hull
 from palette4d.analysis.convex_hulls import CONCAVE
 from palette4d.analysis.options import AnalysisOptions
 

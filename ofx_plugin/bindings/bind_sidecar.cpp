@@ -11,7 +11,7 @@
 
 #include "arrays.hpp"
 #include "binders.hpp"
-#include "model/slice.hpp"
+#include "model/ramps.hpp"
 #include "sidecar/sidecar.hpp"
 
 using palette4d::Edits;

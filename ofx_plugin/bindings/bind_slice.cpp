@@ -5,7 +5,7 @@
 #include "binders.hpp"
 #include "model/handles.hpp"
 #include "model/lineage.hpp"
-#include "model/slice.hpp"
+#include "model/ramps.hpp"
 
 using namespace palette4d;
 using namespace palette4d::bindings;

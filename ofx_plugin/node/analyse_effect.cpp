@@ -10,6 +10,7 @@
 #include "analysis.hpp"
 #include "buttons.hpp"
 #include "clip_image.hpp"
+#include "describe.hpp"
 #include "exr.hpp"
 #include "param_define.hpp"
 #include "params.hpp"
@@ -25,44 +26,22 @@ namespace fs = std::filesystem;
 constexpr const char* kSource = kOfxImageEffectSimpleSourceClipName;
 
 OfxStatus describe_analyse(const Suites& suites, OfxImageEffectHandle effect) {
-    OfxPropertySetHandle handle = nullptr;
-    if (!suites.effect->getPropertySet ||
-        suites.effect->getPropertySet(effect, &handle) != kOfxStatOK || !handle) {
-        return kOfxStatFailed;
-    }
-    const Properties node(suites, handle);
-    node.set_string(kOfxPropLabel, "Palette4D Analyse");
-    node.set_string(kOfxPropShortLabel, "P4D Analyse");
-    node.set_string(kOfxPropLongLabel, "Palette4D Analyse");
-    node.set_string(kOfxPropVersionLabel, PALETTE4D_VERSION);
-    node.set_string(kOfxPropPluginDescription,
-                    "Finds the time-varying palette of its input and writes it to a sidecar, for "
-                    "the node Palette4D. The picture passes.");
-    node.set_string(kOfxImageEffectPluginPropGrouping, "Color");
-    node.set_strings(kOfxImageEffectPropSupportedContexts,
-                     {kOfxImageEffectContextFilter, kOfxImageEffectContextGeneral});
-    node.set_strings(kOfxImageEffectPropSupportedPixelDepths,
-                     {kOfxBitDepthFloat, kOfxBitDepthByte});
-    node.set_string(kOfxImageEffectPluginRenderThreadSafety, kOfxImageEffectRenderFullySafe);
-    node.set_int(kOfxImageEffectPluginPropHostFrameThreading, 0);
-    node.set_int(kOfxImageEffectPropSupportsTiles, 1);
-    node.set_int(kOfxImageEffectPropSupportsMultiResolution, 1);
-    node.set_int(kOfxImageEffectPropTemporalClipAccess, 1);
-    return kOfxStatOK;
+    const About about{"Palette4D Analyse",
+                      "P4D Analyse",
+                      "Palette4D Analyse",
+                      "Finds the time-varying palette of its input and writes it to a sidecar, for "
+                      "the node Palette4D. The picture passes.",
+                      {kOfxImageEffectContextFilter, kOfxImageEffectContextGeneral},
+                      1};
+    return describe_effect(suites, effect, about) ? kOfxStatOK : kOfxStatFailed;
 }
 
 OfxStatus describe_in_context(const Suites& suites, OfxImageEffectHandle effect) {
     for (const char* name : {kSource, kOfxImageEffectOutputClipName}) {
-        OfxPropertySetHandle handle = nullptr;
-        if (!suites.effect->clipDefine ||
-            suites.effect->clipDefine(effect, name, &handle) != kOfxStatOK) {
+        if (!define_clip(suites, effect, name, {kOfxImageComponentRGBA, kOfxImageComponentRGB},
+                         name == kSource)) {
             return kOfxStatFailed;
         }
-        const Properties clip(suites, handle);
-        clip.set_strings(kOfxImageEffectPropSupportedComponents,
-                         {kOfxImageComponentRGBA, kOfxImageComponentRGB});
-        clip.set_int(kOfxImageEffectPropSupportsTiles, 1);
-        clip.set_int(kOfxImageEffectPropTemporalClipAccess, name == kSource);
     }
     OfxParamSetHandle params = nullptr;
     if (!suites.effect->getParamSet || suites.effect->getParamSet(effect, &params) != kOfxStatOK) {

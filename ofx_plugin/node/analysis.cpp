@@ -13,13 +13,9 @@
 #include "paths.hpp"
 #include "process.hpp"
 #include "program_file.hpp"
+#include "windows.hpp"
 
-#if defined(_WIN32)
-#if !defined(NOMINMAX)
-#define NOMINMAX
-#endif
-#include <windows.h>
-#else
+#if !defined(_WIN32)
 #include <dlfcn.h>
 #include <stdlib.h>
 #include <unistd.h>

@@ -6,10 +6,9 @@
 #include "sidecar_choice.hpp"
 
 namespace palette4d::node {
-namespace {
 
 bool define_clip(const Suites& suites, OfxImageEffectHandle effect, const char* name,
-                 std::initializer_list<const char*> components) {
+                 std::initializer_list<const char*> components, int other_frames) {
     OfxPropertySetHandle handle = nullptr;
     if (!suites.effect->clipDefine ||
         suites.effect->clipDefine(effect, name, &handle) != kOfxStatOK) {
@@ -18,31 +17,26 @@ bool define_clip(const Suites& suites, OfxImageEffectHandle effect, const char* 
     const Properties clip(suites, handle);
     clip.set_strings(kOfxImageEffectPropSupportedComponents, components);
     clip.set_int(kOfxImageEffectPropSupportsTiles, 1);
-    clip.set_int(kOfxImageEffectPropTemporalClipAccess, 0);
+    clip.set_int(kOfxImageEffectPropTemporalClipAccess, other_frames);
     return true;
 }
 
-}  // namespace
-
-OfxStatus describe(const Suites& suites, OfxImageEffectHandle effect) {
+std::optional<Properties> describe_effect(const Suites& suites, OfxImageEffectHandle effect,
+                                          const About& about) {
     OfxPropertySetHandle handle = nullptr;
     if (!suites.effect->getPropertySet ||
         suites.effect->getPropertySet(effect, &handle) != kOfxStatOK || !handle) {
-        return kOfxStatFailed;
+        return std::nullopt;
     }
     // Properties that a host does not know or refuses keep the host's defaults.
     const Properties node(suites, handle);
-    node.set_string(kOfxPropLabel, "Palette4D");
-    node.set_string(kOfxPropShortLabel, "Palette4D");
-    node.set_string(kOfxPropLongLabel, "Palette4D time-varying palette");
+    node.set_string(kOfxPropLabel, about.label);
+    node.set_string(kOfxPropShortLabel, about.short_label);
+    node.set_string(kOfxPropLongLabel, about.long_label);
     node.set_string(kOfxPropVersionLabel, PALETTE4D_VERSION);
-    node.set_string(kOfxPropPluginDescription,
-                    "Recolours a clip by the edits made to its time-varying colour palette.");
+    node.set_string(kOfxPropPluginDescription, about.description);
     node.set_string(kOfxImageEffectPluginPropGrouping, "Color");
-
-    node.set_strings(
-        kOfxImageEffectPropSupportedContexts,
-        {kOfxImageEffectContextFilter, kOfxImageEffectContextGeneral, kOfxImageEffectContextPaint});
+    node.set_strings(kOfxImageEffectPropSupportedContexts, about.contexts);
     // Float before byte. The node renders short and half but does not ask for them: so hosts with
     // 16-bit pictures hand over float.
     node.set_strings(kOfxImageEffectPropSupportedPixelDepths,
@@ -53,13 +47,26 @@ OfxStatus describe(const Suites& suites, OfxImageEffectHandle effect) {
     node.set_int(kOfxImageEffectPluginPropHostFrameThreading, 0);
     node.set_int(kOfxImageEffectPropSupportsTiles, 1);
     node.set_int(kOfxImageEffectPropSupportsMultiResolution, 1);
-    node.set_int(kOfxImageEffectPropTemporalClipAccess, 0);
+    node.set_int(kOfxImageEffectPropTemporalClipAccess, about.other_frames);
     node.set_int(kOfxImageEffectPropSupportsMultipleClipDepths, 0);
     node.set_int(kOfxImageEffectPropSupportsMultipleClipPARs, 0);
     node.set_string(kOfxImageEffectPropCPURenderSupported, "true");
+    return node;
+}
+
+OfxStatus describe(const Suites& suites, OfxImageEffectHandle effect) {
+    const About about{
+        "Palette4D",
+        "Palette4D",
+        "Palette4D time-varying palette",
+        "Recolours a clip by the edits made to its time-varying colour palette.",
+        {kOfxImageEffectContextFilter, kOfxImageEffectContextGeneral, kOfxImageEffectContextPaint},
+        0};
+    const std::optional<Properties> node = describe_effect(suites, effect, about);
+    if (!node) return kOfxStatFailed;
     // A pixel's result depends on that pixel only, so a host may bake the node into a LUT.
-    node.set_string(kOfxImageEffectPropNoSpatialAwareness, "true");
-    describe_colour(node);
+    node->set_string(kOfxImageEffectPropNoSpatialAwareness, "true");
+    describe_colour(*node);
     return kOfxStatOK;
 }
 

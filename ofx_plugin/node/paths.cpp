@@ -5,12 +5,8 @@
 #include <cstdlib>
 #include <cstring>
 #include <vector>
-#if defined(_WIN32)
-#if !defined(NOMINMAX)
-#define NOMINMAX
-#endif
-#include <windows.h>
-#endif
+
+#include "windows.hpp"
 
 namespace palette4d::node {
 namespace {

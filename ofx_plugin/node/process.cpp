@@ -7,13 +7,9 @@
 #include <utility>
 
 #include "paths.hpp"
+#include "windows.hpp"
 
-#if defined(_WIN32)
-#if !defined(NOMINMAX)
-#define NOMINMAX
-#endif
-#include <windows.h>
-#else
+#if !defined(_WIN32)
 #include <dirent.h>
 #include <fcntl.h>
 #include <signal.h>

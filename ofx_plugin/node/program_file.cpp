@@ -6,13 +6,9 @@
 #include <cstring>
 
 #include "paths.hpp"
+#include "windows.hpp"
 
-#if defined(_WIN32)
-#if !defined(NOMINMAX)
-#define NOMINMAX
-#endif
-#include <windows.h>
-#else
+#if !defined(_WIN32)
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>

@@ -1,11 +1,6 @@
 #include "sidecar_cache.hpp"
 
-#if defined(_WIN32)
-#if !defined(NOMINMAX)
-#define NOMINMAX
-#endif
-#include <windows.h>
-#else
+#if !defined(_WIN32)
 #include <sys/stat.h>
 #endif
 
@@ -23,7 +18,9 @@
 #include <utility>
 
 #include "model/lineage.hpp"
+#include "model/ramps.hpp"
 #include "paths.hpp"
+#include "windows.hpp"
 
 namespace palette4d::node {
 namespace {

@@ -8,8 +8,7 @@ import weakref
 import numpy as np
 import pytest
 from analysis_frames import constant, grey, mixture, noise, stats
-from palette4d.analysis import colour_statistics, pipeline
-from palette4d.analysis.baselines import static_hull
+from palette4d.analysis import colour_statistics, pipeline, static_hull
 from palette4d.analysis.options import METHODS, AnalysisOptions
 
 from palette4d import _core

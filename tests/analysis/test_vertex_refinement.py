@@ -8,7 +8,7 @@ import itertools
 import numpy as np
 import pytest
 from analysis_frames import mixture, noise, stats
-from palette4d.analysis.baselines import static_hull
+from palette4d.analysis import static_hull
 from palette4d.analysis.convex_hulls import CONCAVE, deepest_concavity, hull_mesh
 from palette4d.analysis.frame_statistics import Gamut
 from palette4d.analysis.objective import losses_of, refine_jointly

@@ -7,6 +7,7 @@
 #include "fuzz.hpp"
 #include "model/handles.hpp"
 #include "model/lineage.hpp"
+#include "model/ramps.hpp"
 #include "recolour/recolour.hpp"
 #include "sidecar/sidecar.hpp"
 

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "model/slice.hpp"
+#include "model/ramps.hpp"
 #include "recolour/recolour.hpp"
 #include "sidecar/sidecar.hpp"
 #include "strict_host.hpp"

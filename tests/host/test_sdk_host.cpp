@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "model/handles.hpp"
-#include "model/slice.hpp"
+#include "model/ramps.hpp"
 #include "recolour/recolour.hpp"
 #include "sdk_host.hpp"
 #include "sidecar/sidecar.hpp"

@@ -3,7 +3,6 @@
 
 #include <vector>
 
-#include "model/edits.hpp"
 #include "model/polytope.hpp"
 
 namespace palette4d {
@@ -27,16 +26,13 @@ struct Slice {
     std::vector<Face> faces;
 };
 
+/// u, moved towards v by `weight`.
+Vec3 mixed(const Vec3& u, const Vec3& v, double weight);
+/// Position between two frames, in [0, 1): rounding must not reach 1.
+double weight_between(double from, double to, double frame);
+
 /// Eq. 5 at any real frame; outside the clip, its first or last frame. Throws std::invalid_argument
 /// for NaN.
 Slice slice_at(const Polytope& polytope, double frame);
-
-/// The edited colours of a slice's n vertices: displacements go from handle to handle along a ramp,
-/// and the solution is added. Bit-identical to slice.rgb[i] where nothing on the edge moves. Throws
-/// std::invalid_argument for edits of another number of vertices.
-std::vector<Vec3> edited_colours(const Polytope& polytope, const Edits& edits, const Slice& slice);
-
-/// The bumps that move colours at a frame. Bumps are not bound to the clip: pass slice.frame.
-std::vector<Bump> bumps_at(const Edits& edits, double frame);
 
 }  // namespace palette4d

@@ -8,6 +8,7 @@ import shlex
 import textwrap
 from typing import TYPE_CHECKING, Any
 
+from palette4d import load
 from palette4d.cli import edit_copy, edit_history, picks
 from palette4d.cli.swatches import shown
 from palette4d.common.arguments import ColourAction, accept_negative_values, number
@@ -289,7 +290,7 @@ def run_set(args: argparse.Namespace) -> int:
         return run_adjust(args)
     if args.frame is None:
         raise Palette4dError("found --near without --frame, expected the frame where it is seen")
-    document = _load(args)
+    document = load(args.sidecar)
     before = _without_picks(document)
     found = document.set_near(
         args.near, frame=args.frame, anyway=args.anyway, any_value=args.float, **_how(args)
@@ -310,7 +311,7 @@ def run_set(args: argparse.Namespace) -> int:
 
 def run_adjust(args: argparse.Namespace) -> int:
     """Change a handle, a track or the palette."""
-    document = _load(args)
+    document = load(args.sidecar)
     before = _without_picks(document)
     document.adjust(args.id, track=args.track, frame=args.frame, any_value=args.float, **_how(args))
     document.save()
@@ -337,7 +338,7 @@ def _how(args: argparse.Namespace) -> How:
 
 def run_ramp(args: argparse.Namespace) -> int:
     """Choose the ramp of handles, or of the clip."""
-    document = _load(args)
+    document = load(args.sidecar)
     with document.one_step(f"ramp {args.ramp} {' '.join(args.ids)}".strip()):
         for id_ in args.ids or [None]:
             document.set_ramp(args.ramp, id_)
@@ -386,7 +387,7 @@ def run_move(args: argparse.Namespace) -> int:
     """Move a stop in time, or shift a handle's colour."""
     if args.frame is None and args.by is None:
         raise Palette4dError("move: found neither --frame nor --by, expected at least one of them")
-    document = _load(args)
+    document = load(args.sidecar)
     lines = []
     if args.frame is not None:
         lines.append(f"{document.named(args.id)} -> frame {args.frame:g}")
@@ -403,7 +404,7 @@ def run_move(args: argparse.Namespace) -> int:
 
 def run_reset(args: argparse.Namespace) -> int:
     """Reset a vertex, remove a stop, or reset everything."""
-    document = _load(args)
+    document = load(args.sidecar)
     state, before = document.state, _without_picks(document)
     document.reset(args.id)
     document.save()
@@ -412,9 +413,3 @@ def run_reset(args: argparse.Namespace) -> int:
     else:
         _report(document, before)
     return 0
-
-
-def _load(args: argparse.Namespace) -> Document:
-    from palette4d.grade.document import Document
-
-    return Document.load(args.sidecar)

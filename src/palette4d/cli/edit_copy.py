@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from palette4d import load
 from palette4d.common.arguments import number
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import counted
@@ -102,11 +103,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _copied(path: Path, args: argparse.Namespace) -> str:
-    from palette4d.grade.document import Document
-
-    document = Document.load(path)
+    document = load(path)
     versions = document.versions
-    fit = document.copy_from(Document.load(args.source), time=args.time)
+    fit = document.copy_from(load(args.source), time=args.time)
     document.save()
     kept = [f"; the edits before are version {v!r}" for v in document.versions if v not in versions]
     return f"{path.name}: {fit}{''.join(kept)}"

@@ -6,14 +6,13 @@ import argparse
 import json
 from typing import TYPE_CHECKING
 
+from palette4d import load
 from palette4d.common.arguments import whole
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-
-    from palette4d.grade.document import Document
 
     #: Adds an action by its name, usage and description.
     Action = Callable[[str, str, str], argparse.ArgumentParser]
@@ -72,7 +71,7 @@ def _check_steps(wanted: int, there: int, what: str) -> None:
 
 def run_undo(args: argparse.Namespace) -> int:
     """Revert the last steps."""
-    document = _load(args)
+    document = load(args.sidecar)
     _check_steps(args.steps, len(document.history), "undo")
     steps = [document.undo() for _ in range(args.steps)]
     document.save()
@@ -83,7 +82,7 @@ def run_undo(args: argparse.Namespace) -> int:
 
 def run_redo(args: argparse.Namespace) -> int:
     """Apply the last undone steps again."""
-    document = _load(args)
+    document = load(args.sidecar)
     _check_steps(args.steps, len(document.undone), "redo")
     steps = [document.redo() for _ in range(args.steps)]
     document.save()
@@ -94,7 +93,7 @@ def run_redo(args: argparse.Namespace) -> int:
 
 def run_history(args: argparse.Namespace) -> int:
     """List or forget the steps."""
-    document = _load(args)
+    document = load(args.sidecar)
     done, undone = document.history, document.undone
     if args.clear:
         document.forget_history()
@@ -117,7 +116,7 @@ def run_history(args: argparse.Namespace) -> int:
 
 def run_version(args: argparse.Namespace) -> int:
     """Save, list, use or remove a version."""
-    document = _load(args)
+    document = load(args.sidecar)
     if args.what == "list":
         active = set(document.same_edits())
         for name in document.versions:
@@ -140,9 +139,3 @@ def run_version(args: argparse.Namespace) -> int:
     document.save()
     print(text)
     return 0
-
-
-def _load(args: argparse.Namespace) -> Document:
-    from palette4d.grade.document import Document
-
-    return Document.load(args.sidecar)

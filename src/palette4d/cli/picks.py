@@ -7,6 +7,7 @@ import json
 import math
 from typing import TYPE_CHECKING, Any
 
+from palette4d import load
 from palette4d.cli.swatches import shown
 from palette4d.common.arguments import ColourAction, number, whole
 from palette4d.common.errors import Palette4dError
@@ -37,26 +38,21 @@ def add_actions(action: Action) -> None:
         "it can, a small neighbourhood of the colour the rest. With --with, say where the colour "
         "of an earlier pick is at another frame.",
     )
-    _add_where(pick)
-    _add_new(pick)
-    _add_how(pick)
-    pick.add_argument(
-        "--toward",
-        choices=("shift", "colour"),
-        help="at other frames: the same change (shift, default), or the same new colour",
-    )
-    pick.add_argument("--with", dest="same", metavar="ID", help="the pick whose path is corrected")
-    pick.set_defaults(run=run_pick)
     hold = action(
         "hold",
         f"{_WHERE} [--with ID] {_WHEN}",
         "keep a colour of the clip as it is, whatever picks and handles do. A hold follows its "
         "colour as a pick does.",
     )
-    _add_where(hold)
-    _add_how(hold)
-    hold.add_argument("--with", dest="same", metavar="ID", help="the hold whose path is corrected")
-    hold.set_defaults(run=run_pick, to=None, by=None, toward=None)
+    for parser, name in ((pick, "pick"), (hold, "hold")):
+        _add_where(parser)
+        _add_how(parser)
+        parser.add_argument(
+            "--with", dest="same", metavar="ID", help=f"the {name} whose path is corrected"
+        )
+        parser.set_defaults(run=run_pick)
+    _add_new(pick)
+    hold.set_defaults(to=None, by=None, toward=None)
     _add_change(action)
     for name, text in (
         ("enable", "switch picks and holds on again."),
@@ -123,6 +119,11 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
         action=ColourAction,
         help="the change: DR DG DB or DR,DG,DB",
     )
+    parser.add_argument(
+        "--toward",
+        choices=("shift", "colour"),
+        help="at other frames: the same change (shift, default), or the same new colour",
+    )
 
 
 def _add_how(parser: argparse.ArgumentParser) -> None:
@@ -155,7 +156,6 @@ def _add_change(action: Action) -> None:
     _add_where(parser, required=False)
     _add_new(parser)
     _add_how(parser)
-    parser.add_argument("--toward", choices=("shift", "colour"), help="as in pick")
     parser.set_defaults(run=run_change)
 
 
@@ -171,7 +171,7 @@ def _pixel(text: str) -> tuple[float, float]:
 
 def run_pick(args: argparse.Namespace) -> int:
     """Add a pick or a hold, or correct the path of one."""
-    document = _load(args)
+    document = load(args.sidecar)
     where: dict[str, Any] = {
         "colour": args.colour,
         "pixel": args.pixel,
@@ -215,7 +215,7 @@ def run_pick(args: argparse.Namespace) -> int:
 
 def run_change(args: argparse.Namespace) -> int:
     """Change a pick or hold."""
-    document = _load(args)
+    document = load(args.sidecar)
     old = next((pick for pick in document.picks if pick.id == args.id), None)
     changes: dict[str, Any] = {
         name: value
@@ -249,7 +249,7 @@ def run_change(args: argparse.Namespace) -> int:
 
 def run_switch(args: argparse.Namespace) -> int:
     """Enable, disable or remove picks and holds."""
-    document = _load(args)
+    document = load(args.sidecar)
     ids = list(dict.fromkeys(args.ids))
     if args.action == "unpick":
         document.unpick(*ids)
@@ -266,7 +266,7 @@ def run_switch(args: argparse.Namespace) -> int:
 
 def run_lock(args: argparse.Namespace) -> int:
     """Lock or unlock handles."""
-    document = _load(args)
+    document = load(args.sidecar)
     (document.lock if args.action == "lock" else document.unlock)(*args.ids)
     document.save()
     print(f"{args.action}ed: {', '.join(map(document.named, dict.fromkeys(args.ids)))}")
@@ -276,7 +276,7 @@ def run_lock(args: argparse.Namespace) -> int:
 
 def run_picks(args: argparse.Namespace) -> int:
     """List the picks, holds and locks."""
-    document = _load(args)
+    document = load(args.sidecar)
     if args.json:
         edits = document.fields()["edits"]
         listed = {"picks": edits.get("picks", []), "locks": edits.get("locks", [])}
@@ -342,14 +342,13 @@ def _print_notes(document: Document) -> None:
         return
     moved, among = document.moved_by_picks()
     print(f"{moved} of {counted(among, 'palette colour')} move")
-    for frame in sorted({pick.frame for pick in enabled if pick.to is not None}):
-        share, most = document.side_effect(frame)
-        if share > MANY:
-            print(
-                f"note: at frame {frame:g} {share:.0%} of the picture change too, by more than 10 "
-                f"of 255, most {shown(most)}. If it must stay: hold --frame {frame:g} --colour "
-                + ",".join(f"{value:.4f}" for value in most)
-            )
+    frame, share, most = document.side_effect()
+    if share > MANY:
+        print(
+            f"note: {share:.0%} of the picture change too at frame {frame:.0f}, by more than 10 of "
+            f"255, most {shown(most)}; no frame changes more. If it must stay: "
+            f"hold --frame {frame:.0f} --colour " + ",".join(f"{value:.4f}" for value in most)
+        )
     for line in unmet(enabled, document.frames[2]):
         print(f"not met: {line}")
     for pick in () if document.scene_linear else enabled:
@@ -373,9 +372,3 @@ def _bar(args: argparse.Namespace) -> Any:
     from palette4d.cli.progress import frames_bar
 
     return frames_bar("following", hidden=False)
-
-
-def _load(args: argparse.Namespace) -> Document:
-    from palette4d.grade.document import Document
-
-    return Document.load(args.sidecar)

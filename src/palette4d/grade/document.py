@@ -19,12 +19,13 @@ from palette4d.common.locking import locked
 from palette4d.common.text import counted
 from palette4d.grade import edits, sidecar
 from palette4d.grade.copying import Fit, Time, copied, fit
-from palette4d.grade.edited_palette import ACTIVE, stored_solution
+from palette4d.grade.edited_palette import stored_solution
 from palette4d.grade.edits import Key, State
 from palette4d.grade.handle_edits import HandleEdits
 from palette4d.grade.pick_edits import PickEdits
 from palette4d.grade.recolouring import Recolouring
 from palette4d.grade.sidecar import Fields, OnEdits
+from palette4d.grade.steps import ACTIVE
 
 #: The most characters of a version's name.
 LONGEST_NAME = 100
@@ -204,7 +205,6 @@ class Document(HandleEdits, PickEdits, Recolouring):
         found._disk = None
         if state != self._state:
             found._become(state)
-            found._core, found._solved = None, None
         found.forget_history()
         return found
 

@@ -1,29 +1,22 @@
-"""A palette with the user's edits: what it holds, and the steps that change it.
+"""A palette with the user's edits: what it holds.
 
-Every change goes through `EditedPalette.apply`, which takes one `Edit`; `undo` reverts it. Handles
-are edited in `handle_edits`, picks in `pick_edits`.
+`steps` changes it and takes changes back. Handles are edited in `handle_edits`, picks in
+`pick_edits`.
 """
 
-import contextlib
 import copy
 import math
 import re
-from collections.abc import Generator, Iterable
-from dataclasses import replace
+from collections.abc import Iterable
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
 
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
 from palette4d.grade import edits, sidecar
 from palette4d.grade.edits import (
     RAMP,
-    Change,
     Colour,
-    Edit,
-    Key,
-    Kind,
     Ramp,
     Setting,
     Settings,
@@ -33,19 +26,17 @@ from palette4d.grade.edits import (
 from palette4d.grade.handles import Handles
 from palette4d.grade.palette import Near, Palette, palette_at
 from palette4d.grade.sidecar import Fields
+from palette4d.grade.steps import Steps
 from palette4d.grade.tracks import Track, tracks_of
 
 #: A member `edits.solution`, and the measured members of each pick by its id.
 Solved = tuple[Fields, dict[str, Fields]]
 
-#: The kinds that recolouring uses; versions wait.
-ACTIVE: tuple[Kind, ...] = ("handle", "ramp", "pick", "lock")
-
 #: Names of scene-linear colour spaces: "Linear", "lin_rec709", "ACEScg", "ACES2065-1", ...
 _LINEAR = re.compile(r"\blin(ear)?(\b|_)|scene.linear|acescg|aces2065", re.IGNORECASE)
 
 
-class EditedPalette:
+class EditedPalette(Steps):
     """A palette and its edits in memory; `Document` adds the file.
 
     Attributes
@@ -56,22 +47,25 @@ class EditedPalette:
 
     path: Path | None
 
-    def _start(self, data: bytes, core: _core.Sidecar) -> None:
-        self._fields: Fields = sidecar.fields_of(data)
-        self._core: _core.Sidecar | None = core  # of `_state`; None: parse it on demand
-        self._from_input = core.conversion
-        self._handles = Handles(self._fields["polytope"])
-        self._become(sidecar.state_of(self._fields))
-        self._solved: Solved | None = stored_solution(self._fields["edits"])
-        self._done, self._undone = sidecar.history_of(self._fields, self._name)
-        self._mark_saved()
-
     def _become(self, state: State) -> None:
-        self._state = state
-        self._own: _core.Sidecar | None = None  # without the picks; None: parse it on demand
+        super()._become(state)
+        # What follows from the state, on demand: the core's view, without the picks too, and the
+        # solution of the picks.
+        self._core: _core.Sidecar | None = None
+        self._own: _core.Sidecar | None = None
+        self._solved: Solved | None = None
         self._settings: dict[str, Setting] = {
             id_: value for (kind, id_), value in state.items() if kind == "handle"
         }
+
+    def _start(self, data: bytes, core: _core.Sidecar) -> None:
+        self._fields: Fields = sidecar.fields_of(data)
+        self._from_input = core.conversion
+        self._handles = Handles(self._fields["polytope"])
+        self._become(sidecar.state_of(self._fields))
+        self._core, self._solved = core, stored_solution(self._fields["edits"])
+        self._done, self._undone = sidecar.history_of(self._fields, self._name)
+        self._mark_saved()
 
     def _mark_saved(self) -> None:
         self._saved = (self._state, self._done, self._undone)
@@ -135,24 +129,9 @@ class EditedPalette:
         return MappingProxyType(self._settings)
 
     @property
-    def state(self) -> State:
-        """Everything that the user set, by kind and id (`palette4d.grade.edits`)."""
-        return MappingProxyType(dict(self._state))
-
-    @property
     def edited(self) -> bool:
         """Whether any handle is edited or any colour is picked."""
         return any(kind in ("handle", "pick") for kind, _ in self._state)
-
-    @property
-    def history(self) -> tuple[Edit, ...]:
-        """The steps that `undo` reverts, oldest first; also those of earlier sessions."""
-        return tuple(self._done)
-
-    @property
-    def undone(self) -> tuple[Edit, ...]:
-        """The steps that `redo` applies again, the next one last."""
-        return tuple(self._undone)
 
     @property
     def ramp(self) -> Ramp:
@@ -247,68 +226,6 @@ class EditedPalette:
         away = {end: abs(self._handles.vertex(end)["frame"] - frame) for end in ends}
         nearest = min(ends, key=lambda end: away[end])
         return nearest if away[nearest] <= self.frames[2] / 2 else None
-
-    # -------------------------------------------------------------------------------------- steps
-
-    def apply(self, edit: Edit) -> None:
-        """Apply an edit as one step, which `undo` reverts; an edit without change is no step."""
-        edit = replace(edit, changes=tuple(c for c in edit.changes if c.before != c.after))
-        if not edit.changes:
-            return
-        self._change(edit)
-        self._done = [*self._done, edit]
-        self._undone = []
-
-    @contextlib.contextmanager
-    def one_step(self, label: str) -> Generator[None]:
-        """Make all edits in a ``with`` block one step; an error in it reverts them all."""
-        state, done, undone = self._state, self._done, self._undone
-        try:
-            yield
-        except BaseException:
-            self._become(state)
-            self._done, self._undone, self._core, self._solved = done, undone, None, None
-            raise
-        edit = edits.difference(state, self._state, label)
-        self._done, self._undone = ([*done, edit], []) if edit.changes else (done, undone)
-
-    def undo(self) -> Edit:
-        """Revert the last step, and return it. Steps of earlier sessions can be reverted too."""
-        if not self._done:
-            raise Palette4dError("there is nothing to undo: the palette has no earlier step")
-        step = self._done[-1]
-        self._change(step.inverse())
-        self._done, self._undone = self._done[:-1], [*self._undone, step]
-        return step
-
-    def redo(self) -> Edit:
-        """Apply the last undone step again, and return it."""
-        if not self._undone:
-            raise Palette4dError("there is nothing to redo: no step was undone since the last edit")
-        step = self._undone[-1]
-        self._change(step)
-        self._done, self._undone = [*self._done, step], self._undone[:-1]
-        return step
-
-    def forget_history(self) -> None:
-        """Drop all steps, done and undone; the edits stay."""
-        self._done, self._undone = [], []
-
-    def _change(self, edit: Edit) -> None:
-        self._become(edit.apply(self._state))
-        self._core = None
-        self._solved = None
-
-    def _put(self, kind: Kind, id: str, value: Any, label: str) -> None:
-        """Set one value of the state (None: remove it) as one step."""
-        self.apply(Edit((Change(kind, id, self._state.get((kind, id)), value),), label))
-
-    def _remove(self, keys: Iterable[Key], label: str) -> None:
-        changes = tuple(Change(*key, self._state[key], None) for key in keys)
-        self.apply(Edit(changes, label))
-
-    def _active(self) -> dict[Key, Any]:
-        return {key: value for key, value in self._state.items() if key[0] in ACTIVE}
 
     # ------------------------------------------------------------------------------------ details
 

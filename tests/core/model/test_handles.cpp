@@ -4,7 +4,7 @@
 #include <stdexcept>
 
 #include "check.hpp"
-#include "model/slice.hpp"
+#include "model/ramps.hpp"
 #include "shapes.hpp"
 
 using namespace palette4d;

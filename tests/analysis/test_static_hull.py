@@ -8,13 +8,13 @@ import itertools
 import numpy as np
 import pytest
 from analysis_frames import constant, mixture, stats
-from palette4d.analysis.baselines.static_hull import static_polytope
 from palette4d.analysis.convex_hulls import deepest_concavity, hull_mesh
 from palette4d.analysis.frame_hulls import frame_palette
 from palette4d.analysis.frame_statistics import Gamut, pooled
 from palette4d.analysis.losses import palette_loss
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Palette
+from palette4d.analysis.static_hull import static_polytope
 
 CORNERS = np.array(list(itertools.product((0.1, 0.9), repeat=3)))
 FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])

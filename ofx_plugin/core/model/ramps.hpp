@@ -1,0 +1,20 @@
+// Edits through time: what the handles of a polytope and the solution of its picks do to the
+// palette of a frame.
+#pragma once
+
+#include <vector>
+
+#include "model/edits.hpp"
+#include "model/slice.hpp"
+
+namespace palette4d {
+
+/// The edited colours of a slice's n vertices: displacements go from handle to handle along a ramp,
+/// and the solution is added. Bit-identical to slice.rgb[i] where nothing on the edge moves. Throws
+/// std::invalid_argument for edits of another number of vertices.
+std::vector<Vec3> edited_colours(const Polytope& polytope, const Edits& edits, const Slice& slice);
+
+/// The bumps that move colours at a frame. Bumps are not bound to the clip: pass slice.frame.
+std::vector<Bump> bumps_at(const Edits& edits, double frame);
+
+}  // namespace palette4d
