@@ -101,7 +101,7 @@ def main() -> None:
     parser.add_argument("sidecar", nargs="?", type=Path, default=GOLDEN)
     args = parser.parse_args()
     loads: list[tuple[Callable[[Path, Path, int], None], int]] = [
-        (frames, 100_000), (reset, 20_000), (shots, 10_000), (extra, 3_900_000), (edits, 20_000),
+        (frames, 100_000), (reset, 20_000), (shots, 10_000), (extra, 3_900_000), (edits, 2_000),
     ]  # fmt: skip
     for load, count in loads:
         taken = []

@@ -78,13 +78,13 @@ VERBS = {
     ),
     "export": Verb("export a.p4d.json --frames 3,4 --size 5 -o luts --jobs 1 --quiet --force"),
     "export of a show": Verb(
-        "export shots/edit.shots.json --frames 0 --size 5 -o luts --otio luts.otio --jobs 1 "
+        "export shots/edit.shots.json --every 9 --size 5 -o luts --otio luts.otio --jobs 1 "
         "--quiet --force",
         (SHOW,),
     ),
     "config": Verb("config a.p4d.json --stops --anyway --size 5 -o ocio --jobs 1 --quiet --force"),
     "svg": Verb("plot a.p4d.json -o a.svg --force"),
-    "png": Verb("plot a.p4d.json -o a.png --width 300 --force"),
+    "png": Verb("plot a.p4d.json -o a.png --width 400 --force"),
     "node": Verb("install-plugin --dest ofx"),
     "kdenlive": Verb("install-plugin --kdenlive kdenlive --shotcut shotcut --force"),
 }
