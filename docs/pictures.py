@@ -247,28 +247,44 @@ def draw_picks(demo: Path) -> None:
 
 
 def draw_ramps() -> None:
-    """Draw how an edit goes through four handles with each ramp."""
+    """Draw how an edit goes through four handles with each ramp: colours and curves."""
     document = p4d.load(GOLDEN)
     original = p4d.load(GOLDEN)
-    for frame, amount in ((2, 0.0), (4, 0.5), (6, 0.6), (8, 0.0)):
-        colour = original.colour("e1", frame=frame)
-        document.stop("e1", frame=frame, rgb=(colour[0] + amount, *colour[1:]))
-    frames = np.linspace(1, 8.9, 400)
-    figure = Figure(figsize=(14, 3.6), facecolor=PAGE)
-    for index, ramp in enumerate(("linear", "smooth", "hold")):
+    at, amounts = (2, 4, 6, 8), (0.0, 0.45, 0.6, 0.0)
+    for frame, amount in zip(at, amounts, strict=True):
+        colour = original.colour("e4", frame=frame)
+        document.stop("e4", frame=frame, rgb=(colour[0] + amount, *colour[1:]))
+    frames = np.linspace(1, 9, 1601)[:-1]
+    before = np.array([original.colour("e4", frame=t) for t in frames])
+    figure = Figure(figsize=(14, 4.6), facecolor=PAGE)
+    told = {
+        "linear": "straight from handle to handle",
+        "smooth": "no kink, no overshoot",
+        "hold": "as it is, until the next handle",
+    }
+    for index, (ramp, words) in enumerate(told.items()):
         document.set_ramp(ramp)
-        moved = [
-            document.colour("e1", frame=t)[0] - original.colour("e1", frame=t)[0] for t in frames
-        ]
+        after = np.array([document.colour("e4", frame=t) for t in frames])
+        moved = after[:, 0] - before[:, 0]
         axes = figure.add_subplot(1, 3, index + 1, facecolor=PANEL)
-        axes.plot(frames, moved, color="#f2a5c4", lw=2.5)
-        axes.plot([2, 4, 6, 8], [0, 0.5, 0.6, 0], "o", color=TEXT, ms=9)
-        axes.set_title(ramp, color=TEXT, fontsize=15)
-        axes.set(xticks=[], yticks=[], ylim=(-0.1, 0.75))
-        axes.set_xlabel("time; discs are handles", color=DIM, fontsize=11)
+        for low, colours in ((0.94, before), (0.74, after)):
+            axes.imshow(np.clip(colours[np.newaxis], 0, 1), extent=(1, 9, low, low + 0.16),
+                        aspect="auto")  # fmt: skip
+        # The area below the curve has the edited colour of its frame.
+        area = axes.imshow(np.clip(after[np.newaxis], 0, 1), extent=(1, 9, 0, 0.62), aspect="auto")
+        outline = axes.fill_between(frames, moved, color="none")
+        area.set_clip_path(outline.get_paths()[0], transform=axes.transData)
+        axes.plot(frames, moved, color=TEXT, lw=2)
+        axes.vlines(at, 0, 1.1, color=TEXT, lw=0.8, ls=":", alpha=0.6)
+        axes.plot(at, amounts, "o", color=TEXT, ms=10, mec=PAGE)
+        axes.set_title(f"{ramp}: {words}", color=TEXT, fontsize=14)
+        axes.set(xlim=(1, 9), ylim=(-0.05, 1.12), yticks=[])
+        axes.set_xticks(at, [f"handle\nframe {frame}" for frame in at], color=DIM, fontsize=10)
+        axes.tick_params(length=0)
         if index == 0:
-            axes.set_ylabel("how far the edit\nmoves the colour", color=DIM, fontsize=11)
-    figure.subplots_adjust(0.06, 0.13, 0.99, 0.88, wspace=0.06)
+            axes.set_yticks([0.3, 0.82, 1.02], ["how far it\nmoves", "after", "before"],
+                            color=TEXT, fontsize=11)  # fmt: skip
+    figure.subplots_adjust(0.075, 0.12, 0.99, 0.92, wspace=0.04)
     _save_figure(figure, "ramps.jpg")
 
 
