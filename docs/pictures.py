@@ -5,7 +5,8 @@
 docs/images/demo.jpg is the demo's own plot without its polyhedra. docs/images/timeline.jpg shows
 one colour of the same palette through time, with the parts that an edit is made of named.
 docs/images/tools.jpg shows what the tools make of one frame, docs/images/picks.jpg what picks make
-of several, docs/images/ramps.jpg the three ramps.
+of several, docs/images/looks.jpg mattes, versions and a copied grade, docs/images/ramps.jpg the
+three ramps.
 """
 
 from __future__ import annotations
@@ -38,6 +39,8 @@ HELD = 19
 
 TOOLS_AT, HOUSE, TREES = 20, (0.8, 0.14, 0.12), (0.6, 0.28, 0.05)
 """The frame of tools.jpg, and the red of its house and of its trees."""
+LAKE, OTHER_SHOT = (0.2, 0.42, 0.45), "26-34"
+"""The water's colour in that frame, and the frames that stand for another shot."""
 GOLDEN = Path(__file__).resolve().parents[1] / "tests/golden/sidecars/v1_split.p4d.json"
 
 Image8 = NDArray[np.uint8]
@@ -246,6 +249,45 @@ def draw_picks(demo: Path) -> None:
     _save_figure(figure, "picks.jpg")
 
 
+def draw_looks(demo: Path) -> None:
+    """Draw mattes and the palette of a frame, two versions, and a grade copied to another shot."""
+    sidecar, clip = demo / "sample.p4d.json", p4d.open_clip(str(demo / "clip/sample.####.png"))
+    plain = p4d.load(sidecar)
+    plain.reset()
+    gold = plain.near(GOLD, frame=TOOLS_AT).id
+    edges = {edge["id"]: edge for edge in plain.fields()["polytope"]["edges"]}
+    handle = edges[gold]["from"] if gold in edges else gold
+    warm = plain.trial()
+    warm.adjust(gold, track=True, hue=-35)
+    warm.pick(frame=TOOLS_AT, colour=LAKE, by=(0.2, -0.05, -0.1), clip=clip.source)
+    cool = plain.trial()
+    cool.adjust(chroma=0.5)
+    image = np.ascontiguousarray(clip.read(TOOLS_AT)[..., :3])
+    shot = p4d.analyze(clip.source, frames=OTHER_SHOT)
+    shot.copy_from(warm)
+    first, last, _ = shot.frames
+    middle = (first + last) // 2
+    other = np.ascontiguousarray(clip.read(middle)[..., :3])
+    pictures = [
+        ("the clip", image),
+        (f"render --output weight:{handle}", plain.matte(image, TOOLS_AT, f"weight:{handle}")),
+        ("render --output outside", plain.matte(image, TOOLS_AT, "outside", outside_at=0.02)),
+        ("version warm", warm.recolour(image, TOOLS_AT)),
+        ("version cool", cool.recolour(image, TOOLS_AT)),
+        ("render --output palette", warm.recolour(image, TOOLS_AT, show="palette")),
+        ("another shot", other),
+        ("copy of version warm", shot.recolour(other, middle)),
+    ]
+    figure = Figure(figsize=(16, 16 * (image.shape[0] / image.shape[1] + 0.035)), facecolor=PAGE)
+    for index, (title, picture) in enumerate(pictures):
+        axes = figure.add_subplot(3, 3, index + 1)
+        axes.imshow(np.clip(picture, 0, 1), cmap="grey", vmin=0, vmax=1, interpolation="bicubic")
+        axes.set_title(title, color=TEXT, fontsize=13, loc="left")
+        axes.set_axis_off()
+    figure.subplots_adjust(0.01, 0.01, 0.99, 0.96, wspace=0.02, hspace=0.1)
+    _save_figure(figure, "looks.jpg")
+
+
 def draw_ramps() -> None:
     """Draw how an edit goes through four handles with each ramp: colours and curves."""
     document = p4d.load(GOLDEN)
@@ -302,6 +344,7 @@ def main() -> None:
         draw_timeline(demo, Path(folder))
     draw_tools(demo)
     draw_picks(demo)
+    draw_looks(demo)
     draw_ramps()
 
 
