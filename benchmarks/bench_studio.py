@@ -1,7 +1,7 @@
 """Is the window quick enough to grade in? Latencies, playback and memory, without a screen.
 
     python benchmarks/bench_studio.py SIDECAR CLIP [--times 200] [--size 1400x1000] [--hd HD.mov]
-        [--long LONG.mp4]
+        [--long LONG.mp4] [--parts cold small large play memory]
 
 SIDECAR and CLIP are a small clip (SEASONS). `--hd` and `--long` name movies of 1920x1080 with 120
 and 800 frames; where they do not exist they are made from CLIP (some minutes). Each figure is the
@@ -58,8 +58,13 @@ def make_movie(clip: str, out: Path, count: int) -> None:
 
 
 def stretched(sidecar: Path, clip: str, out: Path) -> Path:
-    """Write the sidecar with its times stretched to another clip's frames."""
-    fields = Document.load(sidecar).fields()
+    """Write the sidecar, without edits, with its times stretched to another clip's frames."""
+    document = Document.load(sidecar)
+    document.reset()
+    for name in document.versions:
+        document.remove_version(name)
+    document.forget_history()
+    fields = document.fields()
     opened = open_clip(clip)
     was = fields["clip"]["frames"]
     scale = (opened.frames[-1] - opened.frames[0]) / (was["last"] - was["first"])
@@ -296,8 +301,50 @@ def show_memory(app: QApplication, sidecar: Path, size: tuple[int, int]) -> None
     bench.close()
 
 
+def small_clip(
+    app: QApplication, sidecar: Path, clip: str, times: int, size: tuple[int, int]
+) -> None:
+    """Print the latencies with the small clip, about 960x540 on screen."""
+    bench = Bench(app, sidecar, clip, (1290, size[1]))
+    viewer = bench.window.viewer
+    print(f"  viewer {viewer.width()}x{viewer.height()}")
+    show("peer, small clip", bench.peer(times), 33, 16)
+    show("drag a colour, small clip", bench.drags(times), 33, 16)
+    show("jump, cached, small clip", bench.jumps(times, cached=True), 50, 33)
+    show("weights under the pointer, small clip", bench.probes(times), 50, 33)
+    show("a pick solved, small clip", bench.picks(times), 100, 50)
+    bench.close()
+
+
+def large_clip(app: QApplication, sidecar: Path, times: int) -> None:
+    """Print the latencies with 1920x1080, fitted."""
+    bench = Bench(app, sidecar, None, (2400, 1350))
+    viewer = bench.window.viewer
+    print(f"  viewer {viewer.width()}x{viewer.height()}")
+    show("peer, 1080p fitted", bench.peer(times), 50, 33)
+    show("drag a colour, 1080p fitted", bench.drags(times), 50, 33)
+    show("jump, cached, 1080p", bench.jumps(times, cached=True), 50, 33)
+    show("jump, not decoded, 1080p", bench.jumps(times, cached=False), 200, 150)
+    show("weights under the pointer, 1080p", bench.probes(times), 50, 33)
+    bench.close()
+
+
+def play(app: QApplication, sidecar: Path, size: tuple[int, int]) -> None:
+    """Print what playing 1920x1080 twice drops."""
+    bench = Bench(app, sidecar, None, size)
+    for number, (shown, dropped, rate) in enumerate(bench.playback(), 1):
+        verdict = "goal" if number == 1 and not dropped else "bar" if not dropped else "MISSED"
+        print(
+            f"playback 1080p, pass {number}: {shown} shown, {dropped} dropped, {rate:.1f} fps"
+            f"   {verdict}",
+            flush=True,
+        )
+    bench.close()
+
+
 def main() -> None:
-    """Run all, and print the table."""
+    """Run the parts, and print the table."""
+    parts = ("cold", "small", "large", "play", "memory")
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("sidecar", type=Path)
     parser.add_argument("clip")
@@ -305,16 +352,14 @@ def main() -> None:
     parser.add_argument("--size", default="1400x1000")
     parser.add_argument("--hd", type=Path, default=Path("build/bench_hd.mov"))
     parser.add_argument("--long", type=Path, default=Path("build/bench_long.mp4"))
-    parser.add_argument("--memory", action="store_true", help="only play CLIP, and show the memory")
+    parser.add_argument("--parts", nargs="+", choices=parts, default=parts, help="default: all")
     args = parser.parse_args()
     size = tuple(map(int, args.size.split("x")))
     app = QApplication.instance() or QApplication([])
     assert isinstance(app, QApplication)
     theme.dress(app)
-    if args.memory:
-        show_memory(app, args.sidecar, size)
-        return
-    for path, count in ((args.hd, 120), (args.long, 800)):
+    movies = {"large": (args.hd, 120), "play": (args.hd, 120), "memory": (args.long, 800)}
+    for path, count in dict.fromkeys(movies[part] for part in args.parts if part in movies):
         if not path.exists():
             print(f"making {path}", flush=True)
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -322,40 +367,24 @@ def main() -> None:
     folder = Path(tempfile.mkdtemp(prefix="palette4d-bench-"))
     small = folder / "small.p4d.json"
     small.write_bytes(args.sidecar.read_bytes())
-    hd = stretched(args.sidecar, str(args.hd), folder / "hd.p4d.json")
-    long = stretched(args.sidecar, str(args.long), folder / "long.p4d.json")
+    if {"large", "play"} & {*args.parts}:
+        hd = stretched(args.sidecar, str(args.hd), folder / "hd.p4d.json")
     print(f"{'action':<42} {'95 % (median)':>20}   bar / goal")
-    show("first window, cold", [cold(small, args.clip) for _ in range(3)], 3000, 2000)
-    bench = Bench(app, small, args.clip, (1290, size[1]))
-    viewer = bench.window.viewer
-    print(f"  viewer {viewer.width()}x{viewer.height()}")
-    show("peer, small clip", bench.peer(args.times), 33, 16)
-    show("drag a colour, small clip", bench.drags(args.times), 33, 16)
-    show("jump, cached, small clip", bench.jumps(args.times, cached=True), 50, 33)
-    show("weights under the pointer, small clip", bench.probes(args.times), 50, 33)
-    if hasattr(Document, "pick"):
-        show("a pick solved, small clip", bench.picks(args.times), 100, 50)
-    bench.close()
-    bench = Bench(app, hd, None, (2400, 1350))
-    viewer = bench.window.viewer
-    print(f"  viewer {viewer.width()}x{viewer.height()}")
-    show("peer, 1080p fitted", bench.peer(args.times), 50, 33)
-    show("drag a colour, 1080p fitted", bench.drags(args.times), 50, 33)
-    show("jump, cached, 1080p", bench.jumps(args.times, cached=True), 50, 33)
-    show("jump, not decoded, 1080p", bench.jumps(args.times, cached=False), 200, 150)
-    show("weights under the pointer, 1080p", bench.probes(args.times), 50, 33)
-    bench.close()
-    bench = Bench(app, hd, None, size)
-    for number, (shown, dropped, rate) in enumerate(bench.playback(), 1):
-        verdict = "goal" if number == 1 and not dropped else "bar" if not dropped else "MISSED"
-        print(
-            f"playback 1080p, pass {number}: {shown} shown, {dropped} dropped, {rate:.1f} fps"
-            f"   {verdict}"
-        )
-    bench.close()
-    # In a process of its own: memory that was used once is not always given back.
-    words = [sys.executable, __file__, str(long), str(args.long), "--size", args.size]
-    subprocess.run([*words, "--memory"], check=True)
+    for part in args.parts:
+        if part == "cold":
+            show("first window, cold", [cold(small, args.clip) for _ in range(3)], 3000, 2000)
+        elif part == "small":
+            small_clip(app, small, args.clip, args.times, size)
+        elif part == "large":
+            large_clip(app, hd, args.times)
+        elif part == "play":
+            play(app, hd, size)
+        elif len(args.parts) == 1:
+            long = stretched(args.sidecar, str(args.long), folder / "long.p4d.json")
+            show_memory(app, long, size)
+        else:  # in a process of its own: memory that was used once is not always given back
+            words = [sys.executable, __file__, str(args.sidecar), args.clip, "--parts", "memory"]
+            subprocess.run([*words, "--long", str(args.long), "--size", args.size], check=True)
 
 
 if __name__ == "__main__":

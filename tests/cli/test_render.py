@@ -484,7 +484,7 @@ def test_show_writes_a_matte_as_a_grey_picture(tmp_path):
     document = Document.load(EDITED)
     handle = document.core.polytope.vertex_ids[0]
     for show in (f"weight:{handle}", "outside"):
-        words = ("--show", show, "--outside-at", 0.01, "--force")
+        words = ("--output", show, "--outside-at", 0.01, "--force")
         assert run(EDITED, source, "-o", tmp_path / "o.exr", *words) == 0
         _, written, _ = stored(tmp_path / "o.exr")
         expected = document.matte(pixels, 5, show, outside_at=0.01)
@@ -495,7 +495,7 @@ def test_show_writes_a_matte_as_a_grey_picture(tmp_path):
 def test_show_writes_a_matte_into_alpha(tmp_path):
     pixels = colours(9, 13, 3)
     source = write_image(tmp_path / "c.0005.tif", pixels)
-    words = ("--show", "outside", "--outside-at", 0.02, "--matte-in", "alpha")
+    words = ("--output", "outside", "--outside-at", 0.02, "--matte-in", "alpha")
     assert run(EDITED, source, "-o", tmp_path / "o.tif", *words) == 0
     _, written, _ = stored(tmp_path / "o.tif")
     np.testing.assert_array_equal(written[..., :3], pixels)
@@ -508,7 +508,16 @@ def test_show_writes_a_matte_into_alpha(tmp_path):
 def test_the_palette_and_the_lightness_are_the_documents(tmp_path):
     pixels = colours(32, 13, 3)
     source = write_image(tmp_path / "c.0005.exr", pixels)
-    words = ("--show", "palette", "--keep-lightness", 1, "--lightness-of", "rec2020", "--mix", 0.5)
+    words = (
+        "--output",
+        "palette",
+        "--keep-lightness",
+        1,
+        "--lightness-of",
+        "rec2020",
+        "--mix",
+        0.5,
+    )
     assert run(EDITED, source, "-o", tmp_path / "o.exr", *words, "--strength", 0.75) == 0
     expected = Document.load(EDITED).recolour(
         pixels, 5, show="palette", keep_lightness=1, lightness_of="rec2020", mix=0.5, strength=0.75
@@ -519,7 +528,7 @@ def test_the_palette_and_the_lightness_are_the_documents(tmp_path):
 @pytest.mark.parametrize("show", ["weight", "weight:", "matte", "outside:v1"])
 def test_an_output_that_does_not_exist_is_wrong_usage(tmp_path, show, capsys):
     with pytest.raises(SystemExit) as stopped:
-        run(EDITED, tmp_path, "-o", tmp_path / "o.exr", "--show", show)
+        run(EDITED, tmp_path, "-o", tmp_path / "o.exr", "--output", show)
     assert stopped.value.code == 2
     assert "weight:ID" in capsys.readouterr().err
 
@@ -527,5 +536,5 @@ def test_an_output_that_does_not_exist_is_wrong_usage(tmp_path, show, capsys):
 def test_a_handle_that_does_not_exist_is_an_error(tmp_path):
     source = write_image(tmp_path / "c.0005.exr", colours(4, 4, 3))
     with pytest.raises(Palette4dError, match="v99"):
-        run(EDITED, source, "-o", tmp_path / "o.exr", "--show", "weight:v99")
+        run(EDITED, source, "-o", tmp_path / "o.exr", "--output", "weight:v99")
     assert not (tmp_path / "o.exr").exists()

@@ -21,7 +21,7 @@ from typing import Any
 import palette4d
 from palette4d.cli.main import main
 from palette4d.grade.document import Document
-from palette4d.studio.session import Session, recovery_file
+from palette4d.studio.session import Session, recovered
 
 for found in pkgutil.walk_packages(palette4d.__path__, "palette4d."):
     if not found.name.startswith(("palette4d.studio", "palette4d.__main__")):
@@ -43,7 +43,9 @@ def autosave(path: Path) -> int:
     session.tick(math.inf)
     if not session.saved:
         assert session.document
-        assert Document.load(recovery_file(path)).settings == session.document.settings
+        copy = recovered(path)
+        assert copy
+        assert Document.load(copy).settings == session.document.settings
         print(f"palette4d: error: {session.status.text}", file=sys.stderr)
     return 0 if session.saved else 1
 

@@ -97,16 +97,49 @@ def test_several_nodes_in_a_chain(
     check_chain(scene.clip, frames, sidecars)
 
 
+@pytest.fixture(scope="module")
+def movie(scene: Scene) -> str:
+    """The clip as a movie of RGB in the scene's folder."""
+    form = ("vcodec=ffv1", "an=1", "pix_fmt=bgr0", "mlt_image_format=rgba", "real_time=-1")
+    scene.write("clip.mkv", *CLIP, "-consumer", "avformat:clip.mkv", *form)
+    return "clip.mkv"
+
+
 def test_many_threads_on_a_movie(
-    scene: Scene, sidecars: tuple[_core.Sidecar, _core.Sidecar]
+    scene: Scene, movie: str, sidecars: tuple[_core.Sidecar, _core.Sidecar]
 ) -> None:
     """docs/hosts/melt.md: threads exchange frames of image sequences, and not those of movies."""
-    movie = ("vcodec=ffv1", "an=1", "pix_fmt=bgr0", "mlt_image_format=rgba", "real_time=-1")
-    scene.write("clip.mkv", *CLIP, "-consumer", "avformat:clip.mkv", *movie)
-    words = ("-profile", "profile", "avformat:clip.mkv")
+    words = ("-profile", "profile", f"avformat:{movie}")
     clip = without_a_message(render(scene, *words))
     assert all((a != b).any() for a, b in zip(clip[1:], clip, strict=False))
     check_chain(clip, without_a_message(render(scene, *words, *GRADES, threads=-4)), sidecars)
+
+
+def test_a_movie_at_another_speed(
+    scene: Scene, movie: str, sidecars: tuple[_core.Sidecar, _core.Sidecar]
+) -> None:
+    """docs/hosts/kdenlive.md: the node counts the frames shown; *Speed* is the clip's factor."""
+    words = ("-profile", "profile", f"timewarp:2:{movie}")
+    grade = ("-attach", SERVICE, "sidecar=first.p4d.json")
+
+    def rendered(*effect: str) -> list[Image]:
+        files, said = scene.write("out_*.png", *words, *effect, *consumer(scene))
+        assert "persistent" not in said
+        return [read_image(path) for path in files]
+
+    clip = rendered()
+    assert len(clip) == len(scene.clip) // 2
+    top = float(np.iinfo(clip[0].dtype).max)
+
+    def worst(frames: list[Image]) -> float:
+        errors = [
+            np.abs(frame[..., :3] / top - recolour(sidecars[0], 100 + 2 * index, image[..., :3]))
+            for index, (frame, image) in enumerate(zip(frames, clip, strict=True))
+        ]
+        return float(np.max(errors))
+
+    assert worst(rendered(*grade, "speed=2")) <= 0.51 / top
+    assert worst(rendered(*grade)) > 0.01
 
 
 def test_a_project_on_disk(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from collections.abc import Generator
 from pathlib import Path
@@ -11,7 +12,7 @@ import pytest
 
 import palette4d
 from palette4d.cli.main import main
-from palette4d.studio.session import TRY_AGAIN, Session, recovery_file
+from palette4d.studio.session import TRY_AGAIN, Session, recovered, recovery_files
 
 GOLDEN = Path(__file__).resolve().parent.parent / "golden" / "sidecars"
 LATER = 1e9
@@ -101,9 +102,33 @@ def test_a_file_that_another_program_broke_is_not_overwritten(
     session.tick(LATER + TRY_AGAIN)
     assert sidecar.read_text() == '{"schema": '
     assert session.status.level == "error"
-    assert palette4d.load(recovery_file(sidecar)).colour(id_) == (0, 1, 0)
+    assert palette4d.load(next(recovery_files(sidecar))).colour(id_) == (0, 1, 0)
     assert session.save_as(tmp_path / "mine.p4d.json")
     assert palette4d.load(tmp_path / "mine.p4d.json").colour(id_) == (0, 1, 0)
+
+
+def test_what_an_earlier_session_could_not_save_stays(
+    session: Session, sidecar: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    id_, whole = vertex(sidecar), sidecar.read_bytes()
+    sidecar.write_text("{")
+    session.edit(lambda document: document.set(id_, rgb=(1.0, 0.0, 0.0)))
+    assert not session.save()
+    sidecar.write_bytes(whole)
+    copy = next(recovery_files(sidecar))
+    os.utime(sidecar, (0, 0))
+    later = Session()
+    later.open_sidecar(sidecar)
+    assert recovered(sidecar) == copy
+    later.edit(lambda document: document.set(id_, rgb=(0.0, 1.0, 0.0)))
+    assert later.save()
+    assert palette4d.load(copy).colour(id_) == (1.0, 0.0, 0.0)
+    sidecar.write_text("{")
+    later.edit(lambda document: document.set(id_, rgb=(0.0, 0.0, 1.0)))
+    assert not later.save()
+    assert palette4d.load(copy).colour(id_) == (1.0, 0.0, 0.0)
+    sidecar.write_bytes(whole)
 
 
 def test_saved_in_another_folder_the_sidecar_finds_its_clip(

@@ -23,7 +23,8 @@ from palette4d.studio.window import Window
 #: and what Qt itself writes on its docks.
 DATA = re.compile(
     r"^([\W\d_]*|[A-Zh]|[vsep]\d+|#?[0-9a-f]{6}|\d+(\.\d+)?|/ \d+.*|.*(\.p4d\.json|####).*"
-    r"|Kdenlive|Shotcut|cube|side|wipe|skew|static|paper|rgbt|[$]OCIO|Float|Close|Scroll (Left|Right)|Qt.*"
+    r"|Kdenlive|Shotcut|cube|side|wipe|skew|static|paper|rgbt|[$]OCIO|Float|Close"
+    r"|Scroll (Left|Right)|Qt.*"
     r"|.*(sRGB|ocio|P3|Rec|ACES|XYZ|palette4d ).*|/.*)$"
 )
 

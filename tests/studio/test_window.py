@@ -81,7 +81,7 @@ def test_a_sidecar_that_cannot_be_written_is_kept_elsewhere(
 ) -> None:
     from palette4d.common.errors import WriteError
     from palette4d.grade import sidecar as sidecars
-    from palette4d.studio.session import recovery_file
+    from palette4d.studio.session import recovery_files
 
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     write = sidecars.write
@@ -97,11 +97,11 @@ def test_a_sidecar_that_cannot_be_written_is_kept_elsewhere(
     assert not opened.session.save()
     assert "no space" in opened.session.status.text
     assert not opened.session.saved
-    assert palette4d.load(recovery_file(sidecar)).colour(id_) == (1.0, 0.0, 0.0)
+    assert palette4d.load(next(recovery_files(sidecar))).colour(id_) == (1.0, 0.0, 0.0)
     monkeypatch.setattr(sidecars, "write", write)
     assert opened.session.save()
     assert palette4d.load(sidecar).colour(id_) == (1.0, 0.0, 0.0)
-    assert not recovery_file(sidecar).exists()
+    assert not next(recovery_files(sidecar)).exists()
 
 
 @pytest.mark.slow

@@ -342,14 +342,13 @@ def _print_notes(document: Document) -> None:
         return
     moved, among = document.moved_by_picks()
     print(f"{moved} of {counted(among, 'palette colour')} move")
-    for frame in sorted({pick.frame for pick in enabled if pick.to is not None}):
-        share, most = document.side_effect(frame)
-        if share > MANY:
-            print(
-                f"note: at frame {frame:g} {share:.0%} of the picture change too, by more than 10 "
-                f"of 255, most {shown(most)}. If it must stay: hold --frame {frame:g} --colour "
-                + ",".join(f"{value:.4f}" for value in most)
-            )
+    frame, share, most = document.side_effect()
+    if share > MANY:
+        print(
+            f"note: {share:.0%} of the picture change too at frame {frame:.0f}, by more than 10 of "
+            f"255, most {shown(most)}; no frame changes more. If it must stay: "
+            f"hold --frame {frame:.0f} --colour " + ",".join(f"{value:.4f}" for value in most)
+        )
     for line in unmet(enabled, document.frames[2]):
         print(f"not met: {line}")
     for pick in () if document.scene_linear else enabled:

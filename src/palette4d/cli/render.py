@@ -11,7 +11,7 @@ from palette4d.common.text import counted
 
 DESCRIPTION = """\
 Recolour the frames of a clip with the edits of a sidecar, by the same code as the OpenFX node.
-Colours that no edit touches keep their exact code values. --show writes mattes instead.
+Colours that no edit touches keep their exact code values. --output writes mattes instead.
 
 Frames keep their numbers: frame 1017 of the clip gets the palette at frame 1017 and is written as
 frame 1017. Movies count from 0. EXR is 32-bit float (half with --half). PNG has 8 bits for an 8-bit
@@ -27,7 +27,7 @@ examples:
   palette4d render clip.p4d.json clip/ -o review.mp4 --compare wipe
   palette4d render clip.p4d.json beach.%04d.dpx -o graded/beach.####.png --frames 1001-1100x2
   palette4d render clip.p4d.json clip/ -o still.png --frames 24 --strength 0.5
-  palette4d render clip.p4d.json clip/ -o key/sky.####.exr --show weight:v5"""
+  palette4d render clip.p4d.json clip/ -o key/sky.####.exr --output weight:v5"""
 
 
 # What `Document.recolour` draws.
@@ -51,7 +51,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument(
         "-o",
-        "--output",
+        dest="output",
         required=True,
         metavar="OUT",
         help="frames as OUT.####.exr, .png or .tif, one # a digit (a plain name for one frame), "
@@ -77,7 +77,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="0 the original, 1 the edit (default 1)",
     )
     parser.add_argument(
-        "--show",
+        "--output",
+        dest="show",
         type=_show,
         default="recoloured",
         metavar="WHAT",
@@ -96,7 +97,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         type=number(0.0001, 100),
         default=0.05,
         metavar="D",
-        help="distance from the palette at which the matte of --show outside is 1 (default 0.05)",
+        help="distance from the palette at which the matte of --output outside is 1 (default 0.05)",
     )
     parser.add_argument(
         "--keep-lightness",
@@ -149,11 +150,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def _show(text: str) -> str:
-    """Argparse type of --show; the sidecar decides whether it has the handle."""
+    """Argparse type of --output; the sidecar decides whether it has the handle."""
     if text in ("recoloured", "outside", "palette") or re.fullmatch("weight:.+", text):
         return text
     raise argparse.ArgumentTypeError(
-        f"found {text!r}, expected weight:ID with the id of a vertex or stop, outside or palette"
+        f"found {text!r}, expected weight:ID with the id of a vertex or stop, outside or palette; "
+        "-o names the files"
     )
 
 

@@ -31,6 +31,8 @@ TOLERANCE = 3 / 255
 LEAST = 1e-6
 #: Colours farther than this from the source's palette are not in its clip.
 NEAR = 0.05
+#: A copy fits if it differs by less than this share of what the grade changes.
+FITS = 0.3
 #: At most this many stops an edge.
 MOST_STOPS = 64
 
@@ -56,9 +58,15 @@ class Fit:
     largest: float
     foreign: float
 
+    @property
+    def fits(self) -> bool:
+        """Whether the copy looks like the copied grade, on most of the clip's colours."""
+        return self.mean <= max(FITS * self.change, 1 / 255) and self.foreign <= 0.5
+
     def __str__(self) -> str:
         """Return the figures for people, in steps of 8 bits."""
-        text = (
+        text = "" if self.fits else "the grade does not fit this clip: "
+        text += (
             f"the copy differs from the copied grade by {self.mean * 255:.1f} of 255 on average, "
             f"by {self.largest * 255:.1f} at most (99 % of the colours); the grade changes the "
             f"colours by {self.change * 255:.1f}"

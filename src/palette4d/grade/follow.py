@@ -36,7 +36,7 @@ MOST_STEP = 0.08
 STIFF, PINNED = 12.0, 1e6
 #: How strongly a colour that is still there is kept there, per frame; it is still there while the
 #: pixels near it are not 1 / SAME fewer or more than at first.
-HOME, SAME = 0.5, 4
+HOME, SAME = 0.5, 2
 #: Where more than LOST times as many pixels as at first are near, the colour is another thing's, as
 #: in the night, where all is dark. From there on it has ended, unless it comes back to its start.
 LOST = 7.0

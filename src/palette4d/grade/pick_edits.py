@@ -235,21 +235,21 @@ class PickEdits(EditedPalette):
         tracks = [{*track.vertices, *track.edges} for track in self.tracks]
         return sum(not moved.isdisjoint(track) for track in tracks), len(tracks)
 
-    def side_effect(self, frame: float, *, least: float = 10 / 255) -> tuple[float, Colour]:
-        """Return what picks do to other colours at a frame.
+    def side_effect(self, *, least: float = 10 / 255) -> tuple[float, float, Colour]:
+        """Return what picks do to other colours, at the frame where they do most.
 
         Returns
         -------
+        frame : float
         share : float
-            Share, 0..1, of the pixels that are not near a picked colour and change by more than
-            `least` in a channel.
+            Share, 0..1, of the frame's pixels that have neither a picked colour nor a shade of it
+            and change by more than `least` in a channel.
         most : tuple of float
             The colour for which this matters most: one to hold.
         """
         from palette4d.grade import solve
 
-        self.check_frame(frame)
-        return solve.side_effect(self._members(), frame, least)
+        return solve.side_effect(self._members(), least)
 
     def colour_of_pixel(
         self,

@@ -244,24 +244,33 @@ def all_picks(fields: Mapping[str, Any]) -> tuple[Pick, ...]:
 
 
 def unmet(picks: Iterable[Pick], step: float) -> list[str]:
-    """Return a line for each enabled pick and hold that is not met, with the likely cause."""
+    """Return a line for each enabled pick and hold that is not met, with the likely cause.
+
+    Two that contradict each other have one line.
+    """
     enabled = [pick for pick in picks if pick.enabled]
-    lines = []
+    lines, pairs = [], set()
     for number, pick in enumerate(enabled):
+        at, off = "", pick.residual
+        if off is None or off <= pick.tolerance:
+            at, off = f" at frame {pick.worst_frame:g}" if pick.worst else "", pick.worst
         if number >= MOST_PICKS:
             lines.append(
                 f"{pick.id} is not solved: only the first {MOST_PICKS} enabled picks and holds "
                 "are. Disable or remove some"
             )
-        elif pick.residual is not None and pick.residual > pick.tolerance:
-            lines.append(f"{pick.id} is off by {pick.residual:.3f}{_cause(pick, enabled, step)}")
-        elif pick.worst is not None and pick.worst > pick.tolerance:
-            at = f"at frame {pick.worst_frame:g}"
-            lines.append(f"{pick.id} is off by {pick.worst:.3f} {at}{_cause(pick, enabled, step)}")
+        elif off is not None and off > pick.tolerance:
+            rival = _rival(pick, enabled, step)
+            pair = {pick.id, rival[0]} if rival else {pick.id}
+            if frozenset(pair) not in pairs:
+                cause = _cause(pick, enabled) if rival is None else rival[1]
+                lines.append(f"{pick.id} is off by {off:.3f}{at}{cause}")
+            pairs.add(frozenset(pair))
     return lines
 
 
-def _cause(pick: Pick, others: Sequence[Pick], step: float) -> str:
+def _rival(pick: Pick, others: Sequence[Pick], step: float) -> tuple[str, str] | None:
+    """Return the id of the pick that stands most in a pick's way, and what to say of it."""
     rivals = []
     for other in others:
         for frame in _together(pick, other, step) if other.id != pick.id else ():
@@ -269,12 +278,16 @@ def _cause(pick: Pick, others: Sequence[Pick], step: float) -> str:
             apart = float(np.linalg.norm(pick.change_at(frame) - other.change_at(frame)))
             if away < NEAR and apart > away:
                 rivals.append((away, other.id, frame, apart))
-    if rivals:
-        away, id_, frame, apart = min(rivals)
-        return (
-            f": at frame {frame:g} the colour of {id_} is only {away:.3f} away, and the two ask "
-            f"for changes that differ by {apart:.3f}. Change or disable one of {pick.id} and {id_}"
-        )
+    if not rivals:
+        return None
+    away, id_, frame, apart = min(rivals)
+    return id_, (
+        f": at frame {frame:g} the colour of {id_} is only {away:.3f} away, and the two ask "
+        f"for changes that differ by {apart:.3f}. Change or disable one of {pick.id} and {id_}"
+    )
+
+
+def _cause(pick: Pick, others: Sequence[Pick]) -> str:
     if pick.global_only:
         return ": the palette alone cannot express it; its neighbourhood is left out"
     if pick.to is not None and any(not -0.05 <= value <= 1.05 for value in pick.to):

@@ -10,17 +10,16 @@ values:
 
 - a pick at colour p wants ``w(p) d + phi(p) a = change - U(p)``, where U is what the user's own
   handles do there; a hold wants the same with no change;
-- the guard: each colour of the clip wants to stay, by its share of the pixels, unless it lies
-  within a pick's bump. A pixel that must stay counts as much as a pixel that has a picked colour:
-  a pick of few pixels moves no palette colour that many pixels are mixed from. Absolute, not
-  squared changes count (reweighted): the rest of the picture stays, instead of changing a little
-  everywhere;
+- the guard: each colour of the clip wants to stay, the more pixels have it and the greyer it is,
+  unless it is near a pick or a shade of it. A pick of few pixels moves no palette colour that many
+  pixels are mixed from. Changes are reweighted: most of the picture stays, instead of changing a
+  little everywhere;
 - few palette colours move (reweighted); bumps are small.
 
 What is left at the picks is then met by the bumps alone. A bump grows with the change, else colours
-would fold over and posterise, until it takes in other things than the one that was picked: many
-more pixels than have the picked colour. A pick of a box with a wide spread of colours has a bump
-at several of them.
+would fold over and posterise, up to a limit: beyond are other things. A pick of a box with a wide
+spread of colours has a bump at several of them. Where the palette would change more of the rest for
+the sake of a hold, the hold is left to its bump.
 
 Frames are solved one by one, at the clip's vertices, at the picks' own frames and every few frames
 between; the core interpolates linearly. So a pick that ends at a frame has no effect at all beyond.
@@ -47,31 +46,39 @@ F64 = NDArray[np.float64]
 
 # The constants below hold for all clips. docs/lab/picks.md shows what they were chosen by.
 
-# A colour of few pixels counts in the guard as if it had this share of them: a lamp.
+# A colour of few pixels counts as if it had this share of them: a lamp.
 LEAST_SHARE = 5e-4
+# The guard's weight beside a pick that has all the pixels.
+GUARD = 0.65
+# A change of a colour is noticed 1 + CHROMA (max - min) times less than that of a grey.
+CHROMA = 6.0
 # A guarded colour that would change by more than LARGE times the largest change that is asked for
 # weighs up to so much, however few pixels have it: they must not overshoot either.
 OVERSHOOT, LARGE = 0.3, 1.1
-# The radius of a pick's bump is RADIUS_0 + RADIUS_1 |change|, at most LARGEST. It is less if other
-# things begin there: if beyond OWN the number of pixels within grows faster than the bump's volume,
-# and ever faster or much faster. That of a hold's is HOLD_RADIUS.
-RADIUS_0, RADIUS_1, LARGEST, OWN, HOLD_RADIUS = 0.08, 0.8, 0.48, 0.12, 0.16
+# The radius of a pick's bump is RADIUS_0 + RADIUS_1 |change|, at most LARGEST; a hold's is
+# HOLD_RADIUS.
+RADIUS_0, RADIUS_1, LARGEST, HOLD_RADIUS = 0.08, 0.87, 0.3, 0.16
+# The guard is off near a pick: at most so far from it, and on beyond.
+NEAR = 0.265
+# Lighter and darker shades of a picked colour are nearer to it by this factor. Below the lightness
+# DARK the shade of a colour is less and less certain.
+SHADE, DARK = 0.55, 0.3
+# With holds, the picture may change by so much more elsewhere than without.
+HOLDS_COST = 0.02
 # A colour of a pick's spread has a bump of its own if the pick's bump would leave more than this of
 # its change undone. A hold's change counts as 1.
 UNDONE = 0.04
-# A stored colour stands for colours around it, about so far.
-CELL = 0.06
 # Cost of a slope: of a displacement that changes along an edge of the palette by as much as the
 # colour. Near greys, where colours are close together, the palette would tear them apart.
-SLOPE = 2.5e-4
-# Costs of a palette colour's displacement and of a bump, beside the weight 1 of a pick. A bump
-# costs less if it had to stay small, or if hardly any colour lies at its slope: the picked colour
-# stands alone, and the palette need not change all others.
-RIDGE, BUMP = 1e-4, 0.4
+SLOPE = 2e-4
+# Costs of a palette colour's displacement and of a bump, beside the weight 1 of a pick.
+RIDGE, BUMP = 1e-4, 0.33
 # Reweighting: rounds, and the sizes, as shares of the largest change, below which a palette
 # colour's displacement and a guarded colour's change no longer cost more per size. A displacement
-# below FEW of the largest change is none.
-ROUNDS, SMALL_MOVE, SMALL_CHANGE, FEW = 5, 0.03, 0.017, 0.1
+# below FEW of the largest change is none. The exponent is between absolute changes (1) and squared
+# ones (0): the former would give up a whole sky to keep the rest.
+EXPONENT = 0.7
+ROUNDS, SMALL_MOVE, SMALL_CHANGE, FEW = 5, 0.03, 0.03, 0.1
 # Picks that nearly coincide and ask for different things: the bumps' sizes stay bounded by
 # 1 / (2 TIKHONOV) times the difference. A lone pick's residual is TIKHONOV^2 of its remainder.
 TIKHONOV = 0.1
@@ -115,33 +122,38 @@ def solve(fields: Mapping[str, Any]) -> tuple[Fields, dict[str, Fields]]:
     return solution, _measured(fields, solution, problem)
 
 
-def side_effect(fields: Mapping[str, Any], frame: float, least: float) -> tuple[float, Colour]:
-    """Return what the picks' solution does to other colours of the clip at a frame.
+def side_effect(fields: Mapping[str, Any], least: float) -> tuple[float, float, Colour]:
+    """Return what the picks' solution does to other colours of the clip, where it does most.
 
     Returns
     -------
+    frame : float
+        The frame where most of the picture changes.
     share : float
-        Share, 0..1, of the pixels that are not near a picked colour and change by more than
-        `least` in a channel.
+        Share, 0..1, of its pixels that have neither a picked colour nor a shade of it and change
+        by more than `least` in a channel.
     most : 3 floats
         The colour for which this matters most; its share of the pixels counts.
     """
     clip = _ClipAtTimes(fields)
     both = _parsed(fields, fields["edits"].get("solution", {}))
-    cut = _core.slice_at(clip.polytope, frame)
-    solved = _core.edited_colours(clip.polytope, both.edits, cut)
-    user = _core.edited_colours(clip.polytope, clip.core.edits, cut)
-    guarded = clip.colours_at(frame)
-    rgb, shares = guarded[:, :3], guarded[:, 3]
-    bumps = both.bumps_at(frame)
-    changes = _core.palette_weights(rgb, cut.rgb, cut.faces)[0] @ (solved - user)
-    changes += _bump(rgb, bumps[:, :3], bumps[:, 3]) @ bumps[:, 4:]
-    size = np.abs(changes).max(axis=1)
     problem = _Problem(clip, [pick for pick in all_picks(fields["edits"]) if pick.enabled])
-    other = problem.guard_at(rgb, frame) > OTHER
-    share = float(shares[other & (size > least)].sum() / max(float(shares.sum()), 1e-9))
-    worst = int(np.argmax(np.where(other, size * np.sqrt(shares), 0.0)))
-    return share, as_colour(rgb[worst])
+    found = [(float(clip.first), 0.0, (0.0, 0.0, 0.0))]
+    for time in problem.times:
+        cut = _core.slice_at(clip.polytope, time)
+        solved = _core.edited_colours(clip.polytope, both.edits, cut)
+        user = _core.edited_colours(clip.polytope, clip.core.edits, cut)
+        guarded = clip.colours_at(time)
+        rgb, shares = guarded[:, :3], guarded[:, 3]
+        bumps = both.bumps_at(time)
+        changes = _core.palette_weights(rgb, cut.rgb, cut.faces)[0] @ (solved - user)
+        changes += _bump(rgb, bumps[:, :3], bumps[:, 3]) @ bumps[:, 4:]
+        size = np.abs(changes).max(axis=1)
+        other = problem.guard_at(rgb, time) > OTHER
+        share = float(shares[other & (size > least)].sum() / max(float(shares.sum()), 1e-9))
+        worst = int(np.argmax(np.where(other, size * np.sqrt(shares), 0.0)))
+        found.append((time, share, as_colour(rgb[worst])))
+    return max(found, key=lambda one: one[1])
 
 
 class _ClipAtTimes:
@@ -217,17 +229,23 @@ class _Problem:
 
     def __init__(self, clip: _ClipAtTimes, picks: Sequence[Pick]) -> None:
         self.clip, self.picks = clip, picks
-        sizes = [self._bump_of(pick) for pick in picks]
         points = [
-            (number, offset, radius, cost)
-            for number, (pick, (radius, cost)) in enumerate(zip(picks, sizes, strict=True))
+            (number, offset, radius)
+            for number, (pick, radius) in enumerate(
+                zip(picks, map(self._radius_of, picks), strict=True)
+            )
             for offset in ((0.0, 0.0, 0.0), *pick.spread)
             if not any(offset) or _undone(pick, offset, radius) > UNDONE
         ]
-        of, offsets, radii, costs = zip(*points, strict=True) if points else ((), (), (), ())
+        of, offsets, radii = zip(*points, strict=True) if points else ((), (), ())
         self.of = np.array(of, int)
+        self.moving = np.array([pick.to is not None for pick in picks], bool)
         self.offsets = np.array(offsets).reshape(-1, 3)
-        self.radii, self.costs = np.array(radii), np.array(costs)
+        self.radii = np.array(radii)
+        #: Share of the pixels near each point where it was picked.
+        self.pixels = np.array(
+            [self._pixels(picks[n].frame)[i] for i, n in enumerate(self.of)], float
+        )
         #: Frames where the effect of a pick begins or ends: nothing may pass them.
         self.borders = sorted(
             {
@@ -243,35 +261,42 @@ class _Problem:
         )
         self.times = self._times()
 
-    def _bump_of(self, pick: Pick) -> tuple[float, float]:
-        """Return the radius of a pick's bumps, and what they cost."""
+    def _radius_of(self, pick: Pick) -> float:
+        """Return the radius of a pick's bumps."""
         if pick.radius is not None or pick.to is None:
-            return pick.radius or HOLD_RADIUS, BUMP
-        change = min(float(np.linalg.norm(pick.change_at(pick.frame))), 1.0)
-        if not self.clip.frames:
-            return RADIUS_0 + RADIUS_1 * min(change, (LARGEST - RADIUS_0) / RADIUS_1), BUMP
-        rgb, shares = np.split(self.clip.colours_at(pick.frame), [3], axis=1)
-        # Each stored colour stands for those around it.
-        around = CELL * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
-        rgb, shares = (rgb[:, None] + around).reshape(-1, 3), np.repeat(shares, len(around))
-        centres = np.array([(0.0, 0.0, 0.0), *pick.spread]) + pick.rgb
-        away = np.linalg.norm(rgb[:, None] - centres, axis=2).min(axis=1)
-        radii = np.geomspace(RADIUS_0, RADIUS_0 + RADIUS_1 * change, 48)
-        part = np.minimum(away / radii[:, None], 1.0) ** 2
-        within = np.maximum((1 - part) ** 3 @ shares, NONE**2)
-        growth = (6 * part * (1 - part) ** 2) @ shares / within
-        faster = (growth > 4) | ((growth > 3) & (growth > np.roll(growth, 1)))
-        end = (faster & (radii > OWN)) | (radii > LARGEST)
-        chosen = max(0, int(np.argmax(end)) - 1) if end.any() else len(radii) - 1
-        alone = float(within[chosen] / within[-1]) * min(1.0, float(growth[chosen]))
-        return float(radii[chosen]), BUMP * alone**2
+            return pick.radius or HOLD_RADIUS
+        change = float(np.linalg.norm(pick.change_at(pick.frame)))
+        return min(RADIUS_0 + RADIUS_1 * change, LARGEST)
+
+    def _pixels(self, time: float) -> F64:
+        """Return the share of the clip's pixels near each point."""
+        guarded = self.clip.colours_at(time)
+        near = _bump(guarded[:, :3], self.centres(time), np.full(len(self.of), NEAR))
+        return np.asarray(guarded[:, 3] @ near, np.float64)
+
+    def strengths(self, time: float) -> F64:
+        """Return how much of its change each point asks for, 0..1."""
+        found = np.array([pick.strength_at(time, self.clip.step) for pick in self.picks])
+        return np.asarray(found[self.of], np.float64)
+
+    def certain(self, time: float) -> F64:
+        """Return how certain it is that each point belongs to what was picked, 0..1.
+
+        A colour of a box's spread that twice as many pixels have at another frame is another
+        thing's there: gaps between leaves have the sky's colour.
+        """
+        spread = self.offsets.any(axis=1) & self.moving[self.of]
+        if not (self.clip.frames and spread.any()):
+            return np.ones(len(self.of))
+        more = self._pixels(time) / np.maximum(self.pixels, LEAST_SHARE)
+        return np.where(spread, np.clip(2 - more, 0.0, 1.0), 1.0)
 
     def guard_at(self, colours: F64, time: float) -> F64:
         """Return how much colours are guarded at a time, 0..1: not at all at a picked one."""
-        strengths = np.array([pick.strength_at(time, self.clip.step) for pick in self.picks])
-        at = [i for i in range(len(self.of)) if self.picks[self.of[i]].to is not None]
-        share = strengths[self.of[at]] / max(float(strengths.max(initial=0)), NONE)
-        far = 1 - share * _bump(colours, self.centres(time)[at], self.radii[at])
+        at = np.flatnonzero(self.moving[self.of])
+        strengths = (self.strengths(time) * self.certain(time))[at]
+        share = strengths / max(float(strengths.max(initial=0)), NONE)
+        far = 1 - share * _shade(colours, self.centres(time)[at], np.minimum(self.radii[at], NEAR))
         found: F64 = far.prod(axis=1)
         return found
 
@@ -279,16 +304,15 @@ class _Problem:
         """Return how much each point counts beside the others, 0..1: by the pixels of its pick.
 
         Else a pick of few pixels could move what many are mixed from, at the price of a large one.
-        A hold counts as the largest pick.
         """
         counts = np.ones(len(of))
-        for number in np.unique(of):
-            if self.clip.frames and self.picks[number].to is not None:
+        if self.clip.frames:
+            for number in np.unique(of):
                 pixels = float(guarded[:, 3] @ within[:, of == number].max(axis=1))
                 counts[of == number] = max(pixels, LEAST_SHARE)
-        moving = np.array([self.picks[number].to is not None for number in of])
-        counts[moving] /= counts[moving].max(initial=0.0) or 1.0
-        return counts
+        moving = self.moving[of]
+        counts /= counts[moving].max(initial=LEAST_SHARE)
+        return np.minimum(1.0, counts)
 
     def centres(self, time: float) -> F64:
         found = np.array([pick.colour_at(time) for pick in self.picks]).reshape(-1, 3)
@@ -313,20 +337,20 @@ class _Problem:
 
     def at(self, time: float) -> _Solved:
         clip = self.clip
-        strengths = np.array([pick.strength_at(time, clip.step) for pick in self.picks])
-        active = np.flatnonzero(strengths[self.of] > 0)
+        strengths, certain = self.strengths(time), self.certain(time)
+        active = np.flatnonzero(strengths * certain > 0)
         if not len(active):
             return _Solved(time, {}, {})
         of = self.of[active]
-        most = strengths.max()
-        share = strengths[of] / most
+        strengths, certain = strengths[active], certain[active]
+        share = certain * strengths / strengths.max()
         radii = self.radii[active]
         centres = self.centres(time)[active]
         cut = _core.slice_at(clip.polytope, time)
         edited = _core.edited_colours(clip.polytope, clip.core.edits, cut)
         weights = _core.palette_weights(centres, cut.rgb, cut.faces)[0]
         changes = np.array([pick.change_at(time) for pick in self.picks])[of]
-        wanted = changes - weights @ (edited - cut.rgb)
+        wanted = strengths[:, None] * (changes - weights @ (edited - cut.rgb))
         scale = float(np.linalg.norm(wanted, axis=1).max())
         if scale < NONE:
             return _Solved(time, {}, {})
@@ -344,28 +368,47 @@ class _Problem:
         )
         slopes = _gathered(_slopes(cut.rgb, cut.faces), places) * free
         far = self.guard_at(guarded[:, :3], time)
-        guard = np.maximum(guarded[:, 3], LEAST_SHARE)
-        counts = self._counts(guarded, of, _bump(guarded[:, :3], centres, radii))
-        unit = 1 / max(float(guard @ (1 - far)), LEAST_SHARE) if clip.frames else 1.0
-        count = len(free)
-        found = _least_squares(
-            rows,
-            share * counts,
-            wanted,
-            guard_rows,
-            (unit * far * guard, far),
-            slopes,
-            scale,
-            self.costs[active] * counts,
-        )
-        moves = found[:count] * free[:, None]
-        sizes = found[count:] * local[:, None]
-        left = (wanted - _gathered(weights, places) @ moves - bumps @ sizes) * share[:, None]
-        sizes += _interpolated(bumps, left)
+        within = _bump(guarded[:, :3], centres, radii)
+        counts = self._counts(guarded, of, within)
+        moving = self.moving[of]
+        guard = _noticed(guarded)
+        if self.clip.frames:
+            # A pick of few pixels moves no palette colour that many pixels are mixed from.
+            near = _bump(guarded[:, :3], centres[moving], np.full(int(moving.sum()), NEAR))
+            pixels = float(guarded[:, 3] @ near.max(axis=1, initial=0.0))
+            guard *= GUARD / max(pixels, LEAST_SHARE)
+
+        def found(counts: F64, costs: F64 = counts) -> F64:
+            solved = _least_squares(
+                rows,
+                share * counts,
+                wanted,
+                guard_rows,
+                (far * guard, far),
+                slopes,
+                scale,
+                BUMP * costs,
+            )
+            solved[len(free) :] += _interpolated(bumps, certain[:, None] * (wanted - rows @ solved))
+            return solved
+
+        best = found(counts)
+        if not moving.all() and moving.any():
+            # A hold must not cost more than it keeps: where the palette would change more of the
+            # rest for its sake, its bump alone keeps it. The cost is convex, so that the mix of
+            # both solutions is within the bound.
+            other = guard * far * (1 - within[:, ~moving].max(axis=1))
+            without = found(counts * moving)
+            least, most = (
+                float(other @ np.linalg.norm(guard_rows @ x, axis=1)) for x in (without, best)
+            )
+            part = min(1.0, HOLDS_COST * least / max(most - least, NONE**2))
+            best = without + part * (best - without) if most > least else best
+        moves, sizes = best[: len(free)] * free[:, None], best[len(free) :] * local[:, None]
         return _Solved(
             time,
-            {place: most * move for place, move in zip(dict.fromkeys(places), moves, strict=True)},
-            {int(i): (c, most * a) for i, c, a in zip(active, centres, sizes, strict=True)},
+            dict(zip(dict.fromkeys(places), moves, strict=True)),
+            {int(i): (c, a) for i, c, a in zip(active, centres, sizes, strict=True)},
         )
 
     def _places(self, cut: _core.Slice, time: float) -> tuple[list[tuple[str, int]], F64]:
@@ -467,6 +510,28 @@ def _bump(colours: F64, centres: F64, radii: F64) -> F64:
     return values
 
 
+def _shade(colours: F64, centres: F64, radii: F64) -> F64:
+    """As `_bump`, but along the ray from black through its centre it is wider."""
+    offsets = colours[:, None] - centres
+    lengths = np.linalg.norm(centres, axis=1)
+    along = (offsets * centres).sum(axis=2) / np.maximum(lengths, DARK)
+    away = ((offsets**2).sum(axis=2) - (1 - SHADE**2) * along**2) / radii**2
+    values: F64 = np.maximum(0.0, 1.0 - away) ** 3
+    return values
+
+
+def _noticed(colours: F64) -> F64:
+    """Return how much a change of (m, 4) colours with shares of the picture is noticed.
+
+    In the square root of its share: a small sky too is seen as a whole. Tints of greys are noticed
+    most, as in CIE94.
+    """
+    found = np.sqrt(np.maximum(colours[:, 3], LEAST_SHARE))
+    found /= 1 + CHROMA * np.ptp(colours[:, :3], axis=1)
+    noticed: F64 = found / found.sum()
+    return noticed
+
+
 def _slopes(palette: F64, faces: NDArray[np.int32]) -> F64:
     """Return the rows (edges, palette colours) of how steeply displacements change along edges."""
     edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
@@ -518,7 +583,7 @@ def _least_squares(
         cost[:moves] = RIDGE / (np.linalg.norm(found[:moves], axis=1) / scale + SMALL_MOVE)
         changed = np.linalg.norm(guard_rows @ found, axis=1) / scale
         weights = np.maximum(weights, whole * OVERSHOOT * np.clip(changed - LARGE, 0, 1))
-        weight = weights * SMALL_CHANGE / (changed + SMALL_CHANGE)
+        weight = weights * (SMALL_CHANGE / (changed + SMALL_CHANGE)) ** EXPONENT
         weight *= float(weights.sum()) / max(float(weight.sum()), 1e-9)
     few = np.linalg.norm(found, axis=1) > FEW * scale
     few[moves:] = True

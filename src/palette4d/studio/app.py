@@ -125,12 +125,12 @@ def run(
         state = settings.value("state")
         if isinstance(state, QByteArray):
             window.restoreState(state)
+    window.setAttribute(Qt.WidgetAttribute.WA_DontShowOnScreen, hidden)
+    window.show()  # first: a dialog stands above it
     if path is not None:
         window.open_path(path, clip)
     if frame is not None:
         session.go(frame)
-    window.setAttribute(Qt.WidgetAttribute.WA_DontShowOnScreen, hidden)
-    window.show()
     sys.excepthook = functools.partial(_unexpected, session)
     if hidden:
         wait_until_shown(app, window)

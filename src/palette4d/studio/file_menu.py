@@ -12,7 +12,7 @@ from palette4d.shows import manifest
 from palette4d.shows.timeline_files import is_timeline
 from palette4d.studio import texts
 from palette4d.studio.paths import sequence_of, sidecar_of
-from palette4d.studio.session import recovery_file
+from palette4d.studio.session import recovered
 
 if TYPE_CHECKING:
     from palette4d.studio.window import Window
@@ -59,10 +59,9 @@ class FileMenu:
         self.remember(path)
 
     def _offer_recovery(self, path: Path) -> None:
-        copy = recovery_file(path)
-        if not copy.exists() or copy.stat().st_mtime < path.stat().st_mtime:
-            return
-        self.session.say(texts.RECOVERY.format(copy=copy), "warning")
+        copy = recovered(path)
+        if copy is not None:
+            self.session.say(texts.RECOVERY.format(copy=copy), "warning")
 
     def open_shot(self, path: Path) -> None:
         """Open a shot of the list."""

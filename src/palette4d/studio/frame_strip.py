@@ -1,7 +1,6 @@
 """The strip of small frames above the rows: made in a thread, with the edits, as displayed."""
 
 import bisect
-import contextlib
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
@@ -143,8 +142,7 @@ class FrameStrip:
             self._thumbs[frame] = key, QPixmap.fromImage(image)
             self._changed()
 
-        with contextlib.suppress(RuntimeError):  # the window is closed
-            self.session.post(done)
+        self.session.post(done)
 
 
 def _nearest(frames: Sequence[int], time: float) -> int:

@@ -14,6 +14,7 @@ class History(QWidget):
         super().__init__()
         self.session = session
         self.list = QListWidget()
+        self.list.setWordWrap(True)
         self.list.setAccessibleName(texts.HISTORY)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)

@@ -142,6 +142,8 @@ class Picture:
         Where colours are outside of the palette.
     share : float
         The share of those.
+    matte : bool
+        The wanted matte is shown; else its handle has no weight in this frame.
     """
 
     request: Request
@@ -151,6 +153,7 @@ class Picture:
     result: F32 | None = None
     outside: U8 | None = None
     share: float = 0.0
+    matte: bool = False
     error: str = ""
     quick_error: float = field(default=0.0)
 
@@ -289,6 +292,7 @@ class Preview:
                 assert small is not None
                 colours = _quick(small, request.grade, request.premultiplied)
             after = _painted(painter, colours, request.premultiplied, exact, check)
+        matte = None
         if request.matte is not None and request.grade is not None and after is not None:
             matte = matte_of(self._source(request), request.grade, request.matte)
             if matte is not None:
@@ -297,7 +301,15 @@ class Preview:
         if request.outside and request.grade is not None:
             outside, share = outside_of(self._source(request), request.grade)
         return Picture(
-            request, before, after, exact, result, outside, share, quick_error=painter.error
+            request,
+            before,
+            after,
+            exact,
+            result,
+            outside,
+            share,
+            matte is not None,
+            quick_error=painter.error,
         )
 
     @staticmethod

@@ -8,10 +8,11 @@ While something is dragged, the edit is tried on a copy; only its last form reac
 import contextlib
 import dataclasses
 import hashlib
+import itertools
 import os
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TypeVar
 
@@ -56,6 +57,7 @@ class Session(SessionView):
         self._document: Document | None = None
         self._trial: Document | None = None
         self._dragged: tuple[Edit, str] | None = None
+        self._copy: Path | None = None  # has the edits that could not be saved
         self._drags = 0  # how many were begun
         self._solver, self._guard = Newest("palette4d solver"), threading.Lock()
         self._stamp: tuple[int, int, int] | None = None
@@ -129,12 +131,23 @@ class Session(SessionView):
         self.say(self._fit() or texts.OPENED.format(name=Path(spec).name))
 
     def _fit(self) -> str:
-        """Return what is odd about the clip for this document."""
-        if self._document is None or self.clip is None:
-            return ""
-        from palette4d.grade.rendering import mismatches
+        """Return what is odd about the clip for this document: its size, or frames that it lacks.
 
-        return "; ".join(mismatches(self._document, self.clip, True))
+        Frames of the clip that the document does not have are not shown.
+        """
+        document, clip = self._document, self.clip
+        if document is None or clip is None:
+            return ""
+        found = []
+        width, height = document.core.clip["width"], document.core.clip["height"]
+        if (width, height) != (clip.width, clip.height):
+            own, other = f"{width}x{height}", f"{clip.width}x{clip.height}"
+            found.append(texts.OTHER_SIZE.format(own=own, found=other))
+        first, last, step = document.frames
+        lacks = {*range(first, last + 1, step)} - {*clip.frames}
+        if lacks:
+            found.append(texts.LACKS_FRAMES.format(count=len(lacks), first=min(lacks)))
+        return "; ".join(found)
 
     @property
     def frames(self) -> tuple[int, int, int]:
@@ -178,6 +191,7 @@ class Session(SessionView):
         if self.player is not None:
             self.player.close()
         self._document = self._trial = self._dragged = None
+        self._copy = None
         self.clip = self.player = self._stamp = self.probe = self.hover = self.place = None
         self.selection, self.playing, self.marks = (), 0, None
         self._edited_at, self.view = None, dataclasses.replace(self.view, version="")
@@ -360,8 +374,11 @@ class Session(SessionView):
             return False
         self._edited_at = None
         self._stamp = _stamp(document.path)
-        with contextlib.suppress(OSError):
-            recovery_file(document.path).unlink(missing_ok=True)
+        if self._copy is not None:  # what another session could not save is not touched
+            with contextlib.suppress(OSError):
+                self._copy.unlink(missing_ok=True)
+            self._copy = None
+            self.say(texts.SAVED_NOW)
         if document.state != before:
             self.say(texts.MERGED)
             self._changed()
@@ -372,10 +389,11 @@ class Session(SessionView):
         """Say why a save failed, and keep the edits in a file of the user's state folder."""
         assert self._document is not None
         assert self._document.path is not None
-        copy = recovery_file(self._document.path)
+        copy = self._copy or next(p for p in recovery_files(self._document.path) if not p.exists())
         try:
             copy.parent.mkdir(parents=True, exist_ok=True)
             self._elsewhere(self._document).save(copy, on_edits="drop")
+            self._copy = copy
             kept = texts.KEPT_IN.format(copy=copy)
         except (Palette4dError, OSError):
             kept = texts.KEPT_HERE
@@ -429,11 +447,21 @@ class Session(SessionView):
         self._changed()
 
 
-def recovery_file(sidecar: Path) -> Path:
-    """Return where edits are kept when the sidecar cannot be written."""
+def recovery_files(sidecar: Path) -> Iterator[Path]:
+    """Yield where edits are kept when the sidecar cannot be written: each session takes another."""
     state = os.environ.get("XDG_STATE_HOME") or str(Path.home() / ".local" / "state")
     name = hashlib.sha256(os.path.realpath(sidecar).encode()).hexdigest()[:12]
-    return Path(state) / "palette4d" / "recovery" / f"{name}-{sidecar.name}"
+    folder = Path(state) / "palette4d" / "recovery"
+    return (folder / f"{name}-{number}-{sidecar.name}" for number in itertools.count(1))
+
+
+def recovered(sidecar: Path) -> Path | None:
+    """Return the newest edits of a sidecar that could not be saved, if they are newer than it."""
+    kept = [*itertools.takewhile(Path.exists, recovery_files(sidecar))]
+    newest = max(kept, key=lambda path: path.stat().st_mtime, default=None)
+    if newest is None or newest.stat().st_mtime < sidecar.stat().st_mtime:
+        return None
+    return newest
 
 
 def _stamp(path: Path) -> tuple[int, int, int] | None:

@@ -2,7 +2,7 @@
 
 import functools
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -73,20 +73,24 @@ class Shots(QWidget):
             if entry.status != manifest.DONE:
                 item.setFlags(Qt.ItemFlag.ItemIsSelectable)
             self.list.addItem(item)
+
+    def draw(self, rows: Sequence[int] | None = None) -> None:
+        """Draw the thumbnails of some shots or of all, graded, in a thread."""
+        wanted = range(self.count()) if rows is None else rows
         work = threading.Thread(
-            target=self._draw, args=(self._generation,), name="palette4d shots", daemon=True
+            target=self._draw, args=(self._generation, wanted), name="palette4d shots", daemon=True
         )
         work.start()
 
-    def _draw(self, generation: int) -> None:
-        """Draw the thumbnails, graded, in a thread."""
-        for row, entry in enumerate(list(self.entries)):
+    def _draw(self, generation: int, rows: Sequence[int]) -> None:
+        entries = list(self.entries)
+        for row in rows:
             if generation != self._generation:
                 return
-            if entry.status != manifest.DONE:
+            if entries[row].status != manifest.DONE:
                 continue
             try:
-                pixels = thumbnail(self.folder / entry.sidecar)
+                pixels = thumbnail(self.folder / entries[row].sidecar)
             except (Palette4dError, OSError):
                 continue
             if pixels is not None:
@@ -100,15 +104,21 @@ class Shots(QWidget):
 
     def _chosen(self, row: int) -> None:
         if 0 <= row < len(self.entries) and self.entries[row].status == manifest.DONE:
+            left = [k for k, entry in enumerate(self.entries) if self._is_open(entry)]
             self.list.setCurrentRow(row)
             self._open(self.folder / self.entries[row].sidecar)
+            self.draw(left)
+
+    def _is_open(self, entry: manifest.Entry) -> bool:
+        return self.session.path == self.folder / entry.sidecar
 
     def open_first(self) -> None:
-        """Open the first shot that has a palette."""
+        """Open the first shot that has a palette, and draw all thumbnails."""
         for row, entry in enumerate(self.entries):
             if entry.status == manifest.DONE:
                 self._chosen(row)
-                return
+                break
+        self.draw()  # not before: two threads that import fileseq at once find it incomplete
 
     def step(self, way: int) -> None:
         """Open the next or previous shot that has a palette."""

@@ -14,6 +14,10 @@ OPENED = "opened {name}"
 CLIP_MISSING = (
     "found no clip at {source}; the palette can be edited. File > Find the clip… shows it"
 )
+OTHER_SIZE = (
+    "the palette is of a clip with {own} pixels, this clip has {found}: check that it is the clip"
+)
+LACKS_FRAMES = "the clip lacks {count} frames of the palette, the first is {first}"
 UNDONE = "undone"
 REDONE = "redone"
 MERGED = "another program edited the file too; the edits of both are kept"
@@ -39,6 +43,7 @@ READING = "reading…"
 BEFORE = "before"
 AFTER = "after"
 NEW_PICK = "choose its new colour"
+NO_MATTE = "{id} has no weight in this frame"
 MATTE, MATTE_ENDS = "weight of {id}", ("0 %", "100 %")
 PROBE_IN = "in"
 PROBE_OUT = "out"

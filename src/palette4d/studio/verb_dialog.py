@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QGuiApplication
+from PySide6.QtGui import QFontDatabase, QGuiApplication
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -125,7 +125,7 @@ class VerbDialog(QDialog):
         self.stage = QLabel()
         self.log = QPlainTextEdit()
         self.log.setReadOnly(True)
-        self.log.setFont(theme.numbers_font(9))
+        self.log.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
         self.log.setFixedHeight(130)
         for widget in (self.bar, self.stage, self.log):
             widget.hide()

@@ -128,7 +128,9 @@ class VerbMenu:
             written = max(out.glob(f"*{ENDING}"), key=lambda path: path.stat().st_mtime)
             self.window.open_path(str(written))
         else:
+            frame = self.session.frame
             self.window.open_path(str(out), dialog.value("") or None)
+            self.session.go(frame)
         dialog.close()
 
     def render(self) -> VerbDialog:
@@ -238,4 +240,8 @@ class VerbMenu:
         ]
         if show is not None:
             fields.append(Field("--shots", texts.SHOT_NAMES, value="*"))
-        return self._verb(texts.COPY_GRADE, "edit", fields)
+
+        def done(_: VerbDialog) -> None:
+            self.window.shots.draw()
+
+        return self._verb(texts.COPY_GRADE, "edit", fields, done)

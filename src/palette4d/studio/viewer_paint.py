@@ -212,22 +212,25 @@ class ViewerPainter:
             return
         painter.setFont(theme.numbers_font(9))
         measure = painter.fontMetrics()
-        words = texts.MATTE.format(id=hover)
+        words = (texts.MATTE if picture.matte else texts.NO_MATTE).format(id=hover)
         ends = texts.MATTE_ENDS
         wide = 90.0
         widths = [measure.horizontalAdvance(text) for text in (words, *ends)]
         tall = measure.height() + 8
-        box = QRectF(12, 0, sum(widths) + wide + 36, tall)
+        box = QRectF(12, 0, sum(widths) + wide + 36 if picture.matte else widths[0] + 16, tall)
         box.moveTop(self.viewer.height() - tall - 12)
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(18, 18, 18, 225))
         painter.drawRoundedRect(box, 4, 4)
         base = box.top() + 4 + measure.ascent()
         x = box.left() + 8
-        for text, width in zip((words, ends[0]), widths[:2], strict=True):
+        shown = (words, ends[0]) if picture.matte else (words,)
+        for text, width in zip(shown, widths, strict=False):
             painter.setPen(QColor(theme.BRIGHT))
             painter.drawText(QPointF(x, base), text)
             x += width + 8
+        if not picture.matte:
+            return
         colour = self._palette_colours().get(hover, QColor(theme.BRIGHT))
         scale = QLinearGradient(x, 0, x + wide, 0)
         scale.setColorAt(0, QColor(MATTE_GREY, MATTE_GREY, MATTE_GREY))

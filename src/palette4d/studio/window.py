@@ -1,5 +1,6 @@
 """The main window: viewer, timeline, solid and inspector of one session, and its menus."""
 
+import contextlib
 import functools
 import time
 from collections.abc import Callable
@@ -61,6 +62,11 @@ class _Post(QObject):
     def __init__(self, parent: QObject) -> None:
         super().__init__(parent)
         self.called.connect(lambda call: call(), Qt.ConnectionType.QueuedConnection)
+
+    def post(self, call: Callable[[], object]) -> None:
+        """Call a function on the window's thread; nothing happens when the window is gone."""
+        with contextlib.suppress(RuntimeError):  # a thread may end after the window
+            self.called.emit(call)
 
 
 class Turns(QObject):
@@ -131,7 +137,7 @@ class Window(QMainWindow):
         super().__init__()
         self.session = session
         self.settings = settings if settings is not None else QSettings("palette4d", "studio")
-        session.post = _Post(self).called.emit
+        session.post = _Post(self).post
         self.turns = Turns(self)
         session.later = self.turns.later
         self.setWindowTitle(f"{texts.TITLE}[*]")
