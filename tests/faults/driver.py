@@ -26,14 +26,14 @@ from palette4d.studio.session import Session, recovered
 for found in pkgutil.walk_packages(palette4d.__path__, "palette4d."):
     if not found.name.startswith(("palette4d.studio", "palette4d.__main__")):
         importlib.import_module(found.name)
-for name in ("OpenImageIO", "PyOpenColorIO", "scipy.optimize", "matplotlib.figure"):
+for name in ("OpenImageIO", "PyOpenColorIO", "fileseq", "opentimelineio", "matplotlib.figure"):
     importlib.import_module(name)
 
 SHIM: Any = ctypes.CDLL(None)
 SHIM.faults_names.restype = ctypes.c_char_p
 KILL, KILL_HALFWAY, NOTHING = 0, -1, -2
 #: A verb that takes longer hangs; SIGALRM ends it.
-SECONDS = 120
+SECONDS = 300
 
 
 def autosave(path: Path) -> int:

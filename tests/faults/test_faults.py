@@ -32,7 +32,7 @@ KILL, KILL_HALFWAY, NOTHING = 0, -1, -2
 REFUSALS = (errno.ENOSPC, errno.EIO, errno.EACCES, errno.EROFS, errno.EINTR)
 LASTING = (errno.ENOSPC, errno.EROFS)
 DATE = re.compile(rb"(?<=capDate\0string\0\x13\0\0\0).{19}")
-TEMPORARY = r"(.*/)?\..*\.[0-9a-f]{16}\.p4d-tmp(\.[^.]*)?"
+TEMPORARY = r"(.*/)?\..*\.[0-9a-f]{16}\.p4d-tmp(\.[^.]*|/.*)?"
 LOCK = r"(.*/)?\..*\.lock(\.[0-9a-f]{16})?"
 
 pytestmark = pytest.mark.skipif(
@@ -85,6 +85,7 @@ VERBS = {
     "config": Verb("config a.p4d.json --stops --anyway --size 5 -o ocio --jobs 1 --quiet --force"),
     "svg": Verb("plot a.p4d.json -o a.svg --force"),
     "png": Verb("plot a.p4d.json -o a.png --width 300 --force"),
+    "node": Verb("install-plugin --dest ofx"),
     "kdenlive": Verb("install-plugin --kdenlive kdenlive --shotcut shotcut --force"),
 }
 
@@ -239,8 +240,8 @@ def check(driver: Driver, material: Path, folder: Path, verb: Verb, *, full: boo
                 assert "palette4d: error: " in done["printed"], where
                 if len(changed) == 1:
                     assert rest == old, where
-            removes = action not in (KILL, KILL_HALFWAY, errno.EROFS) and "unlink" not in name
-            if removes:
+            removing = "unlink" in name or "rmdir" in name
+            if action not in (KILL, KILL_HALFWAY, errno.EROFS) and not removing:
                 assert found == rest, where
             elif done["status"] != 0 or found != rest:
                 again = run(locks=locks)

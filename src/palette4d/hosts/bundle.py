@@ -118,9 +118,16 @@ def install_bundle(
         ) from error
     except OSError as error:
         raise Palette4dError(
-            f"{target}: cannot be installed ({error.strerror}); choose another folder with dest=…"
+            f"{target}: cannot be installed ({_reason(error)}); choose another folder with dest=…"
         ) from error
     return target
+
+
+def _reason(error: OSError) -> str:
+    # One error of `copytree` holds those of all files: (from, to, text).
+    if isinstance(error, shutil.Error) and error.args[0]:
+        return str(error.args[0][0][2])
+    return error.strerror or str(error)
 
 
 def _write_program(bundle: Path) -> None:
