@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis.hpp"
+#include "palette4d_command.hpp"
 #include "buttons.hpp"
 #include "clip_image.hpp"
 #include "describe.hpp"

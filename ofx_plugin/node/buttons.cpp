@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "analysis.hpp"
+#include "palette4d_command.hpp"
 #include "paths.hpp"
 
 namespace palette4d::node {

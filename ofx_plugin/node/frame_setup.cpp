@@ -6,7 +6,7 @@
 #include <tuple>
 #include <utility>
 
-#include "analysis.hpp"
+#include "palette4d_command.hpp"
 #include "convert/colour_spaces.hpp"
 #include "handle_params.hpp"
 #include "host_time.hpp"

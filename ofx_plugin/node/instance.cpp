@@ -6,7 +6,7 @@
 #include <memory>
 #include <optional>
 
-#include "analysis.hpp"
+#include "palette4d_command.hpp"
 #include "buttons.hpp"
 #include "handle_params.hpp"
 #include "host_time.hpp"

@@ -1,4 +1,4 @@
-#include "analysis.hpp"
+#include "palette4d_command.hpp"
 
 #include <filesystem>
 #include <fstream>
@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "paths.hpp"
-#include "process.hpp"
+#include "child_process.hpp"
 #include "program_file.hpp"
 #include "windows.hpp"
 
