@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "palette4d_command.hpp"
 #include "buttons.hpp"
 #include "clip_image.hpp"
 #include "describe.hpp"
 #include "exr.hpp"
+#include "palette4d_command.hpp"
 #include "param_define.hpp"
 #include "params.hpp"
 #include "paths.hpp"

@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "paths.hpp"
 #include "child_process.hpp"
+#include "paths.hpp"
 #include "program_file.hpp"
 #include "windows.hpp"
 

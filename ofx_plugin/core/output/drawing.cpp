@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "recolour/share_rows.hpp"
+#include "threads/share_rows.hpp"
 
 namespace palette4d {
 namespace {
