@@ -170,15 +170,52 @@ def clips() -> None:
 
 
 def linear() -> None:
-    """The palette of an ACEScg clip, found in linear light and in ACEScct."""
-    figure, axes = page(12, 3.9)
-    for k, (name, text) in enumerate(
-        (("palette_in_linear_light", "in linear light"), ("palette_in_log", "in ACEScct"))
+    """Where the handles of a bright ACEScg clip lie, found in linear light and in ACEScct."""
+    config = ocio.Config.CreateFromBuiltinConfig("studio-config-latest")
+
+    def converted(colours: Any, source: str, target: str) -> Picture:
+        processor = config.getProcessor(source, target).getDefaultCPUProcessor()
+        flat = np.array(colours, np.float32).reshape(-1, 1, 3)
+        processor.applyRGB(flat)
+        return flat.reshape(np.shape(colours))
+
+    # The sample clip as light: its brightest parts are 40 times white.
+    clip = p4d.open_clip(CLIP, frames="1-48x4")
+    shown = np.stack([image[::3, ::3, :3] for _, image in clip])
+    display, light = "sRGB Encoded Rec.709 (sRGB)", "ACEScg"
+    seen = converted(shown, display, light)
+    frames = seen / (1.025 - np.clip(seen.max(axis=-1, keepdims=True), 0, 1))
+
+    figure, axes = page(12, 4.6)
+    show(axes, p4d.open_clip(CLIP).read(9), 0.25, 0.75, 4.5)
+    write(axes, 2.5, 0.42, "a frame of an ACEScg clip", fontsize=13)
+    stops = np.arange(-8, 7)
+
+    def place(colours: Picture) -> Any:
+        """Return where colours lie from left to right: stops around middle grey."""
+        grey = np.maximum(colours @ np.array([0.2722, 0.6741, 0.0537]), 1e-6)
+        return 5.4 + 6.3 * (np.clip(np.log2(grey / 0.18), -8, 6) + 8) / 14
+
+    pixels = place(frames[2].reshape(-1, 3))
+    for top, space, text in (
+        (0.75, light, "palette found in linear light: most handles are highlights"),
+        (2.55, None, "palette found in ACEScct: handles from shadow to highlight"),
     ):
-        image = Image.open(IMAGES / f"{name}.png").convert("RGB")
-        picture = np.asarray(image, dtype=np.float32) / 255
-        write(axes, 3.05 + 5.9 * k, 0.25, f"the palette of an ACEScg clip, found {text}")
-        show(axes, picture, 0.15 + 5.9 * k, 0.5, 5.8)
+        write(axes, 8.55, top - 0.3, text, fontsize=12)
+        counts, edges = np.histogram(pixels, bins=70, range=(5.4, 11.7))
+        axes.bar(edges[:-1], -1.15 * counts / counts.max(), np.diff(edges), bottom=top + 1.25,
+                 color="#3d3d3d", align="edge", zorder=1)  # fmt: skip
+        doc = p4d.analyze(frames, input_space=light, palette_space=space, vertices=20)
+        own = np.array([vertex["rgb"] for vertex in doc.fields()["polytope"]["vertices"]])
+        found = converted(own, doc.encoding, light)
+        most = np.maximum(found.max(axis=-1, keepdims=True), 0)
+        colours = np.clip(converted(1.025 * found / (1 + most), light, display), 0, 1)
+        level = np.linspace(0.2, 1.05, len(found))[np.argsort(np.argsort(own.sum(axis=1)) * 7 % 20)]
+        axes.scatter(place(found), top + level, s=150, c=colours, edgecolors=TEXT, zorder=3)
+        axes.plot([5.4, 11.7], [top + 1.25] * 2, color=DIM, lw=1)
+    for stop in stops[::2]:
+        write(axes, 5.4 + 6.3 * (stop + 8) / 14, 4.02, f"{stop:+d}" if stop else "0", color=DIM)
+    write(axes, 8.55, 4.32, "stops around middle grey; grey: the pixels of the frame", color=DIM)
     save(figure, "linear")
 
 

@@ -5,7 +5,8 @@
 docs/images/demo.jpg is the demo's own plot without its polyhedra. docs/images/timeline.jpg shows
 one colour of the same palette through time, with the parts that an edit is made of named.
 docs/images/tools.jpg shows what the tools make of one frame, docs/images/picks.jpg what picks make
-of several, docs/images/ramps.jpg the three ramps.
+of several, docs/images/looks.jpg mattes, versions and a copied grade, docs/images/ramps.jpg the
+three ramps.
 """
 
 from __future__ import annotations
@@ -38,6 +39,8 @@ HELD = 19
 
 TOOLS_AT, HOUSE, TREES = 20, (0.8, 0.14, 0.12), (0.6, 0.28, 0.05)
 """The frame of tools.jpg, and the red of its house and of its trees."""
+LAKE, OTHER_SHOT = (0.2, 0.42, 0.45), "26-34"
+"""The water's colour in that frame, and the frames that stand for another shot."""
 GOLDEN = Path(__file__).resolve().parents[1] / "tests/golden/sidecars/v1_split.p4d.json"
 
 Image8 = NDArray[np.uint8]
@@ -246,29 +249,84 @@ def draw_picks(demo: Path) -> None:
     _save_figure(figure, "picks.jpg")
 
 
+def draw_looks(demo: Path) -> None:
+    """Draw mattes and the palette of a frame, two versions, and a grade copied to another shot."""
+    sidecar, clip = demo / "sample.p4d.json", p4d.open_clip(str(demo / "clip/sample.####.png"))
+    plain = p4d.load(sidecar)
+    plain.reset()
+    gold = plain.near(GOLD, frame=TOOLS_AT).id
+    edges = {edge["id"]: edge for edge in plain.fields()["polytope"]["edges"]}
+    handle = edges[gold]["from"] if gold in edges else gold
+    warm = plain.trial()
+    warm.adjust(gold, track=True, hue=-35)
+    warm.pick(frame=TOOLS_AT, colour=LAKE, by=(0.2, -0.05, -0.1), clip=clip.source)
+    cool = plain.trial()
+    cool.adjust(chroma=0.5)
+    image = np.ascontiguousarray(clip.read(TOOLS_AT)[..., :3])
+    shot = p4d.analyze(clip.source, frames=OTHER_SHOT)
+    shot.copy_from(warm)
+    first, last, _ = shot.frames
+    middle = (first + last) // 2
+    other = np.ascontiguousarray(clip.read(middle)[..., :3])
+    pictures = [
+        ("the clip", image),
+        (f"render --output weight:{handle}", plain.matte(image, TOOLS_AT, f"weight:{handle}")),
+        ("render --output outside", plain.matte(image, TOOLS_AT, "outside", outside_at=0.02)),
+        ("version warm", warm.recolour(image, TOOLS_AT)),
+        ("version cool", cool.recolour(image, TOOLS_AT)),
+        ("render --output palette", warm.recolour(image, TOOLS_AT, show="palette")),
+        ("another shot", other),
+        ("copy of version warm", shot.recolour(other, middle)),
+    ]
+    figure = Figure(figsize=(16, 16 * (image.shape[0] / image.shape[1] + 0.035)), facecolor=PAGE)
+    for index, (title, picture) in enumerate(pictures):
+        axes = figure.add_subplot(3, 3, index + 1)
+        axes.imshow(np.clip(picture, 0, 1), cmap="grey", vmin=0, vmax=1, interpolation="bicubic")
+        axes.set_title(title, color=TEXT, fontsize=13, loc="left")
+        axes.set_axis_off()
+    figure.subplots_adjust(0.01, 0.01, 0.99, 0.96, wspace=0.02, hspace=0.1)
+    _save_figure(figure, "looks.jpg")
+
+
 def draw_ramps() -> None:
-    """Draw how an edit goes through four handles with each ramp."""
+    """Draw how an edit goes through four handles with each ramp: colours and curves."""
     document = p4d.load(GOLDEN)
     original = p4d.load(GOLDEN)
-    for frame, amount in ((2, 0.0), (4, 0.5), (6, 0.6), (8, 0.0)):
-        colour = original.colour("e1", frame=frame)
-        document.stop("e1", frame=frame, rgb=(colour[0] + amount, *colour[1:]))
-    frames = np.linspace(1, 8.9, 400)
-    figure = Figure(figsize=(14, 3.6), facecolor=PAGE)
-    for index, ramp in enumerate(("linear", "smooth", "hold")):
+    at, amounts = (2, 4, 6, 8), (0.0, 0.45, 0.6, 0.0)
+    for frame, amount in zip(at, amounts, strict=True):
+        colour = original.colour("e4", frame=frame)
+        document.stop("e4", frame=frame, rgb=(colour[0] + amount, *colour[1:]))
+    frames = np.linspace(1, 9, 1601)[:-1]
+    before = np.array([original.colour("e4", frame=t) for t in frames])
+    figure = Figure(figsize=(14, 4.6), facecolor=PAGE)
+    told = {
+        "linear": "straight from handle to handle",
+        "smooth": "no kink, no overshoot",
+        "hold": "as it is, until the next handle",
+    }
+    for index, (ramp, words) in enumerate(told.items()):
         document.set_ramp(ramp)
-        moved = [
-            document.colour("e1", frame=t)[0] - original.colour("e1", frame=t)[0] for t in frames
-        ]
+        after = np.array([document.colour("e4", frame=t) for t in frames])
+        moved = after[:, 0] - before[:, 0]
         axes = figure.add_subplot(1, 3, index + 1, facecolor=PANEL)
-        axes.plot(frames, moved, color="#f2a5c4", lw=2.5)
-        axes.plot([2, 4, 6, 8], [0, 0.5, 0.6, 0], "o", color=TEXT, ms=9)
-        axes.set_title(ramp, color=TEXT, fontsize=15)
-        axes.set(xticks=[], yticks=[], ylim=(-0.1, 0.75))
-        axes.set_xlabel("time; discs are handles", color=DIM, fontsize=11)
+        for low, colours in ((0.94, before), (0.74, after)):
+            axes.imshow(np.clip(colours[np.newaxis], 0, 1), extent=(1, 9, low, low + 0.16),
+                        aspect="auto")  # fmt: skip
+        # The area below the curve has the edited colour of its frame.
+        area = axes.imshow(np.clip(after[np.newaxis], 0, 1), extent=(1, 9, 0, 0.62), aspect="auto")
+        outline = axes.fill_between(frames, moved, color="none")
+        area.set_clip_path(outline.get_paths()[0], transform=axes.transData)
+        axes.plot(frames, moved, color=TEXT, lw=2)
+        axes.vlines(at, 0, 1.1, color=TEXT, lw=0.8, ls=":", alpha=0.6)
+        axes.plot(at, amounts, "o", color=TEXT, ms=10, mec=PAGE)
+        axes.set_title(f"{ramp}: {words}", color=TEXT, fontsize=14)
+        axes.set(xlim=(1, 9), ylim=(-0.05, 1.12), yticks=[])
+        axes.set_xticks(at, [f"handle\nframe {frame}" for frame in at], color=DIM, fontsize=10)
+        axes.tick_params(length=0)
         if index == 0:
-            axes.set_ylabel("how far the edit\nmoves the colour", color=DIM, fontsize=11)
-    figure.subplots_adjust(0.06, 0.13, 0.99, 0.88, wspace=0.06)
+            axes.set_yticks([0.3, 0.82, 1.02], ["how far it\nmoves", "after", "before"],
+                            color=TEXT, fontsize=11)  # fmt: skip
+    figure.subplots_adjust(0.075, 0.12, 0.99, 0.92, wspace=0.04)
     _save_figure(figure, "ramps.jpg")
 
 
@@ -286,6 +344,7 @@ def main() -> None:
         draw_timeline(demo, Path(folder))
     draw_tools(demo)
     draw_picks(demo)
+    draw_looks(demo)
     draw_ramps()
 
 

@@ -10,13 +10,14 @@ OFX = Path(__file__).resolve().parents[1] / "ofx_plugin"
 # includes it, so cycles are impossible. The node never sees `fit`, which serves the analysis alone.
 ROOMS: dict[str, set[str]] = {
     "core/simd": set(),
+    "core/threads": set(),
     "core/model": set(),
     "core/convert": {"model"},
     "core/sidecar": {"model", "convert"},
-    "core/recolour": {"simd", "model", "convert"},
+    "core/recolour": {"simd", "threads", "model", "convert"},
     "core/lattice": {"simd", "model", "convert", "recolour"},
-    "core/output": {"model", "convert", "recolour"},
-    "core/fit": {"simd", "model"},
+    "core/output": {"threads", "model", "convert", "recolour"},
+    "core/fit": {"simd", "threads", "model"},
     "node": {"model", "convert", "sidecar", "recolour", "lattice", "output"},
 }
 INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"', re.MULTILINE)

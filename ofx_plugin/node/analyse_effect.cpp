@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "analysis.hpp"
 #include "buttons.hpp"
 #include "clip_image.hpp"
 #include "describe.hpp"
 #include "exr.hpp"
+#include "palette4d_command.hpp"
 #include "param_define.hpp"
 #include "params.hpp"
 #include "paths.hpp"
@@ -57,7 +57,7 @@ OfxStatus describe_in_context(const Suites& suites, OfxImageEffectHandle effect)
     define
         .button({kParamAnalyse, "Analyse",
                  "Fetches all frames of the input and finds their palette in the background. Push "
-                 "again to stop."})
+                 "again to cancel."})
         .set_int(kOfxParamPropLayoutHint, kOfxParamPropLayoutHintNoNewLine);
     define.button(
         {kParamOpenInStudio, "Open in Studio", "Opens the sidecar in the window of palette4d."});
@@ -173,7 +173,7 @@ std::optional<std::pair<long, long>> source_range(const Suites& suites,
 
 /// Fetches the frames and starts the analysis; the line for the status.
 std::string analyse(const Suites& suites, OfxImageEffectHandle effect, const std::string& target) {
-    if (stop_analysis(target)) return "stopped the analysis";
+    if (cancel_analysis(target)) return "cancelled the analysis";
     if (target.empty()) return "enter the path of the new sidecar, such as ~/shot.p4d.json";
     const fs::path sidecar = native(target);
     std::error_code error;

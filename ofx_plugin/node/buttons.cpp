@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "analysis.hpp"
+#include "palette4d_command.hpp"
 #include "paths.hpp"
 
 namespace palette4d::node {
@@ -36,7 +36,7 @@ void define_buttons(ParamDefiner& define) {
     define
         .button({kParamAnalyse, "Analyse",
                  "Finds the clip's palette in the background and writes it to Sidecar; without a "
-                 "name there, beside the clip. Status shows the progress. Push again to stop."})
+                 "name there, beside the clip. Status shows the progress. Push again to cancel."})
         .set_int(kOfxParamPropLayoutHint, kOfxParamPropLayoutHintNoNewLine);
     define
         .button({kParamOpenInStudio, "Open in Studio",
@@ -57,7 +57,7 @@ std::string analysis_target(const Params& params, const Chosen& chosen) {
 
 std::string push_analyse(const Params& params, Chosen& chosen) {
     const std::string target = analysis_target(params, chosen);
-    if (stop_analysis(target)) return "stopped the analysis";
+    if (cancel_analysis(target)) return "cancelled the analysis";
     const std::string clip = clip_of(params, chosen);
     if (clip.empty()) {
         return "Analyse: the host does not report the clip's file; choose it as Clip's file";

@@ -39,16 +39,12 @@ void draw(const Image& in, const Image& out, const OfxRectI& area, const NodeDra
     if (is_empty(covered)) return;
     const bool edit_alone = options.edit_alone() && !drawing.mask;
     if (edit_alone && in.depth == Depth::kFloat) {
-        RecolourOptions recolouring;
-        recolouring.strength = options.strength;
-        recolouring.premultiplied = in.premultiplied;
-        recolouring.conversion = drawing.conversion.get();
         const int width = covered.x2 - covered.x1, height = covered.y2 - covered.y1;
-        drawing.edit->apply({reinterpret_cast<const float*>(in.at(covered.x1, covered.y1)), width,
-                             height, in.channels, in.row_bytes},
-                            {reinterpret_cast<float*>(out.at(covered.x1, covered.y1)), width,
-                             height, out.channels, out.row_bytes},
-                            recolouring);
+        draw_edit({reinterpret_cast<const float*>(in.at(covered.x1, covered.y1)), width, height,
+                   in.channels, in.row_bytes},
+                  {reinterpret_cast<float*>(out.at(covered.x1, covered.y1)), width, height,
+                   out.channels, out.row_bytes},
+                  in.premultiplied, drawing);
         return;
     }
     const auto channels = static_cast<std::size_t>(in.channels);

@@ -6,12 +6,12 @@
 #include <tuple>
 #include <utility>
 
-#include "analysis.hpp"
 #include "convert/colour_spaces.hpp"
 #include "handle_params.hpp"
 #include "host_time.hpp"
 #include "model/handles.hpp"
 #include "output_params.hpp"
+#include "palette4d_command.hpp"
 #include "params.hpp"
 #include "sidecar_cache.hpp"
 #include "sidecar_choice.hpp"

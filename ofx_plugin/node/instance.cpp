@@ -6,11 +6,11 @@
 #include <memory>
 #include <optional>
 
-#include "analysis.hpp"
 #include "buttons.hpp"
 #include "handle_params.hpp"
 #include "host_time.hpp"
 #include "output_params.hpp"
+#include "palette4d_command.hpp"
 #include "params.hpp"
 #include "sidecar_choice.hpp"
 #include "speed_mode.hpp"

@@ -119,7 +119,7 @@ def analyze(
     rate : Fraction, optional
         Frames per second; by default the files' rate, or 24.
     skip_bad_frames : bool
-        Skip missing and unreadable frames instead of stopping at the first.
+        Skip missing and unreadable frames instead of ending at the first.
     allow_cuts : bool
         Analyse a clip with sudden cuts as one shot instead of refusing it.
     input_space, palette_space, ocio_config : str, optional

@@ -51,6 +51,7 @@ def test_the_same_palette_gets_the_same_grade() -> None:
     source, target = graded(), Document(members("split"))
     fit = target.copy_from(source)
     assert worst(target, source, [(t, t) for t in range(21)]) < 4 / 255
+    assert fit.fits
     assert fit.change > 0.02
     assert fit.mean < 1 / 255
     assert fit.largest < 4 / 255
@@ -136,6 +137,8 @@ def test_colours_that_the_source_lacks_are_reported() -> None:
     source.adjust(by=(0.1, 0, 0))
     fit = target.copy_from(source)
     assert fit.foreign > 0.5
+    assert not fit.fits
+    assert "does not fit" in str(fit)
     assert "not in" in str(fit)
 
 

@@ -72,7 +72,7 @@ TEST(the_frames_of_the_host_are_analysed) {
               .find("analyze\n" + (folder() / "shot.frames" / "shot.######.exr").u8string() +
                     "\n-o\n" + effect.target.u8string() + "\n") != std::string::npos);
     effect.push();
-    CHECK(effect.node->text("status").find("stopped") == 0);
+    CHECK(effect.node->text("status").find("cancelled") == 0);
     // Again, over the frames of the first time.
     write("go", "done\n");
     effect.push();

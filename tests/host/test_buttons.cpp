@@ -201,7 +201,7 @@ TEST(a_second_push_stops_the_analysis) {
     CHECK(window.node->text("sidecar") == target.u8string());
     CHECK(soon([&] { return window.says("3 of 40"); }));
     window.push("analyse");
-    EXPECT(window.node->text("status").find("stopped the analysis") == 0,
+    EXPECT(window.node->text("status").find("cancelled the analysis") == 0,
            window.node->text("status"));
     CHECK(soon([] { return ::waitpid(-1, nullptr, WNOHANG) == -1 && errno == ECHILD; }));
     write("go", "done\n");

@@ -233,3 +233,23 @@ def test_the_verb_installs_the_packaged_node(
     binaries = list((tmp_path / "OFX" / BUNDLE).glob("Contents/*/Palette4D.ofx"))
     assert len(binaries) == 1
     assert binaries[0].stat().st_size > 100_000
+
+
+def test_without_a_folder_the_verb_says_first_where_it_installs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "plugins"
+    monkeypatch.setenv("OFX_PLUGIN_PATH", str(folder))
+    parser = argparse.ArgumentParser()
+    install_plugin.add_parser(parser.add_subparsers())
+    args = parser.parse_args(["install-plugin"])
+    assert args.run(args) == 0
+    first, second = capsys.readouterr().out.splitlines()[:2]
+    assert str(folder) in first
+    assert "--dest" in first
+    assert str(folder / BUNDLE) in second
+    folder.rename(tmp_path / "file")
+    folder.touch()
+    with pytest.raises(Palette4dError):
+        args.run(args)
+    assert str(folder) in capsys.readouterr().out

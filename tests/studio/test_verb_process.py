@@ -22,6 +22,6 @@ def test_a_job_does_what_the_command_does_and_reports(tmp_path: Path, analysed: 
 def test_a_stopped_job_leaves_nothing(tmp_path: Path, analysed: Path) -> None:
     out = tmp_path / "stopped.p4d.json"
     job = VerbProcess(["analyze", str(analysed / "clip"), "-o", str(out)], lambda job: None)
-    job.stop()
+    job.cancel()
     assert job.wait(30) != 0
     assert not out.exists()

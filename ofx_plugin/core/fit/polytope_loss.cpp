@@ -1,12 +1,12 @@
 #include "fit/polytope_loss.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <exception>
 #include <stdexcept>
-#include <system_error>
-#include <thread>
+#include <string>
+#include <utility>
+
+#include "threads/share_rows.hpp"
 
 namespace palette4d {
 namespace {
@@ -102,32 +102,15 @@ std::vector<FrameLoss> polytope_loss(const std::vector<Vec4>& vertices,
     const int count = static_cast<int>(which.size());
     std::vector<FrameLoss> losses(which.size());
     std::vector<std::vector<std::pair<int, Vec4>>> parts(gradient ? which.size() : 0);
-    std::atomic<int> next{0};
-    std::vector<std::exception_ptr> failures(static_cast<std::size_t>(std::max(1, threads)));
-    auto work = [&](std::size_t self) {
-        try {
-            Scratch scratch;
-            for (int i = next++; i < count; i = next++) {
-                const FrameColours& frame = frames[which[i]];
-                losses[i] = one_frame(vertices, block_of(blocks, frame.frame), frame, weights,
-                                      scratch, gradient ? &parts[i] : nullptr);
-            }
-        } catch (...) {
-            failures[self] = std::current_exception();
+    // A frame takes microseconds: a few of them are not worth a thread.
+    share_rows(count, std::max(1, std::min(threads, count / 4)), [&](const NextRow& next) {
+        Scratch scratch;
+        for (int i = next(); i >= 0; i = next()) {
+            const FrameColours& frame = frames[which[i]];
+            losses[i] = one_frame(vertices, block_of(blocks, frame.frame), frame, weights, scratch,
+                                  gradient ? &parts[i] : nullptr);
         }
-    };
-    const int used = std::max(1, std::min(threads, count / 4));
-    std::vector<std::thread> pool;
-    pool.reserve(static_cast<std::size_t>(used - 1));
-    try {
-        for (int i = 1; i < used; ++i) pool.emplace_back(work, i);
-    } catch (const std::system_error&) {
-        // The system gives no more threads: those that run share the frames.
-    }
-    work(0);
-    for (std::thread& t : pool) t.join();
-    for (const std::exception_ptr& failure : failures)
-        if (failure) std::rethrow_exception(failure);
+    });
 
     if (gradient) {
         gradient->assign(vertices.size(), Vec4{0, 0, 0, 0});

@@ -36,10 +36,8 @@ void locate(const LatticeDomain& domain, LatticeBlock& block, const float* from,
     }
     if (premultiplied) {
         for (int i = 0; i < count; ++i) {
-            const float alpha = from[i * 4 + 3];
-            for (int c = 0; c < 3; ++c) {
-                block.colour[c][i] = palette4d::straight(block.colour[c][i], alpha);
-            }
+            const float by = palette4d::divisor(from[i * 4 + 3]);
+            for (int c = 0; c < 3; ++c) block.colour[c][i] /= by;
         }
     }
     constexpr float kSide = palette4d::kLatticeSide + 1, kCells = palette4d::kLatticeSide;

@@ -13,14 +13,20 @@ inline constexpr float kLeastAlpha = 1.0f / 255;
 /// tiny. Recolouring lets other pixels pass, and the analysis leaves them out.
 template <class T>
 inline __attribute__((always_inline)) bool divides(T alpha) {
-    return alpha != 0 && 0 * alpha == 0;  // 0 times infinity is NaN
+    return (alpha != 0) & (0 * alpha == 0);  // 0 times infinity is NaN; no branch
 }
 
-/// A channel of a premultiplied pixel, divided by the pixel's alpha; NaN where it divides nothing.
+/// What its channels are divided by; NaN where alpha divides nothing.
+template <class T>
+inline __attribute__((always_inline)) T divisor(T alpha) {
+    constexpr T kNone = std::numeric_limits<T>::quiet_NaN();
+    return divides(alpha) ? alpha : kNone;
+}
+
+/// A channel of a premultiplied pixel, divided by the pixel's alpha.
 template <class T>
 inline __attribute__((always_inline)) T straight(T channel, T alpha) {
-    constexpr T kNone = std::numeric_limits<T>::quiet_NaN();
-    return channel / (divides(alpha) ? alpha : kNone);
+    return channel / divisor(alpha);
 }
 
 }  // namespace palette4d

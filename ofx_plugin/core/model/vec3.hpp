@@ -1,4 +1,4 @@
-// Three-component arithmetic for the core's own sources (not installed, not used by the node).
+// Three-component arithmetic.
 #pragma once
 
 #include <cmath>

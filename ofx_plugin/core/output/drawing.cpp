@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "recolour/share_rows.hpp"
+#include "threads/share_rows.hpp"
 
 namespace palette4d {
 namespace {
@@ -111,33 +111,35 @@ void draw_matte(const Pixels& pixels, const Drawing& drawing) {
     }
 }
 
-/// Recolours without threads of its own: the caller shares out the pixels.
-void recolour(const Pixels& pixels, const Drawing& drawing) {
+}  // namespace
+
+void draw_edit(const ConstImageView& in, const ImageView& out, bool premultiplied,
+               const Drawing& drawing) {
     if (!drawing.edit) {
-        if (pixels.result != pixels.source) {
-            std::copy_n(pixels.source, pixels.count * pixels.channels, pixels.result);
+        if (in.data == out.data) return;
+        for (int y = 0; y < in.height; ++y) {
+            const char* from = reinterpret_cast<const char*>(in.data) + in.row_bytes * y;
+            char* to = reinterpret_cast<char*>(out.data) + out.row_bytes * y;
+            std::copy_n(from, sizeof(float) * static_cast<std::size_t>(in.width * in.channels), to);
         }
         return;
     }
     RecolourOptions options;
     options.strength = drawing.options.strength;
-    options.premultiplied = pixels.premultiplied;
+    options.premultiplied = premultiplied;
     options.conversion = drawing.conversion.get();
-    const auto width = static_cast<int>(pixels.count);
-    const auto channels = static_cast<int>(pixels.channels);
-    const auto stride = static_cast<std::ptrdiff_t>(pixels.count * pixels.channels * sizeof(float));
-    drawing.edit->apply({pixels.source, width, 1, channels, stride},
-                        {pixels.result, width, 1, channels, stride}, options);
+    drawing.edit->apply(in, out, options);
 }
-
-}  // namespace
 
 void draw_pixels(const Pixels& pixels, const Drawing& drawing) {
     const DrawingOptions& options = drawing.options;
     if (options.is_matte()) {
         draw_matte(pixels, drawing);
     } else {
-        recolour(pixels, drawing);
+        const auto width = static_cast<int>(pixels.count);
+        const auto channels = static_cast<int>(pixels.channels);
+        draw_edit({pixels.source, width, 1, channels, 0}, {pixels.result, width, 1, channels, 0},
+                  pixels.premultiplied, drawing);
         if (options.keep > 0) keep_lightness(pixels, options);
     }
     if (options.mix < 1) mix_in_source(pixels, options.mix, {});

@@ -60,6 +60,10 @@ struct Pixels {
     bool premultiplied;
 };
 
+/// Draws the edit alone, row by row, whatever gaps are between rows; copies where there is no edit.
+/// `in` and `out` have the same size and channels, and may be the same.
+void draw_edit(const ConstImageView& in, const ImageView& out, bool premultiplied,
+               const Drawing& drawing);
 /// Draws all but the strip of Output::kPalette. A pixel's result depends on that pixel alone.
 void draw_pixels(const Pixels& pixels, const Drawing& drawing);
 /// Draws the strip into a row, pixels x1 to x2 of row y, if the strip covers that row.

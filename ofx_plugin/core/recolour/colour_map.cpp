@@ -11,7 +11,7 @@
 
 #include "model/alpha.hpp"
 #include "model/vec3.hpp"
-#include "recolour/share_rows.hpp"
+#include "threads/share_rows.hpp"
 
 namespace palette4d {
 namespace {

@@ -121,12 +121,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--skip-bad-frames",
         action="store_true",
-        help="skip missing and unreadable frames instead of stopping at the first",
+        help="skip missing and unreadable frames instead of ending at the first",
     )
     parser.add_argument(
         "--allow-cuts",
         action="store_true",
-        help="analyse a clip with sudden cuts as one shot instead of stopping",
+        help="analyse a clip with sudden cuts as one shot instead of refusing it",
     )
     edits = parser.add_mutually_exclusive_group()
     for flag, text in (

@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from palette4d.hosts.bundle import default_destination
+from palette4d.hosts.bundle import SEARCH_PATH, default_destination, system_destination
 from palette4d.hosts.install import install_plugin
 
 _EPILOG = """\
@@ -40,8 +40,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--dest",
         type=lambda text: Path(text).expanduser(),
         metavar="DIR",
-        help="folder of plugins (default: the first of OFX_PLUGIN_PATH, else the system's; here "
-        f"{default_destination()})".replace("%", "%%"),
+        help="folder of plugins, such as ~/OFX for yourself (default: the first of "
+        f"OFX_PLUGIN_PATH, else the one for all users; here {default_destination()})".replace(
+            "%", "%%"
+        ),
     )
     parser.add_argument("--link", action="store_true", help="make a symbolic link, not a copy")
     for program, what in (("kdenlive", "effect file"), ("shotcut", "filter")):
@@ -65,6 +67,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Install, and print the next steps in the host."""
+    if args.dest is None and not (args.kdenlive or args.shotcut):
+        folder = default_destination()
+        of_all = folder == system_destination()
+        print(
+            f"{'for all users of this machine' if of_all else f'for hosts with {SEARCH_PATH}'}, "
+            f"into {folder}; --dest DIR installs elsewhere, such as for yourself"
+        )
     for path in install_plugin(
         args.dest, link=args.link, kdenlive=args.kdenlive, shotcut=args.shotcut, force=args.force
     ):

@@ -82,8 +82,8 @@ class HandleEdits(EditedPalette):
     ) -> Near:
         """Change the palette colour nearest to a given colour at a frame.
 
-        A vertex within half a frame step moves, so that the colour at the frame is exactly the new
-        one. Otherwise the stop at that time gets the colour, or a new stop.
+        The stop at that time moves, or a vertex within half a frame step, so that the colour at the
+        frame is exactly the new one. Otherwise a stop is added.
 
         Parameters
         ----------

@@ -88,7 +88,7 @@ STEP, MOST_TIMES = 4, 40
 # Keys that a straight line between their neighbours meets within this are left out.
 STRAIGHT = 4e-4
 # A colour that is guarded by at least this is none of those that the user wants to change.
-OTHER = 0.5
+OTHER = 0.9
 # Displacements below this (a quarter of an 8-bit step) are none.
 NONE = 1e-3
 # Stored numbers are rounded, so that the last bits of a LAPACK never show.

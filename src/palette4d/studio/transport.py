@@ -4,13 +4,14 @@ import functools
 import time
 
 from PySide6.QtCore import QObject, QPointF, QRectF, QSize, Qt, QTimer
-from PySide6.QtGui import QColor, QIcon, QPainter, QPixmap, QPolygonF
+from PySide6.QtGui import QColor, QIcon, QPainter, QPixmap, QPolygonF, QResizeEvent
 from PySide6.QtWidgets import (
     QButtonGroup,
     QComboBox,
     QDoubleSpinBox,
     QHBoxLayout,
     QLabel,
+    QLayout,
     QSizePolicy,
     QSpinBox,
     QToolButton,
@@ -29,6 +30,8 @@ AHEAD = 16
 READY, PATIENCE = 4, 0.6
 #: Milliseconds between two looks at the clock while playing.
 CLOCK = 4
+#: The least width of the bar.
+LEAST_WIDTH = 460
 #: Seconds between two requests for frames that are late.
 ASK_EVERY = 0.03
 
@@ -181,6 +184,7 @@ class Transport(QWidget):
         self.session, self.playback = session, playback
         self._silent = False
         row = QHBoxLayout(self)
+        row.setSizeConstraint(QLayout.SizeConstraint.SetNoConstraint)  # it leaves things out
         row.setContentsMargins(8, 4, 8, 4)
         row.setSpacing(3)
         self.buttons: dict[str, QToolButton] = {}
@@ -206,6 +210,7 @@ class Transport(QWidget):
         self.facts.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.facts.setMinimumWidth(96)
         row.addWidget(self.facts, 2)
+        self.labels: list[QLabel] = []
         self.compare: dict[str, QToolButton] = {}
         group = QButtonGroup(self)
         for key, text in texts.COMPARE.items():
@@ -233,6 +238,9 @@ class Transport(QWidget):
         row.addSpacing(6)
         self.exposure = self._number(row, texts.EXPOSURE, -10, 10, 0.25, "exposure", "+0.00")
         self.gamma = self._number(row, texts.GAMMA, 0.2, 5, 0.05, "gamma", "0.00")
+        #: What is left out where there is no room, in this order; the menus have it too.
+        looks = [self.exposure, self.gamma, *self.labels]
+        self.extras: list[list[QWidget]] = [[self.facts], looks, [*self.compare.values()]]
         for event in ("clip", "document", "view", "range"):
             session.on(event, self._show, panel=True)
         session.on("frame", self._show_frame)
@@ -241,12 +249,28 @@ class Transport(QWidget):
         self._clock.timeout.connect(self._show_facts)
         self._show()
 
+    def minimumSizeHint(self) -> QSize:
+        """Return the least size: half of a small screen at 200 %."""
+        return QSize(LEAST_WIDTH, super().minimumSizeHint().height())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Leave out what has no room."""
+        layout = self.layout()
+        for widget in (each for extra in self.extras for each in extra):
+            widget.show()
+        for extra in self.extras:
+            if layout is not None and layout.minimumSize().width() > self.width():
+                for widget in extra:
+                    widget.hide()
+        super().resizeEvent(event)
+
     def _number(
         self, row: QHBoxLayout, text: str, low: float, high: float, step: float, name: str, _: str
     ) -> QDoubleSpinBox:
         label = QLabel(text)
         label.setStyleSheet(f"color: {theme.FAINT}")
         row.addWidget(label)
+        self.labels.append(label)
         box = QDoubleSpinBox()
         box.setRange(low, high)
         box.setSingleStep(step)

@@ -243,8 +243,8 @@ class VerbDialog(QDialog):
                 return
             self.bar.setRange(0, 1000)
             self.bar.setValue(1000 if job.status == 0 else 0)
-            if job.stopped:
-                self.stage.setText(texts.STOPPED)
+            if job.cancelled:
+                self.stage.setText(texts.CANCELLED)
             else:
                 self.stage.setText(texts.DONE if job.status == 0 else texts.FAILED)
             self.go.setEnabled(True)
@@ -259,13 +259,13 @@ class VerbDialog(QDialog):
 
     def _stop_or_close(self) -> None:
         if self.job is not None:
-            self.job.stop()
+            self.job.cancel()
         else:
             self.close()
 
     def reject(self) -> None:
-        """Stop what runs, then close."""
+        """Cancel what runs, then close."""
         if self.job is not None:
-            self.job.stop()
+            self.job.cancel()
             self.job = None
         super().reject()

@@ -1,4 +1,4 @@
-"""Long work in a child process: the command line's own verbs, with progress and a way to stop.
+"""Long work in a child process: the command line's own verbs, with progress and a way to cancel.
 
 A child's crash is a message in the window, not its end. Its command line can be copied.
 """
@@ -24,7 +24,7 @@ _OPEN_BAR = re.compile(r"\[\d+:\d\d[<,]")
 #: Rows and columns of the terminal that a child sees.
 TERMINAL = (24, 120)
 
-#: Seconds in which a stopped child may clean up.
+#: Seconds in which a cancelled child may clean up.
 GRACE = 3.0
 
 
@@ -61,7 +61,7 @@ class VerbProcess:
         self.what, self.fraction = "", None  # type: tuple[str, float | None]
         self.output = self.messages = ""
         self.status: int | None = None
-        self.stopped = False
+        self.cancelled = False
         self._changed = changed
         # tqdm draws its bars only for a terminal.
         self._reader, writer = os.openpty()
@@ -83,9 +83,9 @@ class VerbProcess:
         """The command line that does the same."""
         return command_line(self.words)
 
-    def stop(self) -> None:
-        """Stop it as Ctrl-C does; a child that does not end is killed."""
-        self.stopped = True
+    def cancel(self) -> None:
+        """End it as Ctrl-C does; a child that does not end is killed."""
+        self.cancelled = True
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self._process.pid, 2)
         timer = threading.Timer(GRACE, self._kill)

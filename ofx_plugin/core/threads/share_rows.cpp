@@ -1,4 +1,4 @@
-#include "recolour/share_rows.hpp"
+#include "threads/share_rows.hpp"
 
 #include <algorithm>
 #include <atomic>

@@ -1,4 +1,4 @@
-#include "analysis.hpp"
+#include "palette4d_command.hpp"
 
 #include <filesystem>
 #include <fstream>
@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "child_process.hpp"
 #include "paths.hpp"
-#include "process.hpp"
 #include "program_file.hpp"
 #include "windows.hpp"
 
@@ -175,7 +175,7 @@ std::string start_analysis(const std::string& clip, const std::string& sidecar) 
     return problem;
 }
 
-bool stop_analysis(const std::string& sidecar) {
+bool cancel_analysis(const std::string& sidecar) {
     Analyses& all = analyses();
     const std::lock_guard<std::mutex> lock(all.mutex);
     const auto found = all.by_sidecar.find(key_of(sidecar));
@@ -203,7 +203,7 @@ AnalysisState analysis_state(const std::string& sidecar) {
     if (!one.child) return {false, one.failure};
     const std::string line = last_line(one.folder / "progress");
     return {true, "analysing " + one.clip + (line.empty() ? "" : ": " + line) +
-                      "; push Analyse to stop it"};
+                      "; push Analyse to cancel it"};
 }
 
 void forget_failed_analyses() {

@@ -15,7 +15,7 @@ std::string open_in_studio(const std::string& path, std::optional<double> frame)
 std::string start_analysis(const std::string& clip, const std::string& sidecar);
 
 /// Ends it; false where none runs.
-bool stop_analysis(const std::string& sidecar);
+bool cancel_analysis(const std::string& sidecar);
 
 /// What an analysis does; or, until forgotten, why it failed.
 struct AnalysisState {

@@ -1,4 +1,4 @@
-// Shares the rows of a picture among threads.
+// Shares work among threads: the rows of a picture, the frames of a clip.
 #pragma once
 
 #include <functional>
