@@ -33,12 +33,9 @@ def test_steps_are_undone_in_other_sessions(plain: Path) -> None:
         lambda d: d.set("v1", rgb="#ff8000"),
         lambda d: d.stop("e1", frame=3, rgb=(0.5, 0.5, 0.5)),
         lambda d: d.set_ramp("smooth"),
-        lambda d: d.save_version("warm"),
         lambda d: d.set_ramp("hold", "s1"),
         lambda d: d.move("s1", frame=4),
-        lambda d: d.use_version("warm"),
         lambda d: d.reset(),
-        lambda d: d.remove_version("warm"),
     ]
     for each in acts:
         document = Document.load(plain)
@@ -172,6 +169,75 @@ def test_versions(plain: Path) -> None:
     assert Document.load(plain).versions == document.versions
 
 
+def test_no_step_takes_a_version_away(plain: Path) -> None:
+    document = Document.load(plain)
+    document.set("v1", rgb=(1, 0, 0))
+    document.set("v2", rgb=(1, 0, 0))
+    document.undo()
+    document.save_version("crimson")
+    assert [step.label for step in document.history] == ["set v1 to 1 0 0"]
+    assert document.undone  # saving a version leaves what redo does
+    document.save()
+    document = Document.load(plain)
+    document.undo()
+    document.set("v1", rgb=(0, 0, 1))
+    assert document.versions == ("crimson",)
+    document.use_version("crimson")
+    assert (document.colour("v1"), len(document.history)) == ((1, 0, 0), 2)
+    document.undo()
+    assert document.colour("v1") == (0, 0, 1)
+    assert document.versions == ("before crimson", "crimson")
+    assert document.use_version("crimson") is None
+    document.set("v1", rgb=(0, 1, 0))
+    assert document.save_version("crimson") == "former crimson"
+    assert document.save_version("crimson") is None
+    assert document.version("former crimson").colour("v1") == (1, 0, 0)
+
+
+def test_a_removed_version_comes_back(plain: Path) -> None:
+    document = Document.load(plain)
+    document.set("v1", rgb=(1, 0, 0))
+    document.save_version("red")
+    document.remove_version("red")
+    document.undo()
+    assert document.version("red").colour("v1") == (1, 0, 0)
+    document.redo()
+    assert document.versions == ()
+    document.set("v1", rgb=(0, 1, 0))
+    document.save_version("red")
+    document.undo()
+    document.undo()  # the removal; the name holds other edits now
+    document.redo()
+    assert document.version("red").colour("v1") == (0, 1, 0)
+
+
+def test_versions_of_two_writers_are_no_steps(plain: Path) -> None:
+    mine, theirs = Document.load(plain), Document.load(plain)
+    mine.set("v1", rgb=(1, 0, 0))
+    mine.save_version("red")
+    theirs.set("v2", rgb=(0, 0, 1))
+    theirs.save_version("blue")
+    mine.save()
+    theirs.save()
+    found = Document.load(plain)
+    assert found.versions == ("blue", "red")
+    assert [step.label for step in found.history] == ["set v1 to 1 0 0", "set v2 to 0 0 1"]
+
+
+def test_steps_of_older_files_that_save_versions(plain: Path) -> None:
+    document = Document.load(plain)
+    document.set("v1", rgb=(1, 0, 0))
+    document.save_version("red")
+    document.save()
+    fields = sidecar.load(plain)
+    held = document.fields()["versions"][0]["edits"]
+    saved = {"step": "save version red", "changes": [["version", "red", None, held]]}
+    fields["history"]["done"].append(saved)
+    document = Document(fields)
+    assert document.undo().label == "set v1 to 1 0 0"
+    assert document.versions == ("red",)
+
+
 def test_a_version_is_a_document_of_its_own(plain: Path, tmp_path: Path) -> None:
     document = Document.load(plain)
     document.set("v1", rgb=(1, 0, 0))
@@ -289,7 +355,7 @@ def test_any_edits_can_be_undone_and_done_again(plain: Path, acts: list[Any]) ->
     while document.history:
         document.undo()
     document.save()
-    bare = {n: v for n, v in sidecar.load(plain).items() if n != "history"}
+    bare = {n: v for n, v in sidecar.load(plain).items() if n not in ("history", "versions")}
     assert sidecar.encoded(bare) == first
     document = Document.load(plain)
     undone = 0

@@ -47,7 +47,8 @@ def _add_version(action: Action) -> None:
         "version",
         "(save NAME | list | use NAME | remove NAME)",
         "keep edits under a name, list the names, or make the edits of a version the active edits. "
-        "Active edits that no version holds are kept as a version first.",
+        "Active edits that no version holds are kept as a version first. Undo never takes "
+        "a version away.",
     )
     what = version.add_subparsers(title="actions", metavar="WHAT", dest="what", required=True)
     for name, text in (
@@ -126,11 +127,13 @@ def run_version(args: argparse.Namespace) -> int:
             print("no versions")
         return 0
     if args.what == "save":
-        document.save_version(args.name)
+        former = document.save_version(args.name)
         text = f"version {args.name}: holds the active edits"
+        if former is not None:
+            text += f"\nits edits before are kept as version {former}"
     elif args.what == "remove":
         document.remove_version(args.name)
-        text = f"version {args.name}: removed"
+        text = f"version {args.name}: removed; `undo` brings it back"
     else:
         kept = document.use_version(args.name)
         text = f"version {args.name}: its edits are the active edits"

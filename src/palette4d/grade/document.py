@@ -113,19 +113,32 @@ class Document(HandleEdits, PickEdits, Recolouring):
         """The names of the versions, sorted."""
         return tuple(sorted(name for kind, name in self._state if kind == "version"))
 
-    def save_version(self, name: str) -> None:
-        """Keep the active edits as a version; a version with this name is replaced."""
+    def save_version(self, name: str) -> str | None:
+        """Keep the active edits as a version. This is no step: `undo` leaves versions alone.
+
+        Returns
+        -------
+        str or None
+            The name that an older version of this name has now, such as "former NAME".
+        """
         if not 1 <= len(name.strip()) <= LONGEST_NAME or not name.isprintable():
             raise Palette4dError(
                 f"found the version name {name!r}, expected 1 to {LONGEST_NAME} printable "
                 "characters"
             )
-        self._put("version", name, self.fields()["edits"], f"save version {name}")
+        versions: dict[Key, Any] = {("version", name): self.fields()["edits"]}
+        former, active = self._state.get(("version", name)), self._active()
+        kept = None
+        if former is not None and edits.from_fields(former) != active:
+            kept = self._free_name(f"former {name}")
+            versions["version", kept] = former
+        self.apply(edits.difference(self._state, {**self._state, **versions}))
+        return kept
 
     def use_version(self, name: str) -> str | None:
         """Make the edits of a version the active edits, as one step.
 
-        Active edits that no version holds are kept as a new version.
+        Active edits that no version holds are kept as a new version, which `undo` leaves.
 
         Returns
         -------
@@ -142,10 +155,13 @@ class Document(HandleEdits, PickEdits, Recolouring):
         versions = {key: value for key, value in self._state.items() if key[0] == "version"}
         if not self._active() or self.same_edits():
             return versions, None
-        names = (name[: LONGEST_NAME - 4] + more for more in _suffixes())
-        kept = next(each for each in names if ("version", each) not in versions)
+        kept = self._free_name(name)
         versions["version", kept] = self.fields()["edits"]
         return versions, kept
+
+    def _free_name(self, name: str) -> str:
+        names = (name[: LONGEST_NAME - 4] + more for more in _suffixes())
+        return next(each for each in names if ("version", each) not in self._state)
 
     def copy_from(self, source: "Document", *, time: Time = "relative") -> Fit:
         """Take over the grade of another document, as one step.
@@ -195,7 +211,7 @@ class Document(HandleEdits, PickEdits, Recolouring):
         return tuple(n for n in self.versions if edits.from_fields(self._version(n)) == active)
 
     def remove_version(self, name: str) -> None:
-        """Remove a version."""
+        """Remove a version; `undo` brings it back."""
         self._version(name)
         self._put("version", name, None, f"remove version {name}")
 
@@ -328,8 +344,10 @@ class Document(HandleEdits, PickEdits, Recolouring):
         theirs = new._state
         for step in mine:
             new._change(step)
-        if new._state != state:  # the steps on the way there met theirs
-            mine = [edits.difference(theirs, state, "edits of two programs")]
+        last = edits.difference(new._state, state)
+        if last.undoable().changes:  # the steps on the way there met theirs
+            mine = [edits.difference(theirs, state, "edits of two programs").undoable()]
+        if last.changes:
             new._become(state)
         if mine:
             new._done = new._done + mine

@@ -164,6 +164,8 @@ class Edit:
         result = dict(state)
         for change in self.changes:
             if result.get(change.key) != change.before:
+                if change.kind == "version":
+                    continue  # its name holds other edits now, which stay
                 what = _named(change.key)
                 raise Palette4dError(
                     f"{what} was changed meanwhile, so that the step "
@@ -171,6 +173,11 @@ class Edit:
                 )
             _put(result, change.key, change.after)
         return result
+
+    def undoable(self) -> "Edit":
+        """Return the edit without the versions that it makes: no step takes a version away."""
+        kept = tuple(c for c in self.changes if c.kind != "version" or c.after is None)
+        return replace(self, changes=kept)
 
     def renamed(self, names: Mapping[Key, str]) -> "Edit":
         """Return the same edit with new ids."""

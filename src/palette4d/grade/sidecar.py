@@ -255,7 +255,7 @@ def history_of(document: Mapping[str, Any], name: str) -> tuple[list[edits.Edit]
     found = []
     for part in ("done", "undone"):
         try:
-            found.append([edits.step_from_fields(step) for step in history.get(part, [])])
+            steps = [edits.step_from_fields(step) for step in history.get(part, [])]
         except (Palette4dError, TypeError, ValueError, LookupError, AttributeError) as error:
             raise SidecarError(
                 name,
@@ -263,6 +263,8 @@ def history_of(document: Mapping[str, Any], name: str) -> tuple[list[edits.Edit]
                 f"an unusable list of steps ({error})",
                 "the steps that palette4d wrote; remove the member `history` to go on without them",
             ) from None
+        # Older files have steps that make versions.
+        found.append([kept for step in steps if (kept := step.undoable()).changes])
     return found[0], found[1]
 
 

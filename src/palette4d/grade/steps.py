@@ -44,13 +44,15 @@ class Steps:
         return tuple(self._undone)
 
     def apply(self, edit: Edit) -> None:
-        """Apply an edit as one step, which `undo` reverts; an edit without change is no step."""
+        """Apply an edit as one step, which `undo` reverts; an edit without change is no step.
+
+        Versions that it makes are no part of the step: they stay when it is undone.
+        """
         edit = replace(edit, changes=tuple(c for c in edit.changes if c.before != c.after))
         if not edit.changes:
             return
         self._change(edit)
-        self._done = [*self._done, edit]
-        self._undone = []
+        self._add(edit, self._done, self._undone)
 
     @contextlib.contextmanager
     def one_step(self, label: str) -> Generator[None]:
@@ -62,8 +64,11 @@ class Steps:
             self._become(state)
             self._done, self._undone = done, undone
             raise
-        edit = edits.difference(state, self._state, label)
-        self._done, self._undone = ([*done, edit], []) if edit.changes else (done, undone)
+        self._add(edits.difference(state, self._state, label), done, undone)
+
+    def _add(self, edit: Edit, done: list[Edit], undone: list[Edit]) -> None:
+        step = edit.undoable()
+        self._done, self._undone = ([*done, step], []) if step.changes else (done, undone)
 
     def undo(self) -> Edit:
         """Revert the last step, and return it. Steps of earlier sessions can be reverted too."""
