@@ -10,6 +10,7 @@ import pytest
 from palette4d.colour.encoding_conversion import between
 from palette4d.common.errors import Palette4dError
 from palette4d.grade import sidecar
+from palette4d.grade.copying import Fit
 from palette4d.grade.document import Document
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "sidecars"
@@ -140,6 +141,13 @@ def test_colours_that_the_source_lacks_are_reported() -> None:
     assert not fit.fits
     assert "does not fit" in str(fit)
     assert "not in" in str(fit)
+
+
+def test_a_copy_that_transfers_next_to_nothing_does_not_fit() -> None:
+    change = 0.8 / 255
+    assert not Fit(change, change, 2 * change, 0).fits
+    assert Fit(change, change / 4, change, 0).fits
+    assert Fit(0, 1e-6, 1e-5, 0).fits  # nothing to transfer
 
 
 def test_a_new_analysis_with_another_palette_gets_the_grade(tmp_path: Path) -> None:

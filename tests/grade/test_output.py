@@ -73,6 +73,7 @@ def test_kept_lightness_is_the_images(document, image):
         ({"show": "weight:"}, "weight:ID"),
         ({"show": "outside:v1"}, "outside"),
         ({"show": "weight:nothing"}, "nothing"),
+        ({"show": "weight:p1"}, "picks and holds have no matte"),
         ({"keep_lightness": 1.5}, "0 to 1"),
         ({"mix": float("nan")}, "0 to 1"),
         ({"strength": -0.1}, "0 to 1"),

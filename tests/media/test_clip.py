@@ -182,6 +182,13 @@ def test_a_name_with_marks_is_a_file_when_it_exists(tmp_path):
     assert open_clip(str(path)).frames == [7]
 
 
+def test_frames_outside_of_the_clip_are_named(tmp_path):
+    folder = str(grey_levels(tmp_path, range(8)))
+    with pytest.raises(FrameError, match=r"has frames 0-7; frame 8 is outside"):
+        open_clip(folder, frames="5-8")
+    assert open_clip(folder, frames="5-8", skip_bad_frames=True).skipped == [8]
+
+
 def test_gap_is_named_or_skipped(tmp_path):
     folder = grey_levels(tmp_path, range(1, 9))
     (folder / "clip.0004.png").unlink()

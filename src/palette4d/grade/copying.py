@@ -31,8 +31,9 @@ TOLERANCE = 3 / 255
 LEAST = 1e-6
 #: Colours farther than this from the source's palette are not in its clip.
 NEAR = 0.05
-#: A copy fits if it differs by less than this share of what the grade changes.
-FITS = 0.3
+#: A copy fits if it differs by less than this share of what the grade changes; up to one step of 8
+#: bits, by less than the larger share. A tenth of a step is rounding.
+FITS, FITS_BELOW_A_STEP, ROUNDING = 0.3, 0.5, 0.1 / 255
 #: At most this many stops an edge.
 MOST_STOPS = 64
 
@@ -61,7 +62,8 @@ class Fit:
     @property
     def fits(self) -> bool:
         """Whether the copy looks like the copied grade, on most of the clip's colours."""
-        return self.mean <= max(FITS * self.change, 1 / 255) and self.foreign <= 0.5
+        small = min(FITS_BELOW_A_STEP * self.change, 1 / 255)
+        return self.mean <= max(FITS * self.change, small, ROUNDING) and self.foreign <= 0.5
 
     def __str__(self) -> str:
         """Return the figures for people, in steps of 8 bits."""

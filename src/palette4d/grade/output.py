@@ -3,6 +3,7 @@
 The names and their meaning are those of the node's parameters, and the core draws for both.
 """
 
+import re
 from dataclasses import dataclass
 from typing import Literal
 
@@ -157,6 +158,11 @@ class Output:
         if self.kind != "weight":
             return None
         ids = [*polytope.vertex_ids, *(stop["id"] for stop in edits.stops)]
+        if self.handle not in ids and re.fullmatch(r"p\d+", self.handle):
+            raise Palette4dError(
+                f"found {self.show!r}, expected the id of a vertex or stop: picks and holds have "
+                "no matte, handles have. `palette4d info SIDECAR --handles` lists them"
+            )
         if self.handle not in ids:
             raise unknown(self.handle, "vertex or stop", ids)
         return _core.weight_reader(polytope, edits, _core.slice_at(polytope, frame), self.handle)

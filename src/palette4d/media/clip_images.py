@@ -238,6 +238,12 @@ def _wanted_frames(sequence: ImageSequence, frames: str | None, embedded: str | 
 
 def _missing(sequence: ImageSequence, missing: list[int]) -> FrameError:
     found = sequence.numbers
+    if outside := [frame for frame in missing if not found[0] <= frame <= found[-1]]:
+        return FrameError(
+            f"{sequence.pattern}: the clip has {named(found)}; {named(outside)} "
+            f"{'is' if len(outside) == 1 else 'are'} outside. Choose a range inside the clip with "
+            "frames=…, or leave such frames out with skip_bad_frames=True."
+        )
     gap = any(found[0] < frame < found[-1] for frame in missing)
     no_file = f" (no file {sequence.path(missing[0]).name})" if gap else ""
     return FrameError(
