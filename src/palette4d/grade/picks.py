@@ -287,9 +287,10 @@ def _rival(pick: Pick, others: Sequence[Pick], step: float) -> tuple[str, str] |
     away, id_, frame, apart, picked = min(rivals)
     near = f"at frame {frame:.0f} the colour of {id_} is only {away:.3f} away"
     if away < SAME:
+        at = "" if pick.frame == picked else f" at frame {frame:.0f}"
         near = (
             f"{pick.id}, picked at frame {pick.frame:g}, and {id_}, picked at frame {picked:g}, "
-            f"have the same colour at frame {frame:.0f}"
+            f"have the same colour{at}"
         )
     return id_, (
         f": {near}, and the two ask for changes that differ by {apart:.3f}. Change or disable one "
