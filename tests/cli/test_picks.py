@@ -180,6 +180,42 @@ def test_conflicts_and_old_sidecars_are_told(path: str, run: Run) -> None:
     assert out.count("not met") == 1  # the pair is told once
 
 
+def test_the_same_pick_again_is_named(path: str, run: Run) -> None:
+    words = ("pick", "--frame", "2", "--pixel", "3,3", "--box", "3", "--by", "0.1,0,0")
+    assert run(*words)[0] == 0
+    status, _, err = run(*words)
+    assert status == 1
+    assert "p1 is this pick already" in err
+    assert run("disable", "p1")[0] == 0
+    assert "enable p1" in run(*words)[2]
+    assert [pick["id"] for pick in picks_of(path)] == ["p1"]
+    assert run(*words[:-1], "0.2,0,0")[0] == 0  # another change is another pick
+
+
+def test_only_new_conflicts_are_told_in_full(run: Run) -> None:
+    words = ("--frame", "2", "--colour", "0.36,0.6,0.2", "--no-follow")
+    run("pick", *words, "--by", "0.2,0,0")
+    assert "not met: p1" in run("hold", *words)[1]
+    out = run("hold", "--frame", "2", "--colour", "0.7,0.15,0.1", "--no-follow")[1]
+    assert "not met: p1" not in out
+    assert "as before: p1 and p2" in out
+    assert "not met: p1" in run("change", "p1", "--by", "0.2,0.01,0")[1]
+    assert "not met: p1" in run("picks")[1]
+
+
+def test_what_limits_a_pick_is_told_in_options(run: Run) -> None:
+    words = ("--frame", "2", "--colour", "0.36,0.6,0.2", "--no-follow", "--radius", "0.001")
+    out = run("pick", *words, "--by", "0.5,-0.5,0.6")[1]
+    assert "--radius widens" in out
+    assert "radius=" not in out
+
+
+def test_a_range_without_the_own_frame_is_told(run: Run) -> None:
+    words = ("pick", "--frame", "2", "--colour", "0.36,0.6,0.2", "--no-follow", "--until", "5")
+    assert "outside of its range" in run(*words, "--by", "0.1,0,0", "--from", "4")[1]
+    assert "outside of its range" not in run(*words, "--by", "0.2,0,0", "--from", "1")[1]
+
+
 def test_a_target_far_outside_is_told(run: Run) -> None:
     words = ("--frame", "2", "--colour", "0.36,0.6,0.2", "--no-follow")
     status, out, _ = run("pick", *words, "--to", "1.4,0.2,-0.3")

@@ -315,12 +315,23 @@ def test_two_targets_of_one_colour_are_named_and_stay_bounded(fields: Fields) ->
         Pick.from_fields(entry | measured[entry["id"]])
         for entry in document.fields()["edits"]["picks"]
     ]
-    lines = unmet(picks, 1)
-    assert len(lines) == 1  # the pair is told once
-    assert "p1" in lines[0]
-    assert "p2" in lines[0]
+    [line] = unmet(picks, 1).values()  # the pair is told once
+    assert "p1" in line
+    assert "p2" in line
     for bump in document.fields()["edits"]["solution"]["bumps"]:
         assert np.abs([key["by"] for key in bump["keys"]]).max() < 2
+
+
+def test_two_picks_of_one_colour_are_named_with_their_frames(fields: Fields) -> None:
+    asked = [
+        pick("p1", MIDDLE, (0.7, 0.3, 0.4), frame=3),
+        pick("p2", MIDDLE, (0.2, 0.6, 0.4), frame=7),
+    ]
+    _, measured = solved(fields, *asked)
+    [line] = unmet([Pick.from_fields(one | measured[one["id"]]) for one in asked], 1).values()
+    assert "the same colour" in line
+    assert "picked at frame 3" in line
+    assert "picked at frame 7" in line
 
 
 def test_the_solution_is_the_same_every_time(fields: Fields) -> None:
@@ -339,7 +350,7 @@ def test_a_thousand_picks_are_bounded_in_time(fields: Fields) -> None:
     document, measured = solved(fields, *many)
     assert time.process_time() - start < 30
     assert measured["p1000"]["residual"] > 0
-    lines = unmet(document.picks, 1)
+    lines = unmet(document.picks, 1).values()
     assert sum("not solved" in line for line in lines) == 1000 - MOST_PICKS
     with pytest.raises(Palette4dError, match=str(MOST_PICKS)):
         document.pick(5, colour=MIDDLE, by=(0.1, 0, 0), follow=False)

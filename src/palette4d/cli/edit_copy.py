@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 import fnmatch
 import os
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from palette4d import load
+from palette4d.cli.messages import tell
 from palette4d.common.arguments import number
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import counted
@@ -97,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
             print(_copied(shot, args))
         except Palette4dError as error:
             failed += 1
-            print(f"palette4d: error: {error}", file=sys.stderr)
+            tell("error", str(error))
     print(f"copied the grade to {counted(len(shots) - failed, 'shot')} of {len(shots)}")
     return 1 if failed else 0
 

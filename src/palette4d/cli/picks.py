@@ -8,13 +8,14 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from palette4d import load
+from palette4d.cli.messages import as_options
 from palette4d.cli.swatches import shown
 from palette4d.common.arguments import ColourAction, number, whole
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from palette4d.grade.document import Document
     from palette4d.grade.picks import Pick
@@ -172,6 +173,7 @@ def _pixel(text: str) -> tuple[float, float]:
 def run_pick(args: argparse.Namespace) -> int:
     """Add a pick or a hold, or correct the path of one."""
     document = load(args.sidecar)
+    before = _unmet(document)
     where: dict[str, Any] = {
         "colour": args.colour,
         "pixel": args.pixel,
@@ -209,13 +211,14 @@ def run_pick(args: argparse.Namespace) -> int:
                 args.frame, **where, to=args.to, by=args.by, **given, progress=progress
             )
     document.save()
-    _print_pick(document, found.id, followed=not args.no_follow)
+    _print_pick(document, found.id, before, followed=not args.no_follow)
     return 0
 
 
 def run_change(args: argparse.Namespace) -> int:
     """Change a pick or hold."""
     document = load(args.sidecar)
+    before = _unmet(document)
     old = next((pick for pick in document.picks if pick.id == args.id), None)
     changes: dict[str, Any] = {
         name: value
@@ -243,13 +246,14 @@ def run_change(args: argparse.Namespace) -> int:
             args.id, any_value=args.float, clip=args.clip, progress=progress, **changes
         )
     document.save()
-    _print_pick(document, found.id, followed=not args.no_follow)
+    _print_pick(document, found.id, before, followed=not args.no_follow)
     return 0
 
 
 def run_switch(args: argparse.Namespace) -> int:
     """Enable, disable or remove picks and holds."""
     document = load(args.sidecar)
+    before = _unmet(document)
     ids = list(dict.fromkeys(args.ids))
     if args.action == "unpick":
         document.unpick(*ids)
@@ -260,17 +264,18 @@ def run_switch(args: argparse.Namespace) -> int:
     document.save()
     done = {"unpick": "removed", "enable": "enabled", "disable": "disabled"}[args.action]
     print(f"{done}: {', '.join(ids)}")
-    _print_notes(document)
+    _print_notes(document, before)
     return 0
 
 
 def run_lock(args: argparse.Namespace) -> int:
     """Lock or unlock handles."""
     document = load(args.sidecar)
+    before = _unmet(document)
     (document.lock if args.action == "lock" else document.unlock)(*args.ids)
     document.save()
     print(f"{args.action}ed: {', '.join(map(document.named, dict.fromkeys(args.ids)))}")
-    _print_notes(document)
+    _print_notes(document, before)
     return 0
 
 
@@ -292,10 +297,18 @@ def run_picks(args: argparse.Namespace) -> int:
     return 0
 
 
-def _print_pick(document: Document, id_: str, followed: bool) -> None:
+def _unmet(document: Document) -> dict[frozenset[str], str]:
+    from palette4d.grade.picks import unmet
+
+    return unmet(document.picks, document.frames[2])
+
+
+def _print_pick(
+    document: Document, id_: str, before: Iterable[frozenset[str]], followed: bool
+) -> None:
     found = next(pick for pick in document.picks if pick.id == id_)
     print(_told(document, found, followed))
-    _print_notes(document)
+    _print_notes(document, [ids for ids in before if id_ not in ids])
 
 
 def _told(document: Document, pick: Pick, followed: bool = True) -> str:
@@ -309,11 +322,13 @@ def _told(document: Document, pick: Pick, followed: bool = True) -> str:
         lines[0] += f"; from {start} until {until}{fade}"
     if not pick.enabled:
         return f"{lines[0]}; disabled"
+    if not pick.covers(pick.frame, document.frames[2]):
+        lines.append(f"  note: frame {pick.frame:g} is outside of its range and does not change")
     if pick.path:
         there = [key for key in pick.path if key.there > 0]
         first, last = there[0].frame, there[-1].frame
         keys = counted(len(pick.path), "key")
-        lines.append(f"  follows its colour from frame {first:g} to {last:g} ({keys})")
+        lines.append(f"  follows its colour from frame {first:.0f} to {last:.0f} ({keys})")
         if len(there) < len(pick.path):
             lines.append(
                 "  the change ends where the colour is lost among others; pick it there with "
@@ -329,14 +344,12 @@ def _told(document: Document, pick: Pick, followed: bool = True) -> str:
         line = f"  off by {pick.residual:.4f}; {pick.share:.0%} {what}"
         lines.append(line + (", its neighbourhood left out" if pick.global_only else rest))
         if pick.worst is not None and pick.worst > max(2 * pick.residual, pick.tolerance):
-            lines.append(f"  the farthest off at frame {pick.worst_frame:g}: by {pick.worst:.4f}")
+            lines.append(f"  the farthest off at frame {pick.worst_frame:.0f}: by {pick.worst:.4f}")
     return "\n".join(lines)
 
 
-def _print_notes(document: Document) -> None:
-    """Print what the solution moves, and what it does not meet."""
-    from palette4d.grade.picks import unmet
-
+def _print_notes(document: Document, told: Iterable[frozenset[str]] = ()) -> None:
+    """Print what the solution moves, and what it does not meet; in short what was `told`."""
     enabled = [pick for pick in document.picks if pick.enabled]
     if not enabled:
         return
@@ -345,12 +358,17 @@ def _print_notes(document: Document) -> None:
     frame, share, most = document.side_effect()
     if share > MANY:
         print(
-            f"note: {share:.0%} of the picture change too at frame {frame:.0f}, by more than 10 of "
-            f"255, most {shown(most)}; no frame changes more. If it must stay: "
+            f"note: beside the picked colours {share:.0%} of the picture change too at frame "
+            f"{frame:.0f}, by more than 10 of 255, most {shown(most)}; no frame changes more. "
+            "If it must stay: "
             f"hold --frame {frame:.0f} --colour " + ",".join(f"{value:.4f}" for value in most)
         )
-    for line in unmet(enabled, document.frames[2]):
-        print(f"not met: {line}")
+    lines = _unmet(document)
+    for ids, line in lines.items():
+        if ids not in told:
+            print(f"not met: {as_options(line)}")
+    if old := [" and ".join(sorted(ids)) for ids in lines if ids in told]:
+        print(f"not met, as before: {', '.join(old)}; `picks` says why")
     for pick in () if document.scene_linear else enabled:
         if pick.to is not None and not all(-0.05 <= value <= 1.05 for value in pick.to):
             print(f"note: the new colour of {pick.id} lies far outside 0..1; most files clip it")

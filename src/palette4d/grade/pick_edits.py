@@ -307,6 +307,10 @@ class PickEdits(EditedPalette):
         self._check_pick(found)
         if follow:
             found = replace(found, path=self._clip_of_picks(clip).path(found, progress))
+        for kind, id_ in self._state:
+            if kind == "pick" and _same(self._pick(id_), found):
+                off = "" if self._pick(id_).enabled else f", disabled: `enable {id_}`"
+                raise Palette4dError(f"{id_} is this {found.kind} already{off}; nothing was added")
         taken = (id_ for kind, id_ in self._state if kind == "pick")
         found = replace(found, id=edits.new_id("p", taken))
         self._put("pick", found.id, found.to_fields(), f"{found.kind} {found.id}: {_asked(found)}")
@@ -323,6 +327,12 @@ class PickEdits(EditedPalette):
             known = [known for kind, known in self._state if kind == "pick"]
             raise unknown(id_, "pick or hold", known, "palette4d edit SIDECAR picks")
         return Pick.from_fields(found)
+
+
+def _same(old: Pick, new: Pick) -> bool:
+    """Return whether two picks ask for the same, whatever paths were found or corrected."""
+    unlike = bool(old.path) != bool(new.path)
+    return not unlike and replace(old, path=(), enabled=True) == replace(new, id=old.id, path=())
 
 
 def _asked(pick: Pick) -> str:

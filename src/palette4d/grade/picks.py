@@ -29,8 +29,9 @@ MOST_PICKS = 100
 #: A residual above this, 3 of 255, is told, and above this share of the change.
 MET, MET_PART = 0.012, 0.02
 
-#: Two picks nearer than this in colour are named together if one of them is not met.
-NEAR = 0.2
+#: Two picks nearer than this in colour are named together if one of them is not met. Below half a
+#: step of 8 bits they have the same colour.
+NEAR, SAME = 0.2, 0.5 / 255
 
 
 @dataclass(frozen=True)
@@ -209,6 +210,11 @@ class Pick:
         part = room / np.maximum(np.abs(change), 1e-9)
         return change * min(light, max(0.0, float(part.min())))
 
+    def covers(self, frame: float, step: float) -> bool:
+        """Return whether a frame lies in the range or its ramps."""
+        begin, start, until, end = self.knots(step)
+        return start <= frame <= until or begin < frame < end
+
     @property
     def tolerance(self) -> float:
         """The largest residual of a pick that counts as met."""
@@ -243,29 +249,27 @@ def all_picks(fields: Mapping[str, Any]) -> tuple[Pick, ...]:
     return tuple(Pick.from_fields(entry) for entry in fields.get("picks", ()))
 
 
-def unmet(picks: Iterable[Pick], step: float) -> list[str]:
+def unmet(picks: Iterable[Pick], step: float) -> dict[frozenset[str], str]:
     """Return a line for each enabled pick and hold that is not met, with the likely cause.
 
-    Two that contradict each other have one line.
+    The keys are the ids. Two that contradict each other have one line, under both ids.
     """
     enabled = [pick for pick in picks if pick.enabled]
-    lines, pairs = [], set()
+    lines: dict[frozenset[str], str] = {}
     for number, pick in enumerate(enabled):
         at, off = "", pick.residual
         if off is None or off <= pick.tolerance:
-            at, off = f" at frame {pick.worst_frame:g}" if pick.worst else "", pick.worst
+            at, off = f" at frame {pick.worst_frame:.0f}" if pick.worst else "", pick.worst
         if number >= MOST_PICKS:
-            lines.append(
+            lines[frozenset({pick.id})] = (
                 f"{pick.id} is not solved: only the first {MOST_PICKS} enabled picks and holds "
                 "are. Disable or remove some"
             )
         elif off is not None and off > pick.tolerance:
             rival = _rival(pick, enabled, step)
-            pair = {pick.id, rival[0]} if rival else {pick.id}
-            if frozenset(pair) not in pairs:
-                cause = _cause(pick, enabled) if rival is None else rival[1]
-                lines.append(f"{pick.id} is off by {off:.3f}{at}{cause}")
-            pairs.add(frozenset(pair))
+            ids = frozenset({pick.id, rival[0]} if rival else {pick.id})
+            cause = _cause(pick, enabled) if rival is None else rival[1]
+            lines.setdefault(ids, f"{pick.id} is off by {off:.3f}{at}{cause}")
     return lines
 
 
@@ -277,13 +281,19 @@ def _rival(pick: Pick, others: Sequence[Pick], step: float) -> tuple[str, str] |
             away = float(np.linalg.norm(pick.colour_at(frame) - other.colour_at(frame)))
             apart = float(np.linalg.norm(pick.change_at(frame) - other.change_at(frame)))
             if away < NEAR and apart > away:
-                rivals.append((away, other.id, frame, apart))
+                rivals.append((away, other.id, frame, apart, other.frame))
     if not rivals:
         return None
-    away, id_, frame, apart = min(rivals)
+    away, id_, frame, apart, picked = min(rivals)
+    near = f"at frame {frame:.0f} the colour of {id_} is only {away:.3f} away"
+    if away < SAME:
+        near = (
+            f"{pick.id}, picked at frame {pick.frame:g}, and {id_}, picked at frame {picked:g}, "
+            f"have the same colour at frame {frame:.0f}"
+        )
     return id_, (
-        f": at frame {frame:g} the colour of {id_} is only {away:.3f} away, and the two ask "
-        f"for changes that differ by {apart:.3f}. Change or disable one of {pick.id} and {id_}"
+        f": {near}, and the two ask for changes that differ by {apart:.3f}. Change or disable one "
+        f"of {pick.id} and {id_}"
     )
 
 
