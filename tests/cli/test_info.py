@@ -90,11 +90,11 @@ def test_info_tells_of_all_edits(tmp_path: Path, capsys: pytest.CaptureFixture[s
     capsys.readouterr()
     assert main.main(["info", str(path)]) == 0
     out = capsys.readouterr().out
-    assert "3 vertices, 3 stops, smooth ramps; 3 steps to undo" in out
+    assert "3 vertices, 3 stops, smooth ramps; 2 steps to undo" in out
     assert "versions  warm" in out
     assert main.main(["info", str(path), "--json"]) == 0
     info = json.loads(capsys.readouterr().out)
-    assert (info["ramp"], info["steps"], info["versions"]) == ("smooth", 3, ["warm"])
+    assert (info["ramp"], info["steps"], info["versions"]) == ("smooth", 2, ["warm"])
     track = next(track for track in info["tracks"] if "v1" in track["vertices"])
     assert "v1" in track["edited"]
     assert track["rgb"] != track["edited_rgb"]
