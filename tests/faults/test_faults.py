@@ -253,7 +253,7 @@ def check(driver: Driver, material: Path, folder: Path, verb: Verb, *, full: boo
     return trials
 
 
-@pytest.mark.parametrize("name", ["set", "copy", "autosave", "analyze", "exr", "movie"])
+@pytest.mark.parametrize("name", ["set", "copy", "autosave", "exr", "movie", "node"])
 def test_each_kind_of_call_killed_and_refused(
     name: str, driver: Driver, material: Path, tmp_path: Path
 ) -> None:

@@ -84,6 +84,19 @@ class EditedPalette(Steps):
         return self._core
 
     @property
+    def solved(self) -> bool:
+        """Whether the solution of the picks is known, so that nothing waits for it."""
+        picks = (value for (kind, _), value in self._state.items() if kind == "pick")
+        return self._solved is not None or not any(pick.get("enabled", True) for pick in picks)
+
+    def take_solution(self, other: "EditedPalette") -> None:
+        """Take over the solution of another document of this palette with the same edits."""
+        if self._solved is None and other._active() == self._active():
+            self._solved = other._solved
+            if other._state == self._state:
+                self._core = other._core
+
+    @property
     def _name(self) -> str:
         return "<document>" if self.path is None else str(self.path)
 
