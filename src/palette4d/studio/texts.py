@@ -48,6 +48,7 @@ MATTE, MATTE_ENDS = "weight of {id}", ("0 %", "100 %")
 PROBE_IN = "in"
 PROBE_OUT = "out"
 NO_COLOUR = "there is no colour: the pixels are transparent or not finite"
+BAD_FRAME = "Bring a good copy, then choose File > Load the file again"
 NO_FRAME = "the clip has no frame {frame}"
 
 # ------------------------------------------------------------------------------- below the picture
