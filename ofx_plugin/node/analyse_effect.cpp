@@ -233,7 +233,7 @@ void changed(const Suites& suites, OfxImageEffectHandle effect, const Properties
     } else if (text.empty() && !target.empty() && fs::is_regular_file(native(target), error)) {
         text = target + " is there: choose it in the node Palette4D";
     }
-    text = printable(text);
+    text = without_controls(text);
     if (params.string_now(kParamStatus) != text) params.note_string(kParamStatus, text);
 }
 
