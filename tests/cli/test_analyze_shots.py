@@ -263,7 +263,10 @@ class TestAgain:
         assert [status for _, status, _ in shots(out)] == ["failed", "done"]
         assert analyze(cut_movie, out, "--detect-shots", "--force", "--keep-edits") == 0
         assert edited.read_bytes() == mine
-        assert analyze(cut_movie, out, "--detect-shots", "--set", "palette_size=5", "--drop-edits") == 0
+        assert (
+            analyze(cut_movie, out, "--detect-shots", "--set", "palette_size=5", "--drop-edits")
+            == 0
+        )
         assert sidecar(out, "rushes_s001")["edits"]["vertices"] == []
 
     def test_only_some(
