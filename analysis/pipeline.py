@@ -43,6 +43,7 @@ from palette4d import _core
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import counted
 from palette4d.grade import sidecar
+from palette4d.grade.names import vertex_colours
 from palette4d.media import colour_space, cuts
 from palette4d.media.array_clip import ArrayClip
 from palette4d.media.clip_base import Clip, describe, even_step
@@ -196,6 +197,10 @@ def analyze(
         notes.append(f"{counted(len(skipped), 'bad frame')} skipped: {describe(skipped)}")
     document["colours"] = clip_colours.clip_colours(usable)
     notes += colour_space.record(document, clip, used)
+    vertices = document["polytope"]["vertices"]
+    names = vertex_colours(vertices, document["clip"]["encoding"])
+    for vertex, name in zip(vertices, names, strict=True):
+        vertex["name"] = name
     notes += [*gathered.notes, *missing, *found.notes, *warnings]
     return Analysis(
         found.polytope,

@@ -60,7 +60,8 @@ std::string push_analyse(const Params& params, Chosen& chosen) {
     if (cancel_analysis(target)) return "cancelled the analysis";
     const std::string clip = clip_of(params, chosen);
     if (clip.empty()) {
-        return "Analyse: the host does not report the clip's file; choose it as Clip's file";
+        return "Analyse: the host does not report the clip's file; choose it as Clip's file, or "
+               "add the effect Palette4D Analyse, which asks the host for the frames";
     }
     const std::string problem = start_analysis(clip, target);
     if (!problem.empty()) return "Analyse: " + problem;

@@ -69,8 +69,12 @@ bool holds(const Params& params, const Slot& slot, const std::optional<Vec3>& co
 std::string label_of(const Handle& handle) {
     std::ostringstream text;
     text.imbue(std::locale::classic());
-    text << handle.id << (handle.stop ? ", stop at " : ", frame ")
-         << std::round(100 * handle.frame) / 100;
+    text << handle.id;
+    if (handle.name.empty()) {
+        text << (handle.stop ? ", stop at " : ", frame ") << std::round(100 * handle.frame) / 100;
+    } else {
+        text << ": " << handle.name << ", " << std::nearbyint(handle.frame);
+    }
     return text.str();
 }
 

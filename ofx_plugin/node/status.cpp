@@ -52,6 +52,14 @@ bool acts_on_terminals(unsigned code, std::size_t length) {
            (code >= 0x2028 && code <= 0x202e) || (code >= 0x2066 && code <= 0x2069);
 }
 
+std::string words_of_versions(const Sidecar& sidecar) {
+    std::string text;
+    for (const NamedVersion& one : sidecar.versions) {
+        text += (text.empty() ? "versions '" : ", '") + one.name + "'";
+    }
+    return text;
+}
+
 }  // namespace
 
 std::string without_controls(const std::string& text) {
@@ -95,6 +103,7 @@ std::string status_of(const Chosen& chosen, const std::vector<std::string>& firs
         }
         lines.push_back(text);
         if (!chosen.embedded) lines.push_back("file " + chosen.path);
+        lines.push_back(words_of_versions(sidecar));
         if (!chosen.media.empty() && !same_clip(chosen.media, sidecar.clip.source)) {
             lines.push_back("note: this sidecar is of " + sidecar.clip.source +
                             ", and the host's clip is " + chosen.media);

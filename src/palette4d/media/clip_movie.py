@@ -27,6 +27,7 @@ from palette4d.media.clip_base import (
     DEFAULT_RATE,
     F32,
     LEAVE_OUT,
+    MOST_SAMPLES,
     Clip,
     ClipError,
     Fill,
@@ -257,6 +258,10 @@ def open_movie(
             f"{LEAVE_OUT}"
         )
     height, width, channels = _shape(first)
+    if height * width * channels > MOST_SAMPLES:
+        raise ClipError(
+            f"{path}: found {width}x{height} pixels, expected at most 13000x13000; scale it down"
+        )
     notes = []
     if stamps is not None and base is not None and _varies(stamps, base, own_rate):
         notes.append(f"{path}: the frame rate varies; frames are counted, their times are not used")

@@ -98,6 +98,6 @@ def plot(
         matplotlib.rc_context(style.RC),
         replacing(output, force=force) as temporary,
     ):
-        figure = page.build(sidecar, columns, against, names)
+        figure = page.build(sidecar, columns, against, names, document.colour_names)
         page.save(figure, temporary, output.suffix.lower()[1:], width)
     return [column.frame for column in columns if not column.pictures]

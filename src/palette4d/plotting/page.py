@@ -1,6 +1,6 @@
 """The page: heading, frames before and after, the timeline, the polyhedra, and a legend."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -143,8 +143,12 @@ def build(
     columns: Sequence[Column],
     against: _core.Edits | None = None,
     named: Sequence[str] = ("before", "after"),
+    colours: Mapping[str, str] | None = None,
 ) -> Any:
-    """Lay out and draw the page; return a matplotlib Figure of `WIDTH` points."""
+    """Lay out and draw the page; return a matplotlib Figure of `WIDTH` points.
+
+    `colours` has the names of the handles' colours by id.
+    """
     from matplotlib.figure import Figure
 
     palette = PlottedPalette.of(sidecar, against)
@@ -171,7 +175,7 @@ def build(
     axes.set(xlim=(0, WIDTH), ylim=(0, height), autoscale_on=False)
     axes.set_axis_off()
     _draw_heading(axes, sidecar, palette, height)
-    timeline.draw(axes, panel, encoding)
+    timeline.draw(axes, panel, encoding, colours or {})
     if shapes:
         for k, name in enumerate(names):
             y = top - (k + 0.5) * picture_height - GAP * k

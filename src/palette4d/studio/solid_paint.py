@@ -268,15 +268,20 @@ class SolidPainter:
         if spoilt is None:
             return
         dents, turned = spoilt
-        said = [
+        heads = (
             counted(int(dents.sum()), texts.CONCAVE_EDGE, texts.CONCAVE_EDGES),
             counted(int(turned.sum()), texts.FLIPPED_FACE, texts.FLIPPED_FACES),
-        ]
-        said = [text for text, found in zip(said, (dents, turned), strict=True) if found.any()]
-        if said:
-            painter.setPen(QColor(theme.WARNING))
-            head = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop
-            painter.drawText(QRectF(8, 6, wide, tall), head, "⚠ " + ", ".join(said))
+        )
+        whys = (texts.CONCAVE_WHY, texts.FLIPPED_WHY)
+        top = 6.0
+        flags = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextWordWrap
+        for head, why, found in zip(heads, whys, spoilt, strict=True):
+            if not found.any():
+                continue
+            for text, colour in ((f"⚠ {head}", theme.WARNING), (why, theme.TEXT)):
+                painter.setPen(QColor(colour))
+                box = QRectF(8, top, wide, self.view.height())
+                top = painter.drawText(box, int(flags), text).bottom() + 1
 
 
 def troubles(palette: Palette) -> Spoilt:

@@ -348,7 +348,9 @@ SOLID_HINT = "drag to turn · drag a colour: X, Y, Z along R, G, B"
 SOLID_AXIS = "along {axis} alone"
 COLOUR_MOVED = "moved a colour"
 CONCAVE_EDGE, CONCAVE_EDGES = "concave edge", "concave edges"
+CONCAVE_WHY = "Notched: gradients bend there."
 FLIPPED_FACE, FLIPPED_FACES = "face turned inside out", "faces turned inside out"
+FLIPPED_WHY = "Hatched: colours cross there, and gradients may fold. If you see it, change less."
 
 # ----------------------------------------------------------------------------------- the inspector
 NOTHING_SELECTED = "Nothing is selected"

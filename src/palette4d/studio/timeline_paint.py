@@ -245,11 +245,17 @@ class TimelinePainter:
             layout.height + TAIL,
             collar=3.0,
             beside=(layout.scale.left, layout.scale.right, SIDE),
+            longer=self._colour_names(),
+            ends=(GUTTER, self.places.width),
         )
         for name in names:
             painter.setFont(paint.small_font(self.view, -1.5, bold=name.bright))
             colour = style.BRIGHT if name.bright else style.TEXT
             paint.label(painter, name.x, name.y, name.text, colour, style.PANEL)
+
+    def _colour_names(self) -> dict[str, str]:
+        document = self.session.document
+        return {} if document is None else document.colour_names
 
     def _paint_ruler(self, painter: QPainter) -> None:
         painter.save()
