@@ -327,6 +327,7 @@ class Preview:
                 strip,
                 premultiplied=premultiplied and pixels.shape[2] == 4,
                 precision="single",
+                threads=0,
                 conversion=grade.conversion,
             )
         return result
@@ -367,6 +368,7 @@ def _quick(colours: F32, grade: Grade, premultiplied: bool) -> F32:
         colours,
         premultiplied=premultiplied and colours.shape[2] == 4,
         precision="single",
+        threads=0,
         conversion=grade.conversion,
     )
 

@@ -241,6 +241,7 @@ KEPT_VERSION = "kept as version {name}"
 USES_VERSION = "version {name}"
 NO_VERSION = "there is no version {number}; V keeps one"
 NO_VERSIONS = "no versions yet: V keeps one"
+NO_OTHER_VERSION = "no version differs from this grade; before shows the source"
 COMPARED = "before shows version {name}"
 COMPARED_SOURCE = "before shows the source"
 
