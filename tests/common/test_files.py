@@ -109,6 +109,31 @@ def test_file_and_folder_are_synced(old: Path, monkeypatch: pytest.MonkeyPatch) 
     assert events == ["file", "rename", "folder"]
 
 
+@pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="lists this process's open files")
+def test_windows_renames_closed_files_and_waits_for_a_reader(
+    old: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rename, refusals = Path.replace, [PermissionError(13, "in use")] * 2
+
+    def windows(self: Path, target: Path) -> Path:
+        assert not any(
+            handle.samefile(self) for handle in Path("/proc/self/fd").iterdir() if handle.exists()
+        )
+        if refusals:
+            raise refusals.pop()
+        return rename(self, target)
+
+    monkeypatch.setattr(Path, "replace", windows)
+    monkeypatch.setattr(files.sys, "platform", "win32")
+    replace(old, lambda: None)
+    assert old.read_bytes() == b"new"
+    refusals += [PermissionError(13, "in use")] * 100
+    monkeypatch.setattr(files.time, "sleep", lambda _: None)
+    with pytest.raises(WriteError, match="in use"):
+        replace(old, lambda: None)
+    assert names(old.parent) == [old.name]
+
+
 @pytest.mark.parametrize("mode", [0o640, 0o600, 0o444])
 def test_permissions_are_kept(old: Path, mode: int) -> None:
     old.chmod(mode)

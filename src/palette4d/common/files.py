@@ -128,7 +128,7 @@ def replacing(
         refuse_existing(path, force)
         if check is not None:
             check()
-        temporary.replace(path)
+        _rename(temporary, path)
     except OSError as error:
         raise WriteError(
             f"{path}: cannot be written: {error.strerror or error}; expected a disk with room, "
@@ -137,7 +137,8 @@ def replacing(
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
-        os.close(lock)
+        if lock is not None:
+            os.close(lock)
     _sync_folder(path.parent)
 
 
@@ -189,16 +190,34 @@ def _temporary_name(path: Path) -> Path:
     return path.with_name(f".{path.stem[:40]}.{secrets.token_hex(8)}.p4d-tmp{path.suffix}")
 
 
-def _new_temporary(path: Path) -> tuple[Path, int]:
-    """Create a temporary file; return it with a handle that locks it until it is closed."""
+def _new_temporary(path: Path) -> tuple[Path, int | None]:
+    """Create a temporary file; return it with a handle that locks it until it is closed.
+
+    Windows locks nothing here, and would not rename an open file.
+    """
     while True:
         temporary = _temporary_name(path)
         # 0o666 less the umask, as for any new file.
         handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
-        if _is_locked(handle):
+        ours = _is_locked(handle)
+        if ours and sys.platform != "win32":
             return temporary, handle
         os.close(handle)
+        if ours:
+            return temporary, None
         temporary.unlink(missing_ok=True)
+
+
+def _rename(temporary: Path, path: Path) -> None:
+    """Replace `path`. Windows refuses while a program has it open, as the node has for a moment."""
+    for left in reversed(range(40 if sys.platform == "win32" else 1)):
+        try:
+            temporary.replace(path)
+            return
+        except PermissionError:
+            if not left:
+                raise
+            time.sleep(0.05)
 
 
 def _copy_permissions(path: Path, handle: int) -> None:

@@ -18,6 +18,7 @@ from typing import Any
 
 import av
 import numpy as np
+from av.codec.codec import Capabilities
 from av.error import FFmpegError
 from numpy.typing import NDArray
 
@@ -204,6 +205,8 @@ class MovieClip(Clip):
             # Report a damaged picture instead of concealing the damage.
             stream.codec_context.options = {"err_detect": "crccheck+explode"}
             stream.thread_type = "AUTO"
+            if start and len(self.key_frames) == self.count and _has_slices(stream):
+                stream.thread_type = "SLICE"  # frame threads would decode later pictures too
             if start and self.stamps:
                 try:
                     container.seek(self.stamps[start], stream=stream, backward=True)
@@ -301,6 +304,11 @@ def _open(path: Path) -> Any:
             f"{path}: the movie cannot be opened ({reason}); expected a whole movie file that "
             "FFmpeg can read. Bring a good copy, or convert it to an image sequence."
         ) from error
+
+
+def _has_slices(stream: Any) -> bool:
+    """Whether several threads can decode one picture."""
+    return bool(int(stream.codec_context.codec.capabilities) & int(Capabilities.slice_threads))
 
 
 def _video_stream(container: Any, path: Path) -> Any:
