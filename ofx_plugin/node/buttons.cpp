@@ -14,7 +14,7 @@ std::string text_of(const Params& params, const char* name) {
     return params.string_at(name, Params::kAnyTime).value_or("");
 }
 
-/// The clip as palette4d names it; empty where nobody tells. The user's choice comes first.
+/// The clip as palette4d names it; empty if unknown. The user's choice comes first.
 std::string clip_of(const Params& params, const Chosen& chosen) {
     const std::string given = expanded(meant(text_of(params, kParamClipFile)));
     if (!given.empty()) return clip_spec(given);

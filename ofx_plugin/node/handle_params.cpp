@@ -107,7 +107,7 @@ void define_handle_params(ParamDefiner& define) {
             .set_int(kOfxParamPropLayoutHint, kOfxParamPropLayoutHintNoNewLine);
         define.colour({slot.colour.c_str(), slot.colour_label.c_str(),
                        "The new colour of this handle, in the palette's encoding. It is linear "
-                       "light if Picture is in is set to Scene-linear. May be keyframed."},
+                       "light if Input colour space is set to Scene-linear. May be keyframed."},
                       kUnset, -kLargest, kLargest);
     }
     define.begin_group("handleIds", "Which handles");

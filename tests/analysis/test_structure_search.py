@@ -14,7 +14,7 @@ from palette4d.analysis.dense_polytope import DensePolytope
 from palette4d.analysis.frame_statistics import Gamut
 from palette4d.analysis.objective import Objective
 from palette4d.analysis.options import AnalysisOptions
-from palette4d.analysis.polytope import Palette, SkewPolytope
+from palette4d.analysis.polytope import FramePalette, SkewPolytope
 from palette4d.analysis.structure_search import Priced, choose, key_frames, walk
 
 FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
@@ -28,7 +28,7 @@ def bend(count, size, at, colours=FOUR):
     for i in range(count):
         rgb = colours + 0.01 * i
         rgb[1, 2] += size * max(0, 1 - abs(i - at) / at)
-        palettes.append(Palette(rgb, hull_mesh(colours).faces))
+        palettes.append(FramePalette(rgb, hull_mesh(colours).faces))
     return palettes, stats([mixture(p.rgb, i) for i, p in enumerate(palettes)])
 
 
@@ -114,7 +114,7 @@ def splitting():
     early, late = hull_mesh(SIX), hull_mesh(seven)
     assert len(late.rgb) == 7
     links = tuple((min(i, 5), i) for i in range(7))
-    first, second = Palette(SIX, early.faces), Palette(seven, late.faces)
+    first, second = FramePalette(SIX, early.faces), FramePalette(seven, late.faces)
     return DensePolytope(range(8), [[first] * 4, [second] * 4], [links], [late.faces]).polytope()
 
 
@@ -151,7 +151,7 @@ def test_key_frames_hold_the_ends_and_the_worst():
     pictures = [mixture(FOUR, i) for i in range(100)]
     pictures[37] = mixture(np.eye(4)[:, :3], 37)
     frames = stats(pictures)
-    palettes = [Palette(FOUR, hull_mesh(FOUR).faces)] * 2
+    palettes = [FramePalette(FOUR, hull_mesh(FOUR).faces)] * 2
     static = DensePolytope((0, 99), [palettes], []).polytope()
     chosen = [frame.frame for frame in key_frames(static, frames, AnalysisOptions(), 24)]
     assert {0, 37, 99} <= set(chosen)

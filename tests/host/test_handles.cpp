@@ -316,7 +316,7 @@ TEST(colours_that_the_host_takes_back_are_no_edits) {
     const auto again = node.undo();
     CHECK(none_in_use());
     CHECK(std::get<Colour>(node.value("handle02")) == (Colour{0.5, 0.5, 0.501}));
-    // They are not given anew, which would be a step that nobody could get behind.
+    // They are not set again, which would be a step that nobody could get behind.
     CHECK(node.changed("strength") == kOfxStatOK);
     CHECK(node.undo_steps().empty());
     // Done again, and undone again.

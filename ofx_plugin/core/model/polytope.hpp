@@ -6,9 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "model/vec3.hpp"
+
 namespace palette4d {
 
-using Vec3 = std::array<double, 3>;
 using Face = std::array<int, 3>;
 
 /// A palette colour at one frame. `rgb` is in the palette's encoding (any finite value). `frame` is

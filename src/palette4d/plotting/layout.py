@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from palette4d.plotting.rows import Palette, Rows
+from palette4d.plotting.rows import PlottedPalette, Rows
 from palette4d.plotting.style import number
 
 F64 = NDArray[np.float64]
@@ -140,7 +140,7 @@ class Timeline:
         The largest radius of a vertex, in rows.
     """
 
-    palette: Palette
+    palette: PlottedPalette
     rows: Rows
     scale: Scale
     row_height: float

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.common.text import counted
 from palette4d.plotting import polyhedron, style, timeline
-from palette4d.plotting.rows import Palette, arrange
+from palette4d.plotting.rows import PlottedPalette, arrange
 from palette4d.plotting.solid import Shape, View, even_sample, extent_of
 
 F64 = NDArray[np.float64]
@@ -151,7 +151,7 @@ def build(
     """
     from matplotlib.figure import Figure
 
-    palette = Palette.of(sidecar, against)
+    palette = PlottedPalette.of(sidecar, against)
     encoding = str(sidecar.clip["encoding"])
     rows = arrange(palette.frames, palette.rgb, palette.edges)
     row_height = float(np.clip(1100.0 / max(rows.count, 1), 16.0, 50.0))
@@ -195,7 +195,9 @@ def build(
     return figure
 
 
-def _draw_heading(axes: Any, sidecar: _core.Sidecar, palette: Palette, height: float) -> None:
+def _draw_heading(
+    axes: Any, sidecar: _core.Sidecar, palette: PlottedPalette, height: float
+) -> None:
     """Write the title, the facts below it, and the legend at its right."""
     from matplotlib.legend_handler import HandlerTuple
 

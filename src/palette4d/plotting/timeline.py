@@ -19,7 +19,7 @@ from palette4d.plotting.layout import (
     disc_names,
     half_bands,
 )
-from palette4d.plotting.rows import Palette, Rows
+from palette4d.plotting.rows import PlottedPalette, Rows
 
 F64 = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ class Panel:
     """The timeline's place on the page, in points."""
 
     def __init__(
-        self, palette: Palette, rows: Rows, left: float, right: float, row_height: float
+        self, palette: PlottedPalette, rows: Rows, left: float, right: float, row_height: float
     ) -> None:
         scale = Scale(palette.first, palette.last, left + SIDE, right - SIDE)
         self.layout = Timeline(palette, rows, scale, row_height)

@@ -23,6 +23,8 @@ Spoilt = tuple[NDArray[np.bool_], NDArray[np.bool_]]
 
 #: The radius of a disc, and of the place where an edited colour was.
 DISC, ORIGIN = 6.5, 3.6
+#: Behind words that stand over the solid.
+PLATE = QColor(38, 38, 38, 215)
 AXIS_NAMES = ("R", "G", "B")
 #: A face is drawn in this many strips, for a smooth gradient; in fewer while something moves.
 STRIPS, MOVING_STRIPS = 5, 2
@@ -279,9 +281,12 @@ class SolidPainter:
             if not found.any():
                 continue
             for text, colour in ((f"⚠ {head}", theme.WARNING), (why, theme.TEXT)):
-                painter.setPen(QColor(colour))
                 box = QRectF(8, top, wide, self.view.height())
-                top = painter.drawText(box, int(flags), text).bottom() + 1
+                box = painter.boundingRect(box, int(flags), text)
+                painter.fillRect(box.adjusted(-4, -1, 4, 1), PLATE)
+                painter.setPen(QColor(colour))
+                painter.drawText(box, int(flags), text)
+                top = box.bottom() + 1
 
 
 def troubles(palette: Palette) -> Spoilt:

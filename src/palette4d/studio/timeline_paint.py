@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QWidget
 
 from palette4d.plotting import style
 from palette4d.plotting.layout import BAND, Disc, Timeline, disc_names, half_bands
-from palette4d.plotting.rows import Palette
+from palette4d.plotting.rows import PlottedPalette
 from palette4d.studio import paint, texts, theme
 from palette4d.studio.frame_strip import FrameStrip
 from palette4d.studio.screen_colours import on_screen
@@ -366,7 +366,7 @@ class TimelinePainter:
         painter.setClipping(False)
 
     @staticmethod
-    def _weight(palette: Palette, edge: int, weights: dict[str, float]) -> float:
+    def _weight(palette: PlottedPalette, edge: int, weights: dict[str, float]) -> float:
         ids = [palette.edge_ids[edge], *(palette.ids[v] for v in palette.edges[edge])]
         return max((weights[id_] for id_ in ids if id_ in weights), default=0.0)
 
