@@ -72,6 +72,7 @@ HOSTILE = {
     "infinite": b'{"frame": 1e999}',
     "too large": b'{"frame": ' + b"9" * 400 + b"}",
     "no text": b"\xff",
+    "infinite text": b'{"frame": "inf"}',
 }
 
 
