@@ -335,8 +335,8 @@ def _searched(run: _Run, options: AnalysisOptions, simple: SkewPolytope) -> Skew
     for configuration in reversed(configurations):
         if len(configuration) <= options.blocks:
             apart, these = block_merging.placed(configuration, few, frames, options)
-            dense, remarks = _glued(these, apart)
-            notes.append(remarks)
+            dense, note = _glued(these, apart)
+            notes.append(note)
             vertex_removal.thin_out(dense, these, options)
             starts.append(dense.polytope())
     progress = run.counter("vertex_removal")
