@@ -330,6 +330,7 @@ $(addprefix fuzz-,$(filter-out $(FUZZ_NATIVE),$(FUZZ))): fuzz-%: $(TEST_VENV)/.i
 		$(TEST_VENV)/bin/python -P -m pytest -q -s tests/fuzz -k $* -m "not slow" -o faulthandler_timeout=0
 
 # From a folder of its own, so that no file of the tree can stand in for the installed package.
+# One test more than processors: some wait for a host or for a process.
 test-py: $(TEST_VENV)/.installed
 	@echo "== pytest on the installed wheel"
 	@rm -rf build/test-run && mkdir -p build/test-run
@@ -338,7 +339,7 @@ test-py: $(TEST_VENV)/.installed
 		qt="-p no:pytest-qt"; }; \
 	wheel=$$(echo "$(CURDIR)"/$(TEST_WHEELS)/*.whl) && cd build/test-run && \
 		PALETTE4D_WHEEL="$$wheel" "$(CURDIR)/$(TEST_VENV)/bin/python" -P -m pytest \
-		-c "$(CURDIR)/pyproject.toml" --rootdir "$(CURDIR)" "$(CURDIR)/tests" -n $(JOBS) --dist worksteal --durations 10 $$qt \
+		-c "$(CURDIR)/pyproject.toml" --rootdir "$(CURDIR)" "$(CURDIR)/tests" -n $$(($(JOBS) + 1)) --dist worksteal --durations 10 $$qt \
 		$(if $(SLOW),-o faulthandler_timeout=3600,-m "not slow") $(PYTEST_ARGS)
 
 # ---------------------------------------------------------------------------- releases

@@ -234,7 +234,7 @@ void changed(const Suites& suites, OfxImageEffectHandle effect, const Properties
                fs::is_regular_file(reachable(native(target)), error)) {
         text = target + " is there: choose it in the node Palette4D";
     }
-    text = printable(text);
+    text = without_controls(text);
     if (params.string_now(kParamStatus) != text) params.note_string(kParamStatus, text);
 }
 

@@ -62,7 +62,7 @@ std::string words_of_versions(const Sidecar& sidecar) {
 
 }  // namespace
 
-std::string printable(const std::string& text) {
+std::string without_controls(const std::string& text) {
     static const char* const kDigits = "0123456789abcdef";
     std::string result;
     for (std::size_t i = 0; i < text.size();) {
@@ -114,7 +114,7 @@ std::string status_of(const Chosen& chosen, const std::vector<std::string>& firs
     for (const std::string& line : lines) {
         if (!line.empty()) text += (text.empty() ? "" : "\n") + line;
     }
-    return printable(text);
+    return without_controls(text);
 }
 
 }  // namespace palette4d::node

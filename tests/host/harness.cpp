@@ -306,18 +306,22 @@ int stand_in(const std::vector<std::string>& words) {
 }  // namespace
 }  // namespace test
 
-/// palette4d_host_tests BUNDLE FOLDER [NAME …] [-NAME …]: runs the tests whose names contain one of
-/// NAME (all without one), and none of -NAME.
+/// palette4d_host_tests BUNDLE FOLDER [NAME …] [-NAME …] [odd|even]: runs the tests whose names
+/// contain one of NAME (all without one), and none of -NAME; with odd or even every second of them.
 int main(int argc, char** argv) {
-    const std::vector<std::string> words = strict::arguments(argc, argv);
+    std::vector<std::string> words = strict::arguments(argc, argv);
     if (words.size() < 3) {
-        std::cerr << "usage: palette4d_host_tests BUNDLE FOLDER [NAME ...]\n";
+        std::cerr
+            << "usage: palette4d_host_tests BUNDLE FOLDER [NAME ...] [-NAME ...] [odd|even]\n";
         return 2;
     }
     if (words[1] == "-E") return test::stand_in(words);
+    const bool halved = words.back() == "odd" || words.back() == "even";
+    const int half = words.back() == "odd" ? 1 : 0;
+    if (halved) words.pop_back();
     test::g_bundle = words[1];
     test::g_own_file = std::filesystem::absolute(std::filesystem::u8path(words[0]));
-    int failed_cases = 0, run = 0;
+    int failed_cases = 0, run = 0, number = 0;
     for (const test::Case& test_case : test::cases()) {
         bool any = false, wanted = false, unwanted = false;
         for (std::size_t i = 3; i < words.size(); ++i) {
@@ -326,7 +330,7 @@ int main(int argc, char** argv) {
             any |= !minus;
             (minus ? unwanted : wanted) |= holds;
         }
-        if (unwanted || (any && !wanted)) continue;
+        if (unwanted || (any && !wanted) || (halved && ++number % 2 != half)) continue;
         ++run;
         // Whole: what the node is given and what it says are compared as texts.
         test::g_folder =
