@@ -149,29 +149,20 @@ def test_edges_are_told_where_a_change_is_larger_than_its_reach(fields: Fields) 
     assert small.side_effect().torn == 0
 
 
-def rest(document: Document, rows: Any, frame: float) -> float:
-    """Mean change of some colours of the clip."""
-    return float(np.mean([np.abs(moved(document, row[:3], frame)).max() for row in rows]))
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_a_hold_keeps_its_colour_and_what_is_like_it(fields: Fields, seed: int) -> None:
-    """In all frames, and hardly at the cost of others."""
+@pytest.mark.parametrize("seed", range(2))
+def test_a_hold_never_adds_to_a_change(fields: Fields, seed: int) -> None:
+    """Of no colour, in no frame: neither of the held one nor of any other."""
     rng = np.random.default_rng(seed)
-    others = [[*rgb, 0.1] for rgb in rng.uniform(0.15, 0.6, (6, 3)).tolist()]
     held = np.array(MIDDLE) + rng.uniform(-0.12, 0.12, 3)
-    others = [row for row in others if np.linalg.norm(row[:3] - held) > 0.2]
-    like = cluster(held, 0.1, 0.03)
-    found = {**fields, "colours": [{"frame": 0, "rgbw": [*cluster(MIDDLE, 0.3), *like, *others]}]}
+    rows = [*cluster(MIDDLE, 0.3), *cluster(held, 0.1), *cluster((0.2, 0.2, 0.3), 0.6)]
+    found = {**fields, "colours": [{"frame": 0, "rgbw": rows}]}
     asked = pick("p1", MIDDLE, (0.65, 0.25, 0.45), **{"from": 8, "until": 12, "fade": 4})
-    alone, _ = solved(found, asked)
-    both, _ = solved(found, asked, pick("p2", held.tolist()))
-    for frame in (5, 6, 8, 10, 14):
+    alone, both = solved(found, asked)[0], solved(found, asked, pick("p2", held.tolist()))[0]
+    colours = rng.uniform(-0.1, 1.1, (300, 1, 3)).astype(np.float32)
+    for frame in (5, 6.5, 8, 10, 14):
+        before, after = (np.abs(d.recolour(colours, frame) - colours) for d in (alone, both))
+        assert (after <= before + 1e-6).all()
         np.testing.assert_allclose(moved(both, held, frame), 0, atol=0.002)
-        for row in like:
-            before, after = (np.abs(moved(d, row[:3], frame)).max() for d in (alone, both))
-            assert after <= before + 0.002
-        assert rest(both, others, frame) < 1.25 * rest(alone, others, frame) + 1 / 255
 
 
 def test_a_hold_does_no_harm_where_it_meets_a_pick(fields: Fields) -> None:

@@ -19,9 +19,9 @@ What is left at the picks is then met by the bumps alone. A bump grows with the 
 would fold over and posterise, up to a limit: beyond are other things. A pick of a box with a wide
 spread of colours has a bump at several of them.
 
-A hold wants to stay, as a pick wants to change. Then it scales what all else does to the colours
-near it and its shades, to nothing at its own. So the colour never changes more than without the
-hold. A hold ends before the nearest pick.
+A hold takes no part in this. It scales what all else does to the colours near it and its shades,
+to nothing at its own. So no colour ever changes more with a hold than without. A hold ends at the
+nearest pick.
 
 Frames are solved one by one, at the clip's vertices, at the picks' own frames and every few frames
 between; the core interpolates linearly. So a pick that ends at a frame has no effect at all beyond.
@@ -52,7 +52,7 @@ F64 = NDArray[np.float64]
 # A colour of few pixels counts as if it had this share of them: a lamp.
 LEAST_SHARE = 5e-4
 # The guard's weight beside a pick that has all the pixels.
-GUARD = 0.65
+GUARD = 0.635
 # A change of a colour is noticed 1 + CHROMA (max - min) times less than that of a grey.
 CHROMA = 6.0
 # A guarded colour that would change by more than LARGE times the largest change that is asked for
@@ -385,14 +385,13 @@ class _Problem:
         own = np.array([self.picks[i].radius or LARGEST for i in self.of[held]])
         radii = np.maximum(np.minimum(own, most), np.minimum(own, LEAST))
         keep = asked[held] * np.minimum(1.0, most / LEAST)
-        own_colour = ~self.offsets[held].any(axis=1)
-        moves, sizes = self._meet(time, picked, held[own_colour], keep[own_colour])
+        moves, sizes = self._meet(time, picked)
         bumps = dict(zip(picked.tolist(), sizes, strict=True))
         bumps |= dict(zip(held.tolist(), np.column_stack([radii, keep]), strict=True))
         return _Solved(time, moves, bumps)
 
     def _meet(
-        self, time: float, picked: NDArray[np.int64], held: NDArray[np.int64], keep: F64
+        self, time: float, picked: NDArray[np.int64]
     ) -> tuple[dict[tuple[str, int], F64], F64]:
         """Return the displacements by place, and the sizes of the bumps of picked points."""
         clip = self.clip
@@ -402,37 +401,34 @@ class _Problem:
         if not len(picked):
             return nothing
         places, free = self._places(cut, time)
-        both = np.concatenate([picked, held])
-        of, centres = self.of[both], self.centres(time)[both]
+        of, centres, radii = self.of[picked], self.centres(time)[picked], self.radii[picked]
         strengths, certain = self.strengths(time)[picked], self.certain(time)[picked]
         weights = _core.palette_weights(centres, cut.rgb, cut.faces)[0]
         changes = np.array([pick.change_at(time) for pick in self.picks])[of]
-        n = len(picked)
-        wanted = np.zeros((len(both), 3))
-        wanted[:n] = strengths[:, None] * (changes - weights @ edited)[:n]
+        wanted = strengths[:, None] * (changes - weights @ edited)
         scale = float(np.linalg.norm(wanted, axis=1).max())
         if scale < NONE:
             return nothing
-        local = np.array([not self.picks[i].global_only for i in of[:n]])
-        bumps = bump_values(centres, centres[:n], self.radii[picked]) * local
+        local = np.array([not self.picks[i].global_only for i in of])
+        bumps = bump_values(centres, centres, radii) * local
         rows = np.hstack([_gathered(weights, places) * free, bumps])
         guarded = clip.colours_at(time)
-        within = bump_values(guarded[:, :3], centres[:n], self.radii[picked])
+        within = bump_values(guarded[:, :3], centres, radii)
         guard_weights = _core.palette_weights(guarded[:, :3], cut.rgb, cut.faces)[0]
         guard_rows = np.hstack([_gathered(guard_weights, places) * free, within * local])
         slopes = _gathered(_slopes(cut.rgb, cut.faces), places) * free
         far = self.guard_at(guarded[:, :3], time)
         guard = _noticed(guarded)
-        counts = self._counts(guarded, of[:n], within)
+        counts = self._counts(guarded, of, within)
         if clip.frames:
             # A pick of few pixels moves no palette colour that many pixels are mixed from.
-            near = bump_values(guarded[:, :3], centres[:n], np.full(n, NEAR))
+            near = bump_values(guarded[:, :3], centres, np.full(len(of), NEAR))
             pixels = float(guarded[:, 3] @ near.max(axis=1))
             guard *= GUARD / max(pixels, LEAST_SHARE)
 
         solved = _least_squares(
             rows,
-            np.concatenate([certain * strengths / strengths.max() * counts, keep]),
+            certain * strengths / strengths.max() * counts,
             wanted,
             guard_rows,
             (far * guard, far),
@@ -441,8 +437,8 @@ class _Problem:
             BUMP * counts,
         )
         moves, sizes = solved[: len(free)] * free[:, None], solved[len(free) :]
-        left = (wanted - rows @ solved)[:n]
-        sizes = (sizes + _interpolated(bumps[:n], certain[:, None] * left)) * local[:, None]
+        left = wanted - rows @ solved
+        sizes = (sizes + _interpolated(bumps, certain[:, None] * left)) * local[:, None]
         return dict(zip(dict.fromkeys(places), moves, strict=True)), sizes
 
     def _places(self, cut: _core.Slice, time: float) -> tuple[list[tuple[str, int]], F64]:
