@@ -250,7 +250,7 @@ def _dispensable(
     few = range(0, len(frames), max(1, len(frames) // WORST_FRAMES))
     rises = []
     for chain in moves.chains(polytope):
-        rest = moves.without_chain(polytope, chain)
+        rest = moves.without_chain(polytope, chain, any_mesh=True)
         rows = frame_losses(rest, frames, few, weights, options, coarse=True)
         rise = float((options.lambda_ * rows[:, 0] + rows[:, 1] + rows[:, 2]).sum())
         rises.append((rise, chain))
