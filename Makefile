@@ -330,6 +330,7 @@ $(addprefix fuzz-,$(filter-out $(FUZZ_NATIVE),$(FUZZ))): fuzz-%: $(TEST_VENV)/.i
 		$(TEST_VENV)/bin/python -P -m pytest -q -s tests/fuzz -k $* -m "not slow" -o faulthandler_timeout=0
 
 # From a folder of its own, so that no file of the tree can stand in for the installed package.
+# One test more than processors: some wait for a host or for a process.
 test-py: $(TEST_VENV)/.installed
 	@echo "== pytest on the installed wheel"
 	@rm -rf build/test-run && mkdir -p build/test-run
@@ -338,7 +339,7 @@ test-py: $(TEST_VENV)/.installed
 		qt="-p no:pytest-qt"; }; \
 	wheel=$$(echo "$(CURDIR)"/$(TEST_WHEELS)/*.whl) && cd build/test-run && \
 		PALETTE4D_WHEEL="$$wheel" "$(CURDIR)/$(TEST_VENV)/bin/python" -P -m pytest \
-		-c "$(CURDIR)/pyproject.toml" --rootdir "$(CURDIR)" "$(CURDIR)/tests" -n $(JOBS) --dist worksteal --durations 10 $$qt \
+		-c "$(CURDIR)/pyproject.toml" --rootdir "$(CURDIR)" "$(CURDIR)/tests" -n $$(($(JOBS) + 1)) --dist worksteal --durations 10 $$qt \
 		$(if $(SLOW),-o faulthandler_timeout=3600,-m "not slow") $(PYTEST_ARGS)
 
 # ---------------------------------------------------------------------------- releases
@@ -355,7 +356,7 @@ RELEASE_PYTHON = $(CURDIR)/$(RELEASE)/env/bin/python
 # No time of the build in what is built: 1 January 1980, where zip files begin.
 RELEASE_ENVIRONMENT = PATH="$(CURDIR)/$(RELEASE)/env/bin:$$PATH" SOURCE_DATE_EPOCH=315532800 \
 	ZIG_GLOBAL_CACHE_DIR="$(ZIG_CACHE)" ZIG_LOCAL_CACHE_DIR="$(ZIG_CACHE)" \
-	PALETTE4D_ZIG="$$($(RELEASE_PYTHON) -c 'import pathlib, ziglang; print(pathlib.Path(ziglang.__file__).with_name("zig"))')"
+	PALETTE4D_ZIG="$$("$(RELEASE_PYTHON)" -c 'import pathlib, ziglang; print(pathlib.Path(ziglang.__file__).with_name("zig"))')"
 SYSTEMS := linux-x86_64 linux-aarch64 windows macos-x86_64 macos-arm64
 
 # $(call release-build,CONFIGURE_PRESETS,BUILD_PRESETS)
@@ -370,18 +371,20 @@ endef
 $(BUNDLES)/SHA256SUMS: $(SOURCES) $(RELEASE)/.installed tools/assemble_bundle.py
 	@echo "== the OpenFX bundle for every system (takes 10 to 20 minutes the first time)"
 	$(call release-build,$(SYSTEMS),$(SYSTEMS))
-	@$(RELEASE_PYTHON) tools/assemble_bundle.py build/cmake $(BUNDLES)
+	@"$(RELEASE_PYTHON)" tools/assemble_bundle.py build/cmake $(BUNDLES)
 
 bundles: $(BUNDLES)/SHA256SUMS ## the OpenFX bundle for every system
 
-# The tree once more, in another folder and with an empty cache, must give the same bytes.
+# The tree once more, in another folder (its name has a blank) and with an empty cache, must give the
+# same bytes.
+AGAIN := $(RELEASE)/again/a tree
 bundles-again: $(BUNDLES)/SHA256SUMS
 	@echo "== the bundle once more, elsewhere"
-	@rm -rf $(RELEASE)/again && mkdir -p $(RELEASE)/again/tree
+	@rm -rf $(RELEASE)/again && mkdir -p "$(AGAIN)"
 	@tar -c --exclude=./build --exclude=./.venv --exclude=./.git --exclude=./demo_output . | \
-		tar -x -C $(RELEASE)/again/tree
-	$(MAKE) -C $(RELEASE)/again/tree ZIG_CACHE="$(CURDIR)/$(RELEASE)/again/zig" bundles
-	cmp $(BUNDLES)/SHA256SUMS $(RELEASE)/again/tree/$(BUNDLES)/SHA256SUMS
+		tar -x -C "$(AGAIN)"
+	$(MAKE) -C "$(AGAIN)" ZIG_CACHE="$(CURDIR)/$(RELEASE)/again/zig" bundles
+	cmp $(BUNDLES)/SHA256SUMS "$(AGAIN)/$(BUNDLES)/SHA256SUMS"
 
 # Wine and qemu run what is for other systems; the tests say which package is missing.
 test-bundles: $(BUNDLES)/SHA256SUMS $(TEST_VENV)/.installed

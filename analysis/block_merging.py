@@ -17,7 +17,7 @@ import numpy as np
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
 from palette4d.analysis.losses import palette_loss, refine_palette
 from palette4d.analysis.options import AnalysisOptions
-from palette4d.analysis.polytope import Palette
+from palette4d.analysis.polytope import FramePalette
 
 # Evaluations per frame are few: refinement starts from the neighbour's refined palette.
 EVALUATIONS = 30
@@ -37,7 +37,7 @@ class Block:
     """
 
     first: int
-    palettes: tuple[Palette, ...]
+    palettes: tuple[FramePalette, ...]
     losses: tuple[float, ...]
 
     def weighted_loss(self, frames: int, options: AnalysisOptions) -> float:
@@ -53,7 +53,7 @@ def _theta(n: int, m: int, frames: int, options: AnalysisOptions) -> float:
 
 def initial_blocks(
     frames: Sequence[FrameStatistics],
-    palettes: Sequence[Palette],
+    palettes: Sequence[FramePalette],
     links: Sequence[Sequence[tuple[int, int]] | None],
     options: AnalysisOptions,
 ) -> list[Block]:
@@ -62,7 +62,7 @@ def initial_blocks(
     All palettes of a block have the order of its first frame.
     """
     blocks: list[Block] = []
-    run: list[Palette] = []
+    run: list[FramePalette] = []
     order = np.arange(0)
     for i, palette in enumerate(palettes):
         pairs = links[i - 1] if i else None
@@ -71,7 +71,7 @@ def initial_blocks(
         else:
             to = dict(pairs)
             order = np.array([to[int(v)] for v in order])
-            run = [*run, Palette(palette.rgb[order], run[0].faces)]
+            run = [*run, FramePalette(palette.rgb[order], run[0].faces)]
         loss = palette_loss(frames[i].coarse, run[-1].rgb, options)
         if pairs is None:
             blocks.append(Block(i, (run[0],), (loss,)))
@@ -99,7 +99,7 @@ class Merge:
         self.keep, self.adopt = keep, adopt
         self.frames, self.gamut, self.options = frames, gamut, options
         self.forwards = keep.first < adopt.first
-        self.palettes: list[Palette] = []
+        self.palettes: list[FramePalette] = []
         self.losses: list[float] = []
         n = len(frames)
         self.before = keep.weighted_loss(n, options) + adopt.weighted_loss(n, options)
@@ -123,7 +123,7 @@ class Merge:
         loss = palette_loss(colours, previous.rgb, self.options)
         if abs(loss - fitted) > SAME * fitted:
             rgb = refine_palette(colours, previous, self.gamut, self.options, EVALUATIONS)
-            previous = Palette(rgb, previous.faces)
+            previous = FramePalette(rgb, previous.faces)
             loss = palette_loss(colours, rgb, self.options)
         self.palettes.append(previous)
         self.losses.append(loss)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from palette4d.analysis.frame_statistics import FrameStatistics
-from palette4d.analysis.polytope import Palette, SkewPolytope
+from palette4d.analysis.polytope import FramePalette, SkewPolytope
 from scipy.spatial import ConvexHull, QhullError
 
 F64 = NDArray[np.float64]
@@ -24,7 +24,7 @@ CONCAVE = 0.05
 NARROW = 0.24
 
 
-def hull_mesh(points: F64) -> Palette:
+def hull_mesh(points: F64) -> FramePalette:
     """Return the vertices and outward triangles of the convex hull of (n, 3) points.
 
     Raises
@@ -42,7 +42,7 @@ def hull_mesh(points: F64) -> Palette:
     a, b, c = (rgb[faces[:, i]] for i in range(3))
     inwards = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
     faces[inwards] = faces[inwards][:, ::-1]
-    return Palette(rgb, faces.astype(np.int32))
+    return FramePalette(rgb, faces.astype(np.int32))
 
 
 def two_sided(polygon: NDArray[np.integer[Any]]) -> I32:
@@ -103,8 +103,8 @@ def hull_volume(rgb: F64) -> float:
 
 def mesh_volume(rgb: F64, faces: I32) -> float:
     """Return the volume inside a closed mesh, negative if it is turned inside out."""
-    a, b, c = (rgb[faces[:, i]] for i in range(3))
-    return float(np.einsum("ij,ij->i", a - rgb[0], np.cross(b - a, c - a)).sum()) / 6
+    (a, b, c), (d, e, f), (g, h, i) = (rgb - rgb[0])[faces].T
+    return float((a * (e * i - f * h) + d * (h * c - b * i) + g * (b * f - c * e)).sum()) / 6
 
 
 def deepest_concavity(polytope: SkewPolytope, frames: Iterable[FrameStatistics]) -> float:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 from palette4d.analysis.losses import NO_FACES
-from palette4d.analysis.polytope import Palette, Section, SkewPolytope
+from palette4d.analysis.polytope import FramePalette, Section, SkewPolytope
 
 F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
@@ -40,7 +40,7 @@ class DensePolytope:
     def __init__(
         self,
         frames: Sequence[int],
-        blocks: Sequence[Sequence[Palette]],
+        blocks: Sequence[Sequence[FramePalette]],
         links: Sequence[Links] = (),
         faces_between: Sequence[I32] = (),
     ) -> None:

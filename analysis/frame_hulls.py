@@ -1,6 +1,6 @@
 """Frame hulls, section 5.2.1: a polyhedral palette for each frame.
 
-Input: the colours of a frame. Output: a `Palette` of at most `palette_size` colours and the
+Input: the colours of a frame. Output: a `FramePalette` of at most `palette_size` colours and the
 triangles of their convex hull. The convex hull of the colours is simplified (Tan et al. 2016) and
 clipped to the gamut, close colours are merged, and the vertices refined (Wang et al. 2019). Colours
 without volume give palettes of one colour, of two (a line), or flat two-sided polygons.
@@ -14,7 +14,7 @@ from palette4d.analysis.convex_hulls import THIN, hull_mesh, two_sided
 from palette4d.analysis.frame_statistics import Gamut
 from palette4d.analysis.losses import NO_FACES, palette_loss, refine_palette
 from palette4d.analysis.options import AnalysisOptions
-from palette4d.analysis.polytope import Palette
+from palette4d.analysis.polytope import FramePalette
 from scipy.spatial import ConvexHull
 
 from palette4d import _core
@@ -22,7 +22,9 @@ from palette4d import _core
 F64 = NDArray[np.float64]
 
 
-def frame_palette(colours: _core.ColourTree, gamut: Gamut, options: AnalysisOptions) -> Palette:
+def frame_palette(
+    colours: _core.ColourTree, gamut: Gamut, options: AnalysisOptions
+) -> FramePalette:
     """Return the refined, simplified hull of a frame's colours, inside the gamut."""
     flat = flat_palette(colours.rgb, options)
     if flat is not None:
@@ -74,7 +76,7 @@ def merge_close(points: F64, distance: float) -> F64:
     return points
 
 
-def flat_palette(points: F64, options: AnalysisOptions) -> Palette | None:
+def flat_palette(points: F64, options: AnalysisOptions) -> FramePalette | None:
     """Return the palette of colours without volume, or None when they have one.
 
     One colour for a point, two for a line, a two-sided polygon of at most `palette_size` corners
@@ -86,16 +88,16 @@ def flat_palette(points: F64, options: AnalysisOptions) -> Palette | None:
     along = (points - centre) @ axes.T
     extent = np.ptp(along, axis=0)
     if extent[0] <= 2 * THIN:
-        return Palette(centre[None], NO_FACES)
+        return FramePalette(centre[None], NO_FACES)
     if extent[1] <= 2 * THIN:
         ends = [int(np.argmin(along[:, 0])), int(np.argmax(along[:, 0]))]
-        return Palette(points[ends], NO_FACES)
+        return FramePalette(points[ends], NO_FACES)
     if extent[2] > 2 * THIN:
         return None
     polygon: NDArray[np.int32] = ConvexHull(along[:, :2]).vertices  # anticlockwise
     while len(polygon) > max(3, options.palette_size):
         polygon = np.delete(polygon, _least_corner(along[polygon, :2]))
-    return Palette(points[polygon], two_sided(np.arange(len(polygon))))
+    return FramePalette(points[polygon], two_sided(np.arange(len(polygon))))
 
 
 def _least_corner(corners: F64) -> int:

@@ -18,7 +18,7 @@ import itertools
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d.analysis.polytope import Palette
+from palette4d.analysis.polytope import FramePalette
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import ConvexHull, QhullError
 
@@ -51,7 +51,7 @@ class Glue:
     complete: bool = True
 
 
-def glue(first: Palette, second: Palette) -> Glue:
+def glue(first: FramePalette, second: FramePalette) -> Glue:
     """Return the best inter-frame edges between two palettes."""
     n, m = len(first.rgb), len(second.rgb)
     distance = np.linalg.norm(first.rgb[:, None] - second.rgb[None], axis=2)
@@ -97,8 +97,8 @@ class _Search:
 
     def __init__(
         self,
-        first: Palette,
-        second: Palette,
+        first: FramePalette,
+        second: FramePalette,
         distance: F64,
         allowed: Bool,
         strict: bool,
@@ -231,7 +231,9 @@ def _nearest_links(distance: F64) -> tuple[tuple[int, int], ...]:
     return tuple(sorted(links))
 
 
-def _same_topology(first: Palette, second: Palette, links: tuple[tuple[int, int], ...]) -> bool:
+def _same_topology(
+    first: FramePalette, second: FramePalette, links: tuple[tuple[int, int], ...]
+) -> bool:
     if len(links) != len(first.rgb) or len({i for i, _ in links}) != len({j for _, j in links}):
         return False
     to = dict(links)
@@ -239,7 +241,9 @@ def _same_topology(first: Palette, second: Palette, links: tuple[tuple[int, int]
     return image == {_triangle(*map(int, face)) for face in second.faces}
 
 
-def _broken_edges(first: Palette, second: Palette, links: tuple[tuple[int, int], ...]) -> int:
+def _broken_edges(
+    first: FramePalette, second: FramePalette, links: tuple[tuple[int, int], ...]
+) -> int:
     near, far = first.adjacency(), second.adjacency()
     broken = 0
     for one, other, pairs in ((near, far, links), (far, near, tuple((j, i) for i, j in links))):
@@ -256,7 +260,9 @@ def _triangle(a: int, b: int, c: int) -> tuple[int, int, int]:
     return min((a, b, c), (b, c, a), (c, a, b))
 
 
-def transition_faces(first: Palette, second: Palette, links: tuple[tuple[int, int], ...]) -> I32:
+def transition_faces(
+    first: FramePalette, second: FramePalette, links: tuple[tuple[int, int], ...]
+) -> I32:
     """Return the (f, 3) triangles over the links: the topology between the two frames.
 
     If colours only split, it is the second palette's mesh; if they only merge, the first's. If

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from palette4d.analysis.frame_statistics import Gamut
 from palette4d.analysis.options import AnalysisOptions
-from palette4d.analysis.polytope import Palette
+from palette4d.analysis.polytope import FramePalette
 
 from palette4d import _core
 
@@ -128,7 +128,7 @@ def summarise(rows: F64, k: float, options: AnalysisOptions) -> Losses:
 
 def refine_palette(
     colours: _core.ColourTree,
-    palette: Palette,
+    palette: FramePalette,
     gamut: Gamut,
     options: AnalysisOptions,
     most_evaluations: int = 60,

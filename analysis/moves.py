@@ -55,8 +55,13 @@ def chains(polytope: SkewPolytope) -> list[tuple[int, ...]]:
     return [chain for chain in found if few.isdisjoint(chain)]
 
 
-def without_chain(polytope: SkewPolytope, chain: tuple[int, ...]) -> SkewPolytope:
-    """Return the polytope without a chain of `chains`."""
+def without_chain(
+    polytope: SkewPolytope, chain: tuple[int, ...], any_mesh: bool = False
+) -> SkewPolytope:
+    """Return the polytope without a chain of `chains`.
+
+    With `any_mesh` sections get the first mesh found, for losses that do not depend on it.
+    """
     gone = set(chain)
     place = np.cumsum([v not in gone for v in range(len(polytope.vertices))]) - 1
 
@@ -65,7 +70,9 @@ def without_chain(polytope: SkewPolytope, chain: tuple[int, ...]) -> SkewPolytop
         at = next((i for i, track in enumerate(tracks) if not gone.isdisjoint(track)), None)
         if at is not None:
             del tracks[at]
-            if len(faces):
+            if len(faces) and any_mesh:
+                faces = next(_drawn_in(faces, at))
+            elif len(faces):
                 faces = _least_concave(polytope, Section(section.first, section.last, tuple(tracks),
                                                          faces), at)  # fmt: skip
         renamed = tuple(tuple(int(place[v]) for v in track) for track in tracks)

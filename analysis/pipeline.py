@@ -32,7 +32,7 @@ from palette4d.analysis.block_merging import Block
 from palette4d.analysis.convex_hulls import CONCAVE, deepest_concavity
 from palette4d.analysis.dense_polytope import DensePolytope
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
-from palette4d.analysis.losses import Losses
+from palette4d.analysis.losses import LOST_SHARE, Losses
 from palette4d.analysis.objective import losses_of
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import SkewPolytope
@@ -43,6 +43,7 @@ from palette4d import _core
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import counted
 from palette4d.grade import sidecar
+from palette4d.grade.names import vertex_colours
 from palette4d.media import colour_space, cuts
 from palette4d.media.array_clip import ArrayClip
 from palette4d.media.clip_base import Clip, describe, even_step
@@ -196,6 +197,10 @@ def analyze(
         notes.append(f"{counted(len(skipped), 'bad frame')} skipped: {describe(skipped)}")
     document["colours"] = clip_colours.clip_colours(usable)
     notes += colour_space.record(document, clip, used)
+    vertices = document["polytope"]["vertices"]
+    names = vertex_colours(vertices, document["clip"]["encoding"])
+    for vertex, name in zip(vertices, names, strict=True):
+        vertex["name"] = name
     notes += [*gathered.notes, *missing, *found.notes, *warnings]
     return Analysis(
         found.polytope,
@@ -353,13 +358,33 @@ def _searched(run: _Run, options: AnalysisOptions, simple: SkewPolytope) -> Skew
         yield stop_insertion.insert_stops(relaxed, frames, gamut, options)
 
     for tried in tries():
-        for one in dict.fromkeys((tried[-1], tried[0])):
-            polytope = vertex_refinement.refine(one.polytope, frames, gamut, options, one.brief)
-            stops = len(one.polytope.vertices) - len(tried[0].polytope.vertices)
-            # Stops need not be worth their cost.
-            if not fits or _price(polytope, run, stops) <= _price(simple, run):
+        for polytope, free in _with_useful_stops(run, tried):
+            if not fits or _price(polytope, run, free) <= _price(simple, run):
                 return polytope
     return tried[0].polytope
+
+
+def _with_useful_stops(
+    run: _Run, tried: Sequence[stop_insertion.WithStops]
+) -> Iterator[tuple[SkewPolytope, int]]:
+    """Yield the refined polytope with all stops, if they are of use, and without stops.
+
+    Stops are of use if they lower the price, or if fewer pixels are lost: `LOST_SHARE` of a frame
+    for each handle. Then they need not be worth their cost: the second item is how many are free.
+    """
+    refined = [
+        vertex_refinement.refine(one.polytope, run.frames, run.gamut, run.options, one.brief)
+        for one in dict.fromkeys((tried[0], tried[-1]))
+    ]
+    if len(refined) > 1:
+        plain, rich = refined
+        before, after = (
+            stop_insertion.lost_share(one, run.frames, run.gamut, run.options) for one in refined
+        )
+        stops = len(rich.vertices) - len(plain.vertices)
+        if before - after >= LOST_SHARE * stops or _price(rich, run) <= _price(plain, run):
+            yield rich, stops
+    yield refined[0], 0
 
 
 def _consistent_blocks(

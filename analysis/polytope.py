@@ -1,7 +1,7 @@
 """The 4D skew polytope (section 4.1) as the analysis builds it, and its form in the sidecar.
 
-Times are frame numbers. `Palette` is one frame's polyhedron. `SkewPolytope` is the palette of the
-clip: vertices, and for each block and each transition the tracks (chains of vertices) and the
+Times are frame numbers. `FramePalette` is one frame's polyhedron. `SkewPolytope` is the palette of
+the clip: vertices, and for each block and each transition the tracks (chains of vertices) and the
 triangles over them.
 """
 
@@ -20,7 +20,7 @@ I32 = NDArray[np.int32]
 
 
 @dataclasses.dataclass(frozen=True)
-class Palette:
+class FramePalette:
     """A polyhedral palette: (n, 3) colours and (f, 3) outward triangles (none for n < 3)."""
 
     rgb: F64

@@ -17,7 +17,7 @@ from palette4d.analysis.frame_hulls import frame_palette
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut, pooled
 from palette4d.analysis.objective import refine_jointly
 from palette4d.analysis.options import AnalysisOptions
-from palette4d.analysis.polytope import Palette, Section, SkewPolytope
+from palette4d.analysis.polytope import FramePalette, Section, SkewPolytope
 
 F64 = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ def plain_options(options: AnalysisOptions) -> Iterator[AnalysisOptions]:
 
 
 def static_polytope(
-    palette: Palette, frames: Sequence[FrameStatistics], gamut: Gamut, options: AnalysisOptions
+    palette: FramePalette, frames: Sequence[FrameStatistics], gamut: Gamut, options: AnalysisOptions
 ) -> SkewPolytope:
     """Return the palette, refined, as a polytope that does not change with time."""
     first, last = float(frames[0].frame), float(frames[-1].frame)

@@ -37,6 +37,7 @@ REMOVED = 0.5  # the least share of a misfit that a stop must remove
 WORTH = 0.04  # the most that lost pixels may raise the value of `Objective`
 SAME_COLOUR = 0.25  # lost colours within this distance belong together
 FARTHEST = 1000  # lost colours that are looked at
+TRIED = 8  # places for stops that are tried, the most promising first
 NEAREST = 8  # tracks that are tried: the nearest need not be the one to spare
 EVALUATIONS = 30
 
@@ -68,9 +69,14 @@ def insert_stops(
         if worst is None:
             break
         best: tuple[int, float, WithStops] | None = None
-        for trial in _trials(now.polytope, frames, misfit, worst, gamut):
-            if options.vertices and len(trial.polytope.vertices) > options.vertices:
-                continue
+        trials = [
+            trial
+            for trial in _trials(now.polytope, frames, misfit, worst, gamut)
+            if not options.vertices or len(trial.polytope.vertices) <= options.vertices
+        ]
+        # Those that are best before their stops move are tried.
+        trials.sort(key=lambda trial: _settled(now, trial, frames, gamut, options, 0)[1])
+        for trial in trials[:TRIED]:
             moved, change = _settled(now, trial, frames, gamut, options)
             price = change + options.handle_cost * len(trial.new)
             if change > WORTH if trial.share else price > 0:
@@ -85,6 +91,17 @@ def insert_stops(
         else:
             steps.append(best[2])
     return steps
+
+
+def lost_share(
+    polytope: SkewPolytope,
+    frames: Sequence[FrameStatistics],
+    gamut: Gamut,
+    options: AnalysisOptions,
+) -> float:
+    """Return the sum of the frames' shares of lost pixels, without those that count as noise."""
+    lost = _Misfit.of(polytope, frames, gamut, options).lost
+    return float(lost[lost >= LOST_SHARE].sum())
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -281,8 +298,12 @@ def _settled(
     frames: Sequence[FrameStatistics],
     gamut: Gamut,
     options: AnalysisOptions,
+    evaluations: int = EVALUATIONS,
 ) -> tuple[WithStops, float]:
-    """Move the new vertices to their best places; return the polytope and the change in value."""
+    """Move the new vertices to their best places; return the polytope and the change in value.
+
+    With no `evaluations` they stay where they are.
+    """
     brief = (*now.brief, *trial.new[: trial.peaks])
     evaluate = Objective(trial.polytope, frames, options, gamut, True, brief)
     vertices = trial.polytope.vertices.copy()
@@ -297,7 +318,8 @@ def _settled(
         upper[:, 3] = np.minimum(upper[:, 3], times + span)
     if trial.held:
         lower[: trial.peaks, 3] = upper[: trial.peaks, 3] = times[: trial.peaks]
-    vertices = move(evaluate, vertices, moving, which, (lower, upper), EVALUATIONS)
+    if evaluations:
+        vertices = move(evaluate, vertices, moving, which, (lower, upper), evaluations)
     value, _ = evaluate(vertices, which)
     unchanged = Objective(now.polytope, frames, options, gamut, True, now.brief)
     before, _ = unchanged(now.polytope.vertices, which)

@@ -35,7 +35,8 @@ F64 = NDArray[np.float64]
 FIRST_EVALUATIONS, EVALUATIONS, COMPARE_EVALUATIONS = 50, 20, 40
 STEP = 0.01
 # The palettes of a walk are compared at this cost, whatever `handle_cost` is.
-USUAL_COST = AnalysisOptions().handle_cost
+USUAL = AnalysisOptions()
+USUAL_COST = USUAL.handle_cost
 # A walk ends at a price this share above the least so far.
 PATIENCE = 0.08
 # Palettes whose price is this share above the least are refined before they are compared.
@@ -77,14 +78,15 @@ def search(
     The starts come in the order of their blocks. A start with more blocks than one that did not
     pay is not searched.
     """
-    some = few if len(few) <= EVEN_FRAMES else key_frames(static, few, options, EVEN_FRAMES)
-    ends = {time for start in starts for b in start.blocks for time in (b.first, b.last)}
-    ends |= {frame.frame for frame in some}
-    some = [frame for frame in frames if frame.frame in ends]
+    usual = few if len(few) <= EVEN_FRAMES else key_frames(static, few, options, EVEN_FRAMES)
+    some = usual
     found: list[tuple[Priced, int | None]]
     found = [(one, None) for one in walk(static, some, gamut, options, [])]
     least = math.inf
     for at, start in enumerate(starts):
+        ends = {time for b in start.blocks for time in (b.first, b.last)}
+        ends |= {frame.frame for frame in usual}
+        some = [frame for frame in frames if frame.frame in ends]
         known = [one for one, _ in found]
         steps = walk(start, some, gamut, options, known)
         best = min(steps, key=_usual_price)
@@ -92,10 +94,10 @@ def search(
             steps += walk(moves.enriched(best.polytope), some, gamut, options, [*known, *steps])
         found += [(one, at) for one in steps]
         progress(at + 1, len(starts))
-        usual = min(map(_usual_price, steps))
-        if usual > least:
+        price = min(map(_usual_price, steps))
+        if price > least:
             break
-        least = usual
+        least = price
     return _best(found, frames, gamut, options)
 
 
@@ -210,17 +212,19 @@ def hopeless(
     """Return whether palettes with fewer vertices are unlikely to be the best.
 
     They are not when prices have risen far since the best one `found` on this walk, or when the
-    value alone, which rises as vertices go, is too much beside what is `known`.
+    value alone, which rises as vertices go, is too much beside what is `known`: at the usual cost
+    of a handle and, for other options, at theirs too, so that these look no less far.
     """
+    fewest = min(2 * min(len(block.tracks) for block in one.polytope.blocks), one.handles)
 
-    def least(of: Iterable[Priced]) -> float:
-        prices = (x.price(options.handle_cost) for x in of if allowed(x, (), options))
-        return min(prices, default=math.inf)
+    def at(cost: float, most: AnalysisOptions) -> bool:
+        def least(of: Iterable[Priced]) -> float:
+            return min((x.price(cost) for x in of if allowed(x, (), most)), default=math.inf)
 
-    fewest = 2 * min(len(block.tracks) for block in one.polytope.blocks)
-    floor = one.value + options.handle_cost * min(fewest, one.handles)
-    risen = one.price(options.handle_cost) > (1 + PATIENCE) * least(found)
-    return risen or floor > least(known)
+        risen = one.price(cost) > (1 + PATIENCE) * least(found)
+        return risen or one.value + cost * fewest > least(known)
+
+    return at(USUAL_COST, USUAL) and at(options.handle_cost, options)
 
 
 def allowed(one: Priced, found: Sequence[Priced], options: AnalysisOptions) -> bool:
@@ -246,7 +250,7 @@ def _dispensable(
     few = range(0, len(frames), max(1, len(frames) // WORST_FRAMES))
     rises = []
     for chain in moves.chains(polytope):
-        rest = moves.without_chain(polytope, chain)
+        rest = moves.without_chain(polytope, chain, any_mesh=True)
         rows = frame_losses(rest, frames, few, weights, options, coarse=True)
         rise = float((options.lambda_ * rows[:, 0] + rows[:, 1] + rows[:, 2]).sum())
         rises.append((rise, chain))

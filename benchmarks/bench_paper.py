@@ -191,13 +191,13 @@ def draw_timelines(sidecars: Sequence[tuple[str, Path]], output: Path, width: in
     from matplotlib.figure import Figure
 
     from palette4d.plotting import style, timeline
-    from palette4d.plotting.rows import Palette, arrange
+    from palette4d.plotting.rows import PlottedPalette, arrange
 
     room, margin, points = 30.0, 14.0, 800.0
     read = [(title, _core.read_sidecar(str(path))) for title, path in sidecars]
     panels = []
     for _, sidecar in read:
-        palette = Palette.of(sidecar)
+        palette = PlottedPalette.of(sidecar)
         rows = arrange(palette.frames, palette.rgb, palette.edges)
         tall = min(33.0, 500.0 / rows.count)
         panels.append(timeline.Panel(palette, rows, margin, points - margin, tall))

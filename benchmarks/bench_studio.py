@@ -29,7 +29,7 @@ os.environ["QT_QPA_PLATFORM"] = "offscreen"
 
 import numpy as np
 import OpenImageIO as oiio
-from PySide6.QtCore import QSettings
+from PySide6.QtCore import QEventLoop, QSettings
 from PySide6.QtWidgets import QApplication
 
 from palette4d.colour.ocio_config import BUILT_IN
@@ -109,11 +109,12 @@ class Bench:
     def wait(self, ready: Callable[[], bool], seconds: float = 20) -> None:
         """Handle events until something is so."""
         end = time.perf_counter() + seconds
+        flags = QEventLoop.ProcessEventsFlag
         while not ready():
-            self.app.processEvents()
+            # As the window's own loop: it sleeps until something happens.
+            self.app.processEvents(flags.AllEvents | flags.WaitForMoreEvents)
             if time.perf_counter() > end:
                 raise TimeoutError(self.session.status.text)
-            time.sleep(0.0002)
 
     def current(self) -> bool:
         """Whether the picture of now is shown."""
@@ -358,6 +359,7 @@ def main() -> None:
     app = QApplication.instance() or QApplication([])
     assert isinstance(app, QApplication)
     theme.dress(app)
+    sys.setswitchinterval(0.001)  # as `studio.app` does
     movies = {"large": (args.hd, 120), "play": (args.hd, 120), "memory": (args.long, 800)}
     for path, count in dict.fromkeys(movies[part] for part in args.parts if part in movies):
         if not path.exists():

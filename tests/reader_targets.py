@@ -1,14 +1,18 @@
 """What the readers do with any bytes: the targets of tests/fuzz/test_readers.py.
 
 Each takes a file and a folder for what it writes. It returns "accepted" or "refused"; every other
-error than `Palette4dError` is a fault.
+error than `Palette4dError` is a fault. `many` gives them mutations of tests/fuzz/readers/.
 """
 
 from __future__ import annotations
 
+import collections
 import contextlib
 import io
 import json
+import os
+import random
+import time
 import traceback
 from pathlib import Path
 from typing import Any
@@ -23,6 +27,17 @@ from palette4d.common.errors import Palette4dError
 from palette4d.shows import manifest as manifests
 from palette4d.shows import timeline, timeline_files
 from palette4d.shows.shots import numbered
+
+CORPORA = Path(__file__).parent / "fuzz/readers"
+TOKENS = (
+    *(b"{", b"}", b"[", b"]", b",", b":", b'"', b"null", b"true", b"[]", b"{}", b'""', b"-", b"\0"),
+    *(b"1e999", b"-1e308", b"0.5", b"NaN", b"9" * 400, b"2147483648", b"\\ud800", b"\\u0000"),
+    *(b"\xff", b"\xef\xbb\xbf", b"\x1b[2J", b"[" * 80, b"../", b"\r\n", b"00:00:00:00", b"<&\"'>"),
+)
+VALUES: tuple[Any, ...] = (
+    *(None, True, 0, -1, 0.5, 2**31, 10**30, -(10**400), 1e308, "", "a", "../x", "\0", "x" * 400),
+    *([], {}, [1], [[]], {"a": 1}, "\ud800", ["a", "b"], [24, 0], [1e300, 1], ["1e9999999"]),
+)
 
 
 def manifest(path: Path, folder: Path) -> str:
@@ -41,7 +56,7 @@ def manifest(path: Path, folder: Path) -> str:
 
 def index(path: Path, folder: Path) -> str:
     """Read the index of a series; one that is accepted is reported and written."""
-    header = json.loads((Path(__file__).parent / "fuzz/readers/index/two.json").read_text("utf-8"))
+    header = json.loads((CORPORA / "index/two.json").read_text("utf-8"))
     del header["frames"]
     try:
         entries = series_index.read_index(path, header, force=False)
@@ -61,17 +76,19 @@ def correction(path: Path, folder: Path) -> str:
     text = path.read_bytes().decode("utf-8", "ignore")
     about = Description("urn:x", text, (text,), text)
     written = cdl.Cdl((1.5, 1.0, 1.0), saturation=0.5)
+    config = ocio.Config.CreateRaw()
+    ocio.ClearAllCaches()  # of earlier files of these names
     for name in ("cc", "ccc", "cdl"):
         file = folder / f"x.{name}"
         file.write_text(cdl.write(written, name, text, about), "utf-8", newline="\n")
         transform: Any = ocio.FileTransform(src=str(file), cccId="0")
-        processor = ocio.Config.CreateRaw().getProcessor(transform)
+        processor = config.getProcessor(transform)
         assert processor.createGroupTransform()[0].getSat() == 0.5
     return "accepted"
 
 
 def edit(path: Path, folder: Path) -> str:
-    """Read a timeline and its shots, in a child process; return a fault as its traceback."""
+    """Read a timeline and its shots; return a fault as its traceback."""
     try:
         text = timeline_files.as_json(str(path), {})
     except Exception:  # an adapter may raise anything; `timeline_files.read` reports it
@@ -83,3 +100,76 @@ def edit(path: Path, folder: Path) -> str:
     except Exception:
         return traceback.format_exc()
     return "accepted"
+
+
+TARGETS = {
+    "manifest": manifest,
+    "index": index,
+    "correction": correction,
+    "otio": edit,
+    "edl": edit,
+}
+
+
+def many(kind: str, seed: str, first: int, count: int, folder: Path) -> collections.Counter[str]:
+    """Give a target the inputs of these numbers; return how many were accepted and refused.
+
+    The file `number` in the folder holds the number of the input that is tried.
+    """
+    corpus = [path.read_bytes() for path in sorted((CORPORA / kind).iterdir())]
+    path = folder / f"input.{kind}"
+    outcomes: collections.Counter[str] = collections.Counter()
+    told = os.open(folder / "number", os.O_WRONLY | os.O_CREAT)
+    for number in range(first, first + count):
+        os.pwrite(told, b"%20d" % number, 0)
+        choose = random.Random(f"{kind} {seed} {number}")
+        data = corpus[number] if number < len(corpus) else mutated(choose, corpus)
+        path.write_bytes(data)
+        start = time.process_time()
+        try:
+            outcome = TARGETS[kind](path, folder)
+        except Exception:
+            outcome = traceback.format_exc()
+        assert outcome in ("accepted", "refused"), f"input {number}, {data!r}: {outcome}"
+        assert time.process_time() - start < 5, f"input {number} took too long: {data!r}"
+        outcomes[outcome] += 1
+    os.close(told)
+    return outcomes
+
+
+def mutated(choose: random.Random, corpus: list[bytes]) -> bytes:
+    """One input: half of them change one value of a JSON text, the others change bytes."""
+    data = choose.choice(corpus)
+    if choose.random() < 0.5:
+        try:
+            return with_other_value(choose, data)
+        except (ValueError, RecursionError):
+            pass
+    for _ in range(choose.choice((1, 1, 2, 3, 12))):
+        at, end = sorted(choose.randrange(len(data) + 1) for _ in range(2))
+        end = min(end, at + choose.choice((0, 1, 8, 200)))
+        other = choose.choice(corpus)
+        start = choose.randrange(len(other) + 1)
+        piece = choose.choice((b"", choose.choice(TOKENS), other[start : start + 40]))
+        data = data[:at] + piece + data[end:]
+    return data
+
+
+def with_other_value(choose: random.Random, data: bytes) -> bytes:
+    document = json.loads(data)
+    places: list[tuple[Any, Any]] = []
+    left = [document]
+    while left:
+        held = left.pop()
+        if isinstance(held, dict | list):
+            keys = list(held) if isinstance(held, dict) else range(len(held))
+            places += [(held, key) for key in keys]
+            left += [held[key] for key in keys]
+    if not places:
+        raise ValueError("nothing to change")
+    held, key = choose.choice(places)
+    if choose.random() < 0.2:
+        del held[key]
+    else:
+        held[key] = choose.choice(VALUES)
+    return json.dumps(document).encode()

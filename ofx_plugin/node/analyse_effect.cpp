@@ -109,7 +109,7 @@ public:
         if (keep) return;
         std::error_code error;
         for (const fs::path& file : written_) fs::remove(file, error);
-        if (made_) fs::remove(folder_, error);
+        if (made_) fs::remove(reachable(folder_), error);
     }
     Frames(const Frames&) = delete;
     Frames& operator=(const Frames&) = delete;
@@ -122,9 +122,9 @@ public:
     /// or where it cannot be made.
     bool make() {
         std::error_code error;
-        made_ = fs::create_directories(folder_, error);
+        made_ = fs::create_directories(reachable(folder_), error);
         std::vector<fs::path> old;
-        for (const auto& entry : fs::directory_iterator(folder_, error)) {
+        for (const auto& entry : fs::directory_iterator(reachable(folder_), error)) {
             const std::string file = entry.path().filename().u8string();
             const std::string start = name_ + ".", end = ".exr";
             const bool ours =
@@ -140,7 +140,7 @@ public:
     bool write(long number, const Image& image) {
         std::string digits = std::to_string(number);
         digits.insert(0, 6 - std::min<std::size_t>(6, digits.size()), '0');
-        written_.push_back(folder_ / native(name_ + "." + digits + ".exr"));
+        written_.push_back(reachable(folder_ / native(name_ + "." + digits + ".exr")));
         return write_exr(written_.back(), image);
     }
 
@@ -177,7 +177,7 @@ std::string analyse(const Suites& suites, OfxImageEffectHandle effect, const std
     if (target.empty()) return "enter the path of the new sidecar, such as ~/shot.p4d.json";
     const fs::path sidecar = native(target);
     std::error_code error;
-    if (!sidecar.is_absolute() || !fs::is_directory(sidecar.parent_path(), error)) {
+    if (!sidecar.is_absolute() || !fs::is_directory(reachable(sidecar.parent_path()), error)) {
         return target + ": found no such folder; enter the path of the new sidecar in full";
     }
     const auto range = source_range(suites, effect);
@@ -230,10 +230,11 @@ void changed(const Suites& suites, OfxImageEffectHandle effect, const Properties
     std::error_code error;
     if (!state.words.empty()) {
         text += (text.empty() ? "" : "\n") + state.words;
-    } else if (text.empty() && !target.empty() && fs::is_regular_file(native(target), error)) {
+    } else if (text.empty() && !target.empty() &&
+               fs::is_regular_file(reachable(native(target)), error)) {
         text = target + " is there: choose it in the node Palette4D";
     }
-    text = printable(text);
+    text = without_controls(text);
     if (params.string_now(kParamStatus) != text) params.note_string(kParamStatus, text);
 }
 

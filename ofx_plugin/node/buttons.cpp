@@ -14,7 +14,7 @@ std::string text_of(const Params& params, const char* name) {
     return params.string_at(name, Params::kAnyTime).value_or("");
 }
 
-/// The clip as palette4d names it; empty where nobody tells. The user's choice comes first.
+/// The clip as palette4d names it; empty if unknown. The user's choice comes first.
 std::string clip_of(const Params& params, const Chosen& chosen) {
     const std::string given = expanded(meant(text_of(params, kParamClipFile)));
     if (!given.empty()) return clip_spec(given);
@@ -60,7 +60,8 @@ std::string push_analyse(const Params& params, Chosen& chosen) {
     if (cancel_analysis(target)) return "cancelled the analysis";
     const std::string clip = clip_of(params, chosen);
     if (clip.empty()) {
-        return "Analyse: the host does not report the clip's file; choose it as Clip's file";
+        return "Analyse: the host does not report the clip's file; choose it as Clip's file, or "
+               "add the effect Palette4D Analyse, which asks the host for the frames";
     }
     const std::string problem = start_analysis(clip, target);
     if (!problem.empty()) return "Analyse: " + problem;

@@ -41,6 +41,7 @@ bool belongs_to_host(const std::string& variable) {
 
 struct Child::System {
     HANDLE process = nullptr;
+    HANDLE job = nullptr;  ///< what the process starts belongs to it too
 };
 
 namespace {
@@ -77,7 +78,8 @@ std::vector<wchar_t> environment() {
     return block;
 }
 
-HANDLE spawn(const std::vector<std::string>& arguments, std::string& problem) {
+/// With a job, the process belongs to it before it runs.
+HANDLE spawn(const std::vector<std::string>& arguments, HANDLE job, std::string& problem) {
     std::wstring line;
     for (const std::string& argument : arguments) {
         line += (line.empty() ? L"" : L" ") + quoted(wide(argument));
@@ -87,12 +89,15 @@ HANDLE spawn(const std::vector<std::string>& arguments, std::string& problem) {
     how.cb = sizeof how;
     PROCESS_INFORMATION started{};
     if (!CreateProcessW(wide(arguments[0]).c_str(), &line[0], nullptr, nullptr, FALSE,
-                        CREATE_NO_WINDOW | CREATE_NEW_PROCESS_GROUP | CREATE_UNICODE_ENVIRONMENT,
+                        CREATE_NO_WINDOW | CREATE_NEW_PROCESS_GROUP | CREATE_SUSPENDED |
+                            CREATE_UNICODE_ENVIRONMENT,
                         variables.data(), nullptr, &how, &started)) {
         problem =
             arguments[0] + ": cannot be started (error " + std::to_string(GetLastError()) + ")";
         return nullptr;
     }
+    if (job) AssignProcessToJobObject(job, started.hProcess);
+    ResumeThread(started.hThread);
     CloseHandle(started.hThread);
     return started.hProcess;
 }
@@ -101,24 +106,30 @@ HANDLE spawn(const std::vector<std::string>& arguments, std::string& problem) {
 
 std::string start_detached(const std::vector<std::string>& arguments) {
     std::string problem;
-    if (const HANDLE process = spawn(arguments, problem)) CloseHandle(process);
+    if (const HANDLE process = spawn(arguments, nullptr, problem)) CloseHandle(process);
     return problem;
 }
 
 std::unique_ptr<Child> Child::start(const std::vector<std::string>& arguments,
                                     std::string& problem) {
-    const HANDLE process = spawn(arguments, problem);
-    if (!process) return nullptr;
     auto system = std::make_unique<System>();
-    system->process = process;
-    return std::unique_ptr<Child>(new Child(std::move(system)));
+    system->job = CreateJobObjectW(nullptr, nullptr);
+    system->process = spawn(arguments, system->job, problem);
+    std::unique_ptr<Child> child(new Child(std::move(system)));
+    return child->system_->process ? std::move(child) : nullptr;
 }
 
-Child::~Child() { CloseHandle(system_->process); }
+Child::~Child() {
+    if (system_->process) CloseHandle(system_->process);
+    if (system_->job) CloseHandle(system_->job);
+}
 
 bool Child::running() { return WaitForSingleObject(system_->process, 0) == WAIT_TIMEOUT; }
 
-void Child::stop() { TerminateProcess(system_->process, 1); }
+void Child::stop() {
+    if (system_->job) TerminateJobObject(system_->job, 1);
+    TerminateProcess(system_->process, 1);
+}
 
 #else
 

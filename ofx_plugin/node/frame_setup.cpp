@@ -40,7 +40,7 @@ void prepare(FrameSetup& setup, const Params& params, const OutputSettings& sett
         drawing.conversion = linear_picture(params, sidecar, time);
         if (!drawing.conversion) {
             setup.passes = true;
-            setup.problem = "Picture is in: found a palette in '" + sidecar.clip.encoding +
+            setup.problem = "Input colour space: found a palette in '" + sidecar.clip.encoding +
                             "', expected sRGB, Rec.709 or another display encoding; choose Input "
                             "space and give the node its picture in that encoding";
             return;

@@ -69,8 +69,12 @@ bool holds(const Params& params, const Slot& slot, const std::optional<Vec3>& co
 std::string label_of(const Handle& handle) {
     std::ostringstream text;
     text.imbue(std::locale::classic());
-    text << handle.id << (handle.stop ? ", stop at " : ", frame ")
-         << std::round(100 * handle.frame) / 100;
+    text << handle.id;
+    if (handle.name.empty()) {
+        text << (handle.stop ? ", stop at " : ", frame ") << std::round(100 * handle.frame) / 100;
+    } else {
+        text << ": " << handle.name << ", " << std::nearbyint(handle.frame);
+    }
     return text.str();
 }
 
@@ -103,7 +107,7 @@ void define_handle_params(ParamDefiner& define) {
             .set_int(kOfxParamPropLayoutHint, kOfxParamPropLayoutHintNoNewLine);
         define.colour({slot.colour.c_str(), slot.colour_label.c_str(),
                        "The new colour of this handle, in the palette's encoding. It is linear "
-                       "light if Picture is in is set to Scene-linear. May be keyframed."},
+                       "light if Input colour space is set to Scene-linear. May be keyframed."},
                       kUnset, -kLargest, kLargest);
     }
     define.begin_group("handleIds", "Which handles");

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "buttons.hpp"
 #include "handle_params.hpp"
@@ -49,7 +50,7 @@ std::string as_format(const std::string& text) {
 
 void show(const Suites& suites, OfxImageEffectHandle effect, const std::string& problem,
           bool is_new) {
-    const std::string format = as_format(printable(problem));
+    const std::string format = as_format(without_controls(problem));
     // A host may offer version 2 of the suite with null functions.
     if (suites.message2 && suites.message2->setPersistentMessage) {
         suites.message2->setPersistentMessage(effect, kOfxMessageError, kMessageId, format.c_str());
@@ -66,6 +67,47 @@ const char* step_after(const std::string& param) {
     if (param == kParamResetHandles) return "Reset handles";
     if (param == kParamAnalyse) return "Analyse the clip";
     return param.rfind("handle", 0) == 0 ? "Use the handle" : "Follow the sidecar";
+}
+
+/// What *Status* says of a time of the host, and the sidecar's frame there.
+struct ShownFrame {
+    std::string words;
+    std::optional<double> frame;
+};
+
+ShownFrame shown_frame(const Params& params, const Chosen& chosen, const HostClip& host,
+                       OfxTime time) {
+    ShownFrame shown;
+    const Sidecar& sidecar = *chosen.sidecar();
+    const FrameAt at = frame_at(sidecar.clip, time_settings_at(params, time), host, time);
+    shown.words = words_of(time, at);
+    if (!std::isfinite(at.frame)) return shown;
+    shown.frame = std::clamp(at.frame, static_cast<double>(sidecar.clip.first),
+                             static_cast<double>(sidecar.clip.last));
+    if (mode_at(params, time) != Mode::kExact) {
+        const auto lattice =
+            chosen.result.loaded->ready_lattice_at(at.frame, edits_at(params, sidecar, time).edits);
+        if (lattice && lattice->largest_error() > 0) shown.words += "\n" + words_of(*lattice);
+    }
+    return shown;
+}
+
+/// `pushed`: what a button did; `copy`: what became of the project's copy of the sidecar.
+void write_status(Params& params, Chosen chosen, const std::string& pushed, const std::string& copy,
+                  const std::string& shown) {
+    std::string expects;
+    if (const Sidecar* sidecar = chosen.sidecar()) {
+        const bool in_palette_space = params.int_now(kParamPictureIn).value_or(0) == 1;
+        expects = words_of_picture(*sidecar, linear_picture(params, *sidecar, 0)
+                                                 ? "scene-linear light"
+                                                 : encoding_of(*sidecar, in_palette_space));
+    }
+    const AnalysisState analysis = analysis_state(analysis_target(params, chosen));
+    // The file that an analysis will write is not missing.
+    if (analysis.running && !chosen.result.loaded) chosen.result.problem.clear();
+    const std::string text =
+        status_of(chosen, {pushed, analysis.words}, handles_in_use(params), {expects, copy, shown});
+    if (params.string_now(kParamStatus) != text) params.note_string(kParamStatus, text);
 }
 
 }  // namespace
@@ -130,44 +172,16 @@ void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const P
         const std::lock_guard<std::mutex> lock(instance->mutex);
         instance->shown = handles;
     }
-    std::string shown;
-    const Sidecar* sidecar = chosen.sidecar();
-    const std::optional<OfxTime> time = args.get_double(kOfxPropTime);
-    std::optional<double> frame;
-    if (sidecar && time) {
-        const TimeSettings settings = time_settings_at(params, *time);
-        // Before the first render, assume that media frame and time are equal, as on Resolve's
-        // pages.
-        if (!rendered && !chosen.media.empty()) source_less_time = 0;
+    // Before the first render, assume that media frame and time are equal, as on Resolve's pages.
+    if (!rendered && !chosen.media.empty()) source_less_time = 0;
+    ShownFrame shown;
+    if (const auto time = args.get_double(kOfxPropTime); time && chosen.sidecar()) {
         std::optional<double> source_frame;
         if (source_less_time) source_frame = *time + *source_less_time;
-        const FrameAt at =
-            frame_at(sidecar->clip, settings, host_clip(suites, effect, source_frame), *time);
-        shown = words_of(*time, at);
-        if (std::isfinite(at.frame)) {
-            frame = std::clamp(at.frame, static_cast<double>(sidecar->clip.first),
-                               static_cast<double>(sidecar->clip.last));
-        }
-        if (mode_at(params, *time) != Mode::kExact && std::isfinite(at.frame)) {
-            const auto lattice = chosen.result.loaded->ready_lattice_at(
-                at.frame, edits_at(params, *sidecar, *time).edits);
-            if (lattice && lattice->largest_error() > 0) shown += "\n" + words_of(*lattice);
-        }
+        shown = shown_frame(params, chosen, host_clip(suites, effect, source_frame), *time);
     }
-    if (param == kParamOpenInStudio) pushed = push_open_in_studio(params, chosen, frame);
-    std::string expects;
-    if (sidecar) {
-        const bool in_palette_space = params.int_now(kParamPictureIn).value_or(0) == 1;
-        expects = words_of_picture(*sidecar, linear_picture(params, *sidecar, 0)
-                                                 ? "scene-linear light"
-                                                 : encoding_of(*sidecar, in_palette_space));
-    }
-    const AnalysisState analysis = analysis_state(analysis_target(params, chosen));
-    // The file that an analysis will write is not missing.
-    if (analysis.running && !chosen.result.loaded) chosen.result.problem.clear();
-    const std::string text =
-        status_of(chosen, {pushed, analysis.words}, handles_in_use(params), {expects, copy, shown});
-    if (params.string_now(kParamStatus) != text) params.note_string(kParamStatus, text);
+    if (param == kParamOpenInStudio) pushed = push_open_in_studio(params, chosen, shown.frame);
+    write_status(params, std::move(chosen), pushed, copy, shown.words);
 }
 
 void note_source_frame(OfxImageEffectHandle effect, OfxTime time,

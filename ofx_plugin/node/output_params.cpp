@@ -52,7 +52,7 @@ void define_output_params(ParamDefiner& define) {
                    "The colour space whose luminance weights define lightness. Auto: the sidecar's "
                    "colour space, or Rec.709 if the node does not know that space."},
                   {"Auto", "Rec.709", "Rec.2020", "P3", "ACES AP1", "Rec.601"});
-    define.choice({kParamPictureIn, "Picture is in",
+    define.choice({kParamPictureIn, "Input colour space",
                    "The node's input colour space. Input space: the analysed clip's code values. "
                    "Palette space: the palette's code values, such as ACEScct, for hosts that "
                    "convert themselves. Without a conversion in the sidecar both are the same. "

@@ -35,8 +35,9 @@ OutputSettings output_settings_at(const Params& params, OfxTime time);
 /// where the source is.
 void prefer_alpha(const Suites& suites, OfxImageEffectHandle effect, const Properties& out_args);
 
-/// The conversion from scene-linear to the palette's code values, where *Picture is in* selects it
-/// and the sidecar has no conversion. Else null, also where the encoding has no known curve.
+/// The conversion from scene-linear to the palette's code values, where *Input colour space*
+/// selects it and the sidecar has no conversion. Else null, also where the encoding has no known
+/// curve.
 std::shared_ptr<const ColourConversion> linear_picture(const Params& params, const Sidecar& sidecar,
                                                        OfxTime time);
 /// The encoding of the node's picture: the sidecar's input space, or the palette's if chosen.

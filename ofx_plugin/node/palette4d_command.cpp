@@ -83,7 +83,7 @@ Analyses& analyses() {
 
 std::string key_of(const std::string& sidecar) {
     std::error_code error;
-    const fs::path path = fs::weakly_canonical(native(sidecar), error);
+    const fs::path path = fs::weakly_canonical(reachable(native(sidecar)), error);
     return error ? sidecar : path.u8string();
 }
 

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <cstdlib>
 #include <cstring>
+#include <fstream>
 #include <vector>
 
 #include "windows.hpp"
@@ -56,7 +57,7 @@ std::size_t variable_at(const std::string& path, std::size_t at, std::string& na
 
 bool is_file(const fs::path& path) {
     std::error_code error;
-    return fs::is_regular_file(path, error);
+    return fs::is_regular_file(reachable(path), error);
 }
 
 /// Cleans a pasted path: blanks or line ends around it, quotes, or a file:// URL.
@@ -95,7 +96,7 @@ constexpr const char* kProject = "[Project]/";
 /// that prefix where the whole is no file and the rest is one of our forms.
 std::string without_project(const std::string& path) {
     std::error_code error;
-    if (native(path).is_relative() || fs::exists(native(expanded(path)), error)) {
+    if (native(path).is_relative() || fs::exists(reachable(native(expanded(path))), error)) {
         return path;
     }
     for (std::size_t at = path.find('/', 1); at != std::string::npos; at = path.find('/', at + 1)) {
@@ -166,6 +167,52 @@ fs::path native(const std::string& utf8) {
 #else
     return fs::u8path(utf8);
 #endif
+}
+
+fs::path reachable(const fs::path& path) {
+#if defined(_WIN32)
+    const auto starts = [](const std::wstring& text, const wchar_t* with) {
+        return text.rfind(with, 0) == 0;
+    };
+    // 260 with the name of a file in a folder; none for paths that have a prefix.
+    if (path.native().size() < 248 || starts(path.native(), L"\\\\?\\")) return path;
+    std::wstring full(32768, L'\0');
+    full.resize(
+        GetFullPathNameW(path.c_str(), static_cast<DWORD>(full.size()), full.data(), nullptr));
+    if (full.empty() || starts(full, L"\\\\?\\") || starts(full, L"\\\\.\\")) return path;
+    return starts(full, L"\\\\") ? L"\\\\?\\UNC" + full.substr(1) : L"\\\\?\\" + full;
+#else
+    return path;
+#endif
+}
+
+std::optional<std::string> bytes_of(const fs::path& file, std::size_t most) {
+    std::string text;
+    char block[65536];
+    const auto wanted = [&] { return std::min(sizeof block, most - text.size()); };
+#if defined(_WIN32)
+    const HANDLE handle = CreateFileW(reachable(file).c_str(), GENERIC_READ,
+                                      FILE_SHARE_READ | FILE_SHARE_WRITE | FILE_SHARE_DELETE,
+                                      nullptr, OPEN_EXISTING, FILE_ATTRIBUTE_NORMAL, nullptr);
+    if (handle == INVALID_HANDLE_VALUE) return std::nullopt;
+    DWORD got = 0;
+    bool read = GetFileType(handle) == FILE_TYPE_DISK;
+    while (read && wanted() > 0) {
+        read = ReadFile(handle, block, static_cast<DWORD>(wanted()), &got, nullptr) != 0;
+        if (!read || got == 0) break;
+        text.append(block, got);
+    }
+    CloseHandle(handle);
+    if (!read) return std::nullopt;
+#else
+    std::ifstream stream(file, std::ios::binary);
+    while (stream && wanted() > 0) {
+        stream.read(block, static_cast<std::streamsize>(wanted()));
+        text.append(block, static_cast<std::size_t>(stream.gcount()));
+    }
+    if (!stream.is_open() || stream.bad()) return std::nullopt;
+#endif
+    return text;
 }
 
 std::optional<std::string> find_beside(const std::string& media, const std::string& folder) {
@@ -290,7 +337,7 @@ std::string words_of_missing(const std::string& given_path) {
     }
     std::error_code error;
     const fs::path given = native(expanded(path));
-    if (fs::exists(given, error)) return "";
+    if (fs::exists(reachable(given), error)) return "";
     const bool relative = given.is_relative();
     std::string words = "the file does not exist";
     words +=
@@ -306,7 +353,7 @@ std::string clip_folder(const std::string& path, const std::string& source) {
     if (error || source.empty()) return "";
     const fs::path frames = (sidecar.parent_path() / native(source)).lexically_normal();
     const fs::path folder = frames.parent_path();
-    return fs::is_directory(folder, error) ? folder.u8string() : "";
+    return fs::is_directory(reachable(folder), error) ? folder.u8string() : "";
 }
 
 }  // namespace palette4d::node

@@ -1,6 +1,7 @@
 // Finds sidecar files. Depends neither on OpenFX nor on the core.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -12,6 +13,14 @@ inline constexpr const char* kSearchPath = "PALETTE4D_PATH";
 
 /// The path that a host gives in UTF-8. On Windows bytes that are no UTF-8 become U+FFFD.
 std::filesystem::path native(const std::string& utf8);
+
+/// The path as calls of the system take it: on Windows a long one gets the prefix without which
+/// 260 characters are the most. Not for people to read.
+std::filesystem::path reachable(const std::filesystem::path& path);
+
+/// The bytes of a file, at most `most`; empty where it cannot be read. Programs may replace or
+/// remove the file meanwhile, also on Windows.
+std::optional<std::string> bytes_of(const std::filesystem::path& file, std::size_t most);
 
 /// The path (UTF-8) with a leading ~ and $NAME, ${NAME} and %NAME% replaced from the environment.
 /// Unknown names stay as they are.

@@ -6,7 +6,6 @@
 #include <cstring>
 
 #include "paths.hpp"
-#include "windows.hpp"
 
 #if !defined(_WIN32)
 #include <fcntl.h>
@@ -23,8 +22,11 @@ constexpr const char* kRemedy = "; run 'palette4d install-plugin' again";
 
 bool absolute(const std::string& path) {
 #if defined(_WIN32)
-    return path.size() > 2 && std::isalpha(static_cast<unsigned char>(path[0])) != 0 &&
-           path[1] == ':' && (path[2] == '\\' || path[2] == '/');
+    const bool of_a_drive = std::isalpha(static_cast<unsigned char>(path[0])) != 0 &&
+                            path[1] == ':' && (path[2] == '\\' || path[2] == '/');
+    const bool of_a_server =
+        path.rfind("\\\\", 0) == 0 && path[2] != '\\' && path[2] != '.' && path[2] != '?';
+    return path.size() > 2 && (of_a_drive || of_a_server);
 #else
     return path[0] == '/';
 #endif
@@ -32,23 +34,17 @@ bool absolute(const std::string& path) {
 
 /// The file's text, at most one byte longer than the limit; else what is wrong with the file.
 std::string text_of(const fs::path& file, std::string& problem) {
+#if defined(_WIN32)
+    const std::optional<std::string> text = bytes_of(file, kMaxProgramBytes + 1);
+    std::error_code error;
+    if (!text) {
+        problem = fs::exists(reachable(file), error) ? "it is not a file that can be read"
+                                                     : "found no such file";
+    }
+    return text.value_or("");
+#else
     std::string text(kMaxProgramBytes + 1, '\0');
     std::size_t size = 0;
-#if defined(_WIN32)
-    const HANDLE handle = CreateFileW(file.c_str(), GENERIC_READ, FILE_SHARE_READ, nullptr,
-                                      OPEN_EXISTING, FILE_ATTRIBUTE_NORMAL, nullptr);
-    if (handle == INVALID_HANDLE_VALUE) {
-        problem = "found no such file";
-        return "";
-    }
-    DWORD got = 0;
-    if (GetFileType(handle) != FILE_TYPE_DISK ||
-        !ReadFile(handle, &text[0], static_cast<DWORD>(text.size()), &got, nullptr)) {
-        problem = "it is not a file that can be read";
-    }
-    size = got;
-    CloseHandle(handle);
-#else
     const int handle = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
     if (handle < 0) {
         problem = errno == ENOENT ? "found no such file"
@@ -70,14 +66,14 @@ std::string text_of(const fs::path& file, std::string& problem) {
         if (got < 0) problem = std::string("it cannot be read: ") + std::strerror(errno);
     }
     ::close(handle);
-#endif
     text.resize(problem.empty() ? size : 0);
     return text;
+#endif
 }
 
 bool executable(const std::string& path) {
     std::error_code error;
-    if (!fs::is_regular_file(native(path), error)) return false;
+    if (!fs::is_regular_file(reachable(native(path)), error)) return false;
 #if defined(_WIN32)
     return true;
 #else

@@ -10,7 +10,6 @@
 #include <ctime>
 #include <exception>
 #include <filesystem>
-#include <fstream>
 #include <new>
 #include <optional>
 #include <thread>
@@ -137,19 +136,8 @@ std::optional<Stamp> stamp_of(const fs::path& path, std::string& problem) {
 }
 
 /// The file's text, at most one byte longer than the limit, which the parser then refuses.
-std::optional<std::string> text_of(const fs::path& path, std::uintmax_t expected) {
-    std::ifstream file(path, std::ios::binary);
-    if (!file) return std::nullopt;
-    std::string text;
-    text.reserve(static_cast<std::size_t>(expected));
-    char block[65536];
-    while (text.size() <= kMaxSidecarBytes) {
-        file.read(block, sizeof block);
-        text.append(block, static_cast<std::size_t>(file.gcount()));
-        if (!file) break;
-    }
-    if (file.bad()) return std::nullopt;
-    return text;
+std::optional<std::string> text_of(const fs::path& path) {
+    return bytes_of(path, kMaxSidecarBytes + 1);
 }
 
 SidecarResult parse(const std::string& text, const std::string& path) {
@@ -175,7 +163,7 @@ void refresh(Entry& entry, const fs::path& path, const std::string& name) {
         if (same && entry.settled) return;
         const bool settled = Clock::now() - before->modified > kSettled &&
                              std::time(nullptr) - before->change_seconds > kSettled.count();
-        std::optional<std::string> text = text_of(path, before->bytes);
+        std::optional<std::string> text = text_of(path);
         if (!text) {
             problem = "the file cannot be read";
             break;
@@ -390,13 +378,13 @@ std::shared_ptr<const Recolourer> LoadedSidecar::prepare(const Key& key) const {
 
 SidecarResult load_sidecar(const std::string& path) {
     try {
-        const fs::path given = native(path);
+        const fs::path given = reachable(native(path));
         std::error_code error;
         fs::path canonical = fs::weakly_canonical(given, error);
         if (error) canonical = given;
         const std::shared_ptr<Entry> entry = entry_of(canonical.u8string());
         const std::lock_guard<std::mutex> lock(entry->mutex);
-        refresh(*entry, canonical, path);
+        refresh(*entry, reachable(canonical), path);
         return entry->result;
     } catch (const std::bad_alloc&) {
         throw;
@@ -425,9 +413,8 @@ SidecarResult load_sidecar_text(const std::string& text, const std::string& name
 
 std::optional<std::string> sidecar_text(const std::string& path) {
     std::string problem;
-    const fs::path file = native(path);
-    const std::optional<Stamp> stamp = stamp_of(file, problem);
-    return stamp ? text_of(file, stamp->bytes) : std::nullopt;
+    const fs::path file = reachable(native(path));
+    return stamp_of(file, problem) ? text_of(file) : std::nullopt;
 }
 
 void purge_sidecars() {

@@ -52,9 +52,17 @@ bool acts_on_terminals(unsigned code, std::size_t length) {
            (code >= 0x2028 && code <= 0x202e) || (code >= 0x2066 && code <= 0x2069);
 }
 
+std::string words_of_versions(const Sidecar& sidecar) {
+    std::string text;
+    for (const NamedVersion& one : sidecar.versions) {
+        text += (text.empty() ? "versions '" : ", '") + one.name + "'";
+    }
+    return text;
+}
+
 }  // namespace
 
-std::string printable(const std::string& text) {
+std::string without_controls(const std::string& text) {
     static const char* const kDigits = "0123456789abcdef";
     std::string result;
     for (std::size_t i = 0; i < text.size();) {
@@ -95,6 +103,7 @@ std::string status_of(const Chosen& chosen, const std::vector<std::string>& firs
         }
         lines.push_back(text);
         if (!chosen.embedded) lines.push_back("file " + chosen.path);
+        lines.push_back(words_of_versions(sidecar));
         if (!chosen.media.empty() && !same_clip(chosen.media, sidecar.clip.source)) {
             lines.push_back("note: this sidecar is of " + sidecar.clip.source +
                             ", and the host's clip is " + chosen.media);
@@ -105,7 +114,7 @@ std::string status_of(const Chosen& chosen, const std::vector<std::string>& firs
     for (const std::string& line : lines) {
         if (!line.empty()) text += (text.empty() ? "" : "\n") + line;
     }
-    return printable(text);
+    return without_controls(text);
 }
 
 }  // namespace palette4d::node

@@ -19,6 +19,6 @@ std::string status_of(const Chosen& chosen, const std::vector<std::string>& firs
 
 /// The text (UTF-8) without what acts on a terminal: control characters but line breaks, and marks
 /// that turn the direction of writing, become escapes such as \u001b.
-std::string printable(const std::string& text);
+std::string without_controls(const std::string& text);
 
 }  // namespace palette4d::node

@@ -14,15 +14,13 @@ from typing import Any
 import any_clips
 import numpy as np
 import pytest
-from palette4d.analysis import colour_statistics, pipeline
-from palette4d.analysis.options import AnalysisOptions
+from palette4d.analysis import pipeline
 from palette4d.analysis.pipeline import Analysis
 from scipy.spatial import ConvexHull
 
 from palette4d import _core
 from palette4d.cli import main
 from palette4d.grade import sidecar
-from palette4d.media import cuts
 from palette4d.media.clip import Clip, open_clip
 
 # kind: most of L, most handles, most distance of a pixel outside. Each is about one and a half
@@ -73,7 +71,7 @@ class Found:
 
 @pytest.fixture(scope="module")
 def analysed(tmp_path_factory):
-    """A function that writes a kind of clip and analyses it, once."""
+    """A function that writes a kind of clip and analyses it, once; cuts would be refused."""
 
     @functools.cache
     def analyse(kind: str) -> Found:
@@ -243,9 +241,8 @@ def test_fields_are_read_as_they_are_woven(analysed):
     assert combed > 0.4
 
 
-@pytest.mark.parametrize(("kind", "starts"), [("cut", [7]), ("cut_of_two", [5, 8])])
-def test_the_command_refuses_cuts(kind, starts, tmp_path, capsys):
-    spec = getattr(any_clips, kind)(tmp_path / "clip")
+def test_the_command_refuses_cuts(tmp_path, capsys):
+    spec, starts = any_clips.cut_of_two(tmp_path / "clip"), [5, 8]
     out = tmp_path / "out.p4d.json"
     assert main.main(["analyze", spec, "-o", str(out), "--quiet"]) == 1
     message = capsys.readouterr().err
@@ -269,27 +266,16 @@ def test_the_command_spans_a_cut_when_told_to(tmp_path, capsys):
     assert any("the palette spans" in note for note in json.loads(printed.out)["notes"])
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_no_other_kind_is_taken_for_a_cut(kind, analysed):
-    found = analysed(kind)
-    gathered = [
-        colour_statistics.gather(number, image, AnalysisOptions())
-        for number, image in found.clip.iter_colours()
-    ]
-    assert cuts.find_cuts((frame.frame, frame.histogram) for frame in gathered) == []
-
-
-@pytest.mark.parametrize("kind", ["interlaced", "monochrome"])
-def test_through_the_command(kind, tmp_path, capsys):
+def test_through_the_command(tmp_path, capsys):
     folder = tmp_path / "clip"
     folder.mkdir()
-    spec = getattr(any_clips, kind)(folder)
+    spec = any_clips.interlaced(folder)
     out = tmp_path / "out.p4d.json"
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert main.main(["analyze", spec, "-o", str(out), "--json"]) == 0
     report = json.loads(capsys.readouterr().out)
-    assert report["stages"][-1]["L"] <= KINDS[kind][0]
+    assert report["stages"][-1]["L"] <= KINDS["interlaced"][0]
     assert len(report["frames"]) == any_clips.FRAMES
     read = _core.read_sidecar(str(out))
     assert len(read.polytope.vertices) == report["stages"][-1]["vertices"]

@@ -17,7 +17,7 @@ from palette4d.analysis.convex_hulls import hull_mesh
 from palette4d.analysis.frame_statistics import Gamut
 from palette4d.analysis.losses import palette_loss
 from palette4d.analysis.options import AnalysisOptions
-from palette4d.analysis.polytope import Palette
+from palette4d.analysis.polytope import FramePalette
 
 GAMUT = Gamut(np.zeros(3), np.ones(3))
 OPTIONS = AnalysisOptions()
@@ -43,7 +43,7 @@ def test_weights_of_equation_10():
 def test_initial_blocks_follow_the_links(clip):
     base = hull_mesh(FOUR)
     order = np.array([2, 0, 3, 1])
-    shuffled = Palette(base.rgb[order], np.argsort(order)[base.faces].astype(np.int32))
+    shuffled = FramePalette(base.rgb[order], np.argsort(order)[base.faces].astype(np.int32))
     links = [[(int(v), int(np.argsort(order)[v])) for v in range(4)], None]
     blocks = initial_blocks(clip[:3], [base, shuffled, base], links, OPTIONS)
     assert [(b.first, len(b.palettes)) for b in blocks] == [(0, 2), (2, 1)]

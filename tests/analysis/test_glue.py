@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from palette4d.analysis.convex_hulls import hull_mesh
 from palette4d.analysis.glue import glue, transition_faces
-from palette4d.analysis.polytope import Palette
+from palette4d.analysis.polytope import FramePalette
 
 CUBE = np.array(list(itertools.product([0.2, 0.8], repeat=3)))
 
@@ -55,7 +55,7 @@ def test_a_moved_palette_is_consistent():
     first = solid(1, 7)
     order = np.random.default_rng(2).permutation(7)
     place = np.argsort(order)
-    second = Palette(first.rgb[order] + 0.01, place[first.faces].astype(np.int32))
+    second = FramePalette(first.rgb[order] + 0.01, place[first.faces].astype(np.int32))
     found = glue(first, second)
     assert found.consistent
     assert found.broken == 0
@@ -124,7 +124,7 @@ def test_palettes_of_one_and_two_colours(n, m):
 
     def make(count):
         if count <= 2:
-            return Palette(np.linspace(0.1, 0.9, count)[:, None].repeat(3, 1), none)
+            return FramePalette(np.linspace(0.1, 0.9, count)[:, None].repeat(3, 1), none)
         return hull_mesh(CUBE)
 
     first, second = make(n), make(m)

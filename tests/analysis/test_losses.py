@@ -11,7 +11,7 @@ import pytest
 from palette4d.analysis.frame_statistics import Gamut
 from palette4d.analysis.losses import NO_FACES, minimise, refine_palette, smoothness
 from palette4d.analysis.options import AnalysisOptions
-from palette4d.analysis.polytope import Palette
+from palette4d.analysis.polytope import FramePalette
 from scipy.optimize import minimize
 from scipy.spatial import ConvexHull
 
@@ -180,7 +180,7 @@ def test_refinement_never_worsens_and_stays_in_its_box():
     colours = tree(rng.random((2000, 3)) * 0.6 + 0.2)
     before = _core.palette_loss(colours, BOX, NO_FACES, WEIGHTS)
     gamut = Gamut(np.zeros(3), np.ones(3))
-    moved = refine_palette(colours, Palette(BOX, NO_FACES), gamut, options)
+    moved = refine_palette(colours, FramePalette(BOX, NO_FACES), gamut, options)
     after = _core.palette_loss(colours, moved, NO_FACES, WEIGHTS)
     assert 50 * after[0] + after[1] < 50 * before[0] + before[1]
     assert np.abs(moved - BOX).max() <= 0.05 + 1e-12

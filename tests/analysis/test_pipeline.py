@@ -34,17 +34,14 @@ NOTHING = noise(0) * np.float32(np.nan)
 # name: frames, colours of the first frame's palette (None: any)
 CLIPS = {
     "one frame": ([noise(1)], None),
-    "two frames": ([noise(1), noise(2)], None),
     "one colour": ([constant([0.3, 0.4, 0.5])] * 5, 1),
     "one colour that changes": ([constant([0.3 + 0.1 * i, 0.4, 0.5]) for i in range(5)], 1),
-    "black": ([constant([0, 0, 0])] * 4, 1),
     "grey": ([grey(i) for i in range(5)], 2),
     "two colours": ([two_colours(i) for i in range(4)], 2),
     "a plane of colours": ([flat(i) for i in range(3)], None),
     "float above one and below zero": ([noise(i, 8, -1) for i in range(3)], None),
     "large values": ([noise(i, 1e4) for i in range(3)], None),
     "one pixel": ([noise(i)[:1, :1] for i in range(3)], 1),
-    "three pixels": ([noise(i)[:1, :3] for i in range(3)], 3),
     "five pixels": ([noise(i)[:1, :5] for i in range(3)], None),
     "fade from and to black": (
         [noise(i, i / 4) for i in range(5)] + [noise(i, (4 - i) / 4) for i in range(1, 5)],
@@ -52,8 +49,7 @@ CLIPS = {
     ),
     "grey to colour": ([grey(i) for i in range(3)] + [noise(i) for i in range(3)], 2),
     "a flash": ([noise(i, 0.5) for i in range(3)] + [constant([1, 1, 1])] + [noise(4, 0.5)], None),
-    "nothing finite in the middle": ([noise(1), NOTHING, noise(2)], None),
-    "nothing finite at the ends": ([NOTHING, noise(1), noise(2), NOTHING], None),
+    "nothing finite here and there": ([NOTHING, noise(1), NOTHING, noise(2), NOTHING], None),
     "a cut": ([noise(i, 0.3) for i in range(2)] + [noise(i, 0.3, 0.6) for i in range(2)], None),
 }
 
@@ -72,7 +68,7 @@ def test_any_clip_gives_a_valid_sidecar(name, tmp_path):
         assert np.isfinite(_core.slice_at(read.polytope, t).rgb).all()
     if colours is not None:
         assert len(_core.slice_at(read.polytope, clip.frames[0]).rgb) == colours
-    if name in ("one colour", "one colour that changes", "black"):
+    if name in ("one colour", "one colour that changes"):
         assert len(analysis.polytope.vertices) == 2
         assert analysis.stages[-1].losses.L < 1e-5
     if "finite" in name:
@@ -97,7 +93,7 @@ def test_the_same_clip_gives_the_same_text():
     frames = [noise(i, 0.5 + 0.1 * i) for i in range(5)]
     texts = {
         sidecar.dumps(pipeline.analyze(ArrayClip(frames), AnalysisOptions(threads=n)).document)
-        for n in (1, 1, 3)
+        for n in (1, 3)
     }
     assert len(texts) == 1
 
@@ -145,14 +141,10 @@ def drifting(count):
 
 
 MOVING = {
-    "drifting": drifting(9),
-    "noise": [noise(i) for i in range(4)],
     "noise that grows": [noise(i, 0.2 + 0.1 * i) for i in range(6)],
     "a flash": [*drifting(5)[:3], constant([1, 1, 1]), *drifting(5)[3:]],
     "a fade": [mixture(FOUR * i / 6, i) for i in range(7)],
-    "grey": [grey(i) for i in range(3)],
     "one colour": [constant([0.3, 0.4, 0.5])] * 3,
-    "one frame": [mixture(FOUR, 0)],
     "there and gone": [
         mixture(FOUR if i in (2, 3) else FOUR[:1].repeat(4, 0), i) for i in range(6)
     ],
@@ -184,7 +176,7 @@ def test_where_little_moves_the_default_beats_eight_static_colours(seasons, firs
         assert default.L_prime < pipeline.find_polytope(frames, options).stages[-1].losses.L_prime
 
 
-@pytest.mark.parametrize("most", [8, 10, 12])
+@pytest.mark.parametrize("most", [8, 11])
 def test_few_vertices_mean_few_colours(most):
     """A colour has one at either end of the clip at least."""
     analysis = pipeline.find_polytope(stats(drifting(9)), AnalysisOptions(vertices=most))
@@ -193,8 +185,10 @@ def test_few_vertices_mean_few_colours(most):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_every_method_covers_the_clip(method):
+def test_every_method_covers_the_clip_and_lets_go_of_its_frames(method):
+    """Of a show, the frames of one shot after the other are in memory, never of all."""
     frames = stats(drifting(6), first=11)
+    gone = [weakref.ref(frame) for frame in frames] + [weakref.ref(f.coarse) for f in frames]
     analysis = pipeline.find_polytope(frames, AnalysisOptions(method=method))
     times = analysis.polytope.vertices[:, 3]
     assert times.min() == 11
@@ -202,6 +196,9 @@ def test_every_method_covers_the_clip(method):
     assert analysis.polytope.blocks[0].first == 11
     assert analysis.polytope.blocks[-1].last == 16
     assert analysis.stages[-1].vertices == len(times)
+    del frames
+    gc.collect()
+    assert [ref() for ref in gone] == [None] * len(gone)
 
 
 def test_the_default_beats_the_static_hull_where_colours_move():
@@ -214,14 +211,3 @@ def test_blocks_are_limited():
     for most in (1, 2):
         analysis = pipeline.find_polytope(frames, AnalysisOptions(blocks=most))
         assert len(analysis.polytope.blocks) <= most
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_an_analysis_lets_go_of_its_frames(method):
-    """Of a show, the frames of one shot after the other are in memory, never of all."""
-    frames = stats(drifting(4))
-    gone = [weakref.ref(frame) for frame in frames] + [weakref.ref(f.coarse) for f in frames]
-    assert pipeline.find_polytope(frames, AnalysisOptions(method=method)).stages
-    del frames
-    gc.collect()
-    assert [ref() for ref in gone] == [None] * len(gone)

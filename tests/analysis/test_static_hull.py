@@ -13,7 +13,7 @@ from palette4d.analysis.frame_hulls import frame_palette
 from palette4d.analysis.frame_statistics import Gamut, pooled
 from palette4d.analysis.losses import palette_loss
 from palette4d.analysis.options import AnalysisOptions
-from palette4d.analysis.polytope import Palette
+from palette4d.analysis.polytope import FramePalette
 from palette4d.analysis.static_hull import static_polytope
 
 CORNERS = np.array(list(itertools.product((0.1, 0.9), repeat=3)))
@@ -67,10 +67,10 @@ def test_a_mesh_that_has_folded_is_unfolded():
     mesh = hull_mesh(CORNERS)
     other = mesh.rgb[[1, 0, *range(2, len(mesh.rgb))]]  # two colours have changed places
     plain = dataclasses.replace(OPTIONS, convexity=0.0, separation=0.0)
-    folded = Palette(other, mesh.faces)
+    folded = FramePalette(other, mesh.faces)
     polytope = static_polytope(folded, frames, GAMUT, plain)
     assert deepest_concavity(polytope, frames) < 1e-9
     # With a colour inside of the others it cannot be.
-    inside = Palette(np.vstack([other, CORNERS.mean(axis=0)]), mesh.faces)
+    inside = FramePalette(np.vstack([other, CORNERS.mean(axis=0)]), mesh.faces)
     polytope = static_polytope(inside, frames, GAMUT, plain)
     np.testing.assert_array_equal(polytope.blocks[0].faces, mesh.faces)

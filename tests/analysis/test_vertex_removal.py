@@ -9,7 +9,7 @@ from palette4d.analysis.convex_hulls import hull_mesh
 from palette4d.analysis.dense_polytope import DensePolytope
 from palette4d.analysis.losses import palette_loss
 from palette4d.analysis.options import AnalysisOptions
-from palette4d.analysis.polytope import Palette
+from palette4d.analysis.polytope import FramePalette
 from palette4d.analysis.vertex_removal import THINNED, thin_out
 
 FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
@@ -22,7 +22,7 @@ def moving(count, bend=0.0, at=0):
     for i in range(count):
         rgb = FOUR + 0.02 * i
         rgb[1, 2] += bend * max(0, 1 - abs(i - at) / at) if at else 0
-        out.append(Palette(rgb, FACES))
+        out.append(FramePalette(rgb, FACES))
     return out
 
 

@@ -5,12 +5,18 @@ from __future__ import annotations
 import hashlib
 import plistlib
 import re
+import shutil
 import struct
+import sys
 import zipfile
 from pathlib import Path
 
 import lief
 import pytest
+
+from palette4d import _core
+from palette4d.hosts import bundle as hosts
+from palette4d.hosts.bundle import architecture, default_destination
 
 ENTRIES = ["OfxGetNumberOfPlugins", "OfxGetPlugin", "OfxSetHost"]
 C_LIBRARY = re.compile(r"(libc|libm|libpthread|libdl|librt|ld-linux-(x86-64|aarch64))\.so\.\d+")
@@ -78,6 +84,14 @@ def test_windows(bundle: Path) -> None:
     assert [type(entry) for entry in pe.debug] == [lief.PE.Repro]
 
 
+@pytest.mark.parametrize(
+    "preset", ["linux-x86_64", "linux-aarch64", "windows", "macos-x86_64", "macos-arm64"]
+)
+def test_functions_check_their_stack(preset: str, bundle: Path, repo_root: Path) -> None:
+    core = repo_root / "build" / "cmake" / preset / "core" / "libpalette4d_core.a"
+    assert b"__stack_chk_fail" in core.read_bytes()
+
+
 def slices(path: Path) -> list[bytes]:
     data = path.read_bytes()
     magic, count = struct.unpack_from(">II", data)
@@ -130,6 +144,23 @@ def test_the_arm64_part_has_the_signature_that_macos_asks_for(bundle: Path) -> N
         start = page * step
         found = directory[hashes + 32 * page : hashes + 32 * (page + 1)]
         assert found == hashlib.sha256(part[start : min(start + step, limit)]).digest(), page
+
+
+@pytest.mark.parametrize("system", ["linux", "win32", "darwin"])
+def test_it_installs_on_every_system(
+    system: str, bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As from a wheel, to where the hosts of that system look."""
+    package = tmp_path / "palette4d"
+    shutil.copytree(bundle, package / "_ofx" / bundle.name)
+    monkeypatch.setattr(_core, "__file__", str(package / "_core.so"))
+    monkeypatch.setattr(hosts, "architecture", lambda: architecture(system, "AMD64"))
+    monkeypatch.setenv("OFX_PLUGIN_PATH", str(tmp_path / "OFX"))
+    assert default_destination(system) == tmp_path / "OFX"
+    installed = hosts.install_bundle(hosts.find_bundle(), default_destination(system))
+    library = installed / "Contents" / architecture(system, "AMD64") / "Palette4D.ofx"
+    assert library.read_bytes() == (bundle / library.relative_to(installed)).read_bytes()
+    assert (installed / hosts.PROGRAM).read_text() == f"{sys.executable}\n"
 
 
 def test_no_library_tells_where_it_was_built(bundle: Path, repo_root: Path) -> None:

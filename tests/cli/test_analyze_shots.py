@@ -22,17 +22,8 @@ from edits import clip, external, movie, picture, save, sequence, timeline
 
 from palette4d.cli import main
 
-#: Small palettes of few colours: a shot takes a fraction of a second.
-QUICK = (
-    "--set",
-    "palette_size=4",
-    "--set",
-    "colours=512",
-    "--set",
-    "coarse_colours=128",
-    "--set",
-    "blocks=1",
-)
+#: A palette that does not change: these tests are about shots, not about the search.
+QUICK = ("--method", "static", "--set", "colours=512", "--set", "coarse_colours=128")
 
 
 def analyze(source: Path | str, out: Path, *words: str) -> int:
@@ -98,8 +89,9 @@ class TestMovies:
     def test_a_sidecar_a_shot(
         self, cut_movie: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     ) -> None:
-        out = tmp_path / "shots"
-        assert analyze(cut_movie, out, "--detect-shots") == 0
+        out, log = tmp_path / "shots", tmp_path / "progress.txt"
+        assert analyze(cut_movie, out, "--detect-shots", "--progress", str(log)) == 0
+        assert log.read_text().splitlines()[-2:] == ["frames: 10 of 10", "done"]
         printed = capsys.readouterr()
         assert "2 shots of 2: 2 analysed" in printed.out
         assert printed.err == ""
@@ -265,13 +257,16 @@ class TestAgain:
         edited = out / "rushes_s001.p4d.json"
         recolour(edited)
         mine = edited.read_bytes()
-        assert analyze(cut_movie, out, "--detect-shots", "--vertices", "4") == 1
+        assert analyze(cut_movie, out, "--detect-shots", "--set", "palette_size=5") == 1
         assert "rushes_s001: " in capsys.readouterr().err
         assert edited.read_bytes() == mine
         assert [status for _, status, _ in shots(out)] == ["failed", "done"]
         assert analyze(cut_movie, out, "--detect-shots", "--force", "--keep-edits") == 0
         assert edited.read_bytes() == mine
-        assert analyze(cut_movie, out, "--detect-shots", "--vertices", "4", "--drop-edits") == 0
+        assert (
+            analyze(cut_movie, out, "--detect-shots", "--set", "palette_size=5", "--drop-edits")
+            == 0
+        )
         assert sidecar(out, "rushes_s001")["edits"]["vertices"] == []
 
     def test_only_some(

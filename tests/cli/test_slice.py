@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from palette4d.cli.main import main
+from palette4d.grade.document import Document
 
 EDITED = Path(__file__).resolve().parents[1] / "golden" / "sidecars" / "v1_edited.p4d.json"
 
@@ -49,6 +50,7 @@ def test_a_clip_without_end_is_refused_before_anything_is_made(
 ) -> None:
     endless = with_last_frame(tmp_path / "endless.p4d.json", 1_000_000_000)
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(Document, "palette", None)  # the first slice would fail
     assert main([endless if word == "SIDECAR" else word for word in command]) == 1
     assert "more than 1000000 frames" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palette4d.colour.names import colour_names
+from palette4d.colour.names import named_lch
 
 NAMES = {
     "#000000": "black",
@@ -30,6 +30,10 @@ NAMES = {
     "#5f7a5f": "greyish green",
     "#1f3020": "dark green",
 }
+
+
+def colour_names(colours, encoding):
+    return [name for _, name in named_lch(colours, encoding)]
 
 
 @pytest.mark.parametrize(("code", "name"), NAMES.items())

@@ -109,6 +109,31 @@ def test_file_and_folder_are_synced(old: Path, monkeypatch: pytest.MonkeyPatch) 
     assert events == ["file", "rename", "folder"]
 
 
+@pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="lists this process's open files")
+def test_windows_renames_closed_files_and_waits_for_a_reader(
+    old: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rename, refusals = Path.replace, [PermissionError(13, "in use")] * 2
+
+    def windows(self: Path, target: Path) -> Path:
+        assert not any(
+            handle.samefile(self) for handle in Path("/proc/self/fd").iterdir() if handle.exists()
+        )
+        if refusals:
+            raise refusals.pop()
+        return rename(self, target)
+
+    monkeypatch.setattr(Path, "replace", windows)
+    monkeypatch.setattr(files.sys, "platform", "win32")
+    replace(old, lambda: None)
+    assert old.read_bytes() == b"new"
+    refusals += [PermissionError(13, "in use")] * 100
+    monkeypatch.setattr(files.time, "sleep", lambda _: None)
+    with pytest.raises(WriteError, match="in use"):
+        replace(old, lambda: None)
+    assert names(old.parent) == [old.name]
+
+
 @pytest.mark.parametrize("mode", [0o640, 0o600, 0o444])
 def test_permissions_are_kept(old: Path, mode: int) -> None:
     old.chmod(mode)
@@ -161,6 +186,68 @@ def test_a_link_of_another_user_is_not_followed(old: Path, monkeypatch: pytest.M
         replace(link, lambda: None)
     assert old.read_bytes() == b"old"
     assert names(shared) == ["out.cube"]
+
+
+def test_no_link_on_the_way_may_be_of_another_user(
+    old: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A link of ours leads to a folder where another user put one that leads to a file of ours."""
+    shared = old.parent / "shared"
+    shared.mkdir()
+    (shared / "theirs.cube").symlink_to(old)
+    own = old.with_name("own.cube")
+    own.symlink_to(shared / "theirs.cube")
+    assert files.link_target(own) == old
+    real = Path.lstat
+
+    class Stranger:
+        st_uid = 4711
+        st_mode = stat.S_IFLNK
+
+    monkeypatch.setattr(
+        Path, "lstat", lambda self: Stranger() if self.parent == shared else real(self)
+    )
+    with pytest.raises(Palette4dError, match="link of another user"):
+        files.link_target(own)
+
+
+def test_a_link_that_is_swapped_while_it_is_read_is_not_followed(
+    old: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mine = old.with_name("mine.cube")
+    mine.write_bytes(b"mine")
+    link = old.with_name("link.cube")
+    link.symlink_to(mine)
+    real = Path.readlink
+
+    def swapped(path: Path) -> Path:
+        path.unlink()
+        path.symlink_to(old)
+        return real(path)
+
+    monkeypatch.setattr(Path, "readlink", swapped)
+    with pytest.raises(Palette4dError, match="link that another program changes"):
+        replace(link, lambda: None)
+    assert (old.read_bytes(), mine.read_bytes()) == (b"old", b"mine")
+
+
+def test_a_link_in_place_of_the_temporary_file_is_refused(old: Path) -> None:
+    """Neither the file's name nor its permissions go to what the link leads to."""
+    other = old.with_name("other")
+    other.write_bytes(b"other")
+    other.chmod(0o600)
+    old.chmod(0o666)
+
+    def swap() -> None:
+        (temporary,) = old.parent.glob(".*.p4d-tmp*")
+        temporary.unlink()
+        temporary.symlink_to(other)
+
+    with pytest.raises(Palette4dError, match="link in place of the temporary file"):
+        replace(old, swap)
+    assert (old.read_bytes(), other.read_bytes()) == (b"old", b"other")
+    assert stat.S_IMODE(other.stat().st_mode) == 0o600
+    assert names(old.parent) == [old.name, "other"]
 
 
 def test_a_link_that_leads_nowhere_is_replaced(tmp_path: Path) -> None:

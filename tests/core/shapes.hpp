@@ -64,7 +64,7 @@ inline Mesh cube() {
 }
 
 /// A cube whose top is pushed in to a point below the middle: not convex.
-inline Mesh dented_cube() {
+inline Mesh concave_cube() {
     Mesh mesh = cube();
     mesh.rgb.push_back({0.5, 0.5, 0.3});
     mesh.faces.erase(mesh.faces.begin() + 2, mesh.faces.begin() + 4);

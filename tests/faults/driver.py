@@ -1,20 +1,22 @@
 """Runs verbs with faults, each in a fork of this process, which has imported everything.
 
-It reads trials as lines of JSON and answers each with a line: the exit status (negative: the
-signal), the names of the calls that changed files, and what was printed. The verb `autosave` is an
-edit in the window, and what the window then does by itself.
+Processes that a verb starts are forks too. It reads trials as lines of JSON and answers each with a
+line: the exit status (negative: the signal), the names of the calls that changed files, and what
+was printed. The verb `autosave` is an edit in the window, and what the window then does by itself.
 """
 
 import ctypes
 import importlib
 import json
 import math
+import multiprocessing
 import os
 import pkgutil
 import signal
 import sys
 import tempfile
 import traceback
+from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +30,10 @@ for found in pkgutil.walk_packages(palette4d.__path__, "palette4d."):
         importlib.import_module(found.name)
 for name in ("OpenImageIO", "PyOpenColorIO", "fileseq", "opentimelineio", "matplotlib.figure"):
     importlib.import_module(name)
+
+FORKS = multiprocessing.get_context("fork")
+multiprocessing.get_context = lambda method=None: FORKS
+resource_tracker.ensure_running = lambda: None
 
 SHIM: Any = ctypes.CDLL(None)
 SHIM.faults_names.restype = ctypes.c_char_p

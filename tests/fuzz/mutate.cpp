@@ -1,6 +1,6 @@
 // TARGET --inputs N [--seed S] [--keep FOLDER] CORPUS…: N mutations of the files in the
 // folders, the same for the same seed. An input whose outcome is new joins those that are mutated,
-// and is kept in a file where asked for. A crash says which input it was: --only N makes it anew.
+// and is kept in a file where asked for. A crash says which input it was: --only N makes it again.
 #include <algorithm>
 #include <csignal>
 #include <cstdlib>

@@ -111,26 +111,24 @@ FULL = OSError(28, "No space left on device")
 
 
 @pytest.mark.parametrize(
-    ("moment", "problem"),
+    ("step", "problem"),
     [
         ("fsync", FULL),
         ("fsync", Interrupted()),
-        ("chmod", Interrupted()),
+        ("fchmod", Interrupted()),
         ("replace", FULL),
         ("replace", Interrupted()),
     ],
 )
-def test_failure_at_any_moment_leaves_the_old_file(
-    edited: Path, monkeypatch: pytest.MonkeyPatch, moment: str, problem: BaseException
+def test_failure_at_any_step_leaves_the_old_file(
+    edited: Path, monkeypatch: pytest.MonkeyPatch, step: str, problem: BaseException
 ) -> None:
     def fail(*_args: Any, **_keywords: Any) -> None:
         raise problem
 
     before = edited.read_bytes()
-    if moment == "fsync":
-        monkeypatch.setattr(os, "fsync", fail)
-    else:
-        monkeypatch.setattr(Path, moment, fail)
+    owner = Path if step == "replace" else os
+    monkeypatch.setattr(owner, step, fail)
     expected = Interrupted if isinstance(problem, Interrupted) else Palette4dError
     with pytest.raises(expected):
         sidecar.save(golden("split"), edited, on_edits="drop")

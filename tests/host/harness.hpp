@@ -50,6 +50,9 @@ long every(long step);
 const std::string& bundle();
 std::filesystem::path folder();
 
+/// This program.
+std::filesystem::path own_file();
+
 /// Writes a file in folder(); its path.
 std::string write(const std::string& name, const std::string& text);
 

@@ -1,4 +1,4 @@
-// A shell script in the place of the Python that the node's buttons start.
+// A copy of the test program itself, in the place of the Python that the node's buttons start.
 #pragma once
 
 #include <chrono>
@@ -29,33 +29,24 @@ bool soon(Done done) {
     return false;
 }
 
-/// A script that serves as Python; its path.
-inline std::string script(const std::string& body) {
-    const std::string path =
-        write("python", "#!/bin/sh\ncd '" + folder().u8string() + "'\n" + body);
-    std::filesystem::permissions(path, std::filesystem::perms::owner_all);
-    return path;
-}
-
 /// The bundle with that program, as `palette4d install-plugin` installs it.
-inline std::string installed(const std::string& program) {
+inline std::string installed(const std::filesystem::path& program) {
     const std::filesystem::path copy = folder() / "OFX" / "Palette4D.ofx.bundle";
     std::filesystem::create_directories(copy.parent_path());
-    std::filesystem::copy(bundle(), copy, std::filesystem::copy_options::recursive);
+    std::filesystem::copy(std::filesystem::u8path(bundle()), copy,
+                          std::filesystem::copy_options::recursive);
     std::filesystem::create_directories(copy / "Contents" / "Resources");
-    std::ofstream(copy / "Contents" / "Resources" / "program") << program << "\n";
+    std::ofstream(copy / "Contents" / "Resources" / "program") << program.u8string() << "\n";
     return copy.u8string();
 }
 
-inline constexpr const char* kRecord = "printf '%s\\n' \"$@\" > new && mv new started\n";
-
-/// Plays `palette4d analyze`: waits for the file `go`, whose last line says how it ends.
-inline const char* const kAnalyse =
-    "printf '%s\\n' \"$@\" > started\n"
-    "shift 5; out=$3; progress=$6\n"
-    "echo 'structure search: 3 of 40' > \"$progress\"\n"
-    "while [ ! -e go ]; do sleep 0.01; done\n"
-    "[ \"$(cat go)\" = done ] && cp box.json \"$out\"\n"
-    "cat go >> \"$progress\"\n";
+/// A bundle whose program notes its arguments in the file `started`. As `palette4d analyze` it then
+/// waits for the file `go`, which says how it ends: with `done`, after copying box.json to the
+/// sidecar, or with an error.
+inline std::string installed() {
+    const std::filesystem::path copy = folder() / ("python" + own_file().extension().u8string());
+    std::filesystem::copy_file(own_file(), copy);
+    return installed(copy);
+}
 
 }  // namespace test

@@ -1,6 +1,5 @@
-// Analyse and Open in Studio: which program they start, how, and what the status says. A script
+// Analyse and Open in Studio: which program they start, how, and what the status says. This program
 // stands in for Python here; test_buttons.py starts the real one.
-#if !defined(_WIN32)
 #include <cerrno>
 #include <csignal>
 #include <cstdlib>
@@ -9,10 +8,12 @@
 #include "harness.hpp"
 #include "stand_in.hpp"
 
+#if !defined(_WIN32)
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#endif
 
 using namespace strict;
 using namespace test;
@@ -26,7 +27,7 @@ using Seconds = std::chrono::duration<double>;
 struct Window {
     Plugin plugin;
     std::unique_ptr<Instance> node = plugin.create();
-    explicit Window(const std::string& body) : plugin(installed(script(body))) {}
+    explicit Window(const std::string& bundle = installed()) : plugin(bundle) {}
     void push(const char* button) { CHECK(node->changed(button) == kOfxStatOK); }
     /// As the host tells of any change; the status after it.
     std::string status() {
@@ -37,23 +38,50 @@ struct Window {
     void expect(const std::string& words) { EXPECT(says(words), node->text("status")); }
 };
 
+/// Whether this process has neither children nor zombies.
+bool no_children() {
+#if defined(_WIN32)
+    return true;
+#else
+    return ::waitpid(-1, nullptr, WNOHANG) == -1 && errno == ECHILD;
+#endif
+}
+
+std::string note() { return text_of(folder() / "started"); }
+bool noted() { return fs::exists(folder() / "started"); }
+
+#if defined(_WIN32)
+const std::string kRoot = "C:\\";
+#else
+const std::string kRoot = "/";
+#endif
+
 }  // namespace
 
 TEST(the_programs_file_is_one_absolute_path) {
-    for (const std::string good : {"/usr/bin/python3", "/a b/\xc3\xa9", "/x\n", "/x\r\n"}) {
+    for (const std::string& good :
+         {kRoot + "usr/bin/python3", kRoot + "a b/\xc3\xa9", kRoot + "x\n", kRoot + "x\r\n"}) {
         const ProgramPath found = parse_program(good);
         EXPECT(found.problem.empty(), good);
         CHECK(found.path == good.substr(0, good.find_first_of("\r\n")));
     }
     for (const std::string& bad :
          {std::string(), std::string("\n"), std::string("python3"), std::string("./x"),
-          std::string("/x\n/y"), std::string("/x\n\n"), std::string("/x\t"),
-          std::string("/x\0y", 4), "/" + std::string(kMaxProgramBytes, 'x')}) {
+          kRoot + "x\n" + kRoot + "y", kRoot + "x\n\n", kRoot + "x\t", kRoot + std::string(1, '\0'),
+          kRoot + std::string(kMaxProgramBytes, 'x')}) {
         const ProgramPath found = parse_program(bad);
         EXPECT(found.path.empty() && !found.problem.empty(), bad);
     }
 }
 
+#if defined(_WIN32)
+TEST(the_programs_file_may_name_a_servers_folder) {
+    CHECK(parse_program("\\\\server\\share\\python.exe").problem.empty());
+    for (const char* bad : {"C:", "C:x", "\\x", "\\\\", "\\\\.\\pipe\\x", "\\\\?\\x", "/x"}) {
+        EXPECT(!parse_program(bad).problem.empty(), bad);
+    }
+}
+#else
 TEST(the_programs_file_is_believed_only_if_it_is_ours) {
     const fs::path file = folder() / "program";
     const auto refused = [&](const char* why) {
@@ -90,13 +118,33 @@ TEST(the_programs_file_is_believed_only_if_it_is_ours) {
     refused("it is not a file");
 }
 
-TEST(studio_opens_the_sidecar_at_the_frame) {
-    Window window("echo $$ > pid\n" + std::string(kRecord) +
-                  "ls -l /proc/self/fd > files; env > variables; sleep 600");
+TEST(a_program_gets_nothing_of_the_hosts) {
+    write("python", "#!/bin/sh\ncd '" + folder().u8string() +
+                        "'\necho $$ > pid\n"
+                        "ls -l /proc/self/fd > files; env > variables; exec sleep 600");
+    fs::permissions(folder() / "python", fs::perms::owner_all);
+    Window window(installed(folder() / "python"));
     // Without O_CLOEXEC, as hosts have many.
     const int mine = ::fcntl(STDERR_FILENO, F_DUPFD, 100);
     setenv("LD_LIBRARY_PATH", "/of/the/host", 1);
     setenv("PYTHONHOME", "/of/the/host", 1);
+    window.node->set("sidecar", sidecar());
+    window.push("openInStudio");
+    CHECK(soon([] { return text_of(folder() / "variables").find("PWD=") != std::string::npos; }));
+    CHECK(text_of(folder() / "variables").find("/of/the/host") == std::string::npos);
+    const std::string files = text_of(folder() / "files");
+    EXPECT(files.find(" " + std::to_string(mine) + " ->") == std::string::npos, files);
+    // It runs on, and is no child of the host.
+    CHECK(no_children());
+    CHECK(::kill(std::stoi(text_of(folder() / "pid")), SIGKILL) == 0);
+    ::close(mine);
+    unsetenv("LD_LIBRARY_PATH");
+    unsetenv("PYTHONHOME");
+}
+#endif
+
+TEST(studio_opens_the_sidecar_at_the_frame) {
+    Window window;
     const std::string path = sidecar("a name's $(touch no).p4d.json");
     window.node->set("sidecar", path);
     window.node->shown_time = 2.5;
@@ -105,38 +153,26 @@ TEST(studio_opens_the_sidecar_at_the_frame) {
     CHECK(Seconds(std::chrono::steady_clock::now() - began).count() < 5);
     EXPECT(window.node->text("status").find("opened " + path + " in Studio") == 0,
            window.node->text("status"));
-    CHECK(soon([] { return fs::exists(folder() / "variables"); }));
-    CHECK(text_of(folder() / "started") ==
-          "-E\n-P\n-m\npalette4d\nstudio\n" + path + "\n--frame\n12.5\n");
-    CHECK(soon([] { return text_of(folder() / "variables").find("PWD=") != std::string::npos; }));
-    CHECK(text_of(folder() / "variables").find("/of/the/host") == std::string::npos);
-    const std::string files = text_of(folder() / "files");
-    EXPECT(files.find(" " + std::to_string(mine) + " ->") == std::string::npos, files);
-    // No child of the host: neither one that it could wait for, nor a zombie.
-    CHECK(::waitpid(-1, nullptr, WNOHANG) == -1 && errno == ECHILD);
-    ::close(mine);
-    unsetenv("LD_LIBRARY_PATH");
-    unsetenv("PYTHONHOME");
-    const auto end = [] { CHECK(::kill(std::stoi(text_of(folder() / "pid")), SIGKILL) == 0); };
-    end();
+    CHECK(soon(noted));
+    EXPECT(note() == "-E\n-P\n-m\npalette4d\nstudio\n" + path + "\n--frame\n12.5\n", note());
+    CHECK(no_children());
     // A frame outside of the clip is the nearest of it.
     fs::remove(folder() / "started");
     window.node->shown_time = 1000;
     window.push("openInStudio");
-    CHECK(soon([] { return fs::exists(folder() / "started"); }));
-    CHECK(text_of(folder() / "started").find("--frame\n20\n") != std::string::npos);
-    end();
+    CHECK(soon(noted));
+    CHECK(note().find("--frame\n20\n") != std::string::npos);
 }
 
 TEST(studio_opens_the_clip_where_there_is_no_sidecar) {
-    Window window(kRecord);
+    Window window;
     window.push("openInStudio");
     window.expect("No sidecar chosen");
-    CHECK(!fs::exists(folder() / "started"));
+    CHECK(!noted());
     window.node->set("clipFile", (folder() / "shot.1001.exr").u8string());
     window.push("openInStudio");
-    CHECK(soon([] { return fs::exists(folder() / "started"); }));
-    CHECK(text_of(folder() / "started") ==
+    CHECK(soon(noted));
+    CHECK(note() ==
           "-E\n-P\n-m\npalette4d\nstudio\n" + (folder() / "shot.####.exr").u8string() + "\n");
 }
 
@@ -153,13 +189,13 @@ TEST(nothing_starts_where_nothing_is_installed) {
     }
     // Neither the project's nor the clip's folder is asked for a program.
     fs::create_directories(folder() / "Resources");
-    write("Resources/program", "/bin/sh");
+    write("Resources/program", own_file().u8string());
     CHECK(node->changed("openInStudio") == kOfxStatOK);
     CHECK(node->text("status").find("found no such file") != std::string::npos);
 }
 
 TEST(an_analysis_runs_beside_the_host) {
-    Window window(kAnalyse);
+    Window window;
     write("box.json", sidecar_text());
     const fs::path target = folder() / "shot.p4d.json";
     const std::string clip = (folder() / "shot.####.exr").u8string();
@@ -167,9 +203,8 @@ TEST(an_analysis_runs_beside_the_host) {
     window.push("analyse");
     CHECK(window.node->text("sidecar") == target.u8string());
     CHECK(soon([&] { return window.says("analysing " + clip + ": structure search: 3 of 40"); }));
-    CHECK(text_of(folder() / "started")
-              .find("palette4d\nanalyze\n" + clip + "\n-o\n" + target.u8string() +
-                    "\n--quiet\n--progress\n") != std::string::npos);
+    CHECK(note().find("palette4d\nanalyze\n" + clip + "\n-o\n" + target.u8string() +
+                      "\n--quiet\n--progress\n") != std::string::npos);
     // The picture passes, and the host shows why.
     const Layout layout;
     Picture source(layout), output(layout);
@@ -189,11 +224,11 @@ TEST(an_analysis_runs_beside_the_host) {
     CHECK(window.node->render(4, &source, output, layout.bounds) == kOfxStatOK);
     CHECK(output.pixels(layout.bounds) != source.pixels(layout.bounds));
     CHECK(window.node->effect().persistent_message.empty());
-    CHECK(::waitpid(-1, nullptr, WNOHANG) == -1 && errno == ECHILD);
+    CHECK(no_children());
 }
 
 TEST(a_second_push_stops_the_analysis) {
-    Window window(kAnalyse);
+    Window window;
     const fs::path target = folder() / "mine.p4d.json";
     window.node->set("clipFile", (folder() / "shot.mov").u8string());
     window.node->set("sidecar", target.u8string());
@@ -203,14 +238,14 @@ TEST(a_second_push_stops_the_analysis) {
     window.push("analyse");
     EXPECT(window.node->text("status").find("cancelled the analysis") == 0,
            window.node->text("status"));
-    CHECK(soon([] { return ::waitpid(-1, nullptr, WNOHANG) == -1 && errno == ECHILD; }));
+    CHECK(soon(no_children));
     write("go", "done\n");
     CHECK(!window.says("analysing"));
     CHECK(!fs::exists(target));
 }
 
 TEST(an_analysis_that_fails_says_why) {
-    Window window(kAnalyse);
+    Window window;
     const std::string kept = sidecar("mine.p4d.json");
     window.node->set("clipFile", (folder() / "shot.mov").u8string());
     window.node->set("sidecar", kept);
@@ -229,11 +264,11 @@ TEST(an_analysis_that_fails_says_why) {
 }
 
 TEST(analyse_needs_to_know_the_clip) {
-    Window window(kAnalyse);
+    Window window;
     window.push("analyse");
     EXPECT(window.node->text("status").find("choose it as Clip's file") != std::string::npos,
            window.node->text("status"));
-    CHECK(!fs::exists(folder() / "started"));
+    CHECK(!noted());
     // Resolve tells, and then finds the sidecar by the clip's name.
     window.node->effect().properties.put("OfxImageEffectPropSrcFilePath",
                                          (folder() / "shot.[1001-1003].exr").u8string());
@@ -242,8 +277,6 @@ TEST(analyse_needs_to_know_the_clip) {
     window.push("analyse");
     CHECK(soon([&] { return window.says("time 0 is frame 10"); }));
     CHECK(window.node->text("sidecar").empty());
-    CHECK(text_of(folder() / "started").find((folder() / "shot.####.exr").u8string()) !=
-          std::string::npos);
+    CHECK(note().find((folder() / "shot.####.exr").u8string()) != std::string::npos);
     CHECK(fs::exists(folder() / "shot.p4d.json"));
 }
-#endif

@@ -80,7 +80,7 @@ TEST(hosts_ask_again_when_a_sidecar_is_chosen) {
     const std::string path = sidecar("chosen.p4d.json");
     CHECK(set("strength", 0.5).empty());
     CHECK(set("sidecar", path) == "ofx_scene_linear");
-    // Another encoding, seen when the file is read anew.
+    // Another encoding, seen when the file is reloaded.
     std::string text = sidecar_text();
     const std::string old = R"("encoding": "linear")";
     write("chosen.p4d.json", text.replace(text.find(old), old.size(), R"("encoding": "sRGB")"));

@@ -1,5 +1,7 @@
 // What the node says about itself, and its life in the host.
 #include <algorithm>
+#include <fstream>
+#include <string>
 
 #include "harness.hpp"
 
@@ -172,6 +174,13 @@ TEST(load_and_unload_repeat) {
             CHECK(plugin.unload() == kOfxStatOK);
         }
     }
+#if defined(__linux__)
+    // Nothing of the library stays, for which its static objects must be destroyed by now.
+    std::ifstream maps("/proc/self/maps");
+    for (std::string line; std::getline(maps, line);) {
+        EXPECT(line.find("/Palette4D.ofx") == std::string::npos, line);
+    }
+#endif
 }
 
 TEST(identity_is_reported) {

@@ -157,6 +157,19 @@ TEST(handles_show_what_the_sidecar_holds) {
     CHECK(std::get<int>(node.value("handle01On")) == 1);
 }
 
+TEST(labels_have_the_names_of_the_colours_where_the_sidecar_has_them) {
+    Graded graded;
+    std::string text = sidecar_text(true);
+    const std::string id = "\"id\": \"v0\"";
+    const std::size_t at = text.find(id);
+    CHECK(at != std::string::npos);
+    text.replace(at, id.size(), id + ", \"name\": \"deep grey\"");
+    graded.choose(write("named.p4d.json", text));
+    Instance& node = *graded.node;
+    CHECK(node.properties("handle01").text(kOfxPropLabel) == "v0: deep grey, 10");
+    CHECK(node.properties("handle16").text(kOfxPropLabel) == "v15, frame 20");
+}
+
 TEST(without_a_sidecar_the_slots_are_as_they_were_described) {
     Graded graded;
     Instance& node = *graded.node;
@@ -303,7 +316,7 @@ TEST(colours_that_the_host_takes_back_are_no_edits) {
     const auto again = node.undo();
     CHECK(none_in_use());
     CHECK(std::get<Colour>(node.value("handle02")) == (Colour{0.5, 0.5, 0.501}));
-    // They are not given anew, which would be a step that nobody could get behind.
+    // They are not set again, which would be a step that nobody could get behind.
     CHECK(node.changed("strength") == kOfxStatOK);
     CHECK(node.undo_steps().empty());
     // Done again, and undone again.

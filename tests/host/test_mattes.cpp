@@ -24,7 +24,7 @@ bool is_number(const Vec3& p) {
     return !std::isnan(p[0]) && !std::isnan(p[1]) && !std::isnan(p[2]);
 }
 
-/// The matte of one straight colour, worked out anew.
+/// The matte of one straight colour, computed again.
 class Reference {
 public:
     Reference(const palette4d::Sidecar& sidecar, double frame, int handle)

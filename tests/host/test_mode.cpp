@@ -80,7 +80,7 @@ TEST(the_lattice_is_near_the_exact_picture_and_the_same_in_every_tile) {
         CHECK(lattice != exact);
         CHECK(difference(lattice, exact) <= Lattice::kTolerance);
         for (const int rows : {1, 7}) CHECK(node.render(source, 1.25, rows) == lattice);
-        // Made anew after other frames, in another order.
+        // Rebuilt after other frames, in another order.
         for (int t = 0; t < 10; ++t) node.render(source, 0.3 + t, 13);
         CHECK(node.plugin.call(kOfxActionPurgeCaches, &node.instance->effect(), nullptr, nullptr) ==
               kOfxStatOK);

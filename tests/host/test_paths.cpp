@@ -1,5 +1,6 @@
 // Where a sidecar is: ~, variables, relative and moved files.
 #include <cstdlib>
+#include <fstream>
 
 #include "../../ofx_plugin/node/paths.hpp"
 #include "harness.hpp"
@@ -9,6 +10,7 @@ using namespace test;
 using palette4d::node::clip_folder;
 using palette4d::node::clip_spec;
 using palette4d::node::expanded;
+using palette4d::node::reachable;
 using palette4d::node::sidecar_beside;
 using palette4d::node::words_of_missing;
 
@@ -169,6 +171,47 @@ TEST(the_node_finds_its_sidecar) {
     CHECK(node->effect().persistent_message.find(folder().u8string() + "/none.p4d.json") !=
           std::string::npos);
 }
+
+TEST(paths_longer_than_260_characters) {
+    fs::path deep = folder();
+    while (deep.u8string().size() < 400) deep /= fs::u8path("Einstellung öäü 色");
+    fs::create_directories(reachable(deep));
+    const std::string path = (deep / "clip.p4d.json").u8string();
+    std::ofstream(reachable(fs::u8path(path))) << sidecar_text();
+    CHECK(find_file(path, "") == path);
+    CHECK(find_file("/moved/clip.p4d.json", deep.u8string()) == path);
+    CHECK(clip_folder(path, "../" + deep.filename().u8string() + "/f.####.exr") == deep.u8string());
+    Ready scene(path);
+    CHECK(scene.instance->changed("sidecar") == kOfxStatOK);
+    const std::string status = scene.instance->text("status");
+    EXPECT(status.find("\nfile " + path + "\n") != std::string::npos, status);
+    const Layout layout;
+    Picture source(layout), output(layout);
+    fill(source);
+    CHECK(scene.instance->render(3, &source, output, layout.bounds) == kOfxStatOK);
+    CHECK(output.pixels(layout.bounds) == recoloured(scene.parsed, 13, source, layout.bounds));
+}
+
+#if defined(_WIN32)
+TEST(the_long_form_of_windows_paths) {
+    const std::string tail(300, 'x');
+    const auto form = [&](const std::string& start) {
+        const std::string text = reachable(palette4d::node::native(start + tail)).u8string();
+        return text.substr(0, text.size() - tail.size());
+    };
+    CHECK(form("C:\\a\\") == "\\\\?\\C:\\a\\");
+    CHECK(form("c:/a/../b/./") == "\\\\?\\c:\\b\\");
+    CHECK(form("\\\\server\\share\\a\\") == "\\\\?\\UNC\\server\\share\\a\\");
+    CHECK(form("//server/share/") == "\\\\?\\UNC\\server\\share\\");
+    CHECK(form("\\\\?\\C:\\a\\") == "\\\\?\\C:\\a\\");
+    CHECK(reachable("C:/a/b") == "C:/a/b");
+    // A server's folder is no relative path, and a drive's own folder is one.
+    CHECK(palette4d::node::meant("\"\\\\server\\share\\a b.json\"") ==
+          "\\\\server\\share\\a b.json");
+    CHECK(fs::path("\\\\server\\share\\a").is_absolute() && fs::path("C:a").is_relative());
+    CHECK(clip_spec("\\\\server\\share\\shot.1001.exr") == "\\\\server\\share\\shot.####.exr");
+}
+#endif
 
 TEST(a_still_stands_for_its_sequence) {
     const std::pair<const char*, const char*> names[] = {

@@ -115,11 +115,13 @@ TEST(the_user_chooses_a_version) {
     // The status counts the version's edits and names the version.
     CHECK(scene.instance->changed("version") == kOfxStatOK);
     CHECK(scene.instance->text("status").find("0 edits") != std::string::npos);
-    CHECK(scene.instance->text("status").find("'plain'") != std::string::npos);
+    CHECK(scene.instance->text("status").find(" in version 'plain'\n") != std::string::npos);
     scene.set("version", std::string());
     CHECK(scene.render() == active);
     CHECK(scene.instance->changed("version") == kOfxStatOK);
     CHECK(scene.instance->text("status").find("in version") == std::string::npos);
+    CHECK(scene.instance->text("status").find("\nversions 'warm 'Gr\u00fcn', 'plain'\n") !=
+          std::string::npos);
 }
 
 TEST(a_version_that_is_not_there_is_said) {

@@ -17,7 +17,7 @@ from any_clips import landscape
 from distributed import Client
 from edits import clip, external, movie, save, timeline
 from farm_processes import Farm, farm, wait_for
-from pieces import piece
+from pieces import noted, piece
 from without_module import run_without
 
 from palette4d.cli import main
@@ -240,6 +240,31 @@ def test_no_worker_yet_is_told_and_waited_for(
     told = capsys.readouterr().err
     assert told.count("has no worker yet") == 1
     assert f"`dask worker {made.address}`" in told
+
+
+def test_a_farm_that_loses_all_workers_ends_with_an_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = os.pathsep.join(
+        [str(Path(__file__).resolve().parents[1]), os.environ.get("PYTHONPATH", "")]
+    )
+    monkeypatch.setattr(farms, "WATCHED_EVERY", 0.2)
+    monkeypatch.setattr(farms, "WORKERS_WITHIN", 5)
+    with farm(tmp_path / "farm", workers=1, PYTHONPATH=path) as made:
+        with Client(made.address, set_as_default=False) as client:
+            client.wait_for_workers(1, timeout=120)
+        found: dict[int, object] = {}
+
+        def take(key: int, result: object) -> None:
+            found[key] = result
+            made.kill(made.workers["w0"])
+
+        Workers(cluster=made.address).run(noted, dict.fromkeys(range(9), str(tmp_path)), take)
+    assert len(found) == 9
+    lost = found[8]
+    assert isinstance(lost, Failed)
+    assert "no worker for 5 seconds" in lost.text
+    assert "the farm has no worker any more" in capsys.readouterr().err
 
 
 class TestRefusals:

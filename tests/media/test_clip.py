@@ -53,6 +53,16 @@ def test_huge_frame_range_is_refused():
         parse_frames("1-99999999999")
 
 
+@pytest.mark.parametrize("frames", ["1-99999999999", "1-9999999x2,1-9999999y3"])
+def test_a_pattern_with_a_huge_range_is_refused(tmp_path, frames):
+    write_image(tmp_path / "a.1.png", np.zeros((1, 1, 3), np.uint8))
+    with pytest.raises(Palette4dError):
+        open_clip(str(tmp_path / f"a.{frames}#.png"))
+    dated = "a_20230101-120000."
+    write_image(tmp_path / f"{dated}0001.png", np.zeros((1, 1, 3), np.uint8))
+    assert open_clip(str(tmp_path / f"{dated}####.png")).frames == [1]
+
+
 @pytest.mark.parametrize(
     ("stem", "expected"),
     [
@@ -434,6 +444,15 @@ def test_data_window_lies_in_the_display_window(tmp_path):
     expected = np.zeros((4, 5, 3), np.float32)
     expected[1:3, :3] = values[:, 1:]
     np.testing.assert_array_equal(pixels, expected)
+
+
+def test_a_small_file_that_states_a_huge_picture_is_refused(tmp_path):
+    """An EXR of one pixel in a window of 120 GB."""
+    small = np.zeros((1, 1, 3), np.float32)
+    path = write_image(tmp_path / "huge.exr", small, full=(0, 0, 100_000, 100_000))
+    assert path.stat().st_size < 1000
+    with pytest.raises(FrameError, match="100000x100000 pixels in 3 channels are too many"):
+        open_clip(str(path))
 
 
 def test_orientation_is_applied(tmp_path):

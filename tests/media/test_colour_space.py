@@ -271,14 +271,17 @@ def test_a_file_rule_decides_by_name(
 # ---------------------------------------------------------------------------- from clip to sidecar
 
 
-def analyse(clip: str, output: Path, *options: str) -> dict[str, Any]:
-    assert main(["analyze", clip, "-o", str(output), "--quiet", *options]) == 0
+def analyse(clip: str, output: Path, *options: str, method: str = "static") -> dict[str, Any]:
+    words = ["--quiet", "--method", method, *options]
+    assert main(["analyze", clip, "-o", str(output), *words]) == 0
     document: dict[str, Any] = json.loads(output.read_text(encoding="utf-8"))
     return document
 
 
 def test_a_scene_linear_clip_end_to_end(linear_clip: str, tmp_path: Path) -> None:
-    document = analyse(linear_clip, tmp_path / "cg.p4d.json", "--input-space", "ACEScg")
+    document = analyse(
+        linear_clip, tmp_path / "cg.p4d.json", "--input-space", "ACEScg", method="skew"
+    )
     assert document["clip"]["encoding"] == "ACEScct"
     stated = document["clip"]["conversion"]
     assert (stated["input_space"], stated["config"]) == ("ACEScg", ocio_config.BUILT_IN)
@@ -292,9 +295,9 @@ def test_a_scene_linear_clip_end_to_end(linear_clip: str, tmp_path: Path) -> Non
 
 def test_hulls_in_linear_light_are_useless(linear_clip: str, tmp_path: Path, capsys: Any) -> None:
     """The same clip, the same options: what the docs claim."""
-    log = analyse(linear_clip, tmp_path / "log.p4d.json", "--input-space", "ACEScg")
+    log = analyse(linear_clip, tmp_path / "log.p4d.json", "--input-space", "ACEScg", method="skew")
     assert "scene-linear" not in capsys.readouterr().err
-    linear = analyse(linear_clip, tmp_path / "lin.p4d.json")
+    linear = analyse(linear_clip, tmp_path / "lin.p4d.json", method="skew")
     assert "--input-space" in capsys.readouterr().err
     assert "conversion" not in linear["clip"]
     worse = linear["quality"]["stages"][-1]["L"] / log["quality"]["stages"][-1]["L"]

@@ -407,7 +407,7 @@ def cube() -> tuple[F64, list[list[int]]]:
     return rgb, [list(t) for a, b, c, d in quads for t in ((a, b, c), (a, c, d))]
 
 
-def dented_cube() -> tuple[F64, list[list[int]]]:
+def concave_cube() -> tuple[F64, list[list[int]]]:
     """The cube with its top pushed in to a point: not convex."""
     rgb, faces = cube()
     top = (4, 5, 7, 6)
@@ -457,14 +457,14 @@ def all_bodies() -> list[Body]:
         Body("triangle", tetrahedron[:3], [[0, 1, 2], [2, 1, 0]], anywhere),
         Body("square", square, [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]],
              np.vstack([anywhere, on_square])),
-        # Two corners coincide, as at the moment of a split.
-        Body("split-moment", np.vstack([tetrahedron, tetrahedron[3]]), SPLIT_TETRAHEDRON,
+        # Two corners coincide, as where a colour splits.
+        Body("at-a-split", np.vstack([tetrahedron, tetrahedron[3]]), SPLIT_TETRAHEDRON,
              np.vstack([anywhere, rng.dirichlet(np.ones(4), 20) @ tetrahedron])),
     ]  # fmt: skip
     solids = {
         "tetrahedron": (tetrahedron, TETRAHEDRON),
         "cube": cube(),
-        "dented-cube": dented_cube(),
+        "concave-cube": concave_cube(),
         **{f"hull-{n}": random_hull(n, n) for n in (5, 8, 13, 21)},
     }
     for name, (rgb, faces) in solids.items():
@@ -473,7 +473,7 @@ def all_bodies() -> list[Body]:
         close = surface_points(rgb, faces, rng)
         bodies.append(Body(name, rgb, faces, np.vstack([inside, anywhere]), 1e-8))
         bodies.append(
-            Body(f"{name}-surface", rgb, faces, close, 1e-4 if name == "dented-cube" else 1e-8)
+            Body(f"{name}-surface", rgb, faces, close, 1e-4 if name == "concave-cube" else 1e-8)
         )
     return bodies
 

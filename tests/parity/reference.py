@@ -7,6 +7,7 @@ cases of `cases.py` run on it and on the compiled core; where they differ, one o
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Sequence
 from typing import Any
@@ -354,19 +355,28 @@ def mean_value_coordinates(points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) 
 
 def palette_weights(points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> tuple[F64, F64]:
     """(m, 3), (n, 3), (f, 3) -> (m, n) weights of q(p) and (m,) distances |p - q|."""
-    colours, triangles = np.asarray(rgb, float), np.asarray(faces, int).reshape(-1, 3).tolist()
-    rows, distances = [], []
-    for p in np.asarray(points, float):
-        distance, weights = closest_weights(p, colours, triangles)
-        if distance <= ON_SURFACE:
-            distance = 0.0
-        elif triangles and abs(solid_angle_turns(p, colours, triangles)) > 0.5:
-            inner = mean_value_weights(p, colours, triangles)
-            if inner is not None:
-                distance, weights = 0.0, inner
-        rows.append(weights)
-        distances.append(distance)
+    colours = tuple(map(tuple, np.asarray(rgb, float).tolist()))
+    triangles = tuple(map(tuple, np.asarray(faces, int).reshape(-1, 3).tolist()))
+    each = [weights_of(tuple(p), colours, triangles) for p in np.asarray(points, float).tolist()]
+    rows, distances = [weights for weights, _ in each], [distance for _, distance in each]
     return np.array(rows).reshape(-1, len(colours)), np.array(distances)
+
+
+# Many cases weigh the same colours in the same palette.
+@functools.cache
+def weights_of(
+    point: tuple[float, ...], rgb: tuple[tuple[float, ...], ...], faces: tuple[tuple[int, ...], ...]
+) -> tuple[F64, float]:
+    """Weights of one colour, and its distance from the palette."""
+    p, colours, triangles = np.array(point), np.array(rgb), [list(face) for face in faces]
+    distance, weights = closest_weights(p, colours, triangles)
+    if distance <= ON_SURFACE:
+        return weights, 0.0
+    if triangles and abs(solid_angle_turns(p, colours, triangles)) > 0.5:
+        inner = mean_value_weights(p, colours, triangles)
+        if inner is not None:
+            return inner, 0.0
+    return weights, distance
 
 
 def polytope_weights(points: ArrayLike, document: Document, frame: float) -> F64:

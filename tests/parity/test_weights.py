@@ -17,7 +17,7 @@ def test_the_core_weighs_as_the_reference(body: Body) -> None:
     expected, far = REFERENCE.weights(body.points, body.rgb, body.faces)
     found, distance = CORE.weights(body.points, body.rgb, body.faces)
     np.testing.assert_allclose(distance, far, rtol=0, atol=1e-11)
-    if body.name == "split-moment":  # two corners coincide: only their sum means anything
+    if body.name == "at-a-split":  # two corners coincide: only their sum means anything
         expected, found = (np.c_[w[:, :3], w[:, 3] + w[:, 4]] for w in (expected, found))
     np.testing.assert_allclose(found, expected, rtol=0, atol=body.tolerance)
 
@@ -28,7 +28,7 @@ def test_mean_value_coordinates_agree(body: Body) -> None:
     inside = distance == 0
     assert inside.sum() > 10
     found, expected = CORE.mvc(body.points[inside], body.rgb, body.faces), expected[inside]
-    if body.name == "split-moment":
+    if body.name == "at-a-split":
         expected, found = (np.c_[w[:, :3], w[:, 3] + w[:, 4]] for w in (expected, found))
     np.testing.assert_allclose(found, expected, rtol=0, atol=body.tolerance)
 
@@ -36,7 +36,7 @@ def test_mean_value_coordinates_agree(body: Body) -> None:
 def test_the_textbook_formula_away_from_the_surface() -> None:
     """Outside too, where palettes are never weighed by it."""
     for body in SOLID:
-        if body.name.endswith("-surface") or body.name == "split-moment":
+        if body.name.endswith("-surface") or body.name == "at-a-split":
             continue
         expected = REFERENCE.mvc(body.points, body.rgb, body.faces)
         found = CORE.mvc(body.points, body.rgb, body.faces)

@@ -7,13 +7,13 @@ import pytest
 
 from palette4d import _core
 from palette4d.plotting.layout import Scale, Timeline, disc_names, half_bands
-from palette4d.plotting.rows import Palette, arrange
+from palette4d.plotting.rows import PlottedPalette, arrange
 
 GOLDEN = Path(__file__).resolve().parent.parent / "golden" / "sidecars"
 
 
 def timeline(name: str, width: float = 800.0, row_height: float = 40.0) -> Timeline:
-    palette = Palette.of(_core.read_sidecar(str(GOLDEN / f"{name}.p4d.json")))
+    palette = PlottedPalette.of(_core.read_sidecar(str(GOLDEN / f"{name}.p4d.json")))
     rows = arrange(palette.frames, palette.rgb, palette.edges)
     return Timeline(palette, rows, Scale(palette.first, palette.last, 0.0, width), row_height)
 

@@ -16,16 +16,8 @@ from edits import clip, dissolve, external, gap, movie, save, timeline
 
 from palette4d.cli import main
 
-QUICK = (
-    "--set",
-    "palette_size=4",
-    "--set",
-    "colours=512",
-    "--set",
-    "coarse_colours=128",
-    "--set",
-    "blocks=1",
-)
+#: A palette that does not change: these tests are about timelines.
+QUICK = ("--method", "static", "--set", "colours=512", "--set", "coarse_colours=128")
 #: What other programs keep in a timeline.
 THEIRS = {"colour": {"lut": "théirs.cube", "big": 2**60, "share": 0.1, "none": None}}
 

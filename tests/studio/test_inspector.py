@@ -56,6 +56,7 @@ def colour(panel: Inspector, id_: str = "v2") -> tuple[float, ...]:
 
 def test_it_says_the_colour_in_all_units(panel: Inspector) -> None:
     assert panel.title.text() == "v2"
+    assert panel.place.text() == "red · vertex · frame 0"
     assert [panel.boxes[name].value() for name in "RGB"] == [0.9, 0.1, 0.1]
     assert panel.hex.text() == "#e61a1a"
     lightness, chroma, hue = Lch("sRGB").of([0.9, 0.1, 0.1])

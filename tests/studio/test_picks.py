@@ -102,9 +102,11 @@ def test_the_list_switches_off_selects_and_removes(qtbot: Any, opened: Window) -
     item.setCheckState(0, Qt.CheckState.Unchecked)
     assert not picks(opened)[0].enabled
     opened.session.undo()
+    qtbot.waitUntil(lambda: not opened.session.solving)
     assert picks(opened)[0].enabled
     opened.session.select("p1")
     opened.inspector.boxes["R"].setValue(0.5)  # another colour for the same pick
+    qtbot.waitUntil(lambda: not opened.session.solving)
     assert picks(opened)[0].to == (0.5, NEW[1], NEW[2])
     qtbot.mouseClick(opened.inspector.picks.remove, LEFT)
     assert not picks(opened)

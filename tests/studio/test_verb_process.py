@@ -10,13 +10,13 @@ from palette4d.studio.verb_process import VerbProcess
 
 def test_a_job_does_what_the_command_does_and_reports(tmp_path: Path, analysed: Path) -> None:
     out = tmp_path / "by_job.p4d.json"
-    words = ["analyze", str(analysed / "clip"), "-o", str(out)]
+    words = ["analyze", str(analysed / "clip"), "-o", str(out), "--frames", "1-3"]
     heard: list[float | None] = []
     job = VerbProcess(words, lambda job: heard.append(job.fraction))
     assert job.wait(120) == 0
     assert job.command == " ".join(["palette4d", *words])
     assert any(fraction is not None for fraction in heard)
-    assert palette4d.load(out).frames == (1, 12, 1)
+    assert palette4d.load(out).frames == (1, 3, 1)
 
 
 def test_a_stopped_job_leaves_nothing(tmp_path: Path, analysed: Path) -> None:

@@ -9,7 +9,7 @@
 #include <variant>
 #include <vector>
 
-#include "model/polytope.hpp"
+#include "model/vec3.hpp"
 
 namespace palette4d {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "convert/colour_conversion.hpp"
-#include "model/polytope.hpp"
+#include "model/vec3.hpp"
 
 namespace palette4d {
 

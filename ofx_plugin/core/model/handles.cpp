@@ -15,11 +15,16 @@ std::vector<Handle> handles_of(const Polytope& polytope, const Edits& edits) {
         const Vertex& vertex = vertices[i];
         const bool edited = i < edits.vertex_rgb.size() && edits.vertex_rgb[i].has_value();
         handles.push_back({vertex.id, false, static_cast<int>(i), vertex.frame,
-                           edited ? *edits.vertex_rgb[i] : vertex.rgb});
+                           edited ? *edits.vertex_rgb[i] : vertex.rgb, vertex.name});
     }
     for (std::size_t i = 0; i < edits.stops.size(); ++i) {
         const Stop& stop = edits.stops[i];
-        handles.push_back({stop.id, true, static_cast<int>(i), stop.frame, stop.rgb});
+        const Edge& edge = polytope.edges()[static_cast<std::size_t>(stop.edge)];
+        const Vertex& from = vertices[static_cast<std::size_t>(edge.from)];
+        const Vertex& to = vertices[static_cast<std::size_t>(edge.to)];
+        const bool later = to.frame - stop.frame < stop.frame - from.frame;
+        handles.push_back({stop.id, true, static_cast<int>(i), stop.frame, stop.rgb,
+                           later ? to.name : from.name});
     }
     return handles;
 }

@@ -16,6 +16,8 @@ struct Handle {
     int index;  ///< into polytope.vertices(), or edits.stops
     double frame;
     Vec3 rgb;  ///< as edited, else the vertex's own colour
+    /// The name of its colour before edits; a stop's is that of the nearer end of its edge.
+    std::string name;
 };
 
 /// All handles: the polytope's vertices in order, then the stops in order.

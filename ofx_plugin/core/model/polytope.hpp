@@ -6,17 +6,20 @@
 #include <string>
 #include <vector>
 
+#include "model/vec3.hpp"
+
 namespace palette4d {
 
-using Vec3 = std::array<double, 3>;
 using Face = std::array<int, 3>;
 
 /// A palette colour at one frame. `rgb` is in the palette's encoding (any finite value). `frame` is
-/// the time t in the clip's frame numbers (not normalised; may be fractional).
+/// the time t in the clip's frame numbers (not normalised; may be fractional). `name` says for
+/// people what colour it is; it may be empty.
 struct Vertex {
     std::string id;
     Vec3 rgb;
     double frame;
+    std::string name = {};
 };
 
 /// An inter-frame edge; `from` and `to` index vertices and vertices[from].frame <

@@ -1,11 +1,12 @@
 // Three-component arithmetic.
 #pragma once
 
+#include <array>
 #include <cmath>
 
-#include "model/polytope.hpp"
-
 namespace palette4d {
+
+using Vec3 = std::array<double, 3>;
 
 inline Vec3 operator+(const Vec3& a, const Vec3& b) {
     return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};

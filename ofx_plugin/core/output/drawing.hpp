@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "convert/colour_conversion.hpp"
-#include "recolour/colour_map.hpp"
 #include "recolour/recolour.hpp"
+#include "recolour/recolour_image.hpp"
 
 namespace palette4d {
 

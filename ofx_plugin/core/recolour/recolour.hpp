@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "model/edits.hpp"
-#include "recolour/colour_map.hpp"
 #include "recolour/mvc.hpp"
+#include "recolour/recolour_image.hpp"
 
 namespace palette4d {
 

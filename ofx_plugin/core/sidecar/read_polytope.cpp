@@ -66,9 +66,10 @@ Polytope read_polytope(const Cursor& where, const ClipInfo& clip, const std::str
     const Cursor vertex_list = where.member("vertices");
     for (std::size_t i = 0, n = vertex_list.list("vertices"); i < n; ++i) {
         const Cursor entry = vertex_list.element(i);
-        entry.require_members({"id", "frame", "rgb"});
+        entry.require_members({"id", "frame", "rgb"}, {"name"});
         const Cursor id = entry.member("id");
         Vertex vertex{id.id(), entry.member("rgb").rgb(), entry.member("frame").frame()};
+        if (entry.has("name")) vertex.name = entry.member("name").name();
         claim(ids.taken, id, vertex.id);
         ids.vertices.emplace(vertex.id, static_cast<int>(i));
         vertices.push_back(std::move(vertex));

@@ -209,7 +209,7 @@ def run(args: argparse.Namespace) -> int:
 def _run(args: argparse.Namespace, progress: _ProgressFile) -> int:
     settings = _settings(args)
     if analyze_shots.is_show(args):
-        return analyze_shots.run(args, settings)
+        return analyze_shots.run(args, settings, progress)
     from palette4d.grade import sidecar
 
     on_edits = settings.pop("on_edits")

@@ -283,7 +283,7 @@ def run_set(args: argparse.Namespace) -> int:
     """Change a vertex, a stop, an edge at a frame, or the palette colour near a colour."""
     if (args.near is None) == (args.id is None):
         raise Palette4dError(
-            f"found {'both' if args.id else 'neither'} ID and --near, expected one of them; "
+            f"found {'ID and --near' if args.id else 'no ID and no --near'}, expected one of them; "
             f"`palette4d info {shlex.quote(args.sidecar)}` lists the ids"
         )
     if args.near is None:

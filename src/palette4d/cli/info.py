@@ -62,8 +62,6 @@ def run(args: argparse.Namespace) -> int:
 
 def info_of(document: "Document") -> dict[str, Any]:
     """Return the output of ``palette4d info --json``; docs/sidecar.md explains the names."""
-    from palette4d.colour.names import colour_names
-
     fields = document.fields()
     clip, polytope = fields["clip"], fields["polytope"]
     frames = clip["frames"]
@@ -71,7 +69,7 @@ def info_of(document: "Document") -> dict[str, Any]:
     stops = fields["edits"]["stops"]
     stages = fields["quality"]["stages"]
     vertices = polytope["vertices"]
-    names = colour_names([vertex["rgb"] for vertex in vertices], clip["encoding"])
+    names = document.names
     return {
         "name": clip["name"],
         "source": clip["source"],
@@ -94,17 +92,17 @@ def info_of(document: "Document") -> dict[str, Any]:
         "locks": fields["edits"].get("locks", []),
         "versions": list(document.versions),
         "steps": len(document.history),
-        "tracks": _named([_track(document, track) for track in document.tracks], clip["encoding"]),
+        "tracks": [_track(document, track) for track in document.tracks],
         "losses": stages[-1] if stages else {},
         "stages": stages,
         "palette": [
             {
                 **vertex,
                 "hex": hex_of(vertex["rgb"]),
-                "called": f"{name}, {vertex['frame']:.6g}",
+                "called": names[vertex["id"]],
                 "edited": edited.get(vertex["id"]),
             }
-            for vertex, name in zip(vertices, names, strict=True)
+            for vertex in vertices
         ],
         "palette_edges": [
             {**edge, "stops": [stop["id"] for stop in stops if stop["edge"] == edge["id"]]}
@@ -113,18 +111,6 @@ def info_of(document: "Document") -> dict[str, Any]:
         "palette_stops": stops,
         "block_ranges": [[block["first"], block["last"]] for block in polytope["blocks"]],
     }
-
-
-def _named(tracks: list[dict[str, Any]], encoding: str) -> list[dict[str, Any]]:
-    """Return tracks with what people call them: their colour in the clip, and their frames."""
-    from palette4d.colour.names import colour_names
-
-    colours = colour_names([track["rgb"] for track in tracks], encoding)
-    spans = ["-".join(f"{frame:.6g}" for frame in track["frames"]) for track in tracks]
-    return [
-        {**track, "called": f"{colour}, {span}"}
-        for track, colour, span in zip(tracks, colours, spans, strict=True)
-    ]
 
 
 def _track(document: "Document", track: "Track") -> dict[str, Any]:
@@ -146,6 +132,7 @@ def _track(document: "Document", track: "Track") -> dict[str, Any]:
     _, frame, rgb, after = max(found, key=lambda each: each[0])
     return {
         "name": track.name,
+        "called": track.called,
         "frames": [track.first, track.last],
         "frame": frame,
         "rgb": rgb,

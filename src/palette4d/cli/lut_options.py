@@ -37,7 +37,9 @@ def add_lut_options(parser: argparse.ArgumentParser, default: str | None, *, spa
     if space:
         spaces = "input (the clip's), palette, or a colour space"
         add("--space", default="input", help=f"takes and returns: {spaces} (default input)")
-        config = "knows SPACE (default: the sidecar's, $OCIO, or the studio config)"
+        config = (
+            "the config that defines SPACE (default: the sidecar's, $OCIO, or the studio config)"
+        )
         add("--ocio-config", metavar="CONFIG", help=config)
 
 

@@ -70,7 +70,10 @@ def of_lch(lightness: float, chroma: float, hue: float) -> str:
     return f"greyish {name}" if chroma < GREYISH else name
 
 
-def colour_names(rgb: ArrayLike, encoding: str) -> list[str]:
-    """Return the names of (n, 3) code values of an encoding; unknown counts as sRGB."""
+def named_lch(rgb: ArrayLike, encoding: str) -> list[tuple[float, str]]:
+    """Return the lightness and the name of (n, 3) code values of an encoding.
+
+    An unknown encoding counts as sRGB.
+    """
     values = np.reshape(np.asarray(rgb, np.float64), (-1, 3))
-    return [of_lch(*row) for row in Lch(encoding).of(values).tolist()]
+    return [(row[0], of_lch(*row)) for row in Lch(encoding).of(values).tolist()]

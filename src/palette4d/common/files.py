@@ -24,6 +24,8 @@ _TEMPORARY = re.compile(r"\..*\.[0-9a-f]{16}\.p4d-tmp(\.[^.]*)?", re.DOTALL)
 #: Seconds after which a temporary file counts as left over where files cannot be locked.
 _LEFT_OVER_AFTER = 86400.0
 _swept: set[Path] = set()
+#: As many links on the way to a file as Linux follows.
+_MOST_LINKS = 40
 
 
 def refuse_existing(path: Path, force: bool) -> None:
@@ -56,19 +58,32 @@ def make_folder(folder: Path) -> None:
 def link_target(path: str | os.PathLike[str]) -> Path:
     """Return the target of a symbolic link, or the path itself.
 
-    In a folder that others may write to, their links could lead a write to any file of ours.
+    In a folder that others may write to, their links could lead a write to any file of ours. So
+    each link on the way must be ours, root's or that of its folder's owner.
     """
     path = Path(path)
-    if not path.is_symlink() or not path.exists():
+    if not path.exists():
         return path
-    if sys.platform != "win32":
-        owner = path.lstat().st_uid
-        if owner not in (0, os.geteuid(), path.parent.stat().st_uid):
+    for _ in range(_MOST_LINKS):
+        before = path.lstat()
+        if not stat.S_ISLNK(before.st_mode):
+            return path
+        if sys.platform == "win32":
+            return Path(os.path.realpath(path))
+        if before.st_uid not in (0, os.geteuid(), path.parent.stat().st_uid):
             raise Palette4dError(
                 f"{path}: found a symbolic link of another user, expected one of yours or of the "
                 "folder's owner; remove it, or choose another name"
             )
-    return Path(os.path.realpath(path))
+        target = path.parent / path.readlink()
+        after = path.lstat()
+        if not os.path.samestat(before, after) or before.st_ctime_ns != after.st_ctime_ns:
+            break
+        path = target
+    raise Palette4dError(
+        f"{path}: found a symbolic link that another program changes, expected one that stays; "
+        "choose another folder"
+    )
 
 
 @contextmanager
@@ -97,14 +112,23 @@ def replacing(
         raise _closed(path, f": {error.strerror}") from error
     try:
         yield temporary
-        with temporary.open("rb+") as written:
-            os.fsync(written.fileno())
-        with contextlib.suppress(FileNotFoundError):
-            temporary.chmod(stat.S_IMODE(path.stat().st_mode))
+        if temporary.is_symlink():
+            raise Palette4dError(
+                f"{path}: found a link in place of the temporary file; nothing was written here. "
+                f"Another program changes {path.parent}: choose another folder"
+            )
+        # Not by name: another user of the folder could put a link there now.
+        written = os.open(temporary, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0))
+        try:
+            os.fsync(written)
+            with contextlib.suppress(FileNotFoundError):
+                _copy_permissions(path, written)
+        finally:
+            os.close(written)
         refuse_existing(path, force)
         if check is not None:
             check()
-        temporary.replace(path)
+        _rename(temporary, path)
     except OSError as error:
         raise WriteError(
             f"{path}: cannot be written: {error.strerror or error}; expected a disk with room, "
@@ -113,7 +137,8 @@ def replacing(
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
-        os.close(lock)
+        if lock is not None:
+            os.close(lock)
     _sync_folder(path.parent)
 
 
@@ -165,16 +190,41 @@ def _temporary_name(path: Path) -> Path:
     return path.with_name(f".{path.stem[:40]}.{secrets.token_hex(8)}.p4d-tmp{path.suffix}")
 
 
-def _new_temporary(path: Path) -> tuple[Path, int]:
-    """Create a temporary file; return it with a handle that locks it until it is closed."""
+def _new_temporary(path: Path) -> tuple[Path, int | None]:
+    """Create a temporary file; return it with a handle that locks it until it is closed.
+
+    Windows locks nothing here, and would not rename an open file.
+    """
     while True:
         temporary = _temporary_name(path)
         # 0o666 less the umask, as for any new file.
         handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
-        if _is_locked(handle):
+        ours = _is_locked(handle)
+        if ours and sys.platform != "win32":
             return temporary, handle
         os.close(handle)
+        if ours:
+            return temporary, None
         temporary.unlink(missing_ok=True)
+
+
+def _rename(temporary: Path, path: Path) -> None:
+    """Replace `path`. Windows refuses while a program has it open, as the node has for a moment."""
+    for left in reversed(range(40 if sys.platform == "win32" else 1)):
+        try:
+            temporary.replace(path)
+            return
+        except PermissionError:
+            if not left:
+                raise
+            time.sleep(0.05)
+
+
+def _copy_permissions(path: Path, handle: int) -> None:
+    """Give an open file the permissions of another file, which is no link."""
+    mode = path.lstat().st_mode
+    if stat.S_ISREG(mode) and hasattr(os, "fchmod"):
+        os.fchmod(handle, mode & 0o777)
 
 
 def _is_locked(handle: int) -> bool:

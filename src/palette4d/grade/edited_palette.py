@@ -24,6 +24,7 @@ from palette4d.grade.edits import (
     as_colour,
 )
 from palette4d.grade.handles import Handles
+from palette4d.grade.names import colours_by_id
 from palette4d.grade.palette import Near, Palette, palette_at
 from palette4d.grade.sidecar import Fields
 from palette4d.grade.steps import Steps
@@ -81,6 +82,19 @@ class EditedPalette(Steps):
                 fields.pop(member, None)
             self._core = _core.parse_sidecar(sidecar.encoded(fields), self._name)
         return self._core
+
+    @property
+    def solved(self) -> bool:
+        """Whether the solution of the picks is known, so that nothing waits for it."""
+        picks = (value for (kind, _), value in self._state.items() if kind == "pick")
+        return self._solved is not None or not any(pick.get("enabled", True) for pick in picks)
+
+    def take_solution(self, other: "EditedPalette") -> None:
+        """Take over the solution of another document of this palette with the same edits."""
+        if self._solved is None and other._active() == self._active():
+            self._solved = other._solved
+            if other._state == self._state:
+                self._core = other._core
 
     @property
     def _name(self) -> str:
@@ -169,7 +183,23 @@ class EditedPalette(Steps):
     @property
     def tracks(self) -> list[Track]:
         """The palette's colours through time: the rows of `palette4d plot`."""
-        return tracks_of(self._handles)
+        return tracks_of(self._handles, colours_by_id(self._handles, self.encoding))
+
+    @property
+    def colour_names(self) -> dict[str, str]:
+        """The names of the unedited colours of vertices and stops by id, such as "deep red"."""
+        return colours_by_id(self._handles, self.encoding, self._settings)
+
+    @property
+    def names(self) -> dict[str, str]:
+        """The names of vertices and stops by id: colour and frame, such as "deep red, 13"."""
+        colours = self.colour_names
+        return {id_: f"{colour}, {round(self.frame_of(id_))}" for id_, colour in colours.items()}
+
+    def called(self, id: str) -> str:
+        """Return the name of a vertex or stop, or of an edge's track; "" for other ids."""
+        tracks = (track.called for track in self.tracks if id in track.edges)
+        return self.names.get(id) or next(tracks, "")
 
     def palette(self, frame: float) -> Palette:
         """Return the palette at a time: ids, colours as analysed and as edited, faces.

@@ -14,11 +14,14 @@ class Handles:
     ----------
     vertices, edges : dict of str to dict
         The sidecar's members by id, in the sidecar's order.
+    colours : dict of str to str
+        The names of the vertices' colours, once `names.colours_by_id` has found them.
     """
 
     def __init__(self, polytope: Mapping[str, Any]) -> None:
         self.vertices: dict[str, dict[str, Any]] = {v["id"]: v for v in polytope["vertices"]}
         self.edges: dict[str, dict[str, Any]] = {e["id"]: e for e in polytope["edges"]}
+        self.colours: dict[str, str] = {}
 
     def vertex(self, id_: str, others: Iterable[str] = ()) -> dict[str, Any]:
         """Return a vertex.

@@ -72,7 +72,7 @@ class Recolouring(EditedPalette):
         output = Output(show, strength, keep_lightness, lightness_of, mix, matte_in, outside_at)
         pixels = _checked_image(image)
         palette = self.palette(frame)
-        self._conversion(space)
+        self._conversion(space)  # an error for a space that the sidecar lacks
         recolourer = _core.Recolourer(
             palette.rgb, palette.edited, palette.faces, bumps=palette.bumps
         )

@@ -40,7 +40,7 @@ _ORDER: dict[str, tuple[str, ...]] = {
     "/clip/conversion/steps/*": ("kind", "direction"),
     "/clip/frames": ("first", "last", "step", "skipped"),
     "/polytope": ("vertices", "edges", "blocks", "transitions"),
-    "/polytope/vertices/*": ("id", "frame", "rgb"),
+    "/polytope/vertices/*": ("id", "frame", "rgb", "name"),
     "/polytope/edges/*": ("id", "from", "to"),
     "/polytope/blocks/*": ("first", "last", "tracks", "faces"),
     "/polytope/transitions/*": ("tracks", "faces"),

@@ -4,13 +4,14 @@ A chain follows one palette colour through its vertices. At a split or a merge o
 the chain; every other edge begins or ends another chain.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from palette4d.grade.handles import Handles
+from palette4d.grade.names import numbered
 
 F64 = NDArray[np.float64]
 
@@ -102,6 +103,8 @@ class Track:
     ----------
     name : str
         The id of its first vertex.
+    called : str
+        Its name for people: its most colourful vertex, and its frames, such as "deep red, 13-31".
     first, last : float
         The first and the last frame, with forks.
     vertices, edges : tuple of str
@@ -109,28 +112,42 @@ class Track:
     """
 
     name: str
+    called: str
     first: float
     last: float
     vertices: tuple[str, ...]
     edges: tuple[str, ...]
 
 
-def tracks_of(handles: Handles) -> list[Track]:
-    """Return the tracks of a palette; every vertex and every edge belongs to exactly one."""
+def tracks_of(handles: Handles, colours: Mapping[str, str]) -> list[Track]:
+    """Return the tracks of a palette; every vertex and every edge belongs to exactly one.
+
+    Parameters
+    ----------
+    colours : mapping of str to str
+        The names of the vertices' colours.
+    """
     ids, edge_ids = list(handles.vertices), list(handles.edges)
     place = {id_: index for index, id_ in enumerate(ids)}
+    rgb = np.array([vertex["rgb"] for vertex in handles.vertices.values()], dtype=np.float64)
+    edges = [(place[edge["from"]], place[edge["to"]]) for edge in handles.edges.values()]
     chains, _, _ = find_chains(
-        np.array([vertex["frame"] for vertex in handles.vertices.values()], dtype=np.float64),
-        np.array([vertex["rgb"] for vertex in handles.vertices.values()], dtype=np.float64),
-        [(place[edge["from"]], place[edge["to"]]) for edge in handles.edges.values()],
+        np.array([vertex["frame"] for vertex in handles.vertices.values()], np.float64), rgb, edges
     )
-    tracks = []
+    names = []
     for chain in chains:
-        edges = tuple(edge_ids[edge] for edge in chain.edges)
+        # A fork between two other tracks has no vertex of its own.
+        inside = chain.vertices or edges[chain.edges[0]]
+        strongest = max(inside, key=lambda vertex: float(np.ptp(rgb[vertex])))
+        span = "-".join(dict.fromkeys(str(round(at)) for at in (chain.first, chain.last)))
+        names.append((colours[ids[strongest]].rstrip(" 0123456789"), span))
+    tracks = []
+    for chain, (colour, span), number in zip(chains, names, numbered(names), strict=True):
         vertices = tuple(ids[vertex] for vertex in chain.vertices)
-        # A fork between two other tracks has no vertex of its own; its edge names it.
-        name = vertices[0] if vertices else edges[0]
-        tracks.append(Track(name, chain.first, chain.last, vertices, edges))
+        along = tuple(edge_ids[edge] for edge in chain.edges)
+        first, last = chain.first, chain.last
+        called = f"{colour}{number}, {span}"
+        tracks.append(Track((vertices or along)[0], called, first, last, vertices, along))
     return tracks
 
 

@@ -106,7 +106,7 @@ ALL: tuple[Parameter, ...] = (
     MIX,
     Choice(
         "pictureIn",
-        "Picture is in",
+        "Input colour space",
         ("Input space", "Palette space", "Scene-linear"),
         "Input space",
     ),

@@ -11,6 +11,7 @@ import concurrent.futures
 import contextlib
 import logging
 import os
+import queue
 import re
 import sys
 import threading
@@ -31,13 +32,15 @@ from palette4d.jobs.pool import (
     outcome,
 )
 
-#: Seconds to wait for the scheduler's answer, and for the first worker.
+#: Seconds to wait for the scheduler's answer, and for workers where there is none.
 ANSWERS_WITHIN = 15
 WORKERS_WITHIN = 120
 
-#: Seconds until a note says that there is no worker, and seconds between checks.
+#: Seconds until a note says that there is no worker, and seconds between checks: for the first
+#: worker, and while all work.
 TOLD_AFTER = 3
 ASKED_EVERY = 0.2
+WATCHED_EVERY = 5
 
 
 def check_address(text: str) -> str:
@@ -83,8 +86,6 @@ def run(
             "as you on the farm. Use tls:// with your certificates (docs/shots.md)"
         )
     with _connected(address) as client:
-        from distributed import as_completed
-
         _check_scheduler(client, address)
         config = from_anywhere(os.environ.get("OCIO"))
         keys = {}
@@ -95,11 +96,18 @@ def run(
             futures.append(client.submit(_piece, work, task, config, key=name, pure=False))
         _check_workers(client, address)
         try:
-            for future in as_completed(futures, loop=client.loop):
+            for future in _finished(client, futures, address):
                 found = _outcome(future)
                 with later_interrupts():
-                    take(keys[future.key], found)
+                    take(keys.pop(future.key), found)
                 future.release()  # results may be large
+            deserted = Failed(
+                f"the farm has had no worker for {WORKERS_WITHIN} seconds (too little memory?); "
+                "start some with `dask worker`, and run the same command again"
+            )
+            for key in keys.values():
+                with later_interrupts():
+                    take(key, deserted)
         finally:
             with contextlib.suppress(Exception):  # the scheduler may have gone
                 client.cancel(futures)
@@ -123,6 +131,42 @@ def _piece(work: Callable[[Task, int], Result], task: Task, config: str | None) 
             os.environ.pop("OCIO", None)
             if before is not None:
                 os.environ["OCIO"] = before
+
+
+def _finished(client: Any, futures: list[Any], address: str) -> Iterator[Any]:
+    """Yield each future when it is done; end early if the farm keeps no worker."""
+    done: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    for future in futures:
+        future.add_done_callback(done.put)
+    told, seen = False, time.monotonic()
+    left = len(futures)
+    while left:
+        try:
+            future = done.get(timeout=WATCHED_EVERY)
+        except queue.Empty:
+            waited = time.monotonic() - seen
+            if _has_worker(client):
+                told, seen = False, time.monotonic()
+            elif waited >= WORKERS_WITHIN:
+                return
+            elif not told:
+                told = True
+                _say(
+                    "palette4d: note: the farm has no worker any more; start one with `dask worker "
+                    f"{address}` (waiting for {WORKERS_WITHIN - waited:.0f} more seconds)"
+                )
+        else:
+            told, seen = False, time.monotonic()
+            left -= 1
+            yield future
+
+
+def _has_worker(client: Any) -> bool:
+    """Whether the scheduler says that it has a worker; False where it does not answer."""
+    try:
+        return bool(client.sync(client.scheduler.ncores, callback_timeout=ANSWERS_WITHIN))
+    except OSError:
+        return False
 
 
 def _version() -> str:

@@ -32,6 +32,9 @@ DEFAULT_RATE = Fraction(24)
 COUNTED_PIXELS = 4_000_000
 """In larger frames the analysis counts only every n-th row, so about this many pixels."""
 
+MOST_SAMPLES = 1 << 29
+"""The most samples of a frame, 13,000 x 13,000 pixels in R, G and B: a small file can state any."""
+
 LEAVE_OUT = (
     "Bring a good copy, choose a range with frames=…, or leave such frames out with "
     "skip_bad_frames=True."

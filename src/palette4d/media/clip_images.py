@@ -18,6 +18,7 @@ from palette4d.media.clip_base import (
     DEFAULT_RATE,
     F32,
     LEAVE_OUT,
+    MOST_SAMPLES,
     Clip,
     ClipError,
     Fill,
@@ -304,6 +305,14 @@ def _open(path: Path, what: str) -> tuple[Any, Any]:
     if spec.width < 1 or spec.height < 1 or spec.nchannels < 1:
         source.close()
         raise _unreadable(path, what, f"its size is {spec.width}x{spec.height}")
+    chosen = _channel_choice(spec)
+    channels = max(chosen) + 1 - min(chosen)
+    for width, height in ((spec.width, spec.height), (spec.full_width, spec.full_height)):
+        if width * height * channels > MOST_SAMPLES:
+            source.close()
+            raise _unreadable(
+                path, what, f"{width}x{height} pixels in {channels} channels are too many"
+            )
     return source, spec
 
 

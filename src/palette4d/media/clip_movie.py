@@ -18,6 +18,7 @@ from typing import Any
 
 import av
 import numpy as np
+from av.codec.codec import Capabilities
 from av.error import FFmpegError
 from numpy.typing import NDArray
 
@@ -27,6 +28,7 @@ from palette4d.media.clip_base import (
     DEFAULT_RATE,
     F32,
     LEAVE_OUT,
+    MOST_SAMPLES,
     Clip,
     ClipError,
     Fill,
@@ -78,6 +80,8 @@ _FORMATS = (
 ONLY_FILES = {"format_whitelist": ",".join(_FORMATS), "protocol_whitelist": "file"}
 
 
+#: Pixels of a strip that is converted at once: it stays in the processor's cache.
+_STRIP = 30_000
 #: Pictures whose decoding takes longer than opening the file again for a seek.
 WORTH_SEEKING = 4
 
@@ -203,6 +207,8 @@ class MovieClip(Clip):
             # Report a damaged picture instead of concealing the damage.
             stream.codec_context.options = {"err_detect": "crccheck+explode"}
             stream.thread_type = "AUTO"
+            if start and len(self.key_frames) == self.count and _has_slices(stream):
+                stream.thread_type = "SLICE"  # frame threads would decode later pictures too
             if start and self.stamps:
                 try:
                     container.seek(self.stamps[start], stream=stream, backward=True)
@@ -257,6 +263,10 @@ def open_movie(
             f"{LEAVE_OUT}"
         )
     height, width, channels = _shape(first)
+    if height * width * channels > MOST_SAMPLES:
+        raise ClipError(
+            f"{path}: found {width}x{height} pixels, expected at most 13000x13000; scale it down"
+        )
     notes = []
     if stamps is not None and base is not None and _varies(stamps, base, own_rate):
         notes.append(f"{path}: the frame rate varies; frames are counted, their times are not used")
@@ -296,6 +306,11 @@ def _open(path: Path) -> Any:
             f"{path}: the movie cannot be opened ({reason}); expected a whole movie file that "
             "FFmpeg can read. Bring a good copy, or convert it to an image sequence."
         ) from error
+
+
+def _has_slices(stream: Any) -> bool:
+    """Whether several threads can decode one picture."""
+    return bool(int(stream.codec_context.codec.capabilities) & int(Capabilities.slice_threads))
 
 
 def _video_stream(container: Any, path: Path) -> Any:
@@ -524,22 +539,29 @@ def _from_luma_chroma(picture: av.VideoFrame) -> F32:
     bits, unit = _bits(picture), float(1 << (_bits(picture) - 8))
     kind = np.uint8 if bits == 8 else np.uint16
     planes = [_plane(plane, kind) for plane in _full_chroma(picture).planes]
-    samples = np.stack([plane.astype(np.float32) for plane in planes], axis=-1)
     largest = float((1 << bits) - 1)
-    if int(picture.color_range) == _FULL_RANGE:
-        luma = samples[..., 0] / np.float32(largest)
-        chroma = (samples[..., 1:3] - np.float32(128 * unit)) / np.float32(largest)
-    else:
-        luma = (samples[..., 0] - np.float32(16 * unit)) / np.float32(219 * unit)
-        chroma = (samples[..., 1:3] - np.float32(128 * unit)) / np.float32(224 * unit)
+    full = int(picture.color_range) == _FULL_RANGE
+    black, white = (0.0, largest) if full else (16 * unit, 219 * unit)
+    span = largest if full else 224 * unit
     red_weight, blue_weight = LUMA_WEIGHTS[_matrix(picture)]
     green_weight = 1 - red_weight - blue_weight
-    out = np.empty_like(samples)
-    out[..., 0] = luma + np.float32(2 * (1 - red_weight)) * chroma[..., 1]
-    out[..., 2] = luma + np.float32(2 * (1 - blue_weight)) * chroma[..., 0]
-    out[..., 1] = (
-        luma - np.float32(red_weight) * out[..., 0] - np.float32(blue_weight) * out[..., 2]
-    ) / np.float32(green_weight)
-    if samples.shape[2] == 4:
-        out[..., 3] = samples[..., 3] / np.float32(largest)
-    return np.clip(out, 0, 1, out=out)
+    height, width = planes[0].shape
+    out = np.empty((height, width, len(planes)), np.float32)
+    rows = max(1, _STRIP // width)
+    for top in range(0, height, rows):
+        luma, blue, red, *rest = [plane[top : top + rows].astype(np.float32) for plane in planes]
+        luma -= np.float32(black)
+        luma /= np.float32(white)
+        for chroma, weight in ((blue, blue_weight), (red, red_weight)):
+            chroma -= np.float32(128 * unit)
+            chroma /= np.float32(span)
+            chroma *= np.float32(2 * (1 - weight))
+            chroma += luma
+        luma -= np.float32(red_weight) * red
+        luma -= np.float32(blue_weight) * blue
+        luma /= np.float32(green_weight)
+        for alpha in rest:
+            alpha /= np.float32(largest)
+        for channel, values in enumerate((red, luma, blue, *rest)):
+            np.clip(values, 0, 1, out=out[top : top + rows, :, channel])
+    return out

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from palette4d.common.arguments import MAX_FRAMES
 from palette4d.common.text import counted
 from palette4d.media.clip_base import ClipError, describe
 
@@ -192,6 +193,14 @@ def of_pattern(spec: str) -> tuple[ImageSequence, str | None]:
 
     path = Path(spec)
     folder = path.parent
+    # fileseq lists each frame of "1-9999999x2,1-9999999y3", for minutes.
+    own = re.search(r"[0-9,xy:-]*(?=[#@%$<])", path.name)
+    ends = re.findall(r"([0-9]+)-+([0-9]+)", own[0] if own else "")
+    if sum(abs(int(last) - int(first)) for first, last in ends) > MAX_FRAMES:
+        raise ClipError(
+            f"{spec}: the pattern's own range holds more than {MAX_FRAMES} frames; expected fewer, "
+            "or one of frames=…"
+        )
     try:
         # One `#` means one digit, as in the sidecar's source.
         parsed = FileSequence(path.name, pad_style=PAD_STYLE_HASH1)

@@ -65,7 +65,7 @@ def plot(
     from palette4d.grade.document import Document
     from palette4d.media.source_clip import frame_colours
     from palette4d.plotting import page, style
-    from palette4d.plotting.rows import Palette
+    from palette4d.plotting.rows import PlottedPalette
 
     output = Path(path)
     if output.suffix.lower() not in EXTENSIONS:
@@ -81,7 +81,7 @@ def plot(
     names = ("before", "after") if before is None else (before or "active", version or "active")
     first, last = sidecar.polytope.first_frame, sidecar.polytope.last_frame
     if frames is None:
-        frames = page.default_frames(first, last, Palette.of(sidecar, against).edited_times)
+        frames = page.default_frames(first, last, PlottedPalette.of(sidecar, against).edited_times)
     columns = []
     for frame in sorted(set(frames)):
         if not first <= frame <= last:
@@ -98,6 +98,6 @@ def plot(
         matplotlib.rc_context(style.RC),
         replacing(output, force=force) as temporary,
     ):
-        figure = page.build(sidecar, columns, against, names)
+        figure = page.build(sidecar, columns, against, names, document.colour_names)
         page.save(figure, temporary, output.suffix.lower()[1:], width)
     return [column.frame for column in columns if not column.pictures]

@@ -4,7 +4,8 @@
 pixels). x is right. y is down; 0 is the top of the first row.
 """
 
-from collections.abc import Callable, Sequence
+import itertools
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
@@ -12,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from palette4d.plotting.rows import Palette, Rows
+from palette4d.plotting.rows import PlottedPalette, Rows
 from palette4d.plotting.style import number
 
 F64 = NDArray[np.float64]
@@ -139,7 +140,7 @@ class Timeline:
         The largest radius of a vertex, in rows.
     """
 
-    palette: Palette
+    palette: PlottedPalette
     rows: Rows
     scale: Scale
     row_height: float
@@ -358,6 +359,8 @@ def disc_names(
     shorten: Callable[[str], str] = str,
     collar: float = COLLAR,
     beside: tuple[float, float, float] | None = None,
+    longer: Mapping[str, str] | None = None,
+    ends: tuple[float, float] = (-np.inf, np.inf),
 ) -> list[Label]:
     """Return the ids above or below their discs, edited ids first; ids without space are left out.
 
@@ -377,27 +380,52 @@ def disc_names(
         Space that a disc takes beyond its radius.
     beside : (float, float, float), optional
         The x of the first and last frame, and the space beyond them, where ids may be too.
+    longer : mapping of str to str, optional
+        What to write after an id where there is still space.
+    ends : (float, float)
+        The smallest and largest x of these longer texts.
     """
-    taken: list[Box] = []
+    tall = 0.95 * size
+
+    def boxed(text: str, x: float, y: float) -> Box:
+        half = width(text) / 2
+        return (x - half, y - tall / 2, x + half, y + tall / 2)
+
+    def free(box: Box, own: str = "") -> bool:
+        others = [*covered, *(other for id_, other in taken.items() if id_ != own)]
+        return box[3] < bottom and not any(_meet(box, other) for other in others)
+
+    covered: list[Box] = []
     for disc in discs:
         reach = disc.radius + collar
-        taken.append((disc.x - reach, disc.y - reach, disc.x + reach, disc.y + reach))
-    labels, tall = [], 0.95 * size
-    for disc in sorted(discs, key=lambda disc: disc.kind == "plain"):
-        text, reach = shorten(disc.id), disc.radius + collar + 0.5
+        covered.append((disc.x - reach, disc.y - reach, disc.x + reach, disc.y + reach))
+    labels: dict[str, Label] = {}
+    taken: dict[str, Box] = {}
+    order = sorted(discs, key=lambda disc: disc.kind == "plain")
+    for disc in order:
+        text, away = shorten(disc.id), disc.radius + collar + 0.5
         half = width(text) / 2
-        places = [(disc.x, disc.y - reach - tall / 2), (disc.x, disc.y + reach + tall / 2)]
-        if beside is not None and disc.home in beside[:2] and reach + 2 * half <= beside[2]:
+        places = [(disc.x, disc.y + side * (away + tall / 2)) for side in (-1, 1)]
+        if beside is not None and disc.home in beside[:2] and away + 2 * half <= beside[2]:
             way = -1 if disc.home == beside[0] else 1
-            places.insert(0, (disc.x + way * (reach + half), disc.y))
-        for x, y in places:
-            box = (x - half, y - tall / 2, x + half, y + tall / 2)
-            if box[3] >= bottom or any(_meet(box, other) for other in taken):
-                continue
-            taken.append(box)
-            labels.append(Label(text, x, y, disc.kind != "plain"))
-            break
-    return labels
+            places.insert(0, (disc.x + way * (away + half), disc.y))
+        found = (place for place in places if free(boxed(text, *place)))
+        for x, y in itertools.islice(found, 1):
+            taken[disc.id] = boxed(text, x, y)
+            labels[disc.id] = Label(text, x, y, disc.kind != "plain")
+    for disc in order if longer else ():
+        if disc.id not in labels or disc.id not in (longer or {}):
+            continue
+        text, away = f"{labels[disc.id].text} {(longer or {})[disc.id]}", disc.radius + collar + 0.5
+        aside = width(text) / 2 - disc.radius
+        for side, way in itertools.product((-1, 1), (0, 1, -1)):
+            x, y = disc.x + way * aside, disc.y + side * (away + tall / 2)
+            box = boxed(text, x, y)
+            if ends[0] <= box[0] and box[2] <= ends[1] and free(box, disc.id):
+                taken[disc.id] = box
+                labels[disc.id] = Label(text, x, y, disc.kind != "plain")
+                break
+    return list(labels.values())
 
 
 def _meet(one: Box, two: Box) -> bool:

@@ -1,6 +1,6 @@
 """The page: heading, frames before and after, the timeline, the polyhedra, and a legend."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.common.text import counted
 from palette4d.plotting import polyhedron, style, timeline
-from palette4d.plotting.rows import Palette, arrange
+from palette4d.plotting.rows import PlottedPalette, arrange
 from palette4d.plotting.solid import Shape, View, even_sample, extent_of
 
 F64 = NDArray[np.float64]
@@ -143,11 +143,15 @@ def build(
     columns: Sequence[Column],
     against: _core.Edits | None = None,
     named: Sequence[str] = ("before", "after"),
+    colours: Mapping[str, str] | None = None,
 ) -> Any:
-    """Lay out and draw the page; return a matplotlib Figure of `WIDTH` points."""
+    """Lay out and draw the page; return a matplotlib Figure of `WIDTH` points.
+
+    `colours` has the names of the handles' colours by id.
+    """
     from matplotlib.figure import Figure
 
-    palette = Palette.of(sidecar, against)
+    palette = PlottedPalette.of(sidecar, against)
     encoding = str(sidecar.clip["encoding"])
     rows = arrange(palette.frames, palette.rgb, palette.edges)
     row_height = float(np.clip(1100.0 / max(rows.count, 1), 16.0, 50.0))
@@ -171,7 +175,7 @@ def build(
     axes.set(xlim=(0, WIDTH), ylim=(0, height), autoscale_on=False)
     axes.set_axis_off()
     _draw_heading(axes, sidecar, palette, height)
-    timeline.draw(axes, panel, encoding)
+    timeline.draw(axes, panel, encoding, colours or {})
     if shapes:
         for k, name in enumerate(names):
             y = top - (k + 0.5) * picture_height - GAP * k
@@ -191,7 +195,9 @@ def build(
     return figure
 
 
-def _draw_heading(axes: Any, sidecar: _core.Sidecar, palette: Palette, height: float) -> None:
+def _draw_heading(
+    axes: Any, sidecar: _core.Sidecar, palette: PlottedPalette, height: float
+) -> None:
     """Write the title, the facts below it, and the legend at its right."""
     from matplotlib.legend_handler import HandlerTuple
 

@@ -1,10 +1,10 @@
 """The timeline's content and layout, without a drawing library: vertices, times, rows.
 
-`Palette` holds a sidecar's palette and edits as arrays. `arrange` finds the rows. A chain follows
-one palette colour through its vertices. At a split or a merge one edge continues the chain. Every
-other edge begins or ends another chain, which forks from or joins the chain of that vertex. Chains
-that never overlap in time share a row. Rows are ordered for short forks with few crossings, and
-otherwise from bright to dark.
+`PlottedPalette` holds a sidecar's palette and edits as arrays. `arrange` finds the rows. A chain
+follows one palette colour through its vertices. At a split or a merge one edge continues the chain.
+Every other edge begins or ends another chain, which forks from or joins the chain of that vertex.
+Chains that never overlap in time share a row. Rows are ordered for short forks with few crossings,
+and otherwise from bright to dark.
 """
 
 from collections.abc import Callable, Sequence
@@ -33,7 +33,7 @@ MAX_TRIALS = 20_000
 
 
 @dataclass(frozen=True)
-class Palette:
+class PlottedPalette:
     """A palette and its edits as arrays.
 
     Attributes
@@ -73,7 +73,7 @@ class Palette:
     against: _core.Edits | None = None
 
     @classmethod
-    def of(cls, sidecar: _core.Sidecar, against: _core.Edits | None = None) -> "Palette":
+    def of(cls, sidecar: _core.Sidecar, against: _core.Edits | None = None) -> "PlottedPalette":
         """Read the arrays from a sidecar; `against`: other edits as the colours before."""
         polytope, edits = sidecar.polytope, sidecar.edits
         vertices = np.asarray(polytope.vertices, dtype=np.float64).reshape(-1, 4)

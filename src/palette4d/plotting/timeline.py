@@ -3,6 +3,7 @@
 Everything is on one matplotlib Axes; its unit is the point (1/72 inch), y upwards.
 """
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from palette4d.plotting.layout import (
     disc_names,
     half_bands,
 )
-from palette4d.plotting.rows import Palette, Rows
+from palette4d.plotting.rows import PlottedPalette, Rows
 
 F64 = NDArray[np.float64]
 
@@ -30,7 +31,7 @@ class Panel:
     """The timeline's place on the page, in points."""
 
     def __init__(
-        self, palette: Palette, rows: Rows, left: float, right: float, row_height: float
+        self, palette: PlottedPalette, rows: Rows, left: float, right: float, row_height: float
     ) -> None:
         scale = Scale(palette.first, palette.last, left + SIDE, right - SIDE)
         self.layout = Timeline(palette, rows, scale, row_height)
@@ -90,8 +91,8 @@ def disc(
     return (*markers, marker("o", radius, **rim))
 
 
-def draw(axes: Any, panel: Panel, encoding: str) -> None:
-    """Draw the timeline."""
+def draw(axes: Any, panel: Panel, encoding: str, colours: Mapping[str, str]) -> None:
+    """Draw the timeline; `colours` has the names of the discs' colours by id."""
     _draw_ground(axes, panel)
     _draw_axis(axes, panel)
     for rank, edge in enumerate(panel.layout.paths):
@@ -99,7 +100,7 @@ def draw(axes: Any, panel: Panel, encoding: str) -> None:
     discs = panel.layout.discs(panel.left + 4, panel.right - 4)
     for each in discs:
         _draw_disc(axes, panel, each, encoding)
-    _draw_ids(axes, panel, discs)
+    _draw_ids(axes, panel, discs, colours)
 
 
 def _draw_ground(axes: Any, panel: Panel) -> None:
@@ -192,7 +193,7 @@ def _draw_disc(axes: Any, panel: Panel, shown: Disc, encoding: str) -> None:
     rim.set_gid(f"{'stop' if shown.kind == 'stop' else 'vertex'}-{shown.id}")
 
 
-def _draw_ids(axes: Any, panel: Panel, discs: list[Disc]) -> None:
+def _draw_ids(axes: Any, panel: Panel, discs: list[Disc], colours: Mapping[str, str]) -> None:
     size = float(np.clip(0.18 * panel.layout.row_height, 6.0, 8.0))
     names = disc_names(
         discs,
@@ -200,6 +201,8 @@ def _draw_ids(axes: Any, panel: Panel, discs: list[Disc]) -> None:
         lambda text: _width(text, size),
         panel.layout.height - 1,
         lambda text: style.printable(text, 14),
+        longer={id_: style.printable(colour, 30) for id_, colour in colours.items()},
+        ends=(panel.left + 4, panel.right - 4),
     )
     for name in names:
         label = {**style.CENTRED, "fontsize": size, "va": "center_baseline", "zorder": 20}

@@ -130,9 +130,13 @@ class _Reader:
         except (
             *(Palette4dError, self.otio.exceptions.OTIOError),
             *(OSError, ValueError, ArithmeticError),  # names and times that cannot be
+            NotImplementedError,
         ) as error:
+            problem = in_words(error)
+            if isinstance(error, NotImplementedError):
+                problem = "a gap before it has no length, expected one; set its source_range"
             name = file_safe(clip.name or "shot")
-            self.shots.append(Shot(name, "", 0, 0, (0, 0), place=place, problem=in_words(error)))
+            self.shots.append(Shot(name, "", 0, 0, (0, 0), place=place, problem=problem))
 
     def shot(self, clip: Any, place: Place, used: Any) -> Shot:
         """Return the shot for a clip and the time range of its media that the edit shows."""

@@ -1,6 +1,7 @@
 """Starting the window, with or without a screen."""
 
 import contextlib
+import ctypes
 import functools
 import os
 import re
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 
 #: The size of a window that was never opened before.
 USUAL_SIZE = (1600, 1000)
+#: Qt loads it for each window on an X screen since 6.5; many desktops lack it.
+XCB_CURSOR = "libxcb-cursor.so.0"
 #: Seconds after which a screenshot is taken even if something is still being computed.
 LONGEST_WAIT = 60.0
 
@@ -54,6 +57,17 @@ def answers(display: str) -> bool:
             found.connect(place)
             return True
     return False
+
+
+def missing_library() -> str | None:
+    """Return a library that Qt needs for an X screen, where it would abort without; or None."""
+    wanted = os.environ.get("QT_QPA_PLATFORM", "xcb")
+    if sys.platform.startswith("linux") and wanted == "xcb" and not os.getenv("WAYLAND_DISPLAY"):
+        try:
+            ctypes.CDLL(XCB_CURSOR)
+        except OSError:
+            return XCB_CURSOR
+    return None
 
 
 def run(
@@ -95,6 +109,11 @@ def run(
             f"found no screen (DISPLAY={os.environ.get('DISPLAY', '')!r}, no WAYLAND_DISPLAY), "
             "expected one for the window. `palette4d studio PATH --screenshot OUT.png` draws it "
             "without a screen; for the window itself use a remote screen (ssh -X, VNC)"
+        )
+    elif (library := missing_library()) is not None:
+        raise Palette4dError(
+            f"found no {library}, which Qt needs for a window; install it (Debian, Ubuntu: "
+            "libxcb-cursor0; Fedora, Rocky: xcb-util-cursor)"
         )
     from PySide6.QtCore import QByteArray, QSettings, Qt, QTemporaryDir
     from PySide6.QtWidgets import QApplication

@@ -22,7 +22,7 @@ def handles_of(document: Document, ids: tuple[str, ...]) -> list[str]:
 
 def reset(session: Session) -> None:
     """Reset the selected vertices, and remove the selected stops and picks (`reset`, `unpick`)."""
-    document = session.document
+    document = session.newest
     if document is None:
         return
     picks = [pick.id for pick in document.picks if pick.id in session.selection]
@@ -46,7 +46,7 @@ def reset_all(session: Session) -> None:
 
 def remove(session: Session, ids: list[str]) -> None:
     """Remove picks and holds, and unlock handles (`unpick`, `unlock`)."""
-    document = session.document
+    document = session.newest
     if document is None:
         return
     locks = [id_ for id_ in ids if id_ in document.locks]
@@ -64,7 +64,7 @@ def remove(session: Session, ids: list[str]) -> None:
 
 def lock(session: Session) -> None:
     """Lock the selected handles, or unlock them if all are locked (`lock`, `unlock`)."""
-    document = session.document
+    document = session.newest
     ids = [] if document is None else handles_of(document, session.selection)
     if document is None or not ids:
         session.say(texts.SELECT_A_HANDLE, "warning")
@@ -77,7 +77,7 @@ def lock(session: Session) -> None:
 
 def set_ramp(session: Session, ramp: Ramp) -> None:
     """Set the ramp of the selected handles; without a selection, the clip's (`ramp`)."""
-    document = session.document
+    document = session.newest
     if document is None:
         return
     ids = handles_of(document, session.selection)
@@ -139,7 +139,7 @@ def move_stop(session: Session, id_: str, frame: float, *, dragging: bool = Fals
 
 def keep_version(session: Session) -> None:
     """Keep the edits as the next version: A, B, C…, then A2, B2… (`version save`)."""
-    document = session.document
+    document = session.newest
     if document is None:
         return
     rounds = ("", *map(str, range(2, len(document.versions) + 3)))

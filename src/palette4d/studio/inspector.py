@@ -283,12 +283,14 @@ class Inspector(QWidget):
             "place": texts.PLACE_HINT,
         }
         more = texts.AND_MORE.format(count=count - 1) if count > 1 else ""
-        name = target.id
+        name, called = target.id, ""
+        if document is not None:
+            called = document.colour_names.get(target.id) or document.called(target.id)
         if target.place is not None:
             name = texts.PLACE.format(x=target.place.x, y=target.place.y)
         self.title.setText(f"{name}{more}")
         where = f"{texts.FRAME} {style.number(target.frame)}"
-        self.place.setText(f"{kinds[target.kind]} · {where}")
+        self.place.setText(" · ".join(filter(None, (called, kinds[target.kind], where))))
 
     def shown(self, rgb: F64) -> U8:
         """Return what the screen shows of code values of the palette."""

@@ -104,7 +104,7 @@ class Listener(QObject):
             return
         try:
             frame = parse(bytes(socket.readLine(BYTES).data()))["frame"]
-            wanted = None if frame is None else float(frame)
+            wanted = None if frame is None else frame + 0.0  # texts would be numbers to float()
         except (ValueError, KeyError, TypeError, OverflowError):
             return
         socket.write(b"ok\n")

@@ -128,15 +128,18 @@ class MenuActions:
             grade_steps.use_version(self.session, names[number - 1])
 
     def compare_version(self) -> None:
-        """Compare with the next version; after the last with the source."""
-        names = ["", *self.session.versions]
+        """Compare with the next version that differs; after the last with the source."""
+        document = self.session.newest
+        same = () if document is None else document.same_edits()
+        names = ["", *(name for name in self.session.versions if name not in same)]
         now = self.session.view.version
         at = names.index(now) if now in names else 0
         name = names[(at + 1) % len(names)]
         compare = self.session.view.compare
         self.session.look(version=name, compare=compare if compare != "after" else "wipe")
         if len(names) == 1:
-            self.session.say(texts.NO_VERSIONS, "warning")
+            text = texts.NO_OTHER_VERSION if self.session.versions else texts.NO_VERSIONS
+            self.session.say(text, "warning")
         else:
             self.session.say(texts.COMPARED.format(name=name) if name else texts.COMPARED_SOURCE)
 

@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 
 from palette4d.common.errors import in_words
 from palette4d.media.clip import Clip
+from palette4d.media.clip_base import LEAVE_OUT
 from palette4d.media.clip_movie import MovieClip
+from palette4d.studio import texts
 
 F32 = NDArray[np.float32]
 F16 = NDArray[np.float16]
@@ -222,7 +224,8 @@ class Player:
             try:
                 self._take(number, region)
             except Exception as error:  # a decoder may fail in any way: the window stays
-                self.errors[number] = in_words(error) or type(error).__name__
+                words = in_words(error) or type(error).__name__
+                self.errors[number] = words.replace(LEAVE_OUT, texts.BAD_FRAME)
             finally:
                 with self._wake:
                     self._reading.discard(number)
@@ -274,6 +277,16 @@ def resampled(pixels: F32, region: Region) -> F32:
         upper = _between(part, down[strip], up[strip], across[strip, None, None], 0)
         result[strip] = _between(upper, left, right, along[:, None], 1)
     return result
+
+
+def nearest(pixels: F32, region: Region) -> F32:
+    """Return a part of a frame at a smaller size: of each new pixel the nearest one."""
+    part = pixels[region.top : region.bottom, region.left : region.right]
+    for axis, wanted in enumerate((region.height, region.width)):
+        size = part.shape[axis]
+        at = np.minimum((np.arange(wanted) + 0.5) * size / wanted, size - 1).astype(np.intp)
+        part = np.take(part, at, axis)
+    return part
 
 
 def _between(image: F32, low: Taps, high: Taps, share: F32, axis: int) -> F32:

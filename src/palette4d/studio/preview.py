@@ -22,7 +22,7 @@ from palette4d.common.errors import in_words
 from palette4d.grade.document import Document
 from palette4d.grade.palette import Palette
 from palette4d.studio.display import Display, Look
-from palette4d.studio.player import ByteCache, Region, resampled
+from palette4d.studio.player import ByteCache, Region, nearest, resampled
 
 F32 = NDArray[np.float32]
 U8 = NDArray[np.uint8]
@@ -279,12 +279,12 @@ class Preview:
         result = None
         small: F32 | None = None
         if not exact or region.whole:
-            small = self._source(request)
+            small = self._source(request, first=not exact and request.settled)
         if "before" in request.sides:
             before = self._before(request, painter, exact, check)
         if "after" in request.sides:
             if request.grade is None:
-                colours = self._source(request)
+                colours = self._source(request) if small is None else small
             elif exact:
                 result = self.exact(request.pixels, request.grade, request.premultiplied, check)
                 colours = resampled(result, region)
@@ -327,15 +327,19 @@ class Preview:
                 strip,
                 premultiplied=premultiplied and pixels.shape[2] == 4,
                 precision="single",
+                threads=0,
                 conversion=grade.conversion,
             )
         return result
 
-    def _source(self, request: Request) -> F32:
+    def _source(self, request: Request, *, first: bool = False) -> F32:
+        """Return the region's pixels at its size; of a first picture, nearest pixels will do."""
         if request.scaled:
             return request.pixels
         key = (request.clip, request.frame, request.region)
         found = self._small.get(key)
+        if found is None and first:
+            return nearest(request.pixels, request.region)
         if found is None:
             found = resampled(request.pixels, request.region)
             self._small.put(key, found, found.nbytes)
@@ -367,6 +371,7 @@ def _quick(colours: F32, grade: Grade, premultiplied: bool) -> F32:
         colours,
         premultiplied=premultiplied and colours.shape[2] == 4,
         precision="single",
+        threads=0,
         conversion=grade.conversion,
     )
 

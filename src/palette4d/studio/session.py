@@ -6,6 +6,7 @@ While something is dragged, the edit is tried on a copy; only its last form reac
 """
 
 import contextlib
+import copy
 import dataclasses
 import hashlib
 import itertools
@@ -23,7 +24,6 @@ from palette4d.media.clip import Clip, open_clip
 from palette4d.media.source_clip import find_clip
 from palette4d.studio import texts
 from palette4d.studio.display import Display
-from palette4d.studio.newest import Newest
 from palette4d.studio.player import Player
 from palette4d.studio.session_view import SessionView
 
@@ -42,7 +42,10 @@ class Session(SessionView):
     Attributes
     ----------
     document : Document or None
-        The document; while something is dragged, a copy with the drag's edit.
+        The document as the views show it: while something is dragged, a copy with the drag's edit;
+        while picks are being solved, the document before the edit.
+    newest : Document or None
+        The document with all edits; its picks may not be solved yet.
     player : Player or None
         Reads the clip's frames.
     display : Display or None
@@ -59,7 +62,6 @@ class Session(SessionView):
         self._dragged: tuple[Edit, str] | None = None
         self._copy: Path | None = None  # has the edits that could not be saved
         self._drags = 0  # how many were begun
-        self._solver, self._guard = Newest("palette4d solver"), threading.Lock()
         self._stamp: tuple[int, int, int] | None = None
         self._edited_at: float | None = None  # the first edit that is not on disk
         self._last_edit = self._next_try = 0.0
@@ -73,6 +75,16 @@ class Session(SessionView):
     def document(self) -> Document | None:
         """The document as the views show it."""
         return self._trial or self._document
+
+    @property
+    def newest(self) -> Document | None:
+        """The document with all edits; its picks may not be solved yet."""
+        return self._document
+
+    @property
+    def solving(self) -> bool:
+        """Whether the views show an older document until the picks of an edit are solved."""
+        return self._trial is not None and self._dragged is None
 
     @property
     def versions(self) -> tuple[str, ...]:
@@ -198,21 +210,52 @@ class Session(SessionView):
 
     # -------------------------------------------------------------------------------------- edits
 
-    def edit(self, operation: Callable[[Document], T], text: str = "") -> T | None:
-        """Do an edit, as a verb does it; an error becomes the status, and None is returned."""
-        if self._document is None:
+    def edit(
+        self, operation: Callable[[Document], T], text: str = "", solved: Document | None = None
+    ) -> T | None:
+        """Do an edit, as a verb does it; an error becomes the status, and None is returned.
+
+        The views hear of it when its picks are solved. `solved` is a copy of the document that may
+        have the same edits, with its picks solved.
+        """
+        document = self._document
+        if document is None:
             return None
-        self.cancel()
+        self._trial = self._trial or copy.copy(document)
+        dragged, self._dragged = self._dragged, None
         try:
-            result = operation(self._document)
+            result = operation(document)
         except (Palette4dError, OSError) as error:
+            if dragged is not None:
+                self._settle()
+            elif document.solved or self.beside is None:
+                self._trial = None
             self.report(error)
             return None
         self._note_edit()
         if text:
             self.say(text)
-        self._changed()
+        self._settle(solved or self._trial)
         return result
+
+    def _settle(self, solved: Document | None = None) -> None:
+        """Tell the views of the document, when its picks are solved, which takes a while."""
+        document = self._document
+        assert document is not None
+        if solved is not None:
+            document.take_solution(solved)
+        if document.solved or self.beside is None:
+            self._trial = None
+            self._changed()
+            return
+        trial = document.trial()
+
+        def finish() -> None:
+            # A drag that has begun meanwhile is shown instead.
+            if self._document is document and self._dragged is None:
+                self._settle(trial)
+
+        self.beside(lambda: self._solve(trial, finish))
 
     def edit_later(
         self,
@@ -235,7 +278,7 @@ class Session(SessionView):
 
         def finish(result: T) -> None:
             if self._document is document:
-                self.edit(repeat, text)
+                self.edit(repeat, text, trial)
                 then(result)
 
         def repeat(own: Document) -> None:
@@ -250,6 +293,7 @@ class Session(SessionView):
         def work() -> None:
             try:
                 result = operation(trial, say)
+                trial.core  # noqa: B018  its picks are solved when it is read
             except Exception as error:  # whatever fails, the window stays
                 failed = error
                 self.post(lambda: fail(failed))
@@ -275,44 +319,36 @@ class Session(SessionView):
             self._drags += 1
         self._dragged = operation, text
         number = self._drags
-        if any(kind == "pick" for kind, _ in trial.state):
-            self._solver.ask(lambda: self._solve(trial, number))
-        else:
+        if trial.solved or self.beside is None:
             self._show_trial(trial, number)
+        else:
+            self.beside(lambda: self._solve(trial, lambda: self._show_trial(trial, number)))
 
-    def _solve(self, trial: Document, number: int) -> None:
-        """Solve the picks of a trial; runs in a thread."""
+    def _solve(self, trial: Document, then: Callable[[], object]) -> None:
+        """Solve the picks of a copy; runs in a thread."""
         try:
             trial.core  # noqa: B018  it is computed when it is read
         except Exception as error:  # whatever fails, the window stays
             failed = error
             self.post(lambda: self.report(failed))
         else:
-            self.post(lambda: self._show_trial(trial, number))
+            self.post(then)
 
     def _show_trial(self, trial: Document, number: int) -> None:
-        with self._guard:  # without views `post` calls in the solver's thread
-            if self._dragged is None or number != self._drags:
-                return
+        if self._dragged is not None and number == self._drags:
             self._trial = trial
-        self._changed()
-
-    def _end_drag(self) -> None:
-        with self._guard:
-            self._trial = self._dragged = None
+            self._changed()
 
     def drop(self) -> None:
         """Do the edit that was dragged last."""
         if self._dragged is not None:
-            operation, text = self._dragged
-            self._end_drag()
-            self.edit(operation, text)
+            self.edit(*self._dragged)
 
     def cancel(self) -> None:
         """Forget the edit that is being dragged."""
         if self._dragged is not None:
-            self._end_drag()
-            self._changed()
+            self._dragged = None
+            self._settle()
 
     @property
     def dragging(self) -> bool:

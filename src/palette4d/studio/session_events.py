@@ -31,6 +31,9 @@ class Events:
         What the last action did.
     post : callable
         Runs a function on the views' thread; the window sets it.
+    beside : callable or None
+        Runs a function beside the views' thread; of functions that wait only the newest. The window
+        sets it. None: picks are solved when they are read.
     later : callable
         Runs a panel's function soon, when the picture is shown; the window sets it.
     """
@@ -40,6 +43,7 @@ class Events:
         self._callbacks: dict[str, list[tuple[Callable[[], object], bool]]] = {}
         self.status = Status()
         self.post: Callable[[Callable[[], object]], object] = lambda call: call()
+        self.beside: Callable[[Callable[[], object]], object] | None = None
         self.later: Callable[[Callable[[], object]], object] = lambda call: call()
 
     @property

@@ -23,6 +23,8 @@ Spoilt = tuple[NDArray[np.bool_], NDArray[np.bool_]]
 
 #: The radius of a disc, and of the place where an edited colour was.
 DISC, ORIGIN = 6.5, 3.6
+#: Behind words that stand over the solid.
+PLATE = QColor(38, 38, 38, 215)
 AXIS_NAMES = ("R", "G", "B")
 #: A face is drawn in this many strips, for a smooth gradient; in fewer while something moves.
 STRIPS, MOVING_STRIPS = 5, 2
@@ -268,15 +270,23 @@ class SolidPainter:
         if spoilt is None:
             return
         dents, turned = spoilt
-        said = [
+        heads = (
             counted(int(dents.sum()), texts.CONCAVE_EDGE, texts.CONCAVE_EDGES),
             counted(int(turned.sum()), texts.FLIPPED_FACE, texts.FLIPPED_FACES),
-        ]
-        said = [text for text, found in zip(said, (dents, turned), strict=True) if found.any()]
-        if said:
-            painter.setPen(QColor(theme.WARNING))
-            head = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop
-            painter.drawText(QRectF(8, 6, wide, tall), head, "⚠ " + ", ".join(said))
+        )
+        whys = (texts.CONCAVE_WHY, texts.FLIPPED_WHY)
+        top = 6.0
+        flags = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextWordWrap
+        for head, why, found in zip(heads, whys, spoilt, strict=True):
+            if not found.any():
+                continue
+            for text, colour in ((f"⚠ {head}", theme.WARNING), (why, theme.TEXT)):
+                box = QRectF(8, top, wide, self.view.height())
+                box = painter.boundingRect(box, int(flags), text)
+                painter.fillRect(box.adjusted(-4, -1, 4, 1), PLATE)
+                painter.setPen(QColor(colour))
+                painter.drawText(box, int(flags), text)
+                top = box.bottom() + 1
 
 
 def troubles(palette: Palette) -> Spoilt:

@@ -48,6 +48,7 @@ MATTE, MATTE_ENDS = "weight of {id}", ("0 %", "100 %")
 PROBE_IN = "in"
 PROBE_OUT = "out"
 NO_COLOUR = "there is no colour: the pixels are transparent or not finite"
+BAD_FRAME = "Bring a good copy, then choose File > Load the file again"
 NO_FRAME = "the clip has no frame {frame}"
 
 # ------------------------------------------------------------------------------- below the picture
@@ -241,6 +242,7 @@ KEPT_VERSION = "kept as version {name}"
 USES_VERSION = "version {name}"
 NO_VERSION = "there is no version {number}; V keeps one"
 NO_VERSIONS = "no versions yet: V keeps one"
+NO_OTHER_VERSION = "no version differs from this grade; before shows the source"
 COMPARED = "before shows version {name}"
 COMPARED_SOURCE = "before shows the source"
 
@@ -348,7 +350,9 @@ SOLID_HINT = "drag to turn · drag a colour: X, Y, Z along R, G, B"
 SOLID_AXIS = "along {axis} alone"
 COLOUR_MOVED = "moved a colour"
 CONCAVE_EDGE, CONCAVE_EDGES = "concave edge", "concave edges"
+CONCAVE_WHY = "Notched: gradients bend there."
 FLIPPED_FACE, FLIPPED_FACES = "face turned inside out", "faces turned inside out"
+FLIPPED_WHY = "Hatched: colours cross there, and gradients may fold. If you see it, change less."
 
 # ----------------------------------------------------------------------------------- the inspector
 NOTHING_SELECTED = "Nothing is selected"

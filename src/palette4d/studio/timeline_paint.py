@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QWidget
 
 from palette4d.plotting import style
 from palette4d.plotting.layout import BAND, Disc, Timeline, disc_names, half_bands
-from palette4d.plotting.rows import Palette
+from palette4d.plotting.rows import PlottedPalette
 from palette4d.studio import paint, texts, theme
 from palette4d.studio.frame_strip import FrameStrip
 from palette4d.studio.screen_colours import on_screen
@@ -245,11 +245,17 @@ class TimelinePainter:
             layout.height + TAIL,
             collar=3.0,
             beside=(layout.scale.left, layout.scale.right, SIDE),
+            longer=self._colour_names(),
+            ends=(GUTTER, self.places.width),
         )
         for name in names:
             painter.setFont(paint.small_font(self.view, -1.5, bold=name.bright))
             colour = style.BRIGHT if name.bright else style.TEXT
             paint.label(painter, name.x, name.y, name.text, colour, style.PANEL)
+
+    def _colour_names(self) -> dict[str, str]:
+        document = self.session.document
+        return {} if document is None else document.colour_names
 
     def _paint_ruler(self, painter: QPainter) -> None:
         painter.save()
@@ -360,7 +366,7 @@ class TimelinePainter:
         painter.setClipping(False)
 
     @staticmethod
-    def _weight(palette: Palette, edge: int, weights: dict[str, float]) -> float:
+    def _weight(palette: PlottedPalette, edge: int, weights: dict[str, float]) -> float:
         ids = [palette.edge_ids[edge], *(palette.ids[v] for v in palette.edges[edge])]
         return max((weights[id_] for id_ in ids if id_ in weights), default=0.0)
 

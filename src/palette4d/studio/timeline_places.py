@@ -13,7 +13,7 @@ from PySide6.QtCore import QPointF
 
 from palette4d.grade.picks import Pick
 from palette4d.plotting.layout import BAND, COLLAR, Disc, Scale, Timeline
-from palette4d.plotting.rows import Palette, Rows, arrange
+from palette4d.plotting.rows import PlottedPalette, Rows, arrange
 from palette4d.studio import paint
 from palette4d.studio.session import Session
 
@@ -81,7 +81,7 @@ class Places:
         self.zoomed: tuple[float, float] | None = None
         self.scroll = 0.0
         self.dragged: tuple[str, float, float, float] | None = None
-        self._palette: tuple[object, Palette, Rows] | None = None
+        self._palette: tuple[object, PlottedPalette, Rows] | None = None
         self._layout: tuple[object, Timeline, list[Disc]] | None = None
         self._lanes: tuple[int, list[tuple[Pick, int]]] | None = None
 
@@ -108,13 +108,13 @@ class Places:
     # ------------------------------------------------------------------------------------- layout
 
     @property
-    def content(self) -> Palette | None:
+    def content(self) -> PlottedPalette | None:
         """The palette through time."""
         document, key = self.session.document, self.revision
         if document is None:
             return None
         if self._palette is None or self._palette[0] != key:
-            palette = Palette.of(document.core)
+            palette = PlottedPalette.of(document.core)
             old = self._palette
             if old is not None and old[1].edges == palette.edges and old[1].ids == palette.ids:
                 rows = old[2]  # the rows depend on the clip's palette alone, not on edits

@@ -344,16 +344,20 @@ class TimelineView(QWidget):
                 " ".join(f"{v:.3f}" for v in colour) for colour in (disc.before, disc.after)
             )
             kind = texts.STOP if disc.kind == "stop" else texts.VERTEX
-            line = f"{kind} {disc.id}, {texts.FRAME} {style.number(disc.frame)}\n{before}"
+            line = f"{kind} {disc.id}: {self._called(disc.id)}\n{before}"
             return line if before == after else f"{line} → {after}"
         if hit.what == "band":
-            return texts.ROW_TIP.format(id=hit.id)
+            return f"{self._called(hit.id)}\n{texts.ROW_TIP.format(id=hit.id)}"
         for pick, _ in self.places.lanes() if hit.what == "pick" else ():
             if pick.id == hit.id:
                 _, start, until, _ = self.places.reach(pick)
                 ends = style.number(start), style.number(until), style.number(pick.fade)
                 return f"{pick.id}: {texts.PICK_TIP.format(*ends)}"
         return ""
+
+    def _called(self, id_: str) -> str:
+        document = self.session.document
+        return "" if document is None else document.called(id_)
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
         """Show the menu of what is under the pointer."""

@@ -90,7 +90,7 @@ class VerbDialog(QDialog):
         """Make the form."""
         super().__init__(parent)
         self.setWindowTitle(title)
-        self.setMinimumWidth(620)
+        self.setMinimumWidth(760)
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self.verb, self.fields = verb, tuple(fields)
         self.job: VerbProcess | None = None

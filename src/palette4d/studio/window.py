@@ -37,6 +37,7 @@ from palette4d.studio.inspector import Inspector
 from palette4d.studio.instance import Listener
 from palette4d.studio.menu_actions import MenuActions
 from palette4d.studio.menu_entries import ACTIONS, Action
+from palette4d.studio.newest import Newest
 from palette4d.studio.paths import sequence_of
 from palette4d.studio.session import Session
 from palette4d.studio.shot_list import Shots
@@ -140,6 +141,7 @@ class Window(QMainWindow):
         session.post = _Post(self).post
         self.turns = Turns(self)
         session.later = self.turns.later
+        session.beside = Newest("palette4d solver").ask
         self.setWindowTitle(f"{texts.TITLE}[*]")
         self.setAcceptDrops(True)
         self.setDockNestingEnabled(True)
@@ -450,6 +452,7 @@ class Window(QMainWindow):
             and picture.exact
             and picture.request.frame == session.frame
             and picture.request.revision == session.revision
+            and not session.solving
             and session.player.idle
             and self.turns.settled
             and (self.timeline.settled or not self.timeline.isVisible())

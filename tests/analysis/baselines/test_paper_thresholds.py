@@ -18,7 +18,7 @@ from palette4d.analysis.frame_statistics import Gamut
 from palette4d.analysis.losses import loss_weights, palette_loss, smoothness
 from palette4d.analysis.objective import loss_of
 from palette4d.analysis.options import AnalysisOptions
-from palette4d.analysis.polytope import Palette
+from palette4d.analysis.polytope import FramePalette
 
 GAMUT = Gamut(np.zeros(3), np.ones(3))
 
@@ -81,7 +81,7 @@ def moving(count, bend=0.0, at=0):
     for i in range(count):
         rgb = FOUR + 0.02 * i
         rgb[1, 2] += bend * max(0, 1 - abs(i - at) / at) if at else 0
-        out.append(Palette(rgb, FACES))
+        out.append(FramePalette(rgb, FACES))
     return out
 
 

@@ -91,6 +91,10 @@ CLIPS = {
 }
 
 
+# Those that are simplified to more vertices, too.
+MANY = ("two frames", "a still cube", "a lattice that grows", "fade from and to black")
+
+
 def cloud(i):
     """Colours in a ball that moves, grows and changes its shape."""
     rng = np.random.default_rng(i)
@@ -179,8 +183,7 @@ def check_slices(polytope, times):
     return counts
 
 
-@pytest.mark.parametrize("vertices", [8, 20])
-@pytest.mark.parametrize("name", CLIPS)
+@pytest.mark.parametrize(("name", "vertices"), [*((n, 8) for n in CLIPS), *((n, 20) for n in MANY)])
 def test_slices_are_those_of_the_convex_hull(name, vertices):
     images, (fewest, most) = CLIPS[name]
     frames, polytope = analysed(images, vertices)
@@ -198,7 +201,7 @@ def test_slices_are_those_of_the_convex_hull(name, vertices):
     assert np.isfinite(rows).all()
 
 
-@pytest.mark.parametrize("vertices", [8, 12, 20, 40])
+@pytest.mark.parametrize("vertices", [8, 40])
 def test_everything_is_enclosed_before_clipping(vertices):
     frames = frames_of([cloud(i) for i in range(7)])
     gamut = Gamut.of(frames)
@@ -297,7 +300,7 @@ def test_vertices_stay_in_the_gamut():
     assert (polytope.vertices[:, :3] <= gamut.high).all()
 
 
-@pytest.mark.parametrize("seed", [1023, 1056, 1183, 1239, 1330, 1447])
+@pytest.mark.parametrize("seed", [1023, 1239, 1447])
 def test_nearly_coincident_facets_are_told_apart(seed):
     """Points of a lattice, off by rounding: qhull's facets of these do not fit together."""
     rng = np.random.default_rng(seed)

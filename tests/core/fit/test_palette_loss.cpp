@@ -196,7 +196,7 @@ TEST(only_dents_are_concave) {
     const ColourTree tree({{0.5, 0.5, 0.2}}, {1});
     for (const shapes::Mesh& mesh : {shapes::tetrahedron(), shapes::cube()})
         CHECK_EQUAL(palette_loss(tree, mesh.rgb, mesh.faces, {50, 1, 1}, nullptr).D, 0.0);
-    const shapes::Mesh dented = shapes::dented_cube();
+    const shapes::Mesh dented = shapes::concave_cube();
     // Each of the dent's four edges folds in by the tetrahedron over three corners of the top, of
     // area 1/2, with its point 0.7 below: six times its volume is 0.7. The cube's edges stay
     // convex.
@@ -214,7 +214,7 @@ TEST(the_gradient_is_that_of_differences) {
     // k covers all pixels, so that v_N does not jump.
     const ColourTree tree(colours, std::vector<double>(colours.size(), 1));
     const LossWeights weights{50, 200, 0.7, 0.9, 0.5};
-    shapes::Mesh mesh = shapes::dented_cube();
+    shapes::Mesh mesh = shapes::concave_cube();
     for (Vec3& v : mesh.rgb)
         for (double& x : v) x = 0.5 + 0.6 * (x - 0.5) + random.uniform(-0.03, 0.03);
     std::vector<Vec3> gradient;

@@ -61,7 +61,7 @@ Edited edited(Mesh mesh, std::uint64_t seed) {
 
 std::vector<Edited> palettes() {
     Random random(5);
-    std::vector<Edited> all{edited(tetrahedron(), 1), edited(cube(), 2), edited(dented_cube(), 3),
+    std::vector<Edited> all{edited(tetrahedron(), 1), edited(cube(), 2), edited(concave_cube(), 3),
                             edited(flat_square(), 4), edited(flat_triangle(), 5)};
     for (int i = 0; i < 4; ++i) all.push_back(edited(random_convex(random, 6 + 5 * i), 6 + i));
     return all;
@@ -282,13 +282,13 @@ void check_that_bits_depend_on_pixels_only(const Edited& palette) {
 
 TEST(instruction_sets_threads_tiles_and_what_was_asked_before_do_not_show) {
     Random random(40);
-    check_that_bits_depend_on_pixels_only(edited(dented_cube(), 3));
+    check_that_bits_depend_on_pixels_only(edited(concave_cube(), 3));
     check_that_bits_depend_on_pixels_only(edited(random_convex(random, 8), 4));
 }
 
 TEST(threads_of_a_host_share_one_lattice) {
     Random random(41);
-    for (const Edited& palette : {edited(dented_cube(), 9), edited(random_convex(random, 8), 9)}) {
+    for (const Edited& palette : {edited(concave_cube(), 9), edited(random_convex(random, 8), 9)}) {
         const auto recolourer = palette.recolourer();
         // The same colours for all threads, so that they are at the same cells at the same time.
         const Image image = picture(400, 24, 4, 11);
@@ -438,7 +438,7 @@ TEST(bumps_and_holds_are_evaluated_at_each_colour) {
                                      {{0.2, 0.7, 0.5}, 0.6, {0.1, -0.6, 0.1}},
                                      {{0.4, 0.5, 0.4}, 0.4, {}, 1},
                                      {{0.6, 0.3, 0.5}, 0.2, {}, 0.5}};
-    for (const Edited& palette : {edited(random_convex(random, 9), 3), edited(dented_cube(), 4)}) {
+    for (const Edited& palette : {edited(random_convex(random, 9), 3), edited(concave_cube(), 4)}) {
         const auto recolourer = std::make_shared<Recolourer>(palette.mesh.rgb, palette.colours,
                                                              palette.mesh.faces, bumps);
         for (const bool premultiplied : {false, true}) {

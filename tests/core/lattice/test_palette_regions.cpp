@@ -151,7 +151,7 @@ TEST(no_more_boxes_of_a_grid_have_some_of_the_inside_than_is_said) {
 
 TEST(there_are_none_where_they_would_not_hold) {
     CHECK(Subject(tetrahedron(), 1).regions() != nullptr);
-    CHECK(Subject(dented_cube(), 2).regions() == nullptr);
+    CHECK(Subject(concave_cube(), 2).regions() == nullptr);
     CHECK(Subject(flat_square(), 3).regions() == nullptr);
     CHECK(Subject(tetrahedron(), 5).regions(1e9) == nullptr);
 }

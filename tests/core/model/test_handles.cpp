@@ -29,6 +29,7 @@ TEST(handles_are_the_vertices_then_the_stops) {
     const Edits edits = some_edits(polytope);
     const std::vector<Handle> handles = handles_of(polytope, edits);
     CHECK_EQUAL(handles.size(), 17u);
+    CHECK(handles[3].name.empty());
     for (std::size_t i = 0; i < handles.size(); ++i) {
         CHECK_EQUAL(find_handle(polytope, edits, handles[i].id), static_cast<int>(i));
         CHECK_EQUAL(handles[i].stop, i >= 15);

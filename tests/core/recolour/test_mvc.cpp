@@ -151,8 +151,8 @@ TEST(weights_sum_to_one_and_reproduce_the_point) {
     }
 }
 
-TEST(a_dented_body_reproduces_its_points_too) {
-    const Mesh mesh = dented_cube();
+TEST(a_concave_body_reproduces_its_points_too) {
+    const Mesh mesh = concave_cube();
     Random random(3);
     int inside = 0;
     for (int i = 0; i < 3000; ++i) {
@@ -229,8 +229,8 @@ TEST(close_to_a_face_nothing_is_lost) {
 }
 
 TEST(a_face_whose_plane_holds_the_point_adds_nothing_beside_it) {
-    // Inside a dented body, in the planes of the dent's faces but beside them.
-    const Mesh mesh = dented_cube();
+    // Inside a concave body, in the planes of the concavity's faces but beside them.
+    const Mesh mesh = concave_cube();
     Random random(6);
     int tried = 0;
     for (int i = 0; i < 200; ++i) {
@@ -267,7 +267,7 @@ TEST(the_two_ways_near_a_plane_and_away_from_it_meet) {
 
 TEST(any_finite_point_gives_finite_weights_that_sum_to_one) {
     Random random(7);
-    std::vector<Mesh> meshes{tetrahedron(), cube(), dented_cube(), flat_square(), flat_triangle()};
+    std::vector<Mesh> meshes{tetrahedron(), cube(), concave_cube(), flat_square(), flat_triangle()};
     // Collapsed in every way: a point, a line, twins, slivers.
     meshes.push_back(
         {{{.5, .5, .5}, {.5, .5, .5}, {.5, .5, .5}, {.5, .5, .5}}, tetrahedron().faces});
@@ -330,7 +330,7 @@ TEST(outside_the_closest_surface_point_counts) {
 TEST(the_closest_point_is_never_beaten) {
     Random random(9);
     for (int round = 0; round < 100; ++round) {
-        const Mesh mesh = round % 2 ? random_convex(random, 4 + random.below(10)) : dented_cube();
+        const Mesh mesh = round % 2 ? random_convex(random, 4 + random.below(10)) : concave_cube();
         for (int i = 0; i < 10; ++i) {
             const Vec3 p = random.colour(-0.5, 1.5);
             const Projected at = project(mesh, p);
@@ -352,7 +352,7 @@ TEST(the_closest_point_is_never_beaten) {
 TEST(weights_are_continuous_across_the_surface) {
     Random random(10);
     for (int round = 0; round < 100; ++round) {
-        const Mesh mesh = round % 3 ? random_convex(random, 4 + random.below(12)) : dented_cube();
+        const Mesh mesh = round % 3 ? random_convex(random, 4 + random.below(12)) : concave_cube();
         const Vec3 centre = round % 3 ? middle(mesh) : Vec3{0.5, 0.5, 0.1};
         for (int i = 0; i < 20; ++i) {
             Vec3 in = centre, out = shifted(centre, random.colour(-1, 1), 3);

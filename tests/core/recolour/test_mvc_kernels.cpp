@@ -59,12 +59,12 @@ Mesh body(int kind, Random& random) {
             return mesh;
         }
         case 2:  // not convex
-            mesh = dented_cube();
+            mesh = concave_cube();
             for (Vec3& v : mesh.rgb) {
                 for (double& x : v) x += random.uniform(-0.05, 0.05);
             }
             return mesh;
-        case 3: {  // two corners close to each other, as in the moment of a split
+        case 3: {  // two corners close to each other, as where a colour splits
             mesh = cube();
             const double apart = std::pow(10, -1 - random.below(5));
             for (std::size_t c = 0; c < 3; ++c) {
@@ -194,7 +194,7 @@ TEST(the_error_stays_below_the_promise_everywhere) {
 TEST(ordinary_colours_take_the_fast_way) {
     Random random(2);
     RecolourCounts counts;
-    for (const Mesh& mesh : {cube(), random_convex(random, 8), dented_cube()}) {
+    for (const Mesh& mesh : {cube(), random_convex(random, 8), concave_cube()}) {
         const Recolourer recolourer = edited(mesh, random).recolourer();
         std::vector<float> colours;
         for (int i = 0; i < 30000; ++i) colours.push_back(static_cast<float>(random.uniform()));
@@ -298,7 +298,7 @@ TEST(instructions_that_are_not_there_are_refused) {
 TEST(a_pixel_does_not_see_its_surroundings) {
     Random random(7);
     for (const bool premultiplied : {false, true}) {
-        const Subject subject = edited(dented_cube(), random);
+        const Subject subject = edited(concave_cube(), random);
         const Recolourer recolourer = subject.recolourer();
         constexpr int kWidth = 97, kHeight = 13, kChannels = 4;
         std::vector<float> image;

@@ -1,4 +1,4 @@
-#include "recolour/colour_map.hpp"
+#include "recolour/recolour_image.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,64 @@
+"""Handles and tracks have names for people, and no two handles at one frame share a name."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from palette4d import Document
+from palette4d.grade.names import vertex_colours
+
+SPLIT = Path(__file__).resolve().parent.parent / "golden/sidecars/v1_split.p4d.json"
+
+
+def test_colours_of_one_name_at_one_frame_get_numbers_the_lightest_first() -> None:
+    colours = [(0, 0.1, 0.0, 0.0), (0.2, 0, 0, 0.5), (0.4, 0.9, 0, 0), (7, 0, 0, 0.6)]
+    colours.append((0.3, 0, 0, 0.55))
+    vertices = [{"frame": frame, "rgb": rgb} for frame, *rgb in colours]
+    names = vertex_colours(vertices, "sRGB")
+    assert names == ["dark red", "deep blue 2", "red", "deep blue", "deep blue 1"]
+
+
+def test_names_are_of_the_unedited_colours_and_at_whole_frames() -> None:
+    document = Document.load(SPLIT)
+    names, tracks = document.names, [track.called for track in document.tracks]
+    assert set(names) == {v["id"] for v in document.fields()["polytope"]["vertices"]}
+    assert len(set(names.values())) == len(names)
+    assert len(set(tracks)) == len(tracks)
+    document.set("v1", rgb=(1, 0, 0))
+    assert (document.names, [t.called for t in document.tracks]) == (names, tracks)
+
+
+def test_a_stop_has_the_name_of_the_nearer_end() -> None:
+    document = Document.load(SPLIT)
+    edge = document.fields()["polytope"]["edges"][0]
+    start, end = (document.frame_of(edge[end]) for end in ("from", "to"))
+    for share, near in ((0.25, edge["from"]), (0.75, edge["to"])):
+        stop = document.stop(edge["id"], frame=start + share * (end - start), rgb=(0, 1, 0))
+        assert document.colour_names[stop] == document.colour_names[near]
+    track = next(track for track in document.tracks if edge["id"] in track.edges)
+    assert document.called(edge["id"]) == track.called
+    assert document.called("nothing") == ""
+
+
+def test_names_in_the_file_are_kept(tmp_path: Path) -> None:
+    fields = json.loads(SPLIT.read_text(encoding="utf-8"))
+    for number, vertex in enumerate(fields["polytope"]["vertices"]):
+        vertex["name"] = f"hue {number}"
+    path = tmp_path / "named.p4d.json"
+    path.write_text(json.dumps(fields), encoding="utf-8")
+    document = Document.load(path)
+    assert document.colour_names["v1"] == "hue 0"
+    document.set("v1", rgb=(1, 0, 0))
+    document.save()
+    assert Document.load(path).colour_names["v1"] == "hue 0"
+
+
+def test_encodings_do_not_change_names() -> None:
+    display = np.array([[0.55, 0.02, 0.03], [0.2, 0.3, 0.7]])
+    linear = ((display + 0.055) / 1.055) ** 2.4
+    seen, light = (
+        vertex_colours([{"frame": 0, "rgb": rgb.tolist()} for rgb in colours], encoding)
+        for colours, encoding in ((display, "sRGB"), (linear, "lin_rec709_srgb"))
+    )
+    assert seen == light
