@@ -12,7 +12,7 @@ import OpenImageIO as oiio
 import pytest
 from PySide6.QtNetwork import QLocalSocket
 
-from palette4d.studio import instance
+from palette4d.studio import app, instance
 from palette4d.studio.window import Window
 
 
@@ -43,6 +43,17 @@ def test_without_a_screen_it_says_how_to_do_without(sidecar: Path, tmp_path: Pat
     )
     assert done.returncode == 1
     assert "--screenshot" in done.stderr
+
+
+def test_a_library_that_qt_would_abort_without_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(name: str) -> None:
+        raise OSError(name)
+
+    monkeypatch.setattr(app.ctypes, "CDLL", missing)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    assert app.missing_library() is None  # without a screen
+    monkeypatch.setenv("QT_QPA_PLATFORM", "xcb")
+    assert app.missing_library() == "libxcb-cursor.so.0"
 
 
 def brought_forward(sidecar: Path, qtbot: Any) -> bool:
