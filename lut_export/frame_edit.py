@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
+from palette4d.grade.bumps import bumped
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -40,7 +41,7 @@ class FrameEdit:
     edited : (n, 3) float64; the same colours after the edit.
     faces : (f, 3) int32; the slice's triangles.
     strength : 0 leaves colours alone, 1 is the edit.
-    bumps : (b, 7) float64; centre, radius and displacement of what moves besides the palette.
+    bumps : (b, 8) float64; what moves besides the palette, and holds (`bumped`).
     recolourer : the node's own code for the edit.
     conversion : from the colours' space to the palette's space; None if they are the same.
     """
@@ -71,19 +72,11 @@ class FrameEdit:
             return points
         at = points if self.conversion is None else self.conversion.to_palette(points)
         weights, _ = _core.palette_weights(at, self.palette, self.faces)
-        step = self.strength * (weights @ (self.edited - self.palette) + self._bumped(at))
+        step = self.strength * bumped(at, weights @ (self.edited - self.palette), self.bumps)
         if self.conversion is None:
             return points + step
         moved = (step != 0).any(axis=1, keepdims=True)
         return np.where(moved, self.conversion.to_clip(at + step), points)
-
-    def _bumped(self, at: F64) -> F64:
-        """Return the (m, 3) displacements of (m, 3) colours by the bumps, at strength 1."""
-        step = np.zeros_like(at)
-        for bump in self.bumps:
-            within = 1 - ((at - bump[:3]) ** 2).sum(axis=1, keepdims=True) / bump[3] ** 2
-            step += np.maximum(within, 0) ** 3 * bump[4:]
-        return step
 
 
 def frame_edit(

@@ -138,6 +138,8 @@ def stops(sidecar: _core.Sidecar) -> tuple[int, ...]:
     times += [float(polytope.vertices[i, 3]) for i in around]
     times += [time for edge in edges for time in _ramp_times(sidecar, edge)]
     times += [time for bump in solution["bumps"] for time in _bump_times(bump)]
+    holds = solution.get("holds", []) if times else []
+    times += [float(key["frame"]) for hold in holds for key in hold["keys"]]
     if not times:
         raise Palette4dError(
             "nothing is edited in this sidecar, so that there are no stops; edit it, or choose "

@@ -105,8 +105,8 @@ std::vector<Face> faces_from(const py::object& object) {
 std::vector<Bump> bumps_from(const py::object& object) {
     std::vector<Bump> bumps;
     if (object.is_none()) return bumps;
-    for (const auto& row : rows_from<7>(object, "bumps")) {
-        bumps.push_back({{row[0], row[1], row[2]}, row[3], {row[4], row[5], row[6]}});
+    for (const auto& row : rows_from<8>(object, "bumps")) {
+        bumps.push_back({{row[0], row[1], row[2]}, row[3], {row[4], row[5], row[6]}, row[7]});
     }
     return bumps;
 }
@@ -122,9 +122,9 @@ DoubleArray to_array(const std::vector<std::array<double, 4>>& vertices) {
 }
 
 DoubleArray to_array(const std::vector<Bump>& bumps) {
-    std::vector<std::array<double, 7>> rows;
-    for (const auto& [centre, radius, by] : bumps) {
-        rows.push_back({centre[0], centre[1], centre[2], radius, by[0], by[1], by[2]});
+    std::vector<std::array<double, 8>> rows;
+    for (const auto& [centre, radius, by, keep] : bumps) {
+        rows.push_back({centre[0], centre[1], centre[2], radius, by[0], by[1], by[2], keep});
     }
     return rows_to_array(rows);
 }

@@ -132,7 +132,7 @@ py::list stops_of(const NamedEdits& self) {
 
 py::dict solution_of(const NamedEdits& self) {
     const palette4d::Solution& solution = self.solution;
-    py::list vertices, keys, bumps;
+    py::list vertices, keys, bumps, holds;
     for (std::size_t i = 0; i < solution.vertex_by.size(); ++i) {
         if (solution.vertex_by[i] == Vec3{0, 0, 0}) continue;
         py::dict entry;
@@ -161,10 +161,25 @@ py::dict solution_of(const NamedEdits& self) {
         entry["keys"] = steps;
         bumps.append(entry);
     }
+    for (const auto& hold : solution.holds) {
+        py::list steps;
+        for (const auto& key : hold.keys) {
+            py::dict step;
+            step["frame"] = key.frame;
+            step["rgb"] = as_tuple(key.centre);
+            step["radius"] = key.radius;
+            step["keep"] = key.keep;
+            steps.append(step);
+        }
+        py::dict entry;
+        entry["keys"] = steps;
+        holds.append(entry);
+    }
     py::dict result;
     result["vertices"] = vertices;
     result["keys"] = keys;
     result["bumps"] = bumps;
+    if (!solution.holds.empty()) result["holds"] = holds;
     return result;
 }
 
@@ -209,8 +224,9 @@ void bind_sidecar(py::module_& module) {
                                [](const NamedEdits& self) { return name_of(self.default_ramp); })
         .def_property_readonly("solution", &solution_of)
         .def_property_readonly("empty", &empty)
-        .def("bumps_at", &bumps_of, py::arg("frame"),
-             "(n, 7) float64: centre, radius and displacement of the bumps at a frame.");
+        .def(
+            "bumps_at", &bumps_of, py::arg("frame"),
+            "(n, 8) float64: centre, radius, displacement and keep of bumps and holds at a frame.");
 
     py::class_<BoundSidecar>(module, "Sidecar", "A validated sidecar file.")
         .def_property_readonly("clip", &clip_of)

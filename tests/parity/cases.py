@@ -90,16 +90,24 @@ def bump(radius: float, *keys: tuple[float, Colour, Colour]) -> dict[str, Any]:
     }
 
 
+def hold(*keys: tuple[float, Colour, float, float]) -> dict[str, Any]:
+    """A hold of a solution: its keys are frame, centre, radius and keep."""
+    names = ("frame", "rgb", "radius", "keep")
+    return {"keys": [dict(zip(names, key, strict=True)) for key in keys]}
+
+
 def solution(
     vertices: dict[str, Colour],
     keys: list[tuple[str, float, Colour]],
     bumps: list[dict[str, Any]],
+    holds: list[dict[str, Any]] | None = None,
 ) -> dict[str, Any]:
     """A solution of picks."""
     return {
         "vertices": [{"vertex": name, "by": list(by)} for name, by in vertices.items()],
         "keys": [{"edge": edge, "frame": t, "by": list(by)} for edge, t, by in keys],
         "bumps": bumps,
+        **({"holds": holds} if holds else {}),
     }
 
 
@@ -316,6 +324,28 @@ def all_documents() -> dict[str, Document]:
             {},
             [],
             solution=solution({}, [], [bump(0.9, (0, (0.4, 0.3, 0.2), (0.1, -0.2, 0.05)))]),
+        ),
+        "colour-holds": edited(
+            colour_document(),
+            {},
+            [],
+            solution=solution(
+                {},
+                [],
+                [bump(0.9, (0, (0.4, 0.3, 0.2), (0.1, -0.2, 0.05)))],
+                [hold((0, (0.6, 0.3, 0.3), 0.4, 0.5)), hold((0, (0.2, 0.2, 0.2), 0.5, 1))],
+            ),
+        ),
+        "changes-holds": edited(
+            changes,
+            {"a1": (0.9, 0.3, 0.1)},
+            [],
+            solution=solution(
+                {},
+                [],
+                [bump(0.5, (15, (0.5, 0.4, 0.3), (0.2, -0.1, 0.1)))],
+                [hold((10, (0.4, 0.4, 0.4), 0.3, 0), (20, (0.6, 0.5, 0.3), 0.6, 1))],
+            ),
         ),
         "changes-back": edited(changes, {"b0": (1.0, 0.0, 0.0)}, []),
     }

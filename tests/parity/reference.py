@@ -221,18 +221,25 @@ def edited_colours(document: Document, frame: float) -> F64:
     return np.array(rows).reshape(-1, 3)
 
 
-def bumps_at(document: Document, frame: float) -> list[tuple[F64, float, F64]]:
-    """Centre, radius and displacement of every bump at a frame."""
+Bump = tuple[F64, float, F64, float]
+
+
+def bumps_at(document: Document, frame: float) -> list[Bump]:
+    """Centre, radius, displacement and keep of every bump and hold at a frame."""
     frame = clamped(document, frame)
     found = []
     for bump in document["edits"].get("solution", {"bumps": []})["bumps"]:
         keys = bump["keys"]
         times = [key["frame"] for key in keys]
-        centre, by = (
-            np.array([np.interp(frame, times, [key[name][c] for key in keys]) for c in range(3)])
-            for name in ("rgb", "by")
-        )
-        found.append((centre, float(bump["radius"]), by))
+        rows = np.array([[*key["rgb"], *key["by"]] for key in keys])
+        now = np.array([np.interp(frame, times, column) for column in rows.T])
+        found.append((now[:3], float(bump["radius"]), now[3:], 0.0))
+    for hold in document["edits"].get("solution", {}).get("holds", []):
+        keys = hold["keys"]
+        times = [key["frame"] for key in keys]
+        rows = np.array([[*key["rgb"], key["radius"], key["keep"]] for key in keys])
+        now = np.array([np.interp(frame, times, column) for column in rows.T])
+        found.append((now[:3], float(now[3]), np.zeros(3), float(now[4])))
     return found
 
 
@@ -401,7 +408,7 @@ def recolour(
     faces: ArrayLike,
     strength: float = 1.0,
     premultiplied: bool = False,
-    bumps: Sequence[tuple[F64, float, F64]] = (),
+    bumps: Sequence[Bump] = (),
 ) -> NDArray[np.float32]:
     """p' = p + strength (sum_i w_i(q) (v'_i - v_i) + bumps) for an (h, w, 3 or 4) image."""
     displacement = np.asarray(edited, float) - np.asarray(original, float)
@@ -417,9 +424,9 @@ def recolour(
                 continue
             weights, _ = palette_weights([own], original, faces)
             moved = weights[0] @ displacement
-            for centre, radius, by in bumps:
-                within = 1 - float(((own - centre) ** 2).sum()) / radius**2
-                moved = moved + max(within, 0.0) ** 3 * by
+            for centre, radius, by, keep in bumps:
+                part = max(1 - float(((own - centre) ** 2).sum()) / radius**2, 0.0) ** 3
+                moved = (moved + part * by) * (1 - part * keep)
             moved = alpha * strength * moved
             for channel in range(3):
                 if moved[channel] != 0:

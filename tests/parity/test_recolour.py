@@ -147,7 +147,7 @@ def test_rounds_are_rare_where_the_implementations_differ() -> None:
 def test_colours_beyond_all_bumps_keep_their_bits(name: str) -> None:
     image = picture(3)
     for frame in times_of(name):
-        (centre, radius, _), *_ = bumps_at(DOCUMENTS[name], frame)
+        (centre, radius, *_), *_ = bumps_at(DOCUMENTS[name], frame)
         away = np.linalg.norm(image - centre, axis=2)
         beyond = ~(away < radius * (1 - 1e-6))  # NaN too
         assert 0 < beyond.sum() < beyond.size
@@ -165,7 +165,7 @@ def test_bumps_add_to_what_the_palette_does() -> None:
     plain["edits"]["solution"]["bumps"] = []
     colours = image[finite].astype(float)
     wanted = np.zeros_like(colours)
-    for centre, radius, by in bumps_at(document, frame):
+    for centre, radius, by, _ in bumps_at(document, frame):
         within = 1 - ((colours - centre) ** 2).sum(axis=1, keepdims=True) / radius**2
         wanted += np.maximum(within, 0) ** 3 * by
     for code in (CORE, FAST, LATTICE):

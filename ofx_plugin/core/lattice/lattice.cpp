@@ -28,6 +28,7 @@ public:
           exact_(float_worker(recolourer, options, channels, true)),
           builder_(store, options.instructions) {
         waiting_.reserve(kMostLeft + kWaiting);
+        std::fill(std::begin(bumped_[3]), std::end(bumped_[3]), 1.0f);
     }
 
     void row(const float* in, float* out, int width) override {
@@ -97,6 +98,7 @@ private:
         }
         kernels_.weigh(b, count);
         const bool bumps = bumps_.count > 0 && set_bumps_(bumps_, b.colour, bumped_, count);
+        if (bumps) hold(count);
         if (blocks_++ % kSampleEvery == 0) sample(static_cast<int>(blocks_ % count));
         kernels_.blend(store_.nodes(), b, count, from, to, channels_, strength_, premultiplied_);
         if (bumps) add_bumps(to, count);
@@ -109,6 +111,13 @@ private:
             }
         }
         return true;
+    }
+
+    /// Holds scale what the palette does.
+    void hold(int count) {
+        for (int k = 0; k < 4; ++k) {
+            for (int i = 0; i < count; ++i) block_.weight[k][i] *= bumped_[3][i];
+        }
     }
 
     /// Moves the block's interpolated pixels by bumped_.
@@ -180,6 +189,7 @@ private:
             sampled_moves_.push_back(moved);
             sampled_bumps_.push_back(bumped_[c][i]);
         }
+        sampled_scales_.push_back(bumped_[3][i]);
         if (sampled_.size() >= 3 * 1024) check_samples();
     }
 
@@ -187,7 +197,7 @@ private:
         const float* const exact = builder_.displacements(sampled_.data(), sampled_.size() / 3);
         double largest = 0;
         for (std::size_t i = 0; i < sampled_.size(); ++i) {
-            const double displacement = static_cast<double>(exact[i]),
+            const double displacement = static_cast<double>(exact[i] * sampled_scales_[i / 3]),
                          bump = static_cast<double>(sampled_bumps_[i]);
             largest = std::max(
                 largest, lattice_error(static_cast<double>(sampled_[i]), displacement + bump,
@@ -197,6 +207,7 @@ private:
         sampled_.clear();
         sampled_moves_.clear();
         sampled_bumps_.clear();
+        sampled_scales_.clear();
     }
 
     Store& store_;
@@ -209,10 +220,11 @@ private:
     std::unique_ptr<FloatWorker> exact_;
     Store::Builder builder_;
     LatticeBlock block_{};
-    alignas(64) float bumped_[3][kSize]{};  ///< what the bumps do to the block's colours
+    /// What the bumps do to the block's colours, and what holds leave of what the palette does.
+    alignas(64) float bumped_[4][kSize]{};
     std::vector<Waiting> waiting_;
     std::size_t left_ = 0;  ///< blocks still waiting after the last do_waiting()
-    std::vector<float> sampled_, sampled_moves_, sampled_bumps_;
+    std::vector<float> sampled_, sampled_moves_, sampled_bumps_, sampled_scales_;
     long long interpolated_ = 0, blocks_ = 0;
 };
 

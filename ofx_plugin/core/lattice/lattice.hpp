@@ -21,7 +21,7 @@ namespace palette4d {
 /// interpolation. Its nodes then hold mean value coordinates extended beyond the surface. So cells
 /// that the surface crosses interpolate smoothly.
 ///
-/// Bumps are not interpolated: they are evaluated at each colour.
+/// Bumps and holds are not interpolated: they are evaluated at each colour.
 class Lattice final : public ColourMap {
 public:
     /// Bound of |interpolated - exact| / max(|exact|, 0.1) for each channel. Probes use a tighter

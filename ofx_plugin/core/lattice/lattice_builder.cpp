@@ -22,7 +22,7 @@ constexpr float kSurely = 0.75f;
 constexpr float kMostCreased = 0.0006f;
 
 /// The unit of relative errors, as in lattice_error(). `moved` is the palette's displacement, to
-/// which the bumps add.
+/// which the bumps add, and which holds scale.
 Four size_of(Four colour, Four moved, const BumpPlan<float>& bumps) {
     Four exact = colour + moved;
     for (int b = 0; b < bumps.count; ++b) {
@@ -33,6 +33,10 @@ Four size_of(Four colour, Four moved, const BumpPlan<float>& bumps) {
             distance2 += away * away;
         }
         const float t = std::max(0.0f, 1 - distance2 * bump.inverse_radius2);
+        if (bump.keep > 0) {
+            exact = colour + (1 - bump.keep * (t * t * t)) * (exact - colour);
+            continue;
+        }
         for (int c = 0; c < 3; ++c) exact[c] += t * t * t * bump.by[c];
     }
     const Four least = all_four(0.1f);

@@ -32,6 +32,9 @@ struct Bump {
     Vec3 centre;
     double radius;  ///< where the bump ends, in the palette's code values
     Vec3 by;        ///< the displacement at its centre
+    /// Where above 0 this is a hold: the displacement by the palette and by all other bumps is
+    /// multiplied by 1 - keep max(0, 1 - |c - centre|^2 / radius^2)^3. `by` does not count.
+    double keep = 0;
 };
 
 /// Displacements that meet the user's picks, added to the edited colours.
@@ -52,11 +55,22 @@ struct Solution {
         std::vector<BumpKey> keys;  ///< at least one, in increasing frame order
     };
 
+    struct HoldKey {
+        double frame;
+        Vec3 centre;
+        double radius, keep;
+    };
+    /// A hold over time, as a bump.
+    struct MovingHold {
+        std::vector<HoldKey> keys;
+    };
+
     /// One element per polytope vertex, or none. Linear in time between vertices and keys.
     std::vector<Vec3> vertex_by;
     /// At most one key per edge and frame; any order.
     std::vector<Key> keys;
     std::vector<MovingBump> bumps;
+    std::vector<MovingHold> holds;
 };
 
 struct Edits {

@@ -183,6 +183,22 @@ void require_vertices(const char* what, std::size_t found, const Polytope& polyt
                                 std::to_string(polytope.vertices().size()));
 }
 
+/// The keys before and after a frame, and the weight of the latter.
+template <class Key>
+struct Around {
+    const Key &a, &b;
+    double weight;
+};
+
+template <class Key>
+Around<Key> around(const std::vector<Key>& keys, double frame) {
+    const auto after = std::upper_bound(keys.begin(), keys.end(), frame,
+                                        [](double t, const Key& key) { return t < key.frame; });
+    const Key& b = after == keys.end() ? keys.back() : *after;
+    const Key& a = after == keys.begin() ? b : *(after - 1);
+    return {a, b, &a == &b ? 0.0 : weight_between(a.frame, b.frame, frame)};
+}
+
 }  // namespace
 
 std::vector<Vec3> edited_colours(const Polytope& polytope, const Edits& edits, const Slice& slice) {
@@ -239,14 +255,15 @@ std::vector<Vec3> edited_colours(const Polytope& polytope, const Edits& edits, c
 std::vector<Bump> bumps_at(const Edits& edits, double frame) {
     std::vector<Bump> result;
     for (const Solution::MovingBump& bump : edits.solution.bumps) {
-        const auto after =
-            std::upper_bound(bump.keys.begin(), bump.keys.end(), frame,
-                             [](double t, const Solution::BumpKey& key) { return t < key.frame; });
-        const Solution::BumpKey& b = after == bump.keys.end() ? bump.keys.back() : *after;
-        const Solution::BumpKey& a = after == bump.keys.begin() ? b : *(after - 1);
-        const double weight = &a == &b ? 0.0 : weight_between(a.frame, b.frame, frame);
+        const auto [a, b, weight] = around(bump.keys, frame);
         const Vec3 by = mixed(a.by, b.by, weight);
         if (!still(by)) result.push_back({mixed(a.centre, b.centre, weight), bump.radius, by});
+    }
+    for (const Solution::MovingHold& hold : edits.solution.holds) {
+        const auto [a, b, weight] = around(hold.keys, frame);
+        const double keep = (1 - weight) * a.keep + weight * b.keep;
+        const double radius = (1 - weight) * a.radius + weight * b.radius;
+        if (keep > 0) result.push_back({mixed(a.centre, b.centre, weight), radius, {}, keep});
     }
     return result;
 }

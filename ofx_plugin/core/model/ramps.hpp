@@ -14,7 +14,8 @@ namespace palette4d {
 /// std::invalid_argument for edits of another number of vertices.
 std::vector<Vec3> edited_colours(const Polytope& polytope, const Edits& edits, const Slice& slice);
 
-/// The bumps that move colours at a frame. Bumps are not bound to the clip: pass slice.frame.
+/// The bumps that move colours at a frame, then the holds. Bumps are not bound to the clip: pass
+/// slice.frame.
 std::vector<Bump> bumps_at(const Edits& edits, double frame);
 
 }  // namespace palette4d

@@ -17,8 +17,9 @@ PALETTE4D_INLINE Lanes<T> within(const typename BumpPlan<T>::One& bump, const La
     return all(T(1)) - (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) * all(bump.inverse_radius2);
 }
 
-/// Adds to `moved` bump by bump. `low` may be null. False when no colour is within a bump.
-template <class T>
+/// Adds to `moved` bump by bump, and scales its `rows` by holds. `low` may be null. False when no
+/// colour is within a bump.
+template <int rows, class T>
 PALETTE4D_INLINE bool add_all(const BumpPlan<T>& plan, Channels<const T> high,
                               Channels<const T> low, Channels<T> moved, int count) {
     constexpr int n = Lanes<T>::kCount;
@@ -57,6 +58,11 @@ PALETTE4D_INLINE bool add_all(const BumpPlan<T>& plan, Channels<const T> high,
                 v[c] = away(bump, c, load(high[c] + at), low ? load(low[c] + at) : zero);
             }
             const Lanes<T> t = max(within(bump, v), zero), weight = t * t * t;
+            if (bump.keep > 0) {
+                const Lanes<T> scale = all(T(1)) - weight * all(bump.keep);
+                for (int c = 0; c < rows; ++c) store(moved[c] + at, load(moved[c] + at) * scale);
+                continue;
+            }
             for (int c = 0; c < 3; ++c) {
                 store(moved[c] + at, load(moved[c] + at) + weight * all(bump.by[c]));
             }
@@ -69,7 +75,7 @@ PALETTE4D_INLINE bool add_all(const BumpPlan<T>& plan, Channels<const T> high,
 template <class T>
 void add(const BumpPlan<T>& plan, Channels<const T> high, Channels<const T> low, Channels<T> moved,
          int count) {
-    add_all(plan, high, low, moved, count);
+    add_all<3>(plan, high, low, moved, count);
 }
 
 bool set(const BumpPlan<float>& plan, Channels<const float> colour, Channels<float> moved,
@@ -77,7 +83,8 @@ bool set(const BumpPlan<float>& plan, Channels<const float> colour, Channels<flo
     for (int c = 0; c < 3; ++c) {
         for (int at = 0; at < count; at += Lanes<float>::kCount) store(moved[c] + at, all(0.0f));
     }
-    return add_all<float>(plan, colour, nullptr, moved, count);
+    for (int at = 0; at < count; at += Lanes<float>::kCount) store(moved[3] + at, all(1.0f));
+    return add_all<4, float>(plan, colour, nullptr, moved, count);
 }
 
 constexpr BumpKernels kKernels = {&add<float>, &add<double>, &set};

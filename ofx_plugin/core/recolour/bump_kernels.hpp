@@ -1,5 +1,5 @@
-// Adds the displacements of bumps to 64 colours at a time. Plain data and pointers only, as in
-// mvc_kernels.hpp.
+// Adds the displacements of bumps to 64 colours, and applies holds, at a time. Plain data and
+// pointers only, as in mvc_kernels.hpp.
 #pragma once
 
 namespace palette4d {
@@ -12,6 +12,7 @@ struct BumpPlan {
         T high[3], low[3];
         T inverse_radius2;
         T by[3];
+        T keep;  ///< above 0 for holds, which come last
     };
     const One* bumps;
     int count;
@@ -24,13 +25,13 @@ struct BumpKernels {
     template <class T>
     using Channels = T (*)[kSize];
 
-    /// Adds to `moved` what the bumps do at strength 1 to colours high + low.
+    /// Adds to `moved` what the bumps do at strength 1 to colours high + low; then holds scale it.
     void (*add_single)(const BumpPlan<float>& plan, Channels<const float> high,
                        Channels<const float> low, Channels<float> moved, int count);
     void (*add_twofold)(const BumpPlan<double>& plan, Channels<const double> high,
                         Channels<const double> low, Channels<double> moved, int count);
-    /// Sets `moved` for colours of one number a channel; NaN and infinity do not move. False when
-    /// none of them moves.
+    /// Sets `moved` for colours of one number a channel; NaN and infinity do not move. Its fourth
+    /// row is the holds' scale of what else moves the colours. False when it moves and scales none.
     bool (*set)(const BumpPlan<float>& plan, Channels<const float> colour, Channels<float> moved,
                 int count);
 

@@ -60,7 +60,7 @@ const Vec3& DoubleWorker::displacement(const Vec3& p) {
     Entry& entry = memory_[slot(p)];
     if (!entry.known || entry.colour != p) {
         Vec3 moved = recolourer_.palette_displacement(p, weights_, workspace_);
-        if (bumps_) moved = moved + recolourer_.bumps_displacement(p);
+        if (bumps_) moved = recolourer_.with_bumps(p, moved);
         entry = {p, moved, true};
     }
     return entry.displacement;

@@ -36,9 +36,16 @@ Recolourer::Recolourer(std::vector<Vec3> original, const std::vector<Vec3>& edit
             throw std::invalid_argument(
                 "recolour: found a bump with a number that is not finite, or with no radius");
         }
+        if (!(bump.keep >= 0 && bump.keep <= 1)) {
+            throw std::invalid_argument("recolour: found a hold that keeps " +
+                                        std::to_string(bump.keep) + ", expected 0 to 1");
+        }
     }
-    const auto still = [](const Bump& bump) { return bump.by == Vec3{0, 0, 0}; };
+    const auto still = [](const Bump& bump) { return bump.keep == 0 && bump.by == Vec3{0, 0, 0}; };
     bumps_.erase(std::remove_if(bumps_.begin(), bumps_.end(), still), bumps_.end());
+    const auto moving = [](const Bump& bump) { return bump.keep == 0; };
+    const auto holds = std::stable_partition(bumps_.begin(), bumps_.end(), moving);
+    if (holds == bumps_.begin() && displaced_.empty()) bumps_.clear();
     if (moves()) plan_ = std::make_unique<RecolourPlan>(body_, displacement_, bumps_);
 }
 
@@ -53,12 +60,16 @@ Vec3 Recolourer::palette_displacement(const Vec3& p, std::vector<double>& weight
     return sum;
 }
 
-Vec3 Recolourer::bumps_displacement(const Vec3& p) const {
-    Vec3 sum{};
+Vec3 Recolourer::with_bumps(const Vec3& p, const Vec3& moved) const {
+    Vec3 sum = moved;
     for (const Bump& bump : bumps_) {
         const Vec3 away = bump.centre - p;
         const double t = std::max(0.0, 1 - dot(away, away) / (bump.radius * bump.radius));
-        add(sum, t * t * t, bump.by);
+        if (bump.keep > 0) {
+            sum = (1 - bump.keep * (t * t * t)) * sum;
+        } else {
+            add(sum, t * t * t, bump.by);
+        }
     }
     return sum;
 }
@@ -67,7 +78,7 @@ Vec3 Recolourer::displaced(const Vec3& p, double strength) const {
     if (!moves() || strength == 0 || !finite(p)) return p;
     std::vector<double> weights(body_.rgb().size());
     PaletteBody::Workspace workspace;
-    const Vec3 moved = palette_displacement(p, weights, workspace) + bumps_displacement(p);
+    const Vec3 moved = with_bumps(p, palette_displacement(p, weights, workspace));
     Vec3 result = p;
     for (std::size_t c = 0; c < 3; ++c) {
         const double step = strength * moved[c];

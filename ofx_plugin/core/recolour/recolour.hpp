@@ -1,4 +1,5 @@
-// Recolouring of images: p' = p + strength * (sum_i w_i(q) (v'_i - v_i) + the bumps at p).
+// Recolouring of images: p' = p + strength * (sum_i w_i(q) (v'_i - v_i) + the bumps at p),
+// where holds scale the sum in the brackets.
 #pragma once
 
 #include <memory>
@@ -42,13 +43,13 @@ private:
     /// At strength 1, without bumps. `p` must be finite; `weights` has one element per vertex.
     Vec3 palette_displacement(const Vec3& p, std::vector<double>& weights,
                               PaletteBody::Workspace& workspace) const;
-    /// What the bumps do, at strength 1.
-    Vec3 bumps_displacement(const Vec3& p) const;
+    /// The displacement of p at strength 1, of which the palette does `moved`.
+    Vec3 with_bumps(const Vec3& p, const Vec3& moved) const;
 
     PaletteBody body_;
     std::vector<Vec3> displacement_;  ///< edited - original, one per vertex
     std::vector<int> displaced_;      ///< indices of the vertices that move
-    std::vector<Bump> bumps_;         ///< those that move a colour
+    std::vector<Bump> bumps_;         ///< those that move a colour, then the holds
     std::unique_ptr<const RecolourPlan> plan_;
 };
 

@@ -184,6 +184,7 @@ BumpMemory<T>::BumpMemory(const std::vector<Bump>& bumps) {
         split(bump.centre, one.high, one.low);
         one.inverse_radius2 = static_cast<T>(1 / (bump.radius * bump.radius));
         round(bump.by, one.by);
+        one.keep = static_cast<T>(bump.keep);
         bumps_.push_back(one);
     }
 }

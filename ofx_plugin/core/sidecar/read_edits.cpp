@@ -42,7 +42,7 @@ std::pair<int, double> read_place(const Cursor& entry, const Polytope& polytope,
 }
 
 Solution read_solution(const Cursor& where, const Polytope& polytope, const Ids& ids) {
-    where.require_members({"vertices", "keys", "bumps"});
+    where.require_members({"vertices", "keys", "bumps"}, {"holds"});
     Solution solution;
     const Cursor vertices = where.member("vertices");
     const std::size_t moved = vertices.list("vertices that move");
@@ -85,6 +85,27 @@ Solution read_solution(const Cursor& where, const Polytope& polytope, const Ids&
                                  step.member("rgb").rgb(), step.member("by").rgb()});
         }
         solution.bumps.push_back(std::move(bump));
+    }
+
+    if (!where.has("holds")) return solution;
+    const Cursor holds = where.member("holds");
+    for (std::size_t i = 0, n = holds.list("holds"); i < n; ++i) {
+        const Cursor entry = holds.element(i);
+        entry.require_members({"keys"});
+        Solution::MovingHold hold;
+        const Cursor steps = entry.member("keys");
+        std::optional<double> previous;
+        const std::size_t count = steps.list("keys");
+        if (count == 0) steps.wrong("at least one key");
+        for (std::size_t j = 0; j < count; ++j) {
+            const Cursor step = steps.element(j);
+            step.require_members({"frame", "rgb", "radius", "keep"});
+            hold.keys.push_back({step.member("frame").later_frame(previous),
+                                 step.member("rgb").rgb(),
+                                 step.member("radius").number(kMinRadius, kMaxColour),
+                                 step.member("keep").number(0, 1)});
+        }
+        solution.holds.push_back(std::move(hold));
     }
     return solution;
 }

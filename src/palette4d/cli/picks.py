@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 #: The share of the picture above which it is said what else a pick changes.
 MANY = 0.1
+#: And where edges are told: this share of the pixels lies on them.
+TORN = 0.03
 
 _WHERE = "--frame T (--colour C | --pixel X,Y [--box N])"
 _WHEN = "[--from A] [--until B] [--fade N]"
@@ -53,7 +55,7 @@ def add_actions(action: Action) -> None:
         )
         parser.set_defaults(run=run_pick)
     _add_new(pick)
-    hold.set_defaults(to=None, by=None, toward=None)
+    hold.set_defaults(to=None, by=None, toward=None, global_only=False)
     _add_change(action)
     for name, text in (
         ("enable", "switch picks and holds on again."),
@@ -125,6 +127,7 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
         choices=("shift", "colour"),
         help="at other frames: the same change (shift, default), or the same new colour",
     )
+    parser.add_argument("--global-only", action="store_true", help="move palette colours only")
 
 
 def _add_how(parser: argparse.ArgumentParser) -> None:
@@ -143,7 +146,6 @@ def _add_how(parser: argparse.ArgumentParser) -> None:
         metavar="R",
         help="where the local neighbourhood ends, in code values (default: grows with the change)",
     )
-    add("--global-only", action="store_true", help="move palette colours only")
     add("--no-follow", action="store_true", help="the colour is the same in all frames")
 
 
@@ -339,10 +341,12 @@ def _told(document: Document, pick: Pick, followed: bool = True) -> str:
         why = f": the clip {source!r} was not found; give it with --clip" if followed else ""
         lines.append(f"  is at the same colour in all frames{why}")
     if pick.residual is not None and pick.share is not None:
-        what = "the palette" if pick.kind == "pick" else "kept by the palette"
-        rest = f", {1 - pick.share:.0%} its neighbourhood"
-        line = f"  off by {pick.residual:.4f}; {pick.share:.0%} {what}"
-        lines.append(line + (", its neighbourhood left out" if pick.global_only else rest))
+        line = f"  off by {pick.residual:.4f}"
+        if pick.kind == "pick":
+            rest = f"{1 - pick.share:.0%} its neighbourhood"
+            rest = "its neighbourhood left out" if pick.global_only else rest
+            line += f"; {pick.share:.0%} the palette, {rest}"
+        lines.append(line)
         if pick.worst is not None and pick.worst > max(2 * pick.residual, pick.tolerance):
             lines.append(f"  the farthest off at frame {pick.worst_frame:.0f}: by {pick.worst:.4f}")
     return "\n".join(lines)
@@ -355,13 +359,23 @@ def _print_notes(document: Document, told: Iterable[frozenset[str]] = ()) -> Non
         return
     moved, among = document.moved_by_picks()
     print(f"{moved} of {counted(among, 'palette colour')} move")
-    frame, share, most = document.side_effect()
-    if share > MANY:
+    effect = document.side_effect()
+    print(
+        f"at frame {effect.frame:.0f}, {effect.share:.0%} of the picture's pixels change by more "
+        f"than 10 of 255: {effect.share - effect.others:.0%} near the picked colours and their "
+        f"shades, {effect.others:.0%} others; no frame changes more of others"
+    )
+    if effect.others > MANY:
+        colour = ",".join(f"{value:.4f}" for value in effect.most)
         print(
-            f"note: beside the picked colours {share:.0%} of the picture change too at frame "
-            f"{frame:.0f}, by more than 10 of 255, most {shown(most)}; no frame changes more. "
-            "If it must stay: "
-            f"hold --frame {frame:.0f} --colour " + ",".join(f"{value:.4f}" for value in most)
+            f"note: of the others {shown(effect.most)} changes most. If it must stay: "
+            f"hold --frame {effect.frame:.0f} --colour {colour}"
+        )
+    if effect.torn > TORN:
+        print(
+            f"note: edges may show at frame {effect.torn_frame:.0f}: {effect.torn:.0%} of the "
+            "picture's pixels have colours between those that change and those that stay. Choose "
+            "a smaller change, a larger --radius, or pick a box that has them too"
         )
     lines = _unmet(document)
     for ids, line in lines.items():

@@ -16,6 +16,7 @@ from palette4d.grade.picks import MOST_PICKS, Pick, Toward, all_picks, check_ran
 
 if TYPE_CHECKING:
     from palette4d.grade.clip_of_picks import ClipOfPicks
+    from palette4d.grade.solve import SideEffect
 
 
 class PickEdits(EditedPalette):
@@ -120,14 +121,13 @@ class PickEdits(EditedPalette):
         until: float | None = None,
         fade: float = 0.0,
         radius: float | None = None,
-        global_only: bool = False,
         any_value: bool = False,
         progress: Callable[[int, int], object] | None = None,
     ) -> Pick:
         """Keep a colour of the clip as it is, whatever picks and handles do; as `pick`."""
         at = self._picked(frame, colour, pixel, box, clip, any_value)
         found = replace(at, start=start, until=until, fade=fade, radius=radius)
-        return self._add_pick(replace(found, global_only=global_only), clip, follow, progress)
+        return self._add_pick(found, clip, follow, progress)
 
     def correct_path(
         self,
@@ -176,7 +176,7 @@ class PickEdits(EditedPalette):
         for name in ("rgb", "to"):
             if name in changes:
                 changes[name] = self._checked(changes[name], any_value)
-        if old.kind == "hold" and (bad := {"to", "toward"} & changes.keys()):
+        if old.kind == "hold" and (bad := {"to", "toward", "global_only"} & changes.keys()):
             raise Palette4dError(f"{id} is a hold, which has no {' and no '.join(sorted(bad))}")
         new = replace(old, **changes)
         self._check_pick(new)
@@ -235,17 +235,11 @@ class PickEdits(EditedPalette):
         tracks = [{*track.vertices, *track.edges} for track in self.tracks]
         return sum(not moved.isdisjoint(track) for track in tracks), len(tracks)
 
-    def side_effect(self, *, least: float = 10 / 255) -> tuple[float, float, Colour]:
-        """Return what picks do to other colours, at the frame where they do most.
+    def side_effect(self, *, least: float = 10 / 255) -> "SideEffect":
+        """Return which share of the pixels picks change by more than `least` in a channel.
 
-        Returns
-        -------
-        frame : float
-        share : float
-            Share, 0..1, of the frame's pixels that have neither a picked colour nor a shade of it
-            and change by more than `least` in a channel.
-        most : tuple of float
-            The colour for which this matters most: one to hold.
+        It says how much of it is not near a picked colour, where edges show, and which colour to
+        hold.
         """
         from palette4d.grade import solve
 

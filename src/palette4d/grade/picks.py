@@ -76,7 +76,7 @@ class Pick:
     radius : float or None
         Where the local remainder ends, in the palette's code values; None: chosen by the solver.
     global_only : bool
-        No local remainder.
+        No local remainder; picks only.
     enabled : bool
     path : tuple of PathKey
         Where the colour is at other frames, linear between the keys; empty: always `rgb`.

@@ -49,7 +49,7 @@ _ORDER: dict[str, tuple[str, ...]] = {
     "/edits": ("ramp", "vertices", "stops", "picks", "locks", "solution"),
     "/edits/vertices/*": ("vertex", "rgb", "ramp"),
     "/edits/stops/*": ("id", "edge", "frame", "rgb", "ramp"),
-    "/edits/solution": ("vertices", "keys", "bumps"),
+    "/edits/solution": ("vertices", "keys", "bumps", "holds"),
     "/versions/*": ("name", "edits"),
     "/history": ("done", "undone"),
 }
@@ -82,6 +82,7 @@ _SPREAD = {
     "/edits/solution/vertices",
     "/edits/solution/keys",
     "/edits/solution/bumps",
+    "/edits/solution/holds",
     "/colours",
     "/versions",
     "/history",

@@ -5,11 +5,10 @@ numbers every time.
 
 A palette colour's displacement moves a colour c by its mean value weight w(c) (eqs. 6, 7). So each
 frame is a linear least-squares problem for the displacements d of its palette colours and the
-sizes a of the bumps around the picked and held colours. At a frame, with all colours in code
-values:
+sizes a of the bumps around the picked colours. At a frame, with all colours in code values:
 
 - a pick at colour p wants ``w(p) d + phi(p) a = change - U(p)``, where U is what the user's own
-  handles do there; a hold wants the same with no change;
+  handles do there;
 - the guard: each colour of the clip wants to stay, the more pixels have it and the greyer it is,
   unless it is near a pick or a shade of it. A pick of few pixels moves no palette colour that many
   pixels are mixed from. Changes are reweighted: most of the picture stays, instead of changing a
@@ -18,8 +17,11 @@ values:
 
 What is left at the picks is then met by the bumps alone. A bump grows with the change, else colours
 would fold over and posterise, up to a limit: beyond are other things. A pick of a box with a wide
-spread of colours has a bump at several of them. Where the palette would change more of the rest for
-the sake of a hold, the hold is left to its bump.
+spread of colours has a bump at several of them.
+
+A hold takes no part in this. It scales what all else does to the colours near it and its shades,
+to nothing at its own. So no colour ever changes more with a hold than without. A hold ends at the
+nearest pick.
 
 Frames are solved one by one, at the clip's vertices, at the picks' own frames and every few frames
 between; the core interpolates linearly. So a pick that ends at a frame has no effect at all beyond.
@@ -29,7 +31,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -37,6 +39,7 @@ from numpy.typing import NDArray
 
 from palette4d import _core
 from palette4d.grade import sidecar
+from palette4d.grade.bumps import bump_values, bumped
 from palette4d.grade.edits import Colour, as_colour
 from palette4d.grade.keyframes import needed
 from palette4d.grade.picks import MOST_PICKS, Pick, all_picks
@@ -49,22 +52,22 @@ F64 = NDArray[np.float64]
 # A colour of few pixels counts as if it had this share of them: a lamp.
 LEAST_SHARE = 5e-4
 # The guard's weight beside a pick that has all the pixels.
-GUARD = 0.65
+GUARD = 0.635
 # A change of a colour is noticed 1 + CHROMA (max - min) times less than that of a grey.
 CHROMA = 6.0
 # A guarded colour that would change by more than LARGE times the largest change that is asked for
 # weighs up to so much, however few pixels have it: they must not overshoot either.
 OVERSHOOT, LARGE = 0.3, 1.1
-# The radius of a pick's bump is RADIUS_0 + RADIUS_1 |change|, at most LARGEST; a hold's is
-# HOLD_RADIUS.
-RADIUS_0, RADIUS_1, LARGEST, HOLD_RADIUS = 0.08, 0.87, 0.3, 0.16
+# The radius of a bump is RADIUS_0 + RADIUS_1 |change|, at most LARGEST. A hold has LARGEST, or ends
+# at the nearest pick. Where that is nearer than LEAST, it keeps less and less.
+RADIUS_0, RADIUS_1, LARGEST, LEAST = 0.08, 0.87, 0.3, 0.05
 # The guard is off near a pick: at most so far from it, and on beyond.
 NEAR = 0.265
 # Lighter and darker shades of a picked colour are nearer to it by this factor. Below the lightness
 # DARK the shade of a colour is less and less certain.
 SHADE, DARK = 0.55, 0.3
-# With holds, the picture may change by so much more elsewhere than without.
-HOLDS_COST = 0.02
+# A hold holds shades that are darker and lighter by this part, too.
+LIGHTER = 0.17
 # A colour of a pick's spread has a bump of its own if the pick's bump would leave more than this of
 # its change undone. A hold's change counts as 1.
 UNDONE = 0.04
@@ -89,6 +92,8 @@ STEP, MOST_TIMES = 4, 40
 STRAIGHT = 4e-4
 # A colour that is guarded by at least this is none of those that the user wants to change.
 OTHER = 0.9
+# Edges show where colours come out more than TORN times as far apart; measured over such a step.
+TORN, STEP_IN_COLOUR = 3.0, 0.01
 # Displacements below this (a quarter of an 8-bit step) are none.
 NONE = 1e-3
 # Stored numbers are rounded, so that the last bits of a LAPACK never show.
@@ -122,38 +127,72 @@ def solve(fields: Mapping[str, Any]) -> tuple[Fields, dict[str, Fields]]:
     return solution, _measured(fields, solution, problem)
 
 
-def side_effect(fields: Mapping[str, Any], least: float) -> tuple[float, float, Colour]:
-    """Return what the picks' solution does to other colours of the clip, where it does most.
+@dataclass(frozen=True)
+class SideEffect:
+    """What the picks do to the pixels of a clip, at the frame where they do most beside themselves.
 
-    Returns
-    -------
+    Attributes
+    ----------
     frame : float
-        The frame where most of the picture changes.
     share : float
-        Share, 0..1, of its pixels that have neither a picked colour nor a shade of it and change
-        by more than `least` in a channel.
+        Share, 0..1, of the frame's pixels that change by more than asked for in a channel.
+    others : float
+        The same for pixels that are not near a picked colour or a shade of it.
     most : 3 floats
-        The colour for which this matters most; its share of the pixels counts.
+        The other colour for which this matters most; its share of the pixels counts.
+    torn, torn_frame : float
+        Share of pixels whose colours come out more than `TORN` times as far apart, so that edges
+        show, at the frame where it is largest.
     """
+
+    frame: float
+    share: float
+    others: float
+    most: Colour
+    torn: float
+    torn_frame: float
+
+
+def side_effect(fields: Mapping[str, Any], least: float) -> SideEffect:
+    """Return what the picks' solution does; `least` is the change that counts."""
     clip = _ClipAtTimes(fields)
     both = _parsed(fields, fields["edits"].get("solution", {}))
     problem = _Problem(clip, [pick for pick in all_picks(fields["edits"]) if pick.enabled])
-    found = [(float(clip.first), 0.0, (0.0, 0.0, 0.0))]
+    found = [SideEffect(float(clip.first), 0.0, 0.0, (0.0, 0.0, 0.0), 0.0, float(clip.first))]
     for time in problem.times:
         cut = _core.slice_at(clip.polytope, time)
         solved = _core.edited_colours(clip.polytope, both.edits, cut)
         user = _core.edited_colours(clip.polytope, clip.core.edits, cut)
         guarded = clip.colours_at(time)
-        rgb, shares = guarded[:, :3], guarded[:, 3]
+        rgb, shares = guarded[:, :3], guarded[:, 3] / max(float(guarded[:, 3].sum()), 1e-9)
         bumps = both.bumps_at(time)
-        changes = _core.palette_weights(rgb, cut.rgb, cut.faces)[0] @ (solved - user)
-        changes += _bump(rgb, bumps[:, :3], bumps[:, 3]) @ bumps[:, 4:]
-        size = np.abs(changes).max(axis=1)
+
+        def changes(
+            rgb: F64, by: F64 = solved - user, cut: _core.Slice = cut, bumps: F64 = bumps
+        ) -> F64:
+            return bumped(rgb, _core.palette_weights(rgb, cut.rgb, cut.faces)[0] @ by, bumps)
+
+        change = changes(rgb)
+        size = np.abs(change).max(axis=1)
         other = problem.guard_at(rgb, time) > OTHER
-        share = float(shares[other & (size > least)].sum() / max(float(shares.sum()), 1e-9))
         worst = int(np.argmax(np.where(other, size * np.sqrt(shares), 0.0)))
-        found.append((time, share, as_colour(rgb[worst])))
-    return max(found, key=lambda one: one[1])
+        slopes = [
+            np.linalg.norm(changes(rgb + step) - change, axis=1) / STEP_IN_COLOUR
+            for step in STEP_IN_COLOUR * np.eye(3)
+        ]
+        found.append(
+            SideEffect(
+                time,
+                float(shares[size > least].sum()),
+                float(shares[other & (size > least)].sum()),
+                as_colour(rgb[worst]),
+                float(shares[np.max(slopes, axis=0) > TORN - 1].sum()),
+                time,
+            )
+        )
+    torn = max(found, key=lambda one: one.torn)
+    most = max(found, key=lambda one: (one.others, one.share))
+    return replace(most, torn=torn.torn, torn_frame=torn.torn_frame)
 
 
 class _ClipAtTimes:
@@ -210,14 +249,15 @@ class _ClipAtTimes:
 
 @dataclass(frozen=True)
 class _Solved:
-    """The solution at one time: displacements by place, and bumps by the number of the point.
+    """The solution at one time: displacements by place, bumps and holds by the number of the point.
 
-    A place is ("v", vertex index) or ("e", edge index).
+    A place is ("v", vertex index) or ("e", edge index). A bump is its displacement, a hold its
+    radius and how much it keeps.
     """
 
     time: float
     moves: dict[tuple[str, int], F64]
-    bumps: dict[int, tuple[F64, F64]]
+    bumps: dict[int, F64]
 
 
 class _Problem:
@@ -234,7 +274,7 @@ class _Problem:
             for number, (pick, radius) in enumerate(
                 zip(picks, map(self._radius_of, picks), strict=True)
             )
-            for offset in ((0.0, 0.0, 0.0), *pick.spread)
+            for offset in ((0.0, 0.0, 0.0), *_shades(pick), *pick.spread)
             if not any(offset) or _undone(pick, offset, radius) > UNDONE
         ]
         of, offsets, radii = zip(*points, strict=True) if points else ((), (), ())
@@ -262,16 +302,16 @@ class _Problem:
         self.times = self._times()
 
     def _radius_of(self, pick: Pick) -> float:
-        """Return the radius of a pick's bumps."""
+        """Return the radius of a pick's bumps, or where a hold ends at most."""
         if pick.radius is not None or pick.to is None:
-            return pick.radius or HOLD_RADIUS
+            return pick.radius or LARGEST
         change = float(np.linalg.norm(pick.change_at(pick.frame)))
         return min(RADIUS_0 + RADIUS_1 * change, LARGEST)
 
     def _pixels(self, time: float) -> F64:
         """Return the share of the clip's pixels near each point."""
         guarded = self.clip.colours_at(time)
-        near = _bump(guarded[:, :3], self.centres(time), np.full(len(self.of), NEAR))
+        near = bump_values(guarded[:, :3], self.centres(time), np.full(len(self.of), NEAR))
         return np.asarray(guarded[:, 3] @ near, np.float64)
 
     def strengths(self, time: float) -> F64:
@@ -310,9 +350,8 @@ class _Problem:
             for number in np.unique(of):
                 pixels = float(guarded[:, 3] @ within[:, of == number].max(axis=1))
                 counts[of == number] = max(pixels, LEAST_SHARE)
-        moving = self.moving[of]
-        counts /= counts[moving].max(initial=LEAST_SHARE)
-        return np.minimum(1.0, counts)
+        counts /= counts.max()
+        return counts
 
     def centres(self, time: float) -> F64:
         found = np.array([pick.colour_at(time) for pick in self.picks]).reshape(-1, 3)
@@ -336,80 +375,71 @@ class _Problem:
         )
 
     def at(self, time: float) -> _Solved:
+        """Solve one time."""
+        asked = self.strengths(time) * self.certain(time)
+        picked = np.flatnonzero((asked > 0) & self.moving[self.of])
+        held = np.flatnonzero((asked > 0) & ~self.moving[self.of])
+        centres = self.centres(time)
+        away = np.linalg.norm(centres[held, None] - centres[picked], axis=2)
+        most = (away / asked[picked]).min(axis=1, initial=np.inf)
+        own = np.array([self.picks[i].radius or LARGEST for i in self.of[held]])
+        radii = np.maximum(np.minimum(own, most), np.minimum(own, LEAST))
+        keep = asked[held] * np.minimum(1.0, most / LEAST)
+        moves, sizes = self._meet(time, picked)
+        bumps = dict(zip(picked.tolist(), sizes, strict=True))
+        bumps |= dict(zip(held.tolist(), np.column_stack([radii, keep]), strict=True))
+        return _Solved(time, moves, bumps)
+
+    def _meet(
+        self, time: float, picked: NDArray[np.int64]
+    ) -> tuple[dict[tuple[str, int], F64], F64]:
+        """Return the displacements by place, and the sizes of the bumps of picked points."""
         clip = self.clip
-        strengths, certain = self.strengths(time), self.certain(time)
-        active = np.flatnonzero(strengths * certain > 0)
-        if not len(active):
-            return _Solved(time, {}, {})
-        of = self.of[active]
-        strengths, certain = strengths[active], certain[active]
-        share = certain * strengths / strengths.max()
-        radii = self.radii[active]
-        centres = self.centres(time)[active]
         cut = _core.slice_at(clip.polytope, time)
-        edited = _core.edited_colours(clip.polytope, clip.core.edits, cut)
+        edited = _core.edited_colours(clip.polytope, clip.core.edits, cut) - cut.rgb
+        nothing: tuple[dict[tuple[str, int], F64], F64] = {}, np.zeros((len(picked), 3))
+        if not len(picked):
+            return nothing
+        places, free = self._places(cut, time)
+        of, centres, radii = self.of[picked], self.centres(time)[picked], self.radii[picked]
+        strengths, certain = self.strengths(time)[picked], self.certain(time)[picked]
         weights = _core.palette_weights(centres, cut.rgb, cut.faces)[0]
         changes = np.array([pick.change_at(time) for pick in self.picks])[of]
-        wanted = strengths[:, None] * (changes - weights @ (edited - cut.rgb))
+        wanted = strengths[:, None] * (changes - weights @ edited)
         scale = float(np.linalg.norm(wanted, axis=1).max())
         if scale < NONE:
-            return _Solved(time, {}, {})
-        guarded = clip.colours_at(time)
-        places, free = self._places(cut, time)
+            return nothing
         local = np.array([not self.picks[i].global_only for i in of])
-        bumps = _bump(centres, centres, radii) * local
+        bumps = bump_values(centres, centres, radii) * local
         rows = np.hstack([_gathered(weights, places) * free, bumps])
-        guard_rows = np.hstack(
-            [
-                _gathered(_core.palette_weights(guarded[:, :3], cut.rgb, cut.faces)[0], places)
-                * free,
-                _bump(guarded[:, :3], centres, radii) * local,
-            ]
-        )
+        guarded = clip.colours_at(time)
+        within = bump_values(guarded[:, :3], centres, radii)
+        guard_weights = _core.palette_weights(guarded[:, :3], cut.rgb, cut.faces)[0]
+        guard_rows = np.hstack([_gathered(guard_weights, places) * free, within * local])
         slopes = _gathered(_slopes(cut.rgb, cut.faces), places) * free
         far = self.guard_at(guarded[:, :3], time)
-        within = _bump(guarded[:, :3], centres, radii)
-        counts = self._counts(guarded, of, within)
-        moving = self.moving[of]
         guard = _noticed(guarded)
-        if self.clip.frames:
+        counts = self._counts(guarded, of, within)
+        if clip.frames:
             # A pick of few pixels moves no palette colour that many pixels are mixed from.
-            near = _bump(guarded[:, :3], centres[moving], np.full(int(moving.sum()), NEAR))
-            pixels = float(guarded[:, 3] @ near.max(axis=1, initial=0.0))
+            near = bump_values(guarded[:, :3], centres, np.full(len(of), NEAR))
+            pixels = float(guarded[:, 3] @ near.max(axis=1))
             guard *= GUARD / max(pixels, LEAST_SHARE)
 
-        def found(counts: F64, costs: F64 = counts) -> F64:
-            solved = _least_squares(
-                rows,
-                share * counts,
-                wanted,
-                guard_rows,
-                (far * guard, far),
-                slopes,
-                scale,
-                BUMP * costs,
-            )
-            solved[len(free) :] += _interpolated(bumps, certain[:, None] * (wanted - rows @ solved))
-            return solved
-
-        best = found(counts)
-        if not moving.all() and moving.any():
-            # A hold must not cost more than it keeps: where the palette would change more of the
-            # rest for its sake, its bump alone keeps it. The cost is convex, so that the mix of
-            # both solutions is within the bound.
-            other = guard * far * (1 - within[:, ~moving].max(axis=1))
-            without = found(counts * moving)
-            least, most = (
-                float(other @ np.linalg.norm(guard_rows @ x, axis=1)) for x in (without, best)
-            )
-            part = min(1.0, HOLDS_COST * least / max(most - least, NONE**2))
-            best = without + part * (best - without) if most > least else best
-        moves, sizes = best[: len(free)] * free[:, None], best[len(free) :] * local[:, None]
-        return _Solved(
-            time,
-            dict(zip(dict.fromkeys(places), moves, strict=True)),
-            {int(i): (c, a) for i, c, a in zip(active, centres, sizes, strict=True)},
+        solved = _least_squares(
+            rows,
+            certain * strengths / strengths.max() * counts,
+            wanted,
+            guard_rows,
+            (far * guard, far),
+            slopes,
+            scale,
+            BUMP * counts,
         )
+        moves, sizes = solved[: len(free)] * free[:, None], solved[len(free) :]
+        left = wanted - rows @ solved
+        sizes = (sizes + _interpolated(bumps, certain[:, None] * left)) * local[:, None]
+        return dict(zip(dict.fromkeys(places), moves, strict=True)), sizes
 
     def _places(self, cut: _core.Slice, time: float) -> tuple[list[tuple[str, int]], F64]:
         """Return the place of each palette colour, and how free each distinct place is, 0..1.
@@ -462,56 +492,57 @@ class _Problem:
                 for t in kept
                 if frames[0] < t < frames[1]
             ]
-        return {"vertices": vertices, "keys": keys, "bumps": self._bumps(solved, borders)}
+        bumps, holds = self._bumps(solved, borders)
+        found = {"vertices": vertices, "keys": keys, "bumps": bumps}
+        return found | ({"holds": holds} if holds else {})
 
-    def _bumps(self, solved: Sequence[_Solved], borders: set[float]) -> list[Fields]:
-        bumps = []
+    def _bumps(
+        self, solved: Sequence[_Solved], borders: set[float]
+    ) -> tuple[list[Fields], list[Fields]]:
+        bumps, holds = [], []
         for number, pick in enumerate(self.picks[i] for i in self.of):
             begin, _, _, end = pick.knots(self.clip.step)
+            size = 3 if self.moving[self.of[number]] else 2
             keys: dict[float, F64] = {}
             for one in solved:
-                if number in one.bumps:
-                    keys[one.time] = np.concatenate(one.bumps[number])
-                elif begin <= one.time <= end:
-                    keys[one.time] = np.concatenate(
-                        [pick.colour_at(one.time) + self.offsets[number], np.zeros(3)]
-                    )
-            values = np.array(list(keys.values())).reshape(-1, 6)
-            if not (np.linalg.norm(values[:, 3:], axis=1) >= NONE).any():
+                if begin <= one.time <= end:
+                    centre = pick.colour_at(one.time) + self.offsets[number]
+                    # A hold that keeps nothing needs a radius all the same.
+                    by = one.bumps.get(number, np.zeros(3) if size == 3 else np.array([LEAST, 0]))
+                    keys[one.time] = np.concatenate([centre, by])
+            values = np.array(list(keys.values())).reshape(-1, 3 + size)
+            if not (np.linalg.norm(values[:, -size:], axis=1) >= NONE).any():
                 continue
             times = list(keys)
-            bumps.append(
-                {
-                    "radius": round(float(self.radii[number]), DIGITS),
-                    "keys": [
-                        {
-                            "frame": _whole(t),
-                            "rgb": _rounded(keys[t][:3]),
-                            "by": _rounded(keys[t][3:]),
-                        }
-                        for t in _kept(times, values, borders)
-                    ],
-                }
-            )
-        return bumps
+            steps = []
+            for t in _kept(times, values, borders):
+                row = _rounded(keys[t])
+                what = {"by": row[3:]} if size == 3 else {"radius": row[3], "keep": row[4]}
+                steps.append({"frame": _whole(t), "rgb": row[:3], **what})
+            if size == 3:
+                radius = round(float(self.radii[number]), DIGITS)
+                bumps.append({"radius": radius, "keys": steps})
+            else:
+                holds.append({"keys": steps})
+        return bumps, holds
+
+
+def _shades(pick: Pick) -> list[Colour]:
+    """Return the offsets to a lighter and a darker shade, which a hold holds too."""
+    if pick.to is not None:
+        return []
+    return [as_colour([part * value for value in pick.rgb]) for part in (-LIGHTER, LIGHTER)]
 
 
 def _undone(pick: Pick, offset: Colour, radius: float) -> float:
     """Return how much of a pick's change its bump leaves undone at an offset from its centre."""
     change = 1.0 if pick.to is None else float(np.linalg.norm(pick.change_at(pick.frame)))
-    done = _bump(np.array([offset]), np.zeros((1, 3)), np.array([radius]))
+    done = bump_values(np.array([offset]), np.zeros((1, 3)), np.array([radius]))
     return change * (1 - float(done[0, 0]))
 
 
-def _bump(colours: F64, centres: F64, radii: F64) -> F64:
-    """Return (n, m) values, 0..1, of m bumps at n colours, as the core computes them."""
-    away = ((colours[:, None] - centres) ** 2).sum(axis=2) / radii**2
-    values: F64 = np.maximum(0.0, 1.0 - away) ** 3
-    return values
-
-
 def _shade(colours: F64, centres: F64, radii: F64) -> F64:
-    """As `_bump`, but along the ray from black through its centre it is wider."""
+    """As `bump_values`, but along the ray from black through its centre it is wider."""
     offsets = colours[:, None] - centres
     lengths = np.linalg.norm(centres, axis=1)
     along = (offsets * centres).sum(axis=2) / np.maximum(lengths, DARK)
@@ -622,9 +653,7 @@ def _measured(fields: Mapping[str, Any], solution: Fields, problem: _Problem) ->
         weights = _core.palette_weights(colours, cut.rgb, cut.faces)[0]
         user = _core.edited_colours(core.polytope, clip.core.edits, cut)
         both = _core.edited_colours(core.polytope, core.edits, cut)
-        active = core.bumps_at(time)
-        palette = weights @ (both - cut.rgb)
-        total = palette + _bump(colours, active[:, :3], active[:, 3]) @ active[:, 4:]
+        total = bumped(colours, weights @ (both - cut.rgb), core.bumps_at(time))
         off = np.linalg.norm(total - wanted, axis=1)
         asked = wanted - weights @ (user - cut.rgb)
         largest = max(float(np.linalg.norm(asked, axis=1).max()), NONE)

@@ -86,9 +86,9 @@ def _add_pick(menu: QMenu, session: Session, pick: Pick) -> None:
     _add_go(menu, session, pick.frame)
     switch = not pick.enabled
     entry(menu, texts.ACTS, pick.enabled, lambda: grade_steps.enable(session, pick.id, switch))
-    only = changed(global_only=not pick.global_only)
-    entry(menu, texts.PALETTE_ONLY, pick.global_only, only)
     if pick.kind == "pick":
+        only = changed(global_only=not pick.global_only)
+        entry(menu, texts.PALETTE_ONLY, pick.global_only, only)
         same = pick.toward == "colour"
         entry(menu, texts.SAME_COLOUR, same, changed(toward="shift" if same else "colour"))
     fades = menu.addMenu(texts.FADE)

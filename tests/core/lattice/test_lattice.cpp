@@ -431,11 +431,13 @@ TEST(what_is_wrong_is_said) {
     CHECK_EQUAL(lattice.apply(empty.in(), empty.out(), {}).exact(), 0LL);
 }
 
-TEST(bumps_are_evaluated_at_each_colour) {
+TEST(bumps_and_holds_are_evaluated_at_each_colour) {
     Random random(60);
     const std::vector<Bump> bumps = {{{0.5, 0.4, 0.3}, 0.3, {0.3, -0.35, 0.2}},
                                      {{0.6, 0.6, 0.6}, 0.02, {-0.55, 0.5, -0.5}},
-                                     {{0.2, 0.7, 0.5}, 0.6, {0.1, -0.6, 0.1}}};
+                                     {{0.2, 0.7, 0.5}, 0.6, {0.1, -0.6, 0.1}},
+                                     {{0.4, 0.5, 0.4}, 0.4, {}, 1},
+                                     {{0.6, 0.3, 0.5}, 0.2, {}, 0.5}};
     for (const Edited& palette : {edited(random_convex(random, 9), 3), edited(concave_cube(), 4)}) {
         const auto recolourer = std::make_shared<Recolourer>(palette.mesh.rgb, palette.colours,
                                                              palette.mesh.faces, bumps);

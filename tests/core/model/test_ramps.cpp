@@ -194,3 +194,14 @@ TEST(bumps_follow_their_keys_and_are_left_out_while_they_do_nothing) {
     CHECK(same_bits(bumps_at(edits, 4)[0].centre, {1, 0, 0}));
     CHECK(same_bits(bumps_at(edits, 5)[0].centre, {1, 0.5, 0}));
 }
+
+TEST(holds_come_after_bumps_and_are_left_out_while_they_keep_nothing) {
+    Edits edits;
+    edits.solution.holds = {{{{2, {0, 0, 0}, 0.5, 0}, {4, {1, 0, 0}, 0.25, 1}}}};
+    CHECK(bumps_at(edits, 2).empty());
+    edits.solution.bumps = {{0.25, {{3, {0.5, 0.5, 0.5}, {0.125, 0, 0}}}}};
+    const Bump hold = bumps_at(edits, 3)[1];
+    CHECK(same_bits(hold.centre, {0.5, 0, 0}) && same_bits(hold.by, {0, 0, 0}));
+    CHECK(hold.radius == 0.375 && hold.keep == 0.5);
+    CHECK_EQUAL(bumps_at(edits, 9)[1].keep, 1.0);
+}

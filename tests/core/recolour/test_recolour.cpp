@@ -1,3 +1,4 @@
+#include "model/vec3.hpp"
 #include "recolour/recolour.hpp"
 
 #include <algorithm>
@@ -271,16 +272,25 @@ const std::vector<Bump> kBumps = {{{0.5, 0.4, 0.3}, 0.4, {0.2, -0.1, 0.05}},
                                   {{0.9, 0.9, 0.9}, 0.07, {-0.3, 0, 0.1}},
                                   {{1.3, 0.2, 0.1}, 0.5, {0, 0.25, 0}}};
 
-/// What the bumps do to a colour, in plain words.
-Vec3 bumped(const std::vector<Bump>& bumps, const Vec3& p) {
-    Vec3 sum{};
+/// What the bumps do to a colour that the palette moves by `sum`, in plain words.
+Vec3 bumped(const std::vector<Bump>& bumps, const Vec3& p, Vec3 sum = {}) {
     for (const Bump& bump : bumps) {
-        double distance2 = 0;
-        for (std::size_t c = 0; c < 3; ++c) distance2 += std::pow(p[c] - bump.centre[c], 2);
-        const double within = std::max(0.0, 1 - distance2 / (bump.radius * bump.radius));
-        for (std::size_t c = 0; c < 3; ++c) sum[c] += std::pow(within, 3) * bump.by[c];
+        const Vec3 away = p - bump.centre;
+        const double within = std::max(0.0, 1 - dot(away, away) / std::pow(bump.radius, 2));
+        for (std::size_t c = 0; c < 3; ++c) {
+            sum[c] += std::pow(within, 3) * bump.by[c];
+            sum[c] *= 1 - std::pow(within, 3) * bump.keep;
+        }
     }
     return sum;
+}
+
+/// kBumps and two holds, given in another order.
+std::vector<Bump> with_holds() {
+    std::vector<Bump> bumps = kBumps;
+    bumps.insert(bumps.begin(), {{0.4, 0.4, 0.4}, 0.5, {}, 1});
+    bumps.push_back({{0.6, 0.3, 0.3}, 0.3, {}, 0.5});
+    return bumps;
 }
 
 }  // namespace
@@ -303,10 +313,27 @@ TEST(bumps_add_to_what_the_palette_does) {
     }
 }
 
+TEST(holds_scale_what_all_else_does) {
+    const Recolourer plain = cube_recolourer();
+    const Recolourer held(cube().rgb, moved_cube(), cube().faces, with_holds());
+    std::vector<Bump> in_order = with_holds();
+    std::rotate(in_order.begin(), in_order.begin() + 1, in_order.end() - 1);
+    Random random(22);
+    for (int i = 0; i < 500; ++i) {
+        const Vec3 p = random.colour(-0.3, 1.6);
+        const Vec3 moved = bumped(in_order, p, plain.displaced(p, 1) - p);
+        const Vec3 found = held.displaced(p, 0.75);
+        for (std::size_t k = 0; k < 3; ++k) CHECK_NEAR(found[k] - p[k], 0.75 * moved[k], 1e-14);
+    }
+    CHECK(held.displaced({0.4, 0.4, 0.4}, 1) == (Vec3{0.4, 0.4, 0.4}));
+    CHECK(!Recolourer(cube().rgb, cube().rgb, cube().faces, {with_holds()[0]}).moves());
+}
+
 TEST(bumps_in_pictures_are_the_same_by_every_way) {
     const Recolourer both(cube().rgb, moved_cube(), cube().faces, kBumps);
     const Recolourer only(cube().rgb, cube().rgb, cube().faces, kBumps);
-    for (const Recolourer* recolourer : {&both, &only}) {
+    const Recolourer held(cube().rgb, moved_cube(), cube().faces, with_holds());
+    for (const Recolourer* recolourer : {&both, &only, &held}) {
         for (const int channels : {3, 4}) {
             const Image image = noise(203, 9, channels, 5);
             const RecolourOptions way{0.75, channels == 4, 1};
@@ -395,7 +422,8 @@ TEST(bumps_far_from_0_and_small_ones_are_exact_too) {
 
 TEST(bumps_that_are_no_bumps_are_refused) {
     for (const Bump& bump : {Bump{{0, 0, kNan}, 1, {1, 1, 1}}, Bump{{0, 0, 0}, 0, {1, 1, 1}},
-                             Bump{{0, 0, 0}, kInf, {1, 1, 1}}, Bump{{0, 0, 0}, 1, {1, kInf, 1}}}) {
+                             Bump{{0, 0, 0}, kInf, {1, 1, 1}}, Bump{{0, 0, 0}, 1, {1, kInf, 1}},
+                             Bump{{0, 0, 0}, 1, {}, 1.5}, Bump{{0, 0, 0}, 1, {}, kNan}}) {
         CHECK_THROWS(std::invalid_argument,
                      Recolourer(cube().rgb, cube().rgb, cube().faces, {bump}));
     }
