@@ -254,7 +254,7 @@ TEST(an_analysis_that_fails_says_why) {
     CHECK(soon([&] { return window.says("failed: it has edits; keep them with --keep-edits"); }));
     // The sidecar that is there still serves.
     window.expect("3 edits");
-    CHECK(text_of(kept) == sidecar_text());
+    CHECK(text_of(fs::u8path(kept)) == sidecar_text());
     CHECK(window.node->changed("reload") == kOfxStatOK);
     CHECK(!window.says("failed"));
     // One that dies.
