@@ -151,14 +151,15 @@ def material(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def state_of(folder: Path) -> State:
-    """Every file's content (less the date of an EXR), a link's target, and that of folders.
+    """Every file's content (less the date of an EXR), and folders.
 
-    A TIFF counts by its pixels: its library repeats a write, and leaves a gap.
+    A link counts as its target: where links are refused, copies take their place. A TIFF counts by
+    its pixels: its library repeats a write, and leaves a gap.
     """
     found = {}
     for path in sorted(folder.rglob("*")):
         name = str(path.relative_to(folder))
-        if path.is_symlink():
+        if path.is_symlink() and not path.exists():
             found[name] = b"-> " + os.fsencode(path.readlink())
         elif path.suffix == ".tif" and not re.fullmatch(TEMPORARY, name):
             found[name] = oiio.ImageBuf(str(path)).get_pixels().tobytes()
