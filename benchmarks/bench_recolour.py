@@ -167,11 +167,15 @@ def against_peers(
         print(f"{'':34} {rates(part.size // 3, runs, {name: run})[name]:7.1f} with {name}")
 
 
-def bumps_in(image: F32, count: int = 5, radius: float = 0.07, seed: int = 3) -> F64:
-    """Make (count, 7) bumps, as of picks and holds, at colours of a picture."""
+def bumps_in(image: F32, radius: float = 0.07, seed: int = 3) -> F64:
+    """Make (9, 8) bumps at colours of a picture: three picks, and two holds of three shades each."""
     rng = np.random.default_rng(seed)
-    centres = rng.choice(image.reshape(-1, image.shape[2])[:, :3], count)
-    return np.column_stack([centres, np.full(count, radius), rng.uniform(-0.2, 0.2, (count, 3))])
+    centres = rng.choice(image.reshape(-1, image.shape[2])[:, :3], 5)
+    shades = [centre * scale for centre in centres[3:] for scale in (1, 0.83, 1.17)]
+    places = np.vstack([centres[:3], *shades])
+    by, keep = rng.uniform(-0.2, 0.2, (9, 3)), np.repeat([0.0, 1.0], [3, 6])
+    by[3:] = 0
+    return np.column_stack([places, np.full(9, radius), by, keep])
 
 
 def with_picks(what: str, palette: Palette, image: F32, runs: int) -> None:
