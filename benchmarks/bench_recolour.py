@@ -168,7 +168,7 @@ def against_peers(
 
 
 def bumps_in(image: F32, radius: float = 0.07, seed: int = 3) -> F64:
-    """Make (9, 8) bumps at colours of a picture: three picks, and two holds of three shades each."""
+    """Make (9, 8) bumps at a picture's colours: three picks, and two holds of three shades each."""
     rng = np.random.default_rng(seed)
     centres = rng.choice(image.reshape(-1, image.shape[2])[:, :3], 5)
     shades = [centre * scale for centre in centres[3:] for scale in (1, 0.83, 1.17)]
