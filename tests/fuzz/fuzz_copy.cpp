@@ -46,7 +46,7 @@ std::string outcome_of(const std::uint8_t* data, std::size_t size) {
     chosen.result = load_sidecar_text(std::string(reinterpret_cast<const char*>(data), size),
                                       "clip.p4d.json (the project's copy)");
     check(status_of(chosen, {"first"}, 3, {"last"}));
-    check(printable(chosen.result.problem));
+    check(without_controls(chosen.result.problem));
     if (!chosen.result.loaded) {
         return kind_of(chosen.result.problem.substr(chosen.result.problem.rfind("expected") + 1));
     }
