@@ -156,8 +156,11 @@ build/test-wheel.stamp: $(SOURCES) $(shell find tests/core tests/host tests/fuzz
 	@echo "== C++: core, bindings, OpenFX bundle and their tests (takes 2 to 4 minutes)"
 	@rm -rf $(TEST_WHEELS)
 	@unset MAKEFLAGS && PATH="$(CURDIR)/$(TOOLS)/bin:$$PATH" $(TOOLS)/bin/python $(PIP) wheel . \
-		--no-deps --no-build-isolation --wheel-dir $(TEST_WHEELS) -C build-dir=build/cmake/test -C cmake.define.PALETTE4D_BUILD_TESTS=ON \
-		-C cmake.define.PALETTE4D_WERROR=ON -C cmake.define.OPENFX_ROOT="$(abspath $(OPENFX_ROOT))"
+		--no-deps --no-build-isolation --wheel-dir $(TEST_WHEELS) \
+		--config-settings=build-dir=build/cmake/test \
+		--config-settings=cmake.define.PALETTE4D_BUILD_TESTS=ON \
+		--config-settings=cmake.define.PALETTE4D_WERROR=ON \
+		--config-settings=cmake.define.OPENFX_ROOT="$(abspath $(OPENFX_ROOT))"
 	@touch $@
 
 # Nothing but the wheel, its dependencies and the tests'. A fresh environment for every change of them.
