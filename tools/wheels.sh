@@ -21,14 +21,14 @@ for version in 3.11 3.12 3.13; do
     "$python" -m venv "$env"
     "$env/bin/python" $pip install --require-hashes --only-binary :all: -r locks/build.txt
     "$env/bin/python" $pip wheel . --no-deps --no-build-isolation --wheel-dir "$folder/raw$version" \
-        -C build-dir="build/cmake/wheel$version" \
-        -C cmake.define.CMAKE_TOOLCHAIN_FILE="$PWD/ofx_plugin/cmake/ZigToolchain.cmake" \
-        -C cmake.define.PALETTE4D_ZIG="$PALETTE4D_ZIG" \
-        -C cmake.define.PALETTE4D_ZIG_TARGET=x86_64-linux-gnu.2.17 \
-        -C cmake.define.CMAKE_INTERPROCEDURAL_OPTIMIZATION=OFF \
-        -C cmake.define.PALETTE4D_WERROR=ON \
-        -C cmake.define.PALETTE4D_BUILD_PLUGIN=OFF \
-        -C cmake.define.PALETTE4D_READY_BUNDLE="$bundle"
+        --config-settings=build-dir="build/cmake/wheel$version" \
+        --config-settings=cmake.define.CMAKE_TOOLCHAIN_FILE="$PWD/ofx_plugin/cmake/ZigToolchain.cmake" \
+        --config-settings=cmake.define.PALETTE4D_ZIG="$PALETTE4D_ZIG" \
+        --config-settings=cmake.define.PALETTE4D_ZIG_TARGET=x86_64-linux-gnu.2.17 \
+        --config-settings=cmake.define.CMAKE_INTERPROCEDURAL_OPTIMIZATION=OFF \
+        --config-settings=cmake.define.PALETTE4D_WERROR=ON \
+        --config-settings=cmake.define.PALETTE4D_BUILD_PLUGIN=OFF \
+        --config-settings=cmake.define.PALETTE4D_READY_BUNDLE="$bundle"
     # What the wheel depends on needs glibc 2.28.
     auditwheel repair --only-plat --plat manylinux_2_28_x86_64 --wheel-dir "$wheels" "$folder/raw$version"/*.whl
 

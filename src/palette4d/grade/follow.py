@@ -34,8 +34,8 @@ MOST_STEP = 0.08
 #: Weight of the path's bends: what is shorter than some 2 pi STIFF^(1/4) frames is jitter, which
 #: would be flicker of the grade. And the weight of colours that the user gave.
 STIFF, PINNED = 12.0, 1e6
-#: How strongly a colour that is still there is kept there, per frame; it is still there while the
-#: pixels near it are not 1 / SAME fewer or more than at first.
+#: How strongly the path is drawn to the picked colour, per frame. The pull fades as the count of
+#: pixels near that colour departs from the first count; at half or twice that count it is 0.
 HOME, SAME = 0.5, 2
 #: Where more than LOST times as many pixels as at first are near, the colour is another thing's, as
 #: in the night, where all is dark. From there on it has ended, unless it comes back to its start.

@@ -61,7 +61,7 @@ OVERSHOOT, LARGE = 0.3, 1.1
 # The radius of a bump is RADIUS_0 + RADIUS_1 |change|, at most LARGEST. A hold has LARGEST, or ends
 # at the nearest pick. Where that is nearer than LEAST, it keeps less and less.
 RADIUS_0, RADIUS_1, LARGEST, LEAST = 0.08, 0.87, 0.3, 0.05
-# The guard is off near a pick: at most so far from it, and on beyond.
+# The guard is off at a pick, and is back to full strength at this distance.
 NEAR = 0.265
 # Lighter and darker shades of a picked colour are nearer to it by this factor. Below the lightness
 # DARK the shade of a colour is less and less certain.
