@@ -154,6 +154,7 @@ def bad_palette(first, last):
     return np.vstack([early, np.column_stack([later, np.full(8, float(last))])]), faces
 
 
+@pytest.mark.slow
 def test_a_bad_palette(seasons, judge, measured, tmp_path):
     clip = some_frames(seasons, tmp_path)
     numbers, colours = exact_colours(clip, measured)

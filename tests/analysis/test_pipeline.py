@@ -38,7 +38,7 @@ CLIPS = {
     "one colour that changes": ([constant([0.3 + 0.1 * i, 0.4, 0.5]) for i in range(5)], 1),
     "grey": ([grey(i) for i in range(5)], 2),
     "two colours": ([two_colours(i) for i in range(4)], 2),
-    "a plane of colours": ([flat(i) for i in range(3)], None),
+    "a plane of colours": ([flat(i) for i in range(2)], None),
     "float above one and below zero": ([noise(i, 8, -1) for i in range(3)], None),
     "large values": ([noise(i, 1e4) for i in range(3)], None),
     "one pixel": ([noise(i)[:1, :1] for i in range(3)], 1),

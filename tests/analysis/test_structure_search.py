@@ -182,12 +182,15 @@ def found():
     return analyse
 
 
+@pytest.mark.slow
 def test_a_dearer_handle_never_means_more_handles(found):
     counts = [found(handle_cost=0.0005)[1], found()[1], found(handle_cost=0.05)[1]]
     assert counts == sorted(counts, reverse=True)
     assert counts[0] > counts[-1]
 
 
-@pytest.mark.parametrize("less", [{"blocks": 1}, {"vertices": 10}])
+@pytest.mark.parametrize(
+    "less", [{"blocks": 1}, pytest.param({"vertices": 10}, marks=pytest.mark.slow)]
+)
 def test_more_of_what_is_allowed_is_never_worse(found, less):
     assert found()[0] <= 1.005 * found(**less)[0]

@@ -118,14 +118,14 @@ def recoloured_sample(
     folder = tmp_path_factory.mktemp("sample")
     clip, sidecar = folder / "sample", folder / "sample.p4d.json"
     palette4d("sample-clip", "-o", clip / "sample.####.png", "--size", "128x72", "--quiet")
-    palette4d("analyze", clip, "-o", sidecar, "--quiet")
+    palette4d("analyze", clip, "-o", sidecar, "--quiet", "--method", "static")
     # The sky at the beginning, the yellow trees in the middle, the night sky at the end.
     summer = ("--near", "0.2,0.45,0.95", "--frame", 1)
-    palette4d("edit", sidecar, "set", *summer, "--rgb", 0.5, 0.2, 0.9)
+    palette4d("edit", sidecar, "set", "--anyway", *summer, "--rgb", 0.5, 0.2, 0.9)
     yellow = ("--near", "0.75,0.6,0.1", "--frame", 22.5)
-    palette4d("edit", sidecar, "set", *yellow, "--rgb", 0.95, 0.3, 0.6)
+    palette4d("edit", sidecar, "set", "--anyway", *yellow, "--rgb", 0.95, 0.3, 0.6)
     night = ("--near", "0.02,0.07,0.28", "--frame", 48)
-    palette4d("edit", sidecar, "set", *night, "--rgb", 0.0, 0.4, 0.25)
+    palette4d("edit", sidecar, "set", "--anyway", *night, "--rgb", 0.0, 0.4, 0.25)
     return render_both_ways(melt, bundle, sidecar, clip)
 
 

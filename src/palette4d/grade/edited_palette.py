@@ -325,6 +325,10 @@ def text_of(colour: Colour) -> str:
 
 
 def _finite(frame: float) -> float:
-    if not math.isfinite(frame):
-        raise Palette4dError(f"found the frame {frame}, expected a finite number")
-    return float(frame)
+    try:
+        number = math.nan if isinstance(frame, str) else float(frame)
+    except (TypeError, ValueError):
+        number = math.nan
+    if not math.isfinite(number):
+        raise Palette4dError(f"found the frame {frame!r}, expected a finite number")
+    return number

@@ -65,7 +65,7 @@ def as_colour(values: Iterable[float] | str, what: str = "colour") -> Colour:
     if len(listed) != 3 or not all(abs(value) <= LARGEST_COLOUR for value in listed):
         raise Palette4dError(
             f"found the {what} {values!r}, expected #rrggbb or 3 finite numbers of at most "
-            f"{LARGEST_COLOUR:g}"
+            f"{LARGEST_COLOUR:g}; give red, green and blue"
         )
     return (listed[0], listed[1], listed[2])
 
