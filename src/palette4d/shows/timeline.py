@@ -130,7 +130,7 @@ class _Reader:
         except (
             *(Palette4dError, self.otio.exceptions.OTIOError),
             *(OSError, ValueError, ArithmeticError),  # names and times that cannot be
-            NotImplementedError,
+            NotImplementedError,  # what OpenTimelineIO raises for a gap without a length
         ) as error:
             problem = in_words(error)
             if isinstance(error, NotImplementedError):
