@@ -6,6 +6,8 @@ frame alone.
 """
 
 import contextlib
+import dataclasses
+import math
 import os
 import threading
 from collections import OrderedDict
@@ -31,6 +33,8 @@ CACHE_BYTES = 250 << 20
 #: Bytes of scaled frames that are kept.
 SMALL_BYTES = 200 << 20
 
+#: The most pixels of a picture that moves; a larger one is made at a half, a third, … of its size.
+MOST_MOVING = 400_000
 #: Pixels of a strip that is resampled at once.
 ROWS = 30_000
 
@@ -61,6 +65,13 @@ class Region:
     def whole(self) -> bool:
         """Whether its pixels are the frame's, not scaled."""
         return (self.width, self.height) == (self.right - self.left, self.bottom - self.top)
+
+    @property
+    def coarse(self) -> "Region":
+        """The part at the size that pictures of drags, jumps and playing have."""
+        by = math.ceil(math.sqrt(self.width * self.height / MOST_MOVING))
+        width, height = max(1, self.width // by), max(1, self.height // by)
+        return dataclasses.replace(self, width=width, height=height)
 
 
 class ByteCache(Generic[K, V]):

@@ -91,10 +91,10 @@ class TimelineView(QWidget):
             ("frame", self._frame_moved),
             ("selection", self.update),
             ("hover", self.update),
-            ("probe", self.update),
+            ("probe", lambda: self.update(0, RULER, GUTTER, self.height() - RULER - FOOT)),
             ("range", self.update),
             ("view", self.update),
-            ("pixels", self.update),
+            ("pixels", lambda: self.strip.settled or self.update()),
         )
         for event, call in calls:
             session.on(event, call, panel=True)
@@ -144,7 +144,7 @@ class TimelineView(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:
         """Draw the timeline."""
         self.strip.ratio = self.devicePixelRatioF()
-        self.painter.paint()
+        self.painter.paint(gutter_alone=event.rect().right() < GUTTER)
 
     # -------------------------------------------------------------------------------- zoom and pan
 
