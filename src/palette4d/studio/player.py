@@ -146,7 +146,7 @@ class Player:
         self._ready = ready
         self._wanted: list[tuple[int, Region | None]] = []
         self._later: list[tuple[int, Region | None]] = []
-        self._reading: set[int] = set()
+        self._reading: set[tuple[int, Region | None]] = set()
         self._wake = threading.Condition()
         self._closed = False
         self._order = threading.Lock() if clip.is_movie else contextlib.nullcontext()
@@ -186,7 +186,7 @@ class Player:
                 self._wake.notify()
 
     def _have(self, number: int, region: Region | None) -> bool:
-        if number in self.errors or number in self._reading:
+        if number in self.errors or (number, region) in self._reading:
             return True
         return number in self._frames if region is None else (number, region) in self._small
 
@@ -231,7 +231,7 @@ class Player:
                 number, region = (self._wanted or self._later).pop(0)
                 if self._have(number, region):
                     continue
-                self._reading.add(number)
+                self._reading.add((number, region))
             try:
                 self._take(number, region)
             except Exception as error:  # a decoder may fail in any way: the window stays
@@ -239,7 +239,7 @@ class Player:
                 self.errors[number] = words.replace(LEAVE_OUT, texts.BAD_FRAME)
             finally:
                 with self._wake:
-                    self._reading.discard(number)
+                    self._reading.discard((number, region))
             if not self._closed:
                 self._ready(number)
 

@@ -94,7 +94,7 @@ class TimelineView(QWidget):
             ("probe", lambda: self.update(0, RULER, GUTTER, self.height() - RULER - FOOT)),
             ("range", self.update),
             ("view", self.update),
-            ("pixels", lambda: self.strip.settled or self.update()),
+            ("pixels", self._pixels_arrived),
         )
         for event, call in calls:
             session.on(event, call, panel=True)
@@ -127,6 +127,11 @@ class TimelineView(QWidget):
     def _new_clip(self) -> None:
         self.strip.clear()
         self._changed()
+
+    def _pixels_arrived(self) -> None:
+        if not self.strip.settled:
+            self.strip.changed()
+            self.update()
 
     def _frame_moved(self) -> None:
         places = self.places

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, QTimer
 from PySide6.QtGui import (
     QImage,
     QKeyEvent,
@@ -32,8 +32,8 @@ ZOOM_STEP, LEAST_ZOOM, MOST_ZOOM = 1.25, 0.02, 64.0
 HOLD_KEYS = Qt.KeyboardModifier.AltModifier | Qt.KeyboardModifier.ControlModifier
 #: The probe stands within so many pixels of the lower rim.
 PROBE_HEIGHT = 200
-#: Frames that are read around the playhead.
-AHEAD, BEHIND = 6, 2
+#: Frames that are read around the playhead, when it has rested for so many milliseconds.
+AHEAD, BEHIND, REST = 6, 2, 80
 
 F32 = NDArray[np.float32]
 
@@ -65,6 +65,9 @@ class Viewer(QWidget):
         self.doing = ""
         self._pan_from = QPointF()
         self.pointer: QPointF | None = None
+        self._resting = QTimer(self)
+        self._resting.setSingleShot(True)
+        self._resting.timeout.connect(self._read_around)
         self.on_pick: Any = None  #: called with a Place for a click or a box
         self.on_hold: Any = None  #: the same with Alt
         session.on("clip", self._clip_changed)
@@ -110,10 +113,16 @@ class Viewer(QWidget):
             self.update()
             return
         if not session.playing:
-            # Its neighbours are read when its picture is shown.
+            # Its neighbours are read when the playhead rests.
+            self._resting.stop()
             session.player.want([session.frame])
             self.refresh()
         self._probe_again()
+
+    def _read_around(self) -> None:
+        """Read the frames around the playhead."""
+        if self.session.player is not None and not self.session.playing:
+            self.session.player.want(frames_around(self.session))
 
     def _pixels_arrived(self) -> None:
         """Show the frame, unless another frame's pixels have arrived."""
@@ -223,8 +232,8 @@ class Viewer(QWidget):
         if session.clip is None or session.playing or session.player is None:
             return
         self._take(picture)
-        if picture.exact and picture.request.frame == session.frame:
-            session.player.want(frames_around(session))
+        if picture.exact:
+            self._resting.start(REST)
 
     def _take(self, picture: Picture) -> None:
         self.picture, self.shown_frame = picture, picture.request.frame
