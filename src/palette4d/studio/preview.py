@@ -210,7 +210,7 @@ class Preview:
 
     def kept(self, key: tuple[Any, ...] | None) -> Picture | None:
         """Return a picture that was made before (`Request.key`), or None."""
-        return self._reel.get(key)
+        return None if key is None else self._reel.get(key)
 
     def forget(self) -> None:
         """Forget the pixels that were kept."""
