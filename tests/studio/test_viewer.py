@@ -17,6 +17,7 @@ from windows import FRAME, Settle, busiest, seen
 
 from palette4d.cli.main import main
 from palette4d.studio import player
+from palette4d.studio.viewer import REST
 from palette4d.studio.window import Window
 
 
@@ -181,6 +182,19 @@ def test_the_probe_says_what_the_frame_has(opened: Window, settle: Settle) -> No
     assert probe.source == tuple(float(v) for v in picture.request.pixels[y, x])
     assert probe.result == tuple(float(v) for v in result_of(opened)[y, x])
     assert sum(probe.weights.values()) == pytest.approx(1, abs=1e-6)
+
+
+def test_a_frame_that_fills_the_memory_can_be_picked(
+    opened: Window, settle: Settle, qtbot: Any
+) -> None:
+    player = opened.session.player
+    assert player is not None
+    player._frames.limit = 1
+    opened.session.go(FRAME + 1)
+    settle(opened)
+    qtbot.wait(3 * REST)  # the frames around it would be read meanwhile
+    QTest.mouseClick(opened.viewer, Qt.MouseButton.LeftButton, pos=opened.viewer.rect().center())
+    assert opened.session.place is not None
 
 
 def test_hovering_over_a_handle_shows_its_matte(opened: Window, settle: Settle) -> None:

@@ -206,6 +206,11 @@ class Player:
         return found
 
     @property
+    def room(self) -> int:
+        """How many frames as those that are kept have room, at least one."""
+        return max(1, self._frames.limit * len(self._frames) // max(self._frames.bytes, 1))
+
+    @property
     def idle(self) -> bool:
         """Whether everything that was wanted is read."""
         with self._wake:

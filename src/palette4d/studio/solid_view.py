@@ -176,6 +176,7 @@ class SolidView(QWidget):
         index = self.index_at(at) if event.button() == Qt.MouseButton.LeftButton else None
         palette = self.palette_now()
         self._drag = Drag(index, at, palette, self.azimuth, self.elevation)
+        self.session.hover_over(None)  # what is dragged is seen in the picture, without a matte
         if index is not None and palette is not None:
             self.session.select(self.handle_of(palette, index))
         elif event.button() == Qt.MouseButton.LeftButton:

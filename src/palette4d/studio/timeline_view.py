@@ -197,6 +197,7 @@ class TimelineView(QWidget):
         self._press = Press(hit, at, self.places.scroll, self.places.span[0], button=event.button())
         if event.button() != Qt.MouseButton.LeftButton:
             return
+        self.session.hover_over(None)  # what is dragged is seen in the picture, without a matte
         add = bool(
             event.modifiers()
             & (Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier)

@@ -463,12 +463,13 @@ class Viewer(QWidget):
 
 
 def frames_around(session: Session) -> list[int]:
-    """Return the frames to read, the playhead's first."""
+    """Return the frames to read, the playhead's first, as many as can be kept with it."""
     assert session.clip is not None
+    assert session.player is not None
     _, _, step = session.frames
     # Movies are decoded forwards; going back takes long.
     behind = 0 if session.clip.is_movie else BEHIND
     offsets = [0, *range(1, AHEAD + 1), *range(-1, -behind - 1, -1)]
-    known = frozenset() if session.player is None else session.player.numbers
     frames = [session.frame + offset * step for offset in offsets]
-    return [frame for frame in frames if frame in known]
+    known = [frame for frame in frames if frame in session.player.numbers]
+    return known[: session.player.room]
