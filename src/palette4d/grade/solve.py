@@ -346,7 +346,7 @@ class _Problem:
 
         def compute() -> F64:
             found = [pick.strength_at(time, self.clip.step) for pick in self.picks]
-            return np.array(found, float)[self.of]
+            return np.asarray(np.array(found)[self.of], np.float64)
 
         return self._once("strengths", time, compute)
 
