@@ -55,7 +55,6 @@ def test_a_host_test_that_ran_is_enough(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stdout
 
 
-@pytest.mark.parametrize("required", ["", "0"])
-def test_a_skipped_host_test_is_fine_where_none_is_required(required: str, tmp_path: Path) -> None:
-    done = run(tmp_path, SKIPPED, required=required)
+def test_a_skipped_host_test_is_fine_where_none_is_required(tmp_path: Path) -> None:
+    done = run(tmp_path, SKIPPED, required="")
     assert done.returncode == 0, done.stdout

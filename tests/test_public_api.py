@@ -103,8 +103,8 @@ def test_the_palettes_of_files_and_of_arrays_hold_their_pixels(clip_folder: Path
     def progress(stage: str, done: int, total: int) -> None:
         told.append((stage, done, total))
 
-    ours = palette4d.analyze(array, vertices=8, progress=progress)
-    theirs = palette4d.analyze(clip_folder / "shot.####.png", frames=frames, vertices=8)
+    ours = palette4d.analyze(array, method="static", progress=progress)
+    theirs = palette4d.analyze(clip_folder / "shot.####.png", frames=frames, method="static")
     assert told
     assert ours.frames == (0, 7, 1)
     assert theirs.frames == (1, 8, 1)

@@ -254,13 +254,14 @@ def test_the_command_refuses_cuts(tmp_path, capsys):
     assert len(ranges) == len(starts) + 1
     for part in ranges:  # what the message names can be analysed
         arguments = ["analyze", spec, "-o", str(out), "--quiet", "--frames", part]
-        assert main.main(arguments) == 0
+        assert main.main([*arguments, "--method", "static"]) == 0
 
 
 def test_the_command_spans_a_cut_when_told_to(tmp_path, capsys):
     spec = any_clips.cut(tmp_path / "clip")
     out = tmp_path / "out.p4d.json"
-    assert main.main(["analyze", spec, "-o", str(out), "--json", "--allow-cuts"]) == 0
+    words = ["analyze", spec, "-o", str(out), "--json", "--allow-cuts", "--method", "static"]
+    assert main.main(words) == 0
     printed = capsys.readouterr()
     assert "the palette spans 1 sudden cut, at frame 7" in printed.err
     assert any("the palette spans" in note for note in json.loads(printed.out)["notes"])

@@ -34,7 +34,7 @@ void failed(const char* file, int line, const std::string& what) {
 
 long every(long step) {
     if (std::getenv("PALETTE4D_EVERY_CALL")) return 1;
-    return std::getenv("PALETTE4D_FEW_CALLS") ? 2 * step + 1 : step;
+    return std::getenv("PALETTE4D_FEW_ROUNDS") ? 2 * step + 1 : step;
 }
 
 void figure(const std::string& what) { std::cout << "      " << what << std::endl; }

@@ -42,7 +42,7 @@ void failed(const char* file, int line, const std::string& what);
 void figure(const std::string& what);
 
 /// A step between the many calls that are refused one after the other; 1, for all of them, where
-/// PALETTE4D_EVERY_CALL is set, and about twice as long where PALETTE4D_FEW_CALLS is: the slow
+/// PALETTE4D_EVERY_CALL is set, and about twice as long where PALETTE4D_FEW_ROUNDS is: the slow
 /// sanitized tests.
 long every(long step);
 

@@ -110,7 +110,7 @@ TEST(every_call_of_a_day_refused_in_turn) {
     // Labelling 32 slots alike is most of it: steps of a prime meet every kind of call.
     CHECK(calls > 1000);
     long refused = 0;
-    for (long n = 0; n < calls; n += every(17)) {
+    for (long n = 0; n < calls; n += every(37)) {
         day.open();
         Config config;
         config.refused_call = n;
@@ -122,5 +122,5 @@ TEST(every_call_of_a_day_refused_in_turn) {
     }
     figure(std::to_string(refused) + " of " + std::to_string(calls) +
            " calls of a day refused, one a day");
-    CHECK(refused > calls / (every(17) + 1));
+    CHECK(refused > calls / (every(37) + 1));
 }

@@ -51,14 +51,19 @@ class TimelinePainter:
         self._picture: tuple[object, tuple[QPixmap, QPixmap]] | None = None
         self._shapes: tuple[object, dict[int, Shapes]] | None = None
 
-    def paint(self) -> None:
-        """Draw the timeline."""
+    def paint(self, *, gutter_alone: bool) -> None:
+        """Draw the timeline, or the column at its left alone."""
         painter = QPainter(self.view)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.fillRect(self.view.rect(), QColor(style.PANEL))
         if self.session.frames[0] == self.session.frames[1] == 0 and self.session.document is None:
             painter.setPen(QColor(theme.FAINT))
             painter.drawText(self.view.rect(), Qt.AlignmentFlag.AlignCenter, texts.NOTHING_OPEN)
+            return
+        if gutter_alone:
+            self._paint_gutter(painter)
+            paint.focus_frame(painter, self.view)
+            painter.end()
             return
         bands, discs = self._pictures()
         painter.drawPixmap(0, 0, bands)

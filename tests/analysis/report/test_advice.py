@@ -119,7 +119,7 @@ def flashing(frames: int = 9) -> ArrayClip:
     [
         (9, {"method": "static"}, 'method="skew"', {}),
         (9, {"vertices": 9}, "vertices=…", {"vertices": 24}),
-        (15, {"gamma": 0.1}, "gamma=0.0003", FLASH),
+        pytest.param(15, {"gamma": 0.1}, "gamma=0.0003", FLASH, marks=pytest.mark.slow),
     ],
     ids=["static", "vertices", "a flash"],
 )

@@ -169,15 +169,15 @@ TEST(colours_beside_a_face_in_a_plane_of_nodes_are_within_the_tolerance) {
 TEST(beside_a_dent_colours_are_within_the_tolerance) {
     // Faces that see each other, and beyond them colours that jump from one to the other.
     Random random(3);
-    for (std::uint64_t seed = 0; seed < 10; ++seed) {
-        Mesh mesh = random_convex(random, 8 + static_cast<int>(seed % 8));
+    for (int seed = 0; seed < check::rounds(10); ++seed) {
+        Mesh mesh = random_convex(random, 8 + seed % 8);
         Vec3 centre{};
         for (const Vec3& colour : mesh.rgb) {
             for (std::size_t c = 0; c < 3; ++c) {
                 centre[c] += colour[c] / static_cast<double>(mesh.rgb.size());
             }
         }
-        Vec3& dent = mesh.rgb[seed % mesh.rgb.size()];
+        Vec3& dent = mesh.rgb[static_cast<std::size_t>(seed) % mesh.rgb.size()];
         for (std::size_t c = 0; c < 3; ++c) dent[c] += 0.5 * (centre[c] - dent[c]);
         Image image(400, 100, 3);
         for (std::size_t i = 0; i < image.data.size(); i += 3) {
@@ -239,12 +239,12 @@ namespace {
 void check_that_bits_depend_on_pixels_only(const Edited& palette) {
     const auto recolourer = palette.recolourer();
     for (const int channels : {3, 4}) {
-        const Image image = picture(517, 61, channels, 7);
-        Image expected(517, 61, channels);
+        const Image image = picture(517, 23, channels, 7);
+        Image expected(517, 23, channels);
         RecolourOptions options{0.8, channels == 4, 1};
         Lattice(recolourer).apply(image.in(), expected.out(), options);
         for (const InstructionSet set : instruction_sets()) {
-            Image found(517, 61, channels);
+            Image found(517, 23, channels);
             options.instructions = set;
             Lattice(recolourer).apply(image.in(), found.out(), options);
             CHECK(same_bits(found.data, expected.data));
@@ -254,7 +254,7 @@ void check_that_bits_depend_on_pixels_only(const Edited& palette) {
             const Lattice lattice(recolourer);
             options.threads = threads;
             for (int again = 0; again < 2; ++again) {
-                Image found(517, 61, channels);
+                Image found(517, 23, channels);
                 lattice.apply(image.in(), found.out(), options);
                 CHECK(same_bits(found.data, expected.data));
             }
@@ -262,7 +262,7 @@ void check_that_bits_depend_on_pixels_only(const Edited& palette) {
         // Tiles from the last to the first, after a picture of something else.
         const Lattice lattice(recolourer);
         const Image other = picture(200, 50, channels, 8);
-        Image nobody(200, 50, channels), found(517, 61, channels);
+        Image nobody(200, 50, channels), found(517, 23, channels);
         lattice.apply(other.in(), nobody.out(), options);
         constexpr int kTile = 37;
         for (int x = 517 / kTile * kTile; x >= 0; x -= kTile) {
@@ -294,7 +294,7 @@ TEST(threads_of_a_host_share_one_lattice) {
         const Image image = picture(400, 24, 4, 11);
         Image expected(400, 24, 4);
         Lattice(recolourer).apply(image.in(), expected.out(), {1.0, true});
-        for (int again = 0; again < 50; ++again) {
+        for (int again = 0; again < check::rounds(50); ++again) {
             const Lattice lattice(recolourer);
             std::vector<Image> found(4, Image(400, 24, 4));
             std::vector<std::thread> threads;

@@ -43,9 +43,9 @@ int refuse_each(const Mesh& mesh) {
     for (Vec3& colour : colours) colour[0] += 0.1 * random.uniform();
     colours[0][1] += 0.3;
     const auto recolourer = std::make_shared<const Recolourer>(mesh.rgb, colours, mesh.faces);
-    Image image(256, 40, 3);
+    Image image(64, 10, 3);
     for (float& value : image.data) value = static_cast<float>(random.uniform(0, 1));
-    Image expected(256, 40, 3), found(256, 40, 3);
+    Image expected(64, 10, 3), found(64, 10, 3);
     recolourer->apply(image.in(), expected.out(), {});
     for (int refused = 1;; ++refused) {
         const Lattice lattice(recolourer);

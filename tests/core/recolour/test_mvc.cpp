@@ -351,7 +351,7 @@ TEST(the_closest_point_is_never_beaten) {
 
 TEST(weights_are_continuous_across_the_surface) {
     Random random(10);
-    for (int round = 0; round < 100; ++round) {
+    for (int round = 0; round < check::rounds(100); ++round) {
         const Mesh mesh = round % 3 ? random_convex(random, 4 + random.below(12)) : concave_cube();
         const Vec3 centre = round % 3 ? middle(mesh) : Vec3{0.5, 0.5, 0.1};
         for (int i = 0; i < 20; ++i) {
