@@ -56,6 +56,15 @@ def reset(source: Path, folder: Path, count: int) -> None:
         assert palette4d(["edit", str(folder / "stops.p4d.json"), "reset"]) == 0
 
 
+def info(source: Path, folder: Path, count: int) -> None:
+    """`info` and `plot` of stops on one edge."""
+    with_stops(source, folder / "stops.p4d.json", count)
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        assert palette4d(["info", str(folder / "stops.p4d.json")]) == 0
+        plot = ["plot", str(folder / "stops.p4d.json"), "-o", str(folder / "stops.svg")]
+        assert palette4d([*plot, "--force"]) == 0
+
+
 def extra(source: Path, folder: Path, count: int) -> None:
     """One edit of a sidecar with many values that palette4d only keeps."""
     document: dict[str, Any] = json.loads(source.read_text("utf-8"))
@@ -100,7 +109,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("sidecar", nargs="?", type=Path, default=GOLDEN)
     loads: list[tuple[Callable[[Path, Path, int], None], int]] = [
-        (frames, 100_000), (reset, 20_000), (shots, 10_000), (extra, 3_900_000), (edits, 20_000),
+        (frames, 100_000), (info, 20_000), (reset, 20_000), (shots, 10_000), (extra, 3_900_000),
+        (edits, 20_000),
     ]  # fmt: skip
     parser.add_argument("--load", choices=[load.__name__ for load, _ in loads])
     args = parser.parse_args()

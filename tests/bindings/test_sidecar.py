@@ -5,6 +5,7 @@ import json
 import os
 import pickle
 import random
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -66,6 +67,32 @@ def test_golden_files_arrive_unchanged(path: Path) -> None:
     assert read.edits.stops == [
         {**stop, "rgb": tuple(stop["rgb"])} for stop in document["edits"]["stops"]
     ]
+
+
+def test_the_time_of_a_palette_hardly_grows_with_the_stops_of_an_edge() -> None:
+    def seconds(stops: int) -> float:
+        document = golden("split")
+        edge = document["polytope"]["edges"][0]
+        frames = {v["id"]: v["frame"] for v in document["polytope"]["vertices"]}
+        first, last = frames[edge["from"]], frames[edge["to"]]
+        document["edits"]["ramp"] = "smooth"
+        document["edits"]["stops"] = [
+            {
+                "id": f"s{i}",
+                "edge": edge["id"],
+                "frame": first + (last - first) * (i + 1) / (stops + 1),
+                "rgb": [0.5, 0.5, i / stops],
+            }
+            for i in range(stops)
+        ]
+        read = _core.parse_sidecar(json.dumps(document), "many")
+        palette = _core.slice_at(read.polytope, (first + last) / 2)
+        start = time.process_time()
+        for _ in range(500):
+            _core.edited_colours(read.polytope, read.edits, palette)
+        return time.process_time() - start
+
+    assert seconds(20_000) < 8 * min(seconds(100) for _ in range(3))
 
 
 def test_transitions_fill_the_time_between_blocks() -> None:

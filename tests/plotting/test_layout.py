@@ -50,6 +50,19 @@ def test_a_point_on_a_band_finds_its_edge() -> None:
     assert layout.edge_near(400.0, -30.0, 6.0) is None
 
 
+def test_of_stops_that_nobody_can_tell_apart_some_are_drawn() -> None:
+    layout = timeline("v1_edited")
+    _, edge, frame, colour = layout.palette.stops[0]
+    first, last = layout.palette.frames[list(layout.palette.edges[edge])]
+    frames = np.linspace(first, last, 20_000)[1:-1].tolist()
+    layout.palette.stops[:] = [(f"t{k}", edge, at, colour) for k, at in enumerate(frames)]
+    discs = layout.discs(0.0, 800.0)
+    assert 100 < sum(disc.kind == "stop" for disc in discs) <= 801
+    assert 1 < len(disc_names(discs, 8.0, lambda text: 20.0, 1000.0)) < 200
+    layout.palette.stops[:] = [("a", edge, frame, colour), ("b", edge, frame + 1e-6, colour)]
+    assert sum(disc.kind == "stop" for disc in layout.discs(0.0, 800.0)) == 2
+
+
 @pytest.mark.parametrize("width", [800.0, 60.0])
 def test_discs_of_a_row_do_not_overlap(width: float) -> None:
     layout = timeline("v1_edited", width)

@@ -73,7 +73,7 @@ struct Solution {
 
     /// One element per polytope vertex, or none. Linear in time between vertices and keys.
     std::vector<Vec3> vertex_by;
-    /// At most one key per edge and frame; any order.
+    /// At most one key per edge and frame, by edge and frame.
     std::vector<Key> keys;
     std::vector<MovingBump> bumps;
     std::vector<MovingHold> holds;
@@ -84,6 +84,8 @@ struct Edits {
     std::vector<std::optional<Vec3>> vertex_rgb;
     /// At most one stop per edge and frame; any order.
     std::vector<Stop> stops;
+    /// The stops' indices by edge and frame, or none: then each palette sorts them.
+    std::vector<int> stop_order{};
     /// One element per polytope vertex, or none: the ramp on the edges that start there.
     std::vector<std::optional<Ramp>> vertex_ramp{};
     Ramp default_ramp = Ramp::kLinear;

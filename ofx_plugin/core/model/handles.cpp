@@ -43,7 +43,7 @@ Edits with_colours(const Polytope& polytope, const Edits& edits, bool keep,
     const std::size_t vertices = polytope.vertices().size();
     Edits result;
     if (keep) {
-        result = edits;
+        result = edits;  // with the order of its stops
         result.stops.clear();
     }
     result.vertex_rgb.resize(vertices);

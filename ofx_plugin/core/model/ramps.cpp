@@ -2,8 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <numeric>
+#include <optional>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include "model/vec3.hpp"
@@ -27,11 +31,15 @@ Vec3 along(const Vec3& centre, double shade) {
 
 bool still(const Vec3& by) { return by == Vec3{0, 0, 0}; }
 
-/// The displacements of one polytope's handles.
+/// The displacements of one polytope's handles, and which handles are around a frame.
 class Displacements {
 public:
     Displacements(const Polytope& polytope, const Edits& edits)
-        : polytope_(polytope), edits_(edits) {}
+        : polytope_(polytope),
+          edits_(edits),
+          sorted_(edits.stop_order.size() == edits.stops.size() ? std::vector<int>()
+                                                                : order_of(edits.stops)),
+          order_(sorted_.empty() ? edits.stop_order : sorted_) {}
 
     Vec3 of_vertex(int vertex) const {
         if (edits_.vertex_rgb.empty() || !edits_.vertex_rgb[vertex]) return {0, 0, 0};
@@ -44,44 +52,32 @@ public:
         return stop.rgb - mixed(from.rgb, to.rgb, weight_between(from.frame, to.frame, stop.frame));
     }
 
-    /// All handles on an edge, its ends included, in time order.
-    std::vector<Knot> on_edge(int edge) const {
-        const Edge& ends = polytope_.edges()[edge];
-        std::vector<Knot> knots;
-        for (const int end : {ends.from, ends.to}) {
-            knots.push_back({polytope_.vertices()[end].frame, of_vertex(end)});
-        }
-        for (const Stop& stop : edits_.stops) {
-            if (stop.edge == edge) knots.push_back({stop.frame, of_stop(stop)});
-        }
-        std::sort(knots.begin(), knots.end(),
-                  [](const Knot& a, const Knot& b) { return a.frame < b.frame; });
-        return knots;
+    /// The stops of an edge just before (or at) and after a frame; null where there is none.
+    std::pair<const Stop*, const Stop*> around(int edge, double frame) const {
+        const std::ptrdiff_t count = stops_until(edge, frame);
+        return {count > 0 ? &stop(edge, count - 1) : nullptr,
+                count < stops_on(edge) ? &stop(edge, count) : nullptr};
     }
 
     /// A monotone cubic (Fritsch and Butland 1984) along an edge. It goes on across a vertex that
     /// one edge enters and one leaves; where edges split or merge its slope is 0.
     Vec3 smooth(int edge, double frame) const {
-        std::vector<Knot> knots = on_edge(edge);
+        const std::ptrdiff_t to = stops_until(edge, frame) + 1;
         const Edge& ends = polytope_.edges()[edge];
-        const auto after = std::upper_bound(knots.begin(), knots.end(), frame,
-                                            [](double t, const Knot& k) { return t < k.frame; });
-        auto to = static_cast<std::size_t>(after - knots.begin());
-        const bool first = to == 1, last = to + 1 == knots.size();
         bool flat_start = false, flat_end = false;
-        if (first) {
-            if (const int before = only_neighbour(ends.from, true, flat_start); before >= 0) {
-                const std::vector<Knot> earlier = on_edge(before);
-                knots.insert(knots.begin(), earlier[earlier.size() - 2]);
-                ++to;
-            }
+        std::optional<Knot> before, after;
+        if (to > 1) {
+            before = knot(edge, to - 2);
+        } else if (const int last = only_neighbour(ends.from, true, flat_start); last >= 0) {
+            before = knot(last, stops_on(last));
         }
-        if (last) {
-            if (const int next = only_neighbour(ends.to, false, flat_end); next >= 0) {
-                knots.push_back(on_edge(next)[1]);
-            }
+        if (to <= stops_on(edge)) {
+            after = knot(edge, to + 1);
+        } else if (const int next = only_neighbour(ends.to, false, flat_end); next >= 0) {
+            after = knot(next, 1);
         }
-        return cubic(knots, to, flat_start, flat_end, frame);
+        return cubic(before, knot(edge, to - 1), knot(edge, to), after, flat_start, flat_end,
+                     frame);
     }
 
 private:
@@ -98,12 +94,38 @@ private:
         return branches ? -1 : found;
     }
 
-    /// The cubic between knots[to - 1] and knots[to].
-    static Vec3 cubic(const std::vector<Knot>& knots, std::size_t to, bool flat_start,
-                      bool flat_end, double frame) {
-        const Knot &a = knots[to - 1], &b = knots[to];
-        const Knot* const before = to >= 2 ? &knots[to - 2] : nullptr;
-        const Knot* const after = to + 1 < knots.size() ? &knots[to + 1] : nullptr;
+    std::vector<int>::const_iterator first_on(int edge) const {
+        return std::lower_bound(order_.begin(), order_.end(), edge,
+                                [&](int i, int e) { return edits_.stops[i].edge < e; });
+    }
+
+    const Stop& stop(int edge, std::ptrdiff_t i) const { return edits_.stops[first_on(edge)[i]]; }
+
+    std::ptrdiff_t stops_on(int edge) const { return first_on(edge + 1) - first_on(edge); }
+
+    /// How many stops of an edge are not after a frame.
+    std::ptrdiff_t stops_until(int edge, double frame) const {
+        const auto first = first_on(edge);
+        return std::upper_bound(first, first_on(edge + 1), frame,
+                                [&](double t, int i) { return t < edits_.stops[i].frame; }) -
+               first;
+    }
+
+    /// A handle of an edge in time order: 0 is its first vertex, then its stops, its last vertex.
+    Knot knot(int edge, std::ptrdiff_t i) const {
+        const Edge& ends = polytope_.edges()[edge];
+        if (i > 0 && i <= stops_on(edge)) {
+            const Stop& found = stop(edge, i - 1);
+            return {found.frame, of_stop(found)};
+        }
+        const int vertex = i == 0 ? ends.from : ends.to;
+        return {polytope_.vertices()[vertex].frame, of_vertex(vertex)};
+    }
+
+    /// The cubic between a and b.
+    static Vec3 cubic(const std::optional<Knot>& before, const Knot& a, const Knot& b,
+                      const std::optional<Knot>& after, bool flat_start, bool flat_end,
+                      double frame) {
         const double length = b.frame - a.frame;
         const double u = weight_between(a.frame, b.frame, frame);
         Vec3 result{};
@@ -149,23 +171,9 @@ private:
 
     const Polytope& polytope_;
     const Edits& edits_;
+    const std::vector<int> sorted_;
+    const std::vector<int>& order_;
 };
-
-/// The nearest elements of an edge on both sides of a frame; null where a side has none.
-template <class Element>
-std::pair<const Element*, const Element*> around(const std::vector<Element>& elements, int edge,
-                                                 double frame) {
-    const Element *before = nullptr, *after = nullptr;
-    for (const Element& element : elements) {
-        if (element.edge != edge) continue;
-        if (element.frame <= frame) {
-            if (before == nullptr || element.frame > before->frame) before = &element;
-        } else if (after == nullptr || element.frame < after->frame) {
-            after = &element;
-        }
-    }
-    return {before, after};
-}
 
 /// The solution's displacement of a palette colour.
 Vec3 solved(const Polytope& polytope, const Solution& solution, const SlicePoint& point,
@@ -174,7 +182,14 @@ Vec3 solved(const Polytope& polytope, const Solution& solution, const SlicePoint
         return solution.vertex_by.empty() ? Vec3{0, 0, 0} : solution.vertex_by[vertex];
     };
     if (point.edge < 0) return of_vertex(point.from);
-    const auto [before, after] = around(solution.keys, point.edge, frame);
+    const auto& keys = solution.keys;
+    const auto later = std::upper_bound(keys.begin(), keys.end(), std::pair(point.edge, frame),
+                                        [](const auto& place, const Solution::Key& key) {
+                                            return place < std::pair(key.edge, key.frame);
+                                        });
+    const auto on_edge = [&](auto key) { return key->edge == point.edge ? &*key : nullptr; };
+    const Solution::Key* before = later == keys.begin() ? nullptr : on_edge(later - 1);
+    const Solution::Key* after = later == keys.end() ? nullptr : on_edge(later);
     if (before == nullptr && after == nullptr) {
         return mixed(of_vertex(point.from), of_vertex(point.to), point.weight);
     }
@@ -209,6 +224,15 @@ Around<Key> around(const std::vector<Key>& keys, double frame) {
 
 }  // namespace
 
+std::vector<int> order_of(const std::vector<Stop>& stops) {
+    std::vector<int> order(stops.size());
+    std::iota(order.begin(), order.end(), 0);
+    std::sort(order.begin(), order.end(), [&](int a, int b) {
+        return std::tie(stops[a].edge, stops[a].frame) < std::tie(stops[b].edge, stops[b].frame);
+    });
+    return order;
+}
+
 std::vector<Vec3> edited_colours(const Polytope& polytope, const Edits& edits, const Slice& slice) {
     require_vertices("edits", edits.vertex_rgb.size(), polytope);
     require_vertices("ramps", edits.vertex_ramp.size(), polytope);
@@ -229,7 +253,7 @@ std::vector<Vec3> edited_colours(const Polytope& polytope, const Edits& edits, c
     };
     const auto by_handles = [&](const SlicePoint& point, const Vec3& original) {
         if (point.edge < 0) return edited(point.from) ? colour(point.from) : original;
-        const auto [before, after] = around(edits.stops, point.edge, slice.frame);
+        const auto [before, after] = displacements.around(point.edge, slice.frame);
         const Ramp ramp =
             (before ? before->ramp : vertex_ramp(point.from)).value_or(edits.default_ramp);
         if (ramp == Ramp::kLinear) {

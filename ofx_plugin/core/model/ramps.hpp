@@ -9,6 +9,9 @@
 
 namespace palette4d {
 
+/// The indices of stops by edge and frame: Edits::stop_order.
+std::vector<int> order_of(const std::vector<Stop>& stops);
+
 /// The edited colours of a slice's n vertices: displacements go from handle to handle along a ramp,
 /// and the solution is added. Bit-identical to slice.rgb[i] where nothing on the edge moves. Throws
 /// std::invalid_argument for edits of another number of vertices.

@@ -1,10 +1,12 @@
 // The members "edits", "versions" and "colours": the user's edits, the picks and their solution.
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <tuple>
 #include <utility>
 
+#include "model/ramps.hpp"
 #include "model/sidecar_error.hpp"
 #include "sidecar/members.hpp"
 
@@ -74,6 +76,9 @@ Solution read_solution(const Cursor& where, const Polytope& polytope, const Ids&
         const auto [edge, frame] = read_place(entry, polytope, ids, "key", occupied);
         solution.keys.push_back({edge, frame, entry.member("by").rgb()});
     }
+    std::sort(solution.keys.begin(), solution.keys.end(), [](const auto& a, const auto& b) {
+        return std::tie(a.edge, a.frame) < std::tie(b.edge, b.frame);
+    });
 
     const Cursor bumps = where.member("bumps");
     for (std::size_t i = 0, n = bumps.list("bumps"); i < n; ++i) {
@@ -217,6 +222,7 @@ Edits read_edits(const Cursor& where, const Polytope& polytope, const Ids& ids) 
         claim(taken, id, stop.id);
         edits.stops.push_back(std::move(stop));
     }
+    edits.stop_order = order_of(edits.stops);
 
     if (where.has("picks")) {
         const Cursor picks = where.member("picks");

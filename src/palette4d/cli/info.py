@@ -2,6 +2,7 @@
 
 import argparse
 import json
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from palette4d.cli.swatches import row, swatch
@@ -70,6 +71,9 @@ def info_of(document: "Document") -> dict[str, Any]:
     stages = fields["quality"]["stages"]
     vertices = polytope["vertices"]
     names = document.names
+    on_edge: dict[str, list[str]] = {edge["id"]: [] for edge in polytope["edges"]}
+    for stop in stops:
+        on_edge[stop["edge"]].append(stop["id"])
     return {
         "name": clip["name"],
         "source": clip["source"],
@@ -92,7 +96,7 @@ def info_of(document: "Document") -> dict[str, Any]:
         "locks": fields["edits"].get("locks", []),
         "versions": list(document.versions),
         "steps": len(document.history),
-        "tracks": [_track(document, track) for track in document.tracks],
+        "tracks": [_track(document, track, on_edge) for track in document.tracks],
         "losses": stages[-1] if stages else {},
         "stages": stages,
         "palette": [
@@ -104,20 +108,18 @@ def info_of(document: "Document") -> dict[str, Any]:
             }
             for vertex in vertices
         ],
-        "palette_edges": [
-            {**edge, "stops": [stop["id"] for stop in stops if stop["edge"] == edge["id"]]}
-            for edge in polytope["edges"]
-        ],
+        "palette_edges": [{**edge, "stops": on_edge[edge["id"]]} for edge in polytope["edges"]],
         "palette_stops": stops,
         "block_ranges": [[block["first"], block["last"]] for block in polytope["blocks"]],
     }
 
 
-def _track(document: "Document", track: "Track") -> dict[str, Any]:
+def _track(
+    document: "Document", track: "Track", on_edge: Mapping[str, list[str]]
+) -> dict[str, Any]:
     """Return a track with its edited handles, and its colours where they change most."""
-    settings = document.settings
-    edited = [id_ for id_ in track.vertices if id_ in settings]
-    edited += [id_ for id_, setting in settings.items() if setting.edge in track.edges]
+    edited = [id_ for id_ in track.vertices if id_ in document.settings]
+    edited += [id_ for edge in track.edges for id_ in on_edge[edge]]
     inside = {*track.vertices, *track.edges}
     found = []
     frames = [(track.first + track.last) / 2, track.first]

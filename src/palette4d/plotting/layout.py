@@ -4,6 +4,7 @@
 pixels). x is right. y is down; 0 is the top of the first row.
 """
 
+import collections
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -216,7 +217,7 @@ class Timeline:
         return found
 
     def discs(self, low: float, high: float) -> list[Disc]:
-        """Return the vertices and then the stops.
+        """Return the vertices and then the stops; of more stops than units of width, some.
 
         Parameters
         ----------
@@ -224,22 +225,26 @@ class Timeline:
             The smallest and largest x that discs may cover.
         """
         palette = self.palette
-        stops = [self.at(edge, when) for _, edge, when, _ in palette.stops]
-        stop_xy = np.array(stops).reshape(-1, 2)
+        stops = palette.stops
+        places = [self.at(edge, when) for _, edge, when, _ in stops]
+        if len(stops) > high - low:  # nobody can tell these apart: one of each edge and unit
+            first = {(stop[1], round(places[k][0])): k for k, stop in enumerate(stops)}
+            stops, places = [stops[k] for k in first.values()], [places[k] for k in first.values()]
+        stop_xy = np.array(places).reshape(-1, 2)
         home = np.concatenate([self.scale.x(palette.frames), stop_xy[:, 0]])
         y = np.concatenate([self.vertex_y, stop_xy[:, 1]])
         largest = self.radius * self.row_height
-        counts = [len(palette.ids), len(palette.stops)]
+        counts = [len(palette.ids), len(stops)]
         x, radius = place(np.repeat([largest, STOP * largest], counts), home, y, low, high)
         kinds: list[Kind] = ["edited" if changed else "plain" for changed in palette.changed]
-        kinds += ["stop"] * len(palette.stops)
+        kinds += ["stop"] * len(stops)
         before = [*palette.rgb]
-        for _, edge, when, _ in palette.stops:
+        for _, edge, when, _ in stops:
             before.append(palette.colours(edge, np.array([when]), edited=False)[0])
-        after = [*palette.edited, *(stop[3] for stop in palette.stops)]
-        ids = [*palette.ids, *(stop[0] for stop in palette.stops)]
-        frames = [*palette.frames, *(stop[2] for stop in palette.stops)]
-        edges = [-1] * counts[0] + [stop[1] for stop in palette.stops]
+        after = [*palette.edited, *(stop[3] for stop in stops)]
+        ids = [*palette.ids, *(stop[0] for stop in stops)]
+        frames = [*palette.frames, *(stop[2] for stop in stops)]
+        edges = [-1] * counts[0] + [stop[1] for stop in stops]
         return [
             Disc(
                 ids[k],
@@ -391,16 +396,29 @@ def disc_names(
         half = width(text) / 2
         return (x - half, y - tall / 2, x + half, y + tall / 2)
 
-    def free(box: Box, own: str = "") -> bool:
-        others = [*covered, *(other for id_, other in taken.items() if id_ != own)]
-        return box[3] < bottom and not any(_meet(box, other) for other in others)
+    # What is drawn, by columns of the text's height: a box is compared with few others.
+    columns: dict[int, dict[tuple[str, str], Box]] = collections.defaultdict(dict)
 
-    covered: list[Box] = []
+    def across(box: Box) -> range:
+        return range(int(box[0] // tall), int(box[2] // tall) + 1)
+
+    def take(kind: str, id_: str, box: Box) -> None:
+        for column in across(box):
+            columns[column][kind, id_] = box
+
+    def free(box: Box, own: str = "") -> bool:
+        return box[3] < bottom and not any(
+            _meet(box, other)
+            for column in across(box)
+            for key, other in columns[column].items()
+            if key != ("name", own)
+        )
+
     for disc in discs:
         reach = disc.radius + collar
-        covered.append((disc.x - reach, disc.y - reach, disc.x + reach, disc.y + reach))
+        box = (disc.x - reach, disc.y - reach, disc.x + reach, disc.y + reach)
+        take("disc", disc.id, box)
     labels: dict[str, Label] = {}
-    taken: dict[str, Box] = {}
     order = sorted(discs, key=lambda disc: disc.kind == "plain")
     for disc in order:
         text, away = shorten(disc.id), disc.radius + collar + 0.5
@@ -411,7 +429,7 @@ def disc_names(
             places.insert(0, (disc.x + way * (away + half), disc.y))
         found = (place for place in places if free(boxed(text, *place)))
         for x, y in itertools.islice(found, 1):
-            taken[disc.id] = boxed(text, x, y)
+            take("name", disc.id, boxed(text, x, y))
             labels[disc.id] = Label(text, x, y, disc.kind != "plain")
     for disc in order if longer else ():
         if disc.id not in labels or disc.id not in (longer or {}):
@@ -422,7 +440,9 @@ def disc_names(
             x, y = disc.x + way * aside, disc.y + side * (away + tall / 2)
             box = boxed(text, x, y)
             if ends[0] <= box[0] and box[2] <= ends[1] and free(box, disc.id):
-                taken[disc.id] = box
+                for column in columns.values():
+                    column.pop(("name", disc.id), None)
+                take("name", disc.id, box)
                 labels[disc.id] = Label(text, x, y, disc.kind != "plain")
                 break
     return list(labels.values())

@@ -89,6 +89,13 @@ TEST(stops_hold_at_their_frames_and_are_joined_by_lines) {
     CHECK(same_bits(at(20), {0, 1, 1}));
     // Continuous, the boundaries at 8 and 10 and the stops included.
     for (double t = 0; t < 20; t += 0.125) CHECK(apart(at(t), at(t + 1e-9)) < 1e-8);
+    // The order that a sidecar brings along, or none.
+    Edits ordered = edits;
+    ordered.stop_order = order_of(edits.stops);
+    CHECK(ordered.stop_order == (std::vector<int>{1, 2, 0}));
+    for (double t = 0; t <= 20; t += 0.5) {
+        CHECK(same_bits(edited_colours(polytope, ordered, slice_at(polytope, t))[0], at(t)));
+    }
     // Another edge is left alone.
     const Slice slice = slice_at(polytope, 5);
     CHECK(same_bits(edited_colours(polytope, edits, slice)[1], slice.rgb[1]));
@@ -151,7 +158,7 @@ TEST(the_solution_is_added_to_the_edited_colours) {
     Edits edits = no_edits(polytope);
     edits.solution.vertex_by.resize(polytope.vertices().size());
     edits.solution.vertex_by[1] = {0, 0, 0.5};
-    edits.solution.keys = {{0, 10, {0.25, 0, 0}}, {0, 5, {0, 0.5, 0}}};
+    edits.solution.keys = {{0, 5, {0, 0.5, 0}}, {0, 10, {0.25, 0, 0}}};
     const auto by = [&](double t) {
         const Slice slice = slice_at(polytope, t);
         Edits plain = edits;

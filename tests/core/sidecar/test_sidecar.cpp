@@ -227,7 +227,7 @@ TEST(picks_ramps_and_versions_arrive) {
     CHECK(edits.solution.vertex_by[7] == (Vec3{-0.04, 0.015, 0.03}));
     CHECK(edits.solution.vertex_by[0] == (Vec3{0, 0, 0}));
     CHECK_EQUAL(edits.solution.keys.size(), 3u);
-    CHECK_EQUAL(edits.solution.keys[1].frame, 2.5);
+    CHECK_EQUAL(edits.solution.keys[1].frame, 6.0);  // by edge and frame; the file has it first
     CHECK_EQUAL(edits.solution.bumps.size(), 2u);
     CHECK_EQUAL(edits.solution.bumps[0].keys.size(), 4u);
     CHECK(edits.solution.bumps[0].keys[2].by == (Vec3{0.06, -0.04, 0.02}));
