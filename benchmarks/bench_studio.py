@@ -335,7 +335,7 @@ def play(app: QApplication, sidecar: Path, size: tuple[int, int]) -> None:
     """Print what playing 1920x1080 twice drops."""
     bench = Bench(app, sidecar, None, size)
     for number, (shown, dropped, rate) in enumerate(bench.playback(), 1):
-        verdict = "goal" if number == 1 and not dropped else "bar" if not dropped else "MISSED"
+        verdict = ("goal" if not dropped else "") if number == 1 else "MISSED" if dropped else "bar"
         print(
             f"playback 1080p, pass {number}: {shown} shown, {dropped} dropped, {rate:.1f} fps"
             f"   {verdict}",

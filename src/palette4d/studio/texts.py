@@ -17,6 +17,12 @@ CLIP_MISSING = (
 OTHER_SIZE = (
     "the palette is of a clip with {own} pixels, this clip has {found}: check that it is the clip"
 )
+#: What errors of the API advise, and what the window offers.
+REMEDIES = {
+    "Give the palette's clip as clip=…, or pick by colour=… with follow=False": (
+        "File > Find the clip… opens the palette's own"
+    ),
+}
 LACKS_FRAMES = "the clip lacks {count} frames of the palette, the first is {first}"
 UNDONE = "undone"
 REDONE = "redone"

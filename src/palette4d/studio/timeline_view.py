@@ -81,7 +81,7 @@ class TimelineView(QWidget):
         self.setMouseTracking(True)
         self.setAccessibleName(texts.TIMELINE)
         self.places = Places(session, lambda: (self.width(), self.height()))
-        self.strip = FrameStrip(session, self.places, self.update)
+        self.strip = FrameStrip(session, self.places, self._strip_changed)
         self.painter = TimelinePainter(self, session, self.places, self.strip)
         self._press: Press | None = None
         self.menu_actions = view_actions(self, TIMELINE_ACTIONS)
@@ -131,7 +131,10 @@ class TimelineView(QWidget):
     def _pixels_arrived(self) -> None:
         if not self.strip.settled:
             self.strip.changed()
-            self.update()
+            self._strip_changed()
+
+    def _strip_changed(self) -> None:
+        self.update(0, RULER, self.width(), STRIP)
 
     def _frame_moved(self) -> None:
         places = self.places
@@ -149,7 +152,7 @@ class TimelineView(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:
         """Draw the timeline."""
         self.strip.ratio = self.devicePixelRatioF()
-        self.painter.paint(gutter_alone=event.rect().right() < GUTTER)
+        self.painter.paint(event.rect())
 
     # -------------------------------------------------------------------------------- zoom and pan
 
