@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from palette4d import _core
+from palette4d.grade.bumps import alongs
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -168,14 +169,12 @@ def against_peers(
 
 
 def bumps_in(image: F32, radius: float = 0.07, seed: int = 3) -> F64:
-    """Make (9, 8) bumps at a picture's colours: three picks, and two holds of three shades each."""
+    """Make (5, 11) bumps at a picture's colours: three picks and two holds."""
     rng = np.random.default_rng(seed)
-    centres = rng.choice(image.reshape(-1, image.shape[2])[:, :3], 5)
-    shades = [centre * scale for centre in centres[3:] for scale in (1, 0.83, 1.17)]
-    places = np.vstack([centres[:3], *shades])
-    by, keep = rng.uniform(-0.2, 0.2, (9, 3)), np.repeat([0.0, 1.0], [3, 6])
+    centres = rng.choice(image.reshape(-1, image.shape[2])[:, :3], 5).astype(np.float64)
+    by, keep = rng.uniform(-0.2, 0.2, (5, 3)), np.repeat([0.0, 1.0], [3, 2])
     by[3:] = 0
-    return np.column_stack([places, np.full(9, radius), by, keep])
+    return np.column_stack([centres, np.full(5, radius), by, keep, alongs(centres, 0.55)])
 
 
 def with_picks(what: str, palette: Palette, image: F32, runs: int) -> None:

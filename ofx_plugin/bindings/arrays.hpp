@@ -28,7 +28,7 @@ std::vector<std::array<double, 4>> vertices_from(const py::object& object, const
 std::vector<double> numbers_from(const py::object& object, const char* what);
 /// (f, 3) integers; an empty array of any shape means no faces.
 std::vector<Face> faces_from(const py::object& object);
-/// (n, 8): centre, radius, displacement, keep. None means no bumps.
+/// (n, 11): centre, radius, displacement, keep, along. None means no bumps.
 std::vector<Bump> bumps_from(const py::object& object);
 /// (n,) float64.
 DoubleArray to_array(const std::vector<double>& numbers);
@@ -36,7 +36,7 @@ DoubleArray to_array(const std::vector<double>& numbers);
 DoubleArray to_array(const std::vector<Vec3>& colours);
 /// (n, 4) float64.
 DoubleArray to_array(const std::vector<std::array<double, 4>>& vertices);
-/// (n, 8) float64, as bumps_from() takes it.
+/// (n, 11) float64, as bumps_from() takes it.
 DoubleArray to_array(const std::vector<Bump>& bumps);
 /// (f, 3) int32.
 IntArray to_array(const std::vector<Face>& faces);

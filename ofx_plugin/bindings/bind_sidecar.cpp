@@ -159,6 +159,7 @@ py::dict solution_of(const NamedEdits& self) {
         py::dict entry;
         entry["radius"] = bump.radius;
         entry["keys"] = steps;
+        if (bump.shade < 1) entry["shade"] = bump.shade;
         bumps.append(entry);
     }
     for (const auto& hold : solution.holds) {
@@ -173,6 +174,7 @@ py::dict solution_of(const NamedEdits& self) {
         }
         py::dict entry;
         entry["keys"] = steps;
+        if (hold.shade < 1) entry["shade"] = hold.shade;
         holds.append(entry);
     }
     py::dict result;
@@ -224,9 +226,8 @@ void bind_sidecar(py::module_& module) {
                                [](const NamedEdits& self) { return name_of(self.default_ramp); })
         .def_property_readonly("solution", &solution_of)
         .def_property_readonly("empty", &empty)
-        .def(
-            "bumps_at", &bumps_of, py::arg("frame"),
-            "(n, 8) float64: centre, radius, displacement and keep of bumps and holds at a frame.");
+        .def("bumps_at", &bumps_of, py::arg("frame"),
+             "(n, 11) float64: centre, radius, displacement, keep and along of bumps and holds.");
 
     py::class_<BoundSidecar>(module, "Sidecar", "A validated sidecar file.")
         .def_property_readonly("clip", &clip_of)

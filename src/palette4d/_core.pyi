@@ -53,12 +53,12 @@ class Edits:
         """The ramp of all other handles: "linear", "smooth" or "hold"."""
     @property
     def solution(self) -> dict[str, Any]:
-        """vertices, keys, bumps and holds as in the file, without vertices that do not move."""
+        """The members in the file, without vertices that do not move."""
     @property
     def empty(self) -> bool:
         """Whether nothing is edited: no vertex, no stop and no solution."""
     def bumps_at(self, frame: float) -> F64:
-        """(n, 8) float64: centre (3), radius, displacement (3), keep; bumps, then holds."""
+        """(n, 11) float64: centre (3), radius, displacement (3), keep, along (3); holds last."""
 
 class ColourConversion:
     """A chain of matrices and curves; see docs/sidecar.md."""
@@ -148,9 +148,9 @@ def polytope_weights(points: ArrayLike, polytope: Polytope, frame: float) -> F64
 class Recolourer:
     """One frame's recolouring: p' = p + strength * (sum_i w_i(q) (v'_i - v_i) + bumps at p).
 
-    `bumps` is (n, 8), as `Edits.bumps_at` gives it. A bump at `centre` with a `radius` moves p by
-    b = max(0, 1 - |p - centre|^2 / radius^2)^3 times its displacement. Where `keep` is above 0, it
-    multiplies what all others move p by 1 - keep b: a hold.
+    `bumps` is (n, 11), as `Edits.bumps_at` gives it. A bump moves p by b times its displacement,
+    with v = p - centre and b = max(0, 1 - (|v|^2 - (along . v)^2) / radius^2)^3. Where `keep` is
+    above 0, it multiplies what all others move p by 1 - keep (1 - (1 - b)^3): a hold.
     """
 
     def __init__(

@@ -38,13 +38,13 @@ def test_a_version_outlives_its_sidecar() -> None:
 
 def test_bumps_at_a_frame() -> None:
     read = _core.read_sidecar(PICKS)
-    moving = [0.405, 0.3, 0.25, 0.125, 0.05, -0.025, -0.025, 0]
-    still = [0.5, 0.35, 0.2, 0.3, -0.03, 0.08, 0.04, 0]
+    moving = [0.405, 0.3, 0.25, 0.125, 0.05, -0.025, -0.025, 0, 0, 0, 0]
+    still = [0.5, 0.35, 0.2, 0.3, -0.03, 0.08, 0.04, 0, 0, 0, 0]
     np.testing.assert_allclose(read.bumps_at(1), [moving, still], rtol=0, atol=1e-15)
     assert read.bumps_at(0).tolist() == [still]  # what does not move is left out
     assert read.bumps_at(-99).tolist() == read.bumps_at(0).tolist()
     assert read.bumps_at(1e9).tolist() == read.edits.bumps_at(20).tolist() == [still]
-    assert read.versions[1][1].bumps_at(3).shape == (0, 8)
+    assert read.versions[1][1].bumps_at(3).shape == (0, 11)
     for bad in (read.bumps_at, read.edits.bumps_at):
         with pytest.raises(ValueError, match="not a number"):
             bad(float("nan"))
@@ -53,12 +53,13 @@ def test_bumps_at_a_frame() -> None:
 @pytest.mark.parametrize(
     ("bumps", "message"),
     [
-        ([[0, 0, 0, 1]], r"expected \(n, 8\)"),
-        (np.zeros(8), r"expected \(n, 8\)"),
-        ([[0, 0, 0, 0, 1, 1, 1, 0]], "no radius"),
-        ([[0, 0, np.nan, 1, 1, 1, 1, 0]], "not finite"),
-        ([[0, 0, 0, 1, 1, 1, 1, 2]], "expected 0 to 1"),
-        ([["a"] * 8], "real numbers"),
+        ([[0, 0, 0, 1]], r"expected \(n, 11\)"),
+        (np.zeros(11), r"expected \(n, 11\)"),
+        ([[0, 0, 0, 0, 1, 1, 1, 0, 0, 0, 0]], "no radius"),
+        ([[0, 0, np.nan, 1, 1, 1, 1, 0, 0, 0, 0]], "not finite"),
+        ([[0, 0, 0, 1, 1, 1, 1, 2, 0, 0, 0]], "expected 0 to 1"),
+        ([[0, 0, 0, 1, 1, 1, 1, 0, 0.6, 0.8, 0]], "shorter `along`"),
+        ([["a"] * 11], "real numbers"),
     ],
 )
 def test_bad_bumps_are_refused_in_words(bumps: object, message: str) -> None:
@@ -68,5 +69,5 @@ def test_bad_bumps_are_refused_in_words(bumps: object, message: str) -> None:
 
 def test_bumps_alone_are_no_identity() -> None:
     assert _core.Recolourer(RGB, RGB, FACES, bumps=None).identity
-    assert _core.Recolourer(RGB, RGB, FACES, bumps=np.zeros((0, 8))).identity
-    assert not _core.Recolourer(RGB, RGB, FACES, bumps=[[0, 0, 0, 1, 0, 0, 1, 0]]).identity
+    assert _core.Recolourer(RGB, RGB, FACES, bumps=np.zeros((0, 11))).identity
+    assert not _core.Recolourer(RGB, RGB, FACES, bumps=[[0, 0, 0, 1, 0, 0, 1, 0, 0, 0, 0]]).identity

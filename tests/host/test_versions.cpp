@@ -10,11 +10,13 @@ using palette4d::Vec3;
 
 namespace {
 
-/// A bump that moves most colours of the test picture, a vertex that moves too, and two versions.
+/// A bump that moves most colours of the test picture, a hold, a vertex that moves too, and two
+/// versions.
 const std::string kSolution =
     R"("solution": {"vertices": [{"vertex": "v2", "by": [0.125, 0, -0.0625]}], "keys": [],
-    "bumps": [{"radius": 1.5, "keys": [{"frame": 11, "rgb": [0.5, 0.5, 0.5], "by": [0.25, -0.125, 0]},
-    {"frame": 19, "rgb": [0.4, 0.5, 0.6], "by": [0, 0.125, 0.25]}]}]})";
+    "bumps": [{"radius": 1.5, "shade": 0.75, "keys": [{"frame": 11, "rgb": [0.5, 0.5, 0.5], "by": [0.25, -0.125, 0]},
+    {"frame": 19, "rgb": [0.4, 0.5, 0.6], "by": [0, 0.125, 0.25]}]}],
+    "holds": [{"shade": 0.5, "keys": [{"frame": 9, "rgb": [0.5, 0.25, 0.5], "radius": 0.5, "keep": 1}]}]})";
 
 std::string text_with(const std::string& solution, const std::string& versions) {
     std::string text = sidecar_text();

@@ -82,18 +82,19 @@ def edited(
     return result
 
 
-def bump(radius: float, *keys: tuple[float, Colour, Colour]) -> dict[str, Any]:
+def bump(radius: float, *keys: tuple[float, Colour, Colour], **shade: float) -> dict[str, Any]:
     """A bump of a solution: its keys are frame, centre and displacement."""
     return {
         "radius": radius,
+        **shade,
         "keys": [{"frame": t, "rgb": list(rgb), "by": list(by)} for t, rgb, by in keys],
     }
 
 
-def hold(*keys: tuple[float, Colour, float, float]) -> dict[str, Any]:
+def hold(*keys: tuple[float, Colour, float, float], **shade: float) -> dict[str, Any]:
     """A hold of a solution: its keys are frame, centre, radius and keep."""
     names = ("frame", "rgb", "radius", "keep")
-    return {"keys": [dict(zip(names, key, strict=True)) for key in keys]}
+    return {"keys": [dict(zip(names, key, strict=True)) for key in keys], **shade}
 
 
 def solution(
@@ -333,7 +334,10 @@ def all_documents() -> dict[str, Document]:
                 {},
                 [],
                 [bump(0.9, (0, (0.4, 0.3, 0.2), (0.1, -0.2, 0.05)))],
-                [hold((0, (0.6, 0.3, 0.3), 0.4, 0.5)), hold((0, (0.2, 0.2, 0.2), 0.5, 1))],
+                [
+                    hold((0, (0.6, 0.3, 0.3), 0.4, 0.5)),
+                    hold((0, (0.2, 0.2, 0.2), 0.5, 1), shade=0.5),
+                ],
             ),
         ),
         "changes-holds": edited(
@@ -343,8 +347,8 @@ def all_documents() -> dict[str, Document]:
             solution=solution(
                 {},
                 [],
-                [bump(0.5, (15, (0.5, 0.4, 0.3), (0.2, -0.1, 0.1)))],
-                [hold((10, (0.4, 0.4, 0.4), 0.3, 0), (20, (0.6, 0.5, 0.3), 0.6, 1))],
+                [bump(0.5, (15, (0.5, 0.4, 0.3), (0.2, -0.1, 0.1)), shade=0.55)],
+                [hold((10, (0.4, 0.4, 0.4), 0.3, 0), (20, (0.6, 0.5, 0.3), 0.6, 1), shade=0.7)],
             ),
         ),
         "changes-back": edited(changes, {"b0": (1.0, 0.0, 0.0)}, []),

@@ -221,25 +221,31 @@ def edited_colours(document: Document, frame: float) -> F64:
     return np.array(rows).reshape(-1, 3)
 
 
-Bump = tuple[F64, float, F64, float]
+Bump = tuple[F64, float, F64, float, F64]
 
 
 def bumps_at(document: Document, frame: float) -> list[Bump]:
-    """Centre, radius, displacement and keep of every bump and hold at a frame."""
+    """Centre, radius, displacement, keep and along of every bump and hold at a frame."""
     frame = clamped(document, frame)
+    solution = document["edits"].get("solution", {"bumps": []})
+
+    def along(centre: F64, entry: Document) -> F64:
+        longer = np.sqrt(1 - entry.get("shade", 1) ** 2)
+        return longer / max(float(np.linalg.norm(centre)), 0.6) * centre
+
     found = []
-    for bump in document["edits"].get("solution", {"bumps": []})["bumps"]:
+    for bump in solution["bumps"]:
         keys = bump["keys"]
         times = [key["frame"] for key in keys]
         rows = np.array([[*key["rgb"], *key["by"]] for key in keys])
         now = np.array([np.interp(frame, times, column) for column in rows.T])
-        found.append((now[:3], float(bump["radius"]), now[3:], 0.0))
-    for hold in document["edits"].get("solution", {}).get("holds", []):
+        found.append((now[:3], float(bump["radius"]), now[3:], 0.0, along(now[:3], bump)))
+    for hold in solution.get("holds", []):
         keys = hold["keys"]
         times = [key["frame"] for key in keys]
         rows = np.array([[*key["rgb"], key["radius"], key["keep"]] for key in keys])
         now = np.array([np.interp(frame, times, column) for column in rows.T])
-        found.append((now[:3], float(now[3]), np.zeros(3), float(now[4])))
+        found.append((now[:3], float(now[3]), np.zeros(3), float(now[4]), along(now[:3], hold)))
     return found
 
 
@@ -424,9 +430,11 @@ def recolour(
                 continue
             weights, _ = palette_weights([own], original, faces)
             moved = weights[0] @ displacement
-            for centre, radius, by, keep in bumps:
-                part = max(1 - float(((own - centre) ** 2).sum()) / radius**2, 0.0) ** 3
-                moved = (moved + part * by) * (1 - part * keep)
+            for centre, radius, by, keep, along in bumps:
+                away = own - centre
+                distance2 = float(away @ away - (along @ away) ** 2)
+                part = max(1 - distance2 / radius**2, 0.0) ** 3
+                moved = (moved + part * by) * (1 - (1 - (1 - part) ** 3) * keep)
             moved = alpha * strength * moved
             for channel in range(3):
                 if moved[channel] != 0:

@@ -165,7 +165,7 @@ def test_bumps_add_to_what_the_palette_does() -> None:
     plain["edits"]["solution"]["bumps"] = []
     colours = image[finite].astype(float)
     wanted = np.zeros_like(colours)
-    for centre, radius, by, _ in bumps_at(document, frame):
+    for centre, radius, by, *_ in bumps_at(document, frame):
         within = 1 - ((colours - centre) ** 2).sum(axis=1, keepdims=True) / radius**2
         wanted += np.maximum(within, 0) ** 3 * by
     for code in (CORE, FAST, LATTICE):

@@ -78,7 +78,7 @@ def settle(qtbot: Any) -> Callable[[Window], None]:
             and picture.request.sides == frozenset(window.viewer.sides)
             and picture.request.region == window.viewer.region()
             and picture.request.matte == session.hover
-            and picture.request.key == window.viewer._before_key()
+            and picture.request.against == window.viewer._before_key()
         )
 
     return lambda window: qtbot.waitUntil(lambda: shown(window), timeout=30_000)

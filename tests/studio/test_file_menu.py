@@ -41,7 +41,7 @@ def test_a_broken_sidecar_is_a_message(window: Window, tmp_path: Path, text: str
 
 
 def test_a_palette_of_one_colour_and_a_clip_of_another_size(
-    window: Window, tmp_path: Path, settle: Settle
+    window: Window, tmp_path: Path, settle: Settle, qtbot: Any
 ) -> None:
     clip, other = tmp_path / "grey", tmp_path / "other"
     for folder, width in ((clip, 64), (other, 32)):
@@ -59,6 +59,10 @@ def test_a_palette_of_one_colour_and_a_clip_of_another_size(
     window.session.find_clip(str(other))
     settle(window)
     assert "32x36" in window.session.status.text
+    QTest.mouseClick(window.viewer, Qt.MouseButton.LeftButton, pos=window.viewer.rect().center())
+    window.inspector.boxes["R"].setValue(0.9)
+    qtbot.waitUntil(lambda: window.session.status.level == "error", timeout=10_000)
+    assert "File > Find the clip" in window.session.status.text
 
 
 def test_an_edit_is_analysed_and_its_manifest_opens_as_a_list_of_shots(

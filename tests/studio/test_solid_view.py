@@ -71,7 +71,10 @@ def colour(view: SolidView, id_: str) -> np.ndarray:
 
 def test_a_dragged_colour_follows_the_pointer(qtbot: Any, view: SolidView) -> None:
     start = at(view, "v2")
+    move(view, start)
+    assert view.session.hover == "v2"
     drag(qtbot, view, start, QPoint(-30, -20))
+    assert view.session.hover is None  # the picture shows the edit, not the matte
     end = at(view, "v2")
     assert (end - start - QPoint(-30, -20)).manhattanLength() <= 2
     assert view.session.selection == ("v2",)

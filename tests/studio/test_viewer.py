@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import shutil
 from pathlib import Path
 from typing import Any
@@ -9,12 +10,29 @@ from typing import Any
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+from numpy.typing import NDArray
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from windows import FRAME, Settle, busiest, seen
 
 from palette4d.cli.main import main
+from palette4d.studio import player
+from palette4d.studio.viewer import REST
 from palette4d.studio.window import Window
+
+
+def result_of(window: Window) -> NDArray[np.float32]:
+    """Return the code values that the exact picture was painted from."""
+    picture = window.viewer.picture
+    assert picture is not None
+    assert picture.exact
+    request = picture.request
+    assert request.region.whole
+    assert request.grade is not None
+    result = window.viewer.preview.exact(request.pixels, request.grade, request.premultiplied)
+    painter = request.display.painter(request.look)
+    assert np.array_equal(picture.after, painter.paint(result[..., :3]))
+    return result
 
 
 def test_the_exact_picture_has_the_bits_of_render(
@@ -29,12 +47,10 @@ def test_the_exact_picture_has_the_bits_of_render(
     words = ["render", str(sidecar), clip, "-o", str(tmp_path / "out.####.tif"), "--bits", "32"]
     assert main([*words, "--frames", str(FRAME), "--quiet"]) == 0
     rendered = oiio.ImageBuf(str(out)).get_pixels(oiio.FLOAT)
-    picture = opened.viewer.picture
-    assert picture is not None
-    assert picture.exact
-    assert picture.result is not None
-    assert np.array_equal(picture.result, rendered[..., : picture.result.shape[2]])
-    assert not np.array_equal(picture.result, picture.request.pixels)
+    result = result_of(opened)
+    assert np.array_equal(result, rendered[..., : result.shape[2]])
+    assert opened.viewer.picture is not None
+    assert not np.array_equal(result, opened.viewer.picture.request.pixels)
 
 
 def test_a_picked_colour_has_the_bits_of_render(
@@ -55,12 +71,10 @@ def test_a_picked_colour_has_the_bits_of_render(
     words = ["render", str(sidecar), clip, "-o", out, "--bits", "32", "--frames", str(FRAME)]
     assert main([*words, "--quiet"]) == 0
     rendered = oiio.ImageBuf(str(tmp_path / "picked.0006.tif")).get_pixels(oiio.FLOAT)
-    picture = opened.viewer.picture
-    assert picture is not None
-    assert picture.result is not None
-    assert np.array_equal(picture.result, rendered[..., : picture.result.shape[2]])
+    result = result_of(opened)
+    assert np.array_equal(result, rendered[..., : result.shape[2]])
     y, x = place.y, place.x
-    assert np.abs(picture.result[y, x] - (0.9, 0.1, 0.5)).max() < 0.05
+    assert np.abs(result[y, x] - (0.9, 0.1, 0.5)).max() < 0.05
 
 
 def test_alt_click_is_a_hold_as_the_verb_makes_it(
@@ -82,17 +96,29 @@ def test_alt_click_is_a_hold_as_the_verb_makes_it(
     assert sidecar.read_bytes() == twin.read_bytes()
 
 
-def test_the_picture_of_a_drag_is_near_the_exact_one(opened: Window, settle: Settle) -> None:
+def test_the_picture_of_a_drag_is_near_the_exact_one(
+    opened: Window, settle: Settle, monkeypatch: pytest.MonkeyPatch
+) -> None:
     id_ = busiest(opened)
     opened.session.edit(lambda document: document.set(id_, rgb=(0.9, 0.3, 0.1)))
     settle(opened)
     exact = opened.viewer.picture
     assert exact is not None
-    quick = opened.viewer.preview.make(exact.request, exact=False)
+    monkeypatch.setattr(player, "MOST_MOVING", 160 * 90 // 3)
+    moving = dataclasses.replace(exact.request, settled=False)
+    coarse = opened.viewer.preview.make(moving, exact=False).after
     assert exact.after is not None
-    assert quick.after is not None
-    assert quick.after.shape == exact.after.shape
-    assert np.abs(quick.after.astype(int) - exact.after.astype(int)).mean() < 1.5
+    assert coarse is not None
+    assert coarse.shape == (45, 80, 4)
+    mean = exact.after.reshape(45, 2, 80, 2, 4).mean(axis=(1, 3))
+    assert np.abs(coarse - mean).mean() < 1.5
+    # Back from another frame, the exact picture that was made is there at once.
+    opened.session.go(FRAME + 1)
+    settle(opened)
+    opened.session.go(FRAME)
+    settle(opened)
+    assert opened.viewer.picture is not None
+    assert opened.viewer.picture.after is exact.after
 
 
 def test_the_view_is_not_clamped_before_the_display(opened: Window, settle: Settle) -> None:
@@ -150,13 +176,25 @@ def test_the_probe_says_what_the_frame_has(opened: Window, settle: Settle) -> No
     picture = opened.viewer.picture
     assert probe is not None
     assert picture is not None
-    assert picture.result is not None
     x, y = probe.x, probe.y
     assert abs(x - 100) <= 1
     assert abs(y - 40) <= 1
     assert probe.source == tuple(float(v) for v in picture.request.pixels[y, x])
-    assert probe.result == tuple(float(v) for v in picture.result[y, x])
+    assert probe.result == tuple(float(v) for v in result_of(opened)[y, x])
     assert sum(probe.weights.values()) == pytest.approx(1, abs=1e-6)
+
+
+def test_a_frame_that_fills_the_memory_can_be_picked(
+    opened: Window, settle: Settle, qtbot: Any
+) -> None:
+    player = opened.session.player
+    assert player is not None
+    player._frames.limit = 1
+    opened.session.go(FRAME + 1)
+    settle(opened)
+    qtbot.wait(3 * REST)  # the frames around it would be read meanwhile
+    QTest.mouseClick(opened.viewer, Qt.MouseButton.LeftButton, pos=opened.viewer.rect().center())
+    assert opened.session.place is not None
 
 
 def test_hovering_over_a_handle_shows_its_matte(opened: Window, settle: Settle) -> None:

@@ -27,17 +27,19 @@ Four size_of(Four colour, Four moved, const BumpPlan<float>& bumps) {
     Four exact = colour + moved;
     for (int b = 0; b < bumps.count; ++b) {
         const BumpPlan<float>::One& bump = bumps.bumps[b];
-        float distance2 = 0;
+        float distance2 = 0, along = 0;
         for (int c = 0; c < 3; ++c) {
             const float away = bump.high[c] - colour[c];
             distance2 += away * away;
+            along += bump.along[c] * away;
         }
-        const float t = std::max(0.0f, 1 - distance2 * bump.inverse_radius2);
+        const float t = std::max(0.0f, 1 - (distance2 - along * along) * bump.inverse_radius2);
+        const float weight = t * t * t, rest = 1 - weight;
         if (bump.keep > 0) {
-            exact = colour + (1 - bump.keep * (t * t * t)) * (exact - colour);
+            exact = colour + (1 - bump.keep * (1 - rest * rest * rest)) * (exact - colour);
             continue;
         }
-        for (int c = 0; c < 3; ++c) exact[c] += t * t * t * bump.by[c];
+        for (int c = 0; c < 3; ++c) exact[c] += weight * bump.by[c];
     }
     const Four least = all_four(0.1f);
     return where_negative(colour * exact, least, max(abs(exact), least));

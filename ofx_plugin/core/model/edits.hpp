@@ -27,14 +27,17 @@ struct Stop {
 };
 
 /// A colour's neighbourhood that moves by itself, on top of the palette. The displacement of a
-/// colour c is max(0, 1 - |c - centre|^2 / radius^2)^3 by.
+/// colour c is w by, with v = c - centre and
+/// w = max(0, 1 - (|v|^2 - (along . v)^2) / radius^2)^3.
 struct Bump {
     Vec3 centre;
     double radius;  ///< where the bump ends, in the palette's code values
     Vec3 by;        ///< the displacement at its centre
     /// Where above 0 this is a hold: the displacement by the palette and by all other bumps is
-    /// multiplied by 1 - keep max(0, 1 - |c - centre|^2 / radius^2)^3. `by` does not count.
+    /// multiplied by 1 - keep (1 - (1 - w)^3). `by` does not count.
     double keep = 0;
+    /// Shorter than 1; 0 for a sphere. The bump is longer this way, by 1 / sqrt(1 - |along|^2).
+    Vec3 along{};
 };
 
 /// Displacements that meet the user's picks, added to the edited colours.
@@ -53,6 +56,8 @@ struct Solution {
     struct MovingBump {
         double radius;
         std::vector<BumpKey> keys;  ///< at least one, in increasing frame order
+        /// Distances to shades of the centre, lighter and darker, count this; 0 < shade <= 1.
+        double shade = 1;
     };
 
     struct HoldKey {
@@ -63,6 +68,7 @@ struct Solution {
     /// A hold over time, as a bump.
     struct MovingHold {
         std::vector<HoldKey> keys;
+        double shade = 1;
     };
 
     /// One element per polytope vertex, or none. Linear in time between vertices and keys.

@@ -17,6 +17,14 @@ struct Knot {
     Vec3 by;
 };
 
+/// Below this length of a colour, its shades are less and less certain: all are near black.
+constexpr double kDark = 0.6;
+
+/// Bump::along of a bump at a colour: the ray from black through it has its shades.
+Vec3 along(const Vec3& centre, double shade) {
+    return std::sqrt(1 - shade * shade) / std::max(norm(centre), kDark) * centre;
+}
+
 bool still(const Vec3& by) { return by == Vec3{0, 0, 0}; }
 
 /// The displacements of one polytope's handles.
@@ -257,13 +265,15 @@ std::vector<Bump> bumps_at(const Edits& edits, double frame) {
     for (const Solution::MovingBump& bump : edits.solution.bumps) {
         const auto [a, b, weight] = around(bump.keys, frame);
         const Vec3 by = mixed(a.by, b.by, weight);
-        if (!still(by)) result.push_back({mixed(a.centre, b.centre, weight), bump.radius, by});
+        const Vec3 centre = mixed(a.centre, b.centre, weight);
+        if (!still(by)) result.push_back({centre, bump.radius, by, 0, along(centre, bump.shade)});
     }
     for (const Solution::MovingHold& hold : edits.solution.holds) {
         const auto [a, b, weight] = around(hold.keys, frame);
         const double keep = (1 - weight) * a.keep + weight * b.keep;
         const double radius = (1 - weight) * a.radius + weight * b.radius;
-        if (keep > 0) result.push_back({mixed(a.centre, b.centre, weight), radius, {}, keep});
+        const Vec3 centre = mixed(a.centre, b.centre, weight);
+        if (keep > 0) result.push_back({centre, radius, {}, keep, along(centre, hold.shade)});
     }
     return result;
 }

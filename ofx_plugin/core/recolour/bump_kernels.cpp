@@ -11,10 +11,17 @@ using palette4d::BumpPlan;
 template <class T>
 using Channels = BumpKernels::Channels<T>;
 
-/// 1 - |v|^2 / radius^2 for v = centre - colour.
+template <class T>
+PALETTE4D_INLINE Lanes<T> square(const Lanes<T> (&v)[3]) {
+    return v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+}
+
+/// 1 - (|v|^2 - (along . v)^2) / radius^2 for v = centre - colour.
 template <class T>
 PALETTE4D_INLINE Lanes<T> within(const typename BumpPlan<T>::One& bump, const Lanes<T> (&v)[3]) {
-    return all(T(1)) - (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) * all(bump.inverse_radius2);
+    const Lanes<T> along =
+        v[0] * all(bump.along[0]) + v[1] * all(bump.along[1]) + v[2] * all(bump.along[2]);
+    return all(T(1)) - (square<T>(v) - along * along) * all(bump.inverse_radius2);
 }
 
 /// Adds to `moved` bump by bump, and scales its `rows` by holds. `low` may be null. False when no
@@ -52,14 +59,16 @@ PALETTE4D_INLINE bool add_all(const BumpPlan<T>& plan, Channels<const T> high,
                            below = zero - away(bump, c, least[c], least_rest[c]);
             v[c] = max(max(above, below), zero);
         }
-        if (!any(within(bump, v) > zero)) continue;
+        if (!any(all(T(1)) - square<T>(v) * all(bump.inverse_reach2) > zero)) continue;
         for (int at = 0; at < count; at += n) {
             for (int c = 0; c < 3; ++c) {
                 v[c] = away(bump, c, load(high[c] + at), low ? load(low[c] + at) : zero);
             }
             const Lanes<T> t = max(within(bump, v), zero), weight = t * t * t;
             if (bump.keep > 0) {
-                const Lanes<T> scale = all(T(1)) - weight * all(bump.keep);
+                const Lanes<T> rest = all(T(1)) - weight;
+                const Lanes<T> scale =
+                    all(T(1)) - (all(T(1)) - rest * rest * rest) * all(bump.keep);
                 for (int c = 0; c < rows; ++c) store(moved[c] + at, load(moved[c] + at) * scale);
                 continue;
             }

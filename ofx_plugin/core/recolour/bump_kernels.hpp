@@ -11,6 +11,9 @@ struct BumpPlan {
     struct One {
         T high[3], low[3];
         T inverse_radius2;
+        T along[3];
+        /// 1 / (half the bump's length)^2, or a little less: no colour beyond has any weight.
+        T inverse_reach2;
         T by[3];
         T keep;  ///< above 0 for holds, which come last
     };

@@ -36,6 +36,11 @@ Recolourer::Recolourer(std::vector<Vec3> original, const std::vector<Vec3>& edit
             throw std::invalid_argument(
                 "recolour: found a bump with a number that is not finite, or with no radius");
         }
+        if (!(dot(bump.along, bump.along) < 1)) {
+            throw std::invalid_argument(
+                "recolour: found a bump that is infinitely long, expected a shorter `along` than "
+                "1");
+        }
         if (!(bump.keep >= 0 && bump.keep <= 1)) {
             throw std::invalid_argument("recolour: found a hold that keeps " +
                                         std::to_string(bump.keep) + ", expected 0 to 1");
@@ -64,11 +69,14 @@ Vec3 Recolourer::with_bumps(const Vec3& p, const Vec3& moved) const {
     Vec3 sum = moved;
     for (const Bump& bump : bumps_) {
         const Vec3 away = bump.centre - p;
-        const double t = std::max(0.0, 1 - dot(away, away) / (bump.radius * bump.radius));
+        const double along = dot(bump.along, away);
+        const double t =
+            std::max(0.0, 1 - (dot(away, away) - along * along) / (bump.radius * bump.radius));
+        const double weight = t * t * t, rest = 1 - weight;
         if (bump.keep > 0) {
-            sum = (1 - bump.keep * (t * t * t)) * sum;
+            sum = (1 - bump.keep * (1 - rest * rest * rest)) * sum;
         } else {
-            add(sum, t * t * t, bump.by);
+            add(sum, weight, bump.by);
         }
     }
     return sum;

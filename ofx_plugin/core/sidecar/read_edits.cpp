@@ -13,6 +13,8 @@ namespace {
 
 /// Smallest radius of a bump, so that its square stays a normal float.
 constexpr double kMinRadius = 1e-4;
+/// Smallest share that distances to shades count, so that bumps stay finite.
+constexpr double kMinShade = 0.1;
 
 std::optional<Ramp> read_ramp(const Cursor& entry) {
     if (!entry.has("ramp")) return std::nullopt;
@@ -39,6 +41,10 @@ std::pair<int, double> read_place(const Cursor& entry, const Polytope& polytope,
                    "at most one " + std::string(what) + " of an edge at a frame");
     }
     return {at, number};
+}
+
+double read_shade(const Cursor& entry) {
+    return entry.has("shade") ? entry.member("shade").number(kMinShade, 1) : 1;
 }
 
 Solution read_solution(const Cursor& where, const Polytope& polytope, const Ids& ids) {
@@ -72,8 +78,9 @@ Solution read_solution(const Cursor& where, const Polytope& polytope, const Ids&
     const Cursor bumps = where.member("bumps");
     for (std::size_t i = 0, n = bumps.list("bumps"); i < n; ++i) {
         const Cursor entry = bumps.element(i);
-        entry.require_members({"radius", "keys"});
-        Solution::MovingBump bump{entry.member("radius").number(kMinRadius, kMaxColour), {}};
+        entry.require_members({"radius", "keys"}, {"shade"});
+        Solution::MovingBump bump{
+            entry.member("radius").number(kMinRadius, kMaxColour), {}, read_shade(entry)};
         const Cursor steps = entry.member("keys");
         std::optional<double> previous;
         const std::size_t count = steps.list("keys");
@@ -91,8 +98,8 @@ Solution read_solution(const Cursor& where, const Polytope& polytope, const Ids&
     const Cursor holds = where.member("holds");
     for (std::size_t i = 0, n = holds.list("holds"); i < n; ++i) {
         const Cursor entry = holds.element(i);
-        entry.require_members({"keys"});
-        Solution::MovingHold hold;
+        entry.require_members({"keys"}, {"shade"});
+        Solution::MovingHold hold{{}, read_shade(entry)};
         const Cursor steps = entry.member("keys");
         std::optional<double> previous;
         const std::size_t count = steps.list("keys");

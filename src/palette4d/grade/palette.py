@@ -30,7 +30,7 @@ class Palette:
         The vertices before and after each colour in time; the same twice if it lies on a vertex.
     weights : (n,) float64
         The share of the vertex after it, 0..1 (eq. 6).
-    bumps : (b, 8) float64
+    bumps : (b, 11) float64
         What moves besides the palette, and holds, as `_core.Recolourer` takes them.
     """
 

@@ -19,9 +19,11 @@ What is left at the picks is then met by the bumps alone. A bump grows with the 
 would fold over and posterise, up to a limit: beyond are other things. A pick of a box with a wide
 spread of colours has a bump at several of them.
 
-A hold takes no part in this. It scales what all else does to the colours near it and its shades,
-to nothing at its own. So no colour ever changes more with a hold than without. A hold ends at the
-nearest pick.
+A hold takes no part in this. It scales what all else does to the colours near it, to nothing at
+its own. So no colour ever changes more with a hold than without. A hold ends at the nearest pick.
+
+Near means one thing in all of this: the shades of a colour, lighter and darker, are nearer than
+others (`bumps.squares`).
 
 Frames are solved one by one, at the clip's vertices, at the picks' own frames and every few frames
 between; the core interpolates linearly. So a pick that ends at a frame has no effect at all beyond.
@@ -30,7 +32,8 @@ between; the core interpolates linearly. So a pick that ends at a frame has no e
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+import json
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -38,8 +41,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palette4d import _core
-from palette4d.grade import sidecar
-from palette4d.grade.bumps import bump_values, bumped
+from palette4d.grade.bumps import alongs, bump_values, bumped, squares
 from palette4d.grade.edits import Colour, as_colour
 from palette4d.grade.keyframes import needed
 from palette4d.grade.picks import MOST_PICKS, Pick, all_picks
@@ -52,7 +54,7 @@ F64 = NDArray[np.float64]
 # A colour of few pixels counts as if it had this share of them: a lamp.
 LEAST_SHARE = 5e-4
 # The guard's weight beside a pick that has all the pixels.
-GUARD = 0.635
+GUARD = 1.1
 # A change of a colour is noticed 1 + CHROMA (max - min) times less than that of a grey.
 CHROMA = 6.0
 # A guarded colour that would change by more than LARGE times the largest change that is asked for
@@ -60,14 +62,11 @@ CHROMA = 6.0
 OVERSHOOT, LARGE = 0.3, 1.1
 # The radius of a bump is RADIUS_0 + RADIUS_1 |change|, at most LARGEST. A hold has LARGEST, or ends
 # at the nearest pick. Where that is nearer than LEAST, it keeps less and less.
-RADIUS_0, RADIUS_1, LARGEST, LEAST = 0.08, 0.87, 0.3, 0.05
+RADIUS_0, RADIUS_1, LARGEST, LEAST = 0.06, 0.87, 0.3, 0.05
+# Distances to the shades of a colour, lighter and darker, count so much.
+SHADE = 0.55
 # The guard is off at a pick, and is back to full strength at this distance.
 NEAR = 0.265
-# Lighter and darker shades of a picked colour are nearer to it by this factor. Below the lightness
-# DARK the shade of a colour is less and less certain.
-SHADE, DARK = 0.55, 0.3
-# A hold holds shades that are darker and lighter by this part, too.
-LIGHTER = 0.17
 # A colour of a pick's spread has a bump of its own if the pick's bump would leave more than this of
 # its change undone. A hold's change counts as 1.
 UNDONE = 0.04
@@ -165,28 +164,22 @@ def side_effect(fields: Mapping[str, Any], least: float) -> SideEffect:
         user = _core.edited_colours(clip.polytope, clip.core.edits, cut)
         guarded = clip.colours_at(time)
         rgb, shares = guarded[:, :3], guarded[:, 3] / max(float(guarded[:, 3].sum()), 1e-9)
-        bumps = both.bumps_at(time)
-
-        def changes(
-            rgb: F64, by: F64 = solved - user, cut: _core.Slice = cut, bumps: F64 = bumps
-        ) -> F64:
-            return bumped(rgb, _core.palette_weights(rgb, cut.rgb, cut.faces)[0] @ by, bumps)
-
-        change = changes(rgb)
+        steps = STEP_IN_COLOUR * np.vstack([np.zeros((1, 3)), np.eye(3)])
+        colours = (rgb + steps[:, None]).reshape(-1, 3)
+        moved = _core.palette_weights(colours, cut.rgb, cut.faces)[0] @ (solved - user)
+        changes = bumped(colours, moved, both.bumps_at(time)).reshape(4, -1, 3)
+        change = changes[0]
         size = np.abs(change).max(axis=1)
         other = problem.guard_at(rgb, time) > OTHER
         worst = int(np.argmax(np.where(other, size * np.sqrt(shares), 0.0)))
-        slopes = [
-            np.linalg.norm(changes(rgb + step) - change, axis=1) / STEP_IN_COLOUR
-            for step in STEP_IN_COLOUR * np.eye(3)
-        ]
+        slopes = np.linalg.norm(changes[1:] - change, axis=2) / STEP_IN_COLOUR
         found.append(
             SideEffect(
                 time,
                 float(shares[size > least].sum()),
                 float(shares[other & (size > least)].sum()),
                 as_colour(rgb[worst]),
-                float(shares[np.max(slopes, axis=0) > TORN - 1].sum()),
+                float(shares[slopes.max(axis=0) > TORN - 1].sum()),
                 time,
             )
         )
@@ -269,19 +262,20 @@ class _Problem:
 
     def __init__(self, clip: _ClipAtTimes, picks: Sequence[Pick]) -> None:
         self.clip, self.picks = clip, picks
+        self._known: dict[tuple[str, float], F64] = {}
         points = [
-            (number, offset, radius)
-            for number, (pick, radius) in enumerate(
-                zip(picks, map(self._radius_of, picks), strict=True)
-            )
-            for offset in ((0.0, 0.0, 0.0), *_shades(pick), *pick.spread)
-            if not any(offset) or _undone(pick, offset, radius) > UNDONE
+            (number, offset, radius, shade)
+            for number, pick in enumerate(picks)
+            for radius in [self._radius_of(pick)]
+            for shade in [self._shade_of(pick, radius)]
+            for offset in ((0.0, 0.0, 0.0), *pick.spread)
+            if not any(offset) or _undone(pick, offset, radius, shade) > UNDONE
         ]
-        of, offsets, radii = zip(*points, strict=True) if points else ((), (), ())
+        of, offsets, radii, shades = zip(*points, strict=True) if points else ((), (), (), ())
         self.of = np.array(of, int)
         self.moving = np.array([pick.to is not None for pick in picks], bool)
         self.offsets = np.array(offsets).reshape(-1, 3)
-        self.radii = np.array(radii)
+        self.radii, self.shades = np.array(radii, float), np.array(shades, float)
         #: Share of the pixels near each point where it was picked.
         self.pixels = np.array(
             [self._pixels(picks[n].frame)[i] for i, n in enumerate(self.of)], float
@@ -308,16 +302,47 @@ class _Problem:
         change = float(np.linalg.norm(pick.change_at(pick.frame)))
         return min(RADIUS_0 + RADIUS_1 * change, LARGEST)
 
+    def _shade_of(self, pick: Pick, radius: float) -> float:
+        """Return what distances to the shades of a pick count.
+
+        A bump is longer towards them, unless it has several times as many pixels then. So many are
+        another thing's: hair is a shade of an orange sign.
+        """
+        if pick.to is None or not self.clip.frames:
+            return SHADE
+        guarded, centre = self.clip.colours_at(pick.frame), np.array([pick.rgb])
+        round_, long = (
+            float(guarded[:, 3] @ bump_values(guarded[:, :3], centre, radius, along)[:, 0])
+            for along in (np.zeros((1, 3)), alongs(centre, SHADE))
+        )
+        more = long / max(round_, LEAST_SHARE)
+        return 1 - (1 - SHADE) * min(1.0, max(0.0, 3 - more))
+
+    def _near(self, colours: F64, time: float, points: NDArray[np.intp], radii: F64 | float) -> F64:
+        """Return (n, m) values, 0..1, of bumps of such radii around points, at n colours."""
+        centres = self.centres(time)[points]
+        return bump_values(colours, centres, radii, alongs(centres, self.shades[points]))
+
     def _pixels(self, time: float) -> F64:
         """Return the share of the clip's pixels near each point."""
         guarded = self.clip.colours_at(time)
-        near = bump_values(guarded[:, :3], self.centres(time), np.full(len(self.of), NEAR))
+        near = self._near(guarded[:, :3], time, np.arange(len(self.of)), NEAR)
         return np.asarray(guarded[:, 3] @ near, np.float64)
+
+    def _once(self, what: str, time: float, compute: Callable[[], F64]) -> F64:
+        """Return what is computed once for a time."""
+        if (what, time) not in self._known:
+            self._known[what, time] = compute()
+        return self._known[what, time]
 
     def strengths(self, time: float) -> F64:
         """Return how much of its change each point asks for, 0..1."""
-        found = np.array([pick.strength_at(time, self.clip.step) for pick in self.picks])
-        return np.asarray(found[self.of], np.float64)
+
+        def compute() -> F64:
+            found = [pick.strength_at(time, self.clip.step) for pick in self.picks]
+            return np.asarray(np.array(found)[self.of], np.float64)
+
+        return self._once("strengths", time, compute)
 
     def certain(self, time: float) -> F64:
         """Return how certain it is that each point belongs to what was picked, 0..1.
@@ -328,15 +353,19 @@ class _Problem:
         spread = self.offsets.any(axis=1) & self.moving[self.of]
         if not (self.clip.frames and spread.any()):
             return np.ones(len(self.of))
-        more = self._pixels(time) / np.maximum(self.pixels, LEAST_SHARE)
-        return np.where(spread, np.clip(2 - more, 0.0, 1.0), 1.0)
+
+        def compute() -> F64:
+            more = self._pixels(time) / np.maximum(self.pixels, LEAST_SHARE)
+            return np.where(spread, np.clip(2 - more, 0.0, 1.0), 1.0)
+
+        return self._once("certain", time, compute)
 
     def guard_at(self, colours: F64, time: float) -> F64:
         """Return how much colours are guarded at a time, 0..1: not at all at a picked one."""
         at = np.flatnonzero(self.moving[self.of])
         strengths = (self.strengths(time) * self.certain(time))[at]
         share = strengths / max(float(strengths.max(initial=0)), NONE)
-        far = 1 - share * _shade(colours, self.centres(time)[at], np.minimum(self.radii[at], NEAR))
+        far = 1 - share * self._near(colours, time, at, np.minimum(self.radii[at], NEAR))
         found: F64 = far.prod(axis=1)
         return found
 
@@ -354,9 +383,11 @@ class _Problem:
         return counts
 
     def centres(self, time: float) -> F64:
-        found = np.array([pick.colour_at(time) for pick in self.picks]).reshape(-1, 3)
-        centres: F64 = found[self.of] + self.offsets
-        return centres
+        def compute() -> F64:
+            found = np.array([pick.colour_at(time) for pick in self.picks]).reshape(-1, 3)
+            return np.asarray(found[self.of] + self.offsets, np.float64)
+
+        return self._once("centres", time, compute)
 
     def _times(self) -> list[float]:
         clip = self.clip
@@ -380,7 +411,8 @@ class _Problem:
         picked = np.flatnonzero((asked > 0) & self.moving[self.of])
         held = np.flatnonzero((asked > 0) & ~self.moving[self.of])
         centres = self.centres(time)
-        away = np.linalg.norm(centres[held, None] - centres[picked], axis=2)
+        along = alongs(centres[held], self.shades[held])
+        away = np.sqrt(squares(centres[picked], centres[held], along)).T
         most = (away / asked[picked]).min(axis=1, initial=np.inf)
         own = np.array([self.picks[i].radius or LARGEST for i in self.of[held]])
         radii = np.maximum(np.minimum(own, most), np.minimum(own, LEAST))
@@ -410,10 +442,10 @@ class _Problem:
         if scale < NONE:
             return nothing
         local = np.array([not self.picks[i].global_only for i in of])
-        bumps = bump_values(centres, centres, radii) * local
+        bumps = self._near(centres, time, picked, radii) * local
         rows = np.hstack([_gathered(weights, places) * free, bumps])
         guarded = clip.colours_at(time)
-        within = bump_values(guarded[:, :3], centres, radii)
+        within = self._near(guarded[:, :3], time, picked, radii)
         guard_weights = _core.palette_weights(guarded[:, :3], cut.rgb, cut.faces)[0]
         guard_rows = np.hstack([_gathered(guard_weights, places) * free, within * local])
         slopes = _gathered(_slopes(cut.rgb, cut.faces), places) * free
@@ -422,7 +454,7 @@ class _Problem:
         counts = self._counts(guarded, of, within)
         if clip.frames:
             # A pick of few pixels moves no palette colour that many pixels are mixed from.
-            near = bump_values(guarded[:, :3], centres, np.full(len(of), NEAR))
+            near = self._near(guarded[:, :3], time, picked, NEAR)
             pixels = float(guarded[:, 3] @ near.max(axis=1))
             guard *= GUARD / max(pixels, LEAST_SHARE)
 
@@ -506,7 +538,7 @@ class _Problem:
             keys: dict[float, F64] = {}
             for one in solved:
                 if begin <= one.time <= end:
-                    centre = pick.colour_at(one.time) + self.offsets[number]
+                    centre = self.centres(one.time)[number]
                     # A hold that keeps nothing needs a radius all the same.
                     by = one.bumps.get(number, np.zeros(3) if size == 3 else np.array([LEAST, 0]))
                     keys[one.time] = np.concatenate([centre, by])
@@ -519,36 +551,21 @@ class _Problem:
                 row = _rounded(keys[t])
                 what = {"by": row[3:]} if size == 3 else {"radius": row[3], "keep": row[4]}
                 steps.append({"frame": _whole(t), "rgb": row[:3], **what})
+            shade = round(float(self.shades[number]), DIGITS)
             if size == 3:
                 radius = round(float(self.radii[number]), DIGITS)
-                bumps.append({"radius": radius, "keys": steps})
+                bumps.append({"radius": radius, "shade": shade, "keys": steps})
             else:
-                holds.append({"keys": steps})
+                holds.append({"shade": shade, "keys": steps})
         return bumps, holds
 
 
-def _shades(pick: Pick) -> list[Colour]:
-    """Return the offsets to a lighter and a darker shade, which a hold holds too."""
-    if pick.to is not None:
-        return []
-    return [as_colour([part * value for value in pick.rgb]) for part in (-LIGHTER, LIGHTER)]
-
-
-def _undone(pick: Pick, offset: Colour, radius: float) -> float:
+def _undone(pick: Pick, offset: Colour, radius: float, shade: float) -> float:
     """Return how much of a pick's change its bump leaves undone at an offset from its centre."""
     change = 1.0 if pick.to is None else float(np.linalg.norm(pick.change_at(pick.frame)))
-    done = bump_values(np.array([offset]), np.zeros((1, 3)), np.array([radius]))
+    centre = np.array([pick.rgb])
+    done = bump_values(centre + offset, centre, radius, alongs(centre, shade))
     return change * (1 - float(done[0, 0]))
-
-
-def _shade(colours: F64, centres: F64, radii: F64) -> F64:
-    """As `bump_values`, but along the ray from black through its centre it is wider."""
-    offsets = colours[:, None] - centres
-    lengths = np.linalg.norm(centres, axis=1)
-    along = (offsets * centres).sum(axis=2) / np.maximum(lengths, DARK)
-    away = ((offsets**2).sum(axis=2) - (1 - SHADE**2) * along**2) / radii**2
-    values: F64 = np.maximum(0.0, 1.0 - away) ** 3
-    return values
 
 
 def _noticed(colours: F64) -> F64:
@@ -687,9 +704,9 @@ def _parsed(fields: Mapping[str, Any], solution: Fields) -> _core.Sidecar:
     """Return the core's view of the palette and of the user's edits, with a solution."""
     without = {n: v for n, v in fields.items() if n not in ("colours", "versions", "history")}
     edits = {n: v for n, v in fields["edits"].items() if n not in ("picks", "locks", "solution")}
-    return sidecar.validate(
-        {**without, "edits": edits | ({"solution": solution} if solution else {})}
-    )
+    document = {**without, "edits": edits | ({"solution": solution} if solution else {})}
+    # Not `sidecar.validate`, which first puts all members into the file's order.
+    return _core.parse_sidecar(json.dumps(document).encode(), "<document>")
 
 
 def _rounded(values: F64) -> list[float]:

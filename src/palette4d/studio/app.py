@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 #: The size of a window that was never opened before.
 USUAL_SIZE = (1600, 1000)
+#: What the rims and the title of a window take, at most.
+RIMS = (16, 48)
 #: Qt loads it for each window on an X screen since 6.5; many desktops lack it.
 XCB_CURSOR = "libxcb-cursor.so.0"
 #: Seconds after which a screenshot is taken even if something is still being computed.
@@ -115,7 +117,7 @@ def run(
             f"found no {library}, which Qt needs for a window; install it (Debian, Ubuntu: "
             "libxcb-cursor0; Fedora, Rocky: xcb-util-cursor)"
         )
-    from PySide6.QtCore import QByteArray, QSettings, Qt, QTemporaryDir
+    from PySide6.QtCore import QByteArray, QSettings, QSize, Qt, QTemporaryDir
     from PySide6.QtWidgets import QApplication
 
     from palette4d.studio import theme
@@ -137,7 +139,10 @@ def run(
         settings = QSettings(nowhere.filePath("studio.ini"), QSettings.Format.IniFormat)
     window = Window(session, settings)
     kept = settings.value("geometry") if size is None else None
-    window.resize(*(size or USUAL_SIZE))
+    wanted = QSize(*(size or USUAL_SIZE))
+    if not hidden:
+        wanted = wanted.boundedTo(app.primaryScreen().availableSize() - QSize(*RIMS))
+    window.resize(wanted)
     window.arrange()
     if isinstance(kept, QByteArray):
         window.restoreGeometry(kept)

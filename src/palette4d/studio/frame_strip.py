@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QRectF
+from PySide6.QtCore import QRectF, QSize
 from PySide6.QtGui import QColor, QImage, QPainter, QPixmap
 
 from palette4d.studio import paint, theme
@@ -32,27 +32,45 @@ class FrameStrip:
     session : Session
     places : Places
         Where frames are.
-    changed : callable
+    update : callable
         Called on the views' thread when another picture is ready.
     """
 
-    def __init__(self, session: Session, places: Places, changed: Callable[[], object]) -> None:
+    def __init__(self, session: Session, places: Places, update: Callable[[], object]) -> None:
         """Begin without pictures."""
-        self.session, self.places, self._changed = session, places, changed
+        self.session, self.places, self._update = session, places, update
         self.ratio = 1.0  #: pixels of the screen for one of the view
         self._thumbs: dict[int, tuple[object, QPixmap]] = {}
         self._making: set[int] = set()
+        self._drawn: tuple[object, QPixmap] | None = None
 
     def clear(self) -> None:
         """Forget the pictures: there is another clip."""
         self._thumbs.clear()
+        self.changed()
+
+    def changed(self) -> None:
+        """Draw the strip again: frames or pictures have arrived."""
+        self._drawn = None
 
     def paint(self, painter: QPainter) -> None:
-        """Draw the strip."""
-        painter.save()
-        box = QRectF(GUTTER, RULER, self.places.width - GUTTER, STRIP)
-        painter.fillRect(QRectF(0, RULER, self.places.width, STRIP), QColor(theme.PIT))
-        painter.setClipRect(box)
+        """Draw the strip; its frames are drawn again only when something in them changed."""
+        session = self.session
+        now = None if session.dragging else (session.revision, session.looked)
+        key = self.places.scale, self.places.width, self.ratio, now
+        if self._drawn is None or self._drawn[0] != key:
+            drawn = QPixmap(QSize(self.places.width, STRIP) * self.ratio)
+            drawn.setDevicePixelRatio(self.ratio)
+            drawn.fill(QColor(theme.PIT))
+            self._drawn = key, drawn
+            within = QPainter(drawn)
+            within.translate(0, -RULER)
+            self._draw(within)
+            within.end()
+        painter.drawPixmap(0, RULER, self._drawn[1])
+
+    def _draw(self, painter: QPainter) -> None:
+        painter.setClipRect(QRectF(GUTTER, RULER, self.places.width - GUTTER, STRIP))
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
         self._ask_thumbnails()
         for frame, place in self.thumbnails():
@@ -63,7 +81,6 @@ class FrameStrip:
                 painter.drawRect(place.adjusted(0.5, 0.5, -0.5, -0.5))
             else:
                 painter.drawPixmap(place, picture, QRectF(picture.rect()))
-        painter.restore()
 
     def thumbnails(self) -> list[tuple[int, QRectF]]:
         """Return the frames of the strip and their places."""
@@ -140,7 +157,8 @@ class FrameStrip:
             if len(self._thumbs) >= KEPT:
                 self._thumbs.clear()  # those in sight are made again
             self._thumbs[frame] = key, QPixmap.fromImage(image)
-            self._changed()
+            self.changed()
+            self._update()
 
         self.session.post(done)
 

@@ -6,6 +6,8 @@ frame alone.
 """
 
 import contextlib
+import dataclasses
+import math
 import os
 import threading
 from collections import OrderedDict
@@ -31,6 +33,8 @@ CACHE_BYTES = 250 << 20
 #: Bytes of scaled frames that are kept.
 SMALL_BYTES = 200 << 20
 
+#: The most pixels of a picture that moves; a larger one is made at a half, a third, … of its size.
+MOST_MOVING = 400_000
 #: Pixels of a strip that is resampled at once.
 ROWS = 30_000
 
@@ -61,6 +65,13 @@ class Region:
     def whole(self) -> bool:
         """Whether its pixels are the frame's, not scaled."""
         return (self.width, self.height) == (self.right - self.left, self.bottom - self.top)
+
+    @property
+    def coarse(self) -> "Region":
+        """The part at the size that pictures of drags, jumps and playing have."""
+        by = math.ceil(math.sqrt(self.width * self.height / MOST_MOVING))
+        width, height = max(1, self.width // by), max(1, self.height // by)
+        return dataclasses.replace(self, width=width, height=height)
 
 
 class ByteCache(Generic[K, V]):
@@ -135,7 +146,7 @@ class Player:
         self._ready = ready
         self._wanted: list[tuple[int, Region | None]] = []
         self._later: list[tuple[int, Region | None]] = []
-        self._reading: set[int] = set()
+        self._reading: set[tuple[int, Region | None]] = set()
         self._wake = threading.Condition()
         self._closed = False
         self._order = threading.Lock() if clip.is_movie else contextlib.nullcontext()
@@ -175,7 +186,7 @@ class Player:
                 self._wake.notify()
 
     def _have(self, number: int, region: Region | None) -> bool:
-        if number in self.errors or number in self._reading:
+        if number in self.errors or (number, region) in self._reading:
             return True
         return number in self._frames if region is None else (number, region) in self._small
 
@@ -193,6 +204,11 @@ class Player:
                 found = self.clip.load(number).pixels
             self._frames.put(number, found, found.nbytes)
         return found
+
+    @property
+    def room(self) -> int:
+        """How many frames as those that are kept have room, at least one."""
+        return max(1, self._frames.limit * len(self._frames) // max(self._frames.bytes, 1))
 
     @property
     def idle(self) -> bool:
@@ -220,7 +236,7 @@ class Player:
                 number, region = (self._wanted or self._later).pop(0)
                 if self._have(number, region):
                     continue
-                self._reading.add(number)
+                self._reading.add((number, region))
             try:
                 self._take(number, region)
             except Exception as error:  # a decoder may fail in any way: the window stays
@@ -228,7 +244,7 @@ class Player:
                 self.errors[number] = words.replace(LEAVE_OUT, texts.BAD_FRAME)
             finally:
                 with self._wake:
-                    self._reading.discard(number)
+                    self._reading.discard((number, region))
             if not self._closed:
                 self._ready(number)
 

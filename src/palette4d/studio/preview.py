@@ -1,9 +1,10 @@
 """The preview: a frame before and after the edits, at the size on screen, beside the views' thread.
 
 Input: a frame's pixels, the palette at that time, a part of the frame and a look. Output: pictures
-of 8 bits. While something moves, the part is scaled down first and recoloured by the lattice; when
-nothing moves, the frame is recoloured exactly, as `palette4d render` does, and scaled down then.
-Of waiting requests only the newest is kept, and exact work stops for a new request.
+of 8 bits. While something moves, the part is scaled down first and recoloured then; when nothing
+moves, the frame is recoloured as `palette4d render` does, and scaled down then. Of waiting requests
+only the newest is kept, and exact work stops for a new request. Pictures are kept, for playing and
+for going back to a frame.
 """
 
 import contextlib
@@ -29,6 +30,8 @@ U8 = NDArray[np.uint8]
 
 #: Bytes of scaled frames, of pictures before the edits, and of pictures to play, that are kept.
 SMALL_BYTES, BEFORE_BYTES, REEL_BYTES = 80 << 20, 40 << 20, 320 << 20
+#: The pixels of a request that has none yet, or none any more.
+NO_PIXELS = np.zeros((0, 0, 3), np.float32)
 #: Pixels that are recoloured between two looks for a newer request.
 STRIP = 300_000
 #: Pixels in which colours outside of the palette are looked for.
@@ -91,7 +94,7 @@ class Request:
         The part and its size.
     display, look
         How code values become colours on the screen.
-    key : hashable
+    against : hashable
         Changes with what `before` is.
     revision : int
         Changes with the grade.
@@ -104,7 +107,7 @@ class Request:
     outside : bool
         Mark colours outside of the palette.
     scaled : bool
-        The pixels are the region's at its size, not the frame's.
+        The pixels are the region's at its coarse size, not the frame's.
     """
 
     clip: int
@@ -116,7 +119,7 @@ class Request:
     region: Region
     display: Display
     look: Look
-    key: Any
+    against: Any
     revision: int
     sides: frozenset[str] = frozenset({"after"})
     settled: bool = True
@@ -125,9 +128,19 @@ class Request:
     scaled: bool = False
 
     @property
-    def film_key(self) -> tuple[Any, ...]:
-        """What a picture to play depends on."""
-        return self.clip, self.frame, self.region, self.look, self.sides, self.key, self.revision
+    def key(self) -> tuple[Any, ...] | None:
+        """What the picture depends on; None if it is not kept."""
+        if self.matte is not None or self.outside:
+            return None
+        return (
+            self.clip,
+            self.frame,
+            self.region,
+            self.look,
+            self.sides,
+            self.against,
+            self.revision,
+        )
 
 
 @dataclass(frozen=True)
@@ -136,8 +149,6 @@ class Picture:
 
     Attributes
     ----------
-    result : (h, w, 3 or 4) float32 or None
-        The frame's exact recoloured code values, of an exact picture.
     outside : (h, w) bool or None
         Where colours are outside of the palette.
     share : float
@@ -150,7 +161,6 @@ class Picture:
     before: U8 | None
     after: U8 | None
     exact: bool
-    result: F32 | None = None
     outside: U8 | None = None
     share: float = 0.0
     matte: bool = False
@@ -198,9 +208,9 @@ class Preview:
             self._film = deque(film)
             self._wake.notify()
 
-    def played(self, key: tuple[Any, ...]) -> Picture | None:
-        """Return a picture that was made to play (`Request.film_key`), or None."""
-        return self._reel.get(key)
+    def kept(self, key: tuple[Any, ...] | None) -> Picture | None:
+        """Return a picture that was made before (`Request.key`), or None."""
+        return None if key is None else self._reel.get(key)
 
     def forget(self) -> None:
         """Forget the pixels that were kept."""
@@ -228,11 +238,14 @@ class Preview:
                 self._develop(scene)
                 continue
             try:
-                # A quick picture first, unless the exact one takes no longer.
-                if not request.settled or request.pixels.size > 4 * STRIP:
-                    self._ready(self.make(request, exact=False))
-                if request.settled:
-                    self._ready(self.make(request, exact=True, check=self._check))
+                found = self.kept(request.key)
+                if found is not None:
+                    self._ready(dataclasses.replace(found, request=request))
+                # A coarse picture first, unless the exact one takes no longer.
+                elif not request.settled or request.pixels.size > 4 * STRIP:
+                    self._show(self.make(request, exact=False))
+                if request.settled and not (found is not None and found.exact):
+                    self._show(self.make(request, exact=True, check=self._check))
             except _Newer:
                 continue
             except Exception as error:  # whatever fails, the window stays and says it
@@ -245,11 +258,19 @@ class Preview:
             request = scene()
             if request is None:
                 return
-            picture = self.make(request, exact=False)
+            self._show(self.make(request, exact=False))
+
+    def _show(self, picture: Picture) -> None:
+        """Keep a picture, unless it belongs to a drag, and tell of it."""
+        request = picture.request
+        key = request.key if request.settled or request.scaled else None
+        if key is not None:
             sides = (picture.before, picture.after)
             size = sum(side.nbytes for side in sides if side is not None)
-            self._reel.put(request.film_key, picture, size)
-            self._ready(picture)
+            # Without the frame's pixels, which are many.
+            kept = dataclasses.replace(request, pixels=NO_PIXELS)
+            self._reel.put(key, dataclasses.replace(picture, request=kept), size)
+        self._ready(picture)
 
     def _ready(self, picture: Picture) -> None:
         if not self._closed:
@@ -269,43 +290,30 @@ class Preview:
         request : Request
             What to show.
         exact : bool
-            As `palette4d render`; or by the lattice at the size on screen.
+            As `palette4d render`; or recoloured at the coarse size on screen.
         check : callable
             Called now and then; may raise to stop.
         """
         painter = request.display.painter(request.look)
-        region = request.region
         before = after = None
-        result = None
-        small: F32 | None = None
-        if not exact or region.whole:
-            small = self._source(request, first=not exact and request.settled)
         if "before" in request.sides:
             before = self._before(request, painter, exact, check)
         if "after" in request.sides:
-            if request.grade is None:
-                colours = self._source(request) if small is None else small
-            elif exact:
-                result = self.exact(request.pixels, request.grade, request.premultiplied, check)
-                colours = resampled(result, region)
-            else:
-                assert small is not None
-                colours = _quick(small, request.grade, request.premultiplied)
+            colours = self._graded(request, request.grade, exact, check)
             after = _painted(painter, colours, request.premultiplied, exact, check)
         matte = None
         if request.matte is not None and request.grade is not None and after is not None:
-            matte = matte_of(self._source(request), request.grade, request.matte)
+            matte = matte_of(self._source(request, exact), request.grade, request.matte)
             if matte is not None:
                 after = _highlighted(after, matte)
         outside, share = None, 0.0
         if request.outside and request.grade is not None:
-            outside, share = outside_of(self._source(request), request.grade)
+            outside, share = outside_of(self._source(request, exact), request.grade)
         return Picture(
             request,
             before,
             after,
             exact,
-            result,
             outside,
             share,
             matte is not None,
@@ -332,48 +340,43 @@ class Preview:
             )
         return result
 
-    def _source(self, request: Request, *, first: bool = False) -> F32:
-        """Return the region's pixels at its size; of a first picture, nearest pixels will do."""
+    def _graded(
+        self, request: Request, grade: Grade | None, exact: bool, check: Callable[[], None]
+    ) -> F32:
+        """Return the region's colours with a grade."""
+        if grade is None:
+            return self._source(request, exact)
+        if exact and not request.region.whole:
+            whole = self.exact(request.pixels, grade, request.premultiplied, check)
+            return resampled(whole, request.region)
+        return self.exact(self._source(request, exact), grade, request.premultiplied, check)
+
+    def _source(self, request: Request, exact: bool) -> F32:
+        """Return the region's pixels at its size, or at its coarse size.
+
+        Of a first picture, nearest pixels will do.
+        """
         if request.scaled:
             return request.pixels
-        key = (request.clip, request.frame, request.region)
+        region = request.region if exact else request.region.coarse
+        key = (request.clip, request.frame, region)
         found = self._small.get(key)
-        if found is None and first:
-            return nearest(request.pixels, request.region)
+        if found is None and not exact and request.settled:
+            return nearest(request.pixels, region)
         if found is None:
-            found = resampled(request.pixels, request.region)
+            found = resampled(request.pixels, region)
             self._small.put(key, found, found.nbytes)
         return found
 
     def _before(self, request: Request, painter: Any, exact: bool, check: Callable[[], None]) -> U8:
-        key = (request.clip, request.frame, request.region, request.look, exact, request.key)
+        key = (request.clip, request.frame, request.region, request.look, exact, request.against)
         found = self._befores.get(key)
         if found is None:
-            grade = request.before
-            if grade is None:
-                colours = self._source(request)
-            elif exact:
-                whole = self.exact(request.pixels, grade, request.premultiplied, check)
-                colours = resampled(whole, request.region)
-            else:
-                colours = _quick(self._source(request), grade, request.premultiplied)
+            colours = self._graded(request, request.before, exact, check)
             found = _painted(painter, colours, request.premultiplied, exact, check)
-            self._befores.put(key, found, found.nbytes)
+            if exact or not request.settled:  # else it is made of nearest pixels
+                self._befores.put(key, found, found.nbytes)
         return found
-
-
-def _quick(colours: F32, grade: Grade, premultiplied: bool) -> F32:
-    """Return colours recoloured by the lattice."""
-    recolourer = grade.recolourer()
-    if recolourer.identity:
-        return colours
-    return _core.Lattice(recolourer).apply(
-        colours,
-        premultiplied=premultiplied and colours.shape[2] == 4,
-        precision="single",
-        threads=0,
-        conversion=grade.conversion,
-    )
 
 
 def _painted(
@@ -420,15 +423,14 @@ def matte_of(colours: F32, grade: Grade, id_: str) -> F32 | None:
     if not shares.any():
         return None
     # Recolouring adds weights times displacements: displaced by its shares in red, a grey picture
-    # of the weights comes out, as quickly as a recoloured frame does.
+    # of the weights comes out.
     moved = np.array(palette.rgb)
     moved[:, 0] += shares
     own = np.ascontiguousarray(colours[..., :3])
     if grade.conversion is not None:
         own = grade.conversion.to_palette(own).astype(np.float32)
-    done = _core.Lattice(_core.Recolourer(palette.rgb, moved, palette.faces)).apply(
-        own, precision="single"
-    )
+    recolourer = _core.Recolourer(palette.rgb, moved, palette.faces)
+    done = recolourer.apply(own, precision="single", threads=0)
     matte: F32 = np.clip(np.nan_to_num(done[..., 0] - own[..., 0]), 0, 1)
     return matte
 

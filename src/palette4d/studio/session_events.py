@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Literal
 
 from palette4d.common.errors import in_words
+from palette4d.studio import texts
 from palette4d.studio.states import Status
 
 Event = Literal[
@@ -19,6 +20,7 @@ Event = Literal[
     "playing",
     "range",
     "status",
+    "followed",  # an edit has read the clip, or failed
 ]
 
 
@@ -74,4 +76,7 @@ class Events:
 
     def report(self, error: Exception) -> None:
         """Show an error as the status."""
-        self.say(in_words(error), "error")
+        words = in_words(error)
+        for remedy, here in texts.REMEDIES.items():
+            words = words.replace(remedy, here)
+        self.say(words, "error")

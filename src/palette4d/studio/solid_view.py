@@ -81,8 +81,9 @@ class SolidView(QWidget):
         self._extent: F64 | None = None
         self.painter = SolidPainter(self)
         self.menu_actions = view_actions(self, SOLID_ACTIONS)
-        for event in ("document", "clip", "frame", "pixels", "selection", "hover", "view"):
+        for event in ("document", "clip", "frame", "selection", "hover", "view"):
             session.on(event, self.update, panel=True)
+        session.on("pixels", self._pixels_arrived, panel=True)
 
     def sizeHint(self) -> QSize:
         """Return a square."""
@@ -93,6 +94,14 @@ class SolidView(QWidget):
         return QSize(220, 200)
 
     # ---------------------------------------------------------------------------------- content
+
+    def _pixels_arrived(self) -> None:
+        """Draw the frame's pixels, unless another frame's have arrived."""
+        if self._pixels is None or self._pixels[0] != self._pixels_key():
+            self.update()
+
+    def _pixels_key(self) -> object:
+        return id(self.session.player), self.session.frame, self.session.looked
 
     @property
     def pressed(self) -> bool:
@@ -144,7 +153,7 @@ class SolidView(QWidget):
         session = self.session
         if session.player is None or session.clip is None:
             return None
-        key = (id(session.player), session.frame, session.looked)
+        key = self._pixels_key()
         if self._pixels is None or self._pixels[0] != key:
             image = session.player.frame(session.frame)
             if image is None:
@@ -167,6 +176,7 @@ class SolidView(QWidget):
         index = self.index_at(at) if event.button() == Qt.MouseButton.LeftButton else None
         palette = self.palette_now()
         self._drag = Drag(index, at, palette, self.azimuth, self.elevation)
+        self.session.hover_over(None)  # what is dragged is seen in the picture, without a matte
         if index is not None and palette is not None:
             self.session.select(self.handle_of(palette, index))
         elif event.button() == Qt.MouseButton.LeftButton:

@@ -17,6 +17,12 @@ CLIP_MISSING = (
 OTHER_SIZE = (
     "the palette is of a clip with {own} pixels, this clip has {found}: check that it is the clip"
 )
+#: What errors of the API advise, and what the window offers.
+REMEDIES = {
+    "Give the palette's clip as clip=…, or pick by colour=… with follow=False": (
+        "File > Find the clip… opens the palette's own"
+    ),
+}
 LACKS_FRAMES = "the clip lacks {count} frames of the palette, the first is {first}"
 UNDONE = "undone"
 REDONE = "redone"
@@ -397,6 +403,8 @@ PLACE_HINT = "choose what it becomes"
 PICK, HOLD = "pick", "hold"
 PICKED = "the colour is picked"
 HELD = "the colour is held"
+STILL_FOLLOWING = "a colour is still being followed through the clip; try again when that is done"
+CLOSES_SOON = "the window closes when the colour is followed; close it again to lose that edit"
 FOLLOWING = "following the colour: {done} of {total} frames"
 PICK_LIST = "Picks, holds and locks"
 PICK_COLUMNS = ("id, kind, frame", "off by", "palette")

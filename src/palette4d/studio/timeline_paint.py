@@ -7,7 +7,7 @@ the colours at the playhead, and the weights of the pixel under the pointer.
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtCore import QPointF, QRect, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPixmap, QPolygonF
 from PySide6.QtWidgets import QWidget
 
@@ -51,8 +51,8 @@ class TimelinePainter:
         self._picture: tuple[object, tuple[QPixmap, QPixmap]] | None = None
         self._shapes: tuple[object, dict[int, Shapes]] | None = None
 
-    def paint(self) -> None:
-        """Draw the timeline."""
+    def paint(self, part: QRect) -> None:
+        """Draw a part of the timeline; the strip alone and the left column alone take less time."""
         painter = QPainter(self.view)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.fillRect(self.view.rect(), QColor(style.PANEL))
@@ -60,16 +60,22 @@ class TimelinePainter:
             painter.setPen(QColor(theme.FAINT))
             painter.drawText(self.view.rect(), Qt.AlignmentFlag.AlignCenter, texts.NOTHING_OPEN)
             return
-        bands, discs = self._pictures()
-        painter.drawPixmap(0, 0, bands)
-        self.strip.paint(painter)
-        self._paint_lanes(painter)
-        self._paint_ruler(painter)
-        self._paint_playhead(painter)
-        painter.drawPixmap(0, 0, discs)
-        self._paint_pointer(painter)
+        strip_alone = part.top() >= RULER and part.bottom() < RULER + STRIP
+        if strip_alone:
+            self.strip.paint(painter)
+            self._paint_playhead(painter)
+        elif part.right() >= GUTTER:
+            bands, discs = self._pictures()
+            painter.drawPixmap(0, 0, bands)
+            self.strip.paint(painter)
+            self._paint_lanes(painter)
+            self._paint_ruler(painter)
+            self._paint_playhead(painter)
+            painter.drawPixmap(0, 0, discs)
+            self._paint_pointer(painter)
         self._paint_gutter(painter)
-        self._paint_zoom_bar(painter)
+        if part.bottom() >= self.places.height - FOOT:
+            self._paint_zoom_bar(painter)
         paint.focus_frame(painter, self.view)
         painter.end()
 

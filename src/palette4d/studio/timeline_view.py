@@ -81,7 +81,7 @@ class TimelineView(QWidget):
         self.setMouseTracking(True)
         self.setAccessibleName(texts.TIMELINE)
         self.places = Places(session, lambda: (self.width(), self.height()))
-        self.strip = FrameStrip(session, self.places, self.update)
+        self.strip = FrameStrip(session, self.places, self._strip_changed)
         self.painter = TimelinePainter(self, session, self.places, self.strip)
         self._press: Press | None = None
         self.menu_actions = view_actions(self, TIMELINE_ACTIONS)
@@ -91,10 +91,10 @@ class TimelineView(QWidget):
             ("frame", self._frame_moved),
             ("selection", self.update),
             ("hover", self.update),
-            ("probe", self.update),
+            ("probe", lambda: self.update(0, RULER, GUTTER, self.height() - RULER - FOOT)),
             ("range", self.update),
             ("view", self.update),
-            ("pixels", self.update),
+            ("pixels", self._pixels_arrived),
         )
         for event, call in calls:
             session.on(event, call, panel=True)
@@ -128,6 +128,14 @@ class TimelineView(QWidget):
         self.strip.clear()
         self._changed()
 
+    def _pixels_arrived(self) -> None:
+        if not self.strip.settled:
+            self.strip.changed()
+            self._strip_changed()
+
+    def _strip_changed(self) -> None:
+        self.update(0, RULER, self.width(), STRIP)
+
     def _frame_moved(self) -> None:
         places = self.places
         start, end = places.span
@@ -144,7 +152,7 @@ class TimelineView(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:
         """Draw the timeline."""
         self.strip.ratio = self.devicePixelRatioF()
-        self.painter.paint()
+        self.painter.paint(event.rect())
 
     # -------------------------------------------------------------------------------- zoom and pan
 
@@ -192,6 +200,7 @@ class TimelineView(QWidget):
         self._press = Press(hit, at, self.places.scroll, self.places.span[0], button=event.button())
         if event.button() != Qt.MouseButton.LeftButton:
             return
+        self.session.hover_over(None)  # what is dragged is seen in the picture, without a matte
         add = bool(
             event.modifiers()
             & (Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier)

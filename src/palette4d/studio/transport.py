@@ -115,8 +115,8 @@ class Playback(QObject):
         nexts = [self.nth(start + k) for k in range(AHEAD)]
         frames = list(dict.fromkeys(n for n in nexts if n is not None))
         missing = [n for n in frames if self._picture(n) is None]
-        player.want(missing, region)
-        ready = [n for n in missing if player.has_small(n, region)]
+        player.want(missing, region.coarse)
+        ready = [n for n in missing if player.has_small(n, region.coarse)]
         viewer.preview.roll([functools.partial(self._scene, n) for n in ready])
 
     def _scene(self, frame: int) -> Request | None:
@@ -172,7 +172,7 @@ class Playback(QObject):
         self._ask()
 
     def _picture(self, frame: int) -> Picture | None:
-        return self.viewer.preview.played(self.viewer.film_key(frame))
+        return self.viewer.preview.kept(self.viewer.film_key(frame))
 
 
 class Transport(QWidget):

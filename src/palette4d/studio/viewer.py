@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, QTimer
 from PySide6.QtGui import (
     QImage,
     QKeyEvent,
@@ -20,7 +20,7 @@ from PySide6.QtWidgets import QWidget
 from palette4d.studio import texts
 from palette4d.studio.pixels import place_between, probe_at
 from palette4d.studio.player import Region
-from palette4d.studio.preview import Grade, Picture, Preview, Request
+from palette4d.studio.preview import NO_PIXELS, Grade, Picture, Preview, Request
 from palette4d.studio.session import Session
 from palette4d.studio.states import Place
 from palette4d.studio.viewer_paint import SharedImage, ViewerPainter, hatched
@@ -28,12 +28,12 @@ from palette4d.studio.viewer_paint import SharedImage, ViewerPainter, hatched
 #: Pixels of the screen within which the pointer takes the wipe's line, and a press is a click.
 NEAR_WIPE, CLICK = 6, 4
 ZOOM_STEP, LEAST_ZOOM, MOST_ZOOM = 1.25, 0.02, 64.0
-#: The pixels of a request that has none yet.
-NO_PIXELS = np.zeros((0, 0, 3), np.float32)
 #: A click with one of these holds; many desktops keep Alt for themselves.
 HOLD_KEYS = Qt.KeyboardModifier.AltModifier | Qt.KeyboardModifier.ControlModifier
-#: Frames that are read around the playhead.
-AHEAD, BEHIND = 6, 2
+#: The probe stands within so many pixels of the lower rim.
+PROBE_HEIGHT = 200
+#: Frames that are read around the playhead, when it has rested for so many milliseconds.
+AHEAD, BEHIND, REST = 6, 2, 80
 
 F32 = NDArray[np.float32]
 
@@ -65,15 +65,17 @@ class Viewer(QWidget):
         self.doing = ""
         self._pan_from = QPointF()
         self.pointer: QPointF | None = None
+        self._resting = QTimer(self)
+        self._resting.setSingleShot(True)
+        self._resting.timeout.connect(self._read_around)
         self.on_pick: Any = None  #: called with a Place for a click or a box
         self.on_hold: Any = None  #: the same with Alt
         session.on("clip", self._clip_changed)
         session.on("document", self.refresh)
         session.on("document", self._probe_again)
-        session.on("pixels", self._probe_again)
         session.on("playing", self.refresh)
         session.on("frame", self.read_frame)
-        session.on("pixels", self.refresh)
+        session.on("pixels", self._pixels_arrived)
         session.on("view", self.refresh)
         session.on("hover", self.refresh)
         for event in ("wipe", "selection"):
@@ -86,6 +88,16 @@ class Viewer(QWidget):
         """What is drawn: "before", "after" or both."""
         compare = "before" if self.comparing else self.session.view.compare
         return ("before", "after") if compare in ("wipe", "side") else (compare,)
+
+    @property
+    def current(self) -> bool:
+        """Whether the picture of now is shown; it may be coarse."""
+        picture, session = self.picture, self.session
+        return (
+            picture is not None
+            and picture.request.frame == session.frame
+            and picture.request.revision == session.revision
+        )
 
     def _clip_changed(self) -> None:
         self.picture, self.images, self.shown_frame, self.problem = None, {}, None, ""
@@ -101,10 +113,22 @@ class Viewer(QWidget):
             self.update()
             return
         if not session.playing:
-            # Its neighbours are read when its picture is shown.
+            # Its neighbours are read when the playhead rests.
+            self._resting.stop()
             session.player.want([session.frame])
             self.refresh()
         self._probe_again()
+
+    def _read_around(self) -> None:
+        """Read the frames around the playhead."""
+        if self.session.player is not None and not self.session.playing:
+            self.session.player.want(frames_around(self.session))
+
+    def _pixels_arrived(self) -> None:
+        """Show the frame, unless another frame's pixels have arrived."""
+        if self.shown_frame != self.session.frame or self.session.playing:
+            self.refresh()
+            self._probe_again()
 
     def refresh(self) -> None:
         """Ask for the picture of now; while playing, the playback chooses the pictures."""
@@ -115,6 +139,9 @@ class Viewer(QWidget):
         if request is not None:
             self.problem = ""
             self.preview.ask(request)
+            # What would be drawn now is the picture of before.
+            if self.session.dragging or self.shown_frame != self.session.frame:
+                return
         elif self.session.player is not None:
             player, frame = self.session.player, self.session.frame
             missing = texts.NO_FRAME.format(frame=frame)
@@ -147,7 +174,7 @@ class Viewer(QWidget):
         return self._request_of(frame, region, NO_PIXELS, settled=False, scaled=True)
 
     def film_key(self, frame: int) -> tuple[Any, ...]:
-        """Return `Request.film_key` of the request for a frame to play."""
+        """Return `Request.key` of the request for a frame to play."""
         session = self.session
         sides = frozenset(self.sides)
         before = self._before_key()
@@ -160,7 +187,7 @@ class Viewer(QWidget):
     def with_pixels(self, request: Request) -> Request | None:
         """Return a request to play with its pixels; None if they are gone."""
         player = self.session.player
-        small = None if player is None else player.small(request.frame, request.region)
+        small = None if player is None else player.small(request.frame, request.region.coarse)
         return None if small is None else dataclasses.replace(request, pixels=small)
 
     def _request_of(self, frame: int, region: Region, pixels: F32, **more: Any) -> Request:
@@ -183,7 +210,7 @@ class Viewer(QWidget):
             region=region,
             display=session.display,
             look=session.looked,
-            key=self._before_key(),
+            against=self._before_key(),
             revision=revision,
             sides=frozenset(self.sides),
             **more,
@@ -194,6 +221,8 @@ class Viewer(QWidget):
         self._take(picture)
 
     def _arrived(self, picture: Picture) -> None:
+        if picture.request.clip != self._clips:
+            return
         if picture.error:
             self.problem = picture.error
             self.session.say(picture.error, "error")
@@ -203,8 +232,8 @@ class Viewer(QWidget):
         if session.clip is None or session.playing or session.player is None:
             return
         self._take(picture)
-        if picture.exact and picture.request.frame == session.frame:
-            session.player.want(frames_around(session))
+        if picture.exact:
+            self._resting.start(REST)
 
     def _take(self, picture: Picture) -> None:
         self.picture, self.shown_frame = picture, picture.request.frame
@@ -430,16 +459,17 @@ class Viewer(QWidget):
     def _probe(self, point: QPointF) -> None:
         at = self.pixel_at(point)
         self.session.show_probe(None if at is None else probe_at(self.session, *at))
-        self.update()
+        self.update(0, self.height() - PROBE_HEIGHT, self.width(), PROBE_HEIGHT)
 
 
 def frames_around(session: Session) -> list[int]:
-    """Return the frames to read, the playhead's first."""
+    """Return the frames to read, the playhead's first, as many as can be kept with it."""
     assert session.clip is not None
+    assert session.player is not None
     _, _, step = session.frames
     # Movies are decoded forwards; going back takes long.
     behind = 0 if session.clip.is_movie else BEHIND
     offsets = [0, *range(1, AHEAD + 1), *range(-1, -behind - 1, -1)]
-    known = frozenset() if session.player is None else session.player.numbers
     frames = [session.frame + offset * step for offset in offsets]
-    return [frame for frame in frames if frame in known]
+    known = [frame for frame in frames if frame in session.player.numbers]
+    return known[: session.player.room]

@@ -49,8 +49,9 @@ from palette4d.studio.viewer import Viewer
 
 #: Milliseconds between two looks at the file.
 TICK = 200
-#: Milliseconds that a picture has before panels are told, and the longest between two panels.
-PICTURE_FIRST, LONGEST_REST = 20, 120
+#: Milliseconds between two looks whether the picture is shown, so that panels can be told; the
+#: longest wait for it, and between two panels.
+LOOK, LONGEST_REST = 5, 120
 #: Shows the picture before while it is down.
 COMPARE_KEY = Qt.Key.Key_C
 
@@ -71,14 +72,21 @@ class _Post(QObject):
 
 
 class Turns(QObject):
-    """Tells panels what changed, one a turn; between two turns the picture goes first.
+    """Tells panels what changed, one a turn, when the picture is shown.
 
     While something is dragged, a panel is told at most the newest state, and panels take at most a
     third of the time.
+
+    Parameters
+    ----------
+    parent : QObject
+    shown : callable
+        Whether the picture of now is shown.
     """
 
-    def __init__(self, parent: QObject) -> None:
+    def __init__(self, parent: QObject, shown: Callable[[], bool]) -> None:
         super().__init__(parent)
+        self._shown, self._asked = shown, 0.0
         self._waiting: dict[Callable[[], object], None] = {}
         self._timer = QTimer(self)
         self._timer.setSingleShot(True)
@@ -88,7 +96,8 @@ class Turns(QObject):
         """Call a function soon; once, however often it is asked for until then."""
         self._waiting[call] = None
         if not self._timer.isActive():
-            self._timer.start(PICTURE_FIRST)
+            self._asked = time.monotonic()
+            self._timer.start(LOOK)
 
     @property
     def settled(self) -> bool:
@@ -96,16 +105,20 @@ class Turns(QObject):
         return not self._waiting
 
     def _next(self) -> None:
+        start = time.monotonic()
+        if not self._shown() and start < self._asked + LONGEST_REST / 1000:
+            self._timer.start(LOOK)
+            return
         call = next(iter(self._waiting), None)
         if call is None:
             return
         del self._waiting[call]
-        start = time.monotonic()
         call()
         panel = getattr(call, "__self__", None)
         if isinstance(panel, QWidget) and not panel.isWindow():  # a window would paint all panels
             panel.repaint()
-        took = time.monotonic() - start
+        self._asked = time.monotonic()
+        took = self._asked - start
         if self._waiting:
             self._timer.start(round(min(2000 * took, LONGEST_REST)))
 
@@ -139,13 +152,13 @@ class Window(QMainWindow):
         self.session = session
         self.settings = settings if settings is not None else QSettings("palette4d", "studio")
         session.post = _Post(self).post
-        self.turns = Turns(self)
-        session.later = self.turns.later
         session.beside = Newest("palette4d solver").ask
         self.setWindowTitle(f"{texts.TITLE}[*]")
         self.setAcceptDrops(True)
         self.setDockNestingEnabled(True)
         self.viewer = Viewer(session)
+        self.turns = Turns(self, lambda: session.player is None or self.viewer.current)
+        session.later = self.turns.later
         self.playback = Playback(session, self.viewer)
         self.transport = Transport(session, self.playback)
         self.timeline = TimelineView(session)
@@ -176,6 +189,9 @@ class Window(QMainWindow):
             button.setToolTip(f"{action.text()} ({keys})")
         for event in ("document", "status", "clip", "selection", "view", "playing"):
             session.on(event, self._show, panel=True)
+        session.on("selection", self._bring_inspector)
+        self._closing = False  # when no edit reads the clip any more
+        session.on("followed", self._close_if_followed)
         self._listener = Listener(self, self._asked_for)
         session.on("document", lambda: self._listener.listen(session.path))
         self._timer = QTimer(self)
@@ -390,6 +406,12 @@ class Window(QMainWindow):
         for action in ("next_shot", "previous_shot"):
             self.actions_by_name[action].setEnabled(many)
 
+    def _bring_inspector(self) -> None:
+        """Show where the colour of a pixel that was clicked is chosen."""
+        if self.session.place is not None:
+            self.docks["inspector"].show()
+            self.docks["inspector"].raise_()
+
     def _fill_versions(self) -> None:
         self.versions.clear()
         for number, name in enumerate(self.session.versions, 1):
@@ -417,7 +439,13 @@ class Window(QMainWindow):
             self.open_path(sequence_of(paths[0]))
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Save; if that fails, ask before anything is lost."""
+        """Save; if that fails, ask before anything is lost. Edits that read the clip come first."""
+        if self.session.following and not self._closing:
+            self._closing = True
+            self.session.say(texts.CLOSES_SOON, "warning")
+            event.ignore()
+            return
+        self._closing = False
         if not self.session.save():
             answer = QMessageBox.question(
                 self,
@@ -432,6 +460,10 @@ class Window(QMainWindow):
         self.settings.setValue("state", self.saveState())
         self.shut()
         event.accept()
+
+    def _close_if_followed(self) -> None:
+        if self._closing and not self.session.following:
+            self.close()
 
     def _asked_for(self, frame: float | None) -> None:
         """Come to the front, and go to a frame."""
@@ -448,10 +480,9 @@ class Window(QMainWindow):
         if session.player is None or self.viewer.problem:
             return True
         return (
-            picture is not None
+            self.viewer.current
+            and picture is not None
             and picture.exact
-            and picture.request.frame == session.frame
-            and picture.request.revision == session.revision
             and not session.solving
             and session.player.idle
             and self.turns.settled

@@ -270,16 +270,18 @@ namespace {
 
 const std::vector<Bump> kBumps = {{{0.5, 0.4, 0.3}, 0.4, {0.2, -0.1, 0.05}},
                                   {{0.9, 0.9, 0.9}, 0.07, {-0.3, 0, 0.1}},
-                                  {{1.3, 0.2, 0.1}, 0.5, {0, 0.25, 0}}};
+                                  {{1.3, 0.2, 0.1}, 0.5, {0, 0.25, 0}},
+                                  {{0.3, 0.5, 0.2}, 0.2, {0.1, 0, 0.1}, 0, {0.4, 0.6, 0.3}}};
 
 /// What the bumps do to a colour that the palette moves by `sum`, in plain words.
 Vec3 bumped(const std::vector<Bump>& bumps, const Vec3& p, Vec3 sum = {}) {
     for (const Bump& bump : bumps) {
         const Vec3 away = p - bump.centre;
-        const double within = std::max(0.0, 1 - dot(away, away) / std::pow(bump.radius, 2));
+        const double away2 = dot(away, away) - std::pow(dot(bump.along, away), 2);
+        const double part = std::pow(std::max(0.0, 1 - away2 / std::pow(bump.radius, 2)), 3);
         for (std::size_t c = 0; c < 3; ++c) {
-            sum[c] += std::pow(within, 3) * bump.by[c];
-            sum[c] *= 1 - std::pow(within, 3) * bump.keep;
+            sum[c] += part * bump.by[c];
+            sum[c] *= 1 - (1 - std::pow(1 - part, 3)) * bump.keep;
         }
     }
     return sum;
@@ -289,7 +291,7 @@ Vec3 bumped(const std::vector<Bump>& bumps, const Vec3& p, Vec3 sum = {}) {
 std::vector<Bump> with_holds() {
     std::vector<Bump> bumps = kBumps;
     bumps.insert(bumps.begin(), {{0.4, 0.4, 0.4}, 0.5, {}, 1});
-    bumps.push_back({{0.6, 0.3, 0.3}, 0.3, {}, 0.5});
+    bumps.push_back({{0.6, 0.3, 0.3}, 0.3, {}, 0.5, {0.7, 0.4, 0.2}});
     return bumps;
 }
 
@@ -382,10 +384,13 @@ TEST(colours_beyond_all_bumps_keep_their_bits) {
             const double alpha = premultiplied ? from[3] : 1.0;
             bool beyond = true;
             for (const Bump& bump : kBumps) {
-                double distance2 = 0;
+                double distance2 = 0, along = 0;
                 for (std::size_t c = 0; c < 3; ++c) {
-                    distance2 += std::pow(from[c] / alpha - bump.centre[c], 2);
+                    const double away = from[c] / alpha - bump.centre[c];
+                    distance2 += away * away;
+                    along += away * bump.along[c];
                 }
+                distance2 -= along * along;
                 beyond &= !(distance2 < bump.radius * bump.radius * (1 + 1e-5));  // NaN too
             }
             const bool same = std::memcmp(from, &found.data[i], 16) == 0;
@@ -423,7 +428,8 @@ TEST(bumps_far_from_0_and_small_ones_are_exact_too) {
 TEST(bumps_that_are_no_bumps_are_refused) {
     for (const Bump& bump : {Bump{{0, 0, kNan}, 1, {1, 1, 1}}, Bump{{0, 0, 0}, 0, {1, 1, 1}},
                              Bump{{0, 0, 0}, kInf, {1, 1, 1}}, Bump{{0, 0, 0}, 1, {1, kInf, 1}},
-                             Bump{{0, 0, 0}, 1, {}, 1.5}, Bump{{0, 0, 0}, 1, {}, kNan}}) {
+                             Bump{{0, 0, 0}, 1, {}, 1.5}, Bump{{0, 0, 0}, 1, {}, kNan},
+                             Bump{{0, 0, 0}, 1, {1, 1, 1}, 0, {0.6, 0.8, 0}}}) {
         CHECK_THROWS(std::invalid_argument,
                      Recolourer(cube().rgb, cube().rgb, cube().faces, {bump}));
     }
