@@ -42,9 +42,9 @@ PATIENCE = 0.08
 # Palettes whose price is this share above the least are refined before they are compared.
 CLOSE = 0.05
 # Of the colours that may go, those that cost least at once are tried.
-COLOURS_TRIED = 3
+COLOURS_TRIED = 2
 # The search looks at these evenly spaced frames, and those with the largest losses.
-KEY_FRAMES, EVEN_FRAMES, WORST_FRAMES = 48, 24, 8
+KEY_FRAMES, EVEN_FRAMES, WORST_FRAMES = 48, 16, 8
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -6,10 +6,12 @@ user CPU, and where more of what is allowed gave less: more blocks or handles or
 with a worse objective, a dearer handle with more handles.
 
     python benchmarks/bench_search.py [CLIP[:A-B] ...] [--drawn NAME ...] [--stills PICTURE ...]
-                                      [--default-only] [--json FILE]
+                                      [--default-only] [--noise] [--json FILE]
 
 Without names all drawn clips (`drawn_clips`) and the sample clip are analysed. A still becomes a
 clip by a pan from corner to corner. CPU is that of the whole default analysis, reading included.
+With --noise each clip is analysed with noise of 1/255 too: how far apart are the colours that
+correspond?
 """
 
 from __future__ import annotations
@@ -29,8 +31,12 @@ import numpy as np
 from evaluator import say, table
 from palette4d.analysis import colour_statistics, pipeline
 from palette4d.analysis.options import AnalysisOptions
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial.distance import cdist
 
+from palette4d import _core
 from palette4d.demo import scene
+from palette4d.grade import sidecar
 from palette4d.media.array_clip import ArrayClip
 from palette4d.media.clip import open_clip
 from palette4d.media.clip_base import Clip
@@ -123,6 +129,22 @@ def broken(results: dict[str, Result]) -> list[str]:
     return found
 
 
+def apart(clip: Clip) -> np.ndarray:
+    """Return the distances of corresponding colours in the palettes of a clip and of the clip with
+    noise of 1/255, at 13 times."""
+    plain = np.stack([image[..., :3] for _, image in clip])
+    noise = np.random.default_rng(0).uniform(-1 / 255, 1 / 255, plain.shape)
+    one, other = (
+        _core.parse_sidecar(sidecar.dumps(pipeline.analyze(array, allow_cuts=True).document))
+        for array in (plain, (plain + noise).clip(0).astype(np.float32))
+    )
+    found = []
+    for time_ in np.linspace(0, len(plain) - 1, 13):
+        gaps = cdist(*(_core.slice_at(p.polytope, time_).rgb for p in (one, other)))
+        found += gaps[linear_sum_assignment(gaps)].tolist()
+    return np.array(found)
+
+
 def main() -> None:
     """Run the benchmark."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
@@ -130,11 +152,17 @@ def main() -> None:
     parser.add_argument("--drawn", nargs="*", choices=drawn_clips.SCENES, default=[])
     parser.add_argument("--stills", nargs="*", default=[], metavar="PICTURE")
     parser.add_argument("--default-only", action="store_true", help="no other settings")
+    parser.add_argument("--noise", action="store_true", help="with noise of 1/255 too")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures")
     args = parser.parse_args()
     settings = list(SETTINGS)[: 1 if args.default_only else None]
     rows, wrong, everything = [], [], {}
+    noises = []
     for name, clip in clips(args):
+        if args.noise:
+            far = apart(clip)
+            figures = (far.mean(), np.quantile(far, 0.9), far.max())
+            noises.append([name, *(f"{x:.3f}" for x in figures)])
         results = analysed(clip, settings)
         everything[name] = {of: dataclasses.asdict(one) for of, one in results.items()}
         default = results["default"]
@@ -150,6 +178,8 @@ def main() -> None:
             args.json.write_text(json.dumps(everything, indent=1))
     heads = ["clip", "default", "L'", "handles", "blocks", "user CPU s", "the best", "with", "away"]
     print(table(heads, rows))
+    if noises:
+        print(table(["clip, with noise", "mean", "90 %", "largest"], noises))
     print("\n".join(wrong or ["More of what is allowed never gave less."]))
     sys.exit(bool(wrong))
 

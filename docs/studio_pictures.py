@@ -80,9 +80,15 @@ def main() -> None:
         draw("studio_picks", sidecar, 28, picks)
 
 
+def rose(window: Any) -> str:
+    """Return the id of the demo's only edited vertex."""
+    (edit,) = window.session.document.fields()["edits"]["vertices"]
+    return str(edit["vertex"])
+
+
 def whole(window: Any) -> None:
     """Select the rose of autumn."""
-    window.session.select("v13")
+    window.session.select(rose(window))
 
 
 def wipe(window: Any) -> None:
@@ -97,7 +103,7 @@ def timeline(window: Any) -> None:
 
 def solid(window: Any) -> None:
     """Select the rose of autumn, seen from the side."""
-    window.session.select("v13")
+    window.session.select(rose(window))
     window.solid.azimuth, window.solid.elevation = 24.0, 14.0
 
 

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 FRAMES = (1, 11, 22, 30, 38, 48)
 """Shown in before_after.png: a summer day, its end, autumn, late autumn, dusk and night."""
-GOLD = 29
+GOLD = 28
 """The frame at which the gold is edited: a vertex of the palette lies there."""
 AUTUMN = 30
 """The frame whose edit is baked: late autumn."""

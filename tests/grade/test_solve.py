@@ -322,8 +322,8 @@ def test_guarded_colours_stay(fields: Fields) -> None:
     lamp = [0.75, 0.7, 0.2]
     rows = [[0.4, 0.4, 0.4, 0.6], [0.3, 0.3, 0.6, 0.3997], [*lamp, 0.0003]]
     document, _ = solved({**fields, "colours": [{"frame": 0, "rgbw": rows}]}, asked)
-    assert np.abs(moved(document, (0.3, 0.3, 0.6), 5)).max() < 0.4 * 0.15
-    assert np.abs(moved(document, lamp, 5)).max() < 1.35 * 0.15
+    assert np.abs(moved(document, (0.3, 0.3, 0.6), 5)).max() < 0.025
+    assert np.abs(moved(document, lamp, 5)).max() < 0.15
 
 
 def test_two_targets_of_one_colour_are_named_and_stay_bounded(fields: Fields) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +11,13 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QTabBar
 from windows import FRAME, Settle, busiest
 
 import palette4d
-from palette4d.studio import menu_entries
+from palette4d.grade.document import Document
+from palette4d.grade.follow import Progress
+from palette4d.studio import menu_entries, texts
 from palette4d.studio.window import Window
 
 
@@ -50,6 +54,36 @@ def test_undo_redo_and_the_history_by_hand(opened: Window) -> None:
     assert session.document.colour(id_) == (0.1, 0.1, 0.1)
     opened.history.go_to(3)
     assert session.document.colour(id_) == (0.3, 0.3, 0.3)
+
+
+def test_a_window_closes_when_its_last_pick_is_followed(
+    opened: Window, sidecar: Path, qtbot: Any
+) -> None:
+    go_on = threading.Event()
+    id_ = busiest(opened)
+
+    def slowly(document: Document, _: Progress) -> None:
+        assert go_on.wait(20)
+        document.set(id_, rgb=(0.3, 0.2, 0.1))
+
+    opened.session.edit_later(slowly, "done")
+    opened.close()
+    opened.open_path(str(sidecar))
+    assert opened.isVisible()
+    assert opened.session.status.text == texts.STILL_FOLLOWING
+    go_on.set()
+    qtbot.waitUntil(lambda: not opened.isVisible())
+    assert Document.load(sidecar).colour(id_) == (0.3, 0.2, 0.1)
+
+
+def test_a_click_in_the_picture_brings_the_inspector(opened: Window, qtbot: Any) -> None:
+    def in_front() -> list[str]:
+        return [bar.tabText(bar.currentIndex()) for bar in opened.findChildren(QTabBar)]
+
+    opened.docks["history"].raise_()
+    qtbot.waitUntil(lambda: texts.HISTORY in in_front())
+    QTest.mouseClick(opened.viewer, Qt.MouseButton.LeftButton, pos=opened.viewer.rect().center())
+    qtbot.waitUntil(lambda: texts.INSPECTOR in in_front())
 
 
 def test_arrows_in_and_out_points_and_playing(opened: Window, qtbot: Any) -> None:

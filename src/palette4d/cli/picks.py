@@ -313,7 +313,7 @@ def _print_pick(
     _print_notes(document, [ids for ids in before if id_ not in ids])
 
 
-def _told(document: Document, pick: Pick, followed: bool = True) -> str:
+def _told(document: Document, pick: Pick, followed: bool = False) -> str:
     """Return a pick or hold for people: what was asked, and how it is met."""
     asked = shown(pick.rgb) + (f" -> {shown(pick.to)}" if pick.to is not None else " stays")
     lines = [f"{pick.id}: {pick.kind} at frame {pick.frame:g}: {asked}"]
@@ -358,7 +358,7 @@ def _print_notes(document: Document, told: Iterable[frozenset[str]] = ()) -> Non
     if not enabled:
         return
     moved, among = document.moved_by_picks()
-    print(f"{moved} of {counted(among, 'palette colour')} move")
+    print(f"{moved} of {counted(among, 'palette colour')} {'moves' if moved == 1 else 'move'}")
     effect = document.side_effect()
     print(
         f"at frame {effect.frame:.0f}, {effect.share:.0%} of the picture's pixels change by more "

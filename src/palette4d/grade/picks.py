@@ -193,6 +193,13 @@ class Pick:
             np.array([key.there for key in self.path], float),
         )
 
+    @cached_property
+    def _limits(self) -> tuple[F64, F64 | float]:
+        """The least and the largest colour that a shift may lead to."""
+        ends = np.vstack([np.array(self.to), np.array(self.rgb), self._keys[1]])
+        high = np.maximum(1.0, ends[:2].max(axis=0)) if ends.max() <= 1 else np.inf
+        return np.minimum(0.0, ends.min(axis=0)), high
+
     def change_at(self, frame: float) -> F64:
         """Return the full change that is asked for at a frame, (3,)."""
         if self.to is None:
@@ -203,9 +210,7 @@ class Pick:
         change: F64 = new - old
         # The change that makes a wall blue by day would make its night black a bright blue.
         light = min(1.0, max(0.0, float(colour.max())) / max(float(old.max()), 1e-9))
-        ends = np.vstack([old, new, self._keys[1]])
-        high = np.maximum(1.0, ends[:2].max(axis=0)) if ends.max() <= 1 else np.inf
-        low = np.minimum(0.0, ends.min(axis=0))
+        low, high = self._limits
         room = np.where(change < 0, colour - low, high - colour)
         part = room / np.maximum(np.abs(change), 1e-9)
         return change * min(light, max(0.0, float(part.min())))

@@ -32,6 +32,7 @@ between; the core interpolates linearly. So a pick that ends at a frame has no e
 from __future__ import annotations
 
 import itertools
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -40,7 +41,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palette4d import _core
-from palette4d.grade import sidecar
 from palette4d.grade.bumps import alongs, bump_values, bumped, squares
 from palette4d.grade.edits import Colour, as_colour
 from palette4d.grade.keyframes import needed
@@ -164,28 +164,22 @@ def side_effect(fields: Mapping[str, Any], least: float) -> SideEffect:
         user = _core.edited_colours(clip.polytope, clip.core.edits, cut)
         guarded = clip.colours_at(time)
         rgb, shares = guarded[:, :3], guarded[:, 3] / max(float(guarded[:, 3].sum()), 1e-9)
-        bumps = both.bumps_at(time)
-
-        def changes(
-            rgb: F64, by: F64 = solved - user, cut: _core.Slice = cut, bumps: F64 = bumps
-        ) -> F64:
-            return bumped(rgb, _core.palette_weights(rgb, cut.rgb, cut.faces)[0] @ by, bumps)
-
-        change = changes(rgb)
+        steps = STEP_IN_COLOUR * np.vstack([np.zeros((1, 3)), np.eye(3)])
+        colours = (rgb + steps[:, None]).reshape(-1, 3)
+        moved = _core.palette_weights(colours, cut.rgb, cut.faces)[0] @ (solved - user)
+        changes = bumped(colours, moved, both.bumps_at(time)).reshape(4, -1, 3)
+        change = changes[0]
         size = np.abs(change).max(axis=1)
         other = problem.guard_at(rgb, time) > OTHER
         worst = int(np.argmax(np.where(other, size * np.sqrt(shares), 0.0)))
-        slopes = [
-            np.linalg.norm(changes(rgb + step) - change, axis=1) / STEP_IN_COLOUR
-            for step in STEP_IN_COLOUR * np.eye(3)
-        ]
+        slopes = np.linalg.norm(changes[1:] - change, axis=2) / STEP_IN_COLOUR
         found.append(
             SideEffect(
                 time,
                 float(shares[size > least].sum()),
                 float(shares[other & (size > least)].sum()),
                 as_colour(rgb[worst]),
-                float(shares[np.max(slopes, axis=0) > TORN - 1].sum()),
+                float(shares[slopes.max(axis=0) > TORN - 1].sum()),
                 time,
             )
         )
@@ -710,9 +704,9 @@ def _parsed(fields: Mapping[str, Any], solution: Fields) -> _core.Sidecar:
     """Return the core's view of the palette and of the user's edits, with a solution."""
     without = {n: v for n, v in fields.items() if n not in ("colours", "versions", "history")}
     edits = {n: v for n, v in fields["edits"].items() if n not in ("picks", "locks", "solution")}
-    return sidecar.validate(
-        {**without, "edits": edits | ({"solution": solution} if solution else {})}
-    )
+    document = {**without, "edits": edits | ({"solution": solution} if solution else {})}
+    # Not `sidecar.validate`, which first puts all members into the file's order.
+    return _core.parse_sidecar(json.dumps(document).encode(), "<document>")
 
 
 def _rounded(values: F64) -> list[float]:

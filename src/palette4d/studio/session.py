@@ -52,6 +52,8 @@ class Session(SessionView):
         How code values of the clip become colours on the screen.
     revision : int
         Rises with every change of what `document` shows.
+    following : int
+        How many edits are still reading the clip.
     """
 
     def __init__(self) -> None:
@@ -68,6 +70,7 @@ class Session(SessionView):
         self.player: Player | None = None
         self.display: Display | None = None
         self.revision = 0
+        self.following = 0
 
     # -------------------------------------------------------------------------------------- files
 
@@ -192,6 +195,8 @@ class Session(SessionView):
 
     def _leave(self) -> None:
         """Close; what cannot be saved stays open, so that nothing is lost."""
+        if self.following:
+            raise Palette4dError(texts.STILL_FOLLOWING)
         if not self.saved and not self.save():
             raise Palette4dError(self.status.text)
         self.close()
@@ -277,18 +282,22 @@ class Session(SessionView):
             self.post(lambda: self.say(words))
 
         def finish(result: T) -> None:
+            self.following -= 1
             if self._document is document:
                 self.edit(repeat, text, trial)
                 then(result)
+            self.emit("followed")
 
         def repeat(own: Document) -> None:
             for step in trial.history:
                 own.apply(step)
 
         def fail(error: Exception) -> None:
+            self.following -= 1
             self.cancel()
             self._changed()  # a view may show what was wanted
             self.report(error)
+            self.emit("followed")
 
         def work() -> None:
             try:
@@ -300,6 +309,7 @@ class Session(SessionView):
             else:
                 self.post(lambda: finish(result))
 
+        self.following += 1
         threading.Thread(target=work, name="palette4d edit", daemon=True).start()
 
     def drag(self, operation: Edit, text: str = "") -> None:

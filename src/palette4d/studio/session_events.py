@@ -20,6 +20,7 @@ Event = Literal[
     "playing",
     "range",
     "status",
+    "followed",  # an edit has read the clip, or failed
 ]
 
 

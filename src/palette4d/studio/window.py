@@ -189,6 +189,9 @@ class Window(QMainWindow):
             button.setToolTip(f"{action.text()} ({keys})")
         for event in ("document", "status", "clip", "selection", "view", "playing"):
             session.on(event, self._show, panel=True)
+        session.on("selection", self._bring_inspector)
+        self._closing = False  # when no edit reads the clip any more
+        session.on("followed", self._close_if_followed)
         self._listener = Listener(self, self._asked_for)
         session.on("document", lambda: self._listener.listen(session.path))
         self._timer = QTimer(self)
@@ -403,6 +406,12 @@ class Window(QMainWindow):
         for action in ("next_shot", "previous_shot"):
             self.actions_by_name[action].setEnabled(many)
 
+    def _bring_inspector(self) -> None:
+        """Show where the colour of a pixel that was clicked is chosen."""
+        if self.session.place is not None:
+            self.docks["inspector"].show()
+            self.docks["inspector"].raise_()
+
     def _fill_versions(self) -> None:
         self.versions.clear()
         for number, name in enumerate(self.session.versions, 1):
@@ -430,7 +439,13 @@ class Window(QMainWindow):
             self.open_path(sequence_of(paths[0]))
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Save; if that fails, ask before anything is lost."""
+        """Save; if that fails, ask before anything is lost. Edits that read the clip come first."""
+        if self.session.following and not self._closing:
+            self._closing = True
+            self.session.say(texts.CLOSES_SOON, "warning")
+            event.ignore()
+            return
+        self._closing = False
         if not self.session.save():
             answer = QMessageBox.question(
                 self,
@@ -445,6 +460,10 @@ class Window(QMainWindow):
         self.settings.setValue("state", self.saveState())
         self.shut()
         event.accept()
+
+    def _close_if_followed(self) -> None:
+        if self._closing and not self.session.following:
+            self.close()
 
     def _asked_for(self, frame: float | None) -> None:
         """Come to the front, and go to a frame."""
