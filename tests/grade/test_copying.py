@@ -110,12 +110,19 @@ def test_colours_of_another_encoding_are_converted() -> None:
 
 def test_encodings_that_cannot_be_converted_are_refused() -> None:
     fields = stretched(members("split"), 1, 0)
-    fields["clip"]["encoding"] = "unknown"
+    fields["clip"]["encoding"] = "nobody's"
     target = Document(fields)
     before = target.fields()
-    with pytest.raises(Palette4dError, match=r"unknown.*sRGB|sRGB.*unknown"):
+    with pytest.raises(Palette4dError, match=r"nobody's.*sRGB|sRGB.*nobody's"):
         target.copy_from(graded())
     assert target.fields() == before
+
+
+def test_an_unknown_encoding_is_taken_for_srgb() -> None:
+    """As in bakes: many movies state none."""
+    fields = stretched(members("split"), 1, 0)
+    fields["clip"]["encoding"] = "unknown"
+    assert Document(fields).copy_from(graded()).fits
 
 
 @pytest.mark.parametrize("time", [-1, 21, "absolute", float("nan")])

@@ -144,7 +144,7 @@ def test_edits_are_not_lost_unasked(edited: Path) -> None:
     ):
         with pytest.raises(Palette4dError) as caught:
             attempt()
-        assert "2 edited vertices and 3 stops" in str(caught.value)
+        assert "2 edited vertices, 3 stops and 0 picks and holds" in str(caught.value)
     assert edited.read_bytes() == before
 
 

@@ -138,17 +138,6 @@ def test_shades_of_a_pick_change_and_are_none_of_the_others(fields: Fields) -> N
     assert (effect.share, effect.others) == (pytest.approx(1), 0)
 
 
-def test_edges_are_told_where_a_change_is_larger_than_its_reach(fields: Fields) -> None:
-    """Between a colour that changes much and one that stays, pixels of both are torn apart."""
-    sky, twig = np.array((0.6, 0.7, 0.8)), np.array((0.15, 0.1, 0.1))
-    rows = [[*(sky + t * (twig - sky)).tolist(), 1 / 21] for t in np.linspace(0, 1, 21)]
-    found = {**fields, "colours": [{"frame": 0, "rgbw": rows}]}
-    large, _ = solved(found, pick("p1", sky, (0.3, 0.1, 0.5)))
-    assert large.side_effect().torn > 0.1
-    small, _ = solved(found, pick("p1", sky, (0.55, 0.6, 0.75)))
-    assert small.side_effect().torn == 0
-
-
 @pytest.mark.parametrize("seed", range(2))
 def test_a_hold_never_adds_to_a_change(fields: Fields, seed: int) -> None:
     """Of no colour, in no frame: neither of the held one nor of any other."""

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 
 #: The share of the picture above which it is said what else a pick changes.
 MANY = 0.1
-#: And where edges are told: this share of the pixels lies on them.
-TORN = 0.03
 
 _WHERE = "--frame T (--colour C | --pixel X,Y [--box N])"
 _WHEN = "[--from A] [--until B] [--fade N]"
@@ -370,12 +368,6 @@ def _print_notes(document: Document, told: Iterable[frozenset[str]] = ()) -> Non
         print(
             f"note: of the others {shown(effect.most)} changes most. If it must stay: "
             f"hold --frame {effect.frame:.0f} --colour {colour}"
-        )
-    if effect.torn > TORN:
-        print(
-            f"note: edges may show at frame {effect.torn_frame:.0f}: {effect.torn:.0%} of the "
-            "picture's pixels have colours between those that change and those that stay. Choose "
-            "a smaller change, a larger --radius, or pick a box that has them too"
         )
     lines = _unmet(document)
     for ids, line in lines.items():

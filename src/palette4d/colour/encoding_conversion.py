@@ -23,7 +23,7 @@ def between(source: str, target: str, configs: Iterable[str] = ()) -> Convert | 
     Parameters
     ----------
     source, target : str
-        Names of encodings.
+        Names of encodings; unknown counts as sRGB.
     configs : iterable of str
         OpenColorIO configs that may know them; the built-in studio config is tried last.
 
@@ -32,6 +32,7 @@ def between(source: str, target: str, configs: Iterable[str] = ()) -> Convert | 
     Palette4dError
         No config knows both.
     """
+    source, target = ("sRGB" if name == "unknown" else name for name in (source, target))
     if target in same_encodings(source):
         return None
     for name in (*configs, NEWEST):

@@ -238,8 +238,7 @@ class PickEdits(EditedPalette):
     def side_effect(self, *, least: float = 10 / 255) -> "SideEffect":
         """Return which share of the pixels picks change by more than `least` in a channel.
 
-        It says how much of it is not near a picked colour, where edges show, and which colour to
-        hold.
+        It says how much of it is not near a picked colour, and which colour to hold.
         """
         from palette4d.grade import solve
 

@@ -451,7 +451,9 @@ def existing(target: Path, on_edits: OnEdits) -> Fields | None:
 
 def _summary(document: Fields) -> str:
     vertices = counted(len(document["edits"]["vertices"]), "edited vertex", "edited vertices")
-    return f"{vertices} and {counted(len(document['edits']['stops']), 'stop')}"
+    stops = counted(len(document["edits"]["stops"]), "stop")
+    picks = counted(len(document["edits"].get("picks", ())), "pick or hold", "picks and holds")
+    return f"{vertices}, {stops} and {picks}"
 
 
 def _would_lose(target: Path, old: Fields) -> Palette4dError:

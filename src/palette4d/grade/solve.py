@@ -34,7 +34,7 @@ from __future__ import annotations
 import itertools
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -91,8 +91,6 @@ STEP, MOST_TIMES = 4, 40
 STRAIGHT = 4e-4
 # A colour that is guarded by at least this is none of those that the user wants to change.
 OTHER = 0.9
-# Edges show where colours come out more than TORN times as far apart; measured over such a step.
-TORN, STEP_IN_COLOUR = 3.0, 0.01
 # Displacements below this (a quarter of an 8-bit step) are none.
 NONE = 1e-3
 # Stored numbers are rounded, so that the last bits of a LAPACK never show.
@@ -137,17 +135,12 @@ class SideEffect:
         The same for pixels that are not near a picked colour or a shade of it.
     most : 3 floats
         The other colour for which this matters most; its share of the pixels counts.
-    torn, torn_frame : float
-        Share of pixels whose colours come out more than `TORN` times as far apart, so that edges
-        show, at the frame where it is largest.
     """
 
     frame: float
     share: float
     others: float
     most: Colour
-    torn: float
-    torn_frame: float
 
 
 def side_effect(fields: Mapping[str, Any], least: float) -> SideEffect:
@@ -156,35 +149,27 @@ def side_effect(fields: Mapping[str, Any], least: float) -> SideEffect:
     both = _parsed(fields, fields["edits"].get("solution", {}))
     enabled = [pick for pick in all_picks(fields["edits"]) if pick.enabled]
     problem = _Problem(clip, enabled[:MOST_PICKS])
-    found = [SideEffect(float(clip.first), 0.0, 0.0, (0.0, 0.0, 0.0), 0.0, float(clip.first))]
+    found = [SideEffect(float(clip.first), 0.0, 0.0, (0.0, 0.0, 0.0))]
     for time in problem.times:
         cut = _core.slice_at(clip.polytope, time)
         solved = _core.edited_colours(clip.polytope, both.edits, cut)
         user = _core.edited_colours(clip.polytope, clip.core.edits, cut)
         guarded = clip.colours_at(time)
         rgb, shares = guarded[:, :3], guarded[:, 3] / max(float(guarded[:, 3].sum()), 1e-9)
-        steps = STEP_IN_COLOUR * np.vstack([np.zeros((1, 3)), np.eye(3)])
-        colours = (rgb + steps[:, None]).reshape(-1, 3)
-        moved = _core.palette_weights(colours, cut.rgb, cut.faces)[0] @ (solved - user)
-        changes = bumped(colours, moved, both.bumps_at(time)).reshape(4, -1, 3)
-        change = changes[0]
+        moved = _core.palette_weights(rgb, cut.rgb, cut.faces)[0] @ (solved - user)
+        change = bumped(rgb, moved, both.bumps_at(time))
         size = np.abs(change).max(axis=1)
         other = problem.guard_at(rgb, time) > OTHER
         worst = int(np.argmax(np.where(other, size * np.sqrt(shares), 0.0)))
-        slopes = np.linalg.norm(changes[1:] - change, axis=2) / STEP_IN_COLOUR
         found.append(
             SideEffect(
                 time,
                 float(shares[size > least].sum()),
                 float(shares[other & (size > least)].sum()),
                 as_colour(rgb[worst]),
-                float(shares[slopes.max(axis=0) > TORN - 1].sum()),
-                time,
             )
         )
-    torn = max(found, key=lambda one: one.torn)
-    most = max(found, key=lambda one: (one.others, one.share))
-    return replace(most, torn=torn.torn, torn_frame=torn.torn_frame)
+    return max(found, key=lambda one: (one.others, one.share))
 
 
 class _ClipAtTimes:
