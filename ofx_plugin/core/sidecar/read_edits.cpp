@@ -13,6 +13,8 @@
 namespace palette4d {
 namespace {
 
+/// In memory each version has a colour for each vertex.
+constexpr std::size_t kMaxVersionVertices = 1'000'000;
 /// Smallest radius of a bump, so that its square stays a normal float.
 constexpr double kMinRadius = 1e-4;
 /// Smallest share that distances to shades count, so that bumps stay finite.
@@ -245,7 +247,12 @@ std::vector<NamedVersion> read_versions(const Cursor& where, const Polytope& pol
                                         const Ids& ids) {
     std::vector<NamedVersion> versions;
     std::set<std::string> taken;
-    for (std::size_t i = 0, n = where.list("versions"); i < n; ++i) {
+    const std::size_t n = where.list("versions"), vertices = polytope.vertices().size();
+    if (n * vertices > kMaxVersionVertices) {
+        where.fail(std::to_string(n) + " versions of " + std::to_string(vertices) + " vertices",
+                   "versions times vertices of at most " + std::to_string(kMaxVersionVertices));
+    }
+    for (std::size_t i = 0; i < n; ++i) {
         const Cursor entry = where.element(i);
         entry.require_members({"name", "edits"});
         const Cursor name = entry.member("name");
