@@ -250,9 +250,12 @@ def find_polytope(
     frames: Sequence[FrameStatistics], options: AnalysisOptions, progress: Progress | None = None
 ) -> Found:
     """Run the stages after `colour_statistics` on at least one frame, in order of time."""
+    # Times from 0 on: how frames are numbered must not show, not even by rounding.
+    first = frames[0].frame
+    frames = [dataclasses.replace(one, frame=one.frame - first) for one in frames]
     run = _Run(frames, options, progress)
     methods = {"skew": _skew, "paper": _paper, "static": _static, "rgbt": _rgbt}
-    polytope = methods[options.method](run)
+    polytope = methods[options.method](run).later(first)
     return Found(polytope, tuple(run.stages), tuple(run.notes), run.bound)
 
 

@@ -118,6 +118,18 @@ class SkewPolytope:
         ]
         return dataclasses.replace(self, vertices=vertices, blocks=tuple(blocks))
 
+    def later(self, by: float) -> SkewPolytope:
+        """Return the polytope so many frames later."""
+
+        def moved(one: Section) -> Section:
+            return dataclasses.replace(one, first=one.first + by, last=one.last + by)
+
+        return SkewPolytope(
+            self.vertices + np.array([0, 0, 0, by]),
+            tuple(map(moved, self.blocks)),
+            tuple(map(moved, self.transitions)),
+        )
+
     def with_stop(self, edge: tuple[int, int], stop: Sequence[float]) -> SkewPolytope:
         """Return the polytope with one more vertex, (r, g, b, frame) on an edge.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import gc
 import weakref
 
@@ -128,6 +129,15 @@ def test_an_array_is_a_clip():
 
 
 FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
+
+
+def test_how_frames_are_numbered_does_not_matter():
+    frames = stats([noise(i) for i in range(6)])
+    later = [dataclasses.replace(one, frame=one.frame + 1001) for one in frames]
+    a, b = (pipeline.find_polytope(f, AnalysisOptions(vertices=12)) for f in (frames, later))
+    np.testing.assert_array_equal(a.polytope.vertices[:, :3], b.polytope.vertices[:, :3])
+    np.testing.assert_allclose(a.polytope.vertices[:, 3] + 1001, b.polytope.vertices[:, 3])
+    assert a.polytope.blocks[-1].last + 1001 == b.polytope.blocks[-1].last
 
 
 def drifting(count):

@@ -95,6 +95,27 @@ def test_the_time_of_a_palette_hardly_grows_with_the_stops_of_an_edge() -> None:
     assert seconds(20_000) < 8 * min(seconds(100) for _ in range(3))
 
 
+def test_versions_do_not_multiply_the_memory() -> None:
+    document = golden("split")
+    empty = {"vertices": [], "stops": []}
+    document["versions"] = [{"name": f"v{i}", "edits": empty} for i in range(1_000_000 // 18 + 1)]
+    error = refusal(document)
+    assert error.pointer == "/versions"
+    assert "55556 versions of 18 vertices" in str(error)
+    del document["versions"][1000:]
+    assert len(_core.parse_sidecar(json.dumps(document), "many").versions) == 1000
+
+
+@pytest.mark.parametrize("name", ["bumps", "holds"])
+def test_no_more_bumps_than_the_solver_makes(name: str) -> None:
+    document = golden("picks_and_holds")
+    found = document["edits"]["solution"][name]
+    found *= 1001 // len(found) + 1
+    error = refusal(document)
+    assert error.pointer == f"/edits/solution/{name}"
+    assert error.expected == f"at most 1000 {name}"
+
+
 def test_transitions_fill_the_time_between_blocks() -> None:
     sections = _core.read_sidecar(GOLDEN / "v1_split.p4d.json").polytope.sections
     spans = [(s["first"], s["last"], s["transition"]) for s in sections]

@@ -13,7 +13,9 @@ import pytest
 import palette4d
 from palette4d import _core
 from palette4d.cli import main
+from palette4d.cli.info import info_of
 from palette4d.grade.document import Document
+from palette4d.grade.palette import Palette
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
 EDITED = str(GOLDEN / "v1_edited.p4d.json")
@@ -30,6 +32,20 @@ def run(*arguments: str) -> subprocess.CompletedProcess[str]:
         timeout=120,
         check=False,
     )
+
+
+def test_a_palette_is_computed_once_for_all_tracks(monkeypatch: pytest.MonkeyPatch) -> None:
+    document = Document.load(EDITED)
+    frames: list[float] = []
+    palette_at = document.palette
+
+    def palette(frame: float) -> Palette:
+        frames.append(frame)
+        return palette_at(frame)
+
+    monkeypatch.setattr(document, "palette", palette)
+    assert len(info_of(document)["tracks"]) > 2
+    assert len(frames) == len({*frames})
 
 
 def test_info_as_json(capsys: pytest.CaptureFixture[str]) -> None:

@@ -21,6 +21,22 @@ def child() -> Iterator[Child]:
         yield one
 
 
+def test_a_script_is_not_run_again(tmp_path: Path) -> None:
+    """A child that starts by `spawn` would run a script that has no guard once more."""
+    script = tmp_path / "script.py"
+    script.write_text(
+        "from palette4d.common.child import Child\n"
+        "import os\n"
+        "print('once')\n"
+        "with Child() as child:\n"
+        "    print(child.call(os.path.basename, 'a/b'))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, str(script)], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (done.returncode, done.stdout) == (0, "once\nb\n"), done.stderr
+
+
 def test_one_process_serves_many_calls(child: Child) -> None:
     first, second = child.call(well, 1, 2), child.call(well, 3, 4)
     assert (first[:2], second[:2]) == ((1, 2), (3, 4))

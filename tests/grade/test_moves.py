@@ -1,5 +1,7 @@
 """Moves of handles, tracks and palettes, over all time and within a range; ramps."""
 
+import itertools
+import time
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +15,8 @@ from palette4d.common.errors import Palette4dError
 from palette4d.grade import sidecar
 from palette4d.grade.document import Document
 from palette4d.grade.edits import RAMP
+from palette4d.grade.handles import Handles
+from palette4d.grade.tracks import tracks_of, way_of
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "sidecars"
 NAMES = ("split", "merge", "edited", "scene_linear")
@@ -307,3 +311,18 @@ def test_every_vertex_and_edge_is_on_one_track() -> None:
         assert sorted(edges) == sorted(e["id"] for e in polytope["edges"])
         names = [track.name for track in doc.tracks]
         assert len(set(names)) == len(names)
+
+
+def test_the_time_of_a_long_track_grows_with_its_vertices() -> None:
+    count = 10_000
+    ids = [f"v{i}" for i in range(count)]
+    vertices = [{"id": id_, "frame": i, "rgb": [0.1, 0.2, 0.3]} for i, id_ in enumerate(ids)]
+    edges = [
+        {"id": f"e{i}", "from": a, "to": b} for i, (a, b) in enumerate(itertools.pairwise(ids))
+    ]
+    handles = Handles({"vertices": vertices, "edges": edges})
+    start = time.process_time()
+    [track] = tracks_of(handles, dict.fromkeys(ids, "blue"))
+    assert track.vertices == tuple(ids)
+    assert len(way_of(handles, "v7")[1]) == count - 1
+    assert time.process_time() - start < 4

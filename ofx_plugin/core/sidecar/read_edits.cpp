@@ -13,6 +13,10 @@
 namespace palette4d {
 namespace {
 
+/// In memory each version has a colour for each vertex.
+constexpr std::size_t kMaxVersionVertices = 1'000'000;
+/// More than the solver makes: each of a hundred picks has at most nine.
+constexpr std::size_t kMaxBumps = 1000;
 /// Smallest radius of a bump, so that its square stays a normal float.
 constexpr double kMinRadius = 1e-4;
 /// Smallest share that distances to shades count, so that bumps stay finite.
@@ -49,6 +53,16 @@ double read_shade(const Cursor& entry) {
     return entry.has("shade") ? entry.member("shade").number(kMinShade, 1) : 1;
 }
 
+/// The length of a list of bumps or holds.
+std::size_t count_of(const Cursor& list, const char* what) {
+    const std::size_t count = list.list(what);
+    if (count > kMaxBumps) {
+        list.fail(std::to_string(count) + " " + what,
+                  "at most " + std::to_string(kMaxBumps) + " " + what);
+    }
+    return count;
+}
+
 Solution read_solution(const Cursor& where, const Polytope& polytope, const Ids& ids) {
     where.require_members({"vertices", "keys", "bumps"}, {"holds"});
     Solution solution;
@@ -81,7 +95,7 @@ Solution read_solution(const Cursor& where, const Polytope& polytope, const Ids&
     });
 
     const Cursor bumps = where.member("bumps");
-    for (std::size_t i = 0, n = bumps.list("bumps"); i < n; ++i) {
+    for (std::size_t i = 0, n = count_of(bumps, "bumps"); i < n; ++i) {
         const Cursor entry = bumps.element(i);
         entry.require_members({"radius", "keys"}, {"shade"});
         Solution::MovingBump bump{
@@ -101,7 +115,7 @@ Solution read_solution(const Cursor& where, const Polytope& polytope, const Ids&
 
     if (!where.has("holds")) return solution;
     const Cursor holds = where.member("holds");
-    for (std::size_t i = 0, n = holds.list("holds"); i < n; ++i) {
+    for (std::size_t i = 0, n = count_of(holds, "holds"); i < n; ++i) {
         const Cursor entry = holds.element(i);
         entry.require_members({"keys"}, {"shade"});
         Solution::MovingHold hold{{}, read_shade(entry)};
@@ -245,7 +259,12 @@ std::vector<NamedVersion> read_versions(const Cursor& where, const Polytope& pol
                                         const Ids& ids) {
     std::vector<NamedVersion> versions;
     std::set<std::string> taken;
-    for (std::size_t i = 0, n = where.list("versions"); i < n; ++i) {
+    const std::size_t n = where.list("versions"), vertices = polytope.vertices().size();
+    if (n * vertices > kMaxVersionVertices) {
+        where.fail(std::to_string(n) + " versions of " + std::to_string(vertices) + " vertices",
+                   "versions times vertices of at most " + std::to_string(kMaxVersionVertices));
+    }
+    for (std::size_t i = 0; i < n; ++i) {
         const Cursor entry = where.element(i);
         entry.require_members({"name", "edits"});
         const Cursor name = entry.member("name");

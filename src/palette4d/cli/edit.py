@@ -127,7 +127,7 @@ def _add_set(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
         "(ID | EDGE --frame T | --near C --frame T) CHANGE [RANGE]",
         "change the colour of a vertex, of a stop, or of an edge at a frame. With --near, the "
         "palette colour nearest to the one that you see at a frame changes there: its stop, or its "
-        "vertex within half a frame, or else a new stop.",
+        "vertex less than a frame away, or else a new stop.",
     )
     parser.add_argument("id", nargs="?", metavar="ID", help="a vertex, a stop, or an edge")
     parser.add_argument(

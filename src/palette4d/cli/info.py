@@ -1,8 +1,9 @@
 """The verb `info`: the content of a sidecar."""
 
 import argparse
+import functools
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from palette4d.cli.swatches import row, swatch
@@ -10,6 +11,7 @@ from palette4d.common.text import counted, hex_of
 
 if TYPE_CHECKING:
     from palette4d.grade.document import Document
+    from palette4d.grade.palette import Palette
     from palette4d.grade.tracks import Track
 
 EPILOG = """\
@@ -74,6 +76,16 @@ def info_of(document: "Document") -> dict[str, Any]:
     on_edge: dict[str, list[str]] = {edge["id"]: [] for edge in polytope["edges"]}
     for stop in stops:
         on_edge[stop["edge"]].append(stop["id"])
+
+    @functools.lru_cache(64)  # tracks share their frames
+    def palette_of(frame: float) -> tuple["Palette", dict[str, list[int]]]:
+        """Return a palette, and where in it ids and ends of edges are."""
+        palette, places = document.palette(frame), dict[str, list[int]]()
+        for at, (id_, ends) in enumerate(zip(palette.ids, palette.ends, strict=True)):
+            for each in {id_, *ends}:
+                places.setdefault(each, []).append(at)
+        return palette, places
+
     return {
         "name": clip["name"],
         "source": clip["source"],
@@ -96,7 +108,7 @@ def info_of(document: "Document") -> dict[str, Any]:
         "locks": fields["edits"].get("locks", []),
         "versions": list(document.versions),
         "steps": len(document.history),
-        "tracks": [_track(document, track, on_edge) for track in document.tracks],
+        "tracks": [_track(document, track, on_edge, palette_of) for track in document.tracks],
         "losses": stages[-1] if stages else {},
         "stages": stages,
         "palette": [
@@ -115,7 +127,10 @@ def info_of(document: "Document") -> dict[str, Any]:
 
 
 def _track(
-    document: "Document", track: "Track", on_edge: Mapping[str, list[str]]
+    document: "Document",
+    track: "Track",
+    on_edge: Mapping[str, list[str]],
+    palette_of: "Callable[[float], tuple[Palette, dict[str, list[int]]]]",
 ) -> dict[str, Any]:
     """Return a track with its edited handles, and its colours where they change most."""
     edited = [id_ for id_ in track.vertices if id_ in document.settings]
@@ -124,13 +139,12 @@ def _track(
     found = []
     frames = [(track.first + track.last) / 2, track.first]
     for frame in [*frames, *(document.frame_of(id_) for id_ in edited)]:
-        palette = document.palette(frame)
-        for id_, ends, rgb, after in zip(
-            palette.ids, palette.ends, palette.rgb, palette.edited, strict=True
-        ):
-            if id_ in inside or inside & {*ends}:
-                change = float(abs(after - rgb).max()) + (id_ in inside) * 1e-9
-                found.append((change, palette.frame, rgb.tolist(), after.tolist()))
+        palette, places = palette_of(float(frame))
+        few = inside if len(inside) < len(places) else [id_ for id_ in places if id_ in inside]
+        for at in sorted({at for id_ in few for at in places.get(id_, ())}):
+            rgb, after = palette.rgb[at], palette.edited[at]
+            change = float(abs(after - rgb).max()) + (palette.ids[at] in inside) * 1e-9
+            found.append((change, palette.frame, rgb.tolist(), after.tolist()))
     _, frame, rgb, after = max(found, key=lambda each: each[0])
     return {
         "name": track.name,

@@ -10,6 +10,7 @@ import multiprocessing
 import pickle
 import signal
 import sys
+import types
 from collections.abc import Callable, Iterable, Iterator
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
@@ -127,7 +128,7 @@ class Child:
         if sys.platform != "win32":
             # Its start ends the block of Ctrl-C.
             resource_tracker.ensure_running()
-        with _without_interrupts():
+        with _without_interrupts(), _without_main():
             self._pipe, theirs = context.Pipe()
             arguments = (theirs, self.seconds, self.megabytes)
             self._process = context.Process(target=_serve, args=arguments, daemon=True)
@@ -152,6 +153,17 @@ def _without_interrupts() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextlib.contextmanager
+def _without_main() -> Iterator[None]:
+    """Hide the program that runs: each process that starts would run the user's script again."""
+    main = sys.modules["__main__"]
+    sys.modules["__main__"] = types.ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = main
 
 
 def _serve(pipe: Connection, seconds: float | None, megabytes: int | None) -> None:

@@ -232,7 +232,7 @@ class EditedPalette(Steps):
         """Return the palette colour nearest to a given colour at a frame.
 
         The edited palette is compared. The handle is the stop at that time, or the vertex of the
-        colour's edge within half a frame step of that time.
+        colour's edge less than a frame step from that time.
         """
         wanted = as_colour(rgb)
         self.check_frame(frame)
@@ -255,7 +255,7 @@ class EditedPalette(Steps):
             return stop
         away = {end: abs(self._handles.vertex(end)["frame"] - frame) for end in ends}
         nearest = min(ends, key=lambda end: away[end])
-        return nearest if away[nearest] <= self.frames[2] / 2 else None
+        return nearest if away[nearest] < self.frames[2] else None
 
     # ------------------------------------------------------------------------------------ details
 

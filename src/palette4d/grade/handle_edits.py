@@ -82,8 +82,8 @@ class HandleEdits(EditedPalette):
     ) -> Near:
         """Change the palette colour nearest to a given colour at a frame.
 
-        The stop at that time moves, or a vertex within half a frame step, so that the colour at the
-        frame is exactly the new one. Otherwise a stop is added.
+        The stop at that time moves, or a vertex less than a frame step away, so that the colour at
+        the frame is exactly the new one. Otherwise a stop is added.
 
         Parameters
         ----------

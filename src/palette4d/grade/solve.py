@@ -111,16 +111,14 @@ def solve(fields: Mapping[str, Any]) -> tuple[Fields, dict[str, Fields]]:
     solution : dict
         The member ``edits.solution``.
     measured : dict
-        For each enabled pick, by its id: ``residual``, ``worst``, ``worst_frame`` and ``global``
-        (`picks.Pick`).
+        For each pick that is solved, by its id: ``residual``, ``worst``, ``worst_frame`` and
+        ``global`` (`picks.Pick`).
     """
     enabled = [pick for pick in all_picks(fields["edits"]) if pick.enabled]
     clip = _ClipAtTimes(fields)
     problem = _Problem(clip, enabled[:MOST_PICKS])
     solved = [problem.at(time) for time in problem.times]
     solution = problem.solution(solved)
-    if len(enabled) > MOST_PICKS:
-        problem = _Problem(clip, enabled)
     return solution, _measured(fields, solution, problem)
 
 
@@ -149,7 +147,8 @@ def side_effect(fields: Mapping[str, Any], least: float) -> SideEffect:
     """Return what the picks' solution does; `least` is the change that counts."""
     clip = _ClipAtTimes(fields)
     both = _parsed(fields, fields["edits"].get("solution", {}))
-    problem = _Problem(clip, [pick for pick in all_picks(fields["edits"]) if pick.enabled])
+    enabled = [pick for pick in all_picks(fields["edits"]) if pick.enabled]
+    problem = _Problem(clip, enabled[:MOST_PICKS])
     found = [SideEffect(float(clip.first), 0.0, 0.0, (0.0, 0.0, 0.0))]
     for time in problem.times:
         cut = _core.slice_at(clip.polytope, time)

@@ -49,12 +49,15 @@ def _continuations(
 
     follows: dict[int, int] = {}
     home = []
-    for vertex in range(len(frames)):
-        arriving = [edge for edge, ends in enumerate(edges) if ends[1] == vertex]
-        leaving = [edge for edge, ends in enumerate(edges) if ends[0] == vertex]
+    arriving_at: list[list[int]] = [[] for _ in frames]
+    leaving_from: list[list[int]] = [[] for _ in frames]
+    for edge, (start, end) in enumerate(edges):
+        leaving_from[start].append(edge)
+        arriving_at[end].append(edge)
+    for arriving, leaving in zip(arriving_at, leaving_from, strict=True):
         home.append(min(arriving or leaving, key=change, default=-1))
         if arriving and leaving:
-            follows[home[vertex]] = min(leaving, key=change)
+            follows[home[-1]] = min(leaving, key=change)
     return follows, home
 
 
@@ -85,13 +88,14 @@ def find_chains(
             vertex_chain[vertex] = len(members)
             members.append([])
 
+    standing_in: list[list[int]] = [[] for _ in members]
+    for v in np.argsort(frames, kind="stable").tolist():
+        standing_in[vertex_chain[v]].append(v)
     chains = []
-    for index, chain in enumerate(members):
-        standing = np.flatnonzero(vertex_chain == index)
-        standing = standing[np.argsort(frames[standing], kind="stable")]
+    for standing, chain in zip(standing_in, members, strict=True):
         times = [float(frames[v]) for v in standing]
         times += [float(frames[v]) for e in chain for v in edges[e]]
-        chains.append(Chain(tuple(int(v) for v in standing), tuple(chain), min(times), max(times)))
+        chains.append(Chain(tuple(standing), tuple(chain), min(times), max(times)))
     return tuple(chains), vertex_chain, edge_chain
 
 
@@ -165,10 +169,13 @@ def way_of(handles: Handles, id_: str) -> tuple[set[str], set[str]]:
         starts = {"from": id_, "to": id_}
     vertices = set(starts.values())
     for near, far in (("to", "from"), ("from", "to")):  # back, then on
-        open_: set[str] = {starts[far]}
+        edges_at: dict[str, list[str]] = {}
+        for edge, ends in handles.edges.items():
+            edges_at.setdefault(ends[near], []).append(edge)
+        open_ = [starts[far]]
         while open_:
-            found = [id_ for id_, edge in handles.edges.items() if edge[near] in open_]
-            edges.update(found)
-            open_ = {handles.edges[edge][far] for edge in found}
-            vertices |= open_
+            for edge in edges_at.pop(open_.pop(), ()):
+                edges.add(edge)
+                open_.append(handles.edges[edge][far])
+                vertices.add(open_[-1])
     return vertices, edges
