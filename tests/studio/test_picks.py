@@ -201,3 +201,9 @@ def test_the_menu_of_a_range_changes_the_pick(qtbot: Any, opened: Window) -> Non
     qtbot.waitUntil(lambda: picks(opened)[0].fade == 5, timeout=20_000)
     choose("same new colour")
     qtbot.waitUntil(lambda: picks(opened)[0].toward == "colour", timeout=20_000)
+    # Ctrl on an end of the range, which drags the fade, keeps the selection.
+    places, (found,) = timeline.places, picks(opened)
+    opened.session.select(found.id)
+    end = QPointF(places.x_of(places.reach(found)[2]), places.lane_y(0)).toPoint()
+    qtbot.mouseClick(timeline, LEFT, Qt.KeyboardModifier.ControlModifier, end)
+    assert opened.session.selection == (found.id,)
