@@ -12,6 +12,7 @@ import OpenImageIO as oiio
 import pytest
 from PySide6.QtNetwork import QLocalSocket
 
+from palette4d.common.errors import Palette4dError
 from palette4d.studio import app, instance
 from palette4d.studio.window import Window
 
@@ -30,6 +31,19 @@ def test_a_screenshot_is_drawn_without_a_screen(sidecar: Path, tmp_path: Path) -
     assert done.returncode == 0, done.stderr
     spec = oiio.ImageBuf(str(out)).spec()
     assert (spec.width, spec.height) == (1400, 700)
+
+
+def test_a_screenshot_of_what_cannot_be_opened_fails_and_a_frame_beyond_is_noted(
+    window: Window, sidecar: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "window.png"
+    assert app.run(str(sidecar), frame=999, screenshot=out, size=(900, 600)) == 0
+    assert "no frame 999; its frames are 1 to 12" in capsys.readouterr().err
+    out.unlink()
+    sidecar.write_text("{")
+    with pytest.raises(Palette4dError, match=r"clip\.p4d\.json"):
+        app.run(str(sidecar), screenshot=out, size=(900, 600))
+    assert not out.exists()
 
 
 def test_without_a_screen_it_says_how_to_do_without(sidecar: Path, tmp_path: Path) -> None:

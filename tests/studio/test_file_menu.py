@@ -87,6 +87,15 @@ def test_an_edit_is_analysed_and_its_manifest_opens_as_a_list_of_shots(
     assert window.session.path != first
     QTest.keyClick(window, Qt.Key.Key_PageUp)
     assert window.session.path == first
+    # Another shot is marked; with a file that is none the list goes, also at the next start.
+    second = window.shots.folder / window.shots.entries[1].sidecar
+    window.open_path(str(second))
+    assert window.shots.list.currentRow() == 1
+    window.settings.setValue("state", window.saveState())
+    window.open_path(str(sidecar))
+    assert (window.docks["shots"].isVisible(), window.shots.count()) == (False, 0)
+    window.restore()
+    assert not window.docks["shots"].isVisible()
 
 
 def _write_edit(path: Path, clip: str) -> None:

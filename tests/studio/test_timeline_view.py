@@ -157,6 +157,15 @@ def test_a_stop_is_dragged_to_whole_frames_and_stays_inside_its_edge(
     assert view.session.document.settings[stop].frame == 4
 
 
+def test_rows_that_have_no_room_are_scrolled_by_the_bar(qtbot: Any, view: TimelineView) -> None:
+    view.resize(500, 150)
+    places = view.places
+    assert places.hidden > 0
+    assert places.top == places.upper + places.head
+    qtbot.mouseClick(view, LEFT, pos=QPoint(view.width() - 2, view.height() - 16))
+    assert places.top == places.upper + places.head - places.hidden
+
+
 def test_keys_go_through_handles_and_rows(qtbot: Any, view: TimelineView) -> None:
     view.setFocus()
     seen = []

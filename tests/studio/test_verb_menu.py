@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from PySide6.QtWidgets import QCheckBox, QComboBox, QLineEdit
 
+from palette4d.studio import texts
 from palette4d.studio.verb_dialog import VerbDialog
 from palette4d.studio.window import Window
 
@@ -42,3 +44,19 @@ def test_shots_go_to_a_folder(opened: Window, sidecar: Path) -> None:
     assert dialog.words()[-1] == "--detect-shots"
     shots.setChecked(False)
     assert dialog.value("-o") == str(sidecar)
+
+
+def test_escape_stops_what_runs_and_the_dialog_says_so(
+    opened: Window, tmp_path: Path, qtbot: Any
+) -> None:
+    dialog = opened.verbs.analyze_again()
+    line = dialog.entry("-o")
+    assert isinstance(line, QLineEdit)
+    line.setText(str(tmp_path / "again.p4d.json"))
+    dialog.start()
+    dialog.reject()
+    assert dialog.stage.text() == texts.STOPPING
+    qtbot.waitUntil(lambda: dialog.stage.text() == texts.CANCELLED, timeout=30_000)
+    assert dialog.isVisible()
+    dialog.reject()
+    assert not dialog.isVisible()

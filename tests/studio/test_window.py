@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QTabBar
+from PySide6.QtWidgets import QFileDialog, QMessageBox, QTabBar
 from windows import FRAME, Settle, busiest
 
 import palette4d
@@ -86,6 +86,16 @@ def test_a_click_in_the_picture_brings_the_inspector(opened: Window, qtbot: Any)
     qtbot.waitUntil(lambda: texts.INSPECTOR in in_front())
 
 
+def test_a_locked_colour_that_is_changed_by_hand_is_said(opened: Window) -> None:
+    id_ = busiest(opened)
+    opened.session.edit(lambda document: document.lock(id_), "locked")
+    assert opened.session.status.text == "locked"
+    opened.session.edit(lambda document: document.set(id_, rgb=(0.3, 0.2, 0.1)), "set it")
+    assert opened.session.status.text == f"set it; locked against picks, changed by hand: {id_}"
+    opened.session.undo()
+    assert opened.session.status.text == texts.UNDONE
+
+
 def test_arrows_in_and_out_points_and_playing(opened: Window, qtbot: Any) -> None:
     session = opened.session
     QTest.keyClick(opened, Qt.Key.Key_Right)
@@ -129,6 +139,14 @@ def test_a_sidecar_that_cannot_be_written_is_kept_elsewhere(
     assert "no space" in opened.session.status.text
     assert not opened.session.saved
     assert palette4d.load(next(recovery_files(sidecar))).colour(id_) == (1.0, 0.0, 0.0)
+    # Enter in the question of the closing window saves elsewhere.
+    asked: list[str] = []
+    monkeypatch.setattr(QMessageBox, "exec", lambda box: asked.append(box.defaultButton().text()))
+    monkeypatch.setattr(QMessageBox, "clickedButton", lambda box: box.defaultButton())
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: ("", ""))
+    opened.close()
+    assert asked == ["Save as…"]
+    assert opened.isVisible()
     monkeypatch.setattr(sidecars, "write", write)
     assert opened.session.save()
     assert palette4d.load(sidecar).colour(id_) == (1.0, 0.0, 0.0)

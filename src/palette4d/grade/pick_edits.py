@@ -336,4 +336,6 @@ def _asked(pick: Pick) -> str:
     text += f" at frame {pick.frame:g}"
     if pick.start is not None or pick.until is not None:
         text += f", {range_text(pick.start, pick.until)}"
+    if pick.fade:
+        text += f", fades of {pick.fade:g} frames"
     return text

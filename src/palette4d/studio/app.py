@@ -117,9 +117,10 @@ def run(
             f"found no {library}, which Qt needs for a window; install it (Debian, Ubuntu: "
             "libxcb-cursor0; Fedora, Rocky: xcb-util-cursor)"
         )
-    from PySide6.QtCore import QByteArray, QSettings, QSize, Qt, QTemporaryDir
+    from PySide6.QtCore import QSettings, QSize, Qt, QTemporaryDir
     from PySide6.QtWidgets import QApplication
 
+    from palette4d.plotting import style
     from palette4d.studio import theme
     from palette4d.studio.instance import bring_forward
     from palette4d.studio.session import Session
@@ -138,25 +139,30 @@ def run(
     if hidden:  # a picture does not depend on who draws it
         settings = QSettings(nowhere.filePath("studio.ini"), QSettings.Format.IniFormat)
     window = Window(session, settings)
-    kept = settings.value("geometry") if size is None else None
     wanted = QSize(*(size or USUAL_SIZE))
     if not hidden:
         wanted = wanted.boundedTo(app.primaryScreen().availableSize() - QSize(*RIMS))
     window.resize(wanted)
     window.arrange()
-    if isinstance(kept, QByteArray):
-        window.restoreGeometry(kept)
-        state = settings.value("state")
-        if isinstance(state, QByteArray):
-            window.restoreState(state)
+    if size is None:
+        window.restore()
     window.setAttribute(Qt.WidgetAttribute.WA_DontShowOnScreen, hidden)
     window.show()  # first: a dialog stands above it
     if path is not None:
         window.open_path(path, clip)
     if frame is not None:
         session.go(frame)
+        first, last, _ = session.frames
+        if session.player is not None and not first <= frame <= last:
+            beyond = texts.BEYOND.format(frame=style.number(frame), first=first, last=last)
+            session.say(beyond, "warning")
     sys.excepthook = functools.partial(_unexpected, session)
     if hidden:
+        if session.status.level == "error":
+            window.shut()
+            raise Palette4dError(session.status.text)
+        if session.status.level == "warning":
+            print(f"note: {session.status.text}", file=sys.stderr)
         wait_until_shown(app, window)
         if prepare is not None:
             prepare(window)

@@ -38,13 +38,15 @@ class FileMenu:
             QApplication.restoreOverrideCursor()
 
     def _open(self, path: str, clip: str | None) -> None:
-        found = Path(path)
+        found, shots = Path(path), self.window.docks["shots"]
         if manifest.is_manifest(found):
             self.window.shots.load(found)
-            self.window.docks["shots"].show()
+            shots.show()
             if self.window.shots.count():
                 self.window.shots.open_first()
-        elif is_timeline(path):
+            self.remember(path)
+            return
+        if is_timeline(path):
             self.window.verbs.analyze_show(path)
         elif found.name.endswith(".json"):
             self.session.open_sidecar(found, clip)
@@ -57,6 +59,8 @@ class FileMenu:
                 self.session.open_clip(path)
                 self.window.verbs.analyze()
         self.remember(path)
+        if not self.window.shots.follow():
+            shots.hide()
 
     def _offer_recovery(self, path: Path) -> None:
         copy = recovered(path)

@@ -105,14 +105,20 @@ def enable(session: Session, id_: str, on: bool) -> None:
     session.edit(change, (texts.ENABLED if on else texts.DISABLED).format(id=id_))
 
 
-def change_pick(session: Session, id_: str, text: str = "", **changes: Any) -> None:
+def change_pick(session: Session, id_: str, text: str, **changes: Any) -> None:
     """Change how and when a pick or hold acts; its colour is followed again (`change`)."""
     clip = None if session.clip is None else session.clip.source
 
     def change(document: Document, progress: Progress) -> None:
         document.change_pick(id_, clip=clip, progress=progress, **changes)
 
-    session.edit_later(change, text or texts.PICK_CHANGED.format(id=id_))
+    session.edit_later(change, text.format(id=id_))
+
+
+def set_fade(session: Session, id_: str, fade: float) -> None:
+    """Let a pick or hold fade over so many frames (`change`)."""
+    text = texts.FADE_SET.format(id=id_, frames=style.number(fade))
+    change_pick(session, id_, text, fade=fade)
 
 
 def range_of(session: Session, pick: Pick) -> tuple[float, float]:

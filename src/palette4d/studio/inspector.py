@@ -479,7 +479,8 @@ class Inspector(QWidget):
     def _said(self) -> str:
         name = self.target.id if self.target is not None else ""
         if self.target is not None and self.target.picked:
-            return texts.PICKED
+            new = self.target.kind == "place"
+            return texts.PICKED if new else texts.PICK_SET.format(id=name)
         return texts.SET_BY_SCOPE[self.scope].format(id=name)
 
     def _start(self) -> F64:

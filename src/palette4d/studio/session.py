@@ -228,6 +228,7 @@ class Session(SessionView):
             return None
         self._trial = self._trial or copy.copy(document)
         dragged, self._dragged = self._dragged, None
+        before = len(document.history)
         try:
             result = operation(document)
         except (Palette4dError, OSError) as error:
@@ -238,7 +239,12 @@ class Session(SessionView):
             self.report(error)
             return None
         self._note_edit()
-        if text:
+        changes = document.history[-1].changes if document.history else ()
+        forced = [c.id for c in changes if c.kind == "handle" and c.id in document.locks]
+        if forced and len(document.history) > before:
+            locked = texts.LOCKED_MOVED.format(ids=", ".join(forced))
+            self.say(f"{text}; {locked}" if text else locked, "warning")
+        elif text:
             self.say(text)
         self._settle(solved or self._trial)
         return result

@@ -40,7 +40,7 @@ class Shots(QWidget):
         self.list = QListWidget()
         self.list.setIconSize(THUMB)
         self.list.setSpacing(2)
-        self.list.setMinimumWidth(230)
+        self.list.setMinimumWidth(160)
         self.list.setAccessibleName(texts.SHOTS)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
@@ -73,6 +73,17 @@ class Shots(QWidget):
             if entry.status != manifest.DONE:
                 item.setFlags(Qt.ItemFlag.ItemIsSelectable)
             self.list.addItem(item)
+
+    def follow(self) -> bool:
+        """Mark the shot that is open; whether the open file is one. If not, forget the show."""
+        row = next((k for k, entry in enumerate(self.entries) if self._is_open(entry)), None)
+        if row is None:
+            self.path, self.entries = None, []
+            self._generation += 1
+            self.list.clear()
+        else:
+            self.list.setCurrentRow(row)
+        return row is not None
 
     def draw(self, rows: Sequence[int] | None = None) -> None:
         """Draw the thumbnails of some shots or of all, graded, in a thread."""
@@ -110,7 +121,8 @@ class Shots(QWidget):
             self.draw(left)
 
     def _is_open(self, entry: manifest.Entry) -> bool:
-        return self.session.path == self.folder / entry.sidecar
+        path = self.session.path
+        return path is not None and path.resolve() == (self.folder / entry.sidecar).resolve()
 
     def open_first(self) -> None:
         """Open the first shot that has a palette, and draw all thumbnails."""

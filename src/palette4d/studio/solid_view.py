@@ -91,7 +91,7 @@ class SolidView(QWidget):
 
     def minimumSizeHint(self) -> QSize:
         """Return the least size in which discs stay apart."""
-        return QSize(220, 200)
+        return QSize(220, 140)
 
     # ---------------------------------------------------------------------------------- content
 

@@ -1,5 +1,6 @@
 """The menus of the timeline: what can be done with the thing under the pointer."""
 
+import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -80,21 +81,25 @@ def _add_pick(menu: QMenu, session: Session, pick: Pick) -> None:
         made.setChecked(on)
         made.triggered.connect(lambda _=False: change())
 
-    def changed(**changes: Any) -> Callable[[], object]:
-        return lambda: grade_steps.change_pick(session, pick.id, **changes)
+    def changed(text: str, **changes: Any) -> Callable[[], object]:
+        return lambda: grade_steps.change_pick(session, pick.id, text, **changes)
 
     _add_go(menu, session, pick.frame)
     switch = not pick.enabled
     entry(menu, texts.ACTS, pick.enabled, lambda: grade_steps.enable(session, pick.id, switch))
     if pick.kind == "pick":
-        only = changed(global_only=not pick.global_only)
+        said = texts.WITH_REMAINDER if pick.global_only else texts.BY_PALETTE
+        only = changed(said, global_only=not pick.global_only)
         entry(menu, texts.PALETTE_ONLY, pick.global_only, only)
         same = pick.toward == "colour"
-        entry(menu, texts.SAME_COLOUR, same, changed(toward="shift" if same else "colour"))
+        said = texts.SAME_SHIFT if same else texts.SAME_EVERYWHERE
+        toward = changed(said, toward="shift" if same else "colour")
+        entry(menu, texts.SAME_COLOUR, same, toward)
     fades = menu.addMenu(texts.FADE)
     for fade in sorted({*FADES, pick.fade}):
         name = texts.FADE_OF.format(frames=style.number(fade)) if fade else texts.NO_FADE
-        entry(fades, name, fade == pick.fade, changed(fade=float(fade)))
+        faded = functools.partial(grade_steps.set_fade, session, pick.id, float(fade))
+        entry(fades, name, fade == pick.fade, faded)
 
 
 def _add_ramps(menu: QMenu, session: Session) -> None:

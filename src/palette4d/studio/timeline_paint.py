@@ -73,6 +73,7 @@ class TimelinePainter:
             self._paint_playhead(painter)
             painter.drawPixmap(0, 0, discs)
             self._paint_pointer(painter)
+            self._paint_scroll_bar(painter)
         self._paint_gutter(painter)
         if part.bottom() >= self.places.height - FOOT:
             self._paint_zoom_bar(painter)
@@ -438,6 +439,18 @@ class TimelinePainter:
         painter.drawPolygon(QPolygonF(foot))
         painter.setPen(QColor(style.INK))
         painter.drawText(QRectF(left, 2, wide, RULER - 7), Qt.AlignmentFlag.AlignCenter, text)
+
+    def _paint_scroll_bar(self, painter: QPainter) -> None:
+        """Show which rows are seen, if not all are."""
+        places = self.places
+        if places.hidden:
+            tall = places.height - FOOT - places.upper
+            share = tall / (places.room + places.hidden)
+            top = places.upper + (places.upper + places.head - places.top) * share
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(QColor(style.GUIDE))
+            box = QRectF(places.width - FOOT + 3, top, FOOT - 6, places.room * share)
+            painter.drawRoundedRect(box, 3, 3)
 
     def _paint_zoom_bar(self, painter: QPainter) -> None:
         top, wide = self.places.height - FOOT, self.places.width - GUTTER

@@ -47,7 +47,7 @@ class Hit:
         The end of a pick's range: "start" or "until"; or of its fade: "fade in", "fade out".
     """
 
-    what: Literal["ruler", "lane", "pick", "gutter", "disc", "band", "zoom", "ground"]
+    what: Literal["ruler", "lane", "pick", "gutter", "disc", "band", "zoom", "scroll", "ground"]
     id: str = ""
     stop: bool = False
     grip: str = ""
@@ -225,11 +225,15 @@ class Places:
         return self.height - self.upper - self.head - TAIL - FOOT
 
     @property
+    def hidden(self) -> float:
+        """The height of rows that there is no room for."""
+        found = self.timeline
+        return 0.0 if found is None else max(0.0, found[0].height - self.room)
+
+    @property
     def top(self) -> float:
         """The widget's y of the first row's top."""
-        found = self.timeline
-        limit = 0.0 if found is None else max(0.0, found[0].height - self.room)
-        self.scroll = min(max(self.scroll, 0.0), limit)
+        self.scroll = min(max(self.scroll, 0.0), self.hidden)
         return self.upper + self.head - self.scroll
 
     def frame_at(self, x: float, *, snap: bool = True) -> float:
@@ -253,6 +257,8 @@ class Places:
         found = self.timeline
         if found is None:
             return Hit("ground")
+        if at.x() >= self.width - FOOT and self.hidden:
+            return Hit("scroll")
         layout, discs = found
         y = at.y() - self.top
         if at.x() < GUTTER:

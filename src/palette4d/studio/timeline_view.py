@@ -179,12 +179,11 @@ class TimelineView(QWidget):
         turn = event.angleDelta()
         steps, sideways = turn.y() / 120, turn.x() / 120
         keys, at = event.modifiers(), event.position()
-        found = self.places.timeline
-        scrolls = found is not None and found[0].height > self.places.room
         start, end = self.places.span
+        zooms = keys & Qt.KeyboardModifier.ControlModifier or at.y() < RULER + STRIP
         if keys & Qt.KeyboardModifier.ShiftModifier or sideways:
             self.places.show(start - (steps + sideways) * 0.1 * (end - start), end - start)
-        elif keys & Qt.KeyboardModifier.ControlModifier or at.y() < RULER + STRIP or not scrolls:
+        elif zooms or not self.places.hidden:
             self.zoom(0.85**steps, at.x())
         else:
             self.places.scroll -= steps * 30
@@ -209,8 +208,11 @@ class TimelineView(QWidget):
             self.session.go(self.places.frame_at(at.x()))
         elif hit.what == "zoom":
             self._drag_zoom_bar(at.x())
+        elif hit.what == "scroll":
+            self._drag_scroll_bar(at.y())
         elif hit.id:
-            self._select(hit.id, add)
+            held = hit.grip and hit.id in self.session.selection  # a fade is dragged with Ctrl
+            self._select(hit.id, add and not held)
             if hit.what == "disc" and (disc := self.places.disc(hit.id)) is not None:
                 self._press.grab = at.x() - disc.home
         elif not add:
@@ -245,6 +247,8 @@ class TimelineView(QWidget):
             self.session.go(self.places.frame_at(at.x()))
         elif press.hit.what == "zoom":
             self._drag_zoom_bar(at.x())
+        elif press.hit.what == "scroll":
+            self._drag_scroll_bar(at.y())
         elif press.hit.stop:
             free = bool(event.modifiers() & Qt.KeyboardModifier.AltModifier)
             self._drag_stop(press.hit.id, at.x() - press.grab, snap=not free)
@@ -260,6 +264,12 @@ class TimelineView(QWidget):
         start, end = self.places.span
         middle = first + (x - GUTTER) / max(self.width() - GUTTER, 1) * (last - first)
         self.places.show(middle - (end - start) / 2, end - start)
+
+    def _drag_scroll_bar(self, y: float) -> None:
+        places = self.places
+        share = (y - places.upper) / max(self.height() - FOOT - places.upper, 1)
+        places.scroll = share * (places.room + places.hidden) - places.room / 2
+        self.update()
 
     def _drag_stop(self, id_: str, x: float, *, snap: bool) -> None:
         frame = self.places.place_for(id_, self.places.frame_at(x, snap=snap))
@@ -291,7 +301,7 @@ class TimelineView(QWidget):
         id_, start, until, fade = self.places.dragged
         pick = next((pick for pick, _ in self.places.lanes() if pick.id == id_), None)
         if pick is not None and fade != pick.fade:
-            grade_steps.change_pick(self.session, id_, fade=fade)
+            grade_steps.set_fade(self.session, id_, fade)
         elif pick is not None:
             grade_steps.set_range(self.session, id_, start, until)
 

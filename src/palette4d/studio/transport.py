@@ -6,6 +6,7 @@ import time
 from PySide6.QtCore import QObject, QPointF, QRectF, QSize, Qt, QTimer
 from PySide6.QtGui import QColor, QIcon, QPainter, QPixmap, QPolygonF, QResizeEvent
 from PySide6.QtWidgets import (
+    QBoxLayout,
     QButtonGroup,
     QComboBox,
     QDoubleSpinBox,
@@ -31,7 +32,7 @@ READY, PATIENCE = 4, 0.6
 #: Milliseconds between two looks at the clock while playing.
 CLOCK = 4
 #: The least width of the bar.
-LEAST_WIDTH = 460
+LEAST_WIDTH = 380
 #: Seconds between two requests for frames that are late.
 ASK_EVERY = 0.03
 
@@ -183,10 +184,15 @@ class Transport(QWidget):
         super().__init__()
         self.session, self.playback = session, playback
         self._silent = False
-        row = QHBoxLayout(self)
-        row.setSizeConstraint(QLayout.SizeConstraint.SetNoConstraint)  # it leaves things out
-        row.setContentsMargins(8, 4, 8, 4)
-        row.setSpacing(3)
+        both = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
+        both.setSizeConstraint(QLayout.SizeConstraint.SetNoConstraint)  # it leaves things out
+        both.setContentsMargins(8, 4, 8, 4)
+        row, looks = QHBoxLayout(), QHBoxLayout()
+        both.addLayout(row, 2)
+        both.addLayout(looks, 1)
+        for each in (both, row, looks):
+            each.setSpacing(3)
+        self._rows = both
         self.buttons: dict[str, QToolButton] = {}
         for name in ("first_frame", "previous_frame", "play", "next_frame", "last_frame"):
             button = QToolButton()
@@ -210,7 +216,7 @@ class Transport(QWidget):
         self.facts.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.facts.setMinimumWidth(96)
         row.addWidget(self.facts, 2)
-        self.labels: list[QLabel] = []
+        row.addStretch(0)
         self.compare: dict[str, QToolButton] = {}
         group = QButtonGroup(self)
         for key, text in texts.COMPARE.items():
@@ -222,7 +228,7 @@ class Transport(QWidget):
             group.addButton(button)
             self.compare[key] = button
             row.addWidget(button)
-        row.addSpacing(6)
+        looks.addSpacing(6)
         self.look = Choice()
         self.look.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.look.setSizeAdjustPolicy(
@@ -234,13 +240,15 @@ class Transport(QWidget):
         self.look.setMaximumWidth(230)
         self.look.setAccessibleName(texts.DISPLAY)
         self.look.activated.connect(self._chosen)
-        row.addWidget(self.look, 2)
-        row.addSpacing(6)
-        self.exposure = self._number(row, texts.EXPOSURE, -10, 10, 0.25, "exposure", "+0.00")
-        self.gamma = self._number(row, texts.GAMMA, 0.2, 5, 0.05, "gamma", "0.00")
+        looks.addWidget(self.look, 2)
+        looks.addSpacing(6)
+        self.exposure = self._number(looks, texts.EXPOSURE, -10, 10, 0.25, "exposure")
+        self.gamma = self._number(looks, texts.GAMMA, 0.2, 5, 0.05, "gamma")
+        looks.addStretch(0)
         #: What is left out where there is no room, in this order; the menus have it too.
-        looks = [self.exposure, self.gamma, *self.labels]
-        self.extras: list[list[QWidget]] = [[self.facts], looks, [*self.compare.values()]]
+        self.extras: list[list[QWidget]] = [[self.facts]]
+        for names in (("first_frame", "last_frame"), ("previous_frame", "next_frame")):
+            self.extras.append([self.buttons[name] for name in names])
         for event in ("clip", "document", "view", "range"):
             session.on(event, self._show, panel=True)
         session.on("frame", self._show_frame)
@@ -254,23 +262,23 @@ class Transport(QWidget):
         return QSize(LEAST_WIDTH, super().minimumSizeHint().height())
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Leave out what has no room."""
-        layout = self.layout()
-        for widget in (each for extra in self.extras for each in extra):
-            widget.show()
-        for extra in self.extras:
-            if layout is not None and layout.minimumSize().width() > self.width():
+        """Take two rows where one has no room; leave out what has none in them."""
+        one, two = QBoxLayout.Direction.LeftToRight, QBoxLayout.Direction.TopToBottom
+        for direction, least in ((one, 0), (one, 1), (two, 0), (two, 1), (two, 2), (two, 3)):
+            self._rows.setDirection(direction)
+            for k, extra in enumerate(self.extras):
                 for widget in extra:
-                    widget.hide()
+                    widget.setVisible(k >= least)
+            if self._rows.minimumSize().width() <= self.width():
+                break
         super().resizeEvent(event)
 
     def _number(
-        self, row: QHBoxLayout, text: str, low: float, high: float, step: float, name: str, _: str
+        self, row: QHBoxLayout, text: str, low: float, high: float, step: float, name: str
     ) -> QDoubleSpinBox:
         label = QLabel(text)
         label.setStyleSheet(f"color: {theme.FAINT}")
         row.addWidget(label)
-        self.labels.append(label)
         box = QDoubleSpinBox()
         box.setRange(low, high)
         box.setSingleStep(step)

@@ -234,7 +234,7 @@ class VerbDialog(QDialog):
         if job is not self.job:
             return
         try:
-            if job.fraction is not None:
+            if job.fraction is not None and not job.cancelled:
                 self.bar.setRange(0, 1000)
                 self.bar.setValue(round(job.fraction * 1000))
                 self.stage.setText(f"{job.what.replace('_', ' ')} {job.fraction:.0%}")
@@ -258,14 +258,15 @@ class VerbDialog(QDialog):
             self._done(self)
 
     def _stop_or_close(self) -> None:
-        if self.job is not None:
-            self.job.cancel()
-        else:
+        if self.job is None:
             self.close()
+        elif not self.job.cancelled:
+            self.job.cancel()
+            self.stage.setText(texts.STOPPING)
 
     def reject(self) -> None:
-        """Cancel what runs, then close."""
+        """Stop what runs, and stay to say so; else close."""
         if self.job is not None:
-            self.job.cancel()
-            self.job = None
-        super().reject()
+            self._stop_or_close()
+        else:
+            super().reject()

@@ -5,7 +5,17 @@ import functools
 import time
 from collections.abc import Callable
 
-from PySide6.QtCore import QEvent, QMimeData, QObject, QSettings, Qt, QTimer, QUrl, Signal
+from PySide6.QtCore import (
+    QByteArray,
+    QEvent,
+    QMimeData,
+    QObject,
+    QSettings,
+    Qt,
+    QTimer,
+    QUrl,
+    Signal,
+)
 from PySide6.QtGui import (
     QAction,
     QActionGroup,
@@ -256,7 +266,7 @@ class Window(QMainWindow):
         self.resizeDocks(
             [self.docks["solid"], self.docks["inspector"]], [side] * 2, both.Horizontal
         )
-        solid = min(max(220, height * 3 // 10), side)
+        solid = min(max(164, height * 3 // 10), side)
         self.resizeDocks(
             [self.docks["solid"], self.docks["inspector"]],
             [solid, max(200, height - solid)],
@@ -264,6 +274,15 @@ class Window(QMainWindow):
         )
         low = max(height * 32 // 100, min(330, height * 2 // 5))
         self.resizeDocks([self.docks["timeline"]], [low], both.Vertical)
+
+    def restore(self) -> None:
+        """Have the size and the panels as they were left; the shots come with a show."""
+        geometry, state = (self.settings.value(name) for name in ("geometry", "state"))
+        if isinstance(geometry, QByteArray):
+            self.restoreGeometry(geometry)
+        if isinstance(state, QByteArray):
+            self.restoreState(state)
+        self.docks["shots"].hide()
 
     def _dock(self, title: str, view: QWidget, area: Qt.DockWidgetArea) -> QDockWidget:
         dock = QDockWidget(title, self)
@@ -286,6 +305,7 @@ class Window(QMainWindow):
         bar.addPermanentWidget(self.view_facts)
         for label in (self.file_facts, self.view_facts):
             label.setStyleSheet(f"color: {theme.FAINT}; padding: 2px 8px")
+            label.setMinimumWidth(1)  # a long name or note makes no wide window
 
     def _make_menus(self) -> None:
         self.menus = {menu: self.menuBar().addMenu(title) for menu, title in texts.MENUS.items()}
@@ -368,6 +388,8 @@ class Window(QMainWindow):
         elif session.clip is not None:
             facts = [session.clip.name, texts.NO_PALETTE]
         self.file_facts.setText("  ·  ".join(facts))
+        tips = ["  ·  ".join(facts), *([texts.DRAG_OUT] if session.path is not None else [])]
+        self.file_facts.setToolTip("\n".join(tips))
         display = session.display
         shown = ""
         if display is not None and not display.known and session.clip is not None:
@@ -377,8 +399,11 @@ class Window(QMainWindow):
             if error * 255 >= 0.05:  # less is not seen
                 shown = texts.LUT_ERROR.format(error=error * 255)
         if view.outside and self.viewer.picture is not None:
-            shown += "  " + texts.OUTSIDE.format(share=self.viewer.picture.share)
+            share = self.viewer.picture.share
+            few = 0 < share < 0.0005
+            shown += "  " + texts.OUTSIDE.format(share=texts.NEARLY_NONE if few else f"{share:.1%}")
         self.view_facts.setText(shown)
+        self.view_facts.setToolTip(shown)
         name = session.path.name if session.path is not None else ""
         title = name or (session.clip.name if session.clip is not None else "")
         self.setWindowTitle(f"{title}[*] — {texts.TITLE}" if title else texts.TITLE)
@@ -447,13 +472,18 @@ class Window(QMainWindow):
             return
         self._closing = False
         if not self.session.save():
-            answer = QMessageBox.question(
-                self,
-                texts.TITLE,
-                texts.CLOSE_ANYWAY.format(why=self.session.status.text),
-                QMessageBox.StandardButton.Discard | QMessageBox.StandardButton.Cancel,
-            )
-            if answer != QMessageBox.StandardButton.Discard:
+            asks = QMessageBox(self)
+            asks.setIcon(QMessageBox.Icon.Warning)
+            asks.setText(texts.CLOSE_ANYWAY.format(why=self.session.status.text))
+            role = QMessageBox.ButtonRole.AcceptRole
+            save_as = asks.addButton(texts.ACTIONS["window"]["save_as"], role)
+            discard = asks.addButton(QMessageBox.StandardButton.Discard)
+            asks.addButton(QMessageBox.StandardButton.Cancel)
+            asks.setDefaultButton(save_as)
+            asks.exec()
+            if asks.clickedButton() == save_as:
+                self.files.save_as()
+            if not self.session.saved and asks.clickedButton() != discard:
                 event.ignore()
                 return
         self.settings.setValue("geometry", self.saveGeometry())
