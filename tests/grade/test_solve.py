@@ -89,6 +89,31 @@ def test_a_second_range_leaves_the_frames_of_the_first_alone(fields: Fields) -> 
     np.testing.assert_allclose(moved(both, OTHER, 14), (-0.1, 0, 0.25), atol=0.006)
 
 
+def test_a_second_range_leaves_a_pick_of_the_whole_clip_alone(fields: Fields) -> None:
+    whole = pick("p1", MIDDLE, (0.6, 0.3, 0.4))
+    late = pick("p2", OTHER, (0.2, 0.5, 0.6), frame=12, **{"from": 11, "until": 13, "fade": 2})
+    alone, _ = solved(fields, whole)
+    both, _ = solved(fields, whole, late)
+    for frame in (0, 5, 9, 15, 18):
+        for colour in (MIDDLE, OTHER):
+            np.testing.assert_allclose(
+                moved(both, colour, frame), moved(alone, colour, frame), atol=solve.STRAIGHT
+            )
+
+
+def test_what_is_near_a_steady_pick_does_not_swing(fields: Fields) -> None:
+    """The palette's colours drift and one splits; the same of them meet the pick at all frames."""
+    sky, cloud, roof = (0.37, 0.13, 0.56), (0.44, 0.24, 0.61), (0.26, 0.44, 0.49)
+    found = {
+        **fields,
+        "colours": [{"frame": 0, "rgbw": [[*sky, 0.4], [*cloud, 0.4], [*roof, 0.2]]}],
+    }
+    document, _ = solved(found, pick("p1", sky, (0.62, 0.06, 0.25)))
+    for colour in (sky, cloud, roof):
+        changes = np.array([moved(document, colour, frame) for frame in range(19)])
+        assert np.ptp(changes, axis=0).max() < 0.05
+
+
 def test_a_shift_stays_in_range_where_the_colour_is_dark(fields: Fields) -> None:
     path = [{"frame": 0, "rgb": [0.4, 0.3, 0.3]}, {"frame": 18, "rgb": [0.15, 0.2, 0.2]}]
     asked = pick("p1", (0.4, 0.3, 0.3), (0.1, 0.4, 0.4), frame=0, path=path)

@@ -56,7 +56,8 @@ std::vector<float> straight_colours(const Pixels& pixels, const ColourConversion
         float* colour = &straight[i * 3];
         for (std::size_t c = 0; c < 3; ++c) colour[c] = static_cast<float>(seen[c]);
         if (!conversion || !finite_pixel(colour)) continue;
-        const Vec3 converted = conversion->to_palette({colour[0], colour[1], colour[2]});
+        // Not of the rounded colour: GCC 12 leaves the rounding out of some channels.
+        const Vec3 converted = conversion->to_palette(seen);
         for (std::size_t c = 0; c < 3; ++c) colour[c] = static_cast<float>(converted[c]);
     }
     return straight;

@@ -4,7 +4,7 @@ Input: the members of a sidecar. Output: its member ``edits.solution``. Pure Num
 numbers every time.
 
 A palette colour's displacement moves a colour c by its mean value weight w(c) (eqs. 6, 7). So each
-frame is a linear least-squares problem for the displacements d of its palette colours and the
+frame has a linear least-squares problem for the displacements d of its palette colours and the
 sizes a of the bumps around the picked colours. At a frame, with all colours in code values:
 
 - a pick at colour p wants ``w(p) d + phi(p) a = change - U(p)``, where U is what the user's own
@@ -25,8 +25,11 @@ its own. So no colour ever changes more with a hold than without. A hold ends at
 Near means one thing in all of this: the shades of a colour, lighter and darker, are nearer than
 others (`bumps.squares`).
 
-Frames are solved one by one, at the clip's vertices, at the picks' own frames and every few frames
-between; the core interpolates linearly. So a pick that ends at a frame has no effect at all beyond.
+Solved are the clip's vertices, the picks' own frames and every few frames between; the core
+interpolates linearly. The problems of all frames are one: a colour that is there at two of them
+wants to change alike. Else one palette colour would move at one frame, and at the next another that
+does the same for the pick, and all that is near would swing. Frames with other picks are no part of
+this, so that a pick that ends at a frame has no effect at all beyond.
 """
 
 from __future__ import annotations
@@ -34,7 +37,7 @@ from __future__ import annotations
 import itertools
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -73,6 +76,9 @@ UNDONE = 0.04
 # Cost of a slope: of a displacement that changes along an edge of the palette by as much as the
 # colour. Near greys, where colours are close together, the palette would tear them apart.
 SLOPE = 2e-4
+# Cost of a swing: of changes that differ between two frames by as much as is asked for, where all
+# pixels have the same colours at both. From 10 to 80 do much the same.
+STEADY = 40.0
 # Costs of a palette colour's displacement and of a bump, beside the weight 1 of a pick.
 RIDGE, BUMP = 1e-4, 0.33
 # Reweighting: rounds, and the sizes, as shares of the largest change, below which a palette
@@ -117,8 +123,7 @@ def solve(fields: Mapping[str, Any]) -> tuple[Fields, dict[str, Fields]]:
     enabled = [pick for pick in all_picks(fields["edits"]) if pick.enabled]
     clip = _ClipAtTimes(fields)
     problem = _Problem(clip, enabled[:MOST_PICKS])
-    solved = [problem.at(time) for time in problem.times]
-    solution = problem.solution(solved)
+    solution = problem.solution(problem.solved())
     return solution, _measured(fields, solution, problem)
 
 
@@ -222,6 +227,42 @@ class _ClipAtTimes:
         part = (time - self.frames[before]) / (self.frames[after] - self.frames[before])
         rows = [self.colours[before], self.colours[after]]
         return np.concatenate([rows[0] * [1, 1, 1, 1 - part], rows[1] * [1, 1, 1, part]])
+
+
+@dataclass(frozen=True)
+class _Unknowns:
+    """What is unknown at a time: displacements of distinct places, then sizes of bumps.
+
+    `places` has the place of each palette colour; `free` how much each distinct one may move, 0..1;
+    `local` is 0 for the points of a pick without a bump.
+    """
+
+    time: float
+    cut: _core.Slice
+    places: list[tuple[str, int]]
+    free: F64
+    picked: NDArray[np.intp]
+    local: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class _Terms:
+    """The least-squares problem at one time, in shares of `scale`, the largest change.
+
+    `far` is how much each of the `guarded` colours is guarded, 0..1, `guard` its weight.
+    """
+
+    of: _Unknowns
+    scale: float
+    rows: F64
+    weights: F64
+    wanted: F64
+    guarded: F64
+    guard_rows: F64
+    guard: F64
+    far: F64
+    slopes: F64
+    bump_costs: F64
 
 
 @dataclass(frozen=True)
@@ -344,10 +385,13 @@ class _Problem:
 
         return self._once("certain", time, compute)
 
-    def guard_at(self, colours: F64, time: float) -> F64:
-        """Return how much colours are guarded at a time, 0..1: not at all at a picked one."""
+    def guard_at(self, colours: F64, time: float, asked: float | None = None) -> F64:
+        """Return how much colours are guarded at a time, 0..1: not at all at a picked one.
+
+        `asked`: if what the picks ask for were that of another time.
+        """
         at = np.flatnonzero(self.moving[self.of])
-        strengths = (self.strengths(time) * self.certain(time))[at]
+        strengths = self._asked(time if asked is None else asked)[at]
         share = strengths / max(float(strengths.max(initial=0)), NONE)
         far = 1 - share * self._near(colours, time, at, np.minimum(self.radii[at], NEAR))
         found: F64 = far.prod(axis=1)
@@ -389,9 +433,81 @@ class _Problem:
             and (t in borders or any(p.strength_at(t, clip.step) > 0 for p in self.picks))
         )
 
-    def at(self, time: float) -> _Solved:
-        """Solve one time."""
-        asked = self.strengths(time) * self.certain(time)
+    def solved(self) -> list[_Solved]:
+        """Solve all times.
+
+        Those at which the same picks ask for something are solved together, as if there were no
+        others, nor the others' frames: so a pick has no effect beyond its begin and end.
+        """
+        active = {time: self._active(time) for time in self.times}
+        met = {time: _Solved(time, {}, {}) for time in self.times}
+        for picks in {*active.values()} - {frozenset()}:
+            alone = self if len(picks) == self.moving.sum() else self._alone(picks)
+            points = np.flatnonzero(np.isin(self.of, sorted(picks)) & self.moving[self.of])
+            own = np.flatnonzero(alone.moving[alone.of])
+            number = dict(zip(own.tolist(), points.tolist(), strict=True))
+            # Where all of them ask for something, and a time before and after.
+            asked = [time for time in self.times if picks <= active[time]]
+            ends = [-np.inf, *alone.times, np.inf]
+            near = [
+                any(a < time < b for time in asked) for a, b in zip(ends, ends[2:], strict=False)
+            ]
+            solved = alone.met(list(itertools.compress(alone.times, near)))
+            times = [one.time for one in solved]
+            for time in [time for time in self.times if active[time] == picks]:
+                at = int(np.searchsorted(times, time))
+                one = solved[at]
+                if one.time != time:
+                    one = self._between(solved[at - 1], one, time)
+                bumps = {number[at]: size for at, size in one.bumps.items()}
+                met[time] = replace(one, bumps=bumps)
+        return [self._with_holds(met[time]) for time in self.times]
+
+    def _between(self, before: _Solved, after: _Solved, time: float) -> _Solved:
+        """Return the solution between two solved times, as the core interpolates."""
+        part, none = (time - before.time) / (after.time - before.time), np.zeros(3)
+        moves = {}
+        for edge in _core.slice_at(self.clip.polytope, time).edges.tolist():
+            start, end = self.clip.polytope.edges[edge].tolist()
+            place = ("e", edge)
+            one = before.moves.get(place, before.moves.get(("v", start), none))
+            other = after.moves.get(place, after.moves.get(("v", end), none))
+            moves[place] = (1 - part) * one + part * other
+        bumps = {
+            at: (1 - part) * before.bumps.get(at, none) + part * after.bumps.get(at, none)
+            for at in {*before.bumps, *after.bumps}
+        }
+        return _Solved(time, moves, bumps)
+
+    def _asked(self, time: float) -> F64:
+        return self.strengths(time) * self.certain(time)
+
+    def _active(self, time: float) -> frozenset[int]:
+        asking = (self.strengths(time) > 0) & self.moving[self.of]
+        return frozenset(self.of[asking].tolist())
+
+    def _alone(self, picks: frozenset[int]) -> _Problem:
+        return _Problem(self.clip, [self.picks[number] for number in sorted(picks)])
+
+    def met(self, times: Sequence[float]) -> list[_Solved]:
+        """Solve some times together, without holds. Bumps meet what is left at the picks."""
+        terms = [term for term in map(self._terms, times) if term]
+        links = [self._links(one, other) for one, other in itertools.pairwise(terms)]
+        solved = {time: _Solved(time, {}, {}) for time in times}
+        for term, found in zip(terms, _least_squares(terms, links), strict=True):
+            of, count = term.of, len(term.of.free)
+            left = self.certain(of.time)[of.picked, None] * (term.wanted - term.rows @ found)
+            sizes = found[count:] + _interpolated(term.rows[:, count:], left)
+            sizes *= term.scale * of.local[:, None]
+            by = term.scale * found[:count] * of.free[:, None]
+            moves = dict(zip(dict.fromkeys(of.places), by, strict=True))
+            bumps = dict(zip(of.picked.tolist(), sizes, strict=True))
+            solved[of.time] = _Solved(of.time, moves, bumps)
+        return [*solved.values()]
+
+    def _with_holds(self, one: _Solved) -> _Solved:
+        """Return the solution at a time with its holds."""
+        time, asked = one.time, self._asked(one.time)
         picked = np.flatnonzero((asked > 0) & self.moving[self.of])
         held = np.flatnonzero((asked > 0) & ~self.moving[self.of])
         centres = self.centres(time)
@@ -401,61 +517,70 @@ class _Problem:
         own = np.array([self.picks[i].radius or LARGEST for i in self.of[held]])
         radii = np.maximum(np.minimum(own, most), np.minimum(own, LEAST))
         keep = asked[held] * np.minimum(1.0, most / LEAST)
-        moves, sizes = self._meet(time, picked)
-        bumps = dict(zip(picked.tolist(), sizes, strict=True))
-        bumps |= dict(zip(held.tolist(), np.column_stack([radii, keep]), strict=True))
-        return _Solved(time, moves, bumps)
+        holds = dict(zip(held.tolist(), np.column_stack([radii, keep]), strict=True))
+        return replace(one, bumps=one.bumps | holds)
 
-    def _meet(
-        self, time: float, picked: NDArray[np.int64]
-    ) -> tuple[dict[tuple[str, int], F64], F64]:
-        """Return the displacements by place, and the sizes of the bumps of picked points."""
+    def _terms(self, time: float) -> _Terms | None:
+        """Return the problem at a time; none where nothing is asked for."""
         clip = self.clip
+        picked = np.flatnonzero((self._asked(time) > 0) & self.moving[self.of])
+        if not len(picked):
+            return None
         cut = _core.slice_at(clip.polytope, time)
         edited = _core.edited_colours(clip.polytope, clip.core.edits, cut) - cut.rgb
-        nothing: tuple[dict[tuple[str, int], F64], F64] = {}, np.zeros((len(picked), 3))
-        if not len(picked):
-            return nothing
-        places, free = self._places(cut, time)
-        of, centres, radii = self.of[picked], self.centres(time)[picked], self.radii[picked]
+        centres, points = self.centres(time)[picked], self.of[picked]
         strengths, certain = self.strengths(time)[picked], self.certain(time)[picked]
         weights = _core.palette_weights(centres, cut.rgb, cut.faces)[0]
-        changes = np.array([pick.change_at(time) for pick in self.picks])[of]
+        changes = np.array([pick.change_at(time) for pick in self.picks])[points]
         wanted = strengths[:, None] * (changes - weights @ edited)
         scale = float(np.linalg.norm(wanted, axis=1).max())
         if scale < NONE:
-            return nothing
-        local = np.array([not self.picks[i].global_only for i in of])
-        bumps = self._near(centres, time, picked, radii) * local
-        rows = np.hstack([_gathered(weights, places) * free, bumps])
+            return None
+        local = np.array([not self.picks[i].global_only for i in points])
+        of = _Unknowns(time, cut, *self._places(cut, time), picked, local)
         guarded = clip.colours_at(time)
-        within = self._near(guarded[:, :3], time, picked, radii)
-        guard_weights = _core.palette_weights(guarded[:, :3], cut.rgb, cut.faces)[0]
-        guard_rows = np.hstack([_gathered(guard_weights, places) * free, within * local])
-        slopes = _gathered(_slopes(cut.rgb, cut.faces), places) * free
+        guard_rows, within = self._rows(guarded[:, :3], of)
         far = self.guard_at(guarded[:, :3], time)
         guard = _noticed(guarded)
-        counts = self._counts(guarded, of, within)
+        counts = self._counts(guarded, points, within)
         if clip.frames:
             # A pick of few pixels moves no palette colour that many pixels are mixed from.
             near = self._near(guarded[:, :3], time, picked, NEAR)
             pixels = float(guarded[:, 3] @ near.max(axis=1))
             guard *= GUARD / max(pixels, LEAST_SHARE)
-
-        solved = _least_squares(
-            rows,
-            certain * strengths / strengths.max() * counts,
-            wanted,
-            guard_rows,
-            (far * guard, far),
-            slopes,
+        return _Terms(
+            of,
             scale,
+            self._rows(centres, of)[0],
+            certain * strengths / strengths.max() * counts,
+            wanted / scale,
+            guarded,
+            guard_rows,
+            far * guard,
+            far,
+            _gathered(_slopes(cut.rgb, cut.faces), of.places) * of.free,
             BUMP * counts,
         )
-        moves, sizes = solved[: len(free)] * free[:, None], solved[len(free) :]
-        left = wanted - rows @ solved
-        sizes = (sizes + _interpolated(bumps, certain[:, None] * left)) * local[:, None]
-        return dict(zip(dict.fromkeys(places), moves, strict=True)), sizes
+
+    def _rows(self, colours: F64, of: _Unknowns) -> tuple[F64, F64]:
+        """Return what each unknown does to colours, and how near they are to the picked points."""
+        weights = _core.palette_weights(colours, of.cut.rgb, of.cut.faces)[0]
+        near = self._near(colours, of.time, of.picked, self.radii[of.picked])
+        return np.hstack([_gathered(weights, of.places) * of.free, near * of.local]), near
+
+    def _links(self, one: _Terms, other: _Terms) -> tuple[F64, F64]:
+        """Return rows whose difference is how the changes of the clip's colours change in time.
+
+        None for colours of which more or less is asked, beside the others.
+        """
+        colours, shares = other.guarded[:, :3], other.guarded[:, 3]
+        steps = max((other.of.time - one.of.time) / self.clip.step, 1.0)
+        weights = STEADY / steps * shares / shares.sum()
+        if (self._asked(one.of.time) != self._asked(other.of.time)).any():
+            before = self.guard_at(colours, other.of.time, one.of.time)
+            weights *= np.abs(before - other.far) < 1 - OTHER
+        root = np.sqrt(weights)[:, None]
+        return root * self._rows(colours, one.of)[0], root * other.guard_rows
 
     def _places(self, cut: _core.Slice, time: float) -> tuple[list[tuple[str, int]], F64]:
         """Return the place of each palette colour, and how free each distinct place is, 0..1.
@@ -566,7 +691,8 @@ def _noticed(colours: F64) -> F64:
 
 def _slopes(palette: F64, faces: NDArray[np.int32]) -> F64:
     """Return the rows (edges, palette colours) of how steeply displacements change along edges."""
-    edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    ends = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    edges = np.column_stack(np.divmod(np.unique(ends @ [len(palette), 1]), len(palette)))
     lengths = np.linalg.norm(palette[edges[:, 0]] - palette[edges[:, 1]], axis=1)
     rows = np.zeros((len(edges), len(palette)))
     each = np.arange(len(edges))
@@ -586,42 +712,70 @@ def _gathered(weights: F64, places: Sequence[tuple[str, int]]) -> F64:
     return gathered
 
 
-def _least_squares(
-    rows: F64,
-    pick: F64,
-    wanted: F64,
-    guard_rows: F64,
-    guard: tuple[F64, F64],
-    slopes: F64,
-    scale: float,
-    bump_costs: F64,
-) -> F64:
-    """Return the displacements of the palette colours, then the sizes of the bumps, (n, 3).
-
-    `guard` has each guarded colour's weight, and how much it is guarded, 0..1.
-    """
-    moves = slopes.shape[1]
-    picked = rows.T @ (pick[:, None] * rows)
-    picked[:moves, :moves] += SLOPE * slopes.T @ slopes
-    target = rows.T @ (pick[:, None] * wanted)
-    weights, whole = guard
-    cost = np.concatenate([np.full(moves, RIDGE), bump_costs])
-    weight: F64 = weights
-    normal: NDArray[np.floating[Any]] = picked
-    found: NDArray[np.floating[Any]] = target
+def _least_squares(terms: Sequence[_Terms], links: Sequence[tuple[F64, F64]]) -> list[F64]:
+    """Return the unknowns at all times: displacements, then sizes of bumps, (n, 3) each."""
+    counts = [len(term.of.free) for term in terms]
+    fixed, targets, costs, weights = [], [], [], []
+    for term, count in zip(terms, counts, strict=True):
+        weighted = term.rows.T * term.weights
+        fixed.append(weighted @ term.rows)
+        fixed[-1][:count, :count] += SLOPE * term.slopes.T @ term.slopes
+        targets.append(weighted @ term.wanted)
+        costs.append(np.concatenate([np.full(count, RIDGE), term.bump_costs]))
+        weights.append(term.guard)
+    for at, (one, other) in enumerate(links):
+        fixed[at] += one.T @ one
+        fixed[at + 1] += other.T @ other
+    between = [-one.T @ other for one, other in links]
+    shares = list(weights)
     for _ in range(ROUNDS):
-        normal = picked + guard_rows.T @ (weight[:, None] * guard_rows) + np.diag(cost)
-        found = np.linalg.solve(normal, target)
-        cost[:moves] = RIDGE / (np.linalg.norm(found[:moves], axis=1) / scale + SMALL_MOVE)
-        changed = np.linalg.norm(guard_rows @ found, axis=1) / scale
-        weights = np.maximum(weights, whole * OVERSHOOT * np.clip(changed - LARGE, 0, 1))
-        weight = weights * (SMALL_CHANGE / (changed + SMALL_CHANGE)) ** EXPONENT
-        weight *= float(weights.sum()) / max(float(weight.sum()), 1e-9)
-    few = np.linalg.norm(found, axis=1) > FEW * scale
-    few[moves:] = True
-    found[~few] = 0.0
-    found[few] = np.linalg.solve(normal[np.ix_(few, few)], target[few])
-    return found.astype(np.float64)
+        normals = [
+            fixed[at] + (term.guard_rows.T * weights[at]) @ term.guard_rows + np.diag(costs[at])
+            for at, term in enumerate(terms)
+        ]
+        found = _solved_chain(normals, between, targets)
+        for at, (term, count) in enumerate(zip(terms, counts, strict=True)):
+            costs[at][:count] = RIDGE / (np.linalg.norm(found[at][:count], axis=1) + SMALL_MOVE)
+            changed = np.linalg.norm(term.guard_rows @ found[at], axis=1)
+            over = term.far * OVERSHOOT * np.minimum(np.maximum(changed - LARGE, 0), 1)
+            shares[at] = np.maximum(shares[at], over)
+            weight = shares[at] * (SMALL_CHANGE / (changed + SMALL_CHANGE)) ** EXPONENT
+            weights[at] = weight * float(shares[at].sum()) / max(float(weight.sum()), 1e-9)
+    few = [np.linalg.norm(one, axis=1) > FEW for one in found]
+    for one, count in zip(few, counts, strict=True):
+        one[count:] = True
+    again = _solved_chain(
+        [normal[np.ix_(one, one)] for normal, one in zip(normals, few, strict=True)],
+        [
+            both[np.ix_(one, other)]
+            for both, (one, other) in zip(between, itertools.pairwise(few), strict=True)
+        ],
+        [target[one] for target, one in zip(targets, few, strict=True)],
+    )
+    for at, one in enumerate(few):
+        found[at][:] = 0.0
+        found[at][one] = again[at]
+    return found
+
+
+def _solved_chain(
+    normals: Sequence[F64], between: Sequence[F64], targets: Sequence[F64]
+) -> list[F64]:
+    """Solve a symmetric system of blocks, each of which meets its neighbours (block Thomas)."""
+    found: list[F64] = []
+    ahead: list[F64] = []
+    for at, (block, target) in enumerate(zip(normals, targets, strict=True)):
+        normal: NDArray[np.floating[Any]] = block
+        if at:
+            normal = normal - between[at - 1].T @ ahead[-1]
+            target = target - between[at - 1].T @ found[-1]
+        both = [target, between[at]] if at < len(between) else [target]
+        solved: F64 = np.linalg.solve(normal, np.hstack(both))
+        found.append(solved[:, :3])
+        ahead.append(solved[:, 3:])
+    for at in range(len(found) - 2, -1, -1):
+        found[at] = found[at] - ahead[at] @ found[at + 1]
+    return found
 
 
 def _kept(times: Sequence[float], values: F64, borders: set[float]) -> list[float]:
