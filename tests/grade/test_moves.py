@@ -166,6 +166,7 @@ def test_one_handle_and_an_edge() -> None:
         ("v1", {"by": (1, 1, 1), "ramp": "round"}),
         ("v1", {"chroma": -1}),
         ("v1", {"rgb": (255, 128, 0)}),
+        ("v1", {"by": (10, -20, 30)}),
     ],
 )
 def test_refusals_change_nothing(id_: str | None, how: dict[str, Any]) -> None:

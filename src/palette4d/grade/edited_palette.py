@@ -161,13 +161,13 @@ class EditedPalette(Steps):
                 f"frame {frame:g} is outside of the clip; choose one from {first} to {last}"
             )
 
-    def check_code_values(self, rgb: Iterable[float]) -> None:
-        """Refuse a colour that looks like integers of 8 bits or more, such as 255 128 0.
+    def check_code_values(self, rgb: Iterable[float], what: str = "colour") -> None:
+        """Refuse a colour or offset that looks like integers of 8 bits or more, such as 255 128 0.
 
         Scene-linear clips accept all colours: their code values may be large.
         """
         values = as_colour(rgb)
-        largest = max(values)
+        largest = max(map(abs, values))
         whole = largest > 1 and all(value.is_integer() for value in values)
         if self.scene_linear or not (whole or largest > 16):
             return
@@ -175,7 +175,7 @@ class EditedPalette(Steps):
         shown = " ".join(f"{value:g}" for value in values)
         scaled = " ".join(f"{value / (2**bits - 1):.4g}" for value in values)
         raise Palette4dError(
-            f"found the colour {shown}, expected code values where 1 is display white; "
+            f"found the {what} {shown}, expected code values where 1 is display white; "
             f"{shown} in {bits} bits is {scaled}. Give that, or add any_value=True if "
             f"{shown} is meant"
         )

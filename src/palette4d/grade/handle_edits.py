@@ -276,6 +276,8 @@ class HandleEdits(EditedPalette):
             )
         if by is not None:
             offset = as_colour(by, "offset")
+            if not any_value:
+                self.check_code_values(offset, "offset")
             return moves.shift(offset), f"by {text_of(offset)}"
         if rgb is None:
             return adjuster(self.encoding, change), str(change)
