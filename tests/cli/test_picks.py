@@ -176,7 +176,7 @@ def test_conflicts_and_old_sidecars_are_told(path: str, run: Run) -> None:
     words = ("--frame", "2", "--colour", "0.36,0.6,0.2", "--no-follow")
     assert "has no colours of its clip" in run("pick", *words, "--by", "0.2,0,0")[1]
     out = run("hold", *words)[1]
-    assert re.search(r"not met: p1 .*p2", out)
+    assert re.search(r"not met: p2 .*p1", out)
     assert out.count("not met") == 1  # the pair is told once
 
 
