@@ -298,7 +298,7 @@ def run_set(args: argparse.Namespace) -> int:
     document.save()
     print(
         f"the palette colour nearest to {shown(args.near)} at frame {args.frame:g} is "
-        f"{shown(found.rgb)} of {found.id}, {found.distance:.3g} away"
+        f"{shown(found.rgb)} of {found.id}, {found.distance:.3f} away"
     )
     if found.handle is None:
         _report(document, before)
