@@ -151,9 +151,9 @@ class HandleEdits(EditedPalette):
         nearest: float = min(abs(knot - at) for knot in knots if knot != at)
         return max(0.0, 1 - abs(frame - at) / nearest)
 
-    def shift(self, id: str, *, by: Iterable[float]) -> None:
+    def shift(self, id: str, *, by: Iterable[float], any_value: bool = False) -> None:
         """Add three offsets to the colour of a vertex or a stop."""
-        offset = as_colour(by, "offset")
+        offset = self._offset(by, any_value)
         new = as_colour([a + b for a, b in zip(self.colour(id), offset, strict=True)])
         with self.one_step(f"move {id} by {text_of(offset)}"):
             self._set(id, new)
@@ -275,9 +275,7 @@ class HandleEdits(EditedPalette):
                 "chroma=… and lightness=…"
             )
         if by is not None:
-            offset = as_colour(by, "offset")
-            if not any_value:
-                self.check_code_values(offset, "offset")
+            offset = self._offset(by, any_value)
             return colour_moves.shift(offset), f"by {text_of(offset)}"
         if rgb is None:
             return adjuster(self.encoding, change), str(change)
@@ -289,6 +287,12 @@ class HandleEdits(EditedPalette):
         new, at = self._checked(rgb, any_value), self.frame_of(id, frame)
         before = self._own_colour(id, at) if id in self._handles.edges else self.colour(id)
         return colour_moves.shift_to(before, new), f"to {text_of(new)}"
+
+    def _offset(self, by: Iterable[float], any_value: bool) -> Colour:
+        offset = as_colour(by, "offset")
+        if not any_value:
+            self.check_code_values(offset, "offset")
+        return offset
 
     def _own_colour(self, edge: str, frame: float) -> Colour:
         """Return the colour of an edge at a frame, without the solution of the picks."""
