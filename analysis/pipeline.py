@@ -44,7 +44,7 @@ from palette4d import _core
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import counted
 from palette4d.grade import sidecar
-from palette4d.grade.names import vertex_colours
+from palette4d.grade.handle_names import vertex_colours
 from palette4d.media import colour_space, cuts
 from palette4d.media.array_clip import ArrayClip
 from palette4d.media.clip_base import Clip, describe, even_step

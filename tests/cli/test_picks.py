@@ -93,7 +93,9 @@ def test_pick_a_pixel_and_see_how_it_is_met(path: str, run: Run) -> None:
     assert pick["path"][-1]["frame"] == FRAMES - 1
     np.testing.assert_allclose(pick["path"][-1]["rgb"], (0.6, 0.6, 0.2), atol=0.06)
     assert "p1: pick at frame 0" in out
-    assert "follows its colour from frame 0 to 5" in out
+    assert re.search(r"follows its colour: #339933 at frame 0, #\w{6} at frame 5", out)
+    assert re.search(r"at frame 5 it is 0\.\d\d away .* change p1 --until \d\b", out)  # yellow
+    assert re.search(r"the colours near it get \d+% of the change", out)
     assert re.search(r"off by 0\.0\d+; \d+% the palette", out)
     assert re.search(r"\d+ of \d+ palette colours move", out)
     np.testing.assert_allclose(moved(path, 0, tuple(pick["rgb"])), (0.1, 0, 0), atol=0.01)
@@ -270,6 +272,48 @@ def test_another_clip_is_refused(path: str, run: Run, tmp_path: Path) -> None:
         assert status == 1
         assert says in errors
         assert "another clip" in errors
+
+
+def test_another_clip_of_the_same_size_is_told(run: Run, tmp_path: Path) -> None:
+    for frame in range(FRAMES):
+        pixels = np.rint(picture(frame)[::-1, :, ::-1] * 255).astype(np.uint8)
+        write_image(tmp_path / f"clip.{frame:04d}.png", pixels)
+    words = ("pick", "--frame", "0", "--pixel", "3,3", "--by", "0,0,0.1")
+    assert "another clip" not in run(*words)[2]
+    _, _, errors = run(*words, "--clip", str(tmp_path / "clip.####.png"))
+    assert "another clip, give the analysed one as --clip" in errors
+
+
+def test_a_colour_that_no_pixel_has_is_told(run: Run) -> None:
+    words = ("pick", "--frame", "2", "--by", "0,0,0.1", "--colour")
+    assert "no pixel" not in run(*words, "0.36,0.6,0.2")[2]
+    status, _, errors = run(*words, "0.9,0.6,0.1")
+    assert status == 0
+    assert re.search(r"no pixel of frame 2 .* p2: the nearest one, #\w{6}, is 0.4", errors)
+
+
+def test_a_hold_that_takes_most_of_a_pick_is_named(run: Run) -> None:
+    run("pick", "--frame", "2", "--colour", "0.36,0.6,0.3", "--by", "0.2,0,0", "--no-follow")
+    near = run("hold", "--frame", "2", "--colour", "0.36,0.6,0.2", "--no-follow")[1]
+    assert re.search(r"the hold p2 takes \d+% of what the colours near p1 would get", near)
+    assert "the hold p2 takes" not in run("disable", "p2")[1]
+
+
+def test_history_says_what_changed(path: str, run: Run) -> None:
+    run("pick", "--frame", "2", "--colour", "0.36,0.6,0.2", "--by", "0.1,0,0", "--no-follow")
+    for words in (
+        ("--radius", "0.2"),
+        ("--to", "#112233"),
+        ("--from", "1", "--until", "3", "--fade", "2"),
+        ("--toward", "colour", "--global-only"),
+    ):
+        assert run("change", "p1", *words)[0] == 0
+    assert [step.label for step in Document.load(path).history[1:]] == [
+        "change p1: radius 0.2",
+        "change p1: to #112233",
+        "change p1: from frame 1 to 3, fades of 2 frames",
+        "change p1: the same new colour at all frames, the palette alone",
+    ]
 
 
 def test_pixels_without_a_colour(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

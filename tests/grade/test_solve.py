@@ -215,6 +215,24 @@ def test_a_colour_of_a_box_gives_way_where_it_is_another_things(fields: Fields) 
     np.testing.assert_allclose(moved(document, leaf, 18), (0.25, -0.15, -0.1), atol=0.02)
 
 
+def test_a_channel_at_its_end_does_not_stop_a_change(fields: Fields) -> None:
+    """Red is full and is to stay so; green changes all the same."""
+    document, _ = solved(fields, pick("p1", (1.0, 0.5, 0.2), (1.0, 0.6, 0.2)))
+    np.testing.assert_allclose(moved(document, (1.0, 0.5, 0.2), 5), (0, 0.1, 0), atol=0.006)
+
+
+def test_what_holds_take_of_the_colours_near_a_pick(fields: Fields) -> None:
+    beside = np.add(MIDDLE, (0.0, 0.1, -0.1))
+    rows = [[*MIDDLE, 0.2], *cluster(np.add(MIDDLE, (0, 0.06, -0.06)), 0.4, 0.01), [0.2] * 4]
+    found = {**fields, "colours": [{"frame": 0, "rgbw": rows}]}
+    asked = pick("p1", MIDDLE, (0.6, 0.4, 0.4))
+    alone = solved(found, asked)[0].around_picks()["p1"]
+    held = solved(found, asked, pick("p2", beside.tolist()))[0].around_picks()["p1"]
+    assert (alone.frame, alone.taken) == (5, {})
+    assert held.taken["p2"] > 0.25
+    assert held.share == pytest.approx(alone.share * (1 - held.taken["p2"]))
+
+
 def test_a_path_is_followed_by_shift_or_by_colour(fields: Fields) -> None:
     path = [{"frame": 0, "rgb": [0.3, 0.3, 0.3]}, {"frame": 18, "rgb": [0.5, 0.4, 0.4]}]
     asked = pick("p1", (0.3, 0.3, 0.3), (0.4, 0.3, 0.3), frame=0, path=path)

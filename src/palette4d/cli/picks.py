@@ -8,22 +8,24 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from palette4d import load
-from palette4d.cli.messages import as_options
-from palette4d.cli.swatches import shown
+from palette4d.cli.messages import as_options, tell
+from palette4d.cli.swatches import shown, swatch
 from palette4d.common.arguments import ColourAction, number, whole
 from palette4d.common.errors import Palette4dError
-from palette4d.common.text import counted
+from palette4d.common.text import counted, hex_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Mapping
 
     from palette4d.grade.document import Document
+    from palette4d.grade.effects import Around
     from palette4d.grade.picks import Pick
 
     Action = Callable[[str, str, str], argparse.ArgumentParser]
 
-#: The share of the picture above which it is said what else a pick changes.
-MANY = 0.1
+#: The share of the picture above which it is said what else a pick changes, and the share of a
+#: pick's neighbourhood above which it is said that a hold takes it.
+MANY, TAKEN = 0.1, 0.2
 
 _WHERE = "--frame T (--colour C | --pixel X,Y [--box N])"
 _WHEN = "[--from A] [--until B] [--fade N]"
@@ -211,6 +213,8 @@ def run_pick(args: argparse.Namespace) -> int:
                 args.frame, **where, to=args.to, by=args.by, **given, progress=progress
             )
     document.save()
+    for line in document.pick_warnings(found.id, args.clip):
+        tell("warning", line)
     _print_pick(document, found.id, before, followed=not args.no_follow)
     return 0
 
@@ -246,6 +250,8 @@ def run_change(args: argparse.Namespace) -> int:
             args.id, any_value=args.float, clip=args.clip, progress=progress, **changes
         )
     document.save()
+    for line in document.pick_warnings(found.id, args.clip):
+        tell("warning", line)
     _print_pick(document, found.id, before, followed=not args.no_follow)
     return 0
 
@@ -264,7 +270,7 @@ def run_switch(args: argparse.Namespace) -> int:
     document.save()
     done = {"unpick": "removed", "enable": "enabled", "disable": "disabled"}[args.action]
     print(f"{done}: {', '.join(ids)}")
-    _print_notes(document, before)
+    _print_notes(document, document.around_picks(), before)
     return 0
 
 
@@ -275,7 +281,7 @@ def run_lock(args: argparse.Namespace) -> int:
     (document.lock if args.action == "lock" else document.unlock)(*args.ids)
     document.save()
     print(f"{args.action}ed: {', '.join(map(document.named, dict.fromkeys(args.ids)))}")
-    _print_notes(document, before)
+    _print_notes(document, document.around_picks(), before)
     return 0
 
 
@@ -287,13 +293,14 @@ def run_picks(args: argparse.Namespace) -> int:
         listed = {"picks": edits.get("picks", []), "locks": edits.get("locks", [])}
         print(json.dumps(listed, allow_nan=False))
         return 0
+    around = document.around_picks()
     for pick in document.picks:
-        print(_told(document, pick))
+        print(_told(document, pick, around))
     if document.locks:
         print(f"locked: {', '.join(map(document.named, document.locks))}")
     if not document.picks and not document.locks:
         print("no picks, holds or locks")
-    _print_notes(document)
+    _print_notes(document, around)
     return 0
 
 
@@ -307,11 +314,14 @@ def _print_pick(
     document: Document, id_: str, before: Iterable[frozenset[str]], followed: bool
 ) -> None:
     found = next(pick for pick in document.picks if pick.id == id_)
-    print(_told(document, found, followed))
-    _print_notes(document, [ids for ids in before if id_ not in ids])
+    around = document.around_picks()
+    print(_told(document, found, around, followed))
+    _print_notes(document, around, [ids for ids in before if id_ not in ids])
 
 
-def _told(document: Document, pick: Pick, followed: bool = False) -> str:
+def _told(
+    document: Document, pick: Pick, around: Mapping[str, Around], followed: bool = False
+) -> str:
     """Return a pick or hold for people: what was asked, and how it is met."""
     asked = shown(pick.rgb) + (f" -> {shown(pick.to)}" if pick.to is not None else " stays")
     lines = [f"{pick.id}: {pick.kind} at frame {pick.frame:g}: {asked}"]
@@ -325,11 +335,8 @@ def _told(document: Document, pick: Pick, followed: bool = False) -> str:
     if not pick.covers(pick.frame, document.frames[2]):
         lines.append(f"  note: frame {pick.frame:g} is outside of its range and does not change")
     if pick.path:
-        there = [key for key in pick.path if key.there > 0]
-        first, last = there[0].frame, there[-1].frame
-        keys = counted(len(pick.path), "key")
-        lines.append(f"  follows its colour from frame {first:.0f} to {last:.0f} ({keys})")
-        if len(there) < len(pick.path):
+        lines += _path(pick)
+        if any(key.there == 0 for key in pick.path):
             lines.append(
                 "  the change ends where the colour is lost among others; pick it there with "
                 f"--with {pick.id} if you still see it"
@@ -347,10 +354,41 @@ def _told(document: Document, pick: Pick, followed: bool = False) -> str:
         lines.append(line)
         if pick.worst is not None and pick.worst > max(2 * pick.residual, pick.tolerance):
             lines.append(f"  the farthest off at frame {pick.worst_frame:.0f}: by {pick.worst:.4f}")
+        if pick.id in around:
+            lines.append(f"  the colours near it get {around[pick.id].share:.0%} of the change")
     return "\n".join(lines)
 
 
-def _print_notes(document: Document, told: Iterable[frozenset[str]] = ()) -> None:
+def _path(pick: Pick) -> list[str]:
+    """Return where a pick's colour goes, and what helps if that is another thing's."""
+    there = [key for key in pick.path if key.there > 0]
+    if not there:
+        return []
+    first, farthest, last = there[0], pick.farthest(), there[-1]
+    told = {key.frame: key.rgb for key in (first, farthest, last)} | {pick.frame: pick.rgb}
+    colours = [f"{swatch(told[f])}{hex_of(told[f])} at frame {f:g}" for f in sorted(told)]
+    lines = [f"  follows its colour: {', '.join(colours)}"]
+    alike = pick.alike()
+    limits = [
+        f"--{name} {frame:g}"
+        for name, frame, lost in (
+            ("from", alike[0], alike[0] > first.frame),
+            ("until", alike[1], alike[1] < last.frame),
+        )
+        if lost
+    ]
+    if limits:
+        lines.append(
+            f"  note: at frame {farthest.frame:g} it is {pick.away(farthest):.2f} away from the "
+            f"picked colour. If that is another thing: {pick.kind} --frame {farthest.frame:g} "
+            f"--pixel X,Y --with {pick.id}, or change {pick.id} {' '.join(limits)}"
+        )
+    return lines
+
+
+def _print_notes(
+    document: Document, around: Mapping[str, Around], told: Iterable[frozenset[str]] = ()
+) -> None:
     """Print what the solution moves, and what it does not meet; in short what was `told`."""
     enabled = [pick for pick in document.picks if pick.enabled]
     if not enabled:
@@ -369,6 +407,14 @@ def _print_notes(document: Document, told: Iterable[frozenset[str]] = ()) -> Non
             f"note: of the others {shown(effect.most)} changes most. If it must stay: "
             f"hold --frame {effect.frame:.0f} --colour {colour}"
         )
+    for id_, near in around.items():
+        for hold, taken in near.taken.items():
+            if taken > TAKEN:
+                print(
+                    f"note: the hold {hold} takes {taken:.0%} of what the colours near {id_} would "
+                    f"get at frame {near.frame:.0f}; a smaller one takes less: change {hold} "
+                    "--radius 0.05"
+                )
     lines = _unmet(document)
     for ids, line in lines.items():
         if ids not in told:

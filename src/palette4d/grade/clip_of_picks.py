@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
+from palette4d.common.text import hex_of
 from palette4d.grade import follow
 from palette4d.grade.edits import Colour, as_colour
 from palette4d.grade.follow import Progress
-from palette4d.grade.picks import PathKey, Pick
+from palette4d.grade.picks import ALIKE, PathKey, Pick
 from palette4d.media.clip_base import describe
 from palette4d.media.source_clip import find_clip, nearest_frame
 
@@ -30,6 +31,9 @@ DIGITS = 6
 #: A box has a spread if more than 1 - MOST_COLOURS of its pixels are farther than WIDE from the
 #: mean. It is told by at most MOST_SPREAD further colours.
 WIDE, MOST_COLOURS, MOST_SPREAD = 0.04, 0.9, 2
+#: A frame whose colours differ by more than this from the analysed ones is of another clip. Frames
+#: of one clip differ by up to 0.13, those of others by 0.19 to 0.9.
+OTHER_CLIP = 0.16
 
 
 class ClipOfPicks:
@@ -131,6 +135,30 @@ class ClipOfPicks:
         mean = np.round(found.mean(axis=0), DIGITS)
         return as_colour(mean), tuple(as_colour(offset) for offset in _spread(found - mean))
 
+    def warnings(self, pick: Pick, colours: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
+        """Return what speaks against a pick's clip and its colour; `colours` is the sidecar's."""
+        clip = self.open()
+        if clip is None:
+            return ()
+        frame = nearest_frame(clip, pick.frame)
+        _, found = follow.read_colours(clip, [frame], self._conversion)
+        if not found:
+            return ()
+        told = []
+        rgb, counts = found[0]
+        if colours and min(_unlike(rgb, counts, np.array(e["rgbw"])) for e in colours) > OTHER_CLIP:
+            told.append(
+                f"the colours of frame {frame} of {clip.source} differ much from those that were "
+                "analysed; if it is another clip, give the analysed one as clip=…, or analyse it"
+            )
+        away = np.linalg.norm(rgb - pick.rgb, axis=1)
+        if away.min() > ALIKE:
+            told.append(
+                f"no pixel of frame {frame} is near the colour of {pick.id}: the nearest one, "
+                f"{hex_of(rgb[away.argmin()])}, is {away.min():.2f} away"
+            )
+        return tuple(told)
+
     def path(self, pick: Pick, progress: Progress | None = None) -> tuple[PathKey, ...]:
         """Return the path of a pick from its own colour and the given keys of its path.
 
@@ -145,6 +173,20 @@ class ClipOfPicks:
         given = [key for key in pick.path if key.given and key.frame != pick.frame]
         starts += [(nearest_frame(clip, key.frame), key.rgb) for key in given]
         return follow.paths(clip, starts, span, conversion=self._conversion, progress=progress)
+
+
+def _unlike(
+    rgb: NDArray[np.float64], counts: NDArray[np.float64], rgbw: NDArray[np.float64]
+) -> float:
+    """Return how much the colours of a frame differ from stored ones, 0..1.
+
+    Compared are how many pixels of each are near the stored colours.
+    """
+    both = []
+    for colours, shares in ((rgb, counts), (rgbw[:, :3], rgbw[:, 3])):
+        square = ((colours[:, None] - rgbw[:, :3]) ** 2).sum(axis=2)
+        both.append(shares / shares.sum() @ np.exp(square / (-2 * ALIKE**2)))
+    return float(np.abs(both[0] - both[1]) @ rgbw[:, 3] / ((both[0] + both[1]) @ rgbw[:, 3]))
 
 
 def _spread(offsets: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -18,15 +18,13 @@ from palette4d import _core
 from palette4d.common.errors import Palette4dError
 from palette4d.grade.edits import Colour, as_colour
 from palette4d.grade.keyframes import needed
-from palette4d.grade.picks import PathKey
+from palette4d.grade.picks import ALIKE, PathKey
 from palette4d.media.clip_base import Clip, FrameError
 
 F64 = NDArray[np.float64]
 Progress = Callable[[int, int], object]
 """Called as progress(done, total)."""
 
-#: Standard deviation of the pixels that count as near, in code values.
-NEAR = 0.08
 #: Rounds of the mean shift from one frame to the next, and the step at which it has arrived.
 ROUNDS, ARRIVED = 8, 1e-4
 #: A colour moves at most so far from one frame to the next; what jumps is another object.
@@ -103,7 +101,7 @@ def paths(
     inside = [frame for frame in clip.frames if low <= frame <= high]
     every = -(-len(inside) // MOST_FRAMES)
     chosen = sorted({*inside[::every], inside[-1], *known})
-    frames, colours = _read(clip, chosen, conversion, progress)
+    frames, colours = read_colours(clip, chosen, conversion, progress)
     for frame in known:
         if frame not in frames:
             raise Palette4dError(
@@ -123,11 +121,11 @@ def paths(
     )
 
 
-def _read(
+def read_colours(
     clip: Clip,
     chosen: Sequence[int],
     conversion: _core.ColourConversion | None,
-    progress: Progress | None,
+    progress: Progress | None = None,
 ) -> tuple[list[int], list[tuple[F64, F64]]]:
     """Return the frames with pixels, and the weighted colours of each."""
     frames, colours = [], []
@@ -185,7 +183,7 @@ def _followed(colours: Sequence[tuple[F64, F64]], start: F64) -> F64:
         path.append(there)
         found = _near(there, *after)
         lost = home is not None and found is not None and found[1] > LOST * home[1]
-        back = float(np.linalg.norm(there - start)) < NEAR
+        back = float(np.linalg.norm(there - start)) < ALIKE
         seen.append(float(not lost and (back or seen[-1] > 0)))
     return np.column_stack([path, seen])
 
@@ -221,6 +219,6 @@ def _shifted(here: F64, before: tuple[F64, F64], after: tuple[F64, F64]) -> F64:
 
 def _near(colour: F64, rgb: F64, counts: F64) -> tuple[F64, float] | None:
     """Return the mean of a frame's pixels near a colour, and their share; None for hardly any."""
-    weight = counts * np.exp(((rgb - colour) ** 2).sum(axis=1) / (-2 * NEAR**2))
+    weight = counts * np.exp(((rgb - colour) ** 2).sum(axis=1) / (-2 * ALIKE**2))
     total, share = float(weight.sum()), float(weight.sum() / counts.sum())
     return (weight @ rgb / total, share) if share >= LEAST_SHARE else None

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import hex_of
 from palette4d.grade import edits
+from palette4d.grade.colour_moves import range_text
 from palette4d.grade.edited_palette import EditedPalette
 from palette4d.grade.edits import Colour, as_colour
 from palette4d.grade.handles import unknown
-from palette4d.grade.moves import range_text
 from palette4d.grade.picks import MOST_PICKS, Pick, Toward, all_picks, check_range
 
 if TYPE_CHECKING:
     from palette4d.grade.clip_of_picks import ClipOfPicks
-    from palette4d.grade.solve import SideEffect
+    from palette4d.grade.effects import Around, SideEffect
 
 
 class PickEdits(EditedPalette):
@@ -151,7 +151,9 @@ class PickEdits(EditedPalette):
         at = self._picked(frame, colour, pixel, box, clip, any_value)
         found = corrected(self._pick(id), at.frame, at.rgb)
         found = replace(found, path=self._clip_of_picks(clip).path(found, progress))
-        self._put("pick", id, found.to_fields(), f"correct {id} at frame {frame:g}")
+        self._put(
+            "pick", id, found.to_fields(), f"correct {id}: {hex_of(at.rgb)} at frame {frame:g}"
+        )
         return self._pick(id)
 
     def change_pick(
@@ -185,7 +187,7 @@ class PickEdits(EditedPalette):
             given = tuple(key for key in old.path if key.given and key.frame != old.frame)
             path = self._clip_of_picks(clip).path(replace(new, path=given), progress)
             new = replace(new, path=path)
-        label = f"change {id}: {_asked(new)}"
+        label = f"change {id}: {_changed(old, new)}"
         if old.enabled != new.enabled:
             label = f"{'enable' if new.enabled else 'disable'} {id}"
         self._put("pick", id, new.to_fields(), label)
@@ -211,7 +213,7 @@ class PickEdits(EditedPalette):
         for id_ in ids:
             if ("lock", id_) not in self._state:
                 locked = [known for kind, known in self._state if kind == "lock"]
-                raise unknown(id_, "lock", locked, "palette4d edit SIDECAR picks")
+                raise unknown(id_, "lock", locked, "`picks` or `Document.locks`")
         self._remove([("lock", id_) for id_ in dict.fromkeys(ids)], f"unlock {' '.join(ids)}")
 
     @property
@@ -240,9 +242,20 @@ class PickEdits(EditedPalette):
 
         It says how much of it is not near a picked colour, and which colour to hold.
         """
-        from palette4d.grade import solve
+        from palette4d.grade import effects
 
-        return solve.side_effect(self._members(), least)
+        return effects.side_effect(self._members(), least)
+
+    def around_picks(self) -> "dict[str, Around]":
+        """Return what the clip's colours near each enabled pick get of its change, by its id."""
+        from palette4d.grade import effects
+
+        return effects.surroundings(self._members())
+
+    def pick_warnings(self, id: str, clip: str | os.PathLike[str] | None = None) -> tuple[str, ...]:
+        """Return what speaks against the clip of a pick or hold, and against its colour."""
+        colours = self._fields.get("colours", ())
+        return self._clip_of_picks(clip).warnings(self._pick(id), colours)
 
     def colour_of_pixel(
         self,
@@ -318,7 +331,7 @@ class PickEdits(EditedPalette):
         found = self._state.get(("pick", id_))
         if found is None:
             known = [known for kind, known in self._state if kind == "pick"]
-            raise unknown(id_, "pick or hold", known, "palette4d edit SIDECAR picks")
+            raise unknown(id_, "pick or hold", known, "`picks`")
         return Pick.from_fields(found)
 
 
@@ -326,6 +339,27 @@ def _same(old: Pick, new: Pick) -> bool:
     """Return whether two picks ask for the same, whatever paths were found or corrected."""
     unlike = bool(old.path) != bool(new.path)
     return not unlike and replace(old, path=(), enabled=True) == replace(new, id=old.id, path=())
+
+
+def _changed(old: Pick, new: Pick) -> str:
+    """Return what is new of a pick, for people: "to #803020, fades of 4 frames"."""
+    both = [
+        (
+            f"{hex_of(pick.rgb)} at frame {pick.frame:g}",
+            "" if pick.to is None else f"to {hex_of(pick.to)}",
+            "all frames"
+            if pick.start is None and pick.until is None
+            else range_text(pick.start, pick.until),
+            f"fades of {pick.fade:g} frames",
+            "default radius" if pick.radius is None else f"radius {pick.radius:g}",
+            f"the same {'new colour' if pick.toward == 'colour' else 'change'} at all frames",
+            "the palette alone" if pick.global_only else "the palette and near colours",
+            "followed" if pick.path else "not followed",
+        )
+        for pick in (old, new)
+    ]
+    found = [after for before, after in zip(*both, strict=True) if before != after]
+    return ", ".join(found) or _asked(new)
 
 
 def _asked(pick: Pick) -> str:

@@ -26,6 +26,10 @@ Toward = Literal["shift", "colour"]
 #: More enabled picks and holds than this are refused: solving and recolouring would be slow.
 MOST_PICKS = 100
 
+#: Pixels within about this distance of a picked colour are taken for the same thing's: it is the
+#: standard deviation when a colour is followed.
+ALIKE = 0.08
+
 #: A residual above this, 3 of 255, is told, and above this share of the change.
 MET, MET_PART = 0.012, 0.02
 
@@ -200,6 +204,26 @@ class Pick:
         high = np.maximum(1.0, ends[:2].max(axis=0)) if ends.max() <= 1 else np.inf
         return np.minimum(0.0, ends.min(axis=0)), high
 
+    def away(self, key: PathKey) -> float:
+        """Return how far a key of the path is from the picked colour."""
+        return float(np.linalg.norm(np.subtract(key.rgb, self.rgb)))
+
+    def farthest(self) -> PathKey:
+        """Return the key of a path at which the colour is the farthest from the picked one."""
+        return max((key for key in self.path if key.there > 0), key=self.away)
+
+    def alike(self) -> tuple[float, float]:
+        """Return the frames between which a path stays near the picked colour."""
+        frames, colours, there = self._keys
+        at = np.unique(np.linspace(frames[0], frames[-1], 1000).round())
+        rgb = np.stack([np.interp(at, frames, channel) for channel in colours.T], axis=1)
+        away = np.linalg.norm(rgb - self.rgb, axis=1) * (np.interp(at, frames, there) > 0)
+        before = at[(away > ALIKE) & (at < self.frame)].max(initial=-math.inf)
+        after = at[(away > ALIKE) & (at > self.frame)].min(initial=math.inf)
+        near = at[(before < at) & (at < after)]
+        start, end = near.min(initial=self.frame), near.max(initial=self.frame)
+        return float(start), float(end)
+
     def change_at(self, frame: float) -> F64:
         """Return the full change that is asked for at a frame, (3,)."""
         if self.to is None:
@@ -212,7 +236,8 @@ class Pick:
         light = min(1.0, max(0.0, float(colour.max())) / max(float(old.max()), 1e-9))
         low, high = self._limits
         room = np.where(change < 0, colour - low, high - colour)
-        part = room / np.maximum(np.abs(change), 1e-9)
+        size = np.abs(change)
+        part = np.where(size > 1e-9, room / np.maximum(size, 1e-9), 1.0)
         return change * min(light, max(0.0, float(part.min())))
 
     def covers(self, frame: float, step: float) -> bool:

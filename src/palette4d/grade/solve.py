@@ -45,7 +45,7 @@ from numpy.typing import NDArray
 
 from palette4d import _core
 from palette4d.grade.bumps import alongs, bump_values, bumped, squares
-from palette4d.grade.edits import Colour, as_colour
+from palette4d.grade.edits import Colour
 from palette4d.grade.keyframes import needed
 from palette4d.grade.picks import MOST_PICKS, Pick, all_picks
 from palette4d.grade.sidecar import Fields
@@ -121,67 +121,17 @@ def solve(fields: Mapping[str, Any]) -> tuple[Fields, dict[str, Fields]]:
         ``global`` (`picks.Pick`).
     """
     enabled = [pick for pick in all_picks(fields["edits"]) if pick.enabled]
-    clip = _ClipAtTimes(fields)
-    problem = _Problem(clip, enabled[:MOST_PICKS])
+    clip = ClipAtTimes(fields)
+    problem = Problem(clip, enabled[:MOST_PICKS])
     solution = problem.solution(problem.solved())
     return solution, _measured(fields, solution, problem)
 
 
-@dataclass(frozen=True)
-class SideEffect:
-    """What the picks do to the pixels of a clip, at the frame where they do most beside themselves.
-
-    Attributes
-    ----------
-    frame : float
-    share : float
-        Share, 0..1, of the frame's pixels that change by more than asked for in a channel.
-    others : float
-        The same for pixels that are not near a picked colour or a shade of it.
-    most : 3 floats
-        The other colour for which this matters most; its share of the pixels counts.
-    """
-
-    frame: float
-    share: float
-    others: float
-    most: Colour
-
-
-def side_effect(fields: Mapping[str, Any], least: float) -> SideEffect:
-    """Return what the picks' solution does; `least` is the change that counts."""
-    clip = _ClipAtTimes(fields)
-    both = _parsed(fields, fields["edits"].get("solution", {}))
-    enabled = [pick for pick in all_picks(fields["edits"]) if pick.enabled]
-    problem = _Problem(clip, enabled[:MOST_PICKS])
-    found = [SideEffect(float(clip.first), 0.0, 0.0, (0.0, 0.0, 0.0))]
-    for time in problem.times:
-        cut = _core.slice_at(clip.polytope, time)
-        solved = _core.edited_colours(clip.polytope, both.edits, cut)
-        user = _core.edited_colours(clip.polytope, clip.core.edits, cut)
-        guarded = clip.colours_at(time)
-        rgb, shares = guarded[:, :3], guarded[:, 3] / max(float(guarded[:, 3].sum()), 1e-9)
-        moved = _core.palette_weights(rgb, cut.rgb, cut.faces)[0] @ (solved - user)
-        change = bumped(rgb, moved, both.bumps_at(time))
-        size = np.abs(change).max(axis=1)
-        other = problem.guard_at(rgb, time) > OTHER
-        worst = int(np.argmax(np.where(other, size * np.sqrt(shares), 0.0)))
-        found.append(
-            SideEffect(
-                time,
-                float(shares[size > least].sum()),
-                float(shares[other & (size > least)].sum()),
-                as_colour(rgb[worst]),
-            )
-        )
-    return max(found, key=lambda one: (one.others, one.share))
-
-
-class _ClipAtTimes:
+class ClipAtTimes:
     """The palette, the user's own displacements and the clip's colours at a time."""
 
     def __init__(self, fields: Mapping[str, Any]) -> None:
-        self.core = _parsed(fields, {})
+        self.core = parsed(fields, {})
         self.polytope = self.core.polytope
         found = fields["clip"]["frames"]
         self.first, self.last, self.step = found["first"], found["last"], found["step"]
@@ -278,14 +228,14 @@ class _Solved:
     bumps: dict[int, F64]
 
 
-class _Problem:
+class Problem:
     """The picks of a clip, solved at one time after the other.
 
     A pick has a point in colour for itself and for each colour of its spread. All have the same
     change and a bump each.
     """
 
-    def __init__(self, clip: _ClipAtTimes, picks: Sequence[Pick]) -> None:
+    def __init__(self, clip: ClipAtTimes, picks: Sequence[Pick]) -> None:
         self.clip, self.picks = clip, picks
         self._known: dict[tuple[str, float], F64] = {}
         points = [
@@ -343,7 +293,7 @@ class _Problem:
         more = long / max(round_, LEAST_SHARE)
         return 1 - (1 - SHADE) * min(1.0, max(0.0, 3 - more))
 
-    def _near(self, colours: F64, time: float, points: NDArray[np.intp], radii: F64 | float) -> F64:
+    def near(self, colours: F64, time: float, points: NDArray[np.intp], radii: F64 | float) -> F64:
         """Return (n, m) values, 0..1, of bumps of such radii around points, at n colours."""
         centres = self.centres(time)[points]
         return bump_values(colours, centres, radii, alongs(centres, self.shades[points]))
@@ -351,7 +301,7 @@ class _Problem:
     def _pixels(self, time: float) -> F64:
         """Return the share of the clip's pixels near each point."""
         guarded = self.clip.colours_at(time)
-        near = self._near(guarded[:, :3], time, np.arange(len(self.of)), NEAR)
+        near = self.near(guarded[:, :3], time, np.arange(len(self.of)), NEAR)
         return np.asarray(guarded[:, 3] @ near, np.float64)
 
     def _once(self, what: str, time: float, compute: Callable[[], F64]) -> F64:
@@ -393,7 +343,7 @@ class _Problem:
         at = np.flatnonzero(self.moving[self.of])
         strengths = self._asked(time if asked is None else asked)[at]
         share = strengths / max(float(strengths.max(initial=0)), NONE)
-        far = 1 - share * self._near(colours, time, at, np.minimum(self.radii[at], NEAR))
+        far = 1 - share * self.near(colours, time, at, np.minimum(self.radii[at], NEAR))
         found: F64 = far.prod(axis=1)
         return found
 
@@ -411,6 +361,8 @@ class _Problem:
         return counts
 
     def centres(self, time: float) -> F64:
+        """Return where each point is at a time, (n, 3)."""
+
         def compute() -> F64:
             found = np.array([pick.colour_at(time) for pick in self.picks]).reshape(-1, 3)
             return np.asarray(found[self.of] + self.offsets, np.float64)
@@ -486,8 +438,8 @@ class _Problem:
         asking = (self.strengths(time) > 0) & self.moving[self.of]
         return frozenset(self.of[asking].tolist())
 
-    def _alone(self, picks: frozenset[int]) -> _Problem:
-        return _Problem(self.clip, [self.picks[number] for number in sorted(picks)])
+    def _alone(self, picks: frozenset[int]) -> Problem:
+        return Problem(self.clip, [self.picks[number] for number in sorted(picks)])
 
     def met(self, times: Sequence[float]) -> list[_Solved]:
         """Solve some times together, without holds. Bumps meet what is left at the picks."""
@@ -545,7 +497,7 @@ class _Problem:
         counts = self._counts(guarded, points, within)
         if clip.frames:
             # A pick of few pixels moves no palette colour that many pixels are mixed from.
-            near = self._near(guarded[:, :3], time, picked, NEAR)
+            near = self.near(guarded[:, :3], time, picked, NEAR)
             pixels = float(guarded[:, 3] @ near.max(axis=1))
             guard *= GUARD / max(pixels, LEAST_SHARE)
         return _Terms(
@@ -565,7 +517,7 @@ class _Problem:
     def _rows(self, colours: F64, of: _Unknowns) -> tuple[F64, F64]:
         """Return what each unknown does to colours, and how near they are to the picked points."""
         weights = _core.palette_weights(colours, of.cut.rgb, of.cut.faces)[0]
-        near = self._near(colours, of.time, of.picked, self.radii[of.picked])
+        near = self.near(colours, of.time, of.picked, self.radii[of.picked])
         return np.hstack([_gathered(weights, of.places) * of.free, near * of.local]), near
 
     def _links(self, one: _Terms, other: _Terms) -> tuple[F64, F64]:
@@ -598,6 +550,12 @@ class _Problem:
             else:
                 free[place] = float(np.interp(time, *self.clip.handles[ids[edge]]))
         return places, np.array(list(free.values()))
+
+    def hold_at(self, rgb: F64, time: float) -> str:
+        """Return the id of the hold that is nearest to a colour."""
+        held = np.flatnonzero(~self.moving[self.of])
+        away = np.linalg.norm(self.centres(time)[held] - rgb, axis=1)
+        return self.picks[int(self.of[held[away.argmin()]])].id
 
     def solution(self, solved: Sequence[_Solved]) -> Fields:
         """Return the sidecar's member: few keys, rounded."""
@@ -791,9 +749,9 @@ def _interpolated(bumps: F64, left: F64) -> F64:
     return sizes
 
 
-def _measured(fields: Mapping[str, Any], solution: Fields, problem: _Problem) -> dict[str, Fields]:
+def _measured(fields: Mapping[str, Any], solution: Fields, problem: Problem) -> dict[str, Fields]:
     """Return the residuals and the palette's share of each pick, from the stored solution."""
-    core = _parsed(fields, solution)
+    core = parsed(fields, solution)
     clip, picks = problem.clip, problem.picks
     between = [(a + b) / 2 for a, b in itertools.pairwise(problem.times)]
     times = {*problem.times, *(float(round(t)) for t in between), *(pick.frame for pick in picks)}
@@ -838,7 +796,7 @@ def _share(done: F64, asked: F64, largest: float) -> float:
     return min(1.0, max(0.0, float(done @ asked) / length))
 
 
-def _parsed(fields: Mapping[str, Any], solution: Fields) -> _core.Sidecar:
+def parsed(fields: Mapping[str, Any], solution: Fields) -> _core.Sidecar:
     """Return the core's view of the palette and of the user's edits, with a solution."""
     without = {n: v for n, v in fields.items() if n not in ("colours", "versions", "history")}
     edits = {n: v for n, v in fields["edits"].items() if n not in ("picks", "locks", "solution")}
