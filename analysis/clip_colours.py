@@ -54,10 +54,17 @@ def _reduced(frames: Sequence[FrameStatistics], gamut: Gamut) -> list[list[float
     keys = cells @ np.array([(CELLS + 1) ** 2, CELLS + 1, 1], np.int64)
     rgb, shares = _grouped(rgb, shares, keys)
     worth = np.maximum(shares, LEAST_SHARE) ** ROOT
-    distance = np.linalg.norm(rgb - rgb[shares.argmax()], axis=1)
+    channels = np.ascontiguousarray(rgb.T)  # much quicker than row by row
+
+    def distances(one: int) -> F64:
+        red, green, blue = (channels - channels[:, one : one + 1]) ** 2
+        away: F64 = np.sqrt(red + green + blue)
+        return away
+
+    distance = distances(int(shares.argmax()))
     nearest = np.zeros(len(rgb), np.int64)
     for one in range(1, min(MOST_COLOURS, len(rgb))):
-        there = np.linalg.norm(rgb - rgb[(distance * worth).argmax()], axis=1)
+        there = distances(int((distance * worth).argmax()))
         nearest[there < distance] = one
         distance = np.minimum(distance, there)
     rgb, shares = _grouped(rgb, shares, nearest)

@@ -64,22 +64,6 @@ def hull_planes(rgb: F64) -> F64 | None:
     return planes
 
 
-def beyond_planes(points: F64, planes: F64) -> F64:
-    """Return how far each of (n, 3) points lies beyond any of (m, 4) planes, negative inside.
-
-    Plane by plane and axis by axis: a matrix product of three columns takes twelve times as long.
-    """
-    x, y, z = np.ascontiguousarray(points.T)
-    farthest = np.full(len(points), -np.inf)
-    for a, b, c, d in planes:
-        distance = a * x
-        distance += b * y
-        distance += c * z
-        distance += d
-        np.maximum(farthest, distance, out=farthest)
-    return farthest
-
-
 def concavity(rgb: F64, faces: I32) -> float:
     """Return the share of its convex hull that a mesh lacks; 0 for a hull that is nearly flat."""
     volume = hull_volume(rgb)

@@ -26,15 +26,33 @@ def frame_palette(
     colours: _core.ColourTree, gamut: Gamut, options: AnalysisOptions
 ) -> FramePalette:
     """Return the refined, simplified hull of a frame's colours, inside the gamut."""
-    flat = flat_palette(colours.rgb, options)
+    return refined(colours, simple_hull(colours, options), gamut, options)
+
+
+def simple_hull(colours: _core.ColourTree, options: AnalysisOptions) -> F64 | FramePalette:
+    """Return (n, 3) corners whose hull holds all colours, or the palette of flat colours."""
+    rgb = colours.rgb
+    flat = flat_palette(rgb, options)
     if flat is not None:
         return flat
-    close = options.merge_distance * gamut.scale
-    mesh = hull_mesh(colours.rgb)
+    mesh = hull_mesh(rgb)
     simple = _core.progressive_hull(mesh.rgb, mesh.faces, options.palette_size)
     if len(simple) > options.palette_size:
         # No edge of a sliver-thin hull can be contracted: use its extreme points instead.
         simple = extreme_points(mesh.rgb, options.palette_size)
+    return simple
+
+
+def refined(
+    colours: _core.ColourTree,
+    simple: F64 | FramePalette,
+    gamut: Gamut,
+    options: AnalysisOptions,
+) -> FramePalette:
+    """Return the refined palette of a `simple_hull`."""
+    if isinstance(simple, FramePalette):
+        return simple
+    close = options.merge_distance * gamut.scale
     best = hull_mesh(merge_close(gamut.clip(simple), close))
     best_loss = palette_loss(colours, best.rgb, options)
     # Refining may push a vertex inside the hull, so the second round starts from the new hull.

@@ -19,7 +19,6 @@ import itertools
 import numpy as np
 from numpy.typing import NDArray
 from palette4d.analysis.polytope import FramePalette
-from scipy.optimize import linear_sum_assignment
 from scipy.spatial import ConvexHull, QhullError
 
 F64 = NDArray[np.float64]
@@ -224,6 +223,8 @@ def _nearest_links(distance: F64) -> tuple[tuple[int, int], ...]:
     colour."""
     if distance.shape[0] > distance.shape[1]:
         return tuple(sorted((i, j) for j, i in _nearest_links(distance.T)))
+    from scipy.optimize import linear_sum_assignment  # slow to import, and few clips need it
+
     rows, columns = linear_sum_assignment(distance)
     links = {(int(i), int(j)) for i, j in zip(rows, columns, strict=True)}
     for j in set(range(distance.shape[1])) - {j for _, j in links}:

@@ -81,7 +81,7 @@ def shaped_weights(options: AnalysisOptions, scale: float, faces: bool = True) -
 
 def palette_loss(colours: _core.ColourTree, rgb: F64, options: AnalysisOptions) -> float:
     """Eq. 4 of one (n, 3) palette."""
-    r, c, *_ = _core.palette_loss(colours, rgb, NO_FACES, loss_weights(options))
+    r, c, *_ = _core.palette_loss(colours, rgb, NO_FACES, loss_weights(options), False)
     return options.lambda_ * r + c
 
 

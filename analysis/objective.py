@@ -105,7 +105,7 @@ def refine_jointly(
         if not np.array_equal(moved, vertices):
             break
     vertices = moved
-    return polytope.with_vertices(vertices), evaluate(vertices, evaluate.everything)[0]
+    return polytope.with_vertices(vertices), evaluate(vertices, evaluate.everything, False)[0]
 
 
 def move_all(evaluate: Objective, vertices: F64, most_evaluations: int) -> F64:
@@ -183,14 +183,18 @@ class Objective:
             inside = (polytope.vertices[:, 3] >= b.first) & (polytope.vertices[:, 3] <= b.last)
             self.block[inside] = b.first, b.last
 
-    def __call__(self, vertices: F64, which: list[int]) -> tuple[float, F64]:
-        """Return sum over `which` of L / N + gamma K (+ shape), and the gradient."""
+    def __call__(
+        self, vertices: F64, which: list[int], with_gradient: bool = True
+    ) -> tuple[float, F64]:
+        """Return sum over `which` of L / N + gamma K (+ shape), and the gradient if wanted."""
         o = self.options
-        rows, gradient = self.loss.evaluate(vertices, which, self.weights, self.threads, True)
+        rows, gradient = self.loss.evaluate(
+            vertices, which, self.weights, self.threads, with_gradient
+        )
         sums = rows.sum(axis=0)
         count = len(self.everything)
         value = (o.lambda_ * sums[0] + sums[1] + sums[2]) / count
-        gradient = gradient / count
+        gradient = gradient / count if with_gradient else np.zeros_like(vertices)
         if o.gamma and count > 1:
             k, slope = smoothness(vertices, self.edges, self.length, self.quick)
             value += o.gamma * k

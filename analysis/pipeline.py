@@ -9,6 +9,7 @@ clip -> colour_statistics -> frame_hulls -> glue -> block_merging -> vertex_remo
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, TypeVar
@@ -43,7 +44,7 @@ from palette4d import _core
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import counted
 from palette4d.grade import sidecar
-from palette4d.grade.names import vertex_colours
+from palette4d.grade.handle_names import vertex_colours
 from palette4d.media import colour_space, cuts
 from palette4d.media.array_clip import ArrayClip
 from palette4d.media.clip_base import Clip, describe, even_step
@@ -274,6 +275,12 @@ class _Run:
         self.stages: list[StageResult] = []
         self.notes: list[str] = []
         self.bound: float | None = None
+        self.measured: dict[SkewPolytope, Losses] = {}
+
+    @functools.cached_property
+    def starts(self) -> list[static_hull.Start]:
+        """The starts of static palettes."""
+        return static_hull.starts(self.frames, self.options)
 
     def counter(self, stage: str) -> Callable[[int, int], object]:
         """Return the progress callback of one stage."""
@@ -286,8 +293,10 @@ class _Run:
             self.report(stage, done, total)
 
     def losses(self, polytope: SkewPolytope) -> Losses:
-        """Measure a polytope on all colours of all frames."""
-        return losses_of(polytope, self.frames, self.options)
+        """Measure a polytope on all colours of all frames, once."""
+        if polytope not in self.measured:
+            self.measured[polytope] = losses_of(polytope, self.frames, self.options)
+        return self.measured[polytope]
 
     def result(self, stage: str, polytope: SkewPolytope) -> StageResult:
         """Return the vertices, blocks and losses after a stage."""
@@ -302,7 +311,7 @@ class _Run:
 def _skew(run: _Run) -> SkewPolytope:
     """Sections 5.2 to 5.5. Each handle of the result is worth its cost (the default method)."""
     options = run.options
-    hulls = [_static(run), *static_hull.plain_hulls(run.frames, run.gamut, options)]
+    hulls = [_static(run), *static_hull.plain_hulls(run.starts, run.frames, run.gamut, options)]
     convex = [h for h in hulls if h is hulls[0] or not _is_concave(h, run)]
     simple = min(convex, key=lambda hull: _price(hull, run))
     run.bound = run.losses(simple).L_prime
@@ -334,16 +343,20 @@ def _searched(run: _Run, options: AnalysisOptions, simple: SkewPolytope) -> Skew
     blocks, first = _consistent_blocks(run, few)
     sequence = block_merging.merge_sequence(blocks, few, gamut, options)
     configurations = [merged for _, merged in run.counted("block_merging", sequence, len(blocks))]
+    few_blocks = [c for c in reversed(configurations) if len(c) <= options.blocks]
     starts, notes = [], []
-    for configuration in reversed(configurations):
-        if len(configuration) <= options.blocks:
+
+    def next_starts() -> Iterator[SkewPolytope]:  # the search may need the first few only
+        for configuration in few_blocks:
             apart, these = block_merging.placed(configuration, few, frames, options)
             dense, note = _glued(these, apart)
             notes.append(note)
             vertex_removal.thin_out(dense, these, options)
             starts.append(dense.polytope())
-    progress = run.counter("vertex_removal")
-    at, found = structure_search.search(starts, simple, few, frames, gamut, options, progress)
+            yield starts[-1]
+
+    begun = run.counted("vertex_removal", next_starts(), len(few_blocks))
+    at, found = structure_search.search(begun, simple, few, frames, gamut, options)
     with_stops = stop_insertion.insert_stops(found, frames, gamut, options)
     run.stages += [
         first,
@@ -456,7 +469,7 @@ def _paper(run: _Run) -> SkewPolytope:
 
 def _static(run: _Run) -> SkewPolytope:
     """One palette for the whole clip (section 6.2), the best of several starts."""
-    hulls = static_hull.static_hulls(run.frames, run.gamut, run.options)
+    hulls = static_hull.static_hulls(run.starts, run.frames, run.gamut, run.options)
     found = list(run.counted("static_hull", hulls, static_hull.STARTS))
     polytope = min(found, key=lambda hull: run.losses(hull).L_prime)
     run.record("static_hull", polytope)

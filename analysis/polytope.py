@@ -49,7 +49,7 @@ class Section:
     faces: I32
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class SkewPolytope:
     """Vertices (n, 4) float64, columns r, g, b, frame; blocks, and the transitions between them."""
 

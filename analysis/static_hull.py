@@ -13,13 +13,17 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 from palette4d.analysis.convex_hulls import THIN, hull_mesh
-from palette4d.analysis.frame_hulls import frame_palette
+from palette4d.analysis.frame_hulls import refined, simple_hull
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut, pooled
 from palette4d.analysis.objective import refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import FramePalette, Section, SkewPolytope
 
+from palette4d import _core
+
 F64 = NDArray[np.float64]
+#: Colours, and their `simple_hull`.
+Start = tuple[_core.ColourTree, F64 | FramePalette]
 
 EVALUATIONS = 50
 # The colours of these evenly spaced frames decide.
@@ -32,22 +36,36 @@ STARTS = 3
 SHORT = 48
 
 
+def starts(frames: Sequence[FrameStatistics], options: AnalysisOptions) -> list[Start]:
+    """Return the starts of all static palettes."""
+    colours = [
+        pooled([f.coarse for f in frames], POOLED * options.coarse_colours // 2**start)
+        for start in range(STARTS)
+    ]
+    return [(tree, simple_hull(tree, options)) for tree in colours]
+
+
 def static_hulls(
-    frames: Sequence[FrameStatistics], gamut: Gamut, options: AnalysisOptions, starts: int = STARTS
+    begin: Sequence[Start],
+    frames: Sequence[FrameStatistics],
+    gamut: Gamut,
+    options: AnalysisOptions,
 ) -> Iterator[SkewPolytope]:
     """Yield refined static palettes from several starts."""
-    for start in range(starts):
-        most = POOLED * options.coarse_colours // 2**start
-        palette = frame_palette(pooled([f.coarse for f in frames], most), gamut, options)
-        yield static_polytope(palette, frames, gamut, options)
+    for colours, simple in begin:
+        yield static_polytope(refined(colours, simple, gamut, options), frames, gamut, options)
 
 
 def plain_hulls(
-    frames: Sequence[FrameStatistics], gamut: Gamut, options: AnalysisOptions
+    begin: Sequence[Start],
+    frames: Sequence[FrameStatistics],
+    gamut: Gamut,
+    options: AnalysisOptions,
 ) -> Iterator[SkewPolytope]:
     """Yield static palettes of no more than `vertices`, refined for the paper's loss."""
     for plain in plain_options(options):
-        for hull in static_hulls(frames, gamut, plain, STARTS if len(frames) < SHORT else 1):
+        some = begin if len(frames) < SHORT else begin[:1]
+        for hull in static_hulls(some, frames, gamut, plain):
             if not options.vertices or len(hull.vertices) <= options.vertices:
                 yield hull
 

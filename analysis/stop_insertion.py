@@ -320,7 +320,7 @@ def _settled(
         lower[: trial.peaks, 3] = upper[: trial.peaks, 3] = times[: trial.peaks]
     if evaluations:
         vertices = move(evaluate, vertices, moving, which, (lower, upper), evaluations)
-    value, _ = evaluate(vertices, which)
+    value, _ = evaluate(vertices, which, False)
     unchanged = Objective(now.polytope, frames, options, gamut, True, now.brief)
-    before, _ = unchanged(now.polytope.vertices, which)
+    before, _ = unchanged(now.polytope.vertices, which, False)
     return WithStops(trial.polytope.with_vertices(vertices), brief), value - before

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,13 +65,12 @@ class Priced:
 
 
 def search(
-    starts: Sequence[SkewPolytope],
+    starts: Iterable[SkewPolytope],
     static: SkewPolytope,
     few: Sequence[FrameStatistics],
     frames: Sequence[FrameStatistics],
     gamut: Gamut,
     options: AnalysisOptions,
-    progress: Callable[[int, int], object],
 ) -> tuple[int | None, SkewPolytope]:
     """Return which start the best polytope comes from (None: the static hull), and the polytope.
 
@@ -93,7 +92,6 @@ def search(
         if _usual_price(best) < (1 + CLOSE) * min(map(_usual_price, known)):
             steps += walk(moves.enriched(best.polytope), some, gamut, options, [*known, *steps])
         found += [(one, at) for one in steps]
-        progress(at + 1, len(starts))
         price = min(map(_usual_price, steps))
         if price > least:
             break

@@ -2,8 +2,8 @@
 
     .venv/bin/python docs/page_pictures.py [NAME ...]
 
-It writes docs/images/NAME.jpg: lut (exports), fit (palettes), shots, clips, linear (colour spaces)
-and node_place (hosts).
+It writes docs/images/NAME.jpg: lut (exports), fit (palettes), shots, clips, linear (colour spaces),
+node_place (hosts), calls (Python) and files.
 """
 
 from __future__ import annotations
@@ -243,8 +243,73 @@ def node_place() -> None:
     save(figure, "node_place")
 
 
+def calls() -> None:
+    """A picture and what four methods of a document make of it."""
+    doc = autumn()
+    image = p4d.open_clip(CLIP).read(30)[..., :3]
+    near = doc.near((0.9, 0.42, 0.62), frame=30)
+    matte = doc.matte(image, 30, f"weight:{near.handle or near.id}")
+    graded, palette = doc.recolour(image, 30), doc.palette(30)
+    figure, axes = page(12, 3.45)
+    for k, (text, picture) in enumerate(
+        (
+            ("image", image),
+            ("doc.recolour(image, 30)", graded),
+            (
+                f'doc.matte(image, 30, "weight:{near.handle or near.id}")',
+                matte[..., None].repeat(3, 2),
+            ),
+        )
+    ):
+        lower = show(axes, picture, 0.2 + 3.9 * k, 0.5, 3.8)
+        write(axes, 2.1 + 3.9 * k, 0.27, text, family="monospace", fontsize=10)
+    for k, colours in enumerate((palette.rgb, palette.edited)):
+        order = np.argsort(palette.rgb.sum(axis=1))
+        strip = np.clip(colours[order], 0, 1)[None]
+        left = 0.2 + 3.9 * k
+        axes.imshow(strip, extent=(left, left + 3.8, lower + 0.42, lower + 0.1), zorder=2,
+                    interpolation="nearest", aspect="auto")  # fmt: skip
+    write(axes, 2.1, lower + 0.6, "doc.palette(30).rgb", family="monospace", fontsize=10)
+    write(axes, 6.0, lower + 0.6, "doc.palette(30).edited", family="monospace", fontsize=10)
+    save(figure, "calls")
+
+
+def files() -> None:
+    """Which command writes which file, and who reads it."""
+    figure, axes = page(12, 3.3)
+    box: dict[str, Any] = {"boxstyle": "round,pad=0.5", "facecolor": "#3a3a3a", "edgecolor": TEXT}
+    arrow: dict[str, Any] = {"arrowstyle": "->", "color": DIM, "lw": 1.4}
+    places = {
+        "edit.otio\nplates": (1.0, 1.65),
+        "edit.shots.json\nmanifest": (4.0, 0.7),
+        "SHOT.p4d.json\nsidecars": (4.0, 2.6),
+        "SHOT.series.json\nindex, with its LUTs": (7.6, 0.7),
+        "config.ocio\na look for each shot": (7.6, 1.65),
+        "renders\nframes, movies": (7.6, 2.6),
+        "graded.otio\nthe edit with references": (10.7, 0.7),
+        "hosts\nthrough the node": (10.7, 2.6),
+    }
+    for text, (x, y) in places.items():
+        write(axes, x, y, text, bbox=box, fontsize=10, zorder=3)
+    for start, end, text in (
+        ((1.7, 1.4), (3.1, 0.8), "analyze"),
+        ((1.7, 1.9), (3.1, 2.5), ""),
+        ((5.0, 0.7), (6.5, 0.7), "export"),
+        ((5.0, 0.9), (6.5, 1.5), "config"),
+        ((5.0, 2.6), (6.7, 2.6), "render"),
+        ((8.7, 0.7), (9.5, 0.7), "--otio"),
+    ):
+        axes.annotate("", end, start, arrowprops=arrow)
+        middle = ((start[0] + end[0]) / 2, (start[1] + end[1]) / 2 - 0.2)
+        write(axes, *middle, text, family="monospace", fontsize=10, color=DIM)
+    axes.annotate(
+        "", (9.9, 2.9), (4.8, 2.95), arrowprops={**arrow, "connectionstyle": "arc3,rad=0.12"}
+    )
+    save(figure, "files")
+
+
 DRAWN: dict[str, Callable[[], None]] = {
-    draw.__name__: draw for draw in (lut, fit, shots, clips, linear, node_place)
+    draw.__name__: draw for draw in (lut, fit, shots, clips, linear, node_place, calls, files)
 }
 
 

@@ -76,7 +76,7 @@ class WrittenConfig:
     path: Path
     base: str
     shots: list[Shot]
-    views: list[tuple[str, str]] = field(default_factory=list)
+    views: list[tuple[str, str]] = field(default_factory=list, repr=False)
     notes: list[str] = field(default_factory=list)
 
 

@@ -13,7 +13,7 @@ import math
 import tempfile
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -89,7 +89,7 @@ class Series:
     """
 
     index: Path
-    document: dict[str, Any]
+    document: dict[str, Any] = field(repr=False)
     baked: list[int]
     kept: list[int]
     failed: dict[int, str]

@@ -25,7 +25,7 @@ from palette4d.lut_export.writers import Description
 from palette4d.cli import export
 from palette4d.common.errors import Palette4dError
 from palette4d.shows import manifest as manifests
-from palette4d.shows import timeline, timeline_files
+from palette4d.shows import timeline_files, timeline_shots
 from palette4d.shows.shots import numbered
 
 CORPORA = Path(__file__).parent / "fuzz/readers"
@@ -94,7 +94,7 @@ def edit(path: Path, folder: Path) -> str:
     except Exception:  # an adapter may raise anything; `timeline_files.read` reports it
         return "refused"
     try:
-        numbered(timeline.shots_of(timeline_files.document_of(path, text)).shots)
+        numbered(timeline_shots.shots_of(timeline_files.document_of(path, text)).shots)
     except Palette4dError:
         return "refused"
     except Exception:

@@ -92,6 +92,8 @@ def test_every_line_of_the_page_runs(
     assert Path("autumn.cube").stat().st_size > 0
     for name in PUBLIC:
         assert f"`{name}" in page
+    for name in (name for name in dir(palette4d.Document) if not name.startswith("_")):
+        assert re.search(rf"\w\.{name}\b|`{name}`", page), f"docs/python.md lacks {name}"
 
 
 def test_the_palettes_of_files_and_of_arrays_hold_their_pixels(clip_folder: Path) -> None:

@@ -10,18 +10,15 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
-from palette4d.analysis.convex_hulls import (
-    beyond_planes,
-    concavity,
-    hull_mesh,
-    hull_planes,
-    narrow,
-)
+from numpy.typing import NDArray
+from palette4d.analysis.convex_hulls import concavity, narrow
 from palette4d.analysis.frame_statistics import FrameStatistics
-from palette4d.analysis.losses import LOST, NO_FACES, loss_weights
+from palette4d.analysis.losses import LOST, NO_FACES
 from palette4d.analysis.options import AnalysisOptions
 
 from palette4d import _core
+
+F64 = NDArray[np.float64]
 
 # The use of handles is measured on this many evenly spaced frames: on all frames it would take
 # longer than the rest of the analysis.
@@ -143,32 +140,15 @@ def report(
 
 
 def _fit(here: _core.Slice, frame: FrameStatistics, options: AnalysisOptions) -> FrameFit:
-    r, c, _, outside, farthest, _ = _core.palette_loss(
-        frame.colours, here.rgb, NO_FACES, loss_weights(options)
+    def measured(**slight: float) -> tuple[float, float, float, float, float, F64]:
+        weights = _core.LossWeights(options.lambda_, options.k, **slight)
+        return _core.palette_loss(frame.colours, here.rgb, NO_FACES, weights, False)
+
+    r, c, _, outside, farthest, _ = measured()
+    visible, lost = (
+        measured(slight=limit)[3] if farthest > limit else 0.0 for limit in (VISIBLE, LOST)
     )
-    visible = _share_beyond(VISIBLE, here, frame) if farthest > VISIBLE else 0.0
-    lost = _share_beyond(LOST, here, frame) if farthest > LOST else 0.0
     return FrameFit(frame.frame, options.lambda_ * r + c, outside, visible, farthest, lost)
-
-
-def _share_beyond(limit: float, here: _core.Slice, frame: FrameStatistics) -> float:
-    """Return the share of pixels farther than `limit` from the convex hull of a slice."""
-    rgb, faces = here.rgb, here.faces
-    colours, counts = frame.colours.rgb, frame.colours.counts
-    share = 0.0
-    planes = hull_planes(rgb)
-    if planes is not None:  # else a point, a line or a polygon is its own convex hull
-        mesh = hull_mesh(rgb)
-        rgb, faces = mesh.rgb, mesh.faces
-        # The distance from the planes is a lower bound: beside an edge the hull is farther away.
-        least = beyond_planes(colours, planes)
-        share = float(counts[least > limit].sum())
-        unclear = (least > 0) & (least <= limit)
-        colours, counts = colours[unclear], counts[unclear]
-    if len(colours):
-        _, distances = _core.palette_weights(colours, rgb, faces)
-        share += float(counts[distances > limit].sum())
-    return share / frame.colours.total
 
 
 def _closest(

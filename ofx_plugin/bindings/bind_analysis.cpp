@@ -8,6 +8,7 @@
 #include "arrays.hpp"
 #include "binders.hpp"
 #include "fit/colour_bins.hpp"
+#include "fit/colour_histogram.hpp"
 #include "fit/colour_tree.hpp"
 #include "fit/palette_loss.hpp"
 #include "fit/polytope_loss.hpp"
@@ -85,17 +86,18 @@ void bind_analysis(py::module_& m) {
         .def("__len__", [](const ColourTree& t) { return t.size(); });
 
     py::class_<LossWeights>(m, "LossWeights")
-        .def(py::init(
-                 [](double lambda, double k, double convexity, double separation, double reach) {
-                     return LossWeights{lambda, k, convexity, separation, reach};
-                 }),
+        .def(py::init([](double lambda, double k, double convexity, double separation, double reach,
+                         double slight) {
+                 return LossWeights{lambda, k, convexity, separation, reach, slight};
+             }),
              py::arg("lambda_"), py::arg("k"), py::arg("convexity") = 0.0,
-             py::arg("separation") = 0.0, py::arg("reach") = 0.0);
+             py::arg("separation") = 0.0, py::arg("reach") = 0.0,
+             py::arg("slight") = LossWeights{}.slight);
 
     m.def(
         "palette_loss",
         [](const ColourTree& colours, const py::object& palette, const py::object& faces,
-           const LossWeights& weights) {
+           const LossWeights& weights, bool with_gradient) {
             const std::vector<Vec3> v = colours_from(palette, "palette");
             if (v.empty())
                 throw py::value_error("palette: found no colours, expected at least one");
@@ -105,12 +107,13 @@ void bind_analysis(py::module_& m) {
             FrameLoss loss;
             {
                 py::gil_scoped_release release;
-                loss = palette_loss(colours, v, f, weights, &gradient);
+                loss = palette_loss(colours, v, f, weights, with_gradient ? &gradient : nullptr);
             }
             return py::make_tuple(loss.R, loss.C, shape_of(loss, weights), loss.outside,
                                   loss.max_distance, to_array(gradient));
         },
-        py::arg("colours"), py::arg("palette"), py::arg("faces"), py::arg("weights"));
+        py::arg("colours"), py::arg("palette"), py::arg("faces"), py::arg("weights"),
+        py::arg("gradient") = true);
 
     py::class_<PolytopeLoss>(m, "PolytopeLoss")
         .def(py::init([](const py::list& blocks, const py::object& frames,
@@ -148,6 +151,22 @@ void bind_analysis(py::module_& m) {
             },
             py::arg("vertices"), py::arg("which"), py::arg("weights"), py::arg("threads"),
             py::arg("gradient"));
+
+    m.def(
+        "colour_histogram",
+        [](const py::object& rgb, const py::object& counts, int cells, double to_one,
+           double above_one) {
+            const std::vector<Vec3> v = colours_from(rgb, "rgb");
+            const std::vector<double> n = numbers_from(counts, "counts");
+            std::vector<double> out;
+            {
+                py::gil_scoped_release release;
+                out = colour_histogram(v, n, {cells, to_one, above_one});
+            }
+            return to_array(out);
+        },
+        py::arg("rgb"), py::arg("counts"), py::kw_only(), py::arg("cells"), py::arg("to_one"),
+        py::arg("above_one"));
 
     m.def(
         "progressive_hull",

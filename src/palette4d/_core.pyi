@@ -334,7 +334,8 @@ class LossWeights:
     """What the losses weigh: lambda of eq. 4, k of eq. 3, and how a palette should be shaped.
 
     `convexity` weighs the concavity of the mesh; colours nearer than `separation` repel each other;
-    a pixel that lies `reach` outside counts twice, farther ones still more (0: all as they lie).
+    a pixel that lies `reach` outside counts twice, farther ones still more (0: all as they lie). A
+    pixel up to `slight` outside does not count in the share of pixels outside.
     """
 
     def __init__(
@@ -344,15 +345,25 @@ class LossWeights:
         convexity: float = ...,
         separation: float = ...,
         reach: float = ...,
+        slight: float = ...,
     ) -> None: ...
 
+def colour_histogram(
+    rgb: ArrayLike, counts: ArrayLike, *, cells: int, to_one: float, above_one: float
+) -> F64:
+    """`media.colour_histogram.histogram`, but pixels instead of their shares."""
+
 def palette_loss(
-    colours: ColourTree, palette: ArrayLike, faces: ArrayLike, weights: LossWeights
+    colours: ColourTree,
+    palette: ArrayLike,
+    faces: ArrayLike,
+    weights: LossWeights,
+    gradient: bool = ...,
 ) -> tuple[float, float, float, float, float, F64]:
     """R (eq. 2), C (eq. 3), shape, share of pixels outside, largest distance, and gradient.
 
     `palette` is (n, 3); `shape` is what convexity, separation and reach add; the (n, 3) gradient is
-    that of lambda R + C + shape.
+    that of lambda R + C + shape, empty without `gradient`.
     """
 
 class PolytopeLoss:

@@ -58,7 +58,7 @@ def test_a_static_hull_that_may_move_stays_within_its_bound():
     frames = stats([mixture(FOUR + 0.01 * i, i, 3000) for i in range(3)])
     options = AnalysisOptions()
     hull = min(
-        static_hull.plain_hulls(frames, GAMUT, options),
+        static_hull.plain_hulls(static_hull.starts(frames, options), frames, GAMUT, options),
         key=lambda one: losses_of(one, frames, options).L_prime,
     )
     bound = losses_of(hull, frames, options).L_prime

@@ -8,27 +8,13 @@
 #include <utility>
 
 #include "model/vec3.hpp"
+#include "simd/kernel_choice.hpp"
 
 namespace palette4d {
 namespace {
 
 // Squared distances closer than this are ties (8-bit colours differ by far more).
 constexpr double kTie = 1e-12;
-
-double squared_distance_to_box(const Vec3& p, const ColourTree::Node& node) {
-    double sum = 0;
-    for (int c = 0; c < 3; ++c) {
-        const double below = node.low[c] - p[c], above = p[c] - node.high[c];
-        const double beside = below > above ? below : above, d = beside > 0 ? beside : 0;
-        sum += d * d;
-    }
-    return sum;
-}
-
-struct Candidate {
-    double d2;
-    int point;
-};
 
 }  // namespace
 
@@ -41,9 +27,10 @@ ColourTree::ColourTree(std::vector<Vec3> rgb, std::vector<double> counts) : size
     }
     std::vector<Colour> order(rgb.size());
     for (std::size_t i = 0; i < rgb.size(); ++i) order[i] = {rgb[i], static_cast<int>(i)};
-    nodes_.reserve(4 * rgb.size() / kLeafSize + 4);
-    build(0, static_cast<int>(rgb.size()), order);
-    build_levels();
+    std::vector<Box> leaves;
+    build(0, static_cast<int>(rgb.size()), order, leaves);
+    leaf_starts_.push_back(static_cast<int>(size_));
+    build_levels(std::move(leaves));
     counts_.resize(rgb.size() + kLeafSize);
     for (int c = 0; c < 3; ++c) {
         channel_[c].resize(rgb.size() + kLeafSize);
@@ -55,43 +42,37 @@ ColourTree::ColourTree(std::vector<Vec3> rgb, std::vector<double> counts) : size
     }
 }
 
-int ColourTree::build(int begin, int end, std::vector<Colour>& order) {
-    const int index = static_cast<int>(nodes_.size());
-    nodes_.push_back({});
-    Node node{order[begin].rgb, order[begin].rgb, begin, end, -1, -1};
+void ColourTree::build(int begin, int end, std::vector<Colour>& order, std::vector<Box>& leaves) {
+    Box box{order[begin].rgb, order[begin].rgb};
+    auto& [low, high] = box;
     for (int i = begin; i < end; ++i)
         for (int c = 0; c < 3; ++c) {
-            node.low[c] = std::min(node.low[c], order[i].rgb[c]);
-            node.high[c] = std::max(node.high[c], order[i].rgb[c]);
+            low[c] = std::min(low[c], order[i].rgb[c]);
+            high[c] = std::max(high[c], order[i].rgb[c]);
         }
-    if (end - begin > kLeafSize) {
-        int axis = 0;
-        for (int c = 1; c < 3; ++c)
-            if (node.high[c] - node.low[c] > node.high[axis] - node.low[axis]) axis = c;
-        const int middle = begin + (end - begin) / 2;
-        std::nth_element(order.begin() + begin, order.begin() + middle, order.begin() + end,
-                         [axis](const Colour& a, const Colour& b) {
-                             return a.rgb[axis] != b.rgb[axis] ? a.rgb[axis] < b.rgb[axis]
-                                                               : a.index < b.index;
-                         });
-        node.left = build(begin, middle, order);
-        node.right = build(middle, end, order);
+    if (end - begin <= kLeafSize) {
+        leaf_starts_.push_back(begin);
+        leaves.push_back(box);
+        return;
     }
-    nodes_[index] = node;
-    return index;
+    int axis = 0;
+    for (int c = 1; c < 3; ++c)
+        if (high[c] - low[c] > high[axis] - low[axis]) axis = c;
+    const int middle = begin + (end - begin) / 2;
+    std::nth_element(order.begin() + begin, order.begin() + middle, order.begin() + end,
+                     [axis](const Colour& a, const Colour& b) {
+                         return a.rgb[axis] != b.rgb[axis] ? a.rgb[axis] < b.rgb[axis]
+                                                           : a.index < b.index;
+                     });
+    build(begin, middle, order, leaves);
+    build(middle, end, order, leaves);
 }
 
-void ColourTree::build_levels() {
-    // A level's boxes: first the leaves, then one around each group of the level before.
-    std::vector<std::pair<Vec3, Vec3>> boxes;
-    for (std::size_t i = 0; i < nodes_.size(); ++i)
-        if (nodes_[i].left < 0) {
-            leaves_.push_back(static_cast<int>(i));
-            boxes.emplace_back(nodes_[i].low, nodes_[i].high);
-        }
+/// A level's boxes: first the leaves, then one around each group of the level before.
+void ColourTree::build_levels(std::vector<Box> boxes) {
     do {
         std::vector<Boxes> level((boxes.size() + Boxes::kSize - 1) / Boxes::kSize);
-        std::vector<std::pair<Vec3, Vec3>> around(level.size());
+        std::vector<Box> around(level.size());
         for (std::size_t i = 0; i < boxes.size(); ++i) {
             Boxes& group = level[i / Boxes::kSize];
             auto& [low, high] = around[i / Boxes::kSize];
@@ -107,82 +88,101 @@ void ColourTree::build_levels() {
         levels_.push_back(std::move(level));
         boxes = std::move(around);
     } while (boxes.size() > 1);
+    std::tie(low_, high_) = boxes[0];
+}
+
+/// Candidates sorted by distance. The farthest group of ties is dropped once the rest suffices.
+class ColourTree::Search {
+public:
+    Search(const ColourTree& tree, const Vec3& v, double k, const LossKernels& kernels,
+           Nearest& memory)
+        : tree_(tree), v_(v), k_(k), kernels_(kernels), best_(memory.best) {
+        best_.clear();
+        visit(tree.levels_.size() - 1, 0);
+    }
+
+    Vec3 mean() const {
+        const double last = best_.back().d2;
+        double near = 0, tied = 0;
+        Vec3 sum{0, 0, 0}, tied_sum{0, 0, 0};
+        for (const Nearest::Candidate& b : best_) {
+            const double n = tree_.counts_[b.point];
+            const bool tie = b.d2 >= last - kTie;
+            (tie ? tied : near) += n;
+            Vec3& s = tie ? tied_sum : sum;
+            for (int c = 0; c < 3; ++c) s[c] += n * tree_.channel_[c][b.point];
+        }
+        const double share = (k_ - near) / tied;
+        return {(sum[0] + share * tied_sum[0]) / k_, (sum[1] + share * tied_sum[1]) / k_,
+                (sum[2] + share * tied_sum[2]) / k_};
+    }
+
+private:
+    /// The nearest of a group's boxes first.
+    void visit(std::size_t level, std::size_t group) {
+        const Boxes& boxes = tree_.levels_[level][group];
+        alignas(64) double squared[Boxes::kSize];
+        kernels_.from_boxes(boxes.sides, v_.data(), squared);
+        for (int n = 0; n < boxes.count; ++n) {
+            int nearest = 0;
+            for (int i = 1; i < boxes.count; ++i)
+                nearest = squared[i] < squared[nearest] ? i : nearest;
+            if (squared[nearest] > limit_ + kTie) return;
+            squared[nearest] = std::numeric_limits<double>::infinity();
+            const std::size_t inner = Boxes::kSize * group + static_cast<std::size_t>(nearest);
+            if (level > 0)
+                visit(level - 1, inner);
+            else
+                leaf(inner);
+        }
+    }
+
+    void leaf(std::size_t at) {
+        const int begin = tree_.leaf_starts_[at], size = tree_.leaf_starts_[at + 1] - begin;
+        const double* const channels[3] = {tree_.channel(0) + begin, tree_.channel(1) + begin,
+                                           tree_.channel(2) + begin};
+        alignas(64) double squared[kLeafSize];
+        kernels_.from_colours(channels, size, v_.data(), squared);
+        for (int i = 0; i < size; ++i)
+            if (squared[i] <= limit_ + kTie) add({squared[i], begin + i});
+    }
+
+    void add(const Nearest::Candidate& one) {
+        auto at = best_.end();
+        while (at != best_.begin() && (at - 1)->d2 > one.d2) --at;
+        best_.insert(at, one);
+        have_ += tree_.counts_[one.point];
+        while (have_ >= k_) {
+            limit_ = best_.back().d2;
+            double group = 0;
+            std::size_t first = best_.size();
+            while (first > 0 && best_[first - 1].d2 >= limit_ - kTie)
+                group += tree_.counts_[best_[--first].point];
+            if (first == 0 || have_ - group < k_) break;
+            best_.resize(first);
+            have_ -= group;
+        }
+    }
+
+    const ColourTree& tree_;
+    const Vec3& v_;
+    const double k_;
+    const LossKernels& kernels_;
+    std::vector<Nearest::Candidate>& best_;
+    double have_ = 0;
+    double limit_ = std::numeric_limits<double>::infinity();
+};
+
+Vec3 ColourTree::nearest_mean(const Vec3& v, double k, const LossKernels& kernels,
+                              Nearest& memory) const {
+    if (!finite(v) || !(k > 0))
+        throw std::invalid_argument("nearest_mean needs a finite colour and a positive k");
+    return Search(*this, v, std::min(k, total_), kernels, memory).mean();
 }
 
 Vec3 ColourTree::nearest_mean(const Vec3& v, double k) const {
-    if (!finite(v) || !(k > 0))
-        throw std::invalid_argument("nearest_mean needs a finite colour and a positive k");
-    k = std::min(k, total_);
-    // Candidates sorted by distance. The farthest group of ties is dropped once the rest suffices.
-    struct Search {
-        std::vector<Candidate> best;
-        std::vector<std::pair<double, int>> stack;
-    };
-    thread_local Search of_this_thread;
-    Search& search = of_this_thread;  // once: each use of a thread_local may be a call
-    auto& [best, stack] = search;
-    best.clear();
-    stack.clear();
-    double have = 0;
-    double limit = std::numeric_limits<double>::infinity();
-    stack.emplace_back(squared_distance_to_box(v, nodes_[0]), 0);
-    while (!stack.empty()) {
-        const auto [box, index] = stack.back();
-        stack.pop_back();
-        if (box > limit + kTie) continue;
-        const Node& node = nodes_[index];
-        if (node.left >= 0) {
-            const double l = squared_distance_to_box(v, nodes_[node.left]);
-            const double r = squared_distance_to_box(v, nodes_[node.right]);
-            if (l <= r) {
-                stack.emplace_back(r, node.right);
-                stack.emplace_back(l, node.left);
-            } else {
-                stack.emplace_back(l, node.left);
-                stack.emplace_back(r, node.right);
-            }
-            continue;
-        }
-        // Always a whole leaf, padding included, so that compilers vectorise the loop.
-        double squared[kLeafSize];
-        const double *const x = channel(0) + node.begin, *const y = channel(1) + node.begin,
-                            *const z = channel(2) + node.begin;
-        for (int i = 0; i < kLeafSize; ++i) {
-            const double dx = x[i] - v[0], dy = y[i] - v[1], dz = z[i] - v[2];
-            squared[i] = dx * dx + dy * dy + dz * dz;
-        }
-        for (int i = node.begin; i < node.end; ++i) {
-            const double d2 = squared[i - node.begin];
-            if (d2 > limit + kTie) continue;
-            auto at = best.end();
-            while (at != best.begin() && (at - 1)->d2 > d2) --at;
-            best.insert(at, {d2, i});
-            have += counts_[i];
-            while (have >= k) {
-                limit = best.back().d2;
-                double group = 0;
-                std::size_t first = best.size();
-                while (first > 0 && best[first - 1].d2 >= limit - kTie)
-                    group += counts_[best[--first].point];
-                if (first == 0 || have - group < k) break;
-                best.resize(first);
-                have -= group;
-            }
-        }
-    }
-    const double last = best.back().d2;
-    double near = 0, tied = 0;
-    Vec3 sum{0, 0, 0}, tied_sum{0, 0, 0};
-    for (const Candidate& b : best) {
-        const double n = counts_[b.point];
-        const bool tie = b.d2 >= last - kTie;
-        (tie ? tied : near) += n;
-        Vec3& s = tie ? tied_sum : sum;
-        for (int c = 0; c < 3; ++c) s[c] += n * channel_[c][b.point];
-    }
-    const double share = (k - near) / tied;
-    return {(sum[0] + share * tied_sum[0]) / k, (sum[1] + share * tied_sum[1]) / k,
-            (sum[2] + share * tied_sum[2]) / k};
+    Nearest memory;
+    return nearest_mean(v, k, kernels_of<LossKernels>(InstructionSet::kBest), memory);
 }
 
 }  // namespace palette4d

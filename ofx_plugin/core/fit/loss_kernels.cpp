@@ -124,7 +124,34 @@ void pull(const double* counts, int size, const palette4d::LossReach& reach,
     }
 }
 
-constexpr palette4d::LossKernels kKernels = {&reach, &fall, &pull};
+void from_boxes(const double (*sides)[3][palette4d::LossKernels::kBoxes], const double* colour,
+                double* squared) {
+    using Numbers = Lanes<double>;
+    const Numbers zero = all(0.0);
+    for (int at = 0; at < palette4d::LossKernels::kBoxes; at += Numbers::kCount) {
+        Numbers sum = zero;
+        for (int c = 0; c < 3; ++c) {
+            const Numbers below = load(sides[0][c] + at) - all(colour[c]),
+                          above = all(colour[c]) - load(sides[1][c] + at),
+                          beside = select(below > above, below, above),
+                          outside = select(beside > zero, beside, zero);
+            sum = sum + outside * outside;
+        }
+        store(squared + at, sum);
+    }
+}
+
+void from_colours(const double* const* channels, int size, const double* colour, double* squared) {
+    using Numbers = Lanes<double>;
+    for (int at = 0; at < size; at += Numbers::kCount) {
+        const Numbers x = load(channels[0] + at) - all(colour[0]),
+                      y = load(channels[1] + at) - all(colour[1]),
+                      z = load(channels[2] + at) - all(colour[2]);
+        store(squared + at, (x * x + y * y) + z * z);
+    }
+}
+
+constexpr palette4d::LossKernels kKernels = {&reach, &fall, &from_boxes, &from_colours, &pull};
 
 }  // namespace
 

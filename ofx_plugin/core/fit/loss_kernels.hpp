@@ -55,6 +55,11 @@ struct LossKernels {
     /// the closest point. Returns whether some colour is outside, padding included.
     bool (*fall)(const LossFacet* facets, const int* which, int count,
                  const double* const* channels, int size, double flat, LossLeaf& leaf);
+    /// Squared distances of a colour from kBoxes boxes; 0 inside.
+    void (*from_boxes)(const double (*sides)[3][kBoxes], const double* colour, double* squared);
+    /// The same from `size` colours, rounded up to whole registers.
+    void (*from_colours)(const double* const* channels, int size, const double* colour,
+                         double* squared);
     /// Sets `weighted` to `pull` from `distance`, for `size` colours with these pixel counts.
     void (*pull)(const double* counts, int size, const LossReach& reach, LossLeaf& leaf);
 

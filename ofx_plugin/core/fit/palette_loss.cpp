@@ -64,9 +64,8 @@ double closeness(const std::vector<Vec3>& v, double separation, std::vector<Vec3
 /// The separation to use in this frame. Where all its colours are close, as in black, a larger one
 /// would push palette colours away from them.
 double separation_within(const ColourTree& colours, double separation) {
-    const ColourTree::Node& all = colours.nodes()[0];
     double extent = 0;
-    for (int c = 0; c < 3; ++c) extent = std::max(extent, all.high[c] - all.low[c]);
+    for (int c = 0; c < 3; ++c) extent = std::max(extent, colours.high()[c] - colours.low()[c]);
     return std::min(separation, extent / 4);
 }
 
@@ -79,20 +78,22 @@ FrameLoss palette_loss(const ColourTree& colours, const std::vector<Vec3>& palet
     struct Scratch {
         PaletteHull hull;
         ReconstructionScratch reconstruction;
+        ColourTree::Nearest nearest;
     };
     thread_local Scratch of_this_thread;
-    Scratch& scratch = of_this_thread;
+    Scratch& scratch = of_this_thread;  // once: each use of a thread_local may be a call
     FrameLoss loss;
+    const LossKernels& kernels = kernels_of<LossKernels>(instructions);
     scratch.hull.build(palette);
-    measure_reconstruction(colours, palette, scratch.hull, weights.reach,
-                           kernels_of<LossKernels>(instructions), scratch.reconstruction, loss,
-                           gradient);
+    measure_reconstruction(colours, palette, scratch.hull, weights, kernels, scratch.reconstruction,
+                           loss, gradient);
     if (gradient)
         for (Vec3& g : *gradient)
             for (double& x : g) x *= weights.lambda;
     const double n = static_cast<double>(palette.size());
     for (std::size_t i = 0; i < palette.size(); ++i) {
-        const Vec3 d = palette[i] - colours.nearest_mean(palette[i], weights.k);
+        const Vec3 d =
+            palette[i] - colours.nearest_mean(palette[i], weights.k, kernels, scratch.nearest);
         const double length = std::sqrt(dot(d, d));
         loss.C += length / n;
         if (gradient && length > 1e-12) add((*gradient)[i], 1 / (n * length), d);

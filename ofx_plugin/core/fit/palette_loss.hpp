@@ -16,6 +16,7 @@ struct LossWeights {
     double convexity = 0;   ///< weight of the concavity D below; 0 in every reported figure
     double separation = 0;  ///< distance to keep between palette colours (S below); 0 likewise
     double reach = 0;       ///< where a pixel outside costs twice (E below); 0: never, likewise
+    double slight = 1e-6;   ///< a pixel up to this far outside does not count as outside
 };
 
 /// One frame's losses. R and C are as in the paper. D is the concavity of the triangle mesh: the
@@ -30,7 +31,7 @@ struct FrameLoss {
     double D = 0;
     double S = 0;
     double E = 0;
-    double outside = 0;       ///< share of pixels outside, by more than 1e-6
+    double outside = 0;       ///< share of pixels outside, by more than `slight`
     double max_distance = 0;  ///< largest distance of a pixel outside
 };
 

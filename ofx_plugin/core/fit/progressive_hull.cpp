@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <queue>
-#include <set>
 #include <stdexcept>
 
 #include "fit/linear_program.hpp"
@@ -20,7 +20,7 @@ public:
     Mesh(const std::vector<Vec3>& rgb, const std::vector<Face>& faces)
         : position_(rgb), faces_(faces), alive_(faces.size(), true), at_(rgb.size()) {
         for (int f = 0; f < static_cast<int>(faces_.size()); ++f)
-            for (int v : faces_[f]) at_[v].insert(f);
+            for (int v : faces_[f]) insert(at_[v], f);
         std::map<std::pair<int, int>, int> directed;
         for (const Face& f : faces_)
             for (int e = 0; e < 3; ++e) ++directed[{f[e], f[(e + 1) % 3]}];
@@ -51,6 +51,26 @@ public:
     }
 
 private:
+    using Sorted = std::vector<int>;  // a small set, rising
+
+    static bool has(const Sorted& set, int x) {
+        return std::binary_search(set.begin(), set.end(), x);
+    }
+    static void insert(Sorted& set, int x) {
+        const auto at = std::lower_bound(set.begin(), set.end(), x);
+        if (at == set.end() || *at != x) set.insert(at, x);
+    }
+    static void erase(Sorted& set, int x) {
+        const auto at = std::lower_bound(set.begin(), set.end(), x);
+        if (at != set.end() && *at == x) set.erase(at);
+    }
+    static Sorted united(const Sorted& a, const Sorted& b) {
+        Sorted out;
+        out.reserve(a.size() + b.size());
+        std::set_union(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(out));
+        return out;
+    }
+
     struct Entry {
         double volume;
         int a, b;
@@ -62,11 +82,14 @@ private:
         }
     };
 
-    std::set<int> neighbours(int v) const {
-        std::set<int> out;
+    Sorted neighbours(int v) const {
+        Sorted out;
+        out.reserve(2 * at_[v].size());
         for (int f : at_[v])
             for (int w : faces_[f])
-                if (w != v) out.insert(w);
+                if (w != v) out.push_back(w);
+        std::sort(out.begin(), out.end());
+        out.erase(std::unique(out.begin(), out.end()), out.end());
         return out;
     }
 
@@ -74,14 +97,13 @@ private:
         if (a > b) std::swap(a, b);
         stamp_.erase({a, b});
         // Contracting keeps the mesh a sphere only when the ends share exactly two neighbours.
-        int shared = 0;
-        const std::set<int> na = neighbours(a), nb = neighbours(b);
-        for (int w : na) shared += static_cast<int>(nb.count(w));
-        if (shared != 2 || !na.count(b)) return;
+        const Sorted na = neighbours(a), nb = neighbours(b);
+        const std::size_t shared = na.size() + nb.size() - united(na, nb).size();
+        if (shared != 2 || !has(na, b)) return;
 
-        std::set<int> around(at_[a]);
-        around.insert(at_[b].begin(), at_[b].end());
+        const Sorted around = united(at_[a], at_[b]);
         std::vector<HalfSpace<3>> constraints;
+        constraints.reserve(around.size());
         Vec3 objective{0, 0, 0};
         double constant = 0;
         for (int f : around) {
@@ -105,37 +127,38 @@ private:
 
     void contract(const Entry& entry) {
         const int a = entry.a, b = entry.b;
-        std::set<int> ring = neighbours(a);
-        const std::set<int> other = neighbours(b);
-        ring.insert(other.begin(), other.end());
-        ring.erase(a);
-        ring.erase(b);
+        const Sorted other = neighbours(b);
+        Sorted ring = united(neighbours(a), other);
+        erase(ring, a);
+        erase(ring, b);
         for (int w : other) stamp_.erase({std::min(b, w), std::max(b, w)});
-        const std::set<int> faces_b = at_[b];
+        const Sorted faces_b = at_[b];
         for (int f : faces_b) {
-            if (at_[a].count(f)) {
-                for (int v : faces_[f]) at_[v].erase(f);
+            if (has(at_[a], f)) {
+                for (int v : faces_[f]) erase(at_[v], f);
                 alive_[f] = false;
                 continue;
             }
             for (int& v : faces_[f])
                 if (v == b) v = a;
-            at_[a].insert(f);
+            insert(at_[a], f);
         }
         at_[b].clear();
         position_[a] = entry.x;
         --left_;
         // All edges with a changed face: at a, on the ring, and from the ring outwards.
-        std::set<std::pair<int, int>> touched;
+        std::vector<std::pair<int, int>> touched;
         for (int v : ring)
-            for (int w : neighbours(v)) touched.insert({std::min(v, w), std::max(v, w)});
+            for (int w : neighbours(v)) touched.emplace_back(std::min(v, w), std::max(v, w));
+        std::sort(touched.begin(), touched.end());
+        touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
         for (const auto& [v, w] : touched) push(v, w);
     }
 
     std::vector<Vec3> position_;
     std::vector<Face> faces_;
     std::vector<bool> alive_;
-    std::vector<std::set<int>> at_;
+    std::vector<Sorted> at_;  // the faces of each vertex
     std::map<std::pair<int, int>, long> stamp_;
     std::priority_queue<Entry> queue_;
     long clock_ = 0;

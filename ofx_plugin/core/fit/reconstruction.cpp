@@ -57,12 +57,13 @@ void try_facet(const Vec3& p, const std::vector<Vec3>& v, const LossFacet& f, Cl
 class Outside {
 public:
     Outside(const ColourTree& colours, const std::vector<Vec3>& v, const PaletteHull& hull,
-            double reach, const LossKernels& kernels, ReconstructionScratch& scratch,
+            const LossWeights& weights, const LossKernels& kernels, ReconstructionScratch& scratch,
             std::vector<Vec3>* gradient)
         : colours_(colours),
           v_(v),
           hull_(hull),
-          reach_{reach > 0 ? 1 / (reach * reach * reach) : 0, kMostReach, 1e-6},
+          reach_{weights.reach > 0 ? 1 / (weights.reach * weights.reach * weights.reach) : 0,
+                 kMostReach, weights.slight},
           kernels_(kernels),
           scratch_(scratch),
           gradient_(gradient) {}
@@ -99,29 +100,30 @@ private:
         unsigned* const reached = scratch_.reached.data() + mine;
         int* const facets = scratch_.facets.data() + mine;
         kernels_.reach(hull_.facets.data(), which, count, boxes.sides, kFlat, reached);
+        unsigned some = 0;
+        for (int i = 0; i < count; ++i) some |= reached[i];
         for (int box = 0; box < boxes.count; ++box) {
+            if (!(some >> box & 1u)) continue;
             int found = 0;
             for (int i = 0; i < count; ++i) {
                 facets[found] = which[i];
                 found += (reached[i] >> box) & 1u;
             }
-            if (found == 0) continue;
             const std::size_t inner = LossKernels::kBoxes * group + static_cast<std::size_t>(box);
             if (level > 0)
                 visit(level - 1, inner, facets, found);
             else
-                leaf(colours_.nodes()[colours_.leaves()[inner]], facets, found);
+                leaf(inner, facets, found);
         }
     }
 
-    void leaf(const ColourTree::Node& node, const int* facets, int count) {
-        const int size = node.end - node.begin;
-        const double* const channels[3] = {colours_.channel(0) + node.begin,
-                                           colours_.channel(1) + node.begin,
-                                           colours_.channel(2) + node.begin};
+    void leaf(std::size_t at, const int* facets, int count) {
+        const int begin = colours_.leaf_starts()[at], size = colours_.leaf_starts()[at + 1] - begin;
+        const double* const channels[3] = {colours_.channel(0) + begin, colours_.channel(1) + begin,
+                                           colours_.channel(2) + begin};
         if (!kernels_.fall(hull_.facets.data(), facets, count, channels, size, kFlat, leaf_))
             return;
-        kernels_.pull(colours_.counts() + node.begin, size, reach_, leaf_);
+        kernels_.pull(colours_.counts() + begin, size, reach_, leaf_);
         add_up(size);
         if (!gradient_) return;
         // Lists instead of branches: those would be mispredicted for every second colour.
@@ -143,7 +145,7 @@ private:
             const int i = beside[n], edge = static_cast<int>(leaf_.edge[i]), e = edge % 3;
             const LossFacet& f = hull_.facets[static_cast<std::size_t>(edge / 3)];
             const double s = leaf_.along[i];
-            add_gradient<2>(i, colours_.rgb(node.begin + i), {f.at[e], f.at[(e + 1) % 3], 0},
+            add_gradient<2>(i, colours_.rgb(begin + i), {f.at[e], f.at[(e + 1) % 3], 0},
                             {1 - s, s, 0});
         }
     }
@@ -220,10 +222,10 @@ private:
 }  // namespace
 
 void measure_reconstruction(const ColourTree& colours, const std::vector<Vec3>& palette,
-                            const PaletteHull& hull, double reach, const LossKernels& kernels,
-                            ReconstructionScratch& scratch, FrameLoss& loss,
-                            std::vector<Vec3>* gradient) {
-    Outside(colours, palette, hull, reach, kernels, scratch, gradient).run(loss);
+                            const PaletteHull& hull, const LossWeights& weights,
+                            const LossKernels& kernels, ReconstructionScratch& scratch,
+                            FrameLoss& loss, std::vector<Vec3>* gradient) {
+    Outside(colours, palette, hull, weights, kernels, scratch, gradient).run(loss);
 }
 
 }  // namespace palette4d

@@ -23,11 +23,11 @@ struct ReconstructionScratch {
     std::vector<Load> loads;        // one per facet
 };
 
-/// Sets R, E, outside and max_distance of `loss`, with E's `reach` as in LossWeights. `gradient`,
-/// unless null, receives the derivatives of R + E. `hull` must be built from `palette`.
+/// Sets R, E, outside and max_distance of `loss`, with `reach` and `slight` of the weights.
+/// `gradient`, unless null, receives the derivatives of R + E. `hull` must be built from `palette`.
 void measure_reconstruction(const ColourTree& colours, const std::vector<Vec3>& palette,
-                            const PaletteHull& hull, double reach, const LossKernels& kernels,
-                            ReconstructionScratch& scratch, FrameLoss& loss,
-                            std::vector<Vec3>* gradient);
+                            const PaletteHull& hull, const LossWeights& weights,
+                            const LossKernels& kernels, ReconstructionScratch& scratch,
+                            FrameLoss& loss, std::vector<Vec3>* gradient);
 
 }  // namespace palette4d

@@ -177,6 +177,14 @@ def _add_track(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
     parser.set_defaults(run=run_adjust, id=None, frame=None, track=False)
 
 
+def _add_float(parser: argparse._ActionsContainer) -> None:
+    parser.add_argument(
+        "--float",
+        action="store_true",
+        help="take colours such as 255 128 0 as they are, not as integers of 8 bits",
+    )
+
+
 def _add_change(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(usage_error=parser.error)
     change = parser.add_argument_group("CHANGE: a colour, or offsets, or hue, chroma and lightness")
@@ -187,11 +195,7 @@ def _add_change(parser: argparse.ArgumentParser) -> None:
         action=ColourAction,
         help="the new colour: R G B, R,G,B or #rrggbb",
     )
-    change.add_argument(
-        "--float",
-        action="store_true",
-        help="take colours such as 255 128 0 as they are, not as integers of 8 bits",
-    )
+    _add_float(change)
     change.add_argument(
         "--by",
         nargs="+",
@@ -265,6 +269,7 @@ def _add_move(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
         action=ColourAction,
         help="added to the colour: DR DG DB or DR,DG,DB",
     )
+    _add_float(parser)
     parser.set_defaults(run=run_move)
 
 
@@ -298,7 +303,7 @@ def run_set(args: argparse.Namespace) -> int:
     document.save()
     print(
         f"the palette colour nearest to {shown(args.near)} at frame {args.frame:g} is "
-        f"{shown(found.rgb)} of {found.id}, {found.distance:.3g} away"
+        f"{shown(found.rgb)} of {found.id}, {found.distance:.3f} away"
     )
     if found.handle is None:
         _report(document, before)
@@ -394,7 +399,7 @@ def run_move(args: argparse.Namespace) -> int:
         document.move(args.id, frame=args.frame)
     if args.by is not None:
         before = document.colour(args.id)
-        document.shift(args.id, by=args.by)
+        document.shift(args.id, by=args.by, any_value=args.float)
         after = document.colour(args.id)
         lines.append(f"{document.named(args.id)}: {shown(before)} -> {shown(after)}")
     document.save()

@@ -192,7 +192,7 @@ class ColourAction(argparse.Action):
 
 
 def parse_colour(words: Sequence[str]) -> tuple[float, float, float] | None:
-    """Return the colour written as R G B, R,G,B or #rrggbb; None if it is not a colour.
+    """Return the colour written as R G B, "R G B", R,G,B or #rrggbb; None if it is not a colour.
 
     >>> parse_colour(["0.5", "-0.1", "1e0"])
     (0.5, -0.1, 1.0)
@@ -202,7 +202,7 @@ def parse_colour(words: Sequence[str]) -> tuple[float, float, float] | None:
     if len(words) == 1 and (match := _HEX.fullmatch(words[0])):
         r, g, b = (int(digits, 16) / 255 for digits in match.groups())
         return (r, g, b)
-    parts = words[0].split(",") if len(words) == 1 else words
+    parts = words[0].replace(",", " ").split() if len(words) == 1 else words
     try:
         r, g, b = (number()(part) for part in parts)
     except (argparse.ArgumentTypeError, ValueError):

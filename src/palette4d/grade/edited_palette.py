@@ -23,8 +23,8 @@ from palette4d.grade.edits import (
     State,
     as_colour,
 )
+from palette4d.grade.handle_names import colours_by_id
 from palette4d.grade.handles import Handles
-from palette4d.grade.names import colours_by_id
 from palette4d.grade.palette import Near, Palette, palette_at
 from palette4d.grade.sidecar import Fields
 from palette4d.grade.steps import Steps
@@ -295,8 +295,8 @@ class EditedPalette(Steps):
     def _check_inside(self, edge: str, frame: float) -> None:
         if edge in self._settings or edge in self._handles.vertices:
             raise Palette4dError(
-                f"{self.named(edge)} has a time of its own: leave out frame=…, which is for "
-                "edges and for near=…"
+                f"{self.named(edge)} has a time of its own, and only edges get stops; set "
+                f"{edge} itself, without frame=…"
             )
         self._handles.check_inside(edge, frame)
 

@@ -7,7 +7,7 @@ from typing import TypedDict, Unpack
 from palette4d import _core
 from palette4d.colour.oklch import Adjustment, adjuster
 from palette4d.common.errors import Palette4dError
-from palette4d.grade import edits, moves, sidecar
+from palette4d.grade import colour_moves, edits, sidecar
 from palette4d.grade.edited_palette import EditedPalette, text_of
 from palette4d.grade.edits import RAMP, Change, Colour, Edit, Key, Ramp, Setting, as_colour, as_ramp
 from palette4d.grade.handles import unknown
@@ -115,7 +115,7 @@ class HandleEdits(EditedPalette):
         if found.distance > FAR and not anyway:
             raise Palette4dError(found.refusal(wanted))
         start, until, fade = how.get("start"), how.get("until"), how.get("fade")
-        if moves.range_of(start, until, fade, self.frames) is not None:
+        if colour_moves.range_of(start, until, fade, self.frames) is not None:
             at = frame if found.id in self._handles.edges else None
             self.adjust(found.id, frame=at, any_value=any_value, **how)
             return replace(found, handle=None)
@@ -151,9 +151,9 @@ class HandleEdits(EditedPalette):
         nearest: float = min(abs(knot - at) for knot in knots if knot != at)
         return max(0.0, 1 - abs(frame - at) / nearest)
 
-    def shift(self, id: str, *, by: Iterable[float]) -> None:
+    def shift(self, id: str, *, by: Iterable[float], any_value: bool = False) -> None:
         """Add three offsets to the colour of a vertex or a stop."""
-        offset = as_colour(by, "offset")
+        offset = self._offset(by, any_value)
         new = as_colour([a + b for a, b in zip(self.colour(id), offset, strict=True)])
         with self.one_step(f"move {id} by {text_of(offset)}"):
             self._set(id, new)
@@ -230,7 +230,7 @@ class HandleEdits(EditedPalette):
             self._check_inside(id, frame)
         elif id is not None and id not in self._handles.edges:
             self.frame_of(id, None)  # refuses unknown ids
-        within = moves.range_of(start, until, fade, self.frames)
+        within = colour_moves.range_of(start, until, fade, self.frames)
         ramp = how.get("ramp")
         known = None if ramp is None else as_ramp(ramp)
         move, what = self._move(id, frame, how, any_value)
@@ -238,7 +238,7 @@ class HandleEdits(EditedPalette):
         if rgb is not None and within is not None and within.weight(self.frame_of(id, frame)) < 1:
             raise Palette4dError(
                 f"the colour is meant at frame {self.frame_of(id, frame):g}, outside of the "
-                f"range {moves.range_text(start, until)}; expected a range with this frame"
+                f"range {colour_moves.range_text(start, until)}; expected a range with this frame"
             )
         stop = self._settings.get(id or "")
         if id is None:
@@ -250,7 +250,7 @@ class HandleEdits(EditedPalette):
             return (self._stop(id, self.frame_of(id, frame), new, known),)
         else:
             name, way = id, ({id}, set())
-        changed = moves.moved(
+        changed = colour_moves.moved(
             *(self._handles, self._settings, way, move, self._own_colour),
             within=within,
             ramp=known,
@@ -258,14 +258,14 @@ class HandleEdits(EditedPalette):
             exact=None if id is None or rgb is None or frame is None else (id, frame),
         )
         if within is not None:
-            what += f" {moves.range_text(start, until)}"
+            what += f" {colour_moves.range_text(start, until)}"
         changes = [Change("handle", n, self._settings.get(n), v) for n, v in changed.items()]
         self.apply(Edit(tuple(changes), f"{'move' if rgb is None else 'set'} {name} {what}"))
         return tuple(change.id for change in changes if change.before != change.after)
 
     def _move(
         self, id: str | None, frame: float | None, how: How, any_value: bool
-    ) -> tuple[moves.Move, str]:
+    ) -> tuple[colour_moves.Move, str]:
         """Return the move that the user asked for, and its text for people."""
         rgb, by = how.get("rgb"), how.get("by")
         change = Adjustment(how.get("hue", 0.0), how.get("chroma", 1.0), how.get("lightness", 1.0))
@@ -275,10 +275,8 @@ class HandleEdits(EditedPalette):
                 "chroma=… and lightness=…"
             )
         if by is not None:
-            offset = as_colour(by, "offset")
-            if not any_value:
-                self.check_code_values(offset, "offset")
-            return moves.shift(offset), f"by {text_of(offset)}"
+            offset = self._offset(by, any_value)
+            return colour_moves.shift(offset), f"by {text_of(offset)}"
         if rgb is None:
             return adjuster(self.encoding, change), str(change)
         if id is None:
@@ -288,7 +286,13 @@ class HandleEdits(EditedPalette):
             )
         new, at = self._checked(rgb, any_value), self.frame_of(id, frame)
         before = self._own_colour(id, at) if id in self._handles.edges else self.colour(id)
-        return moves.shift_to(before, new), f"to {text_of(new)}"
+        return colour_moves.shift_to(before, new), f"to {text_of(new)}"
+
+    def _offset(self, by: Iterable[float], any_value: bool) -> Colour:
+        offset = as_colour(by, "offset")
+        if not any_value:
+            self.check_code_values(offset, "offset")
+        return offset
 
     def _own_colour(self, edge: str, frame: float) -> Colour:
         """Return the colour of an edge at a frame, without the solution of the picks."""

@@ -15,7 +15,7 @@ class Handles:
     vertices, edges : dict of str to dict
         The sidecar's members by id, in the sidecar's order.
     colours : dict of str to str
-        The names of the vertices' colours, once `names.colours_by_id` has found them.
+        The names of the vertices' colours, once `handle_names.colours_by_id` has found them.
     """
 
     def __init__(self, polytope: Mapping[str, Any]) -> None:
@@ -36,8 +36,8 @@ class Handles:
         if id_ in self.edges:
             edge = self.edges[id_]
             raise Palette4dError(
-                f"found the edge {id_}, expected a vertex or a stop; its ends are {edge['from']} "
-                f"and {edge['to']}, and between them it has a colour only at a frame"
+                f"found the edge {id_}, expected a vertex or a stop; between its ends "
+                f"{edge['from']} and {edge['to']} it has a colour only at a frame: give it a stop"
             )
         raise unknown(id_, "vertex or stop", dict.fromkeys([*self.vertices, *others]))
 
@@ -73,13 +73,13 @@ class Handles:
 
 
 def unknown(
-    id_: str, kind: str, ids: Iterable[str], lists: str = "palette4d info SIDECAR"
+    id_: str, kind: str, ids: Iterable[str], lists: str = "`palette4d info` or `Document.names`"
 ) -> Palette4dError:
-    """Return the error for an unknown id; it names similar ids, and the command that lists all."""
+    """Return the error for an unknown id; it names similar ids, and what lists all."""
     known = list(ids)
     near = difflib.get_close_matches(id_, known, n=5, cutoff=0.5) or known[:5]
     if not near:
-        return Palette4dError(f"there is no {kind} {id_!r}; the file holds none")
+        return Palette4dError(f"there is no {kind} {id_!r}; there are none")
     return Palette4dError(
-        f"there is no {kind} {id_!r}; did you mean {' or '.join(near)}? `{lists}` lists all ids"
+        f"there is no {kind} {id_!r}; did you mean {' or '.join(near)}? {lists} lists all"
     )

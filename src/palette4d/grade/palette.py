@@ -91,7 +91,7 @@ class Near:
         return (
             f"found no palette colour within {FAR:g} of ({shown}) at frame {self.frame:g}: pixels "
             f"of this colour are a mix of {mixed}. Edit one of these by its id, or pass "
-            f"anyway=True to edit the nearest, {self.id} at ({there}), {self.distance:.3g} away"
+            f"anyway=True to edit the nearest, {self.id} at ({there}), {self.distance:.3f} away"
         )
 
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import hex_of
 from palette4d.grade import edits
+from palette4d.grade.colour_moves import range_text
 from palette4d.grade.edited_palette import EditedPalette
 from palette4d.grade.edits import Colour, as_colour
 from palette4d.grade.handles import unknown
-from palette4d.grade.moves import range_text
 from palette4d.grade.picks import MOST_PICKS, Pick, Toward, all_picks, check_range
 
 if TYPE_CHECKING:
@@ -213,7 +213,7 @@ class PickEdits(EditedPalette):
         for id_ in ids:
             if ("lock", id_) not in self._state:
                 locked = [known for kind, known in self._state if kind == "lock"]
-                raise unknown(id_, "lock", locked, "palette4d edit SIDECAR picks")
+                raise unknown(id_, "lock", locked, "`picks` or `Document.locks`")
         self._remove([("lock", id_) for id_ in dict.fromkeys(ids)], f"unlock {' '.join(ids)}")
 
     @property
@@ -334,7 +334,7 @@ class PickEdits(EditedPalette):
         found = self._state.get(("pick", id_))
         if found is None:
             known = [known for kind, known in self._state if kind == "pick"]
-            raise unknown(id_, "pick or hold", known, "palette4d edit SIDECAR picks")
+            raise unknown(id_, "pick or hold", known, "`picks`")
         return Pick.from_fields(found)
 
 

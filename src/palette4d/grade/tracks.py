@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from palette4d.grade.handle_names import numbered
 from palette4d.grade.handles import Handles
-from palette4d.grade.names import numbered
 
 F64 = NDArray[np.float64]
 

@@ -6,7 +6,6 @@ workers need the same palette4d. The workers must see the clips and sidecars und
 
 from __future__ import annotations
 
-import asyncio
 import concurrent.futures
 import contextlib
 import logging
@@ -175,6 +174,8 @@ def _version() -> str:
 
 
 def _outcome(future: Any) -> Any:
+    import asyncio
+
     from distributed import KilledWorker
 
     try:

@@ -116,7 +116,9 @@ class ImageClip(Clip):
         # A damaged JPEG returns grey pixels together with an error.
         if stored is None or problem:
             raise _unreadable(path, what, problem)
-        samples = np.asarray(stored)[..., [channel - first for channel in chosen]]
+        samples = np.asarray(stored)
+        if chosen != list(range(first, last)):
+            samples = samples[..., [channel - first for channel in chosen]]
         return header, _in_display_window(samples, spec), spec.get_int_attribute("Orientation", 1)
 
     def _path(self, frame: int) -> Path:

@@ -8,10 +8,10 @@ scene-linear pictures; above 1 its cells are wider.
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 from numpy.typing import NDArray
+
+from palette4d import _core
 
 F64 = NDArray[np.float64]
 
@@ -23,21 +23,14 @@ CELLS = 12
 # Cells from 0 to 1; the cells above reach to about 60.
 CELLS_TO_ONE = 7
 ABOVE_ONE = 0.15
+# Square roots up to 1, where equal steps look alike in darks and lights; logarithms above.
 _EASED = np.arange(CELLS) / CELLS_TO_ONE
 _CODE_VALUES = np.where(_EASED <= 1, _EASED**2, np.exp((_EASED - 1) / ABOVE_ONE))
 
 
 def histogram(rgb: F64, counts: F64) -> F64:
     """Return (CELLS^3,) shares of pixels of (n, 3) colours with (n,) counts; they sum to 1."""
-    places = np.clip(CELLS_TO_ONE * _eased(rgb), 0, CELLS - 1)
-    cells = np.minimum(places.astype(np.int64), CELLS - 2)
-    upper = places - cells
-    red, green, blue = np.stack([1 - upper, upper]).transpose(2, 0, 1)  # (2, n) each
-    lowest = cells @ np.array([CELLS**2, CELLS, 1])
-    out = np.zeros(CELLS**3)
-    for r, g, b in itertools.product((0, 1), repeat=3):
-        weight = counts * red[r] * green[g] * blue[b]
-        out += np.bincount(lowest + (r * CELLS + g) * CELLS + b, weight, minlength=CELLS**3)
+    out = _core.colour_histogram(rgb, counts, cells=CELLS, to_one=CELLS_TO_ONE, above_one=ABOVE_ONE)
     shares_of_cells: F64 = out / out.sum()
     return shares_of_cells
 
@@ -53,14 +46,3 @@ def mean_shift(one: F64, other: F64) -> float:
         for others in ((1, 2), (0, 2), (0, 1))
     ]
     return float(max(shifts))
-
-
-def _eased(colours: F64) -> F64:
-    """Square roots up to 1, where equal steps look alike in darks and lights; logarithms above.
-
-    Colours below 0 count as 0.
-    """
-    positive = np.maximum(colours, 0)
-    above = 1 + ABOVE_ONE * np.log(np.maximum(positive, 1))
-    eased: F64 = np.where(positive <= 1, np.sqrt(positive), above)
-    return eased

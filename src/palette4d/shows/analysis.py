@@ -15,7 +15,7 @@ from palette4d.grade.sidecar import OnEdits
 from palette4d.jobs.workers import Workers
 from palette4d.media.clip import open_clip
 from palette4d.media.colour_space import SpaceOptions
-from palette4d.shows import find_media, shots, timeline, timeline_files
+from palette4d.shows import find_media, shots, timeline_files, timeline_shots
 from palette4d.shows.batch import Show, ShowOptions, Source, analyse
 from palette4d.shows.manifest import FAILED
 from palette4d.shows.shots import Shot
@@ -134,7 +134,7 @@ def _of_edit(
     """Return an edit, its shots, and notes."""
     document = timeline_files.read(path, rate)
     folder = None if media is None else find_media.Folder(Path(media))
-    edit = timeline.shots_of(document, folder, handles)
+    edit = timeline_shots.shots_of(document, folder, handles)
     found, renamed = shots.numbered(edit.shots)
     notes = [f"not analysed: {note}" for note in edit.notes]
     if path.suffix.lower() == ".edl" and rate is None:

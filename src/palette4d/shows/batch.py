@@ -147,6 +147,11 @@ class Show:
         for shot in shots:
             self.plan(shot, known.get(shot.name))
 
+    def __repr__(self) -> str:
+        """Return one line: the manifest's file, and how many shots have a sidecar."""
+        done = sum(entry.status == DONE for entry in self.entries.values())
+        return f"<Show {str(self.path)!r}: {done} of {counted(len(self.entries), 'shot')} done>"
+
     @property
     def manifest(self) -> Manifest:
         """The manifest in its present state."""

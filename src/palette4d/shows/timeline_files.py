@@ -36,7 +36,7 @@ def library() -> Any:
 
 
 @dataclasses.dataclass(frozen=True)
-class Document:
+class TimelineFile:
     """A timeline that was read: its file and OpenTimelineIO's object."""
 
     path: Path
@@ -48,7 +48,7 @@ def is_timeline(spec: str) -> bool:
     return Path(spec).suffix.lower().lstrip(".") in EXTENSIONS
 
 
-def read(path: Path, rate: Fraction | None = None) -> Document:
+def read(path: Path, rate: Fraction | None = None) -> TimelineFile:
     """Read an .otio, .otioz, .otiod or .edl file with exactly one timeline.
 
     `rate` is that of an EDL's timecodes, by default 24; other files state their rate.
@@ -84,7 +84,7 @@ def _unreadable(path: Path, error: Exception) -> Palette4dError:
     )
 
 
-def document_of(path: Path, text: str) -> Document:
+def document_of(path: Path, text: str) -> TimelineFile:
     """Return the only timeline of a file, from its `as_json`; `Palette4dError` if there is none."""
     otio = library()
     try:
@@ -106,7 +106,7 @@ def document_of(path: Path, text: str) -> Document:
         )
     if path.suffix.lower() == ".edl":
         _rebase(found)
-    return Document(path, found)
+    return TimelineFile(path, found)
 
 
 def as_json(path: str, arguments: dict[str, float]) -> str:

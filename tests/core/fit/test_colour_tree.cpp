@@ -45,30 +45,6 @@ void check_near(const Vec3& found, const Vec3& expected, double tolerance) {
     for (int c = 0; c < 3; ++c) CHECK_NEAR(found[c], expected[c], tolerance);
 }
 
-/// Every node holds its points within its box, and its children share its points between them.
-void check_node(const ColourTree& tree, int index) {
-    const ColourTree::Node& node = tree.nodes()[static_cast<std::size_t>(index)];
-    CHECK(node.begin < node.end);
-    for (int c = 0; c < 3; ++c) {
-        double low = kInfinite, high = -kInfinite;
-        for (int i = node.begin; i < node.end; ++i) {
-            low = std::min(low, tree.rgb(i)[c]);
-            high = std::max(high, tree.rgb(i)[c]);
-        }
-        CHECK_EQUAL(node.low[c], low);
-        CHECK_EQUAL(node.high[c], high);
-    }
-    CHECK_EQUAL(node.left < 0, node.right < 0);
-    if (node.left < 0) return;
-    const ColourTree::Node& left = tree.nodes()[static_cast<std::size_t>(node.left)];
-    const ColourTree::Node& right = tree.nodes()[static_cast<std::size_t>(node.right)];
-    CHECK_EQUAL(left.begin, node.begin);
-    CHECK_EQUAL(left.end, right.begin);
-    CHECK_EQUAL(right.end, node.end);
-    check_node(tree, node.left);
-    check_node(tree, node.right);
-}
-
 }  // namespace
 
 TEST(nearest_pixels_by_hand) {
@@ -121,7 +97,7 @@ TEST(the_order_of_the_colours_does_not_matter) {
     }
 }
 
-TEST(boxes_hold_their_colours_and_counts_stay_with_them) {
+TEST(counts_stay_with_their_colours) {
     shapes::Random random(3);
     for (const int n : {1, 12, 13, 500}) {
         std::vector<Vec3> rgb;
@@ -132,8 +108,6 @@ TEST(boxes_hold_their_colours_and_counts_stay_with_them) {
         }
         const ColourTree tree(rgb, counts);
         CHECK_EQUAL(tree.size(), rgb.size());
-        CHECK_EQUAL(tree.nodes()[0].end, n);
-        check_node(tree, 0);
         std::vector<Vec3> found;
         for (int i = 0; i < n; ++i) found.push_back(tree.rgb(i));
         for (std::size_t i = 0; i < found.size(); ++i)
@@ -145,22 +119,27 @@ TEST(boxes_hold_their_colours_and_counts_stay_with_them) {
     }
 }
 
-TEST(the_wide_tree_has_the_same_leaves_and_a_box_around_each_group) {
+TEST(boxes_are_as_small_as_they_can_be) {
     shapes::Random random(4);
     for (const int n : {1, 16, 17, 100, 130, 2000}) {
         std::vector<Vec3> rgb;
         for (int i = 0; i < n; ++i) rgb.push_back(random.colour(-1, 2));
         const ColourTree tree(rgb, std::vector<double>(rgb.size(), 1));
-        int end = 0;
         std::vector<std::pair<Vec3, Vec3>> boxes;
-        for (const int leaf : tree.leaves()) {
-            const ColourTree::Node& node = tree.nodes()[static_cast<std::size_t>(leaf)];
-            CHECK_EQUAL(node.left, -1);
-            CHECK_EQUAL(node.begin, end);
-            end = node.end;
-            boxes.emplace_back(node.low, node.high);
+        const std::vector<int>& starts = tree.leaf_starts();
+        CHECK_EQUAL(starts.front(), 0);
+        CHECK_EQUAL(starts.back(), n);
+        for (std::size_t leaf = 0; leaf + 1 < starts.size(); ++leaf) {
+            CHECK(starts[leaf] < starts[leaf + 1]);
+            CHECK(starts[leaf + 1] - starts[leaf] <= ColourTree::kLeafSize);
+            Vec3 low{kInfinite, kInfinite, kInfinite}, high{-kInfinite, -kInfinite, -kInfinite};
+            for (int i = starts[leaf]; i < starts[leaf + 1]; ++i)
+                for (std::size_t c = 0; c < 3; ++c) {
+                    low[c] = std::min(low[c], tree.rgb(i)[c]);
+                    high[c] = std::max(high[c], tree.rgb(i)[c]);
+                }
+            boxes.emplace_back(low, high);
         }
-        CHECK_EQUAL(end, n);
         for (const std::vector<ColourTree::Boxes>& level : tree.levels()) {
             std::vector<std::pair<Vec3, Vec3>> around;
             std::size_t next = 0;
@@ -180,14 +159,13 @@ TEST(the_wide_tree_has_the_same_leaves_and_a_box_around_each_group) {
             boxes = around;
         }
         CHECK_EQUAL(boxes.size(), 1u);
-        CHECK(boxes[0].first == tree.nodes()[0].low && boxes[0].second == tree.nodes()[0].high);
+        CHECK(boxes[0].first == tree.low() && boxes[0].second == tree.high());
     }
 }
 
 TEST(many_times_the_same_colour) {
     const ColourTree tree(std::vector<Vec3>(100, {0.3, 0.4, 0.5}), std::vector<double>(100, 2));
     CHECK_EQUAL(tree.total(), 200.0);
-    check_node(tree, 0);
     check_near(tree.nearest_mean({1, 1, 1}, 7), {0.3, 0.4, 0.5}, 1e-14);
 }
 

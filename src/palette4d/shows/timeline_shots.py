@@ -21,7 +21,7 @@ from palette4d.media.clip_base import describe
 from palette4d.media.timecode import start_timecode
 from palette4d.shows import find_media, media_range
 from palette4d.shows.shots import Place, Shot
-from palette4d.shows.timeline_files import Document, library
+from palette4d.shows.timeline_files import TimelineFile, library
 
 #: Limits for opening one clip: a long movie's time stamps are read through a slow network.
 SECONDS, MEGABYTES = 300.0, 8192
@@ -37,7 +37,9 @@ class Edit:
     notes: tuple[str, ...]
 
 
-def shots_of(document: Document, folder: find_media.Folder | None = None, handles: int = 0) -> Edit:
+def shots_of(
+    document: TimelineFile, folder: find_media.Folder | None = None, handles: int = 0
+) -> Edit:
     """Return the shots of a timeline; `Shot.problem` says if its media is missing or unusable.
 
     Media is looked for in `folder`, then beside the timeline. `handles` is the number of head and
@@ -76,7 +78,7 @@ class _Reader:
     def __init__(
         self,
         otio: Any,
-        document: Document,
+        document: TimelineFile,
         folder: find_media.Folder | None,
         handles: int,
         child: Child,

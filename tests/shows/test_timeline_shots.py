@@ -27,8 +27,8 @@ from edits import (
 from without_module import run_without
 
 from palette4d.common.errors import Palette4dError
-from palette4d.shows import timeline as timelines
 from palette4d.shows import timeline_files
+from palette4d.shows import timeline_shots as timelines
 from palette4d.shows.find_media import Folder
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from palette4d import Document
-from palette4d.grade.names import vertex_colours
+from palette4d.grade.handle_names import vertex_colours
 
 SPLIT = Path(__file__).resolve().parent.parent / "golden/sidecars/v1_split.p4d.json"
 
