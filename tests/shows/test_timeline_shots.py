@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import os
+import time
 import zipfile
 from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import opentimelineio as otio
@@ -24,12 +27,14 @@ from edits import (
     span,
     timeline,
 )
+from opentimelineio.opentime import RationalTime
 from without_module import run_without
 
 from palette4d.common.errors import Palette4dError
-from palette4d.shows import timeline_files
+from palette4d.shows import timeline_clips, timeline_files
 from palette4d.shows import timeline_shots as timelines
 from palette4d.shows.find_media import Folder
+from palette4d.shows.shots import numbered as unlike
 
 
 @pytest.fixture
@@ -42,10 +47,17 @@ def plates(tmp_path: Path) -> Path:
     return folder
 
 
-def edit(made, tmp_path: Path, plates: Path | None = None, handles: int = 0):
-    path = save(made, tmp_path / "edit.otio")
+def found_in(
+    path: Path, plates: Path | None = None, rate: Fraction | None = None, handles: int = 0
+):
+    listed = timeline_clips.read(path, rate)
     folder = None if plates is None else Folder(plates)
-    return timelines.shots_of(timeline_files.read(path), folder, handles)
+    shots = timelines.shots_of(listed, folder, handles)
+    return SimpleNamespace(shots=shots, notes=listed.notes, rate=listed.rate)
+
+
+def edit(made, tmp_path: Path, plates: Path | None = None, handles: int = 0):
+    return found_in(save(made, tmp_path / "edit.otio"), plates, handles=handles)
 
 
 def frames(made, tmp_path: Path, plates: Path | None = None, handles: int = 0) -> list:
@@ -308,7 +320,7 @@ class TestFiles:
     def test_an_edl(self, tmp_path: Path, plates: Path) -> None:
         path = tmp_path / "reel.edl"
         path.write_text(EDL)
-        found = timelines.shots_of(timeline_files.read(path), Folder(plates))
+        found = found_in(path, plates)
         assert [(s.name, s.first, s.last, s.place.record) for s in found.shots] == [
             ("A001C003", 4, 15, "01:00:00:00"),
             ("take", 2, 11, "01:00:00:12"),  # the dissolve takes four more
@@ -321,7 +333,7 @@ class TestFiles:
         path = tmp_path / "reel.edl"
         events = EDL.partition("003  TAKE")[0].replace("00:00:00:08", "00:00:00:20")
         path.write_text(events.replace("01:00:00:18", "01:00:01:05"))
-        found = timelines.shots_of(timeline_files.read(path, Fraction(25)), Folder(plates))
+        found = found_in(path, plates, Fraction(25))
         assert found.rate == 25
         assert (found.shots[1].first, found.shots[1].last) == (2, 19)
 
@@ -331,7 +343,7 @@ class TestFiles:
         made = timeline(clip("take", external(url, span(0, 30)), 5, 10))
         path = tmp_path / f"edit.{kind}"
         otio.adapters.write_to_file(made, str(path), media_policy="AllMissing")
-        found = timelines.shots_of(timeline_files.read(path), Folder(plates))
+        found = found_in(path, plates)
         assert [(s.first, s.last) for s in found.shots] == [(5, 14)]
 
     @pytest.mark.parametrize(
@@ -348,13 +360,13 @@ class TestFiles:
         path = tmp_path / "bad.otio"
         path.write_text(text)
         with pytest.raises(Palette4dError, match=words):
-            timeline_files.read(path)
+            timeline_clips.read(path)
 
     def test_a_broken_edl(self, tmp_path: Path) -> None:
         path = tmp_path / "bad.edl"
         path.write_text("TITLE: x\n\n001 A V C 00:00:00:00\n")
         with pytest.raises(Palette4dError, match=r"cannot be read as a timeline .*rate=…"):
-            timeline_files.read(path)
+            timeline_clips.read(path)
 
     def test_empty_timelines(self, tmp_path: Path) -> None:
         for made, words in (
@@ -367,7 +379,7 @@ class TestFiles:
         path = tmp_path / "empty.edl"
         path.write_text("TITLE: nothing\n")
         with pytest.raises(Palette4dError, match="found 0 tracks"):
-            timelines.shots_of(timeline_files.read(path))
+            found_in(path)
 
     def test_a_collection(self, tmp_path: Path, plates: Path) -> None:
         made = timeline(clip("take", external("plates/b/take.mov"), 5, 10))
@@ -394,7 +406,7 @@ class TestHostile:
         path = tmp_path / "deep.otio"
         path.write_text('{"OTIO_SCHEMA": "Timeline.1", "metadata": ' + metadata)
         with pytest.raises(Palette4dError, match="cannot be read as a timeline"):
-            timeline_files.read(path)
+            timeline_clips.read(path)
 
     def test_an_archive_that_unpacks_to_too_much(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -407,12 +419,12 @@ class TestHostile:
             archive.writestr("version.txt", "1.0.0")
         assert path.stat().st_size < 100_000
         with pytest.raises(Palette4dError, match="cannot be read as a timeline"):
-            timeline_files.read(path)
+            timeline_clips.read(path)
 
     def test_a_pipe(self, tmp_path: Path) -> None:
         os.mkfifo(tmp_path / "pipe.otio")
         with pytest.raises(Palette4dError, match="expected a file"):
-            timeline_files.read(tmp_path / "pipe.otio")
+            timeline_clips.read(tmp_path / "pipe.otio")
 
     def test_a_name_that_no_disk_can_hold(self, tmp_path: Path, plates: Path) -> None:
         good = external("plates/b/take.mov")
@@ -432,3 +444,42 @@ class TestHostile:
         monkeypatch.setattr(timelines, "SECONDS", 0.0)
         (shot,) = edit(timeline(clip("x", external("plates/b/take.mov"), 5, 10)), tmp_path).shots
         assert "take.mov: the media is unusable" in shot.problem
+
+    def test_odd_numbers_cost_their_shot(self, tmp_path: Path, plates: Path) -> None:
+        good = external("plates/b/take.mov")
+        long_number = otio.schema.ImageSequenceReference(
+            target_url_base="plates", name_suffix=".png", rate=24, frame_zero_padding=2 * 10**9
+        )
+        odd = [clip("nan", good, 5, 10), clip("rate", good, 5, 10), clip("one", good, 0, math.inf)]
+        odd[0].source_range = span(math.nan, 10)
+        odd[1].source_range = span(0, 4, math.nan)
+        odd += [clip("pad", long_number, 0, 4), clip("reel", external("gone.mov"), 0, 4)]
+        odd[-1].metadata["cmx_3600"] = [1, 2]
+        for one in odd:
+            take, *rest = edit(timeline(clip("take", good, 5, 10), one), tmp_path).shots
+            assert not take.problem
+            assert all(shot.problem for shot in rest)
+
+    @pytest.mark.parametrize("rate", [math.nan, math.inf, 0.0, -24.0, 5e-324])
+    def test_a_start_time_of_no_rate(self, tmp_path: Path, plates: Path, rate: float) -> None:
+        made = timeline(clip("take", external("plates/b/take.mov"), 5, 10))
+        made.global_start_time = RationalTime(0, rate)
+        with pytest.raises(Palette4dError, match="expected frames per second above 0"):
+            edit(made, tmp_path)
+
+    def test_nested_compounds(self, tmp_path: Path) -> None:
+        inner = clip("take", external("gone.mov"), 5, 10)
+        for _ in range(900):
+            inner = otio.schema.Stack(children=[inner])
+        with pytest.raises(Palette4dError, match="nested deeper than 64"):
+            edit(timeline(inner), tmp_path)
+
+    def test_many_clips_of_one_name_take_linear_time(self, tmp_path: Path) -> None:
+        """It took 18 s for 4000 clips, each step of which grew with the clips before."""
+        made = timeline(*(clip("x", external("gone.mov"), 5, 10) for _ in range(4000)))
+        path = save(made, tmp_path / "edit.otio")
+        begin = time.process_time()
+        shots, _ = unlike(timelines.shots_of(timeline_clips.clips_of(path)))
+        assert len({shot.name for shot in shots}) == 4000
+        assert shots[-1].place.record == "00:27:46:06"
+        assert time.process_time() - begin < 5

@@ -15,7 +15,7 @@ from palette4d.grade.sidecar import OnEdits
 from palette4d.jobs.workers import Workers
 from palette4d.media.clip import open_clip
 from palette4d.media.colour_space import SpaceOptions
-from palette4d.shows import find_media, shots, timeline_files, timeline_shots
+from palette4d.shows import find_media, shots, timeline_clips, timeline_files, timeline_shots
 from palette4d.shows.batch import Show, ShowOptions, Source, analyse
 from palette4d.shows.manifest import FAILED
 from palette4d.shows.shots import Shot
@@ -132,10 +132,9 @@ def _of_edit(
     path: Path, rate: Fraction | None, media: str | os.PathLike[str] | None, handles: int
 ) -> tuple[Source, list[Shot], list[str]]:
     """Return an edit, its shots, and notes."""
-    document = timeline_files.read(path, rate)
+    edit = timeline_clips.read(path, rate)
     folder = None if media is None else find_media.Folder(Path(media))
-    edit = timeline_shots.shots_of(document, folder, handles)
-    found, renamed = shots.numbered(edit.shots)
+    found, renamed = shots.numbered(timeline_shots.shots_of(edit, folder, handles))
     notes = [f"not analysed: {note}" for note in edit.notes]
     if path.suffix.lower() == ".edl" and rate is None:
         notes.append("an EDL does not state its rate: 24 frames per second are assumed (rate=…)")
@@ -145,4 +144,5 @@ def _of_edit(
             f"{counted(len(renamed), 'shot has the name', 'shots have the names')} of others and "
             f"{'was' if len(renamed) == 1 else 'were'} renamed by the first frame: {some}"
         )
-    return Source(edit.name, str(path), timeline_files.sha256(path), edit.rate), found, notes
+    source = Source(file_safe(path.stem), str(path), timeline_files.sha256(path), edit.rate)
+    return source, found, notes

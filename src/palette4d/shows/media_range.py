@@ -5,7 +5,11 @@ Input: a clip of an OpenTimelineIO timeline. Output: ranges of time, in the edit
 
 from __future__ import annotations
 
+import dataclasses
+import itertools
 import math
+from collections.abc import Sequence
+from fractions import Fraction
 from typing import Any
 
 from palette4d.common.errors import Palette4dError
@@ -15,17 +19,41 @@ from palette4d.shows.timeline_files import library
 ROUNDING = 1e-3
 
 
-def shown(clip: Any) -> tuple[Any, Any] | None:
+@dataclasses.dataclass(frozen=True)
+class Level:
+    """A clip, or what it lies in.
+
+    Attributes
+    ----------
+    item : OpenTimelineIO's object.
+    place : its start in its parent; None for 0, a text if it cannot be known.
+    """
+
+    item: Any
+    place: Any
+
+    @property
+    def moves(self) -> tuple[Any, Any]:
+        """The start of the item's own time, and its start in its parent; None for 0."""
+        if isinstance(self.place, str):
+            raise Palette4dError(self.place)
+        if isinstance(self.item, library().schema.Clip):
+            return self.item.trimmed_range().start_time, self.place
+        own = self.item.source_range
+        return None if own is None else own.start_time, self.place
+
+
+def shown(levels: Sequence[Level]) -> tuple[Any, Any] | None:
     """Return a clip's start in the edit, and the range of its media that the edit shows.
 
-    None if the edit shows nothing of the clip. The start is in the time of the timeline's stack,
-    the range in the media's time.
+    `levels` begins with the clip and ends with the track. None if the edit shows nothing of the
+    clip. The start is in the time of the timeline's stack, the range in the media's time.
     """
     schema = library().schema
-    whole = clip.visible_range()  # with the media that the neighbouring transitions show
-    window, item = whole, clip
-    while item.parent() is not None:
-        parent = item.parent()
+    clip = levels[0].item
+    whole = window = clip.visible_range()  # with the media that neighbouring transitions show
+    for level, parent in itertools.pairwise([*levels, Level(levels[-1].item.parent(), None)]):
+        item = level.item
         if item is not clip and any(
             isinstance(effect, schema.TimeEffect) for effect in item.effects
         ):
@@ -33,14 +61,41 @@ def shown(clip: Any) -> tuple[Any, Any] | None:
                 f"the clip {clip.name!r} lies in a compound {item.name!r} that plays at "
                 "another speed, which is not followed; change the speed of the clip itself"
             )
-        window = item.transformed_time_range(window, parent)
-        if parent.source_range is not None:
-            window = _common(window, parent.source_range)
+        own, place = level.moves
+        window = _moved(window, own, place)
+        if parent.item.source_range is not None:
+            window = _common(window, parent.item.source_range)
             if window is None:
                 return None
-        item = parent
-    left = _common(item.transformed_time_range(window, clip), whole)
+    back = window
+    for level in levels:
+        own, place = level.moves
+        back = _moved(back, place, own)
+    left = _common(back, whole)
     return None if left is None else (window.start_time, _with_speed(clip, left))
+
+
+def frames(shown: Any, rate: Fraction) -> tuple[int, int]:
+    """Return the first and last frame of a range of media, counted in its time at a rate."""
+    start, length = _at(shown.start_time, rate), _at(shown.duration, rate)
+    rounding = Fraction(ROUNDING).limit_denominator(1000)
+    first = math.floor(start + rounding)
+    return first, max(first, math.ceil(start + length - rounding) - 1)
+
+
+def _at(time: Any, rate: Fraction) -> Fraction:
+    value = Fraction(time.value).limit_denominator(10**6)
+    return value * (rate / Fraction(time.rate).limit_denominator(1001))
+
+
+def _moved(window: Any, back: Any, on: Any) -> Any:
+    """Return a time range moved back by one time and on by another; None is 0."""
+    start = window.start_time
+    if back is not None:
+        start = start - back
+    if on is not None:
+        start = start + on
+    return library().opentime.TimeRange(start, window.duration)
 
 
 def _with_speed(clip: Any, shown: Any) -> Any:

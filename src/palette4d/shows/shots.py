@@ -79,15 +79,15 @@ def numbered(shots: Iterable[Shot]) -> tuple[list[Shot], list[str]]:
     suffix: `A`, `A_f120`. So names stay the same when the editor inserts other shots.
     """
     taken: set[str] = set()
+    numbers: dict[str, Iterator[int]] = {}
     out, changed = [], []
     for shot in shots:
         name = shot.name
         if name.lower() in taken:
-            name = f"{shot.name}_f{shot.used[0]}"
-            for again in itertools.count(2):
-                if name.lower() not in taken:
-                    break
-                name = f"{shot.name}_f{shot.used[0]}_{again}"
+            name = begin = f"{shot.name}_f{shot.used[0]}"
+            again = numbers.setdefault(begin.lower(), itertools.count(2))
+            while name.lower() in taken:
+                name = f"{begin}_{next(again)}"
             changed.append(name)
         taken.add(name.lower())
         out.append(dataclasses.replace(shot, name=name))

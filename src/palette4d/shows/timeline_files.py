@@ -1,20 +1,23 @@
-"""Timeline files, read through OpenTimelineIO and its EDL adapter.
+"""Timeline files, read through OpenTimelineIO and its EDL adapter, in a child process.
 
-A child process reads the file first: a small one can crash the library, or take all memory.
+A small file can crash the library, or take all memory. So only plain data leaves the child.
 """
 
 from __future__ import annotations
 
-import dataclasses
+import contextlib
 import hashlib
+from collections.abc import Callable, Iterator
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from palette4d.common.child import Child
+from palette4d.common.child import Child, ChildError
 from palette4d.common.errors import Palette4dError, in_words
 from palette4d.common.json_files import read_regular
 from palette4d.common.text import counted
+
+Result = TypeVar("Result")
 
 EXTENSIONS = frozenset({"otio", "otioz", "otiod", "edl"})
 
@@ -35,24 +38,13 @@ def library() -> Any:
     return opentimelineio
 
 
-@dataclasses.dataclass(frozen=True)
-class TimelineFile:
-    """A timeline that was read: its file and OpenTimelineIO's object."""
-
-    path: Path
-    timeline: Any
-
-
 def is_timeline(spec: str) -> bool:
     """Whether a file is an edit, by its extension."""
     return Path(spec).suffix.lower().lstrip(".") in EXTENSIONS
 
 
-def read(path: Path, rate: Fraction | None = None) -> TimelineFile:
-    """Read an .otio, .otioz, .otiod or .edl file with exactly one timeline.
-
-    `rate` is that of an EDL's timecodes, by default 24; other files state their rate.
-    """
+def in_child(path: Path, call: Callable[..., Result], *arguments: object) -> Result:
+    """Return a module's function of a timeline's file, called in a child process with limits."""
     otio = library()
     if not path.exists():
         raise Palette4dError(f"{path}: there is no such timeline; check the path")
@@ -64,16 +56,14 @@ def read(path: Path, rate: Fraction | None = None) -> TimelineFile:
             "pip install 'palette4d[timeline]'"
         )
     regular = path / "content.otio" if path.is_dir() else path
-    arguments = {"rate": float(rate)} if rate is not None and extension == "edl" else {}
     try:
         read_regular(regular, LARGEST_FILE)
         with Child(SECONDS, MEGABYTES) as child:
-            text = child.call(as_json, str(path), arguments)
+            return child.call(call, *arguments)
     except OSError as error:
         raise Palette4dError(in_words(error)) from error
-    except Palette4dError as error:
+    except ChildError as error:
         raise _unreadable(path, error) from error
-    return document_of(path, text)
 
 
 def _unreadable(path: Path, error: Exception) -> Palette4dError:
@@ -84,13 +74,23 @@ def _unreadable(path: Path, error: Exception) -> Palette4dError:
     )
 
 
-def document_of(path: Path, text: str) -> TimelineFile:
-    """Return the only timeline of a file, from its `as_json`; `Palette4dError` if there is none."""
-    otio = library()
+@contextlib.contextmanager
+def faults_of(path: Path) -> Iterator[None]:
+    """Say in words what OpenTimelineIO raises for a file, which may be anything."""
     try:
-        found = otio.adapters.read_from_string(text, "otio_json")
-    except Exception as error:  # it does not read back everything that it writes
+        yield
+    except (Palette4dError, MemoryError):
+        raise
+    except Exception as error:
         raise _unreadable(path, error) from error
+
+
+def load(path: Path, rate: Fraction | None = None) -> Any:
+    """Return the only timeline of a file; call it in a child process."""
+    otio = library()
+    edl = path.suffix.lower() == ".edl"
+    arguments = {"rate": float(rate)} if rate is not None and edl else {}
+    found = otio.adapters.read_from_file(str(path), **arguments)
     if isinstance(found, otio.schema.SerializableCollection):
         timelines = [one for one in found if isinstance(one, otio.schema.Timeline)]
         if len(timelines) != 1:
@@ -104,16 +104,21 @@ def document_of(path: Path, text: str) -> TimelineFile:
             f"{path}: found a {type(found).__name__}, expected a timeline; write the edit to a "
             "file as a whole"
         )
-    if path.suffix.lower() == ".edl":
+    if edl:
         _rebase(found)
-    return TimelineFile(path, found)
+    return found
 
 
-def as_json(path: str, arguments: dict[str, float]) -> str:
-    """Return a timeline file as OpenTimelineIO's JSON, which it has read without harm."""
-    otio = library()
-    found = otio.adapters.read_from_file(path, **arguments)
-    return str(otio.adapters.write_to_string(found, "otio_json", indent=0))
+def as_json(path: Path) -> str:
+    """Return the timeline of a file as OpenTimelineIO's JSON."""
+    with faults_of(path):
+        return str(library().adapters.write_to_string(load(path), "otio_json"))
+
+
+def check_json(path: Path, text: str) -> None:
+    """Raise an error if OpenTimelineIO cannot read a text for a file."""
+    with faults_of(path):
+        library().adapters.read_from_string(text, "otio_json")
 
 
 def _first_line(error: Exception) -> str:

@@ -80,21 +80,25 @@ def write(
         "manifest": _seen_from(folder, manifest_path),
     }
     text = json.dumps(document, indent=4, ensure_ascii=False) + "\n"
-    otio = timeline_files.library()
+    # The result must be a readable timeline.
+    timeline_files.in_child(source, timeline_files.check_json, target, text)
     with replacing(target, force=force) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
-        otio.adapters.read_from_string(text, "otio_json")  # the result must be a readable timeline
     return count
 
 
 def _document(source: Path) -> Any:
     """Return a timeline's JSON: from an .otio file, else converted by OpenTimelineIO."""
+    text: str | bytes = timeline_files.in_child(source, timeline_files.as_json, source)
     if source.suffix.lower() == ".otio":
-        timeline_files.read(source)  # a broken one is refused in a child process
-        return json.loads(read_regular(source, timeline_files.LARGEST_FILE))
-    otio = timeline_files.library()
-    timeline = timeline_files.read(source).timeline
-    return json.loads(otio.adapters.write_to_string(timeline, "otio_json"))
+        text = read_regular(source, timeline_files.LARGEST_FILE)
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise Palette4dError(
+            f"{source}: it cannot be read as JSON ({error}); expected finite numbers, and metadata "
+            "that is not nested deeply"
+        ) from error
 
 
 def _timeline(document: Any, source: Path) -> Any:
