@@ -101,6 +101,24 @@ def test_a_second_range_leaves_a_pick_of_the_whole_clip_alone(fields: Fields) ->
             )
 
 
+def test_a_ramp_beside_a_pick_of_the_whole_clip_has_no_steps(fields: Fields) -> None:
+    """Early in the ramp hardly anything differs, of no colour; half of it is half of all."""
+    sky, wall = (0.3, 0.25, 0.5), (0.35, 0.5, 0.3)
+    rows = [*cluster(MIDDLE, 0.1), *cluster(OTHER, 0.5), *cluster(sky, 0.2), *cluster(wall, 0.2)]
+    found = {**fields, "colours": [{"frame": 0, "rgbw": rows}]}
+    whole = pick("p1", MIDDLE, (0.65, 0.25, 0.4))
+    late = pick("p2", OTHER, (0.5, 0.3, 0.5), frame=12, **{"from": 12, "until": 14, "fade": 8})
+    key = pick("p3", (0.9, 0.9, 0.9), frame=5)  # far away; so that frame 5 is solved
+    alone, both = solved(found, whole, key)[0], solved(found, whole, late, key)[0]
+    for row in rows:
+        colour = row[:3]
+        start, full = moved(alone, colour, 4), moved(both, colour, 12)
+        for frame in (5, 8):
+            part = (frame - 4) / 8
+            expected = (1 - part) * start + part * full
+            np.testing.assert_allclose(moved(both, colour, frame), expected, atol=0.012)
+
+
 def test_what_is_near_a_steady_pick_does_not_swing(fields: Fields) -> None:
     """The palette's colours drift and one splits; the same of them meet the pick at all frames."""
     sky, cloud, roof = (0.37, 0.13, 0.56), (0.44, 0.24, 0.61), (0.26, 0.44, 0.49)

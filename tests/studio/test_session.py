@@ -9,6 +9,7 @@ from collections.abc import Callable, Generator
 from pathlib import Path
 
 import pytest
+from clip_files import grey_levels
 
 import palette4d
 from palette4d.cli.main import main
@@ -44,6 +45,23 @@ def test_an_edit_leaves_the_bytes_of_the_verb(
     session.tick(LATER)
     assert main(["edit", str(twin), "set", id_, "--rgb", "0.5", "0.25", "0.125"]) == 0
     assert sidecar.read_bytes() == twin.read_bytes()
+
+
+def test_a_palette_of_very_many_frames_takes_little_memory(tmp_path: Path) -> None:
+    """Its frames are counted, not listed: there are 10^9."""
+    grey_levels(tmp_path, range(3, 6))
+    fields = json.loads((GOLDEN / "v1_split.p4d.json").read_text())
+    ranges = [fields["clip"]["frames"], *fields["polytope"]["blocks"]]
+    for one in ranges:
+        one.update({name: one[name] * 50_000_000 for name in ("first", "last")})
+    for one in fields["polytope"]["vertices"]:
+        one["frame"] *= 50_000_000
+    fields["edits"] = {"vertices": [], "stops": []}
+    (tmp_path / "a.p4d.json").write_text(json.dumps(fields))
+    session = Session()
+    session.open_sidecar(tmp_path / "a.p4d.json", str(tmp_path / "clip.####.png"))
+    assert "lacks 999999998 frames of the palette, the first is 0" in session.status.text
+    session.close()
 
 
 def test_a_drag_writes_only_what_is_dropped(session: Session, sidecar: Path) -> None:

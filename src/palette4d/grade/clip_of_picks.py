@@ -31,8 +31,8 @@ DIGITS = 6
 #: A box has a spread if more than 1 - MOST_COLOURS of its pixels are farther than WIDE from the
 #: mean. It is told by at most MOST_SPREAD further colours.
 WIDE, MOST_COLOURS, MOST_SPREAD = 0.04, 0.9, 2
-#: A frame whose colours differ by more than this from the analysed ones is of another clip. Frames
-#: of one clip differ by up to 0.13, those of others by 0.19 to 0.9.
+#: A frame whose colours differ by more than this from the analysed ones is of another clip: those
+#: of one clip differ by up to 0.13, nearly all of others by more than 0.2 (docs/lab/picks.md).
 OTHER_CLIP = 0.16
 
 
@@ -135,8 +135,11 @@ class ClipOfPicks:
         mean = np.round(found.mean(axis=0), DIGITS)
         return as_colour(mean), tuple(as_colour(offset) for offset in _spread(found - mean))
 
-    def warnings(self, pick: Pick, colours: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
-        """Return what speaks against a pick's clip and its colour; `colours` is the sidecar's."""
+    def warnings(self, pick: Pick, stored: Sequence[NDArray[np.float64]]) -> tuple[str, ...]:
+        """Return what speaks against a pick's clip and its colour.
+
+        `stored` are colours of the analysed clip at its times, (m, 4), and their shares.
+        """
         clip = self.open()
         if clip is None:
             return ()
@@ -146,7 +149,8 @@ class ClipOfPicks:
             return ()
         told = []
         rgb, counts = found[0]
-        if colours and min(_unlike(rgb, counts, np.array(e["rgbw"])) for e in colours) > OTHER_CLIP:
+        unlike = min((_unlike(rgb, counts, rgbw) for rgbw in stored), default=0.0)
+        if unlike > OTHER_CLIP:
             told.append(
                 f"the colours of frame {frame} of {clip.source} differ much from those that were "
                 "analysed; if it is another clip, give the analysed one as clip=…, or analyse it"

@@ -57,7 +57,7 @@ def side_effect(fields: Mapping[str, Any], least: float) -> SideEffect:
         moved = _core.palette_weights(rgb, cut.rgb, cut.faces)[0] @ (solved - user)
         change = bumped(rgb, moved, both.bumps_at(time))
         size = np.abs(change).max(axis=1)
-        other = problem.guard_at(rgb, time) > OTHER
+        other = problem.guard_at(rgb, time, problem.asked(time)) > OTHER
         worst = int(np.argmax(np.where(other, size * np.sqrt(shares), 0.0)))
         found.append(
             SideEffect(

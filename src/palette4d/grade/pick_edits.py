@@ -254,8 +254,11 @@ class PickEdits(EditedPalette):
 
     def pick_warnings(self, id: str, clip: str | os.PathLike[str] | None = None) -> tuple[str, ...]:
         """Return what speaks against the clip of a pick or hold, and against its colour."""
-        colours = self._fields.get("colours", ())
-        return self._clip_of_picks(clip).warnings(self._pick(id), colours)
+        from palette4d.grade.solve import ClipAtTimes
+
+        pick, known = self._pick(id), ClipAtTimes(self._members())
+        stored = [known.colours_at(pick.frame), *known.colours] if known.colours else []
+        return self._clip_of_picks(clip).warnings(pick, stored)
 
     def colour_of_pixel(
         self,

@@ -28,8 +28,10 @@ others (`bumps.squares`).
 Solved are the clip's vertices, the picks' own frames and every few frames between; the core
 interpolates linearly. The problems of all frames are one: a colour that is there at two of them
 wants to change alike. Else one palette colour would move at one frame, and at the next another that
-does the same for the pick, and all that is near would swing. Frames with other picks are no part of
-this, so that a pick that ends at a frame has no effect at all beyond.
+does the same for the pick, and all that is near would swing. Each set of picks that ask at the same
+time is solved as if there were no others, and with their whole changes. So a pick that ends at a
+frame has no effect at all beyond. In its ramps the solution goes from the one without it to the one
+with it.
 """
 
 from __future__ import annotations
@@ -335,14 +337,13 @@ class Problem:
 
         return self._once("certain", time, compute)
 
-    def guard_at(self, colours: F64, time: float, asked: float | None = None) -> F64:
+    def guard_at(self, colours: F64, time: float, asked: F64) -> F64:
         """Return how much colours are guarded at a time, 0..1: not at all at a picked one.
 
-        `asked`: if what the picks ask for were that of another time.
+        `asked` is how much of its change each point asks for.
         """
         at = np.flatnonzero(self.moving[self.of])
-        strengths = self._asked(time if asked is None else asked)[at]
-        share = strengths / max(float(strengths.max(initial=0)), NONE)
+        share = asked[at] / max(float(asked[at].max(initial=0)), NONE)
         far = 1 - share * self.near(colours, time, at, np.minimum(self.radii[at], NEAR))
         found: F64 = far.prod(axis=1)
         return found
@@ -388,61 +389,95 @@ class Problem:
     def solved(self) -> list[_Solved]:
         """Solve all times.
 
-        Those at which the same picks ask for something are solved together, as if there were no
-        others, nor the others' frames: so a pick has no effect beyond its begin and end.
+        Picks that ask for something at the same times are solved together, as if there were no
+        others: so a pick has no effect beyond its begin and end. In the ramps of a pick the
+        solution goes from the one without it to the one with it.
         """
-        active = {time: self._active(time) for time in self.times}
-        met = {time: _Solved(time, {}, {}) for time in self.times}
-        for picks in {*active.values()} - {frozenset()}:
-            alone = self if len(picks) == self.moving.sum() else self._alone(picks)
-            points = np.flatnonzero(np.isin(self.of, sorted(picks)) & self.moving[self.of])
-            own = np.flatnonzero(alone.moving[alone.of])
-            number = dict(zip(own.tolist(), points.tolist(), strict=True))
-            # Where all of them ask for something, and a time before and after.
-            asked = [time for time in self.times if picks <= active[time]]
-            ends = [-np.inf, *alone.times, np.inf]
-            near = [
-                any(a < time < b for time in asked) for a, b in zip(ends, ends[2:], strict=False)
-            ]
-            solved = alone.met(list(itertools.compress(alone.times, near)))
-            times = [one.time for one in solved]
-            for time in [time for time in self.times if active[time] == picks]:
-                at = int(np.searchsorted(times, time))
-                one = solved[at]
-                if one.time != time:
-                    one = self._between(solved[at - 1], one, time)
-                bumps = {number[at]: size for at, size in one.bumps.items()}
-                met[time] = replace(one, bumps=bumps)
-        return [self._with_holds(met[time]) for time in self.times]
+        parts = {time: self._parts(time) for time in self.times}
+        found = {
+            picks: self._whole(picks) for picks in {key for part in parts.values() for key in part}
+        }
+        mixed = []
+        for time, part in parts.items():
+            moves: dict[tuple[str, int], F64] = {}
+            bumps: dict[int, F64] = {}
+            for picks, weight in part.items():
+                one = self._at(found[picks], time)
+                for place, by in one.moves.items():
+                    moves[place] = moves.get(place, np.zeros(3)) + weight * by
+                for point, by in one.bumps.items():
+                    bumps[point] = bumps.get(point, np.zeros(3)) + weight * by
+            mixed.append(self._with_holds(_Solved(time, moves, bumps)))
+        return mixed
 
-    def _between(self, before: _Solved, after: _Solved, time: float) -> _Solved:
-        """Return the solution between two solved times, as the core interpolates."""
-        part, none = (time - before.time) / (after.time - before.time), np.zeros(3)
-        moves = {}
+    def _parts(self, time: float) -> dict[frozenset[int], float]:
+        """Return sets of picks, each within the next, and how much of each solution is asked for.
+
+        What the picks of such sets get in sum is what each asks for at this time.
+        """
+        asked = {
+            number: strength
+            for number, pick in enumerate(self.picks)
+            if self.moving[number] and (strength := pick.strength_at(time, self.clip.step)) > 0
+        }
+        order = sorted(asked, key=lambda number: -asked[number])
+        steps = [*(asked[number] for number in order), 0.0]
+        return {
+            frozenset(order[:count]): more - less
+            for count, (more, less) in enumerate(itertools.pairwise(steps), start=1)
+            if more > less
+        }
+
+    def _whole(self, picks: frozenset[int]) -> list[_Solved]:
+        """Solve some picks alone, with their whole changes, at the times when all ask for some."""
+        alone = self
+        if len(picks) < self.moving.sum():
+            alone = Problem(self.clip, [self.picks[number] for number in sorted(picks)])
+        own = np.flatnonzero(alone.moving[alone.of])
+        points = np.flatnonzero(np.isin(self.of, sorted(picks)) & self.moving[self.of])
+        number = dict(zip(own.tolist(), points.tolist(), strict=True))
+        asked = [
+            time
+            for time in alone.times
+            if all(self.picks[i].strength_at(time, self.clip.step) > 0 for i in picks)
+        ]
+        return [
+            replace(one, bumps={number[at]: size for at, size in one.bumps.items()})
+            for one in alone.met(asked or alone.times)
+        ]
+
+    def _at(self, solved: Sequence[_Solved], time: float) -> _Solved:
+        """Return a solution at a time, as the core interpolates between solved times."""
+        times = [one.time for one in solved]
+        at = int(np.searchsorted(times, time))
+        before, after = solved[max(at - 1, 0)], solved[min(at, len(solved) - 1)]
+        if after.time == time:
+            return after
+        part = float(np.interp(time, [before.time, after.time], [0, 1]))
+        none, moves = np.zeros(3), {}
         for edge in _core.slice_at(self.clip.polytope, time).edges.tolist():
             start, end = self.clip.polytope.edges[edge].tolist()
-            place = ("e", edge)
-            one = before.moves.get(place, before.moves.get(("v", start), none))
-            other = after.moves.get(place, after.moves.get(("v", end), none))
-            moves[place] = (1 - part) * one + part * other
+            places = ("e", edge), ("v", start), ("v", end)
+            one, other = (
+                next((by.moves[place] for place in places if place in by.moves), none)
+                for by in (before, after)
+            )
+            moves["e", edge] = (1 - part) * one + part * other
         bumps = {
-            at: (1 - part) * before.bumps.get(at, none) + part * after.bumps.get(at, none)
-            for at in {*before.bumps, *after.bumps}
+            point: (1 - part) * before.bumps.get(point, none) + part * after.bumps.get(point, none)
+            for point in {*before.bumps, *after.bumps}
         }
         return _Solved(time, moves, bumps)
 
-    def _asked(self, time: float) -> F64:
+    def asked(self, time: float) -> F64:
+        """Return how much of its change each point asks for, 0..1."""
         return self.strengths(time) * self.certain(time)
 
-    def _active(self, time: float) -> frozenset[int]:
-        asking = (self.strengths(time) > 0) & self.moving[self.of]
-        return frozenset(self.of[asking].tolist())
-
-    def _alone(self, picks: frozenset[int]) -> Problem:
-        return Problem(self.clip, [self.picks[number] for number in sorted(picks)])
-
     def met(self, times: Sequence[float]) -> list[_Solved]:
-        """Solve some times together, without holds. Bumps meet what is left at the picks."""
+        """Solve some times together, without holds, as if all picks asked for their whole changes.
+
+        Bumps meet what is left at the picks.
+        """
         terms = [term for term in map(self._terms, times) if term]
         links = [self._links(one, other) for one, other in itertools.pairwise(terms)]
         solved = {time: _Solved(time, {}, {}) for time in times}
@@ -459,7 +494,7 @@ class Problem:
 
     def _with_holds(self, one: _Solved) -> _Solved:
         """Return the solution at a time with its holds."""
-        time, asked = one.time, self._asked(one.time)
+        time, asked = one.time, self.asked(one.time)
         picked = np.flatnonzero((asked > 0) & self.moving[self.of])
         held = np.flatnonzero((asked > 0) & ~self.moving[self.of])
         centres = self.centres(time)
@@ -475,16 +510,16 @@ class Problem:
     def _terms(self, time: float) -> _Terms | None:
         """Return the problem at a time; none where nothing is asked for."""
         clip = self.clip
-        picked = np.flatnonzero((self._asked(time) > 0) & self.moving[self.of])
+        certain = self.certain(time)
+        picked = np.flatnonzero((certain > 0) & self.moving[self.of])
         if not len(picked):
             return None
         cut = _core.slice_at(clip.polytope, time)
         edited = _core.edited_colours(clip.polytope, clip.core.edits, cut) - cut.rgb
         centres, points = self.centres(time)[picked], self.of[picked]
-        strengths, certain = self.strengths(time)[picked], self.certain(time)[picked]
         weights = _core.palette_weights(centres, cut.rgb, cut.faces)[0]
         changes = np.array([pick.change_at(time) for pick in self.picks])[points]
-        wanted = strengths[:, None] * (changes - weights @ edited)
+        wanted = changes - weights @ edited
         scale = float(np.linalg.norm(wanted, axis=1).max())
         if scale < NONE:
             return None
@@ -492,7 +527,7 @@ class Problem:
         of = _Unknowns(time, cut, *self._places(cut, time), picked, local)
         guarded = clip.colours_at(time)
         guard_rows, within = self._rows(guarded[:, :3], of)
-        far = self.guard_at(guarded[:, :3], time)
+        far = self.guard_at(guarded[:, :3], time, certain)
         guard = _noticed(guarded)
         counts = self._counts(guarded, points, within)
         if clip.frames:
@@ -504,7 +539,7 @@ class Problem:
             of,
             scale,
             self._rows(centres, of)[0],
-            certain * strengths / strengths.max() * counts,
+            certain[picked] * counts,
             wanted / scale,
             guarded,
             guard_rows,
@@ -528,8 +563,9 @@ class Problem:
         colours, shares = other.guarded[:, :3], other.guarded[:, 3]
         steps = max((other.of.time - one.of.time) / self.clip.step, 1.0)
         weights = STEADY / steps * shares / shares.sum()
-        if (self._asked(one.of.time) != self._asked(other.of.time)).any():
-            before = self.guard_at(colours, other.of.time, one.of.time)
+        asked = self.certain(one.of.time)
+        if (asked != self.certain(other.of.time)).any():
+            before = self.guard_at(colours, other.of.time, asked)
             weights *= np.abs(before - other.far) < 1 - OTHER
         root = np.sqrt(weights)[:, None]
         return root * self._rows(colours, one.of)[0], root * other.guard_rows

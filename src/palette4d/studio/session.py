@@ -159,9 +159,11 @@ class Session(SessionView):
             own, other = f"{width}x{height}", f"{clip.width}x{clip.height}"
             found.append(texts.OTHER_SIZE.format(own=own, found=other))
         first, last, step = document.frames
-        lacks = {*range(first, last + 1, step)} - {*clip.frames}
-        if lacks:
-            found.append(texts.LACKS_FRAMES.format(count=len(lacks), first=min(lacks)))
+        wanted = range(first, last + 1, step)
+        held = {frame for frame in clip.frames if frame in wanted}
+        if lacks := len(wanted) - len(held):
+            missing = next(frame for frame in wanted if frame not in held)
+            found.append(texts.LACKS_FRAMES.format(count=lacks, first=missing))
         return "; ".join(found)
 
     @property
