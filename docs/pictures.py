@@ -37,7 +37,7 @@ SHOWN = (4, 12, 20, 28, 36, 44)
 HELD = 19
 """The frame of the stop that holds the colour."""
 
-TOOLS_AT, HOUSE, TREES = 20, (0.8, 0.14, 0.12), (0.6, 0.28, 0.05)
+TOOLS_AT, WALL, GABLE, TREES = 20, (258, 111), (240, 99), (186, 88)
 """The frame of tools.jpg, and the red of its house and of its trees."""
 LAKE, OTHER_SHOT = (0.2, 0.42, 0.45), "26-34"
 """The water's colour in that frame, and the frames that stand for another shot."""
@@ -190,14 +190,15 @@ def draw_tools(demo: Path) -> None:
     gold = plain.near(GOLD, frame=TOOLS_AT).id
 
     def pick(document: p4d.Document) -> None:
-        document.pick(frame=TOOLS_AT, colour=HOUSE, to=(0.2, 0.35, 0.7), clip=clip.source)
-        document.hold(frame=TOOLS_AT, colour=TREES, clip=clip.source)
+        for wall, blue in ((WALL, "#3359b3"), (GABLE, "#24407f")):
+            document.pick(frame=TOOLS_AT, pixel=wall, box=3, to=blue, clip=clip.source)
+        document.hold(frame=TOOLS_AT, pixel=TREES, box=15, clip=clip.source)
 
     tools: list[tuple[str, Callable[[p4d.Document], object]]] = [
         ("the clip", lambda document: None),
         ("track --hue 60", lambda document: document.adjust(gold, track=True, hue=60)),
         ("palette --chroma 0.4", lambda document: document.adjust(chroma=0.4)),
-        ("pick the red house, hold the trees", pick),
+        ("pick both walls, hold the trees", pick),
     ]
     image = clip.read(TOOLS_AT)[..., :3]
     height, width = image.shape[:2]

@@ -21,6 +21,8 @@ from clip_files import write_image
 from edits import clip, external, movie, picture, save, sequence, timeline
 
 from palette4d.cli import main
+from palette4d.media.clip import open_clip
+from palette4d.shows import batch
 
 #: A palette that does not change: these tests are about shots, not about the search.
 QUICK = ("--method", "static", "--set", "colours=512", "--set", "coarse_colours=128")
@@ -155,6 +157,20 @@ class TestEdits:
         after = state(out)
         assert {name: after[name] for name in before} == before
         assert [status for _, status, _ in shots(out)] == ["done"] * 3
+
+    def test_a_fault_of_a_library_costs_its_shot(
+        self, edit: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def opened(spec: str, **options: Any) -> Any:
+            if "sh010" in spec:
+                raise RuntimeError("a library's own")
+            return open_clip(spec, **options)
+
+        monkeypatch.setattr(batch, "open_clip", opened)
+        assert analyze(edit, tmp_path / "shots") == 1
+        assert [status for _, status, _ in shots(tmp_path / "shots")] == [
+            *("failed", "failed", "done")
+        ]
 
     def test_names_of_others_are_made_unlike(
         self, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -221,6 +221,14 @@ def test_metadata_goes_along(tmp_path):
         assert run(PLAIN, tmp_path / "c.0005.exr", "-o", tmp_path / f"o.{extension}") == 0
 
 
+def test_latin_1_text_goes_along(tmp_path):
+    path = write_image(tmp_path / "c.0005.exr", colours(2, 2, 3), Artist="Andr++")
+    path.write_bytes(path.read_bytes().replace(b"Andr++", b"Andr\xe9s"))
+    for extension in ("exr", "png", "tif"):
+        assert run(PLAIN, path, "-o", tmp_path / f"o.{extension}") == 0
+        assert stored(tmp_path / f"o.{extension}")[2].get_string_attribute("Artist") == "Andrés"
+
+
 def test_movie_as_input(tmp_path):
     frames = [np.random.default_rng(n).integers(0, 255, (6, 8, 3), np.uint8) for n in range(4)]
     movie = write_movie(tmp_path / "m.avi", "rawvideo", "bgr24", frames, "rgb24", rate=Fraction(25))

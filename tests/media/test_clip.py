@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from fractions import Fraction
 from pathlib import Path
 
@@ -230,6 +232,22 @@ def test_cut_file_is_named_or_skipped(tmp_path, extension, keep):
     assert clip.skipped == [2]
     with pytest.raises(FrameError):
         clip.read(2)
+
+
+def test_an_error_text_that_is_no_utf8_is_told(tmp_path):
+    path = write_image(tmp_path / "c.1.exr", np.zeros((2, 2, 3), np.float32))
+    path.write_bytes(path.read_bytes().replace(b"chlist", b"\xf0hlist"))
+    with pytest.raises(FrameError, match="frame 1 cannot be read"):
+        open_clip(str(path))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems refuse such names")
+def test_a_file_name_that_is_no_utf8_is_refused(tmp_path):
+    image = write_image(tmp_path / "c.png", np.zeros((2, 2, 3), np.uint8))
+    named = image.rename(tmp_path / os.fsdecode(b"caf\xe9.png"))
+    for spec in (str(named), str(tmp_path)):
+        with pytest.raises(Palette4dError, match="not UTF-8; rename"):
+            open_clip(spec)
 
 
 def test_first_frame_may_be_the_bad_one(tmp_path):

@@ -412,8 +412,8 @@ def _print_notes(
             if taken > TAKEN:
                 print(
                     f"note: the hold {hold} takes {taken:.0%} of what the colours near {id_} would "
-                    f"get at frame {near.frame:.0f}; a smaller one takes less: change {hold} "
-                    "--radius 0.05"
+                    f"get at frame {near.frame:.0f}. If that is too much, a smaller hold takes "
+                    f"less: change {hold} --radius 0.05"
                 )
     lines = _unmet(document)
     for ids, line in lines.items():

@@ -10,7 +10,7 @@ from __future__ import annotations
 from fractions import Fraction
 from pathlib import Path
 
-from palette4d.media import clip_sequence
+from palette4d.media import clip_sequence, oiio_text
 from palette4d.media.clip_base import Clip, ClipError, FrameError, Image
 
 __all__ = ["Clip", "ClipError", "FrameError", "Image", "open_clip"]
@@ -56,7 +56,7 @@ def open_clip(
             "the clip's name is empty; expected a pattern such as name.####.exr, a folder (. is "
             "the working folder), an image or a movie file"
         )
-    path = Path(spec)
+    path = Path(oiio_text.file_name(spec))
     if path.is_dir():
         found = clip_sequence.in_folder(path)
         if isinstance(found, clip_sequence.ImageSequence):

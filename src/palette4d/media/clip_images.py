@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from palette4d import _core
 from palette4d.common.arguments import MAX_FRAMES, parse_frames
+from palette4d.media import oiio_text
 from palette4d.media.clip_base import (
     DEFAULT_RATE,
     F32,
@@ -111,7 +112,7 @@ class ImageClip(Clip):
         self._check(header, frame)
         first, last = min(chosen), max(chosen) + 1
         stored = source.read_image(source.current_subimage(), 0, first, last, spec.format)
-        problem = source.geterror()
+        problem = oiio_text.problem_of(source)
         source.close()
         # A damaged JPEG returns grey pixels together with an error.
         if stored is None or problem:
@@ -288,9 +289,9 @@ def _open(path: Path, what: str) -> tuple[Any, Any]:
         raise _unreadable(path, what, "the file is empty")
     config = oiio.ImageSpec()
     config.attribute("oiio:UnassociatedAlpha", 1)  # values as they are stored
-    source = oiio.ImageInput.open(str(path), config)
+    source = oiio.ImageInput.open(oiio_text.file_name(path), config)
     if source is None:
-        raise _unreadable(path, what, oiio.geterror())
+        raise _unreadable(path, what, oiio_text.problem_of(oiio))
     # The part of a multi-part EXR that holds the colours; the first one otherwise.
     part = 0
     while source.seek_subimage(part, 0):
@@ -298,7 +299,7 @@ def _open(path: Path, what: str) -> tuple[Any, Any]:
             break
         part += 1
     else:
-        source.geterror()
+        oiio_text.problem_of(source)
         source.seek_subimage(0, 0)
     spec = source.spec()
     if spec.deep:
@@ -389,7 +390,7 @@ def _header(spec: Any, chosen: list[int]) -> Header:
     has_alpha = len(chosen) == 4
     straight = bool(spec.get_int_attribute("oiio:UnassociatedAlpha", 0))
     bits = _bits(spec)
-    space = str(spec.get_string_attribute("oiio:ColorSpace"))
+    space = oiio_text.readable(spec.get_string_attribute("oiio:ColorSpace"))
     return Header(
         width=width,
         height=height,
@@ -400,7 +401,7 @@ def _header(spec: Any, chosen: list[int]) -> Header:
         encoding=_ENCODINGS.get(space.lower(), space) or _dpx_encoding(spec) or "unknown",
         rate=_rate(spec),
         metadata=tuple(
-            (param.name, param.type, param.value)
+            (param.name, param.type, oiio_text.readable(param.value))
             for param in spec.extra_attribs
             if param.name in CARRIED
         ),
@@ -410,14 +411,14 @@ def _header(spec: Any, chosen: list[int]) -> Header:
 
 def _note(spec: Any, chosen: list[int]) -> str:
     """Return a note if the channels that are read have no names of colours."""
-    names = [spec.channelnames[channel] for channel in chosen[:3]]
+    names = [oiio_text.readable(spec.channelnames[channel]) for channel in chosen[:3]]
     if len(set(names)) == 1 or [name.rpartition(".")[2] for name in names] == ["R", "G", "B"]:
         return ""
     return f"no channels R, G and B; {', '.join(names)} are used as red, green and blue"
 
 
 def _dpx_encoding(spec: Any) -> str:
-    transfer = str(spec.get_string_attribute("dpx:Transfer"))
+    transfer = oiio_text.readable(spec.get_string_attribute("dpx:Transfer"))
     return "" if transfer in ("", "Undefined", "User defined") else transfer
 
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.common.errors import Palette4dError, WriteError
 from palette4d.common.files import EXISTS, replacing
+from palette4d.media import oiio_text
 
 FORMATS = ("exr", "png", "tif", "tiff")
 # What each format can hold of the metadata that `palette4d.media.clip_images.CARRIED` names.
@@ -229,15 +230,17 @@ def write_frame(
         spec.attribute("oiio:UnassociatedAlpha", 0 if premultiplied else 1)
 
     with replacing(path, force=True) as temporary:
-        target = oiio.ImageOutput.create(str(temporary))
+        target = oiio.ImageOutput.create(oiio_text.file_name(temporary))
         if target is None:
-            raise OutputError(f"{path}: {oiio.geterror()}; expected .exr, .png or .tif")
+            raise OutputError(f"{path}: {oiio_text.problem_of(oiio)}; expected .exr, .png or .tif")
         if not target.open(str(temporary), spec):
-            raise _cannot_write(path, target.geterror())
+            raise _cannot_write(path, oiio_text.problem_of(target))
         written = target.write_image(stored)
-        problem = target.geterror()  # PNG reports a full disk here, and still returns true
+        # PNG reports a full disk here, and still returns true.
+        problem = oiio_text.problem_of(target)
         closed = target.close()
-        closing = target.geterror()  # likewise; of a whole TIFF it complains about Exif data
+        # Likewise; of a whole TIFF it complains about Exif data.
+        closing = oiio_text.problem_of(target)
         problem = problem or (closing if extension != "tif" else "")
         if problem or not written or not closed or not _is_whole(temporary, stored):
             raise _cannot_write(path, problem)
@@ -255,12 +258,12 @@ def _is_whole(path: Path, stored: NDArray[Any]) -> bool:
     raw.attribute("oiio:UnassociatedAlpha", 1)
     source = oiio.ImageInput.open(str(path), raw)
     if source is None:
-        oiio.geterror()
+        oiio_text.problem_of(oiio)
         return False
     height, _, channels = stored.shape
     first = 0 if path.suffix.lower().startswith(".tif") else height - 1
     rows = source.read_scanlines(0, 0, first, height, 0, 0, channels, source.spec().format)
-    problem = source.geterror()
+    problem = oiio_text.problem_of(source)
     source.close()
     if path.suffix.lower() == ".exr" and not _has_table(path.read_bytes(), height):
         return False

@@ -264,7 +264,18 @@ class Show:
 
 
 def analyse_shot(task: ShotTask, threads: int) -> Analysed:
-    """Analyse one shot."""
+    """Analyse one shot; every error of the media or the analysis is one in words."""
+    try:
+        return _analysed(task, threads)
+    except (Palette4dError, OSError):
+        raise
+    except Exception as error:  # one shot must not end a night's work
+        raise Palette4dError(
+            f"the analysis ended with {type(error).__name__}: {error}; please report this"
+        ) from error
+
+
+def _analysed(task: ShotTask, threads: int) -> Analysed:
     options = task.options
     shot = task.shot
     notes: list[str] = []
@@ -278,14 +289,7 @@ def analyse_shot(task: ShotTask, threads: int) -> Analysed:
             )
     clip = _open(task, shot)
     analysis_options = dataclasses.replace(options.analysis, threads=threads)
-    try:
-        analysis = pipeline.analyze(clip, analysis_options, spaces=options.spaces, allow_cuts=True)
-    except (Palette4dError, OSError):
-        raise
-    except Exception as error:  # one shot must not end a night's work
-        raise Palette4dError(
-            f"the analysis ended with {type(error).__name__}: {error}; please report this"
-        ) from error
+    analysis = pipeline.analyze(clip, analysis_options, spaces=options.spaces, allow_cuts=True)
     analysis.document["clip"]["name"] = shot.name
     # The notes on a movie are told once, not for each of its shots.
     told = clip.notes if shot.place is None else []
