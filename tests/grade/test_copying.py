@@ -67,6 +67,13 @@ def test_another_length_has_corresponding_times() -> None:
     assert worst(target, source, [(1000 + 3 * t, t) for t in range(21)]) < 5 / 255
 
 
+def test_a_target_of_very_many_frames_is_refused() -> None:
+    target = Document(stretched(members("split"), 50_000_000, 0))
+    with pytest.raises(Palette4dError, match="more than 1000000 frames"):
+        target.copy_from(graded())
+    assert not target.settings
+
+
 def test_one_frame_gives_its_look_to_all_frames() -> None:
     source, target = graded(), Document(members("split"))
     target.copy_from(source, time=2)

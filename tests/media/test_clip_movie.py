@@ -46,6 +46,17 @@ def test_lossless_sixteen_bit_is_exact(tmp_path):
         np.testing.assert_array_equal(pixels, frames[frame].astype(np.float32) / np.float32(65535))
 
 
+def test_a_movie_that_claims_very_many_frames_is_refused(tmp_path):
+    path = write_movie(tmp_path / "a.mp4", "mpeg4", "yuv420p", noise(6), "rgb24")
+    movie = bytearray(path.read_bytes())
+    at = movie.index(b"stts") + 12  # the number of frames of the first length
+    movie[at : at + 4] = (400_000_000).to_bytes(4, "big")
+    path.write_bytes(movie)
+    for frames in (None, "0-3"):
+        with pytest.raises(ClipError, match="more than 1000000 frames in the movie"):
+            open_clip(str(path), frames=frames, skip_bad_frames=True)
+
+
 def test_alpha_is_straight(tmp_path):
     frames = noise(2, channels=4)
     path = write_movie(tmp_path / "a.mov", "qtrle", "argb", frames, "argb")

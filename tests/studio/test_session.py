@@ -9,6 +9,7 @@ from collections.abc import Callable, Generator
 from pathlib import Path
 
 import pytest
+from clip_files import grey_levels
 
 import palette4d
 from palette4d.cli.main import main
@@ -44,6 +45,23 @@ def test_an_edit_leaves_the_bytes_of_the_verb(
     session.tick(LATER)
     assert main(["edit", str(twin), "set", id_, "--rgb", "0.5", "0.25", "0.125"]) == 0
     assert sidecar.read_bytes() == twin.read_bytes()
+
+
+def test_a_palette_of_very_many_frames_takes_little_memory(tmp_path: Path) -> None:
+    """Its frames are counted, not listed: there are 10^9."""
+    grey_levels(tmp_path, range(3, 6))
+    fields = json.loads((GOLDEN / "v1_split.p4d.json").read_text())
+    ranges = [fields["clip"]["frames"], *fields["polytope"]["blocks"]]
+    for one in ranges:
+        one.update({name: one[name] * 50_000_000 for name in ("first", "last")})
+    for one in fields["polytope"]["vertices"]:
+        one["frame"] *= 50_000_000
+    fields["edits"] = {"vertices": [], "stops": []}
+    (tmp_path / "a.p4d.json").write_text(json.dumps(fields))
+    session = Session()
+    session.open_sidecar(tmp_path / "a.p4d.json", str(tmp_path / "clip.####.png"))
+    assert "lacks 999999998 frames of the palette, the first is 0" in session.status.text
+    session.close()
 
 
 def test_a_drag_writes_only_what_is_dropped(session: Session, sidecar: Path) -> None:
@@ -136,6 +154,21 @@ def test_a_file_that_another_program_broke_is_not_overwritten(
     assert palette4d.load(next(recovery_files(sidecar))).colour(id_) == (0, 1, 0)
     assert session.save_as(tmp_path / "mine.p4d.json")
     assert palette4d.load(tmp_path / "mine.p4d.json").colour(id_) == (0, 1, 0)
+
+
+def test_the_copy_of_a_file_with_the_longest_name(
+    sidecar: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    longest = sidecar.with_name("a" * 245 + ".p4d.json")
+    sidecar.rename(longest)
+    session = Session()
+    session.open_sidecar(longest)
+    id_ = vertex(longest)
+    session.edit(lambda document: document.set(id_, rgb=(0, 1, 0)))
+    longest.write_text("{")
+    assert not session.save()
+    assert palette4d.load(next(recovery_files(longest))).colour(id_) == (0, 1, 0)
 
 
 def test_what_an_earlier_session_could_not_save_stays(

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from palette4d import _core
 from palette4d.colour.encoding_conversion import between
+from palette4d.common.arguments import frames_between
 from palette4d.common.errors import Palette4dError
 from palette4d.grade import edits
 from palette4d.grade.edits import Key, Setting, as_colour
@@ -223,7 +224,7 @@ def _handles(
 
     first, last, step = target.frames
     before_at: dict[str, list[tuple[float, F64, F64]]] = {}
-    for at in range(first, last + 1, step):
+    for at in frames_between(first, last, step):
         palette = target.palette(at)
         after = graded(palette.rgb, at)
         for id_, colour, new in zip(palette.ids, palette.rgb, after, strict=True):

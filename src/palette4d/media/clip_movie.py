@@ -23,7 +23,7 @@ from av.error import FFmpegError
 from numpy.typing import NDArray
 
 from palette4d import _core
-from palette4d.common.arguments import parse_frames
+from palette4d.common.arguments import MAX_FRAMES, parse_frames
 from palette4d.media.clip_base import (
     DEFAULT_RATE,
     F32,
@@ -332,6 +332,11 @@ def _index(
     by_decoding = stream.codec_context.name == "vp8"
     try:
         for packet in container.demux(stream):
+            if max(stream.frames, len(stamps)) > MAX_FRAMES:
+                raise ClipError(
+                    f"{path}: found more than {MAX_FRAMES} frames in the movie, expected fewer; "
+                    "cut it into parts"
+                )
             pictures: list[Any] = []
             if first is None or by_decoding:
                 try:

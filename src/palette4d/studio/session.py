@@ -159,9 +159,11 @@ class Session(SessionView):
             own, other = f"{width}x{height}", f"{clip.width}x{clip.height}"
             found.append(texts.OTHER_SIZE.format(own=own, found=other))
         first, last, step = document.frames
-        lacks = {*range(first, last + 1, step)} - {*clip.frames}
-        if lacks:
-            found.append(texts.LACKS_FRAMES.format(count=len(lacks), first=min(lacks)))
+        wanted = range(first, last + 1, step)
+        held = {frame for frame in clip.frames if frame in wanted}
+        if lacks := len(wanted) - len(held):
+            missing = next(frame for frame in wanted if frame not in held)
+            found.append(texts.LACKS_FRAMES.format(count=lacks, first=missing))
         return "; ".join(found)
 
     @property
@@ -504,7 +506,9 @@ def recovery_files(sidecar: Path) -> Iterator[Path]:
     state = os.environ.get("XDG_STATE_HOME") or str(Path.home() / ".local" / "state")
     name = hashlib.sha256(os.path.realpath(sidecar).encode()).hexdigest()[:12]
     folder = Path(state) / "palette4d" / "recovery"
-    return (folder / f"{name}-{number}-{sidecar.name}" for number in itertools.count(1))
+    # At most 255 bytes: two names may begin alike, their hashes do not.
+    short = os.fsdecode(os.fsencode(sidecar.name)[-200:])
+    return (folder / f"{name}-{number}-{short}" for number in itertools.count(1))
 
 
 def recovered(sidecar: Path) -> Path | None:
