@@ -8,6 +8,7 @@ clip -> colour_statistics -> frame_hulls -> glue -> block_merging -> vertex_remo
 
 from __future__ import annotations
 
+import concurrent.futures
 import dataclasses
 import functools
 import itertools
@@ -33,10 +34,10 @@ from palette4d.analysis.block_merging import Block
 from palette4d.analysis.convex_hulls import CONCAVE, deepest_concavity
 from palette4d.analysis.dense_polytope import DensePolytope
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
-from palette4d.analysis.losses import LOST_SHARE, Losses
+from palette4d.analysis.losses import LOST_SHARE, Losses, thread_count
 from palette4d.analysis.objective import losses_of
 from palette4d.analysis.options import AnalysisOptions
-from palette4d.analysis.polytope import SkewPolytope
+from palette4d.analysis.polytope import FramePalette, SkewPolytope
 from palette4d.analysis.report import advice, quality
 from palette4d.analysis.report.quality import Report
 
@@ -407,8 +408,12 @@ def _consistent_blocks(
     run: _Run, frames: Sequence[FrameStatistics]
 ) -> tuple[list[Block], StageResult]:
     """Return blocks of topologically consistent frames (sections 5.2 and 5.3.1)."""
-    hulls = (frame_hulls.frame_palette(f.coarse, run.gamut, run.options) for f in frames)
-    palettes = list(run.counted("frame_hulls", hulls, len(frames)))
+
+    def hull(frame: FrameStatistics) -> FramePalette:
+        return frame_hulls.frame_palette(frame.coarse, run.gamut, run.options)
+
+    with concurrent.futures.ThreadPoolExecutor(thread_count(run.options)) as pool:
+        palettes = list(run.counted("frame_hulls", pool.map(hull, frames), len(frames)))
     pairs = (glue.glue(a, b) for a, b in itertools.pairwise(palettes))
     glued = list(run.counted("glue", pairs, len(frames) - 1))
     links = [g.links if g.consistent else None for g in glued]

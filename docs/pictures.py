@@ -219,24 +219,28 @@ def draw_picks(demo: Path) -> None:
     sidecar, clip = demo / "sample.p4d.json", p4d.open_clip(str(demo / "clip/sample.####.png"))
     plain = p4d.load(sidecar)
     plain.reset()
-    house: dict[str, object] = {"frame": 5, "pixel": (258, 111), "box": 5, "to": (0.1, 0.3, 0.9)}
-    sky: dict[str, object] = {"frame": 5, "by": (0.2, -0.1, -0.15)}
+    house: list[dict[str, object]] = [
+        {"pixel": WALL, "box": 5, "to": (0.1, 0.3, 0.9)},
+        {"pixel": GABLE, "box": 3, "to": (0.07, 0.2, 0.6)},
+    ]
+    sky: list[dict[str, object]] = [{"pixel": (60, 30), "box": 41, "by": (0.2, -0.1, -0.15)}]
 
-    def picked(**how: object) -> p4d.Document:
+    def picked(asked: list[dict[str, object]], **how: object) -> p4d.Document:
         document = plain.trial()
-        document.pick(clip=clip.source, **how)
+        for one in asked:
+            document.pick(frame=5, clip=clip.source, **one, **how)
         return document
 
     shown: list[tuple[str, int, Callable[[], p4d.Document]]] = [
         ("the clip, frame 5", 5, lambda: plain),
-        ("pick: the red house becomes blue", 5, lambda: picked(**house)),
-        ("pick of a box: the whole sky", 5, lambda: picked(pixel=(60, 30), box=41, **sky)),
+        ("two picks: the red house becomes blue", 5, lambda: picked(house)),
+        ("pick of a box: the whole sky", 5, lambda: picked(sky)),
         ("the clip, frame 28", 28, lambda: plain),
-        ("the same pick: red trees follow", 28, lambda: picked(**house)),
-        ("until frame 18, ramp of 4: they stay", 28, lambda: picked(until=18, fade=4, **house)),
+        ("the same picks: red trees follow", 28, lambda: picked(house)),
+        ("until frame 18, ramp of 4: they stay", 28, lambda: picked(house, until=18, fade=4)),
         ("the clip, frame 42", 42, lambda: plain),
-        ("night: the red is lost, the pick has ended", 42, lambda: picked(**house)),
-        ("the sky's pick: less in the dark", 42, lambda: picked(pixel=(60, 30), box=41, **sky)),
+        ("night: the red is lost, the picks have ended", 42, lambda: picked(house)),
+        ("the sky's pick: less in the dark", 42, lambda: picked(sky)),
     ]
     first = clip.read(5)
     figure = Figure(figsize=(16, 16 * (first.shape[0] / first.shape[1] + 0.035)), facecolor=PAGE)

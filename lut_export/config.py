@@ -22,6 +22,7 @@ from palette4d.lut_export.config_base import (
     ANY_SHOT,
     LUTS,
     load_base,
+    own_folder,
     refuse_looks,
     relocate,
     space_of_sidecar,
@@ -136,7 +137,7 @@ def write_config(
     make_folder(folder)
     requests = []
     for file, name, chosen in zip(sidecars, shot_names, frames, strict=True):
-        luts = folder / LUTS / name
+        luts = own_folder(own_folder(folder / LUTS) / name)
         _remove_links(luts)
         requests.append(series.Request(file, luts, chosen, settings, name, 0, clip, force))
     baked = series.export(requests, workers, progress)

@@ -2,6 +2,8 @@
 
 import os
 import re
+import shutil
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +17,10 @@ from palette4d.colour.ocio_config import (
     space_of_encoding,
 )
 from palette4d.common.errors import Palette4dError
+from palette4d.common.files import make_folder, replacing, temporary_folder
 
-#: The folder of the LUTs, beside the config.
-LUTS = "luts"
+#: The folders beside the config: of the LUTs, and of what the base's archive holds.
+LUTS, BASE = "luts", "base"
 
 #: The look for all shots: SHOT and FRAME are both variables.
 ANY_SHOT = "palette4d"
@@ -80,14 +83,12 @@ def refuse_looks(config: Any, base: str, names: list[str]) -> None:
 
 def relocate(config: Any, base: str, archive: bool, folder: Path) -> list[str]:
     """Let the new config find the base's own files; return notes about them."""
-    import PyOpenColorIO as ocio
-
     notes: list[str] = []
     own = [str(path) for path in config.getSearchPaths()]
     if not base.startswith("ocio://"):
         if archive:
-            ocio.ExtractOCIOZArchive(base, str(folder / "base"))
-            root = "base"
+            _extract(base, folder / BASE)
+            root = BASE
         else:
             there = Path(base).absolute().parent
             root = "" if there == folder.absolute() else str(there)
@@ -110,11 +111,48 @@ def relocate(config: Any, base: str, archive: bool, folder: Path) -> list[str]:
     return notes
 
 
+def own_folder(folder: Path) -> Path:
+    """Return a folder of the config; it may be missing, but no link to a folder of others."""
+    if folder.is_symlink():
+        raise Palette4dError(
+            f"{folder}: found a link, expected a folder of the config's own; remove the link, or "
+            "choose another folder for the config"
+        )
+    return folder
+
+
+def _extract(archive: str, target: Path) -> None:
+    """Write the files of an archive into a folder, each as a whole."""
+    import PyOpenColorIO as ocio
+
+    with temporary_folder(Path(tempfile.gettempdir())) as scratch:
+        try:
+            ocio.ExtractOCIOZArchive(archive, str(scratch))
+        except failures() as error:
+            raise Palette4dError(
+                f"{archive}: the archive cannot be unpacked ({error}); expected a whole .ocioz, "
+                "and room in the folder for temporary files"
+            ) from error
+        for path in sorted(scratch.rglob("*")):
+            if path.is_dir():
+                continue
+            place = target / path.relative_to(scratch)
+            for folder in reversed(place.relative_to(target.parent).parents[:-1]):
+                make_folder(own_folder(target.parent / folder))
+            with replacing(place, force=True) as temporary:
+                shutil.copyfile(path, temporary)
+
+
 def _declare_variables(config: Any) -> list[str]:
     notes = []
     used = set(re.findall(r"\$\{?([A-Za-z_][A-Za-z0-9_]*)", config.serialize()))
     used |= set(re.findall(r"%([A-Za-z_][A-Za-z0-9_]*)%", config.serialize()))
     for name in sorted(used - {"SHOT", "FRAME"}):
-        config.addEnvironmentVar(name, os.environ.get(name, ""))
-        notes.append(f"the base's variable {name} is now {os.environ.get(name, '')!r} by default")
+        value = os.environ.get(name, "")
+        if value and not Path(value).exists():  # it may be a secret: a base can name any variable
+            config.addEnvironmentVar(name, "")
+            notes.append(f"set the base's variable {name} where the config is used")
+            continue
+        config.addEnvironmentVar(name, value)
+        notes.append(f"the base's variable {name} is now {value!r} by default")
     return notes

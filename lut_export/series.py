@@ -36,7 +36,7 @@ from palette4d import _core
 from palette4d.colour.ocio_config import from_anywhere
 from palette4d.common.arguments import frames_between
 from palette4d.common.errors import Palette4dError, WriteError
-from palette4d.common.files import make_folder, replacing
+from palette4d.common.files import make_folder, replacing, temporary_folder
 from palette4d.common.text import checked_name, file_safe
 from palette4d.jobs.workers import Failed, Workers
 
@@ -360,8 +360,8 @@ class _Export:
 
 def bake_frame(task: FrameTask, threads: int) -> tuple[Entry, bytes]:
     """Bake one file of a series in a temporary folder; return its entry and its content."""
-    with tempfile.TemporaryDirectory(prefix="palette4d-") as scratch:
-        path = Path(scratch) / task.file
+    with temporary_folder(Path(tempfile.gettempdir())) as scratch:
+        path = scratch / task.file
         settings = asdict(task.settings)
         result = bake(task.sidecar, task.frame, path, clip=task.clip, threads=threads, **settings)
         return entry_of(path, result), path.read_bytes()

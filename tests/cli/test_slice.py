@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from palette4d.cli.main import main
+from palette4d.grade import sidecar
 from palette4d.grade.document import Document
 
 EDITED = Path(__file__).resolve().parents[1] / "golden" / "sidecars" / "v1_edited.p4d.json"
@@ -61,9 +62,12 @@ def test_whole_numbers_may_have_a_point(tmp_path: Path, capsys: pytest.CaptureFi
     text = EDITED.read_text(encoding="utf-8")
     dotted = tmp_path / "dotted.p4d.json"
     dotted.write_text(
-        text.replace('"first": 0, "last": 20, "step": 1', '"first": 0.0, "last": 2e1, "step": 1.0'),
+        text.replace('"first": 0, "last": 20, "step": 1', '"first": 0.0, "last": 2e1, "step": 1.0')
+        .replace('"rate": [24, 1]', '"rate": [24.0, 1.0]')
+        .replace('"size": [64, 36]', '"size": [64.0, 36.0]'),
         encoding="utf-8",
     )
-    assert dotted.read_text(encoding="utf-8") != text
+    found = sidecar.load(dotted)["clip"]
+    assert repr(found) == repr(sidecar.load(EDITED)["clip"])
     assert main(["slice", str(dotted), "--frames", "all", "--json"]) == 0
     assert len(json.loads(capsys.readouterr().out)) == 21

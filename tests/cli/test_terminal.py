@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from palette4d.cli.main import main
+from palette4d.cli.progress import frames_bar
 from palette4d.cli.swatches import row
 
 EDITED = Path(__file__).resolve().parents[1] / "golden" / "sidecars" / "v1_edited.p4d.json"
@@ -52,6 +53,17 @@ def test_what_is_printed_is_printable(
     printed = "".join(capsys.readouterr())
     assert printed
     assert all(c == "\n" or (c.isprintable() and c not in "\u202e\u2066") for c in printed)
+
+
+def test_a_name_in_a_progress_bar_is_printable(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+    with frames_bar("shots", hidden=False) as show:
+        show(1, 2, HOSTILE)
+    printed = capsys.readouterr().err
+    assert r"\u001b[2J" in printed
+    assert all(c.isprintable() for c in printed.replace("\r", "").replace("\n", ""))
 
 
 def test_patches_of_colour_still_reach_the_terminal(

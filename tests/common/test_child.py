@@ -37,6 +37,29 @@ def test_a_script_is_not_run_again(tmp_path: Path) -> None:
     assert (done.returncode, done.stdout) == (0, "once\nb\n"), done.stderr
 
 
+def test_the_working_folder_is_no_place_of_modules(tmp_path: Path) -> None:
+    script, folder = tmp_path / "script.py", tmp_path / "project"
+    folder.mkdir()
+    script.write_text(
+        "from palette4d.common.child import Child\n"
+        "import os\n"
+        "with Child() as child:\n"
+        "    print(child.call(os.path.basename, 'a/b'))\n"
+    )
+    for name in ("multiprocessing", "argparse"):
+        (folder / f"{name}.py").write_text("open('ran', 'w')\n")
+    done = subprocess.run(
+        [sys.executable, str(script)],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (0, "b\n"), done.stderr
+    assert not (folder / "ran").exists()
+
+
 def test_one_process_serves_many_calls(child: Child) -> None:
     first, second = child.call(well, 1, 2), child.call(well, 3, 4)
     assert (first[:2], second[:2]) == ((1, 2), (3, 4))

@@ -17,6 +17,8 @@ from palette4d.grade import sidecar
 from palette4d.grade.document import Document
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "sidecars"
+STOP = {"edge": "e1", "frame": 5, "rgb": [0, 0, 0]}
+PICK = {"id": "p1", "kind": "pick", "frame": 5, "rgb": [0, 0, 0], "to": [1, 1, 1]}
 
 
 @pytest.fixture
@@ -122,6 +124,9 @@ def test_the_history_stays_small(plain: Path) -> None:
         {"done": [{"step": "x", "changes": []}]},
         {"done": [{"step": "x", "changes": [["handle", "v1", None, {"rgb": [1, 2]}]]}]},
         {"done": [{"step": "x", "changes": [["thing", "v1", None, {"rgb": [1, 2, 3]}]]}]},
+        {"done": [{"step": "x", "changes": [["handle", "s1", None, STOP | {"frame": "5"}]]}]},
+        {"done": [{"step": "x", "changes": [["pick", "p1", None, {"id": "p1"}]]}]},
+        {"done": [{"step": "x", "changes": [["pick", "p1", None, PICK | {"fade": "5"}]]}]},
         {"undone": [{"step": 3, "changes": [["lock", "v1", None, True]]}]},
         {"undone": [{"step": "x", "changes": [["lock", "v1", None, 3]]}]},
         {"undone": [{"step": "x", "changes": [["version", "v1", None, 3]]}]},

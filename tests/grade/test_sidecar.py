@@ -16,6 +16,7 @@ GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
 FILES = sorted(GOLDEN.glob("v1_*.p4d.json"))
 
 Document = dict[str, Any]
+PICK = {"kind": "pick", "frame": 0, "rgb": [0, 0, 0], "to": [1, 1, 1]}
 
 
 def golden(name: str) -> Document:
@@ -204,3 +205,32 @@ def test_targets_that_cannot_be_written(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="on_edits"):
         sidecar.save(golden("split"), tmp_path / "x.json", on_edits="maybe")  # type: ignore[arg-type]
     assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("member", "pointer"),
+    [
+        ({"edits": {"picks": [dict(PICK, id=f"p{i}") for i in range(1001)]}}, "/edits/picks"),
+        (
+            {
+                "edits": {
+                    "picks": [
+                        dict(PICK, id=id_, path=[{"frame": i / 1000, "rgb": [0, 0, 0]} for i in n])
+                        for id_, n in (("p1", range(10_000)), ("p2", range(10_001)))
+                    ]
+                }
+            },
+            "/edits/picks/1/path",
+        ),
+        ({"colours": [{"frame": 0, "rgbw": []}]}, "/colours/0/rgbw"),
+        ({"colours": [{"frame": 0, "rgbw": [[0, 0, 0, 1]] * 100_001}]}, "/colours/0/rgbw"),
+    ],
+    ids=["picks", "paths", "no colours", "colours"],
+)
+def test_what_would_take_all_time_is_refused(member: Any, pointer: str) -> None:
+    fields = golden("split")
+    edits = {**fields["edits"], **member.get("edits", {})}
+    data = sidecar.encoded({**fields, **member, "edits": edits})
+    with pytest.raises(SidecarError) as caught:
+        _core.parse_sidecar(data, "x")
+    assert caught.value.pointer == pointer

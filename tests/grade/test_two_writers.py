@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -129,6 +130,23 @@ def test_a_lock_file_of_a_dead_process_is_removed(
     assert path.read_bytes() == before
     lock.unlink()
     document.save()
+
+
+def test_a_folder_that_cannot_be_opened_is_locked_by_a_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Files can be written in a folder that may not be listed."""
+    opens = os.open
+
+    def closed(path: Any, *how: Any, **more: Any) -> int:
+        if path == tmp_path:
+            raise PermissionError(errno.EACCES, "closed")
+        return opens(path, *how, **more)
+
+    monkeypatch.setattr(os, "open", closed)
+    with locking.locked(tmp_path / "clip.p4d.json"):
+        assert (tmp_path / ".clip.p4d.json.lock").exists()
+    assert not (tmp_path / ".clip.p4d.json.lock").exists()
 
 
 def test_a_lock_that_was_taken_away_stops_the_write(

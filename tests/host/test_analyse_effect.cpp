@@ -120,6 +120,8 @@ TEST(a_fetch_that_cannot_be_says_why) {
     refused("enter the path of the new sidecar");
     effect.node->set("sidecar", std::string("relative.p4d.json"));
     refused("found no such folder");
+    effect.node->set("sidecar", (folder() / "\x1b[2J" / "shot.p4d.json").u8string());
+    refused("\\u001b[2J");
     effect.node->set("sidecar", effect.target.u8string());
     effect.pictures.pop_back();
     refused("no picture at time 2");

@@ -177,21 +177,27 @@ TEST(studio_opens_the_clip_where_there_is_no_sidecar) {
 }
 
 TEST(nothing_starts_where_nothing_is_installed) {
+    // Neither the clip's folder nor the project's, where the host runs, is asked for a program.
+    const fs::path here = fs::current_path(), project = folder() / "project";
+    for (const fs::path& place : {folder(), project}) {
+        fs::create_directories(place / "Resources");
+        for (const char* name : {"program", "Resources/program"}) {
+            std::ofstream(place / name) << own_file().u8string() << "\n";
+        }
+    }
     Plugin plugin(bundle());
     const auto node = plugin.create();
     node->set("sidecar", sidecar());
     node->set("clipFile", (folder() / "shot.mov").u8string());
+    fs::current_path(project);
     for (const char* button : {"openInStudio", "analyse"}) {
         CHECK(node->changed(button) == kOfxStatOK);
         const std::string said = node->text("status");
-        EXPECT(said.find("run 'palette4d install-plugin'") != std::string::npos, said);
+        EXPECT(said.find("found no such file; run 'palette4d install-plugin'") != std::string::npos,
+               said);
         EXPECT(said.find("box: frames 10-20") != std::string::npos, said);
     }
-    // Neither the project's nor the clip's folder is asked for a program.
-    fs::create_directories(folder() / "Resources");
-    write("Resources/program", own_file().u8string());
-    CHECK(node->changed("openInStudio") == kOfxStatOK);
-    CHECK(node->text("status").find("found no such file") != std::string::npos);
+    fs::current_path(here);
 }
 
 TEST(an_analysis_runs_beside_the_host) {

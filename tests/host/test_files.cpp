@@ -48,6 +48,7 @@ TEST(unusable_sidecars_pass_the_picture_through) {
         {write("other.p4d.json", "[1, 2, 3]"), "other.p4d.json"},
         {write("percent.p4d.json", "{\"schema\": \"%s%n%d\"}"), "percent.p4d.json"},
         {(folder() / "a\nb%s%n.json").u8string(), "%s%n"},
+        {(folder() / "a\x1b[2J.json").u8string(), "a\\u001b[2J.json"},
         {std::string("\xff\xfe/not utf-8"), ""},
         {std::string(5000, 'x'), ""},
     };

@@ -309,6 +309,34 @@ class TestBase:
         got = shown(done.path, {}, ocio.ColorSpaceTransform(src="srgb_tx", dst="half"))
         np.testing.assert_allclose(got, colours() / 2, atol=1e-6)
 
+    def test_the_value_of_a_variable_that_is_no_path_stays_out(
+        self, shot: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        base = self.own(tmp_path)
+        text = base.read_text("utf-8").replace("environment:\n  {}\n", "")
+        base.write_text(text.replace("search_path: files", "search_path: files:$TOKEN"), "utf-8")
+        monkeypatch.setenv("TOKEN", "tulip")
+        done = write_config([shot], tmp_path / "show", **options(5, base=str(base)))
+        assert any("TOKEN" in note for note in done.notes)
+        assert "tulip" not in done.path.read_text("utf-8") + " ".join(done.notes)
+
+    def test_links_in_the_place_of_its_folders_lead_nowhere(
+        self, shot: Path, tmp_path: Path
+    ) -> None:
+        base = ocio.Config.CreateFromFile(str(self.own(tmp_path)))
+        base.archive(str(tmp_path / "base.ocioz"))
+        victim = tmp_path / "victim"
+        victim.mkdir()
+        (victim / "link").symlink_to("somewhere")
+        for name in ("luts", "luts/cube", "base"):
+            folder = tmp_path / ("of_" + name.replace("/", "_"))
+            place = folder / name
+            place.parent.mkdir(parents=True)
+            place.symlink_to(victim)
+            with pytest.raises(Palette4dError, match="found a link"):
+                write_config([shot], folder, **options(5, base=str(tmp_path / "base.ocioz")))
+            assert [path.name for path in victim.iterdir()] == ["link"]
+
     def test_a_declared_variable_is_kept(self, shot: Path, tmp_path: Path) -> None:
         base = self.own(tmp_path, environment=True)
         done = write_config([shot], tmp_path / "show", **options(5, base=str(base)))

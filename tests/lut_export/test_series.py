@@ -177,7 +177,17 @@ class TestResuming:
         # The third file is still there, but of the other edit: it is not listed.
         assert [entry["frame"] for entry in done.document["frames"]] == [0, 4]
 
-    @pytest.mark.parametrize("text", ["", "{}", '{"frames": 3}', "[]", '{"frames": [{}]}'])
+    @pytest.mark.parametrize(
+        "text",
+        [
+            "",
+            "{}",
+            '{"frames": 3}',
+            "[]",
+            '{"frames": [{}]}',
+            pytest.param("[" * 100_000, id="deep"),
+        ],
+    )
     def test_a_broken_index(self, text: str, tmp_path: Path) -> None:
         done = export(EDITED, tmp_path, options(0))
         done.index.write_text(text, "utf-8")

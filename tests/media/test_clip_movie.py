@@ -9,6 +9,7 @@ import pytest
 from av.video.reformatter import ColorRange, Colorspace
 from clip_files import damage, write_movie
 
+from palette4d.media import clip_movie
 from palette4d.media.clip import ClipError, FrameError, open_clip
 from palette4d.media.clip_movie import MovieClip
 
@@ -76,6 +77,15 @@ def test_a_playlist_does_not_lead_to_other_files(tmp_path, playlist):
     (tmp_path / "a.mp4").write_text(playlist)
     with pytest.raises(ClipError, match="its content is none of"):
         open_clip(str(tmp_path / "a.mp4"))
+
+
+def test_pictures_that_are_too_large_are_refused(tmp_path, monkeypatch):
+    path = write_movie(tmp_path / "a.mkv", "ffv1", "bgr0", noise(1), "rgb24")
+    monkeypatch.setattr(clip_movie, "MOST_SAMPLES", HEIGHT * WIDTH * 3)
+    open_clip(str(path))
+    monkeypatch.setattr(clip_movie, "MOST_SAMPLES", HEIGHT * WIDTH * 3 - 1)
+    with pytest.raises(ClipError, match="expected at most 13000x13000"):
+        open_clip(str(path))
 
 
 def test_grey(tmp_path):

@@ -100,6 +100,7 @@ def test_a_broken_one_is_refused(change: Any, tmp_path: Path) -> None:
     ("text", "words"),
     [
         ("", "cannot be read"),
+        pytest.param("[" * 100_000, "cannot be read", id="deep"),
         ("\ud800".encode("utf-8", "surrogatepass"), "cannot be read"),
         ("[]", "found the schema None"),
         ('{"schema": "palette4d.series"}', "found the schema 'palette4d.series'"),

@@ -418,7 +418,15 @@ class TestHostile:
             archive.writestr("content.otio", content)
             archive.writestr("version.txt", "1.0.0")
         assert path.stat().st_size < 100_000
-        with pytest.raises(Palette4dError, match="cannot be read as a timeline"):
+        with pytest.raises(Palette4dError, match=r"more than 300 MB of memory|crashed"):
+            timeline_clips.read(path)
+
+    def test_a_file_that_takes_too_long(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        path = save(timeline(clip("x", external("x.mov"), 5, 10)), tmp_path / "slow.otio")
+        monkeypatch.setattr(timeline_files, "SECONDS", 0.0)
+        with pytest.raises(Palette4dError, match="longer than 0 seconds"):
             timeline_clips.read(path)
 
     def test_a_pipe(self, tmp_path: Path) -> None:
@@ -438,10 +446,16 @@ class TestHostile:
         assert [bool(shot.problem) for shot in found] == [False, True, True, False]
         assert all(len(f"{shot.name}.p4d.json.0123") < 255 for shot in found)
 
-    def test_media_that_cannot_be_opened_in_time(
-        self, tmp_path: Path, plates: Path, monkeypatch: pytest.MonkeyPatch
+    @pytest.mark.parametrize(("limit", "least"), [("SECONDS", 0.0), ("MEGABYTES", 64)])
+    def test_media_that_exceeds_a_limit(
+        self,
+        limit: str,
+        least: float,
+        tmp_path: Path,
+        plates: Path,
+        monkeypatch: pytest.MonkeyPatch,
     ) -> None:
-        monkeypatch.setattr(timelines, "SECONDS", 0.0)
+        monkeypatch.setattr(timelines, limit, least)
         (shot,) = edit(timeline(clip("x", external("plates/b/take.mov"), 5, 10)), tmp_path).shots
         assert "take.mov: the media is unusable" in shot.problem
 

@@ -156,6 +156,21 @@ def test_a_file_that_another_program_broke_is_not_overwritten(
     assert palette4d.load(tmp_path / "mine.p4d.json").colour(id_) == (0, 1, 0)
 
 
+def test_the_copy_of_a_file_with_the_longest_name(
+    sidecar: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    longest = sidecar.with_name("a" * 245 + ".p4d.json")
+    sidecar.rename(longest)
+    session = Session()
+    session.open_sidecar(longest)
+    id_ = vertex(longest)
+    session.edit(lambda document: document.set(id_, rgb=(0, 1, 0)))
+    longest.write_text("{")
+    assert not session.save()
+    assert palette4d.load(next(recovery_files(longest))).colour(id_) == (0, 1, 0)
+
+
 def test_what_an_earlier_session_could_not_save_stays(
     session: Session, sidecar: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

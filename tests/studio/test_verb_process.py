@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 import palette4d
 from palette4d.studio.verb_process import VerbProcess
 
@@ -17,6 +19,15 @@ def test_a_job_does_what_the_command_does_and_reports(tmp_path: Path, analysed: 
     assert job.command == " ".join(["palette4d", *words])
     assert any(fraction is not None for fraction in heard)
     assert palette4d.load(out).frames == (1, 3, 1)
+
+
+def test_a_job_runs_no_module_of_the_working_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "argparse.py").write_text("open('ran', 'w')\n")
+    monkeypatch.chdir(tmp_path)
+    assert VerbProcess(["--version"], lambda job: None).wait(60) == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["argparse.py"]
 
 
 def test_a_stopped_job_leaves_nothing(tmp_path: Path, analysed: Path) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QTextDocument
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog, QMessageBox, QTabBar
 from windows import FRAME, Settle, busiest
@@ -40,6 +41,17 @@ def test_versions_are_kept_used_and_compared(opened: Window, settle: Settle) -> 
     assert not np.array_equal(picture.before, picture.after)
     opened.commands.compare_version()
     assert session.view.version == ""
+
+
+def test_names_that_look_like_html_are_shown_as_they_are(opened: Window, settle: Settle) -> None:
+    name = "<h1>gone</h1> <img src='x.png'>"
+    opened.session.say(name, "error")
+    settle(opened)
+    tip = QTextDocument()
+    tip.setHtml(opened.says.toolTip())
+    assert tip.toPlainText() == name
+    assert opened.says.textFormat() == Qt.TextFormat.PlainText
+    assert opened.file_facts.textFormat() == Qt.TextFormat.PlainText
 
 
 def test_undo_redo_and_the_history_by_hand(opened: Window) -> None:

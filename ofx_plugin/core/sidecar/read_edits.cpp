@@ -17,6 +17,10 @@ namespace {
 constexpr std::size_t kMaxVersionVertices = 1'000'000;
 /// More than the solver makes: each of a hundred picks has at most nine.
 constexpr std::size_t kMaxBumps = 1000;
+/// The solver takes a hundred that are enabled, and milliseconds for each key of a path.
+constexpr std::size_t kMaxPicks = 1000, kMaxPathKeys = 20'000;
+/// The analysis writes some hundreds.
+constexpr std::size_t kMaxWeighted = 100'000;
 /// Smallest radius of a bump, so that its square stays a normal float.
 constexpr double kMinRadius = 1e-4;
 /// Smallest share that distances to shades count, so that bumps stay finite.
@@ -53,12 +57,13 @@ double read_shade(const Cursor& entry) {
     return entry.has("shade") ? entry.member("shade").number(kMinShade, 1) : 1;
 }
 
-/// The length of a list of bumps or holds.
-std::size_t count_of(const Cursor& list, const char* what) {
+/// The length of a list, which with the `others` may have at most `most` entries.
+std::size_t count_of(const Cursor& list, const char* what, std::size_t most,
+                     std::size_t others = 0) {
     const std::size_t count = list.list(what);
-    if (count > kMaxBumps) {
-        list.fail(std::to_string(count) + " " + what,
-                  "at most " + std::to_string(kMaxBumps) + " " + what);
+    if (count + others > most) {
+        list.fail(std::to_string(count + others) + " " + what,
+                  "at most " + std::to_string(most) + " " + what);
     }
     return count;
 }
@@ -95,7 +100,7 @@ Solution read_solution(const Cursor& where, const Polytope& polytope, const Ids&
     });
 
     const Cursor bumps = where.member("bumps");
-    for (std::size_t i = 0, n = count_of(bumps, "bumps"); i < n; ++i) {
+    for (std::size_t i = 0, n = count_of(bumps, "bumps", kMaxBumps); i < n; ++i) {
         const Cursor entry = bumps.element(i);
         entry.require_members({"radius", "keys"}, {"shade"});
         Solution::MovingBump bump{
@@ -115,7 +120,7 @@ Solution read_solution(const Cursor& where, const Polytope& polytope, const Ids&
 
     if (!where.has("holds")) return solution;
     const Cursor holds = where.member("holds");
-    for (std::size_t i = 0, n = count_of(holds, "holds"); i < n; ++i) {
+    for (std::size_t i = 0, n = count_of(holds, "holds", kMaxBumps); i < n; ++i) {
         const Cursor entry = holds.element(i);
         entry.require_members({"keys"}, {"shade"});
         Solution::MovingHold hold{{}, read_shade(entry)};
@@ -139,7 +144,8 @@ Solution read_solution(const Cursor& where, const Polytope& polytope, const Ids&
 constexpr std::size_t kMostSpread = 8;
 
 /// Checks what only the solver reads.
-void check_pick(const Cursor& pick, std::set<std::string>& taken) {
+/// `keys`: how many keys the paths of the picks before have; this one's are added.
+void check_pick(const Cursor& pick, std::set<std::string>& taken, std::size_t& keys) {
     pick.require_members(
         {"id", "kind", "frame", "rgb"},
         {"to", "toward", "from", "until", "fade", "radius", "global_only", "enabled", "path",
@@ -159,7 +165,9 @@ void check_pick(const Cursor& pick, std::set<std::string>& taken) {
     if (pick.has("path")) {
         const Cursor path = pick.member("path");
         std::optional<double> previous;
-        for (std::size_t i = 0, n = path.list("colours over time"); i < n; ++i) {
+        const std::size_t count = count_of(path, "colours over time in all", kMaxPathKeys, keys);
+        keys += count;
+        for (std::size_t i = 0; i < count; ++i) {
             const Cursor step = path.element(i);
             step.require_members({"frame", "rgb"}, {"given", "there"});
             step.member("frame").later_frame(previous);
@@ -190,12 +198,16 @@ void check_pick(const Cursor& pick, std::set<std::string>& taken) {
 
 void check_colours(const Cursor& colours) {
     std::optional<double> previous;
+    std::size_t in_all = 0;
     for (std::size_t i = 0, n = colours.list("frames with colours"); i < n; ++i) {
         const Cursor entry = colours.element(i);
         entry.require_members({"frame", "rgbw"});
         entry.member("frame").later_frame(previous);
         const Cursor rows = entry.member("rgbw");
-        for (std::size_t j = 0, m = rows.list("colours"); j < m; ++j) {
+        const std::size_t count = count_of(rows, "colours in all", kMaxWeighted, in_all);
+        if (count == 0) rows.wrong("at least one colour");
+        in_all += count;
+        for (std::size_t j = 0; j < count; ++j) {
             const Cursor row = rows.element(j);
             if (row.list("4 numbers") != 4) row.wrong("a list of 4 numbers: r, g, b and weight");
             for (std::size_t c = 0; c < 3; ++c) row.element(c).number(kMaxColour, "a number");
@@ -241,8 +253,9 @@ Edits read_edits(const Cursor& where, const Polytope& polytope, const Ids& ids) 
     if (where.has("picks")) {
         const Cursor picks = where.member("picks");
         std::set<std::string> pick_ids;
-        for (std::size_t i = 0, n = picks.list("picks"); i < n; ++i) {
-            check_pick(picks.element(i), pick_ids);
+        std::size_t keys = 0;
+        for (std::size_t i = 0, n = count_of(picks, "picks and holds", kMaxPicks); i < n; ++i) {
+            check_pick(picks.element(i), pick_ids, keys);
         }
     }
     if (where.has("locks")) {

@@ -1,7 +1,10 @@
 """OpenColorIO configs and the names in them; errors suggest similar names."""
 
+import atexit
 import difflib
+import functools
 import os
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -54,12 +57,23 @@ def failures() -> tuple[type[Exception], ...]:
     return ocio.Exception, ocio.ExceptionMissingFile
 
 
+@functools.cache
+def _log_through_python() -> None:
+    """Let OpenColorIO's warnings pass what filters Python's: they quote the config's bytes."""
+    import PyOpenColorIO as ocio
+
+    ocio.SetLoggingFunction(lambda text: print(text, end="", file=sys.stderr))
+    atexit.register(ocio.ResetToDefaultLoggingFunction)
+
+
 def load_config(name: str, option: str) -> Any:
     """Return a config.ocio, an .ocioz archive, or a built-in ``ocio://`` config.
 
     `option` is the option or variable that named it ("ocio_config=…", "$OCIO"), for errors.
     """
     import PyOpenColorIO as ocio
+
+    _log_through_python()
 
     if name.startswith("ocio://"):
         known = [f"ocio://{entry[0]}" for entry in ocio.BuiltinConfigRegistry().getBuiltinConfigs()]

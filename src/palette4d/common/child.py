@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
+import os
 import pickle
 import signal
 import sys
@@ -14,6 +15,7 @@ import types
 from collections.abc import Callable, Iterable, Iterator
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
+from multiprocessing.context import SpawnContext
 from types import TracebackType
 from typing import Any, TypeVar
 
@@ -125,9 +127,13 @@ class Child:
     def _start(self) -> None:
         # Spawned, not forked: the libraries run threads, which a fork would break.
         context = multiprocessing.get_context("spawn")
-        if sys.platform != "win32":
-            # Its start ends the block of Ctrl-C.
-            resource_tracker.ensure_running()
+        with _safe_path():
+            if sys.platform != "win32":
+                # Its start ends the block of Ctrl-C.
+                resource_tracker.ensure_running()
+            self._spawn(context)
+
+    def _spawn(self, context: SpawnContext) -> None:
         with _without_interrupts(), _without_main():
             self._pipe, theirs = context.Pipe()
             arguments = (theirs, self.seconds, self.megabytes)
@@ -153,6 +159,23 @@ def _without_interrupts() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextlib.contextmanager
+def _safe_path() -> Iterator[None]:
+    """Let Python processes that start not look for modules in the working folder.
+
+    `python -c`, by which they start, would run a ``multiprocessing.py`` of a project's folder.
+    """
+    before = os.environ.get("PYTHONSAFEPATH")
+    os.environ["PYTHONSAFEPATH"] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["PYTHONSAFEPATH"]
+        else:
+            os.environ["PYTHONSAFEPATH"] = before
 
 
 @contextlib.contextmanager

@@ -42,8 +42,11 @@ def locked(target: Path) -> Iterator[Callable[[], None]]:
         if sys.platform != "win32":
             try:
                 folder = os.open(target.parent, os.O_RDONLY)
-            except OSError:
-                yield _nothing  # missing or closed to us: the write reports the error
+            except (FileNotFoundError, NotADirectoryError):
+                yield _nothing  # the write reports the error
+                return
+            except OSError:  # a folder that may be written but not listed, for example
+                yield stack.enter_context(_lock_file(target, deadline))
                 return
             stack.callback(os.close, folder)  # releases the lock
             if _flocked(folder, target, deadline):

@@ -380,11 +380,13 @@ def to_fields(state: State, vertex_ids: Iterable[str]) -> dict[str, Any]:
 
 
 def _setting(entry: Mapping[str, Any]) -> Setting:
-    ramp = entry.get("ramp")
+    ramp, edge = entry.get("ramp"), entry.get("edge")
+    if edge is not None and not isinstance(edge, str):
+        raise ValueError(f"found the edge {edge!r}, expected an id")
     return Setting(
         as_colour(entry["rgb"]),
-        entry.get("edge"),
-        entry.get("frame"),
+        edge,
+        _number(entry, "frame"),
         None if ramp is None else as_ramp(ramp),
     )
 
@@ -400,7 +402,25 @@ def _of_setting(setting: Setting) -> dict[str, Any]:
     return fields
 
 
+def _number(entry: Mapping[str, Any], name: str) -> Any:
+    value = entry.get(name)
+    if value is not None and type(value) not in (int, float):
+        raise ValueError(f"found the {name} {value!r}, expected a number")
+    return value
+
+
 def _object(value: Any) -> dict[str, Any]:
+    return dict(value.items())
+
+
+def _pick(value: Any) -> dict[str, Any]:
+    from palette4d.grade.picks import Pick  # which needs this module
+
+    found = Pick.from_fields(value)
+    for name in ("frame", "from", "until", "fade", "radius"):
+        _number(value, name)
+    if found.kind not in ("pick", "hold") or found.frame is None:
+        raise ValueError(f"found the pick {found.id!r}, expected its kind and frame")
     return dict(value.items())
 
 
@@ -414,7 +434,7 @@ def _true(value: Any) -> bool:
 _READ: dict[Kind, Callable[[Any], Any]] = {
     "handle": _setting,
     "ramp": as_ramp,
-    "pick": _object,
+    "pick": _pick,
     "lock": _true,
     "version": _object,
 }

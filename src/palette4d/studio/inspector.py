@@ -102,6 +102,8 @@ class Inspector(QWidget):
         row = QHBoxLayout()
         self.swatch = Swatch()
         self.title, self.place = QLabel(), QLabel()
+        self.title.setTextFormat(Qt.TextFormat.PlainText)
+        self.place.setTextFormat(Qt.TextFormat.PlainText)
         self.title.setStyleSheet(f"color: {theme.BRIGHT}; font-weight: bold")
         self.place.setStyleSheet(f"color: {theme.FAINT}")
         self.place.setWordWrap(True)

@@ -81,7 +81,7 @@ class PickList(QWidget):
                 0, Qt.CheckState.Checked if pick.enabled else Qt.CheckState.Unchecked
             )
             item.setIcon(0, self._icon(pick))
-            item.setToolTip(0, self._tip(pick))
+            item.setToolTip(0, theme.plain(self._tip(pick)))
             self.list.addTopLevelItem(item)
             item.setSelected(pick.id in self.session.selection)
         for id_ in locks:
@@ -197,7 +197,7 @@ class Versions(QWidget):
             button.setText(f"{texts.USED} {name}" if name in used else name)
             button.setCheckable(True)
             button.setChecked(name in used)
-            button.setToolTip(texts.USE_TIP.format(name=name, number=number))
+            button.setToolTip(theme.plain(texts.USE_TIP.format(name=name, number=number)))
             button.clicked.connect(lambda _=False, name=name: self.use(name))
             self.row.insertWidget(1 + number, button)
             self.buttons[name] = button

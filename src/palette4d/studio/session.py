@@ -506,7 +506,9 @@ def recovery_files(sidecar: Path) -> Iterator[Path]:
     state = os.environ.get("XDG_STATE_HOME") or str(Path.home() / ".local" / "state")
     name = hashlib.sha256(os.path.realpath(sidecar).encode()).hexdigest()[:12]
     folder = Path(state) / "palette4d" / "recovery"
-    return (folder / f"{name}-{number}-{sidecar.name}" for number in itertools.count(1))
+    # At most 255 bytes: two names may begin alike, their hashes do not.
+    short = os.fsdecode(os.fsencode(sidecar.name)[-200:])
+    return (folder / f"{name}-{number}-{short}" for number in itertools.count(1))
 
 
 def recovered(sidecar: Path) -> Path | None:

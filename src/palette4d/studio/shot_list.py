@@ -15,7 +15,7 @@ from palette4d.common.errors import Palette4dError
 from palette4d.grade.document import Document
 from palette4d.media.source_clip import find_clip, nearest_frame
 from palette4d.shows import manifest
-from palette4d.studio import texts
+from palette4d.studio import texts, theme
 from palette4d.studio.display import Display, Look
 from palette4d.studio.player import Region, resampled
 from palette4d.studio.session import Session
@@ -66,7 +66,7 @@ class Shots(QWidget):
         self.list.clear()
         for entry in self.entries:
             item = QListWidgetItem(f"{entry.shot.name}\n{texts.SHOT_STATES[entry.status]}")
-            item.setToolTip(entry.error or str(self.folder / entry.sidecar))
+            item.setToolTip(theme.plain(entry.error or str(self.folder / entry.sidecar)))
             blank = QPixmap(THUMB)
             blank.fill(Qt.GlobalColor.black)
             item.setIcon(QIcon(blank))

@@ -1,6 +1,6 @@
 """Colours, sizes and the style sheet: dark and neutral, because colour is judged here."""
 
-from PySide6.QtGui import QColor, QFont, QPalette
+from PySide6.QtGui import QColor, QFont, QPalette, Qt
 from PySide6.QtWidgets import QApplication
 
 # All greys are neutral: red, green and blue are equal.
@@ -130,3 +130,8 @@ def dress(app: QApplication) -> None:
         palette.setColor(QPalette.ColorGroup.Disabled, key, QColor("#5e5e5e"))
     app.setPalette(palette)
     app.setStyleSheet(SHEET)
+
+
+def plain(text: str) -> str:
+    """Return a text that tips and labels show as it is: names in files may look like HTML."""
+    return Qt.convertFromPlainText(text) if Qt.mightBeRichText(text) else text

@@ -21,7 +21,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QMenu, QToolTip, QWidget
 
 from palette4d.plotting import style
-from palette4d.studio import grade_steps, texts
+from palette4d.studio import grade_steps, texts, theme
 from palette4d.studio.frame_strip import FrameStrip
 from palette4d.studio.menu_entries import TIMELINE_ACTIONS, VIEW
 from palette4d.studio.panel_menus import view_actions
@@ -349,7 +349,7 @@ class TimelineView(QWidget):
         if isinstance(event, QHelpEvent) and event.type() == QEvent.Type.ToolTip:
             tip = self.tip(self.places.hit(QPointF(event.pos())))
             if tip:
-                QToolTip.showText(event.globalPos(), tip, self)
+                QToolTip.showText(event.globalPos(), theme.plain(tip), self)
             else:
                 QToolTip.hideText()
             return True

@@ -328,7 +328,7 @@ class Transport(QWidget):
             self.look.setCurrentIndex(wanted.index((chosen.display, chosen.view)))
         if display is not None:
             self.look.setToolTip(
-                texts.LOOK_TIP.format(space=display.space, config=display.name)
+                theme.plain(texts.LOOK_TIP.format(space=display.space, config=display.name))
                 if display.known
                 else texts.AS_IS_TIP
             )

@@ -67,7 +67,7 @@ class VerbProcess:
         self._reader, writer = os.openpty()
         fcntl.ioctl(writer, termios.TIOCSWINSZ, struct.pack("HHHH", *TERMINAL, 0, 0))
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "palette4d", *words],
+            [sys.executable, "-P", "-m", "palette4d", *words],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=writer,

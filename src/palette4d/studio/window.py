@@ -303,6 +303,8 @@ class Window(QMainWindow):
         bar.addWidget(self.file_facts)
         bar.addWidget(self.says, 1)
         bar.addPermanentWidget(self.view_facts)
+        for label in (self.says, self.file_facts, self.view_facts):
+            label.setTextFormat(Qt.TextFormat.PlainText)
         for label in (self.file_facts, self.view_facts):
             label.setStyleSheet(f"color: {theme.FAINT}; padding: 2px 8px")
             label.setMinimumWidth(1)  # a long name or note makes no wide window
@@ -377,7 +379,7 @@ class Window(QMainWindow):
         self.says.setStyleSheet(f"color: {colour[status.level]}")
         sign = {"info": "", "warning": texts.WARNING_SIGN, "error": texts.ERROR_SIGN}
         self.says.setText(sign[status.level] + status.text)
-        self.says.setToolTip(status.text)
+        self.says.setToolTip(theme.plain(status.text))
         facts = []
         if session.path is not None and document is not None:
             facts = [session.path.name, texts.SAVED if session.saved else texts.UNSAVED]
@@ -389,7 +391,7 @@ class Window(QMainWindow):
             facts = [session.clip.name, texts.NO_PALETTE]
         self.file_facts.setText("  ·  ".join(facts))
         tips = ["  ·  ".join(facts), *([texts.DRAG_OUT] if session.path is not None else [])]
-        self.file_facts.setToolTip("\n".join(tips))
+        self.file_facts.setToolTip(theme.plain("\n".join(tips)))
         display = session.display
         shown = ""
         if display is not None and not display.known and session.clip is not None:
@@ -474,6 +476,7 @@ class Window(QMainWindow):
         if not self.session.save():
             asks = QMessageBox(self)
             asks.setIcon(QMessageBox.Icon.Warning)
+            asks.setTextFormat(Qt.TextFormat.PlainText)
             asks.setText(texts.CLOSE_ANYWAY.format(why=self.session.status.text))
             role = QMessageBox.ButtonRole.AcceptRole
             save_as = asks.addButton(texts.ACTIONS["window"]["save_as"], role)
