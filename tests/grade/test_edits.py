@@ -121,7 +121,7 @@ def test_steps_are_the_same_after_their_json() -> None:
     after = {
         **state({"v1": Setting((0.1, 2, -3), ramp="hold"), "s1": stop(3), "s2": stop(4.5)}),
         RAMP: "smooth",
-        ("pick", "p1"): {"id": "p1", "rgb": [0.5, 0.5, 0.5]},
+        ("pick", "p1"): {"id": "p1", "kind": "hold", "frame": 1, "rgb": [0.5, 0.5, 0.5]},
         ("lock", "v1"): True,
         ("version", "warm"): {"vertices": [], "stops": []},
     }

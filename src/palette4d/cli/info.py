@@ -137,7 +137,7 @@ def _track(
     edited += [id_ for edge in track.edges for id_ in on_edge[edge]]
     inside = {*track.vertices, *track.edges}
     found = []
-    frames = [(track.first + track.last) / 2, track.first]
+    frames = [track.at, track.first]
     for frame in [*frames, *(document.frame_of(id_) for id_ in edited)]:
         palette, places = palette_of(float(frame))
         few = inside if len(inside) < len(places) else [id_ for id_ in places if id_ in inside]
@@ -172,12 +172,15 @@ def _print_tracks(info: dict[str, Any]) -> None:
         line += f"{swatch(before)}{hex_of(before):8} "
         changed = before != after
         line += f"{swatch(after)}{hex_of(after):8}" if changed else patch + " " * 8
-        print(f"{line}  {_some(track['edited'])}".rstrip())
+        edited = f"; edited {_some(track['edited'])}" if track["edited"] else ""
+        print(f"{line}  {_some(track['vertices'])}{edited}".rstrip())
     first = info["tracks"][0]["name"]
     print(
-        "\nColours are those of the largest edit, else halfway. `info SIDECAR --handles` lists the"
+        "\nColours: of the largest edit, else where the name fits best. More: `info SIDECAR "
+        "--handles`.\n"
+        f"`edit SIDECAR track {first} …` changes a track.\n"
+        f"`render SIDECAR --output weight:{first} …` shows what a track is for."
     )
-    print(f"vertices and stops. `edit SIDECAR track {first} …` changes a track.")
 
 
 def _some(names: list[str], most: int = 6) -> str:

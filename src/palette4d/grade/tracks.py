@@ -109,6 +109,8 @@ class Track:
         The id of its first vertex.
     called : str
         Its name for people: its most colourful vertex, and its frames, such as "deep red, 13-31".
+    at : float
+        The frame of that vertex; of a fork, the middle.
     first, last : float
         The first and the last frame, with forks.
     vertices, edges : tuple of str
@@ -117,6 +119,7 @@ class Track:
 
     name: str
     called: str
+    at: float
     first: float
     last: float
     vertices: tuple[str, ...]
@@ -125,6 +128,8 @@ class Track:
 
 def tracks_of(handles: Handles, colours: Mapping[str, str]) -> list[Track]:
     """Return the tracks of a palette; every vertex and every edge belongs to exactly one.
+
+    Tracks of one name and the same frames get numbers, the lightest first.
 
     Parameters
     ----------
@@ -135,23 +140,27 @@ def tracks_of(handles: Handles, colours: Mapping[str, str]) -> list[Track]:
     place = {id_: index for index, id_ in enumerate(ids)}
     rgb = np.array([vertex["rgb"] for vertex in handles.vertices.values()], dtype=np.float64)
     edges = [(place[edge["from"]], place[edge["to"]]) for edge in handles.edges.values()]
-    chains, _, _ = find_chains(
-        np.array([vertex["frame"] for vertex in handles.vertices.values()], np.float64), rgb, edges
-    )
-    names = []
+    frames = [float(vertex["frame"]) for vertex in handles.vertices.values()]
+    chains, _, _ = find_chains(np.array(frames), rgb, edges)
+    names, at, light = [], [], []
     for chain in chains:
         # A fork between two other tracks has no vertex of its own.
         inside = chain.vertices or edges[chain.edges[0]]
         strongest = max(inside, key=lambda vertex: float(np.ptp(rgb[vertex])))
         span = "-".join(dict.fromkeys(str(round(at)) for at in (chain.first, chain.last)))
         names.append((colours[ids[strongest]].rstrip(" 0123456789"), span))
+        at.append(frames[strongest] if chain.vertices else (chain.first + chain.last) / 2)
+        light.append(float(rgb[list(inside)].mean()))
+    order = sorted(range(len(chains)), key=lambda number: -light[number])
+    numbers = dict(zip(order, numbered(names[number] for number in order), strict=True))
     tracks = []
-    for chain, (colour, span), number in zip(chains, names, numbered(names), strict=True):
+    for number, (chain, (colour, span)) in enumerate(zip(chains, names, strict=True)):
         vertices = tuple(ids[vertex] for vertex in chain.vertices)
         along = tuple(edge_ids[edge] for edge in chain.edges)
         first, last = chain.first, chain.last
-        called = f"{colour}{number}, {span}"
-        tracks.append(Track((vertices or along)[0], called, first, last, vertices, along))
+        called = f"{colour}{numbers[number]}, {span}"
+        name = (vertices or along)[0]
+        tracks.append(Track(name, called, at[number], first, last, vertices, along))
     return tracks
 
 
