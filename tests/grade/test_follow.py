@@ -116,3 +116,18 @@ def test_a_path_ends_where_all_is_dark() -> None:
     assert np.abs(np.diff(np.interp(range(40), frames, there))).max() < 0.3  # a fade
     sky = follow.paths(clip, [(2, (0.5, 0.6, 0.7))], (0, 39))
     assert all(key.there == 1 for key in sky)  # most of the picture, and still is
+
+
+def test_what_enters_later_changes_nothing_before() -> None:
+    """Without the car, a few other pixels are near its colour."""
+    rng = np.random.default_rng(1)
+    frames = np.empty((20, 60, 100, 3), np.float32)
+    for frame in range(20):
+        frames[frame] = [0.3, 0.45, 0.55] + 0.03 * rng.normal(size=(60, 100, 3))
+        frames[frame, :2, :6] = [0.47, 0.3, 0.3]
+        if frame >= 10:
+            frames[frame, 20:40, 30:60] = [0.52, 0.26, 0.26] + 0.02 * rng.normal(size=(20, 30, 3))
+    path = follow.paths(ArrayClip(frames), [(15, (0.52, 0.26, 0.26))], (0, 19))
+    there = np.interp(range(20), [key.frame for key in path], [key.there for key in path])
+    assert not there[:7].any()
+    assert (there[13:] == 1).all()

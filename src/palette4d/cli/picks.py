@@ -338,7 +338,7 @@ def _told(
         lines += _path(pick)
         if any(key.there == 0 for key in pick.path):
             lines.append(
-                "  the change ends where the colour is lost among others; pick it there with "
+                "  it ends where the colour is lost among others, or hardly there; pick it with "
                 f"--with {pick.id} if you still see it"
             )
     else:
@@ -361,27 +361,24 @@ def _told(
 
 def _path(pick: Pick) -> list[str]:
     """Return where a pick's colour goes, and what helps if that is another thing's."""
-    there = [key for key in pick.path if key.there > 0]
-    if not there:
+    frames, away = pick.followed()
+    if not len(frames):
         return []
-    first, farthest, last = there[0], pick.farthest(), there[-1]
-    told = {key.frame: key.rgb for key in (first, farthest, last)} | {pick.frame: pick.rgb}
-    colours = [f"{swatch(told[f])}{hex_of(told[f])} at frame {f:g}" for f in sorted(told)]
-    lines = [f"  follows its colour: {', '.join(colours)}"]
-    alike = pick.alike()
-    limits = [
-        f"--{name} {frame:g}"
-        for name, frame, lost in (
-            ("from", alike[0], alike[0] > first.frame),
-            ("until", alike[1], alike[1] < last.frame),
-        )
-        if lost
+    first, far, last = float(frames[0]), float(frames[away.argmax()]), float(frames[-1])
+    told = sorted({first, far, last, pick.frame})
+    hexes = [(hex_of(rgb), swatch(rgb)) for rgb in (pick.colour_at(at).tolist() for at in told)]
+    colours = [
+        f"{patch}{text} at frame {at:g}" for at, (text, patch) in zip(told, hexes, strict=True)
     ]
-    if limits:
+    lines = [f"  follows its colour: {', '.join(colours)}"]
+    begin, end = pick.alike()
+    limits = [f"--from {begin:g}"] * (begin > first) + [f"--until {end:g}"] * (end < last)
+    given = any(key.given and key.frame == far for key in pick.path)
+    if pick.kind == "pick" and limits and not given:
         lines.append(
-            f"  note: at frame {farthest.frame:g} it is {pick.away(farthest):.2f} away from the "
-            f"picked colour. If that is another thing: {pick.kind} --frame {farthest.frame:g} "
-            f"--pixel X,Y --with {pick.id}, or change {pick.id} {' '.join(limits)}"
+            f"  note: at frame {far:g} it is {away.max():.2f} away from the picked colour. If that "
+            f"is another thing: pick --frame {far:g} --pixel X,Y --with {pick.id}, or change "
+            f"{pick.id} {' '.join(limits)}"
         )
     return lines
 
@@ -399,7 +396,8 @@ def _print_notes(
     print(
         f"at frame {effect.frame:.0f}, {effect.share:.0%} of the picture's pixels change by more "
         f"than 10 of 255: {effect.share - effect.others:.0%} near the picked colours and their "
-        f"shades, {effect.others:.0%} others; no frame changes more of others"
+        f"shades, {effect.others:.0%} others"
+        + ("; no frame changes more of others" if effect.others > 0 else "")
     )
     if effect.others > MANY:
         colour = ",".join(f"{value:.4f}" for value in effect.most)

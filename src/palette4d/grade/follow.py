@@ -38,6 +38,9 @@ HOME, SAME = 0.5, 2
 #: Where more than LOST times as many pixels as at first are near, the colour is another thing's, as
 #: in the night, where all is dark. From there on it has ended, unless it comes back to its start.
 LOST = 7.0
+#: Where fewer than one in GONE of the pixels at first is near, its object is not in the picture:
+#: what is left is others, and the change would be theirs.
+GONE = 20.0
 #: Fewer near pixels than this share of a frame: the colour is out of sight and stays.
 LEAST_SHARE = 1e-5
 
@@ -167,10 +170,11 @@ def _joined(
 def _followed(colours: Sequence[tuple[F64, F64]], start: F64) -> F64:
     """Return the (n, 4) path from a colour in the first frame to the last one.
 
-    The fourth column is 1 while the colour is there, and 0 from where it is lost.
+    The fourth column is 1 while the colour is there, and 0 from where it is lost, and where hardly
+    any pixel has it.
     """
-    home = _near(start, *colours[0])
-    path, seen = [start], [1.0]
+    home, pixels = _near(start, *colours[0]), _alike(start, *colours[0])
+    path, seen, alive = [start], [1.0], True
     for before, after in itertools.pairwise(colours):
         there = _shifted(path[-1], before, after)
         now = _near(start, *after)
@@ -184,8 +188,14 @@ def _followed(colours: Sequence[tuple[F64, F64]], start: F64) -> F64:
         found = _near(there, *after)
         lost = home is not None and found is not None and found[1] > LOST * home[1]
         back = float(np.linalg.norm(there - start)) < ALIKE
-        seen.append(float(not lost and (back or seen[-1] > 0)))
+        alive = not lost and (back or alive)
+        seen.append(float(alive and GONE * _alike(there, *after) >= pixels))
     return np.column_stack([path, seen])
+
+
+def _alike(colour: F64, rgb: F64, counts: F64) -> float:
+    """Return the share of a frame's pixels that have a colour or one like it."""
+    return float(counts[((rgb - colour) ** 2).sum(axis=1) < ALIKE**2].sum() / counts.sum())
 
 
 def _smoothed(path: F64, fixed: Sequence[int]) -> F64:

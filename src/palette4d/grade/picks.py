@@ -204,20 +204,23 @@ class Pick:
         high = np.maximum(1.0, ends[:2].max(axis=0)) if ends.max() <= 1 else np.inf
         return np.minimum(0.0, ends.min(axis=0)), high
 
-    def away(self, key: PathKey) -> float:
-        """Return how far a key of the path is from the picked colour."""
-        return float(np.linalg.norm(np.subtract(key.rgb, self.rgb)))
+    def followed(self) -> tuple[F64, F64]:
+        """Return frames of a path, and how far its colour there is from the picked one.
 
-    def farthest(self) -> PathKey:
-        """Return the key of a path at which the colour is the farthest from the picked one."""
-        return max((key for key in self.path if key.there > 0), key=self.away)
+        They are whole frames, some hundreds at most, within the pick's range and where the colour
+        is there.
+        """
+        frames, _, there = self._keys
+        low = frames[0] if self.start is None else max(frames[0], self.start)
+        high = frames[-1] if self.until is None else min(frames[-1], self.until)
+        at = np.unique(np.linspace(low, max(low, high), 1000).round())
+        at = at[(low <= at) & (at <= high) & (np.interp(at, frames, there) > 0)]
+        rgb = np.array([self.colour_at(frame) for frame in at]).reshape(-1, 3)
+        return at, np.linalg.norm(rgb - self.rgb, axis=1)
 
     def alike(self) -> tuple[float, float]:
         """Return the frames between which a path stays near the picked colour."""
-        frames, colours, there = self._keys
-        at = np.unique(np.linspace(frames[0], frames[-1], 1000).round())
-        rgb = np.stack([np.interp(at, frames, channel) for channel in colours.T], axis=1)
-        away = np.linalg.norm(rgb - self.rgb, axis=1) * (np.interp(at, frames, there) > 0)
+        at, away = self.followed()
         before = at[(away > ALIKE) & (at < self.frame)].max(initial=-math.inf)
         after = at[(away > ALIKE) & (at > self.frame)].min(initial=math.inf)
         near = at[(before < at) & (at < after)]
