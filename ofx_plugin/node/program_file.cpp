@@ -19,6 +19,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kRemedy = "; run 'palette4d install-plugin' again";
+constexpr const char* kMissing =
+    "found no such file, so no palette4d is known to this node; install "
+    "palette4d and run 'palette4d install-plugin' (Linux only so far)";
 
 bool absolute(const std::string& path) {
 #if defined(_WIN32)
@@ -38,8 +41,8 @@ std::string text_of(const fs::path& file, std::string& problem) {
     const std::optional<std::string> text = bytes_of(file, kMaxProgramBytes + 1);
     std::error_code error;
     if (!text) {
-        problem = fs::exists(reachable(file), error) ? "it is not a file that can be read"
-                                                     : "found no such file";
+        problem =
+            fs::exists(reachable(file), error) ? "it is not a file that can be read" : kMissing;
     }
     return text.value_or("");
 #else
@@ -47,8 +50,8 @@ std::string text_of(const fs::path& file, std::string& problem) {
     std::size_t size = 0;
     const int handle = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
     if (handle < 0) {
-        problem = errno == ENOENT ? "found no such file"
-                                  : std::string("it cannot be read: ") + std::strerror(errno);
+        problem =
+            errno == ENOENT ? kMissing : std::string("it cannot be read: ") + std::strerror(errno);
         return "";
     }
     struct stat about{};
@@ -109,7 +112,8 @@ ProgramPath read_program(const fs::path& file) {
         found.problem = "it names " + found.path + ", which is not a program";
     }
     if (found.problem.empty()) return found;
-    return {"", file.u8string() + ": " + found.problem + kRemedy};
+    const bool missing = found.problem == kMissing;
+    return {"", file.u8string() + ": " + found.problem + (missing ? "" : kRemedy)};
 }
 
 }  // namespace palette4d::node

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import os
 import shutil
 import stat
@@ -81,6 +82,24 @@ def test_replaces_an_earlier_version(bundle: Path, tmp_path: Path) -> None:
     target = install_bundle(bundle, destination)
     assert files(target) == files(bundle)
     assert [path.name for path in destination.iterdir()] == [BUNDLE]
+
+
+def test_replaces_what_cannot_be_renamed(
+    bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A folder of a container's image, for example."""
+    old = make_bundle(tmp_path / "OFX", b"old code")
+    rename = Path.rename
+
+    def refused(self: Path, target: Path) -> Path:
+        if self == old:
+            raise OSError(errno.EXDEV, "Invalid cross-device link")
+        return rename(self, target)
+
+    monkeypatch.setattr(Path, "rename", refused)
+    target = install_bundle(bundle, tmp_path / "OFX")
+    assert files(target) == files(bundle)
+    assert [path.name for path in (tmp_path / "OFX").iterdir()] == [BUNDLE]
 
 
 def test_links(bundle: Path, tmp_path: Path) -> None:

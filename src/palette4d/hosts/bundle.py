@@ -7,6 +7,7 @@ incomplete bundle.
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import platform
 import shutil
@@ -151,7 +152,14 @@ def _replace(fresh: Path, target: Path, aside: Path) -> None:
     """Rename `fresh` to `target`; if that fails, restore the old target."""
     occupied = os.path.lexists(target)
     if occupied:
-        target.rename(aside)
+        try:
+            target.rename(aside)
+        except OSError as error:
+            # A folder in a lower layer of an overlay, as in an image of a container, only copies.
+            if error.errno != errno.EXDEV:
+                raise
+            shutil.copytree(target, aside, symlinks=True)
+            shutil.rmtree(target)
     try:
         fresh.rename(target)
     except OSError:
