@@ -241,6 +241,13 @@ def test_an_error_text_that_is_no_utf8_is_told(tmp_path):
         open_clip(str(path))
 
 
+def test_metadata_that_is_no_utf8_is_taken_as_latin_1(tmp_path):
+    path = write_image(tmp_path / "c.1.exr", np.zeros((2, 2, 3), np.float32), Copyright="Andr#")
+    path.write_bytes(path.read_bytes().replace(b"Andr#", b"Andr\xe9"))
+    image = open_clip(str(path)).load(1)
+    assert {name: value for name, _, value in image.metadata}["Copyright"] == "André"
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems refuse such names")
 def test_a_file_name_that_is_no_utf8_is_refused(tmp_path):
     image = write_image(tmp_path / "c.png", np.zeros((2, 2, 3), np.uint8))
