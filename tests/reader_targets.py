@@ -35,6 +35,7 @@ TOKENS = (
     *(b"1e999", b"-1e308", b"0.5", b"NaN", b"9" * 400, b"2147483648", b"\\ud800", b"\\u0000"),
     *(b"\xff", b"\xef\xbb\xbf", b"\x1b[2J", b"[" * 80, b"../", b"\r\n", b"00:00:00:00", b"<&\"'>"),
 )
+RAW = ocio.Config.CreateRaw()
 VALUES: tuple[Any, ...] = (
     *(None, True, 0, -1, 0.5, 2**31, 10**30, -(10**400), 1e308, "", "a", "../x", "\0", "x" * 400),
     *([], {}, [1], [[]], {"a": 1}, "\ud800", ["a", "b"], [24, 0], [1e300, 1], ["1e9999999"]),
@@ -80,22 +81,24 @@ def correction(path: Path, folder: Path) -> str:
     text = path.read_bytes().decode("utf-8", "ignore")
     about = Description("urn:x", text, (text,), text)
     written = cdl.Cdl((1.5, 1.0, 1.0), saturation=0.5)
-    config = ocio.Config.CreateRaw()
     ocio.ClearAllCaches()  # of earlier files of these names
     name = ("cc", "ccc", "cdl")[len(text) % 3]
     file = folder / f"x.{name}"
     file.write_text(cdl.write(written, name, text, about), "utf-8", newline="\n")
     transform: Any = ocio.FileTransform(src=str(file), cccId="0")
-    processor = config.getProcessor(transform)
+    processor = RAW.getProcessor(transform)
     assert processor.createGroupTransform()[0].getSat() == 0.5
     return "accepted"
 
 
+def unopened(*_: object) -> None:
+    raise Palette4dError("media are not opened here, where no child process can start")
+
+
 def edit(path: Path, folder: Path) -> str:
     """Read a timeline and its shots; return a fault as its traceback."""
-    unopened = Palette4dError("media are not opened here, where no child process can start")
     try:
-        with mock.patch.object(timeline_shots.Child, "call", side_effect=unopened):
+        with mock.patch.object(timeline_shots.Child, "call", unopened):
             numbered(timeline_shots.shots_of(timeline_clips.clips_of(path)))
     except Palette4dError:
         return "refused"
