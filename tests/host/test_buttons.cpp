@@ -199,6 +199,28 @@ TEST(studio_opens_the_clip_where_there_is_no_sidecar) {
                         (folder() / "shot.####.exr").u8string() + "\n");
 }
 
+TEST(studio_says_what_it_opens_in_the_place_of_a_broken_sidecar) {
+    Window window;
+    const auto open = [&] {
+        window.push("openInStudio");
+        return window.node->text("status");
+    };
+    const std::string path = sidecar();
+    window.node->set("sidecar", path);
+    window.node->set("embed", 1);
+    CHECK(window.node->changed("embed") == kOfxStatOK);
+    std::ofstream(fs::u8path(path)) << "{";
+    CHECK(open().find("only the project's copy of the sidecar is here") != std::string::npos);
+    window.node->set("embed", 0);
+    CHECK(window.node->changed("embed") == kOfxStatOK);
+    CHECK(open().find("Open in Studio: this sidecar cannot be opened; choose another") == 0);
+    CHECK(!noted());
+    const std::string clip = (folder() / "shot.mov").u8string();
+    window.node->set("clipFile", clip);
+    CHECK(open().find("opening " + clip + " in Studio; ") == 0);
+    CHECK(soon(noted));
+}
+
 TEST(nothing_starts_where_nothing_is_installed) {
     // Neither the clip's folder nor the project's, where the host runs, is asked for a program.
     const fs::path here = fs::current_path(), project = folder() / "project";
