@@ -47,6 +47,11 @@ bool no_children() {
 #endif
 }
 
+/// Waits for the stand-ins of Studio, which end by themselves: each status looks for them.
+void none_stays(Window& window) {
+    CHECK(soon([&] { return !window.status().empty() && no_children(); }));
+}
+
 std::string note() { return text_of(folder() / "started"); }
 bool noted() { return fs::exists(folder() / "started"); }
 
@@ -158,13 +163,15 @@ TEST(studio_opens_the_sidecar_at_the_frame) {
     CHECK(soon(noted));
     EXPECT(note() == "-E\n-P\n-Xutf8\n-m\npalette4d\nstudio\n" + path + "\n--frame\n12.5\n",
            note());
-    CHECK(soon([&] { return !window.says("Studio") && no_children(); }));
+    none_stays(window);
+    CHECK(!window.says("Studio"));
     // A frame outside of the clip is the nearest of it.
     fs::remove(folder() / "started");
     window.node->shown_time = 1000;
     window.push("openInStudio");
     CHECK(soon(noted));
     CHECK(note().find("--frame\n20\n") != std::string::npos);
+    none_stays(window);
 }
 
 TEST(studio_that_does_not_open_says_why) {
@@ -184,7 +191,8 @@ TEST(studio_that_does_not_open_says_why) {
     CHECK(soon([&] { return window.says("ended: No module named palette4d\n"); }));
     fs::remove(folder() / "fails");
     window.push("openInStudio");
-    CHECK(soon([&] { return !window.says("Studio"); }));
+    none_stays(window);
+    CHECK(!window.says("Studio"));
 }
 
 TEST(studio_opens_the_clip_where_there_is_no_sidecar) {
@@ -197,6 +205,7 @@ TEST(studio_opens_the_clip_where_there_is_no_sidecar) {
     CHECK(soon(noted));
     CHECK(note() == "-E\n-P\n-Xutf8\n-m\npalette4d\nstudio\n" +
                         (folder() / "shot.####.exr").u8string() + "\n");
+    none_stays(window);
 }
 
 TEST(studio_says_what_it_opens_in_the_place_of_a_broken_sidecar) {
@@ -219,6 +228,7 @@ TEST(studio_says_what_it_opens_in_the_place_of_a_broken_sidecar) {
     window.node->set("clipFile", clip);
     CHECK(open().find("opening " + clip + " in Studio; ") == 0);
     CHECK(soon(noted));
+    none_stays(window);
 }
 
 TEST(nothing_starts_where_nothing_is_installed) {
