@@ -371,26 +371,26 @@ define release-build
 		for preset in $(2); do cmake --build --preset $$preset --parallel $(JOBS) || exit; done
 endef
 
-$(BUNDLES)/SHA256SUMS: $(SOURCES) $(RELEASE)/.installed tools/assemble_bundle.py
+$(BUNDLES)/SHA256SUMS-bundle: $(SOURCES) $(RELEASE)/.installed tools/assemble_bundle.py
 	@echo "== the OpenFX bundle for every system (takes 10 to 20 minutes the first time)"
 	$(call release-build,$(SYSTEMS),$(SYSTEMS))
 	@"$(RELEASE_PYTHON)" tools/assemble_bundle.py build/cmake $(BUNDLES)
 
-bundles: $(BUNDLES)/SHA256SUMS ## the OpenFX bundle for every system
+bundles: $(BUNDLES)/SHA256SUMS-bundle ## the OpenFX bundle for every system
 
 # The tree once more, in another folder (its name has a blank) and with an empty cache, must give the
 # same bytes.
 AGAIN := $(RELEASE)/again/a tree
-bundles-again: $(BUNDLES)/SHA256SUMS
+bundles-again: $(BUNDLES)/SHA256SUMS-bundle
 	@echo "== the bundle once more, elsewhere"
 	@rm -rf $(RELEASE)/again && mkdir -p "$(AGAIN)"
 	@tar -c --exclude=./build --exclude=./.venv --exclude=./.git --exclude=./demo_output . | \
 		tar -x -C "$(AGAIN)"
 	$(MAKE) -C "$(AGAIN)" ZIG_CACHE="$(CURDIR)/$(RELEASE)/again/zig" bundles
-	cmp $(BUNDLES)/SHA256SUMS "$(AGAIN)/$(BUNDLES)/SHA256SUMS"
+	cmp $(BUNDLES)/SHA256SUMS-bundle "$(AGAIN)/$(BUNDLES)/SHA256SUMS-bundle"
 
 # Wine and qemu run what is for other systems; the tests say which package is missing.
-test-bundles: $(BUNDLES)/SHA256SUMS $(TEST_VENV)/.installed
+test-bundles: $(BUNDLES)/SHA256SUMS-bundle $(TEST_VENV)/.installed
 	$(call release-build,,windows-tests linux-aarch64-tests)
 	$(TEST_VENV)/bin/python $(PINNED)bundle-test.txt
 	@rm -rf build/test-run && mkdir -p build/test-run && cd build/test-run && \
@@ -400,7 +400,7 @@ test-bundles: $(BUNDLES)/SHA256SUMS $(TEST_VENV)/.installed
 		-n $(JOBS) $(PYTEST_ARGS)
 
 # A wheel for each Python on PATH, repaired, checked, and run through the demo in a bare environment.
-wheels: $(BUNDLES)/SHA256SUMS ## wheels that need no compiler
+wheels: $(BUNDLES)/SHA256SUMS-bundle ## wheels that need no compiler
 	@export $(RELEASE_ENVIRONMENT) && tools/wheels.sh $(RELEASE) "$(CURDIR)/$(BUNDLES)/Palette4D.ofx.bundle"
 
 format: $(TOOLS)/.installed ## rewrite the sources as ruff and clang-format want them

@@ -199,8 +199,8 @@ def analyze(
         notes.append(f"{counted(len(skipped), 'bad frame')} skipped: {describe(skipped)}")
     document["colours"] = clip_colours.clip_colours(usable)
     notes += colour_space.record(document, clip, used)
-    vertices = document["polytope"]["vertices"]
-    names = vertex_colours(vertices, document["clip"]["encoding"])
+    vertices, edges = (document["polytope"][part] for part in ("vertices", "edges"))
+    names = vertex_colours(vertices, edges, document["clip"]["encoding"])
     for vertex, name in zip(vertices, names, strict=True):
         vertex["name"] = name
     notes += [*gathered.notes, *missing, *found.notes, *warnings]

@@ -3,9 +3,9 @@
     python tools/assemble_bundle.py BUILDS OUT
 
 BUILDS holds the build folders of the release presets (`ofx_plugin/CMakePresets.json`). OUT gets
-Palette4D.ofx.bundle, Palette4D-VERSION.ofx.bundle.zip and SHA256SUMS. The same libraries give the
-same bytes: the archive is sorted and has no times. Runs in the environment of ziglang and
-nlohmann-json, whose licences go into the bundle.
+Palette4D.ofx.bundle, Palette4D-VERSION.ofx.bundle.zip and SHA256SUMS-bundle. The same libraries
+give the same bytes: the archive is sorted and has no times. Runs in the environment of ziglang and
+nlohmann-json, whose licences go into the bundle. So do the files for Kdenlive and Shotcut.
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ import hashlib
 import plistlib
 import shutil
 import struct
+import sys
+import types
 import zipfile
 from importlib import metadata
 from pathlib import Path
@@ -59,6 +61,20 @@ def licences() -> dict[str, Path]:
     }
 
 
+def editors_files(version: str) -> dict[str, str]:
+    """Return the files of editing programs, by their paths in the bundle's resources."""
+    # palette4d is not installed here, and these parts of it need nothing of the rest.
+    package = types.ModuleType("palette4d")
+    package.__path__ = [str(Path(__file__).parent.parent / "src" / "palette4d")]
+    sys.modules["palette4d"] = package
+    from palette4d.hosts import kdenlive, shotcut
+
+    files = {f"kdenlive/{kdenlive.FILE}": kdenlive.effect_file(version)}
+    for name, text in shotcut.filter_files(version).items():
+        files[f"shotcut/{shotcut.FOLDER}/{name}"] = text
+    return files
+
+
 def assemble(builds: Path, bundle: Path) -> None:
     """Lay out the bundle from the build folders; a library that is missing is an error."""
     shutil.rmtree(bundle, ignore_errors=True)
@@ -78,6 +94,16 @@ def assemble(builds: Path, bundle: Path) -> None:
     resources.mkdir(parents=True)
     for name, file in licences().items():
         shutil.copyfile(file, resources / f"{name}.txt")
+    for name, text in editors_files(version_of(bundle)).items():
+        path = resources.parent / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+
+
+def version_of(bundle: Path) -> str:
+    """Return the version that Info.plist says."""
+    about = plistlib.loads((bundle / "Contents" / "Info.plist").read_bytes())
+    return str(about["CFBundleShortVersionString"])
 
 
 def pack(bundle: Path, archive: Path) -> None:
@@ -100,15 +126,14 @@ def main() -> None:
     out: Path = arguments.out
     bundle = out / BUNDLE
     assemble(arguments.builds, bundle)
-    about = plistlib.loads((bundle / "Contents" / "Info.plist").read_bytes())
-    archive = out / f"Palette4D-{about['CFBundleShortVersionString']}.ofx.bundle.zip"
+    archive = out / f"Palette4D-{version_of(bundle)}.ofx.bundle.zip"
     pack(bundle, archive)
     files = [archive, *sorted(path for path in bundle.rglob("*") if path.is_file())]
     lines = [
         f"{hashlib.sha256(file.read_bytes()).hexdigest()}  {file.relative_to(out).as_posix()}\n"
         for file in files
     ]
-    (out / "SHA256SUMS").write_text("".join(lines), encoding="utf-8")
+    (out / "SHA256SUMS-bundle").write_text("".join(lines), encoding="utf-8")
     print("".join(lines), end="")
 
 

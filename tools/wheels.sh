@@ -46,6 +46,6 @@ for version in 3.11 3.12 3.13; do
     found="$found $version"
 done
 [ -n "$found" ] || { echo "no Python 3.11 to 3.13 was found on PATH" >&2; exit 1; }
-(cd "$wheels" && sha256sum -- *.whl >SHA256SUMS)
+(cd "$wheels" && sha256sum -- *.whl >SHA256SUMS-wheels)
 echo "== wheels for Python$found: built, checked, and run through the demo"
-cat "$wheels/SHA256SUMS"
+cat "$wheels/SHA256SUMS-wheels"

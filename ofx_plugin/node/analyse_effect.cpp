@@ -116,6 +116,10 @@ public:
 
     bool keep = false;
     const fs::path& folder() const { return folder_; }
+    bool found() const {
+        std::error_code error;
+        return fs::is_directory(reachable(folder_), error);
+    }
     std::string pattern() const { return (folder_ / native(name_ + ".######.exr")).u8string(); }
 
     /// Makes the folder, without the frames of an earlier time; false where other files are in it,
@@ -211,6 +215,28 @@ std::string analyse(const Suites& suites, OfxImageEffectHandle effect, const std
     return problem;
 }
 
+bool exists(const std::string& file) {
+    std::error_code error;
+    return !file.empty() && fs::is_regular_file(reachable(native(file)), error);
+}
+
+/// What Studio opens: the sidecar, or the frames that were fetched for it; else empty.
+std::string studio_target(const std::string& sidecar) {
+    if (sidecar.empty() || exists(sidecar)) return sidecar;
+    const Frames frames(native(sidecar));
+    return frames.found() ? frames.pattern() : "";
+}
+
+std::string open_studio(const std::string& sidecar, const std::string& path) {
+    if (sidecar.empty()) return "Open in Studio: enter the sidecar's path";
+    if (path.empty()) return "Open in Studio: " + sidecar + " is not there yet; push Analyse first";
+    const std::string problem = open_in_studio(path, std::nullopt);
+    return problem.empty() ? "opening " + path +
+                                 " in Studio; if no window appears, move to another frame: Status "
+                                 "says why"
+                           : "Open in Studio: " + problem;
+}
+
 void changed(const Suites& suites, OfxImageEffectHandle effect, const Properties& in_args) {
     const std::string name = in_args.get_string(kOfxPropName).value_or("");
     const std::string reason = in_args.get_string(kOfxPropChangeReason).value_or("");
@@ -221,17 +247,12 @@ void changed(const Suites& suites, OfxImageEffectHandle effect, const Properties
         expanded(meant(params.string_at(kParamSidecar, Params::kAnyTime).value_or("")));
     std::string text;
     if (pushed && name == kParamAnalyse) text = analyse(suites, effect, target);
-    if (pushed && name == kParamOpenInStudio) {
-        const std::string problem =
-            target.empty() ? "enter the sidecar's path" : open_in_studio(target, std::nullopt);
-        text = problem.empty() ? "opened " + target + " in Studio" : problem;
+    const std::string studio = studio_target(target);
+    if (pushed && name == kParamOpenInStudio) text = open_studio(target, studio);
+    for (const std::string& line : {studio_problem(studio), analysis_state(target).words}) {
+        if (!line.empty()) text += (text.empty() ? "" : "\n") + line;
     }
-    const AnalysisState state = analysis_state(target);
-    std::error_code error;
-    if (!state.words.empty()) {
-        text += (text.empty() ? "" : "\n") + state.words;
-    } else if (text.empty() && !target.empty() &&
-               fs::is_regular_file(reachable(native(target)), error)) {
+    if (text.empty() && exists(target)) {
         text = target + " is there: choose it in the node Palette4D";
     }
     text = without_controls(text);

@@ -55,6 +55,11 @@ std::string analysis_target(const Params& params, const Chosen& chosen) {
     return path.is_absolute() || clip.empty() ? given : (clip.parent_path() / path).u8string();
 }
 
+std::string studio_target(const Params& params, const Chosen& chosen) {
+    if (chosen.embedded) return "";
+    return chosen.result.loaded ? chosen.path : clip_of(params, chosen);
+}
+
 std::string push_analyse(const Params& params, Chosen& chosen) {
     const std::string target = analysis_target(params, chosen);
     if (cancel_analysis(target)) return "cancelled the analysis";
@@ -80,16 +85,19 @@ std::string push_analyse(const Params& params, Chosen& chosen) {
 std::string push_open_in_studio(const Params& params, const Chosen& chosen,
                                 std::optional<double> frame) {
     if (chosen.embedded) {
-        return "Open in Studio: only the project's copy of the sidecar is here; save the sidecar "
-               "as a file first";
+        return "Open in Studio: only the project's copy of the sidecar is here; bring back a "
+               "file that can be read first";
     }
-    const bool ready = chosen.result.loaded != nullptr;
-    const std::string path = ready ? chosen.path : clip_of(params, chosen);
-    if (path.empty()) return "Open in Studio: choose a sidecar, or the clip as Clip's file";
-    const std::string problem = open_in_studio(path, ready ? frame : std::nullopt);
+    const std::string path = studio_target(params, chosen);
+    if (path.empty()) {
+        return std::string("Open in Studio: ") +
+               (chosen.any ? "this sidecar cannot be opened; choose another, or the clip as "
+                             "Clip's file"
+                           : "choose a sidecar, or the clip as Clip's file");
+    }
+    const std::string problem = open_in_studio(path, chosen.result.loaded ? frame : std::nullopt);
     if (!problem.empty()) return "Open in Studio: " + problem;
-    return "opened " + path +
-           " in Studio; if no window appears, run 'palette4d studio' in a terminal";
+    return "opening " + path + " in Studio; if no window appears, push Reload: Status says why";
 }
 
 }  // namespace palette4d::node

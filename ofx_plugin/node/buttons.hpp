@@ -19,13 +19,16 @@ void define_buttons(ParamDefiner& define);
 /// The sidecar that *Analyse* writes: the chosen one, or that of the clip's name beside the clip.
 /// Empty while neither is known.
 std::string analysis_target(const Params& params, const Chosen& chosen);
+/// What *Open in Studio* opens: the sidecar, or the clip where none is loaded. Empty while neither
+/// is known.
+std::string studio_target(const Params& params, const Chosen& chosen);
 
 // Only in kOfxActionInstanceChanged; both return a line for the status.
 
 /// Starts the analysis of the clip, or stops the one that runs. Chooses the new sidecar where none
 /// was chosen, and updates `chosen` then.
 std::string push_analyse(const Params& params, Chosen& chosen);
-/// Opens the sidecar, or the clip where there is none.
+/// Opens the sidecar, or the clip.
 std::string push_open_in_studio(const Params& params, const Chosen& chosen,
                                 std::optional<double> frame);
 

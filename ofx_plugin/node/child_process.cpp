@@ -1,6 +1,7 @@
 #include "child_process.hpp"
 
 #include <cerrno>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -9,7 +10,9 @@
 #include "paths.hpp"
 #include "windows.hpp"
 
-#if !defined(_WIN32)
+#if defined(_WIN32)
+#include <io.h>
+#else
 #include <dirent.h>
 #include <fcntl.h>
 #include <signal.h>
@@ -37,9 +40,40 @@ bool belongs_to_host(const std::string& variable) {
 
 }  // namespace
 
+/// What a program writes on standard error: a file without a name, which goes by itself.
+class Errors {
+public:
+    Errors() = default;
+    ~Errors() {
+        if (file_) std::fclose(file_);
+    }
+    Errors(const Errors&) = delete;
+    Errors& operator=(const Errors&) = delete;
+
+    /// Null where there is no room for one.
+    std::FILE* file() const { return file_; }
+    /// Of the last line that is not empty, at most its end. The program has the same position in
+    /// the file, so only after its end.
+    std::string last_line() const {
+        if (!file_ || std::fseek(file_, 0, SEEK_END) != 0) return "";
+        const long size = std::ftell(file_);
+        std::string text(static_cast<std::size_t>(size < 0 ? 0 : size < 4096 ? size : 4096), '\0');
+        std::fseek(file_, -static_cast<long>(text.size()), SEEK_END);
+        text.resize(std::fread(&text[0], 1, text.size(), file_));
+        const std::size_t end = text.find_last_not_of(" \r\n");
+        if (end == std::string::npos) return "";
+        const std::size_t before = text.find_last_of("\r\n", end);
+        return text.substr(before + 1, end - before);
+    }
+
+private:
+    std::FILE* file_ = std::tmpfile();
+};
+
 #if defined(_WIN32)
 
 struct Child::System {
+    Errors errors;
     HANDLE process = nullptr;
     HANDLE job = nullptr;  ///< what the process starts belongs to it too
 };
@@ -78,20 +112,77 @@ std::vector<wchar_t> environment() {
     return block;
 }
 
+/// The only handles that the process gets: nothing to read, nowhere to write but its errors.
+class Standard {
+public:
+    explicit Standard(const Errors& errors) {
+        SECURITY_ATTRIBUTES inherited{sizeof inherited, nullptr, TRUE};
+        nothing_ =
+            CreateFileW(L"NUL", GENERIC_READ | GENERIC_WRITE, FILE_SHARE_READ | FILE_SHARE_WRITE,
+                        &inherited, OPEN_EXISTING, 0, nullptr);
+        if (nothing_ == INVALID_HANDLE_VALUE) return;
+        if (errors.file()) {
+            const auto own = reinterpret_cast<HANDLE>(_get_osfhandle(_fileno(errors.file())));
+            DuplicateHandle(GetCurrentProcess(), own, GetCurrentProcess(), &errors_, 0, TRUE,
+                            DUPLICATE_SAME_ACCESS);
+        }
+        handles_ = {nothing_};
+        if (errors_) handles_.push_back(errors_);
+        SIZE_T size = 0;
+        InitializeProcThreadAttributeList(nullptr, 1, 0, &size);
+        list_.resize(size);
+        if (!InitializeProcThreadAttributeList(list(), 1, 0, &size)) return;
+        begun_ = true;
+        ready_ =
+            UpdateProcThreadAttribute(list(), 0, PROC_THREAD_ATTRIBUTE_HANDLE_LIST, handles_.data(),
+                                      handles_.size() * sizeof(HANDLE), nullptr, nullptr) != 0;
+    }
+    ~Standard() {
+        if (begun_) DeleteProcThreadAttributeList(list());
+        if (errors_) CloseHandle(errors_);
+        if (nothing_ != INVALID_HANDLE_VALUE) CloseHandle(nothing_);
+    }
+    Standard(const Standard&) = delete;
+    Standard& operator=(const Standard&) = delete;
+
+    bool ready() const { return ready_; }
+    STARTUPINFOEXW how() {
+        STARTUPINFOEXW all{};
+        all.StartupInfo.cb = sizeof all;
+        all.StartupInfo.dwFlags = STARTF_USESTDHANDLES;
+        all.StartupInfo.hStdInput = all.StartupInfo.hStdOutput = nothing_;
+        all.StartupInfo.hStdError = errors_ ? errors_ : nothing_;
+        all.lpAttributeList = list();
+        return all;
+    }
+
+private:
+    LPPROC_THREAD_ATTRIBUTE_LIST list() {
+        return reinterpret_cast<LPPROC_THREAD_ATTRIBUTE_LIST>(list_.data());
+    }
+
+    HANDLE nothing_ = INVALID_HANDLE_VALUE, errors_ = nullptr;
+    std::vector<HANDLE> handles_;
+    std::vector<char> list_;
+    bool begun_ = false, ready_ = false;
+};
+
 /// With a job, the process belongs to it before it runs.
-HANDLE spawn(const std::vector<std::string>& arguments, HANDLE job, std::string& problem) {
+HANDLE spawn(const std::vector<std::string>& arguments, HANDLE job, const Errors& errors,
+             std::string& problem) {
     std::wstring line;
     for (const std::string& argument : arguments) {
         line += (line.empty() ? L"" : L" ") + quoted(wide(argument));
     }
     std::vector<wchar_t> variables = environment();
-    STARTUPINFOW how{};
-    how.cb = sizeof how;
+    Standard standard(errors);
+    STARTUPINFOEXW how = standard.how();
     PROCESS_INFORMATION started{};
-    if (!CreateProcessW(wide(arguments[0]).c_str(), &line[0], nullptr, nullptr, FALSE,
+    if (!standard.ready() ||
+        !CreateProcessW(wide(arguments[0]).c_str(), &line[0], nullptr, nullptr, TRUE,
                         CREATE_NO_WINDOW | CREATE_NEW_PROCESS_GROUP | CREATE_SUSPENDED |
-                            CREATE_UNICODE_ENVIRONMENT,
-                        variables.data(), nullptr, &how, &started)) {
+                            CREATE_UNICODE_ENVIRONMENT | EXTENDED_STARTUPINFO_PRESENT,
+                        variables.data(), nullptr, &how.StartupInfo, &started)) {
         problem =
             arguments[0] + ": cannot be started (error " + std::to_string(GetLastError()) + ")";
         return nullptr;
@@ -104,17 +195,11 @@ HANDLE spawn(const std::vector<std::string>& arguments, HANDLE job, std::string&
 
 }  // namespace
 
-std::string start_detached(const std::vector<std::string>& arguments) {
-    std::string problem;
-    if (const HANDLE process = spawn(arguments, nullptr, problem)) CloseHandle(process);
-    return problem;
-}
-
 std::unique_ptr<Child> Child::start(const std::vector<std::string>& arguments,
                                     std::string& problem) {
     auto system = std::make_unique<System>();
     system->job = CreateJobObjectW(nullptr, nullptr);
-    system->process = spawn(arguments, system->job, problem);
+    system->process = spawn(arguments, system->job, system->errors, problem);
     std::unique_ptr<Child> child(new Child(std::move(system)));
     return child->system_->process ? std::move(child) : nullptr;
 }
@@ -126,6 +211,11 @@ Child::~Child() {
 
 bool Child::running() { return WaitForSingleObject(system_->process, 0) == WAIT_TIMEOUT; }
 
+bool Child::failed() const {
+    DWORD status = 0;
+    return GetExitCodeProcess(system_->process, &status) && status != 0;
+}
+
 void Child::stop() {
     if (system_->job) TerminateJobObject(system_->job, 1);
     TerminateProcess(system_->process, 1);
@@ -134,8 +224,9 @@ void Child::stop() {
 #else
 
 struct Child::System {
+    Errors errors;
     pid_t process = 0;
-    bool ended = false;
+    bool ended = false, failed = false;
 };
 
 namespace {
@@ -163,11 +254,15 @@ public:
     Spawn& operator=(const Spawn&) = delete;
 
     /// 0, or an error number.
-    int start(const std::vector<std::string>& arguments, pid_t& process) {
-        for (const int standard : {0, 1, 2}) {
-            posix_spawn_file_actions_addopen(&files_, standard, "/dev/null",
-                                             standard == 0 ? O_RDONLY : O_WRONLY, 0);
+    int start(const std::vector<std::string>& arguments, const Errors& errors, pid_t& process) {
+        // First, as the file may be 0 or 1 where the host has closed those.
+        if (errors.file()) {
+            posix_spawn_file_actions_adddup2(&files_, ::fileno(errors.file()), 2);
+        } else {
+            posix_spawn_file_actions_addopen(&files_, 2, "/dev/null", O_WRONLY, 0);
         }
+        posix_spawn_file_actions_addopen(&files_, 0, "/dev/null", O_RDONLY, 0);
+        posix_spawn_file_actions_addopen(&files_, 1, "/dev/null", O_WRONLY, 0);
         short flags = POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF;
 #if defined(__APPLE__)
         flags |= POSIX_SPAWN_CLOEXEC_DEFAULT;
@@ -214,35 +309,16 @@ private:
     posix_spawnattr_t how_{};
 };
 
-pid_t spawn(const std::vector<std::string>& arguments, std::string& problem) {
-    pid_t process = 0;
-    if (const int error = Spawn().start(arguments, process)) {
-        problem = arguments[0] + ": cannot be started (" + std::strerror(error) + ")";
-        return 0;
-    }
-    return process;
-}
-
 }  // namespace
-
-std::string start_detached(const std::vector<std::string>& arguments) {
-    // The shell starts it in the background and ends at once, so that the program is no child of
-    // the host. It passes the arguments on and reads none of them.
-    std::vector<std::string> all = {"/bin/sh", "-c", "\"$@\" &", "palette4d"};
-    all.insert(all.end(), arguments.begin(), arguments.end());
-    std::string problem;
-    const pid_t shell = spawn(all, problem);
-    while (shell > 0 && ::waitpid(shell, nullptr, 0) < 0 && errno == EINTR) {
-    }
-    return problem;
-}
 
 std::unique_ptr<Child> Child::start(const std::vector<std::string>& arguments,
                                     std::string& problem) {
-    const pid_t process = spawn(arguments, problem);
-    if (process <= 0) return nullptr;
     auto system = std::make_unique<System>();
-    system->process = process;
+    if (system->errors.file()) ::fcntl(::fileno(system->errors.file()), F_SETFD, FD_CLOEXEC);
+    if (const int error = Spawn().start(arguments, system->errors, system->process)) {
+        problem = arguments[0] + ": cannot be started (" + std::strerror(error) + ")";
+        return nullptr;
+    }
     return std::unique_ptr<Child>(new Child(std::move(system)));
 }
 
@@ -250,11 +326,15 @@ Child::~Child() { running(); }
 
 bool Child::running() {
     if (system_->ended) return false;
-    const pid_t done = ::waitpid(system_->process, nullptr, WNOHANG);
+    int status = 0;
+    const pid_t done = ::waitpid(system_->process, &status, WNOHANG);
     // An error: the host has waited for it in our place.
     system_->ended = done != 0 && !(done < 0 && errno == EINTR);
+    system_->failed = done > 0 && !(WIFEXITED(status) && WEXITSTATUS(status) == 0);
     return !system_->ended;
 }
+
+bool Child::failed() const { return system_->failed; }
 
 void Child::stop() {
     if (!running()) return;
@@ -266,5 +346,7 @@ void Child::stop() {
 #endif
 
 Child::Child(std::unique_ptr<System> system) : system_(std::move(system)) {}
+
+std::string Child::last_words() const { return system_->errors.last_line(); }
 
 }  // namespace palette4d::node

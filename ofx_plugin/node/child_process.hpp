@@ -1,6 +1,6 @@
 // Starts programs beside the host. They get none of its open files, none of its variables for
-// libraries and Python, and an empty input; their output is dropped. Depends neither on OpenFX nor
-// on the core.
+// libraries and Python, and an empty input; their output is dropped, but for the errors. Depends
+// neither on OpenFX nor on the core.
 #pragma once
 
 #include <memory>
@@ -9,14 +9,11 @@
 
 namespace palette4d::node {
 
-/// Starts a program that outlives the host and is never waited for. `arguments` begins with its
-/// path; all are UTF-8. Returns what went wrong, or nothing.
-std::string start_detached(const std::vector<std::string>& arguments);
-
-/// A program whose end matters. It keeps running when its object goes.
+/// A program that keeps running when its object goes, and when the host does.
 class Child {
 public:
-    /// Null where it cannot be started; `problem` then says why.
+    /// `arguments` begins with its path; all are UTF-8. Null where it cannot be started; `problem`
+    /// then says why.
     static std::unique_ptr<Child> start(const std::vector<std::string>& arguments,
                                         std::string& problem);
     ~Child();
@@ -25,6 +22,9 @@ public:
 
     /// Returns at once.
     bool running();
+    /// Once it has ended: whether it is known to have failed, and its last line on standard error.
+    bool failed() const;
+    std::string last_words() const;
     /// Ends it and what it has started.
     void stop();
 

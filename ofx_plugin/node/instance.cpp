@@ -103,10 +103,11 @@ void write_status(Params& params, Chosen chosen, const std::string& pushed, cons
                                                  : encoding_of(*sidecar, in_palette_space));
     }
     const AnalysisState analysis = analysis_state(analysis_target(params, chosen));
+    const std::string studio = studio_problem(studio_target(params, chosen));
     // The file that an analysis will write is not missing.
     if (analysis.running && !chosen.result.loaded) chosen.result.problem.clear();
-    const std::string text =
-        status_of(chosen, {pushed, analysis.words}, handles_in_use(params), {expects, copy, shown});
+    const std::string text = status_of(chosen, {pushed, studio, analysis.words},
+                                       handles_in_use(params), {expects, copy, shown});
     if (params.string_now(kParamStatus) != text) params.note_string(kParamStatus, text);
 }
 
@@ -150,7 +151,7 @@ void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const P
     if (!suites.is_natron) params.one_undo_step(step_after(param));
     Chosen chosen = chosen_sidecar(params);
     std::string pushed;
-    if (param == kParamReload) forget_failed_analyses();
+    if (param == kParamReload) forget_failures();
     if (param == kParamAnalyse) pushed = push_analyse(params, chosen);
     const std::string copy = keep_files(params, chosen, param);
     // Not under the instance's lock: setting a parameter may make the host wait for a render.

@@ -1,5 +1,6 @@
 #include "palette4d_command.hpp"
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <locale>
@@ -48,12 +49,13 @@ fs::path own_file() {
 
 /// The command line of palette4d with these arguments; empty with a problem. Hosts start in any
 /// folder: `-P` keeps Python from looking for modules there, and `-E` from the host's variables.
+/// Its errors are UTF-8 on every system.
 std::vector<std::string> command(const std::vector<std::string>& arguments, std::string& problem) {
     const ProgramPath python =
         read_program(own_file().parent_path().parent_path() / "Resources" / "program");
     problem = python.problem;
     if (!problem.empty()) return {};
-    std::vector<std::string> all = {python.path, "-E", "-P", "-m", "palette4d"};
+    std::vector<std::string> all = {python.path, "-E", "-P", "-Xutf8", "-m", "palette4d"};
     all.insert(all.end(), arguments.begin(), arguments.end());
     return all;
 }
@@ -78,6 +80,21 @@ struct Analyses {
 
 Analyses& analyses() {
     static Analyses all;
+    return all;
+}
+
+struct Studios {
+    struct One {
+        std::string path;
+        std::unique_ptr<Child> child;
+    };
+    std::mutex mutex;
+    std::vector<One> open;
+    std::map<std::string, std::string> failures;  ///< by path
+};
+
+Studios& studios() {
+    static Studios all;
     return all;
 }
 
@@ -118,21 +135,26 @@ std::string last_line(const fs::path& file) {
     return text.substr(before + 1, end - before - 1);
 }
 
-constexpr const char* kError = "error: ";
+/// Why a program has ended: the error that it wrote, without the program's name.
+std::string reason(const std::string& line) {
+    for (const std::string start : {"palette4d: error: ", "error: "}) {
+        if (line.rfind(start, 0) == 0) return line.substr(start.size());
+    }
+    return line.empty() ? "it ended without a word; free some memory, or run 'palette4d "
+                          "install-plugin' again in a terminal"
+                        : line;
+}
 
 /// Takes note of an analysis that has ended; false where it has succeeded.
-bool keep(Analysis& one, const std::string& sidecar) {
+bool keep(Analysis& one) {
     if (!one.child || one.child->running()) return true;
-    const std::string line = last_line(one.folder / "progress");
+    std::string line = last_line(one.folder / "progress");
+    if (line.rfind("error: ", 0) != 0 && line != "done") line = one.child->last_words();
     one.child.reset();
     std::error_code error;
     fs::remove_all(one.folder, error);
     if (line == "done") return false;
-    one.failure = "the analysis of " + one.clip + " failed: " +
-                  (line.rfind(kError, 0) == 0
-                       ? line.substr(std::char_traits<char>::length(kError))
-                       : "it ended without a word; run 'palette4d analyze' in a terminal for " +
-                             one.clip + " and " + sidecar);
+    one.failure = "the analysis of " + one.clip + " failed: " + reason(line);
     return true;
 }
 
@@ -149,7 +171,29 @@ std::string open_in_studio(const std::string& path, std::optional<double> frame)
     }
     std::string problem;
     const std::vector<std::string> all = command(arguments, problem);
-    return all.empty() ? problem : start_detached(all);
+    if (all.empty()) return problem;
+    std::unique_ptr<Child> child = Child::start(all, problem);
+    Studios& every = studios();
+    const std::lock_guard<std::mutex> lock(every.mutex);
+    every.failures.erase(path);
+    if (child) every.open.push_back({path, std::move(child)});
+    return problem;
+}
+
+std::string studio_problem(const std::string& path) {
+    Studios& all = studios();
+    const std::lock_guard<std::mutex> lock(all.mutex);
+    const auto ended = [&all](Studios::One& one) {
+        if (one.child->running()) return false;
+        if (one.child->failed()) {
+            all.failures[one.path] =
+                "Studio with " + one.path + " ended: " + reason(one.child->last_words());
+        }
+        return true;
+    };
+    all.open.erase(std::remove_if(all.open.begin(), all.open.end(), ended), all.open.end());
+    const auto found = all.failures.find(path);
+    return found == all.failures.end() ? "" : found->second;
 }
 
 std::string start_analysis(const std::string& clip, const std::string& sidecar) {
@@ -196,7 +240,7 @@ AnalysisState analysis_state(const std::string& sidecar) {
     const auto found = all.by_sidecar.find(key_of(sidecar));
     if (found == all.by_sidecar.end()) return {};
     Analysis& one = found->second;
-    if (!keep(one, sidecar)) {
+    if (!keep(one)) {
         all.by_sidecar.erase(found);
         return {};
     }
@@ -206,7 +250,12 @@ AnalysisState analysis_state(const std::string& sidecar) {
                       "; push Analyse to cancel it"};
 }
 
-void forget_failed_analyses() {
+void forget_failures() {
+    {
+        Studios& all = studios();
+        const std::lock_guard<std::mutex> lock(all.mutex);
+        all.failures.clear();
+    }
     Analyses& all = analyses();
     const std::lock_guard<std::mutex> lock(all.mutex);
     for (auto at = all.by_sidecar.begin(); at != all.by_sidecar.end();) {

@@ -10,6 +10,10 @@ namespace palette4d::node {
 /// Opens a sidecar or a clip in Studio, at a frame of it. Returns what went wrong, or nothing.
 std::string open_in_studio(const std::string& path, std::optional<double> frame);
 
+/// Why Studio has ended with an error since it was last opened with this path; or nothing. Never
+/// waits.
+std::string studio_problem(const std::string& path);
+
 /// Starts `palette4d analyze CLIP -o SIDECAR`, whose rules say when a file is replaced. One runs at
 /// a time for each sidecar. Returns what went wrong, or nothing.
 std::string start_analysis(const std::string& clip, const std::string& sidecar);
@@ -24,6 +28,6 @@ struct AnalysisState {
 };
 /// Never waits. All instances and threads see the same; also while rendering.
 AnalysisState analysis_state(const std::string& sidecar);
-void forget_failed_analyses();
+void forget_failures();
 
 }  // namespace palette4d::node

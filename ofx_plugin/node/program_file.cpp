@@ -18,10 +18,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kRemedy = "; run 'palette4d install-plugin' again";
+constexpr const char* kRemedy = "; run 'palette4d install-plugin' again in a terminal";
 constexpr const char* kMissing =
     "found no such file, so no palette4d is known to this node; install "
-    "palette4d and run 'palette4d install-plugin' (Linux only so far)";
+    "palette4d and run 'palette4d install-plugin' in a terminal (Linux only so far)";
 
 bool absolute(const std::string& path) {
 #if defined(_WIN32)

@@ -17,6 +17,7 @@ import pytest
 from palette4d import _core
 from palette4d.hosts import bundle as hosts
 from palette4d.hosts.bundle import architecture, default_destination
+from palette4d.hosts.editors import install_kdenlive, install_shotcut
 
 ENTRIES = ["OfxGetNumberOfPlugins", "OfxGetPlugin", "OfxSetHost"]
 C_LIBRARY = re.compile(r"(libc|libm|libpthread|libdl|librt|ld-linux-(x86-64|aarch64))\.so\.\d+")
@@ -34,11 +35,20 @@ def test_the_bundle_has_a_library_for_every_system_and_nothing_else(bundle: Path
     folders = ("Linux-x86-64", "Linux-aarch64", "Win64", "MacOS")
     expected = {f"Contents/{folder}/Palette4D.ofx" for folder in folders}
     expected.add("Contents/Info.plist")
+    expected |= {
+        f"Contents/Resources/{name}"
+        for name in (
+            "kdenlive/palette4d.xml",
+            "shotcut/palette4d/meta.qml",
+            "shotcut/palette4d/ui.qml",
+        )
+    }
     licences = {name for name in files if name.startswith("Contents/Resources/licences/")}
     assert licences
     assert files - licences == expected
     about = plistlib.loads((bundle / "Contents" / "Info.plist").read_bytes())
     assert (about["CFBundleExecutable"], about["CFBundlePackageType"]) == ("Palette4D.ofx", "BNDL")
+    assert about["LSMinimumSystemVersion"] == "{}.{}".format(*MACOS)
 
 
 @pytest.mark.parametrize("folder", ["Linux-x86-64", "Linux-aarch64"])
@@ -163,6 +173,16 @@ def test_it_installs_on_every_system(
     assert (installed / hosts.PROGRAM).read_text() == f"{sys.executable}\n"
 
 
+def test_the_files_of_editors_are_inside(bundle: Path, tmp_path: Path) -> None:
+    """docs/hosts says which folder to copy where; `install-plugin` writes the same files."""
+    resources = bundle / "Contents" / "Resources"
+    for folder, install in (("kdenlive", install_kdenlive), ("shotcut", install_shotcut)):
+        written = install(tmp_path / folder)
+        assert written
+        for file in written:
+            assert (resources / file.relative_to(tmp_path)).read_bytes() == file.read_bytes()
+
+
 def test_no_library_tells_where_it_was_built(bundle: Path, repo_root: Path) -> None:
     for path in bundle.rglob("*.ofx"):
         data = path.read_bytes()
@@ -186,7 +206,7 @@ def test_the_archive_holds_the_bundle_and_has_no_times(bundle: Path) -> None:
 
 
 def test_the_checksums_are_of_these_files(bundle: Path) -> None:
-    lines = (bundle.parent / "SHA256SUMS").read_text(encoding="utf-8").splitlines()
+    lines = (bundle.parent / "SHA256SUMS-bundle").read_text(encoding="utf-8").splitlines()
     summed = {}
     for line in lines:
         digest, name = line.split("  ", 1)

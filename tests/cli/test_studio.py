@@ -17,7 +17,7 @@ GOLDEN = Path(__file__).resolve().parent.parent / "golden" / "sidecars"
 def test_without_the_toolkit_it_says_what_to_install(tmp_path: Path) -> None:
     done = run_without("PySide6", tmp_path, "studio")
     assert done.returncode == 1
-    assert "pip install palette4d[studio]" in done.stderr
+    assert f"`{sys.executable} -m pip install PySide6-Essentials`" in done.stderr
 
 
 def test_no_other_verb_loads_the_toolkit() -> None:

@@ -1,22 +1,50 @@
 """Handles and tracks have names for people, and no two handles at one frame share a name."""
 
+import itertools
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from palette4d import Document
 from palette4d.grade.handle_names import vertex_colours
+from palette4d.grade.handles import Handles
+from palette4d.grade.tracks import tracks_of
 
 SPLIT = Path(__file__).resolve().parent.parent / "golden/sidecars/v1_split.p4d.json"
 
 
-def test_colours_of_one_name_at_one_frame_get_numbers_the_lightest_first() -> None:
-    colours = [(0, 0.1, 0.0, 0.0), (0.2, 0, 0, 0.5), (0.4, 0.9, 0, 0), (7, 0, 0, 0.6)]
-    colours.append((0.3, 0, 0, 0.55))
-    vertices = [{"frame": frame, "rgb": rgb} for frame, *rgb in colours]
-    names = vertex_colours(vertices, "sRGB")
-    assert names == ["dark red", "deep blue 2", "red", "deep blue", "deep blue 1"]
+def palette_of(*tracks: list[tuple[float, float, float, float]]) -> Any:
+    """Vertices and edges of tracks of (frame, r, g, b)."""
+    vertices, edges = [], []
+    for track in tracks:
+        ids = [f"v{len(vertices) + n}" for n in range(1, len(track) + 1)]
+        vertices += [
+            {"id": id_, "frame": frame, "rgb": rgb}
+            for id_, (frame, *rgb) in zip(ids, track, strict=True)
+        ]
+        edges += [{"from": a, "to": b} for a, b in itertools.pairwise(ids)]
+    for number, edge in enumerate(edges, 1):
+        edge["id"] = f"e{number}"
+    return {"vertices": vertices, "edges": edges}
+
+
+def test_a_track_keeps_its_number_and_the_lightest_of_one_name_comes_first() -> None:
+    fields = palette_of(
+        [(0, 0, 0, 0.5), (9, 0, 0, 0.5), (20, 0.9, 0, 0)],
+        [(0, 0.1, 0, 0), (9, 0, 0, 0.6), (20, 0, 0.8, 0)],
+        [(0, 0.1, 0.1, 0.1), (20, 0, 0.8, 0)],
+        [(0, 0.95, 0.9, 0), (20, 0.8, 0.8, 0.8)],
+    )
+    names = vertex_colours(fields["vertices"], fields["edges"], "sRGB")
+    assert names[:3] == ["deep blue 2", "deep blue 2", "red"]
+    assert names[3:6] == ["dark red", "deep blue 1", "green 1"]
+    assert names[6:] == ["black", "green 2", "yellow", "light grey"]
+    handles = Handles(fields)
+    named = dict(zip(handles.vertices, names, strict=True))
+    called = [track.called for track in tracks_of(handles, named)]
+    assert called == ["red, 14-20", "green 1, 14-20", "green 2, 10-20", "yellow, 0-10"]
 
 
 def test_names_are_of_the_unedited_colours_and_at_whole_frames() -> None:
@@ -58,7 +86,9 @@ def test_encodings_do_not_change_names() -> None:
     display = np.array([[0.55, 0.02, 0.03], [0.2, 0.3, 0.7]])
     linear = ((display + 0.055) / 1.055) ** 2.4
     seen, light = (
-        vertex_colours([{"frame": 0, "rgb": rgb.tolist()} for rgb in colours], encoding)
+        vertex_colours(
+            palette_of(*([(0, *rgb)] for rgb in colours.tolist()))["vertices"], (), encoding
+        )
         for colours, encoding in ((display, "sRGB"), (linear, "lin_rec709_srgb"))
     )
     assert seen == light

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from palette4d.common.errors import Palette4dError
-from palette4d.grade import solve
+from palette4d.grade import effects, solve
 from palette4d.grade.document import Document
 from palette4d.grade.picks import MOST_PICKS, Pick, unmet
 from palette4d.grade.sidecar import Fields
@@ -179,6 +179,38 @@ def test_shades_of_a_pick_change_and_are_none_of_the_others(fields: Fields) -> N
     assert np.abs(moved(document, shade, 5)).max() > 10 / 255
     effect = document.side_effect()
     assert (effect.share, effect.others) == (pytest.approx(1), 0)
+
+
+def test_tinted_greys_are_told_with_holds_that_cure_them(fields: Fields) -> None:
+    """A street gets a tint of 7 of 255 beside a red car; what is no grey may change so much."""
+    street, leaves, car = [0.35, 0.36, 0.34], [0.2, 0.36, 0.15], (0.5, 0.2, 0.2)
+    rows = [[*street, 0.6], [*leaves, 0.35], [*car, 0.05]]
+    found = {**fields, "colours": [{"frame": 5, "rgbw": rows}]}
+    asked = pick("p1", car, (0.4, 0.3, 0.3))
+    for picks in ([asked], [asked, pick("p2", street)]):
+        document, _ = solved(found, *picks)
+        edits = document.fields()["edits"]
+        edits["solution"]["vertices"] = [
+            {"vertex": vertex["id"], "by": [-7 / 255, 0, 7 / 255]}
+            for vertex in found["polytope"]["vertices"]
+        ]
+        effect = effects.side_effect({**found, "edits": edits}, 10 / 255)
+        assert effect.others == pytest.approx(0.6 if len(picks) == 1 else 0)
+        if len(picks) == 1:
+            assert effect.holds == (tuple(street),)
+            assert effect.left == 0
+
+
+def test_no_hold_is_proposed_that_takes_from_a_pick(fields: Fields) -> None:
+    """A gradient goes on from the picked colour: a hold would tear it."""
+    rows = [[*rgb, 1 / 12] for rgb in np.linspace(MIDDLE, (0.4, 0.4, 0.15), 12)]
+    found = {**fields, "colours": [{"frame": 5, "rgbw": rows}]}
+    asked = pick("p1", MIDDLE, (0.65, 0.25, 0.35), radius=0.3)
+    effect = solved(found, asked)[0].side_effect()
+    assert effect.others > 0
+    held = solved(found, asked, pick("p2", effect.most))[0].around_picks()["p1"]
+    assert held.taken["p2"] > 0.2
+    assert effect.holds == ()
 
 
 @pytest.mark.parametrize("seed", range(2))

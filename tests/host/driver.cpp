@@ -4,8 +4,8 @@
 // strict_host describe BUNDLE
 // The node's parameters as it describes them, a JSON object of names.
 // strict_host push BUNDLE BUTTON [--effect N] [--set NAME=VALUE] [--width W --height H FRAMES.raw]
-// Pushes a button and waits, as long as the status speaks of an analysis. The frames, RGBA in
-// float32, are the clip's from time 1 on.
+// Pushes a button and waits, as long as the status speaks of an analysis, or until Studio fails.
+// The frames, RGBA in float32, are the clip's from time 1 on.
 #include <chrono>
 #include <cstring>
 #include <exception>
@@ -127,7 +127,12 @@ int push(const std::vector<std::string>& names, const Options& options, const Se
         }
         for (const std::string& setting : settings) set(*instance, setting);
         instance->changed(names[1]);
-        while (instance->text("status").rfind("analysing ", 0) == 0) {
+        const auto waits = [&] {
+            const std::string said = instance->text("status");
+            return names[1] == "openInStudio" ? said.find(" ended: ") == std::string::npos
+                                              : said.rfind("analysing ", 0) == 0;
+        };
+        while (waits()) {
             std::this_thread::sleep_for(std::chrono::milliseconds(100));
             instance->changed("", "", kOfxChangeTime);
         }

@@ -288,8 +288,13 @@ int stand_in(const std::vector<std::string>& words) {
     std::string all;
     for (std::size_t i = 1; i < words.size(); ++i) all += words[i] + "\n";
     note("started", all);
-    if (words[5] != "analyze") return 0;
-    const fs::path sidecar = fs::u8path(words.at(8)), progress = fs::u8path(words.at(11));
+    std::ostringstream fails;
+    if (fails << std::ifstream(here / "fails").rdbuf()) {
+        std::cerr << fails.str();
+        return 1;
+    }
+    if (words[6] != "analyze") return 0;
+    const fs::path sidecar = fs::u8path(words.at(9)), progress = fs::u8path(words.at(12));
     std::ofstream(progress, std::ios::binary) << "structure search: 3 of 40\n";
     std::string end;
     while (!std::getline(std::ifstream(here / "go"), end)) {

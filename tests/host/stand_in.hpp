@@ -42,7 +42,7 @@ inline std::string installed(const std::filesystem::path& program) {
 
 /// A bundle whose program notes its arguments in the file `started`. As `palette4d analyze` it then
 /// waits for the file `go`, which says how it ends: with `done`, after copying box.json to the
-/// sidecar, or with an error.
+/// sidecar, or with an error. Where there is a file `fails`, it fails with that on standard error.
 inline std::string installed() {
     const std::filesystem::path copy = folder() / ("python" + own_file().extension().u8string());
     std::filesystem::copy_file(own_file(), copy);

@@ -89,6 +89,31 @@ TEST(the_frames_of_the_host_are_analysed) {
     CHECK(effect.node->is_identity(1, clip, time) == kOfxStatOK && clip == "Source" && time == 1);
 }
 
+TEST(studio_opens_the_sidecar_or_the_frames) {
+    Effect effect;
+    const auto open = [&] {
+        CHECK(effect.node->changed("openInStudio") == kOfxStatOK);
+        return effect.node->text("status");
+    };
+    CHECK(open().find("shot.p4d.json is not there yet; push Analyse first") != std::string::npos);
+    CHECK(!effect.started());
+    write("go", "error: it has cuts\n");
+    effect.push();
+    CHECK(soon([&] { return effect.status().find("failed: it has cuts") != std::string::npos; }));
+    const std::string frames = (folder() / "shot.frames" / "shot.######.exr").u8string();
+    CHECK(open().find("opening " + frames + " in Studio; ") == 0);
+    CHECK(soon([&] {
+        return text_of(folder() / "started").find("studio\n" + frames) != std::string::npos;
+    }));
+    write("fails", "found no screen\n");
+    write("shot.p4d.json", sidecar_text());
+    CHECK(open().find("opening " + effect.target.u8string() + " in Studio; ") == 0);
+    CHECK(
+        soon([&] { return effect.status().find("ended: found no screen") != std::string::npos; }));
+    effect.node->set("sidecar", std::string());
+    CHECK(open() == "Open in Studio: enter the sidecar's path");
+}
+
 TEST(a_cancelled_fetch_leaves_nothing) {
     Config config;
     config.cancel_after = 2;

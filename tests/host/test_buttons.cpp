@@ -47,6 +47,11 @@ bool no_children() {
 #endif
 }
 
+/// Waits for the stand-ins of Studio, which end by themselves: each status looks for them.
+void none_stays(Window& window) {
+    CHECK(soon([&] { return !window.status().empty() && no_children(); }));
+}
+
 std::string note() { return text_of(folder() / "started"); }
 bool noted() { return fs::exists(folder() / "started"); }
 
@@ -131,12 +136,14 @@ TEST(a_program_gets_nothing_of_the_hosts) {
     window.node->set("sidecar", sidecar());
     window.push("openInStudio");
     CHECK(soon([] { return text_of(folder() / "variables").find("PWD=") != std::string::npos; }));
-    CHECK(text_of(folder() / "variables").find("/of/the/host") == std::string::npos);
     const std::string files = text_of(folder() / "files");
     EXPECT(files.find(" " + std::to_string(mine) + " ->") == std::string::npos, files);
-    // It runs on, and is no child of the host.
-    CHECK(no_children());
+    CHECK(text_of(folder() / "variables").find("/of/the/host") == std::string::npos);
+    // It runs on until its end, which the node notices.
+    CHECK(!window.says("ended"));
     CHECK(::kill(std::stoi(text_of(folder() / "pid")), SIGKILL) == 0);
+    CHECK(soon([&] { return window.says("ended: it ended without a word"); }));
+    CHECK(no_children());
     ::close(mine);
     unsetenv("LD_LIBRARY_PATH");
     unsetenv("PYTHONHOME");
@@ -151,17 +158,41 @@ TEST(studio_opens_the_sidecar_at_the_frame) {
     const auto began = std::chrono::steady_clock::now();
     window.push("openInStudio");
     CHECK(Seconds(std::chrono::steady_clock::now() - began).count() < 5);
-    EXPECT(window.node->text("status").find("opened " + path + " in Studio") == 0,
+    EXPECT(window.node->text("status").find("opening " + path + " in Studio; ") == 0,
            window.node->text("status"));
     CHECK(soon(noted));
-    EXPECT(note() == "-E\n-P\n-m\npalette4d\nstudio\n" + path + "\n--frame\n12.5\n", note());
-    CHECK(no_children());
+    EXPECT(note() == "-E\n-P\n-Xutf8\n-m\npalette4d\nstudio\n" + path + "\n--frame\n12.5\n",
+           note());
+    none_stays(window);
+    CHECK(!window.says("Studio"));
     // A frame outside of the clip is the nearest of it.
     fs::remove(folder() / "started");
     window.node->shown_time = 1000;
     window.push("openInStudio");
     CHECK(soon(noted));
     CHECK(note().find("--frame\n20\n") != std::string::npos);
+    none_stays(window);
+}
+
+TEST(studio_that_does_not_open_says_why) {
+    Window window;
+    window.node->set("sidecar", sidecar());
+    write("fails", "a warning\npalette4d: error: found no PySide6, expected it\n\n");
+    window.push("openInStudio");
+    CHECK(soon([&] { return window.says("ended: found no PySide6, expected it\nbox: frames"); }));
+    CHECK(no_children());
+    // Another node has nothing to do with it, and it is forgotten.
+    const auto other = window.plugin.create();
+    CHECK(other->changed("reload") == kOfxStatOK && other->text("status") == "No sidecar chosen");
+    CHECK(!window.says("PySide6"));
+    // Python itself, with more than the node keeps; and the end of one that opens is nothing.
+    write("fails", std::string(100000, 'x') + "\r\nNo module named palette4d");
+    window.push("openInStudio");
+    CHECK(soon([&] { return window.says("ended: No module named palette4d\n"); }));
+    fs::remove(folder() / "fails");
+    window.push("openInStudio");
+    none_stays(window);
+    CHECK(!window.says("Studio"));
 }
 
 TEST(studio_opens_the_clip_where_there_is_no_sidecar) {
@@ -172,8 +203,32 @@ TEST(studio_opens_the_clip_where_there_is_no_sidecar) {
     window.node->set("clipFile", (folder() / "shot.1001.exr").u8string());
     window.push("openInStudio");
     CHECK(soon(noted));
-    CHECK(note() ==
-          "-E\n-P\n-m\npalette4d\nstudio\n" + (folder() / "shot.####.exr").u8string() + "\n");
+    CHECK(note() == "-E\n-P\n-Xutf8\n-m\npalette4d\nstudio\n" +
+                        (folder() / "shot.####.exr").u8string() + "\n");
+    none_stays(window);
+}
+
+TEST(studio_says_what_it_opens_in_the_place_of_a_broken_sidecar) {
+    Window window;
+    const auto open = [&] {
+        window.push("openInStudio");
+        return window.node->text("status");
+    };
+    const std::string path = sidecar();
+    window.node->set("sidecar", path);
+    window.node->set("embed", 1);
+    CHECK(window.node->changed("embed") == kOfxStatOK);
+    std::ofstream(fs::u8path(path)) << "{";
+    CHECK(open().find("only the project's copy of the sidecar is here") != std::string::npos);
+    window.node->set("embed", 0);
+    CHECK(window.node->changed("embed") == kOfxStatOK);
+    CHECK(open().find("Open in Studio: this sidecar cannot be opened; choose another") == 0);
+    CHECK(!noted());
+    const std::string clip = (folder() / "shot.mov").u8string();
+    window.node->set("clipFile", clip);
+    CHECK(open().find("opening " + clip + " in Studio; ") == 0);
+    CHECK(soon(noted));
+    none_stays(window);
 }
 
 TEST(nothing_starts_where_nothing_is_installed) {
@@ -267,7 +322,10 @@ TEST(an_analysis_that_fails_says_why) {
     // One that dies.
     write("go", "killed\n");
     window.push("analyse");
-    CHECK(soon([&] { return window.says("run 'palette4d analyze' in a terminal"); }));
+    CHECK(soon([&] { return window.says("it ended without a word"); }));
+    write("fails", "MemoryError\n");
+    window.push("analyse");
+    CHECK(soon([&] { return window.says("failed: MemoryError\n"); }));
 }
 
 TEST(analyse_needs_to_know_the_clip) {

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -12,6 +14,9 @@ import pytest
 
 from palette4d.hosts.install import install_plugin
 from palette4d.media.clip import open_clip
+
+GOLDEN = Path(__file__).parent.parent / "golden" / "sidecars"
+SCREEN = ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +30,7 @@ def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def push(driver: Path, bundle: Path, button: str, **settings: object) -> str:
-    """The status in the end."""
+    """The status in the end, on a machine without a screen."""
     words = [w for name, value in settings.items() for w in ("--set", f"{name}={value}")]
     # Hosts start anywhere, also where somebody else's module of this name lies.
     hostile = bundle.parent / "cwd"
@@ -38,6 +43,7 @@ def push(driver: Path, bundle: Path, button: str, **settings: object) -> str:
         check=False,
         timeout=300,
         cwd=hostile,
+        env={name: value for name, value in os.environ.items() if name not in SCREEN},
     )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
@@ -61,6 +67,27 @@ def test_analyse_keeps_the_programs_rules(strict_host: Path, clip: Path, tmp_pat
     status = push(strict_host, bundle, "analyse", clipFile=clip, sidecar=kept)
     assert status.startswith(f"the analysis of {clip.parent}/shot.####.png failed: "), status
     assert kept.read_text() == "no sidecar"
+
+
+def test_a_failed_analysis_advises_what_a_host_has(
+    strict_host: Path, clip: Path, tmp_path: Path
+) -> None:
+    (bundle,) = install_plugin(tmp_path / "OFX")
+    for number in (1, 2, 4):
+        shutil.copy(clip, tmp_path / f"gap.{number}.png")
+    status = push(strict_host, bundle, "analyse", clipFile=tmp_path / "gap.1.png")
+    first = status.splitlines()[0]
+    assert "leave such frames out with 'Skip bad frames'" in first
+    assert first.endswith("Push Open in Studio for these, and choose File > Analyse…")
+    assert "--" not in first
+
+
+def test_open_in_studio_says_why_no_window_appears(strict_host: Path, tmp_path: Path) -> None:
+    (bundle,) = install_plugin(tmp_path / "OFX")
+    sidecar = GOLDEN / "v1_edited.p4d.json"
+    status = push(strict_host, bundle, "openInStudio", sidecar=sidecar)
+    # Without the toolkit: found no PySide6.
+    assert status.startswith(f"Studio with {sidecar} ended: found no "), status
 
 
 def test_a_linked_bundle_knows_its_python_too(

@@ -160,6 +160,12 @@ def test_says_what_to_do_without_the_right_to_write(
     assert [path.name for path in destination.iterdir()] == [BUNDLE]
 
 
+def test_a_file_in_the_folders_place_is_named(bundle: Path, tmp_path: Path) -> None:
+    (tmp_path / "OFX").touch()
+    with pytest.raises(Palette4dError, match=r"OFX: found a file, expected a folder.*dest=…"):
+        install_bundle(bundle, tmp_path / "OFX")
+
+
 def test_a_failed_rename_puts_the_old_bundle_back(
     bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

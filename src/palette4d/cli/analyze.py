@@ -13,10 +13,10 @@ from typing import IO, Any
 from palette4d import analyze
 from palette4d.analysis.options import METHODS, OPTIONS, check_methods, parse_setting
 from palette4d.cli import analysis_report, analyze_shots
-from palette4d.cli.messages import as_options, tell
+from palette4d.cli.messages import as_fields, as_options, tell
 from palette4d.cli.progress import progress_bar
 from palette4d.common.arguments import checked, frame_range, whole
-from palette4d.common.errors import Palette4dError
+from palette4d.common.errors import Palette4dError, in_words
 from palette4d.common.text import counted
 
 USAGE = "palette4d analyze CLIP -o OUT [options]"
@@ -177,7 +177,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--progress",
         metavar="FILE",
         type=Path,
-        help="write progress into FILE, line by line; the last is 'done' or 'error: …'",
+        help="write progress into FILE for a host, line by line; the last is 'done' or 'error: …'",
     )
     analyze_shots.add_options(parser)
     parser.add_argument("-h", "--help", action="help", help="show this help")
@@ -285,8 +285,11 @@ class _ProgressFile:
     ) -> None:
         if self.file is None:
             return
-        words = " ".join(as_options(str(error) or type(error).__name__).split())
-        self._write(f"error: {words}" if kind else "done")
+        if isinstance(error, Exception):
+            words = as_fields(in_words(error) or type(error).__name__)
+            self._write(f"error: {' '.join(words.split())}")
+        elif error is None:
+            self._write("done")
         self.file.close()
 
 

@@ -1,13 +1,15 @@
 """What the command line prints on standard error.
 
 Errors and notes of the API name its arguments: ``force=True``, ``frames=…``. Here, and only here,
-they become options: ``--force``, ``--frames``.
+they become options: ``--force``, ``--frames``. Hosts have none: they get the names of the fields of
+Studio's dialog.
 """
 
 import re
 import sys
 
 from palette4d.analysis.options import OPTIONS
+from palette4d.studio import texts
 
 _ARGUMENT = re.compile(r'\b([a-z][a-z0-9_]*)=(True|…|"[^"\n]*"|-?[0-9][0-9.e+-]*[0-9]|[0-9])')
 _SPECIAL = {
@@ -37,6 +39,47 @@ def _option(found: re.Match[str]) -> str:
         return f"--set {name}={value}"
     option = f"--{name.replace('_', '-')}"
     return option if value in ("True", "…") else f"{option} {value}"
+
+
+#: The arguments of `analyze` that have a field in Studio, by name or with their value.
+_FIELDS = {
+    'on_edits="keep"': f"{texts.EDITS}: {texts.EDITS_NAMES[1]}",
+    'on_edits="drop"': f"{texts.EDITS}: {texts.EDITS_NAMES[2]}",
+    "analyze_shots()": texts.DETECT_SHOTS,
+    "frames": texts.FRAMES,
+    "skip_bad_frames": texts.SKIP_BAD,
+    "allow_cuts": texts.ALLOW_CUTS,
+    "input_space": texts.INPUT_SPACE,
+    "palette_space": texts.PALETTE_SPACE,
+    "ocio_config": texts.CONFIG,
+    "vertices": texts.VERTICES,
+    "method": texts.METHOD,
+}
+
+
+def as_fields(text: str) -> str:
+    """Return a message of an analysis in the words of a host's user, who has Studio.
+
+    >>> as_fields("choose frames=…, or leave such frames out with skip_bad_frames=True.")
+    "choose 'Frames', or leave such frames out with 'Skip bad frames'. Push Open in Studio for \
+these, and choose File > Analyse…"
+    """
+
+    def field(found: re.Match[str]) -> str:
+        label, value = _FIELDS.get(found[1]), found[2].strip('"')
+        if label is None:
+            return _option(found)
+        return f"'{label}'" if value in ("True", "…") else f"'{label}' {value}"
+
+    words = text
+    for argument, label in _FIELDS.items():
+        if not argument.isidentifier():
+            words = words.replace(argument, f"'{label}'")
+    words = _ARGUMENT.sub(field, words)
+    if words == text:
+        return text
+    menu, entry = texts.MENUS["file"].replace("&", ""), texts.ACTIONS["window"]["analyze"]
+    return f"{words.rstrip('.')}. Push Open in Studio for these, and choose {menu} > {entry}"
 
 
 def tell(kind: str, text: str) -> None:

@@ -23,10 +23,6 @@ if TYPE_CHECKING:
 
     Action = Callable[[str, str, str], argparse.ArgumentParser]
 
-#: The share of the picture above which it is said what else a pick changes, and the share of a
-#: pick's neighbourhood above which it is said that a hold takes it.
-MANY, TAKEN = 0.1, 0.2
-
 _WHERE = "--frame T (--colour C | --pixel X,Y [--box N])"
 _WHEN = "[--from A] [--until B] [--fade N]"
 
@@ -387,46 +383,25 @@ def _print_notes(
     document: Document, around: Mapping[str, Around], told: Iterable[frozenset[str]] = ()
 ) -> None:
     """Print what the solution moves, and what it does not meet; in short what was `told`."""
-    enabled = [pick for pick in document.picks if pick.enabled]
-    if not enabled:
+    from palette4d.grade.pick_notes import MANY, changed
+
+    if not any(pick.enabled for pick in document.picks):
         return
     moved, among = document.moved_by_picks()
     print(f"{moved} of {counted(among, 'palette colour')} {'moves' if moved == 1 else 'move'}")
     effect = document.side_effect()
-    print(
-        f"at frame {effect.frame:.0f}, {effect.share:.0%} of the picture's pixels change by more "
-        f"than 10 of 255: {effect.share - effect.others:.0%} near the picked colours and their "
-        f"shades, {effect.others:.0%} others"
-        + ("; no frame changes more of others" if effect.others > 0 else "")
-    )
-    if effect.others > MANY:
-        colour = ",".join(f"{value:.4f}" for value in effect.most)
-        print(
-            f"note: of the others {shown(effect.most)} changes most. If it must stay: "
-            f"hold --frame {effect.frame:.0f} --colour {colour}"
-        )
-    for id_, near in around.items():
-        for hold, taken in near.taken.items():
-            if taken > TAKEN:
-                print(
-                    f"note: the hold {hold} takes {taken:.0%} of what the colours near {id_} would "
-                    f"get at frame {near.frame:.0f}. If that is too much, a smaller hold takes "
-                    f"less: change {hold} --radius 0.05"
-                )
+    print(changed(effect))
+    for line in document.pick_notes(effect, around):
+        print(f"note: {as_options(line)}")
+    for rgb in effect.holds if effect.others > MANY else ():
+        colour = ",".join(f"{value:.4f}" for value in rgb)
+        print(f"  hold --frame {effect.frame:.0f} --colour {colour}")
     lines = _unmet(document)
     for ids, line in lines.items():
         if ids not in told:
             print(f"not met: {as_options(line)}")
     if old := [" and ".join(sorted(ids)) for ids in lines if ids in told]:
         print(f"not met, as before: {', '.join(old)}; `picks` says why")
-    for pick in () if document.scene_linear else enabled:
-        if pick.to is not None and not all(-0.05 <= value <= 1.05 for value in pick.to):
-            print(f"note: the new colour of {pick.id} lies far outside 0..1; most files clip it")
-    if not document.has_clip_colours:
-        print(
-            "note: this sidecar has no colours of its clip, so that only the palette's colours "
-            "are guarded. Analyse the clip again for a better guard"
-        )
 
 
 def _box(args: argparse.Namespace) -> int | None:

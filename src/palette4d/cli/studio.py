@@ -28,7 +28,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         "studio",
         help="edit a palette in a window",
         description="Open a window with the picture, the palette through time and the RGB solid.\n"
-        "It needs `pip install palette4d[studio]`.",
+        "It needs the package PySide6-Essentials.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -59,17 +59,18 @@ def run(args: argparse.Namespace) -> int:
     except ImportError as error:
         raise Palette4dError(
             "found no PySide6, expected it for the window; install it with "
-            "`pip install palette4d[studio]`"
+            f"`{sys.executable} -m pip install PySide6-Essentials`"
         ) from error
     if tuple(map(int, PySide6.__version__.split(".")[:2])) < OLDEST_QT:
         raise Palette4dError(
             f"found PySide6 {PySide6.__version__}, expected 6.5 or later; update it with "
-            "`pip install --upgrade palette4d[studio]`"
+            f"`{sys.executable} -m pip install --upgrade PySide6-Essentials`"
         )
     if PySide6.__version__ == BROKEN_QT and sys.version_info < OLDEST_PYTHON_FOR_IT:
         raise Palette4dError(
             f"found PySide6 {BROKEN_QT}, which ends with a crash on this Python (3.11); expected "
-            "another version; get one with `pip install 'palette4d[studio]'`"
+            "another version; get one with "
+            f"`{sys.executable} -m pip install 'PySide6-Essentials!={BROKEN_QT}'`"
         )
     from palette4d.studio import app
 

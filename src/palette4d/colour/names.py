@@ -1,7 +1,7 @@
 """Names of colours for people: a hue with a modifier, such as "deep red" or "pale blue".
 
-The list is fixed and short, in the manner of level 2 of the ISCC-NBS names (Kelly and Judd 1955),
-by the colour's place in OKLCh.
+The list is fixed and short. A colour's name follows from its place in OKLCh. The bounds are those
+at which the names change that people gave to 949 colours in the survey of xkcd.com (2010).
 """
 
 import bisect
@@ -11,19 +11,25 @@ from numpy.typing import ArrayLike
 
 from palette4d.colour.oklch import Lch
 
-#: Each hue ends at this angle of OKLCh.
+#: Each hue ends at an angle of OKLCh. It has its first name from a lightness and a chroma on, and
+#: the second one below either.
 HUES = (
-    (12, "pink"),
-    (42, "red"),
-    (83, "orange"),
-    (118, "yellow"),
-    (160, "green"),
-    (215, "cyan"),
-    (275, "blue"),
-    (318, "purple"),
-    (352, "magenta"),
-    (360, "pink"),
+    (19, "pink", 0.61, 0, "red"),
+    (38, "pink", 0.68, 0, "red"),
+    (79, "orange", 0.56, 0.105, "brown"),
+    (100, "yellow", 0.66, 0, "brown"),
+    (119, "yellow", 0.7, 0, "olive"),
+    (138, "lime", 0.78, 0.16, "green"),
+    (165, "green", 0, 0, "green"),
+    (210, "cyan", 0.82, 0, "teal"),
+    (288, "blue", 0, 0, "blue"),
+    (326, "purple", 0, 0, "purple"),
+    (341, "magenta", 0.6, 0.2, "purple"),
+    (354, "pink", 0.62, 0, "magenta"),
+    (360, "pink", 0.61, 0, "red"),
 )
+#: Colours of these hues are beige from a lightness on and up to a chroma.
+BEIGE_HUES, BEIGE_LIGHT, BEIGE = (45, 112), 0.63, 0.1
 #: Each grey ends at this lightness.
 GREYS = (
     (0.25, "black"),
@@ -37,12 +43,14 @@ GREY, GREYISH = 0.025, 0.07
 #: Up to the first lightness a colour is dark, or deep if it is strong. From the second on it is
 #: pale, or light if it is strong; a vivid one has no modifier.
 DARK, LIGHT, STRONG, VIVID = 0.42, 0.78, 0.11, 0.13
-#: From these lightnesses on, brown is orange, olive is yellow and red is pink.
-ORANGE, PINK = 0.62, 0.69
 
 
-def _at(table: tuple[tuple[float, str], ...], value: float) -> str:
-    return table[min(bisect.bisect(table, (value, "")), len(table) - 1)][1]
+def _hue(lightness: float, chroma: float, hue: float) -> str:
+    if BEIGE_HUES[0] <= hue < BEIGE_HUES[1] and lightness > BEIGE_LIGHT and chroma < BEIGE:
+        return "beige"
+    ends = [end for end, *_ in HUES]
+    _, name, light, strong, other = HUES[bisect.bisect(ends[:-1], hue)]
+    return name if lightness >= light and chroma >= strong else other
 
 
 def of_lch(lightness: float, chroma: float, hue: float) -> str:
@@ -54,20 +62,14 @@ def of_lch(lightness: float, chroma: float, hue: float) -> str:
     'deep red'
     """
     if chroma < GREY or lightness < 0.12:
-        return _at(GREYS, lightness)
-    name = _at(HUES, hue % 360)
-    if name in ("orange", "yellow") and lightness < ORANGE:
-        name = "brown" if name == "orange" else "olive"
-    if name in ("red", "pink"):
-        name = "pink" if lightness > PINK else "red"
-    if name == "magenta" and lightness < DARK:
-        name = "purple"
+        return next(name for end, name in GREYS if lightness < end or end == GREYS[-1][0])
+    name = _hue(lightness, chroma, hue % 360)
     strong = chroma >= STRONG
     if lightness < DARK:
         return f"deep {name}" if strong else f"dark {name}"
     if lightness > LIGHT and chroma < VIVID:
         return f"light {name}" if strong else f"pale {name}"
-    return f"greyish {name}" if chroma < GREYISH else name
+    return f"greyish {name}" if chroma < GREYISH and name != "beige" else name
 
 
 def named_lch(rgb: ArrayLike, encoding: str) -> list[tuple[float, str]]:

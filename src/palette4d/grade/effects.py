@@ -6,21 +6,38 @@ for it.
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from palette4d import _core
-from palette4d.grade.bumps import bumped
+from palette4d.grade.bumps import alongs, bumped
 from palette4d.grade.edits import Colour, as_colour
 from palette4d.grade.picks import MOST_PICKS, all_picks
-from palette4d.grade.solve import LEAST_SHARE, NEAR, NONE, OTHER, ClipAtTimes, Problem, parsed
+from palette4d.grade.solve import (
+    LARGEST,
+    LEAST_SHARE,
+    NEAR,
+    NONE,
+    OTHER,
+    SHADE,
+    ClipAtTimes,
+    Problem,
+    parsed,
+)
 
 F64 = NDArray[np.float64]
+B = NDArray[np.bool_]
+
+
+# A colour whose channels differ by less is a grey. Eyes see tints of greys first (CIE94): they
+# count from half of what counts elsewhere, where a pick has less than half of its effect.
+GREY = 0.1
+# So many holds are proposed at most, and none that takes more of what the colours near a pick get.
+MOST_HOLDS, TAKEN = 3, 0.2
 
 
 @dataclass(frozen=True)
@@ -31,43 +48,119 @@ class SideEffect:
     ----------
     frame : float
     share : float
-        Share, 0..1, of the frame's pixels that change by more than asked for in a channel.
+        Share, 0..1, of the frame's pixels that change by more than asked for in a channel, or are
+        greys that get a tint of more than half of that.
     others : float
         The same for pixels that are not near a picked colour or a shade of it.
     most : 3 floats
         The other colour for which this matters most; its share of the pixels counts.
+    holds : tuple of 3 floats
+        Colours to hold, such as `most`, tried: with these holds fewer others change. A colour is
+        left out if its hold would take more than `TAKEN` of what the colours near a pick get.
+    left : float
+        What of `others` is left with these holds.
     """
 
     frame: float
     share: float
     others: float
     most: Colour
+    holds: tuple[Colour, ...] = ()
+    left: float = 0.0
 
 
 def side_effect(fields: Mapping[str, Any], least: float) -> SideEffect:
     """Return what the picks' solution does; `least` is the change that counts."""
     clip, both, problem = _parts(fields)
-    found = [SideEffect(float(clip.first), 0.0, 0.0, (0.0, 0.0, 0.0))]
+    found, at = [SideEffect(float(clip.first), 0.0, 0.0, (0.0, 0.0, 0.0))], []
     for time in problem.times:
-        cut = _core.slice_at(clip.polytope, time)
-        solved = _core.edited_colours(clip.polytope, both.edits, cut)
-        user = _core.edited_colours(clip.polytope, clip.core.edits, cut)
-        guarded = clip.colours_at(time)
-        rgb, shares = guarded[:, :3], guarded[:, 3] / max(float(guarded[:, 3].sum()), 1e-9)
-        moved = _core.palette_weights(rgb, cut.rgb, cut.faces)[0] @ (solved - user)
-        change = bumped(rgb, moved, both.bumps_at(time))
-        size = np.abs(change).max(axis=1)
-        other = problem.guard_at(rgb, time, problem.asked(time)) > OTHER
+        now = _Colours.at(clip, both, problem, clip.colours_at(time), time)
+        counted, other, size = now.counted(now.bumps, least)
+        shares = now.shares
         worst = int(np.argmax(np.where(other, size * np.sqrt(shares), 0.0)))
         found.append(
             SideEffect(
                 time,
-                float(shares[size > least].sum()),
-                float(shares[other & (size > least)].sum()),
-                as_colour(rgb[worst]),
+                float(shares[counted].sum()),
+                float(shares[counted & other].sum()),
+                as_colour(now.rgb[worst]),
             )
         )
-    return max(found, key=lambda one: (one.others, one.share))
+        at.append(now)
+    most = max(range(len(found)), key=lambda i: (found[i].others, found[i].share))
+    if found[most].others == 0:
+        return found[most]
+    time = found[most].frame
+    near = [*_near_picks(clip, both, problem), *_near_picks(clip, both, problem, [time])]
+    return _with_holds(found[most], at[most - 1], near, problem, least)
+
+
+def _with_holds(
+    effect: SideEffect, at: _Colours, picks: Sequence[_NearPick], problem: Problem, least: float
+) -> SideEffect:
+    """Return the effect with holds that were tried one after the other."""
+    holds: list[Colour] = []
+    bumps, refused, left = at.bumps, np.zeros(len(at.rgb), bool), effect.others
+    while len(holds) < MOST_HOLDS:
+        counted, other, size = at.counted(bumps, least)
+        score = np.where(counted & other & ~refused, size * np.sqrt(at.shares), 0.0)
+        if not score.any():
+            break
+        worst = int(score.argmax())
+        refused[worst] = True
+        trial = np.vstack([bumps, _hold_row(problem, at.rgb[worst], at.time)])
+        if any(one.taken(_hold_row(problem, at.rgb[worst], one.time)) > TAKEN for one in picks):
+            continue
+        counted, other, _ = at.counted(trial, least)
+        rest = float(at.shares[counted & other].sum())
+        if rest < left:
+            holds.append(as_colour(at.rgb[worst]))
+            bumps, left = trial, rest
+    return replace(effect, holds=tuple(holds), left=left)
+
+
+def _hold_row(problem: Problem, rgb: F64, time: float) -> F64:
+    """Return the row of bumps of a hold that is not there yet, (11,)."""
+    centre = rgb[None]
+    along = alongs(centre, SHADE)
+    radii, keep = problem.hold_sizes(centre, along, np.array([LARGEST]), time)
+    return np.concatenate([rgb, radii, np.zeros(3), keep, along[0]])
+
+
+@dataclass(frozen=True)
+class _Colours:
+    """The clip's colours at a time, and what moves them: the palette `moved`, and `bumps`.
+
+    `guarded` is how much each wants to stay.
+    """
+
+    time: float
+    rgb: F64
+    shares: F64
+    moved: F64
+    bumps: F64
+    guarded: F64
+
+    @classmethod
+    def at(
+        cls, clip: ClipAtTimes, both: _core.Sidecar, problem: Problem, rgbw: F64, time: float
+    ) -> _Colours:
+        cut = _core.slice_at(clip.polytope, time)
+        solved = _core.edited_colours(clip.polytope, both.edits, cut)
+        user = _core.edited_colours(clip.polytope, clip.core.edits, cut)
+        rgb, shares = rgbw[:, :3], rgbw[:, 3] / max(float(rgbw[:, 3].sum()), 1e-9)
+        moved = _core.palette_weights(rgb, cut.rgb, cut.faces)[0] @ (solved - user)
+        guarded = problem.guard_at(rgb, time, problem.asked(time))
+        return cls(time, rgb, shares, moved, both.bumps_at(time), guarded)
+
+    def counted(self, bumps: F64, least: float) -> tuple[B, B, F64]:
+        """Return which colours change by what counts, which are not picked, and their changes."""
+        change = bumped(self.rgb, self.moved, bumps)
+        size = np.abs(change).max(axis=1)
+        tint = np.abs(change - change.mean(axis=1, keepdims=True)).max(axis=1)
+        grey = (np.ptp(self.rgb, axis=1) < GREY) & (self.guarded > 0.5)
+        tinted = grey & (tint > least / 2)
+        return (size > least) | tinted, (self.guarded > OTHER) | tinted, size
 
 
 @dataclass(frozen=True)
@@ -91,10 +184,47 @@ class Around:
 
 def surroundings(fields: Mapping[str, Any]) -> dict[str, Around]:
     """Return what the colours near each enabled pick get of its change, by the pick's id."""
-    clip, core, problem = _parts(fields)
     found = {}
+    clip, core, problem = _parts(fields)
+    for near in _near_picks(clip, core, problem):
+        taken: dict[str, float] = {}
+        for hold in near.held:
+            id_ = problem.hold_at(hold[:3], near.time)
+            taken[id_] = max(taken.get(id_, 0.0), near.taken(hold))
+        found[near.id] = Around(near.time, near.share(np.vstack([near.free, near.held])), taken)
+    return found
+
+
+@dataclass(frozen=True)
+class _NearPick:
+    """The colours near a pick, their shares, and what moves them: palette, bumps, and holds."""
+
+    id: str
+    time: float
+    rgb: F64
+    shares: F64
+    along: F64
+    moved: F64
+    free: F64
+    held: F64
+
+    def share(self, bumps: F64) -> float:
+        """Return the mean share of the pick's change that the colours get."""
+        return float(self.shares @ bumped(self.rgb, self.moved, bumps) @ self.along)
+
+    def taken(self, hold: F64) -> float:
+        """Return which share a hold takes of what the colours get without holds, 0..1."""
+        alone = self.share(self.free)
+        return 1 - self.share(np.vstack([self.free, hold])) / alone if alone > NONE else 0.0
+
+
+def _near_picks(
+    clip: ClipAtTimes, core: _core.Sidecar, problem: Problem, times: Sequence[float] = ()
+) -> list[_NearPick]:
+    """Return each pick's surroundings at one of some times, the nearest to its own frame."""
+    found = []
     for number, pick in enumerate(problem.picks):
-        full = [t for t in problem.times if pick.strength_at(t, clip.step) == 1]
+        full = [t for t in times or problem.times if pick.strength_at(t, clip.step) == 1]
         time = min(full, key=lambda t: abs(t - pick.frame), default=None)
         if time is None or (length := float(np.linalg.norm(pick.change_at(time)))) < NONE:
             continue
@@ -108,22 +238,11 @@ def surroundings(fields: Mapping[str, Any]) -> dict[str, Around]:
         weights = _core.palette_weights(rgbw[:, :3], cut.rgb, cut.faces)[0]
         moved = weights @ (_core.edited_colours(core.polytope, core.edits, cut) - cut.rgb)
         bumps = core.bumps_at(time)
+        held = bumps[:, 7] > 0
         along = pick.change_at(time) / length**2
-        share = functools.partial(_share, rgbw[:, :3], moved, shares / shares.sum(), along)
-        holds = bumps[:, 7] > 0
-        free = share(bumps[~holds])
-        taken: dict[str, float] = {}
-        for hold in bumps[holds] if free > NONE else ():
-            id_ = problem.hold_at(hold[:3], time)
-            lost = 1 - share(np.vstack([bumps[~holds], hold])) / free
-            taken[id_] = max(taken.get(id_, 0.0), lost)
-        found[pick.id] = Around(time, share(bumps), taken)
+        rgb, shares = rgbw[:, :3], shares / shares.sum()
+        found.append(_NearPick(pick.id, time, rgb, shares, along, moved, bumps[~held], bumps[held]))
     return found
-
-
-def _share(rgb: F64, moved: F64, shares: F64, along: F64, bumps: F64) -> float:
-    """Return the mean share of a change that colours get, which the palette moves by `moved`."""
-    return float(shares @ bumped(rgb, moved, bumps) @ along)
 
 
 def _parts(fields: Mapping[str, Any]) -> tuple[ClipAtTimes, _core.Sidecar, Problem]:

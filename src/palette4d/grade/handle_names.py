@@ -3,42 +3,50 @@
 The analysis keeps the colour's name with each vertex, so that the node shows the same names.
 """
 
+import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from palette4d.colour.names import named_lch
 from palette4d.grade.edits import Setting
 from palette4d.grade.handles import Handles
+from palette4d.grade.tracks import chains_of, runs_of
 
 
-def vertex_colours(vertices: Sequence[Mapping[str, Any]], encoding: str) -> list[str]:
+def vertex_colours(
+    vertices: Sequence[Mapping[str, Any]], edges: Iterable[Mapping[str, Any]], encoding: str
+) -> list[str]:
     """Return the name of each vertex's colour.
 
-    Colours of one name at one frame get numbers, the lightest first.
+    Tracks that have a colour of one name at the same time get numbers, the lightest first.
 
     Parameters
     ----------
     vertices : sequence of mapping
-        ``rgb`` and ``frame``, as in the sidecar.
+        ``id``, ``rgb`` and ``frame``, as in the sidecar.
+    edges : iterable of mapping
+        ``from`` and ``to``.
     encoding : str
         The palette's encoding; unknown counts as sRGB.
     """
     found = named_lch([vertex["rgb"] for vertex in vertices], encoding)
-    order = sorted(range(len(found)), key=lambda i: -found[i][0])
-    numbers = numbered((found[i][1], round(vertices[i]["frame"])) for i in order)
-    numbers = [number for _, number in sorted(zip(order, numbers, strict=True))]
-    return [name + number for (_, name), number in zip(found, numbers, strict=True)]
-
-
-def numbered(names: Iterable[object]) -> list[str]:
-    """Return " 1", " 2", … for names that occur more than once, and "" for the others."""
-    places: dict[object, list[int]] = {}
-    for place, name in enumerate(names):
-        places.setdefault(name, []).append(place)
-    found: dict[int, str] = {}
-    for same in places.values():
-        found |= {at: f" {n}" if len(same) > 1 else "" for n, at in enumerate(same, 1)}
-    return [found[place] for place in sorted(found)]
+    names = [name for _, name in found]
+    frames = [float(vertex["frame"]) for vertex in vertices]
+    times: dict[str, list[tuple[float, float]]] = {}
+    tracks: dict[str, dict[int, list[int]]] = {}
+    for number, chain in enumerate(chains_of(vertices, edges)):
+        for run in runs_of(chain, frames, names):
+            name = names[run.vertices[0]]
+            times.setdefault(name, []).append((run.first, run.last))
+            tracks.setdefault(name, {}).setdefault(number, []).extend(run.vertices)
+    for name, of in tracks.items():
+        in_time = itertools.pairwise(sorted(times[name]))
+        if any(later[0] <= earlier[1] for earlier, later in in_time):
+            light_first = sorted(of.values(), key=lambda same: -max(found[v][0] for v in same))
+            for number, same in enumerate(light_first, 1):
+                for vertex in same:
+                    names[vertex] = f"{name} {number}"
+    return names
 
 
 def colours_by_id(
@@ -53,7 +61,7 @@ def colours_by_id(
         if all("name" in vertex for vertex in vertices):
             names = [str(vertex["name"]) for vertex in vertices]
         else:
-            names = vertex_colours(vertices, encoding)
+            names = vertex_colours(vertices, handles.edges.values(), encoding)
         handles.colours = dict(zip(handles.vertices, names, strict=True))
     colours = dict(handles.colours)
     for id_, stop in (settings or {}).items():

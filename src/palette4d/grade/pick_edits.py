@@ -1,7 +1,7 @@
 """Picks and holds of a palette: made, changed, removed; and what they do."""
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -251,6 +251,28 @@ class PickEdits(EditedPalette):
         from palette4d.grade import effects
 
         return effects.surroundings(self._members())
+
+    def pick_notes(
+        self,
+        effect: "SideEffect | None" = None,
+        around: "Mapping[str, Around] | None" = None,
+    ) -> list[str]:
+        """Return what speaks against the enabled picks, and what helps, one sentence or two each.
+
+        `effect` and `around` are those of `side_effect` and `around_picks`, if they are at hand.
+        """
+        from palette4d.grade.pick_notes import notes
+
+        enabled = [pick for pick in self.picks if pick.enabled]
+        if not enabled:
+            return []
+        return notes(
+            enabled,
+            effect or self.side_effect(),
+            self.around_picks() if around is None else around,
+            scene_linear=self.scene_linear,
+            has_clip_colours=self.has_clip_colours,
+        )
 
     def pick_warnings(self, id: str, clip: str | os.PathLike[str] | None = None) -> tuple[str, ...]:
         """Return what speaks against the clip of a pick or hold, and against its colour."""

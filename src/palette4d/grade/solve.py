@@ -494,18 +494,29 @@ class Problem:
 
     def _with_holds(self, one: _Solved) -> _Solved:
         """Return the solution at a time with its holds."""
-        time, asked = one.time, self.asked(one.time)
-        picked = np.flatnonzero((asked > 0) & self.moving[self.of])
+        asked = self.asked(one.time)
         held = np.flatnonzero((asked > 0) & ~self.moving[self.of])
-        centres = self.centres(time)
-        along = alongs(centres[held], self.shades[held])
-        away = np.sqrt(squares(centres[picked], centres[held], along)).T
-        most = (away / asked[picked]).min(axis=1, initial=np.inf)
+        centres = self.centres(one.time)[held]
         own = np.array([self.picks[i].radius or LARGEST for i in self.of[held]])
-        radii = np.maximum(np.minimum(own, most), np.minimum(own, LEAST))
-        keep = asked[held] * np.minimum(1.0, most / LEAST)
+        radii, keep = self.hold_sizes(
+            centres, alongs(centres, self.shades[held]), own, one.time, asked[held]
+        )
         holds = dict(zip(held.tolist(), np.column_stack([radii, keep]), strict=True))
         return replace(one, bumps=one.bumps | holds)
+
+    def hold_sizes(
+        self, centres: F64, along: F64, own: F64, time: float, asked: F64 | float = 1.0
+    ) -> tuple[F64, F64]:
+        """Return the radii of holds at a time, and how much they keep.
+
+        They end at the nearest pick, `own` away at most.
+        """
+        every = self.asked(time)
+        picked = np.flatnonzero((every > 0) & self.moving[self.of])
+        away = np.sqrt(squares(self.centres(time)[picked], centres, along)).T
+        most = (away / every[picked]).min(axis=1, initial=np.inf)
+        radii = np.maximum(np.minimum(own, most), np.minimum(own, LEAST))
+        return radii, asked * np.minimum(1.0, most / LEAST)
 
     def _terms(self, time: float) -> _Terms | None:
         """Return the problem at a time; none where nothing is asked for."""

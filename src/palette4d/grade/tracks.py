@@ -4,13 +4,14 @@ A chain follows one palette colour through its vertices. At a split or a merge o
 the chain; every other edge begins or ends another chain.
 """
 
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from palette4d.grade.handle_names import numbered
 from palette4d.grade.handles import Handles
 
 F64 = NDArray[np.float64]
@@ -99,6 +100,46 @@ def find_chains(
     return tuple(chains), vertex_chain, edge_chain
 
 
+def chains_of(
+    vertices: Iterable[Mapping[str, Any]], edges: Iterable[Mapping[str, Any]]
+) -> tuple[Chain, ...]:
+    """Return the chains of a sidecar's vertices and edges."""
+    vertices = list(vertices)
+    place = {vertex["id"]: index for index, vertex in enumerate(vertices)}
+    pairs = [(place[edge["from"]], place[edge["to"]]) for edge in edges]
+    frames = np.array([vertex["frame"] for vertex in vertices], dtype=np.float64)
+    rgb = np.array([vertex["rgb"] for vertex in vertices], dtype=np.float64)
+    return find_chains(frames, rgb, pairs)[0]
+
+
+@dataclass(frozen=True)
+class Run:
+    """Successive vertices of a chain with one label, and the frames of that label."""
+
+    vertices: tuple[int, ...]
+    first: float
+    last: float
+
+
+def runs_of(chain: Chain, frames: Sequence[float], labels: Sequence[str]) -> list[Run]:
+    """Return a chain's runs. Between vertices with two labels the label changes half way.
+
+    Parameters
+    ----------
+    frames, labels : sequence
+        Of all vertices.
+    """
+    found = [tuple(run) for _, run in itertools.groupby(chain.vertices, lambda v: labels[v])]
+    ends = [(frames[a[-1]] + frames[b[0]]) / 2 for a, b in itertools.pairwise(found)]
+    times = itertools.pairwise([chain.first, *ends, chain.last])
+    return [Run(run, *time) for run, time in zip(found, times, strict=False)]
+
+
+def plain(name: str) -> str:
+    """Return the name of a colour without its number."""
+    return name.rstrip(" 0123456789")
+
+
 @dataclass(frozen=True)
 class Track:
     """One palette colour through time, as a row of `plot` shows it.
@@ -108,7 +149,8 @@ class Track:
     name : str
         The id of its first vertex.
     called : str
-        Its name for people: its most colourful vertex, and its frames, such as "deep red, 13-31".
+        Its name for people: the name of its most colourful vertex, and the frames at which it has
+        that colour, such as "deep red, 13-31". Pale blue is blue, too, but dark blue is not.
     at : float
         The frame of that vertex; of a fork, the middle.
     first, last : float
@@ -129,7 +171,7 @@ class Track:
 def tracks_of(handles: Handles, colours: Mapping[str, str]) -> list[Track]:
     """Return the tracks of a palette; every vertex and every edge belongs to exactly one.
 
-    Tracks of one name and the same frames get numbers, the lightest first.
+    Tracks of one name and the same frames, such as forks between tracks, get numbers.
 
     Parameters
     ----------
@@ -137,30 +179,33 @@ def tracks_of(handles: Handles, colours: Mapping[str, str]) -> list[Track]:
         The names of the vertices' colours.
     """
     ids, edge_ids = list(handles.vertices), list(handles.edges)
-    place = {id_: index for index, id_ in enumerate(ids)}
-    rgb = np.array([vertex["rgb"] for vertex in handles.vertices.values()], dtype=np.float64)
-    edges = [(place[edge["from"]], place[edge["to"]]) for edge in handles.edges.values()]
+    rgb = [vertex["rgb"] for vertex in handles.vertices.values()]
     frames = [float(vertex["frame"]) for vertex in handles.vertices.values()]
-    chains, _, _ = find_chains(np.array(frames), rgb, edges)
-    names, at, light = [], [], []
-    for chain in chains:
-        # A fork between two other tracks has no vertex of its own.
-        inside = chain.vertices or edges[chain.edges[0]]
-        strongest = max(inside, key=lambda vertex: float(np.ptp(rgb[vertex])))
-        span = "-".join(dict.fromkeys(str(round(at)) for at in (chain.first, chain.last)))
-        names.append((colours[ids[strongest]].rstrip(" 0123456789"), span))
-        at.append(frames[strongest] if chain.vertices else (chain.first + chain.last) / 2)
-        light.append(float(rgb[list(inside)].mean()))
-    order = sorted(range(len(chains)), key=lambda number: -light[number])
-    numbers = dict(zip(order, numbered(names[number] for number in order), strict=True))
-    tracks = []
-    for number, (chain, (colour, span)) in enumerate(zip(chains, names, strict=True)):
+    names = [colours[id_] for id_ in ids]
+    labels = [plain(name).removeprefix("pale ").removeprefix("light ") for name in names]
+    place = {id_: index for index, id_ in enumerate(ids)}
+    tracks: list[Track] = []
+    taken: dict[str, int] = {}
+    for chain in chains_of(handles.vertices.values(), handles.edges.values()):
+        if chain.vertices:
+            strongest = max(chain.vertices, key=lambda v: max(rgb[v]) - min(rgb[v]))
+            run = next(r for r in runs_of(chain, frames, labels) if strongest in r.vertices)
+            colour, at, first, last = names[strongest], frames[strongest], run.first, run.last
+        else:  # a fork between two other tracks
+            fork = handles.edges[edge_ids[chain.edges[0]]]
+            ends = [place[fork[end]] for end in ("from", "to")]
+            strongest = max(ends, key=lambda v: max(rgb[v]) - min(rgb[v]))
+            colour, first, last = plain(names[strongest]), chain.first, chain.last
+            at = (first + last) / 2
+        span = "-".join(dict.fromkeys(str(round(time)) for time in (first, last)))
+        called = f"{colour}, {span}"
+        taken[called] = taken.get(called, 0) + 1
+        if taken[called] > 1:
+            called = f"{plain(colour)} {taken[called]}, {span}"
         vertices = tuple(ids[vertex] for vertex in chain.vertices)
         along = tuple(edge_ids[edge] for edge in chain.edges)
-        first, last = chain.first, chain.last
-        called = f"{colour}{numbers[number]}, {span}"
         name = (vertices or along)[0]
-        tracks.append(Track(name, called, at[number], first, last, vertices, along))
+        tracks.append(Track(name, called, at, chain.first, chain.last, vertices, along))
     return tracks
 
 

@@ -118,6 +118,11 @@ def install_bundle(
             f"dest=… and name it in the environment variable {SEARCH_PATH}"
         ) from error
     except OSError as error:
+        if os.path.lexists(destination) and not destination.is_dir():
+            raise Palette4dError(
+                f"{destination}: found a file, expected a folder for the node; choose another with "
+                "dest=…"
+            ) from error
         raise Palette4dError(
             f"{target}: cannot be installed ({_reason(error)}); choose another folder with dest=…"
         ) from error

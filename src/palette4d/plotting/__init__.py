@@ -36,7 +36,7 @@ def plot(
     path : path
         The picture.
     frames : list of float, optional
-        Times to show; by default four or five over the clip, with edited frames.
+        Times to show; by default four or five that show what happens, with edited ones.
     clip : str, optional
         The clip; by default the clip that the sidecar names.
     version : str
@@ -81,7 +81,7 @@ def plot(
     names = ("before", "after") if before is None else (before or "active", version or "active")
     first, last = sidecar.polytope.first_frame, sidecar.polytope.last_frame
     if frames is None:
-        frames = page.default_frames(first, last, PlottedPalette.of(sidecar, against).edited_times)
+        frames = page.default_frames(PlottedPalette.of(sidecar, against))
     columns = []
     for frame in sorted(set(frames)):
         if not first <= frame <= last:

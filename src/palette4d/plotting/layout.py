@@ -366,6 +366,7 @@ def disc_names(
     beside: tuple[float, float, float] | None = None,
     longer: Mapping[str, str] | None = None,
     ends: tuple[float, float] = (-np.inf, np.inf),
+    aside: bool = False,
 ) -> list[Label]:
     """Return the ids above or below their discs, edited ids first; ids without space are left out.
 
@@ -389,6 +390,8 @@ def disc_names(
         What to write after an id where there is still space.
     ends : (float, float)
         The smallest and largest x of these longer texts.
+    aside : bool
+        Ids may be at the right or left of their discs, too.
     """
     tall = 0.95 * size
 
@@ -424,6 +427,8 @@ def disc_names(
         text, away = shorten(disc.id), disc.radius + collar + 0.5
         half = width(text) / 2
         places = [(disc.x, disc.y + side * (away + tall / 2)) for side in (-1, 1)]
+        if aside:
+            places += [(disc.x + way * (away + half), disc.y) for way in (1, -1)]
         if beside is not None and disc.home in beside[:2] and away + 2 * half <= beside[2]:
             way = -1 if disc.home == beside[0] else 1
             places.insert(0, (disc.x + way * (away + half), disc.y))
@@ -435,9 +440,9 @@ def disc_names(
         if disc.id not in labels or disc.id not in (longer or {}):
             continue
         text, away = f"{labels[disc.id].text} {(longer or {})[disc.id]}", disc.radius + collar + 0.5
-        aside = width(text) / 2 - disc.radius
+        shift = width(text) / 2 - disc.radius
         for side, way in itertools.product((-1, 1), (0, 1, -1)):
-            x, y = disc.x + way * aside, disc.y + side * (away + tall / 2)
+            x, y = disc.x + way * shift, disc.y + side * (away + tall / 2)
             box = boxed(text, x, y)
             if ends[0] <= box[0] and box[2] <= ends[1] and free(box, disc.id):
                 for column in columns.values():

@@ -24,6 +24,8 @@ GUTTER = 14.0
 HEADER = 76.0
 #: Space for the lines between the timeline and the frames above and below it.
 LEADER = 30.0
+#: The frames to show are chosen among about so many.
+TRIED = 100
 #: Space between the pictures before and after the edits.
 GAP = 4.0
 
@@ -38,6 +40,8 @@ class Column:
         The time of the palette.
     shape : Shape
         The sliced palette; with the clip, also pixels.
+    ids : tuple of str
+        For each of its colours, the vertex of its track that is nearest in time.
     pictures : tuple of (h, w, 3) float32
         The clip's frame at reduced size, and its recolouring if the sidecar has edits. Empty
         without the clip.
@@ -45,47 +49,72 @@ class Column:
 
     frame: float
     shape: Shape
+    ids: tuple[str, ...]
     pictures: tuple[F32, ...] = ()
 
 
-def default_frames(
-    first: float, last: float, edited: Sequence[float] = (), count: int = 4, most: int = 5
-) -> list[float]:
-    """Choose the frames to show: whole frame numbers spread over the clip, with edited frames.
+def default_frames(palette: PlottedPalette, count: int = 4, most: int = 5) -> list[float]:
+    """Choose the frames to show: edited frames, and those that show what happens.
+
+    Where nothing changes they are spread evenly over the clip.
 
     Parameters
     ----------
-    first, last : float
-        The clip's first and last frame.
-    edited : sequence of float
-        Times of edited vertices and stops.
+    palette : PlottedPalette
+        The palette and its edits.
     count, most : int
         Number of frames to show, and the largest number if edits need more. Their distance is at
         least a tenth of the clip, unless the clip has fewer frames.
     """
+    first, last = palette.first, palette.last
     if last <= first:
         return [first]
     gap = max(1.0, (last - first) / 10)
-    wanted = sorted({float(min(max(round(t), first), last)) for t in edited})
+    wanted = sorted({float(min(max(round(t), first), last)) for t in palette.edited_times})
     # The clip's ends, or an edited frame near to an end.
     chosen = [
         min((t for t in wanted if t - first < gap), default=first),
         max((t for t in wanted if last - t < gap), default=last),
     ]
-    spread = np.linspace(first, last, count)
-    if wanted:
-        spread = np.arange(first, last, max(1.0, (last - first) / 1000))
-
-    def room(time: float) -> float:
-        return min(abs(time - other) for other in chosen)
-
-    for candidates, limit in ((wanted, most), ([float(round(t)) for t in spread], count)):
-        while candidates and len(chosen) < limit:
-            best = max(candidates, key=room)
-            if room(best) < gap:
-                break
-            chosen.append(best)
+    while len(chosen) < most and (far := [t for t in wanted if _room(t, chosen) >= gap]):
+        chosen.append(max(far, key=lambda t: _room(t, chosen)))
+    if len(chosen) < count:
+        chosen += _others(palette, chosen, count - len(chosen), gap)
     return sorted(chosen)
+
+
+def _others(palette: PlottedPalette, chosen: list[float], count: int, gap: float) -> list[float]:
+    """Return up to `count` frames, one or two, that leave no other frame far from all shown.
+
+    The distance of two frames is that of the palette's colours plus the time between them.
+    """
+    first, last = palette.first, palette.last
+    steps = int(min(last - first, TRIED))
+    times = np.unique(np.linspace(first, last, steps + 1).round())
+    may = np.array([_room(t, chosen) >= gap for t in times.tolist()])
+    if not may.any():
+        return []
+    every = np.concatenate([times, chosen])
+    away = np.zeros((len(times), len(every)))
+    for track in palette.track_colours(every).swapaxes(0, 1):
+        here = track[: len(times)]
+        away = np.fmax(away, np.linalg.norm(here[:, None] - track[None], axis=-1))
+    away += np.abs(times[:, None] - every[None]) / (last - first)
+    known, tried = away[:, len(times) :].min(axis=1), times[may]
+    to_tried = np.minimum(known[:, None], away[:, : len(times)][:, may])
+    left = (
+        to_tried[:, :, None] if count < 2 else np.minimum(to_tried[:, :, None], to_tried[:, None])
+    )
+    cost = left.max(axis=0) + left.mean(axis=0)
+    if count > 1:
+        cost[np.abs(tried[:, None] - tried[None]) < gap] += len(every)
+    best = np.unravel_index(np.argmin(cost), cost.shape)
+    found = sorted({float(tried[at]) for at in best[: min(count, 2)]})
+    return found if found[-1] - found[0] >= gap else found[:1]
+
+
+def _room(time: float, chosen: Sequence[float]) -> float:
+    return min(abs(time - other) for other in chosen)
 
 
 def column(
@@ -119,8 +148,10 @@ def column(
     rgb, faces = np.asarray(palette.rgb), np.asarray(palette.faces)
     if against is not None:
         rgb = np.asarray(_core.edited_colours(sidecar.polytope, against, palette))
+    nearer = palette.ends[np.arange(len(rgb)), (palette.weights > 0.5).astype(int)]
+    ids = tuple(sidecar.polytope.vertex_ids[vertex] for vertex in nearer)
     if image is None:
-        return Column(frame, Shape(rgb, np.asarray(edited), faces))
+        return Column(frame, Shape(rgb, np.asarray(edited), faces), ids)
     shape = Shape(rgb, np.asarray(edited), faces, even_sample(image, pixels))
     step = max(1, image.shape[1] // width)
     small = np.ascontiguousarray(image[::step, ::step], dtype=np.float32)
@@ -134,8 +165,8 @@ def column(
         return recolourer.apply(small, threads=0)
 
     if sidecar.edits.empty and against is None:
-        return Column(frame, shape, (small,))
-    return Column(frame, shape, (recoloured(against), recoloured(sidecar.edits)))
+        return Column(frame, shape, ids, (small,))
+    return Column(frame, shape, ids, (recoloured(against), recoloured(sidecar.edits)))
 
 
 def build(
@@ -191,7 +222,7 @@ def build(
             axes.imshow(style.shown(picture, encoding), extent=ends, aspect="auto", zorder=4)
         middle = panel.bottom - LEADER - 30 - cube / 2
         view = View.fit(extent, (centre, middle), cube)
-        polyhedron.draw(axes, shown.shape, view, encoding)
+        polyhedron.draw(axes, shown.shape, view, encoding, shown.ids)
     return figure
 
 

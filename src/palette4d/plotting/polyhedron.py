@@ -4,17 +4,28 @@ The drawing order is from far to near: cube, far faces and edges, pixels, near f
 palette colours.
 """
 
+import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from palette4d.plotting import style
+from palette4d.plotting import style, timeline
+from palette4d.plotting.layout import Disc, Kind, disc_names
 from palette4d.plotting.solid import CORNERS, CUBE, Shape, View, facing
 from palette4d.plotting.timeline import disc
 
+F64 = NDArray[np.float64]
 
-def draw(axes: Any, shape: Shape, view: View, encoding: str) -> None:
-    """Draw one polyhedron."""
+#: The kinds and radii of discs, and the size of ids.
+PLAIN: tuple[Kind, float] = ("plain", 5.0)
+EDITED: tuple[Kind, float] = ("edited", 6.5)
+ID_SIZE = 6.5
+
+
+def draw(axes: Any, shape: Shape, view: View, encoding: str, ids: Sequence[str] = ()) -> None:
+    """Draw one polyhedron; `ids` are those of its colours."""
     from matplotlib.collections import LineCollection, TriMesh
     from matplotlib.tri import Triangulation
 
@@ -61,9 +72,29 @@ def draw(axes: Any, shape: Shape, view: View, encoding: str) -> None:
         axes.annotate("", xy=after[index], xytext=points[index], arrowprops=arrow, zorder=8)
     both = np.stack([colours, style.shown(shape.edited, encoding)], axis=1)
     for index in np.argsort(seen[:, 2], kind="stable"):
-        kind, radius = ("edited", 6.5) if index in moved else ("plain", 5.0)
+        kind, radius = EDITED if index in moved else PLAIN
         x, y = points[index].tolist()
         disc(axes, x, y, radius, both[index], kind, 9)
+    _draw_ids(axes, points, shape, set(moved), ids)
+
+
+def _draw_ids(axes: Any, points: F64, shape: Shape, moved: set[int], ids: Sequence[str]) -> None:
+    discs = []
+    for index, (id_, (x, y)) in enumerate(zip(ids, points.tolist(), strict=False)):
+        kind, radius = EDITED if index in moved else PLAIN
+        colours = shape.rgb[index], shape.edited[index]
+        # In a layout y is down.
+        discs.append(Disc(id_, kind, 0.0, -1, x, -y, radius, x, *colours))
+    names = disc_names(
+        discs,
+        ID_SIZE,
+        lambda text: timeline.text_width(text, ID_SIZE),
+        math.inf,
+        lambda text: style.printable(text, 14),
+        aside=True,
+    )
+    for name in names:
+        timeline.draw_id(axes, name, -name.y, ID_SIZE, style.PAGE)
 
 
 def _draw_cube(axes: Any, view: View) -> None:

@@ -139,6 +139,16 @@ class PlottedPalette:
         colours: F64 = self.sampled(frames)[int(edited)][edge]
         return colours
 
+    def track_colours(self, frames: F64) -> F64:
+        """Return the colours before edits of every track at (k,) times, (k, c, 3); NaN: none."""
+        chains, _, edge_chain = find_chains(self.frames, self.rgb, self.edges)
+        found = np.full((len(frames), len(chains), 3), np.nan)
+        before, _ = self.sampled(frames)
+        for chain, colours in zip(edge_chain, before, strict=True):
+            there = np.isfinite(colours[:, 0])
+            found[there, chain] = colours[there]
+        return found
+
     def touched(self, edge: int) -> bool:
         """Whether anything on this edge is edited."""
         return bool(self.changed[list(self.edges[edge])].any()) or any(

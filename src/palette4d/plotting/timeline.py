@@ -14,6 +14,7 @@ from palette4d.plotting.layout import (
     BAND,
     COLLAR,
     Disc,
+    Label,
     Scale,
     Timeline,
     disc_names,
@@ -127,7 +128,7 @@ def _draw_ground(axes: Any, panel: Panel) -> None:
         if not section.number:
             line = {"colors": style.LINE, "linewidth": 0.8, "zorder": 1.5}
             axes.vlines([x0, x1], panel.floor, panel.top - 1, **line)
-    for name in panel.layout.block_names(15 - HEAD, lambda text: _width(text, 8)):
+    for name in panel.layout.block_names(15 - HEAD, lambda text: text_width(text, 8)):
         axes.text(name.x, panel.y(name.y), name.text, zorder=3, **style.CENTRED)
 
 
@@ -198,20 +199,25 @@ def _draw_ids(axes: Any, panel: Panel, discs: list[Disc], colours: Mapping[str, 
     names = disc_names(
         discs,
         size,
-        lambda text: _width(text, size),
+        lambda text: text_width(text, size),
         panel.layout.height - 1,
         lambda text: style.printable(text, 14),
         longer={id_: style.printable(colour, 30) for id_, colour in colours.items()},
         ends=(panel.left + 4, panel.right - 4),
     )
     for name in names:
-        label = {**style.CENTRED, "fontsize": size, "va": "center_baseline", "zorder": 20}
-        label["color"] = style.BRIGHT if name.bright else style.TEXT
-        label["fontweight"] = "bold" if name.bright else "normal"
-        label["bbox"] = {"facecolor": style.PANEL, "alpha": 0.85, "linewidth": 0, "pad": 0.8}
-        axes.text(name.x, panel.y(name.y), name.text, **label)
+        draw_id(axes, name, float(panel.y(name.y)), size, style.PANEL)
 
 
-def _width(text: str, size: float) -> float:
+def draw_id(axes: Any, name: Label, y: float, size: float, ground: str) -> None:
+    """Write the id of a disc at a page's y, with little of its ground around it."""
+    label = {**style.CENTRED, "fontsize": size, "va": "center_baseline", "zorder": 20}
+    label["color"] = style.BRIGHT if name.bright else style.TEXT
+    label["fontweight"] = "bold" if name.bright else "normal"
+    label["bbox"] = {"facecolor": ground, "alpha": 0.85, "linewidth": 0, "pad": 0.8}
+    axes.text(name.x, y, name.text, **label)
+
+
+def text_width(text: str, size: float) -> float:
     """Return about the width of a line of text in points."""
     return 0.64 * size * len(text) + 3
