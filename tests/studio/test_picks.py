@@ -92,6 +92,20 @@ def test_alt_click_holds(qtbot: Any, opened: Window) -> None:
     assert hold.pixel == (20, 10)
 
 
+def test_what_speaks_against_the_picks_stands_below_them(qtbot: Any, opened: Window) -> None:
+    pick(qtbot, opened, 40, 30)
+    notes = opened.inspector.picks.notes
+
+    def says(*, is_far: bool) -> None:
+        qtbot.waitUntil(lambda: ("p1 lies far outside 0..1" in notes.text()) == is_far)
+
+    opened.session.edit(lambda document: document.change_pick("p1", to=(3.0, 0.25, 0.5)))
+    says(is_far=True)
+    assert notes.isVisibleTo(opened)
+    opened.session.undo()
+    says(is_far=False)
+
+
 def test_the_list_switches_off_selects_and_removes(qtbot: Any, opened: Window) -> None:
     pick(qtbot, opened, 40, 30)
     rows = opened.inspector.picks.list

@@ -1,7 +1,7 @@
 """Lists below the inspected colour: picks, holds and locks with what they reach, and versions."""
 
 import numpy as np
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, QTimer
 from PySide6.QtGui import QIcon, QKeyEvent, QPainter, QPixmap
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -25,6 +25,8 @@ from palette4d.studio.session import Session
 #: The size of the colours before a pick's name.
 ICON = QSize(34, 14)
 ID = Qt.ItemDataRole.UserRole
+#: Notes on picks are worked out when nothing has changed for so many milliseconds.
+REST = 300
 
 
 class PickList(QWidget):
@@ -59,8 +61,19 @@ class PickList(QWidget):
         column_ = QVBoxLayout(self)
         column_.setContentsMargins(0, 0, 0, 0)
         column_.setSpacing(4)
+        self.notes = QLabel()
+        self.notes.setTextFormat(Qt.TextFormat.PlainText)
+        self.notes.setWordWrap(True)
+        self.notes.setStyleSheet(f"color: {theme.FAINT}")
+        self.notes.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.notes.hide()
+        self._resting = QTimer(self)
+        self._resting.setSingleShot(True)
+        self._resting.timeout.connect(self._note)
         column_.addLayout(row)
         column_.addWidget(self.list, 1)
+        column_.addWidget(self.notes)
+        session.on("document", lambda: self._resting.start(REST), panel=True)
         self.list.itemSelectionChanged.connect(self._selected)
         self.list.itemChanged.connect(self._toggled)
         for event in ("document", "selection", "view"):
@@ -92,6 +105,15 @@ class PickList(QWidget):
         self.remove.setEnabled(bool(self.list.selectedItems()))
         self.setVisible(bool(picks or locks))
         self._silent = False
+
+    def _note(self) -> None:
+        """Say what speaks against the picks, as the command line does."""
+        document = self.session.document
+        if self.session.dragging or self.session.solving:
+            return  # when it is done, the session tells of the document again
+        notes = [] if document is None else document.pick_notes()
+        self.notes.setText("\n".join(f"{line[0].upper()}{line[1:]}." for line in notes))
+        self.notes.setVisible(bool(notes))
 
     @staticmethod
     def _words(pick: Pick) -> list[str]:
