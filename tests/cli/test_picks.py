@@ -137,6 +137,17 @@ def test_disable_enable_and_change(path: str, run: Run) -> None:
     np.testing.assert_allclose(picks_of(path)[0]["rgb"], (0.7, 0.15, 0.1), atol=0.05)
 
 
+def test_a_change_can_be_taken_back(path: str, run: Run) -> None:
+    run("pick", "--frame", "2", "--colour", "0.36,0.6,0.2", "--by", "0.1,0,0", "--radius", "0.2")
+    before = picks_of(path)[0]
+    assert before["path"]
+    assert run("change", "p1", "--global-only", "--no-follow")[0] == 0
+    assert not picks_of(path)[0].get("path")
+    assert run("change", "p1", "--radius", "0.1")[0] == 1  # of a neighbourhood that is left out
+    assert run("change", "p1", "--no-global-only", "--follow")[0] == 0
+    assert picks_of(path)[0] == before
+
+
 def test_a_range_changes_nothing_beyond(path: str, run: Run, analysed: Path) -> None:
     words = ("--frame", "2", "--colour", "0.36,0.6,0.2", "--by", "0.2,0,0")
     assert run("pick", *words, "--from", "2", "--until", "3", "--fade", "1")[0] == 0

@@ -51,7 +51,7 @@ def add_actions(action: Action) -> None:
         )
         parser.set_defaults(run=run_pick)
     _add_new(pick)
-    hold.set_defaults(to=None, by=None, toward=None, global_only=False)
+    hold.set_defaults(to=None, by=None, toward=None, global_only=None)
     _add_change(action)
     for name, text in (
         ("enable", "switch picks and holds on again."),
@@ -123,7 +123,11 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
         choices=("shift", "colour"),
         help="at other frames: the same change (shift, default), or the same new colour",
     )
-    parser.add_argument("--global-only", action="store_true", help="move palette colours only")
+    parser.add_argument(
+        "--global-only",
+        action=argparse.BooleanOptionalAction,
+        help="move palette colours only",
+    )
 
 
 def _add_how(parser: argparse.ArgumentParser) -> None:
@@ -142,7 +146,11 @@ def _add_how(parser: argparse.ArgumentParser) -> None:
         metavar="R",
         help="where the local neighbourhood ends, in code values (default: grows with the change)",
     )
-    add("--no-follow", action="store_true", help="the colour is the same in all frames")
+    add(
+        "--follow",
+        action=argparse.BooleanOptionalAction,
+        help="whether the colour is followed through the clip (default), or the same at all frames",
+    )
 
 
 def _add_change(action: Action) -> None:
@@ -185,8 +193,8 @@ def run_pick(args: argparse.Namespace) -> int:
         "fade": args.fade,
         "radius": args.radius,
         "toward": args.toward,
-        "global_only": args.global_only or None,
-        "follow": False if args.no_follow else None,
+        "global_only": args.global_only,
+        "follow": args.follow,
     }
     given = {name: value for name, value in how.items() if value is not None}
     with _bar(args) as progress:
@@ -211,7 +219,7 @@ def run_pick(args: argparse.Namespace) -> int:
     document.save()
     for line in document.pick_warnings(found.id, args.clip):
         tell("warning", line)
-    _print_pick(document, found.id, before, followed=not args.no_follow)
+    _print_pick(document, found.id, before, followed=args.follow is not False)
     return 0
 
 
@@ -220,16 +228,11 @@ def run_change(args: argparse.Namespace) -> int:
     document = load(args.sidecar)
     before = _unmet(document)
     old = next((pick for pick in document.picks if pick.id == args.id), None)
+    parts = ("frame", "to", "start", "until", "fade", "radius", "toward", "global_only", "follow")
     changes: dict[str, Any] = {
-        name: value
-        for name in ("frame", "to", "start", "until", "fade", "radius", "toward")
-        if (value := getattr(args, name)) is not None
+        name: value for name in parts if (value := getattr(args, name)) is not None
     }
-    if args.global_only:
-        changes["global_only"] = True
     box = _box(args)
-    if args.no_follow:
-        changes["path"] = ()
     with _bar(args) as progress:
         if args.pixel is not None:
             changes |= {"pixel": args.pixel, "box": box or 1}
@@ -248,7 +251,7 @@ def run_change(args: argparse.Namespace) -> int:
     document.save()
     for line in document.pick_warnings(found.id, args.clip):
         tell("warning", line)
-    _print_pick(document, found.id, before, followed=not args.no_follow)
+    _print_pick(document, found.id, before, followed=args.follow is not False)
     return 0
 
 

@@ -106,6 +106,8 @@ class PickEdits(EditedPalette):
             )
         found = replace(at, kind="pick", to=new, toward=toward, start=start, until=until)
         found = replace(found, fade=fade, radius=radius, global_only=global_only)
+        if radius is not None:
+            _needs_radius(found)
         return self._add_pick(found, clip, follow, progress)
 
     def hold(
@@ -161,6 +163,7 @@ class PickEdits(EditedPalette):
         id: str,
         *,
         by: Iterable[float] | None = None,
+        follow: bool | None = None,
         any_value: bool = False,
         clip: str | os.PathLike[str] | None = None,
         progress: Callable[[int, int], object] | None = None,
@@ -169,7 +172,7 @@ class PickEdits(EditedPalette):
         """Change a pick or hold: any of the attributes of `Pick` but id, kind and path.
 
         `by` gives the new colour as offsets from the picked colour. A new `frame`, `rgb` or range
-        is followed again, if the pick was followed.
+        is followed again, if the pick was followed. `follow` begins or ends that.
         """
         old = self._pick(id)
         if by is not None:
@@ -182,8 +185,12 @@ class PickEdits(EditedPalette):
             raise Palette4dError(f"{id} is a hold, which has no {' and no '.join(sorted(bad))}")
         new = replace(old, **changes)
         self._check_pick(new)
+        if changes.get("radius") is not None:
+            _needs_radius(new)
         moved = {"frame", "rgb", "start", "until", "fade"} & changes.keys()
-        if moved and old.path:
+        if follow is False:
+            new = replace(new, path=())
+        elif follow or (moved and old.path):
             given = tuple(key for key in old.path if key.given and key.frame != old.frame)
             path = self._clip_of_picks(clip).path(replace(new, path=given), progress)
             new = replace(new, path=path)
@@ -358,6 +365,14 @@ class PickEdits(EditedPalette):
             known = [known for kind, known in self._state if kind == "pick"]
             raise unknown(id_, "pick or hold", known, "`picks`")
         return Pick.from_fields(found)
+
+
+def _needs_radius(found: Pick) -> None:
+    if found.global_only:
+        raise Palette4dError(
+            "found a radius for a pick that moves palette colours only (global_only=True), which "
+            "has no neighbourhood; leave out one of the two"
+        )
 
 
 def _same(old: Pick, new: Pick) -> bool:
