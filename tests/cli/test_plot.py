@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from palette4d import _core
 from palette4d.cli.main import main
+from palette4d.grade.document import Document
 from palette4d.plotting import page, style
 from palette4d.plotting.rows import PlottedPalette, arrange
 
@@ -240,6 +241,14 @@ def test_default_frames_without_change(
     assert chosen == pytest.approx(expected, abs=1)
     for time in edited:  # every edit is near to a frame that is shown, as far as five can reach
         assert min(abs(time - v) for v in chosen) <= max(0.5, (last - first) / 8)
+
+
+def test_default_frames_show_the_largest_change() -> None:
+    document = Document.load(GOLDEN / "v1_split.p4d.json")
+    colour = document.palette(17).rgb[0]
+    document.pick(17, colour=colour, by=(0.2, 0, 0), start=16, until=17, follow=False)
+    chosen = page.default_frames(PlottedPalette.of(document.core, None))
+    assert {16, 17} & {*chosen}
 
 
 def test_default_frames_show_what_happens() -> None:

@@ -28,6 +28,8 @@ LUMA = np.array([0.2126, 0.7152, 0.0722])
 SPAN_COST, CROSSING_COST, ORDER_COST = 1.0, 2.5, 0.35
 #: The gain of one row less. Above MANY_ROWS rows only neighbours are joined.
 ROW_SAVING, MANY_ROWS = 1.5, 24
+#: So many frames are looked at for the one at which the colours change most.
+LOOKED_AT = 64
 #: Largest number of tried moves: it limits the search on palettes of hundreds of vertices.
 MAX_TRIALS = 20_000
 
@@ -157,8 +159,16 @@ class PlottedPalette:
 
     @property
     def edited_times(self) -> list[float]:
-        """The frames of edited vertices and of stops."""
-        return [float(t) for t in self.frames[self.changed]] + [stop[2] for stop in self.stops]
+        """The frames of edited vertices and of stops, and that at which the colours change most."""
+        times = np.unique(np.linspace(self.first, self.last, LOOKED_AT).round())
+        before, after = self.sampled(times)
+        change = np.nanmax(np.abs(after - before), axis=(0, 2))
+        most = [float(times[change.argmax()])] if change.max() > 0 else []
+        return [
+            *(float(t) for t in self.frames[self.changed]),
+            *(stop[2] for stop in self.stops),
+            *most,
+        ]
 
 
 @dataclass(frozen=True)
