@@ -481,6 +481,18 @@ class TestHostile:
         with pytest.raises(Palette4dError, match="expected frames per second above 0"):
             edit(made, tmp_path)
 
+    @pytest.mark.parametrize("kind", ["Gap", "Clip"])
+    def test_what_has_no_length_costs_the_shots_behind_it(
+        self, kind: str, tmp_path: Path, plates: Path
+    ) -> None:
+        item = getattr(otio.schema, kind)()
+        item.source_range = None
+        good = external("plates/b/take.mov")
+        made = timeline(clip("a", good, 5, 10), item, clip("b", good, 5, 10))
+        found = {shot.name: shot.problem for shot in edit(made, tmp_path).shots}
+        assert not found["a"]
+        assert f"a {kind.lower()} before it has no length" in found["b"]
+
     def test_nested_compounds(self, tmp_path: Path) -> None:
         inner = clip("take", external("gone.mov"), 5, 10)
         for _ in range(900):

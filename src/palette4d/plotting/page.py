@@ -1,6 +1,6 @@
 """The page: heading, frames before and after, the timeline, the polyhedra, and a legend."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,8 +24,8 @@ GUTTER = 14.0
 HEADER = 76.0
 #: Space for the lines between the timeline and the frames above and below it.
 LEADER = 30.0
-#: The frames to show are chosen among about so many.
-TRIED = 100
+#: The frames to show are chosen among about so many. Colours nearer than ALIKE look alike.
+TRIED, ALIKE = 100, 0.1
 #: Space between the pictures before and after the edits.
 GAP = 4.0
 
@@ -76,41 +76,39 @@ def default_frames(palette: PlottedPalette, count: int = 4, most: int = 5) -> li
         min((t for t in wanted if t - first < gap), default=first),
         max((t for t in wanted if last - t < gap), default=last),
     ]
-    while len(chosen) < most and (far := [t for t in wanted if _room(t, chosen) >= gap]):
-        chosen.append(max(far, key=lambda t: _room(t, chosen)))
-    if len(chosen) < count:
-        chosen += _others(palette, chosen, count - len(chosen), gap)
+    _add(chosen, wanted, most, gap)
+    times = np.unique(np.linspace(first, last, int(min(last - first, TRIED)) + 1).round())
+    while len(chosen) < count:
+        may = times[[_room(t, chosen) >= gap for t in times.tolist()]]
+        change = _surprise(palette, may, chosen)
+        if not (change > ALIKE).any():
+            break
+        chosen.append(float(may[change.argmax()]))
+    even = len(chosen) == 2
+    _add(chosen, np.linspace(first, last, count).round().tolist() if even else times, count, gap)
     return sorted(chosen)
 
 
-def _others(palette: PlottedPalette, chosen: list[float], count: int, gap: float) -> list[float]:
-    """Return up to `count` frames, one or two, that leave no other frame far from all shown.
+def _add(chosen: list[float], times: Iterable[float], count: int, gap: float) -> None:
+    """Add times until there are `count`, those farthest from the others first."""
+    while len(chosen) < count and (far := [float(t) for t in times if _room(t, chosen) >= gap]):
+        chosen.append(max(far, key=lambda t: _room(t, chosen)))
 
-    The distance of two frames is that of the palette's colours plus the time between them.
+
+def _surprise(palette: PlottedPalette, times: F64, chosen: Iterable[float]) -> F64:
+    """Return how far colours are at times from what the chosen frames tell of them, (k,).
+
+    They tell the colours between them, as if these went evenly.
     """
-    first, last = palette.first, palette.last
-    steps = int(min(last - first, TRIED))
-    times = np.unique(np.linspace(first, last, steps + 1).round())
-    may = np.array([_room(t, chosen) >= gap for t in times.tolist()])
-    if not may.any():
-        return []
-    every = np.concatenate([times, chosen])
-    away = np.zeros((len(times), len(every)))
-    for track in palette.track_colours(every).swapaxes(0, 1):
-        here = track[: len(times)]
-        away = np.fmax(away, np.linalg.norm(here[:, None] - track[None], axis=-1))
-    away += np.abs(times[:, None] - every[None]) / (last - first)
-    known, tried = away[:, len(times) :].min(axis=1), times[may]
-    to_tried = np.minimum(known[:, None], away[:, : len(times)][:, may])
-    left = (
-        to_tried[:, :, None] if count < 2 else np.minimum(to_tried[:, :, None], to_tried[:, None])
-    )
-    cost = left.max(axis=0) + left.mean(axis=0)
-    if count > 1:
-        cost[np.abs(tried[:, None] - tried[None]) < gap] += len(every)
-    best = np.unravel_index(np.argmin(cost), cost.shape)
-    found = sorted({float(tried[at]) for at in best[: min(count, 2)]})
-    return found if found[-1] - found[0] >= gap else found[:1]
+    shown = np.array(sorted(chosen))
+    farthest = np.zeros(len(times))
+    for track in palette.track_colours(np.concatenate([times, shown])).swapaxes(0, 1):
+        here, there = track[: len(times)], track[len(times) :]
+        known = np.isfinite(there[:, 0])
+        if known.any():
+            told = [np.interp(times, shown[known], there[known, i]) for i in range(3)]
+            farthest = np.fmax(farthest, np.linalg.norm(here - np.transpose(told), axis=1))
+    return farthest
 
 
 def _room(time: float, chosen: Sequence[float]) -> float:

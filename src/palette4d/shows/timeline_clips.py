@@ -220,10 +220,9 @@ def _end(place: Any, item: Any) -> Any:
         return place
     try:
         duration = item.duration()
-    except NotImplementedError:  # what OpenTimelineIO raises for a gap without a length
-        return "a gap before it has no length, expected one; set its source_range"
-    except Exception as error:  # a clip without any range, or times that cannot be
-        return f"a clip before it has no length ({in_words(error)}); set its source_range"
+    except Exception:  # an item without any range, or times that cannot be: each type has its own
+        kind = type(item).__name__.lower()
+        return f"a {kind} before it has no length, expected one; set its source_range"
     return duration if place is None else place + duration
 
 
