@@ -95,10 +95,20 @@ def test_pick_a_pixel_and_see_how_it_is_met(path: str, run: Run) -> None:
     assert "p1: pick at frame 0" in out
     assert re.search(r"follows its colour: #339933 at frame 0, #\w{6} at frame 5", out)
     assert re.search(r"at frame 5 it is 0\.\d\d away .* change p1 --until \d\b", out)  # yellow
-    assert re.search(r"the colours near it get \d+% of the change", out)
+    assert re.search(r"the colours near it change \d\.\d\d times as much", out)
     assert re.search(r"off by 0\.0\d+; \d+% the palette", out)
     assert re.search(r"\d+ of \d+ palette colours move", out)
     np.testing.assert_allclose(moved(path, 0, tuple(pick["rgb"])), (0.1, 0, 0), atol=0.01)
+
+
+def test_a_box_of_many_things_is_told(run: Run) -> None:
+    words = ("--frame", "2", "--pixel", "15,11", "--box", "13")
+    _, _, errors = run("pick", *words, "--by", "0.2,-0.2,0")
+    assert re.search(r"\d\d% of the pixels in the box of p1 get less than half", errors)
+    _, _, errors = run("hold", *words)
+    assert re.search(r"\d\d% of the pixels in the box of p2 still change", errors)
+    _, _, errors = run("pick", "--frame", "2", "--pixel", "10,13", "--box", "3", "--by", "0.1,0,0")
+    assert "in the box" not in errors
 
 
 def test_hold_lock_list_and_remove(path: str, run: Run) -> None:
@@ -242,6 +252,7 @@ def test_a_target_far_outside_is_told(run: Run) -> None:
         (("pick", "--frame", "9", "--colour", "#336633", "--by", "0,0,0"), 1, "from 0 to 5"),
         (("pick", "--frame", "2", "--pixel", "24,3", "--by", "0,0,0"), 1, "23,15"),
         (("pick", "--frame", "2", "--pixel", "-1,3", "--by", "0,0,0"), 1, "23,15"),
+        (("pick", "--frame", "2", "--pixel", "3,3", "--box", "25", "--by", "0,0,0"), 1, "1 to 24"),
         (("pick", "--frame", "2.5", "--pixel", "3,3", "--by", "0,0,0"), 1, "no frame 2.5"),
         (("pick", "--frame", "2", "--colour", "nan,0,0", "--by", "0,0,0"), 2, "finite"),
         (("pick", "--frame", "2", "--colour", "255,3,3", "--by", "0,0,0"), 1, "display white"),

@@ -208,6 +208,11 @@ def test_picks_are_copied_and_solved_again() -> None:
     changed = target.recolour(image, 116)[0, 0] - image[0, 0]
     assert changed == pytest.approx([0.2, 0, 0], abs=0.02)
     assert target.recolour(image, 130).tobytes() == image.tobytes()
+    back = Document(members("split"))
+    target.change_pick(pick.id, frame=115, start=107)
+    back.copy_from(target)
+    (copied,) = back.picks
+    assert (copied.frame, copied.start, copied.until) == (8, 4, 10)  # frames of the clip
     assert fit.mean < 0.02
     target.unpick(pick.id)
     assert not target.edited

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -435,6 +436,16 @@ def test_two_picks_of_one_colour_are_named_with_their_frames(fields: Fields) -> 
     assert "the same colour" in line
     assert "picked at frame 3" in line
     assert "picked at frame 7" in line
+
+
+def test_a_pick_that_is_near_at_another_frame_is_not_blamed() -> None:
+    path = [{"frame": 2, "rgb": MIDDLE}, {"frame": 5, "rgb": (0.8, 0.3, 0.2)}]
+    met = {"residual": 0.0, "worst": 0.0, "worst_frame": 5, "global": 0.5}
+    asked = Pick.from_fields(pick("p1", (0.8, 0.3, 0.2), (0.9, 0.3, 0.2), path=path) | met)
+    rival = Pick.from_fields(pick("p2", MIDDLE, (0.2, 0.6, 0.4)) | met)
+    assert list(unmet([replace(asked, residual=0.1), rival], 1)) == [{"p1"}]
+    assert list(unmet([replace(asked, worst=0.1), rival], 1)) == [{"p1"}]
+    assert list(unmet([replace(asked, worst=0.1, worst_frame=2), rival], 1)) == [{"p1", "p2"}]
 
 
 def test_the_solution_is_the_same_every_time(fields: Fields) -> None:

@@ -354,7 +354,7 @@ def _told(
         if pick.worst is not None and pick.worst > max(2 * pick.residual, pick.tolerance):
             lines.append(f"  the farthest off at frame {pick.worst_frame:.0f}: by {pick.worst:.4f}")
         if pick.id in around:
-            lines.append(f"  the colours near it get {around[pick.id].share:.0%} of the change")
+            lines.append(f"  the colours near it change {around[pick.id].share:.2f} times as much")
     return "\n".join(lines)
 
 

@@ -93,9 +93,13 @@ class ClipOfPicks:
     def colours(
         self, frame: float, pixel: tuple[float, float], box: int
     ) -> tuple[Colour, tuple[Colour, ...]]:
-        """Return the mean colour of a box around a pixel, and its spread (`Pick.spread`).
+        """Return the mean colour of a box around a pixel, and its spread (`Pick.spread`)."""
+        found = self.box(frame, pixel, box)
+        mean = np.round(found.mean(axis=0), DIGITS)
+        return as_colour(mean), tuple(as_colour(offset) for offset in _spread(found - mean))
 
-        Colours are in the palette's code values.
+    def box(self, frame: float, pixel: tuple[float, float], box: int) -> NDArray[np.float64]:
+        """Return the (n, 3) colours of a box around a pixel, in the palette's code values.
 
         Raises
         ------
@@ -118,8 +122,9 @@ class ClipOfPicks:
                 f"the pixel {x:g},{y:g} lies outside the picture; expected 0,0 (top left) to "
                 f"{clip.width - 1},{clip.height - 1}"
             )
-        if box < 1:
-            raise Palette4dError(f"found a box of {box} pixels, expected at least 1")
+        most = max(clip.width, clip.height)
+        if not 1 <= box <= most:
+            raise Palette4dError(f"found a box of {box} pixels, expected 1 to {most}")
         pixels = clip.straight_colours(clip.read(int(frame)))
         left, top = (max(0, math.floor(at) - (box - 1) // 2) for at in (x, y))
         right, bottom = (math.floor(at) + box // 2 + 1 for at in (x, y))
@@ -130,10 +135,7 @@ class ClipOfPicks:
                 f"the pixel {x:g},{y:g} of frame {frame:g} has no colour: it is transparent or not "
                 "a finite number. Pick another pixel, or a larger box=…"
             )
-        if self._conversion is not None:
-            found = self._conversion.to_palette(found)
-        mean = np.round(found.mean(axis=0), DIGITS)
-        return as_colour(mean), tuple(as_colour(offset) for offset in _spread(found - mean))
+        return found if self._conversion is None else self._conversion.to_palette(found)
 
     def warnings(self, pick: Pick, stored: Sequence[NDArray[np.float64]]) -> tuple[str, ...]:
         """Return what speaks against a pick's clip and its colour.

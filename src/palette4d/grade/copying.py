@@ -266,10 +266,10 @@ def _pick(match: Match, pick: dict[str, Any], into: Any) -> dict[str, Any] | Non
     def colour(rgb: Any) -> list[float]:
         return list(as_colour(rgb if into is None else into(rgb).tolist()))
 
-    def time(frame: float) -> float:
-        first, last, _ = match.target.frames
-        nearest = float(min(max(match.back(frame), first), last))
-        return int(nearest) if nearest.is_integer() else nearest
+    def time(frame: float) -> int:
+        first, last, step = match.target.frames
+        nearest = first + step * round((match.back(frame) - first) / step)
+        return min(max(nearest, first), last)
 
     left_out = ("pixel", "box", "path", "from", "until", "fade")  # of the other clip
     found = {name: value for name, value in pick.items() if name not in left_out}

@@ -23,7 +23,6 @@ from palette4d.grade.edited_palette import stored_solution
 from palette4d.grade.edits import Key, State
 from palette4d.grade.handle_edits import HandleEdits
 from palette4d.grade.pick_edits import PickEdits
-from palette4d.grade.recolouring import Recolouring
 from palette4d.grade.sidecar import Fields, OnEdits
 from palette4d.grade.steps import ACTIVE
 
@@ -31,7 +30,7 @@ from palette4d.grade.steps import ACTIVE
 LONGEST_NAME = 100
 
 
-class Document(HandleEdits, PickEdits, Recolouring):
+class Document(HandleEdits, PickEdits):
     """A clip's palette with its edits.
 
     Get one with `palette4d.load` or `palette4d.analyze`. Colours are code values of the palette

@@ -5,21 +5,24 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import hex_of
 from palette4d.grade import edits
 from palette4d.grade.colour_moves import range_text
-from palette4d.grade.edited_palette import EditedPalette
 from palette4d.grade.edits import Colour, as_colour
 from palette4d.grade.handles import unknown
 from palette4d.grade.picks import MOST_PICKS, Pick, Toward, all_picks, check_range
+from palette4d.grade.recolouring import Recolouring
 
 if TYPE_CHECKING:
     from palette4d.grade.clip_of_picks import ClipOfPicks
     from palette4d.grade.effects import Around, SideEffect
 
 
-class PickEdits(EditedPalette):
+class PickEdits(Recolouring):
     """The picks and locks of a palette. `solve` finds what they move."""
 
     @property
@@ -282,12 +285,38 @@ class PickEdits(EditedPalette):
         )
 
     def pick_warnings(self, id: str, clip: str | os.PathLike[str] | None = None) -> tuple[str, ...]:
-        """Return what speaks against the clip of a pick or hold, and against its colour."""
+        """Return what speaks against the clip of a pick or hold, its colour and its box."""
+        from palette4d.grade.clip_of_picks import MOST_COLOURS
         from palette4d.grade.solve import ClipAtTimes
 
         pick, known = self._pick(id), ClipAtTimes(self._members())
         stored = [known.colours_at(pick.frame), *known.colours] if known.colours else []
-        return self._clip_of_picks(clip).warnings(pick, stored)
+        of_clip = self._clip_of_picks(clip)
+        found = of_clip.warnings(pick, stored)
+        if pick.pixel is None or pick.box is None or pick.box == 1 or of_clip.open() is None:
+            return found
+        missed = self._missed(pick, of_clip.box(pick.frame, pick.pixel, pick.box))
+        if missed <= 1 - MOST_COLOURS:
+            return found
+        what = "get less than half of the change"
+        if pick.kind == "hold":
+            what = "still change by more than 10 of 255"
+        return (
+            *found,
+            f"{missed:.0%} of the pixels in the box of {id} {what}: they have other colours. "
+            f"{pick.kind.capitalize()} them too, or choose a smaller box=…",
+        )
+
+    def _missed(self, pick: Pick, colours: NDArray[np.float64]) -> float:
+        """Return which share of (n, 3) colours does not do what a pick of them asks for."""
+        image = colours[None].astype(np.float32)
+        done = (self.recolour(image, pick.frame, space="palette") - image)[0]
+        if pick.kind == "hold":
+            return float((np.abs(done).max(axis=1) > 10 / 255).mean())
+        if pick.strength_at(pick.frame, self.frames[2]) < 1:
+            return 0.0
+        change = pick.change_at(pick.frame)
+        return float((done @ change < 0.5 * change @ change).mean())
 
     def colour_of_pixel(
         self,

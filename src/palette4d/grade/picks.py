@@ -6,7 +6,6 @@ that meet all of them; `grade.follow` finds where a picked colour is at other fr
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -290,34 +289,35 @@ def unmet(picks: Iterable[Pick], step: float) -> dict[frozenset[str], str]:
     enabled = [pick for pick in picks if pick.enabled]
     lines: dict[frozenset[str], str] = {}
     for number, pick in enumerate(enabled):
-        at, off = "", pick.residual
-        if off is None or off <= pick.tolerance:
-            at, off = f" at frame {pick.worst_frame:.0f}" if pick.worst else "", pick.worst
+        _, start, until, _ = pick.knots(step)
+        frame, at, off = min(max(pick.frame, start), until), "", pick.residual
+        if pick.worst_frame is not None and (off is None or off <= pick.tolerance):
+            frame, at, off = pick.worst_frame, f" at frame {pick.worst_frame:.0f}", pick.worst
         if number >= MOST_PICKS:
             lines[frozenset({pick.id})] = (
                 f"{pick.id} is not solved: only the first {MOST_PICKS} enabled picks and holds "
                 "are. Disable or remove some"
             )
         elif off is not None and off > pick.tolerance:
-            rival = _rival(pick, enabled, step)
+            rival = _rival(pick, enabled, frame, step)
             ids = frozenset({pick.id, rival[0]} if rival else {pick.id})
             cause = _cause(pick, enabled) if rival is None else rival[1]
             lines.setdefault(ids, f"{pick.id} is off by {off:.3f}{at}{cause}")
     return lines
 
 
-def _rival(pick: Pick, others: Sequence[Pick], step: float) -> tuple[str, str] | None:
-    """Return the id of the pick that stands most in a pick's way, and what to say of it."""
+def _rival(pick: Pick, others: Sequence[Pick], frame: float, step: float) -> tuple[str, str] | None:
+    """Return the id of the pick that stands most in a pick's way at a frame, and what to say."""
     rivals = []
     for other in others:
-        for frame in _together(pick, other, step) if other.id != pick.id else ():
+        if other.id != pick.id and other.strength_at(frame, step) > 0:
             away = float(np.linalg.norm(pick.colour_at(frame) - other.colour_at(frame)))
             apart = float(np.linalg.norm(pick.change_at(frame) - other.change_at(frame)))
             if away < NEAR and apart > away:
-                rivals.append((away, other.id, frame, apart, other.frame))
+                rivals.append((away, other.id, apart, other.frame))
     if not rivals:
         return None
-    away, id_, frame, apart, picked = min(rivals)
+    away, id_, apart, picked = min(rivals)
     near = f"at frame {frame:.0f} the colour of {id_} is only {away:.3f} away"
     if away < SAME:
         at = "" if pick.frame == picked else f" at frame {frame:.0f}"
@@ -339,13 +339,6 @@ def _cause(pick: Pick, others: Sequence[Pick]) -> str:
     if len(others) > 1:
         return ": picks and holds nearby, or locked handles, limit it"
     return ": near colours of the clip, which want to stay, limit it; radius=… widens the change"
-
-
-def _together(a: Pick, b: Pick, step: float) -> list[float]:
-    """Return the frames that either of two picks names, where both ask for something."""
-    frames = {key.frame for key in itertools.chain(a.path, b.path)} | {a.frame, b.frame}
-    frames |= {frame for frame in (a.start, a.until, b.start, b.until) if frame is not None}
-    return [f for f in sorted(frames) if min(p.strength_at(f, step) for p in (a, b)) > 0]
 
 
 def check_range(pick: Pick, frames: tuple[int, int, int]) -> None:
