@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Sequence
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,7 +14,6 @@ from numpy.typing import NDArray
 
 from palette4d import _core
 from palette4d.cli.main import main
-from palette4d.grade.document import Document
 from palette4d.plotting import page, style
 from palette4d.plotting.rows import PlottedPalette, arrange
 
@@ -207,55 +204,6 @@ def test_a_note_says_that_the_clip_is_not_there(
     assert printed.err.startswith("palette4d: note: the clip's pixels could not be read")
     assert "--clip" in printed.err
     assert printed.out.strip() == str(out)
-
-
-def palette_through(times: list[float], reds: list[float], edited: Sequence[float]) -> Any:
-    """A grey track, and one whose red goes through values at times; edits at some frames."""
-
-    def track_colours(frames: NDArray[np.float64]) -> NDArray[np.float64]:
-        found = np.full((len(frames), 2, 3), 0.5)
-        found[:, 0, 0] = np.interp(frames, times, reds)
-        found[: len(frames) // 2, 1] = np.nan  # a track that begins
-        return found
-
-    ends = {"first": times[0], "last": times[-1], "edited_times": edited}
-    return SimpleNamespace(track_colours=track_colours, **ends)
-
-
-@pytest.mark.parametrize(
-    ("first", "last", "edited", "expected"),
-    [
-        (0, 30, [], [0, 10, 20, 30]),
-        (5, 5, [5], [5]),
-        (0, 1, [], [0, 1]),
-        (0, 2, [1], [0, 1, 2]),
-        (0, 100, [40], [0, 40, 70, 100]),
-        (0, 100, [40.3, 44, 97], [0, 44, 70, 97]),  # 40 is too close to 44; 97 stands for the end
-        (0, 100, list(range(20, 90, 3)), [0, 26, 50, 74, 100]),
-    ],
-)
-def test_default_frames_without_change(
-    first: float, last: float, edited: list[float], expected: list[float]
-) -> None:
-    chosen = page.default_frames(palette_through([first, last], [0, 0], edited))
-    assert chosen == expected
-    for time in edited:  # every edit is near to a frame that is shown, as far as five can reach
-        assert min(abs(time - v) for v in chosen) <= max(0.5, (last - first) / 8)
-
-
-def test_default_frames_show_the_largest_change() -> None:
-    document = Document.load(GOLDEN / "v1_split.p4d.json")
-    colour = document.palette(17).rgb[0]
-    document.pick(17, colour=colour, by=(0.2, 0, 0), start=16, until=17, follow=False)
-    chosen = page.default_frames(PlottedPalette.of(document.core, None))
-    assert {16, 17} & {*chosen}
-
-
-def test_default_frames_show_what_happens() -> None:
-    lights = palette_through([0, 10, 14, 18, 70, 75, 80, 100], [0, 0, 1, 0, 0, -1, 0, 0], [])
-    assert page.default_frames(lights) == [0, 14, 75, 100]
-    chosen = page.default_frames(palette_through([0, 50, 55, 60, 100], [0, 0, 1, 0, 0], []))
-    assert 55 in chosen
 
 
 def drawn(document: dict[str, Any]) -> tuple[Any, Any]:

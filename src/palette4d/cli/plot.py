@@ -39,7 +39,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     add("sidecar", metavar="SIDECAR", type=Path, help="the sidecar (.p4d.json)")
     choice = f"the picture; its extension chooses: {', '.join(EXTENSIONS)}"
     add("-o", "--output", metavar="OUT", type=Path, required=True, help=choice)
-    chosen = "the frames to show (default: four or five that show what happens)"
+    chosen = "the frames to show (default: up to six that stand for all others, and edited ones)"
     add("--frames", metavar="A,B,C", type=times, help=chosen)
     add(
         "--clip",

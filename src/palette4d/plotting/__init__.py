@@ -36,7 +36,7 @@ def plot(
     path : path
         The picture.
     frames : list of float, optional
-        Times to show; by default four or five that show what happens, with edited ones.
+        Times to show; by default up to six that stand for all others, with edited ones.
     clip : str, optional
         The clip; by default the clip that the sidecar names.
     version : str
@@ -63,8 +63,10 @@ def plot(
     from palette4d.common.errors import Palette4dError
     from palette4d.common.files import refuse_existing, replacing
     from palette4d.grade.document import Document
+    from palette4d.grade.solve import ClipAtTimes
     from palette4d.media.source_clip import frame_colours
     from palette4d.plotting import page, style
+    from palette4d.plotting.frames import default_frames
     from palette4d.plotting.rows import PlottedPalette
 
     output = Path(path)
@@ -76,12 +78,13 @@ def plot(
     refuse_existing(output, force)
     if not isinstance(document, Document):
         document = Document.load(document)
-    sidecar = document.version(version).core
+    graded = document.version(version)
+    sidecar, stored = graded.core, ClipAtTimes(graded.fields())
     against = None if before is None else document.version(before).core.edits
     names = ("before", "after") if before is None else (before or "active", version or "active")
     first, last = sidecar.polytope.first_frame, sidecar.polytope.last_frame
     if frames is None:
-        frames = page.default_frames(PlottedPalette.of(sidecar, against))
+        frames = default_frames(PlottedPalette.of(sidecar, against), stored)
     columns = []
     for frame in sorted(set(frames)):
         if not first <= frame <= last:
@@ -98,6 +101,6 @@ def plot(
         matplotlib.rc_context(style.RC),
         replacing(output, force=force) as temporary,
     ):
-        figure = page.build(sidecar, columns, against, names, document.colour_names)
+        figure = page.build(sidecar, columns, against, names, graded.colour_names)
         page.save(figure, temporary, output.suffix.lower()[1:], width)
     return [column.frame for column in columns if not column.pictures]

@@ -1,6 +1,6 @@
 """The page: heading, frames before and after, the timeline, the polyhedra, and a legend."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,6 @@ from palette4d.plotting import polyhedron, style, timeline
 from palette4d.plotting.rows import PlottedPalette, arrange
 from palette4d.plotting.solid import Shape, View, even_sample, extent_of
 
-F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
 
 #: The page's width in points; --width scales a PNG with the same proportions.
@@ -24,8 +23,6 @@ GUTTER = 14.0
 HEADER = 76.0
 #: Space for the lines between the timeline and the frames above and below it.
 LEADER = 30.0
-#: The frames to show are chosen among about so many. Colours nearer than ALIKE look alike.
-TRIED, ALIKE = 100, 0.1
 #: Space between the pictures before and after the edits.
 GAP = 4.0
 
@@ -51,68 +48,6 @@ class Column:
     shape: Shape
     ids: tuple[str, ...]
     pictures: tuple[F32, ...] = ()
-
-
-def default_frames(palette: PlottedPalette, count: int = 4, most: int = 5) -> list[float]:
-    """Choose the frames to show: edited frames, and those that show what happens.
-
-    Where nothing changes they are spread evenly over the clip.
-
-    Parameters
-    ----------
-    palette : PlottedPalette
-        The palette and its edits.
-    count, most : int
-        Number of frames to show, and the largest number if edits need more. Their distance is at
-        least a tenth of the clip, unless the clip has fewer frames.
-    """
-    first, last = palette.first, palette.last
-    if last <= first:
-        return [first]
-    gap = max(1.0, (last - first) / 10)
-    wanted = sorted({float(min(max(round(t), first), last)) for t in palette.edited_times})
-    # The clip's ends, or an edited frame near to an end.
-    chosen = [
-        min((t for t in wanted if t - first < gap), default=first),
-        max((t for t in wanted if last - t < gap), default=last),
-    ]
-    _add(chosen, wanted, most, gap)
-    times = np.unique(np.linspace(first, last, int(min(last - first, TRIED)) + 1).round())
-    while len(chosen) < count:
-        may = times[[_room(t, chosen) >= gap for t in times.tolist()]]
-        change = _surprise(palette, may, chosen)
-        if not (change > ALIKE).any():
-            break
-        chosen.append(float(may[change.argmax()]))
-    even = len(chosen) == 2
-    _add(chosen, np.linspace(first, last, count).round().tolist() if even else times, count, gap)
-    return sorted(chosen)
-
-
-def _add(chosen: list[float], times: Iterable[float], count: int, gap: float) -> None:
-    """Add times until there are `count`, those farthest from the others first."""
-    while len(chosen) < count and (far := [float(t) for t in times if _room(t, chosen) >= gap]):
-        chosen.append(max(far, key=lambda t: _room(t, chosen)))
-
-
-def _surprise(palette: PlottedPalette, times: F64, chosen: Iterable[float]) -> F64:
-    """Return how far colours are at times from what the chosen frames tell of them, (k,).
-
-    They tell the colours between them, as if these went evenly.
-    """
-    shown = np.array(sorted(chosen))
-    farthest = np.zeros(len(times))
-    for track in palette.track_colours(np.concatenate([times, shown])).swapaxes(0, 1):
-        here, there = track[: len(times)], track[len(times) :]
-        known = np.isfinite(there[:, 0])
-        if known.any():
-            told = [np.interp(times, shown[known], there[known, i]) for i in range(3)]
-            farthest = np.fmax(farthest, np.linalg.norm(here - np.transpose(told), axis=1))
-    return farthest
-
-
-def _room(time: float, chosen: Sequence[float]) -> float:
-    return min(abs(time - other) for other in chosen)
 
 
 def column(

@@ -28,8 +28,6 @@ LUMA = np.array([0.2126, 0.7152, 0.0722])
 SPAN_COST, CROSSING_COST, ORDER_COST = 1.0, 2.5, 0.35
 #: The gain of one row less. Above MANY_ROWS rows only neighbours are joined.
 ROW_SAVING, MANY_ROWS = 1.5, 24
-#: So many frames are looked at for the one at which the colours change most.
-LOOKED_AT = 64
 #: Largest number of tried moves: it limits the search on palettes of hundreds of vertices.
 MAX_TRIALS = 20_000
 
@@ -141,16 +139,6 @@ class PlottedPalette:
         colours: F64 = self.sampled(frames)[int(edited)][edge]
         return colours
 
-    def track_colours(self, frames: F64) -> F64:
-        """Return the colours before edits of every track at (k,) times, (k, c, 3); NaN: none."""
-        chains, _, edge_chain = find_chains(self.frames, self.rgb, self.edges)
-        found = np.full((len(frames), len(chains), 3), np.nan)
-        before, _ = self.sampled(frames)
-        for chain, colours in zip(edge_chain, before, strict=True):
-            there = np.isfinite(colours[:, 0])
-            found[there, chain] = colours[there]
-        return found
-
     def touched(self, edge: int) -> bool:
         """Whether anything on this edge is edited."""
         return bool(self.changed[list(self.edges[edge])].any()) or any(
@@ -159,16 +147,14 @@ class PlottedPalette:
 
     @property
     def edited_times(self) -> list[float]:
-        """The frames of edited vertices and of stops, and that at which the colours change most."""
-        times = np.unique(np.linspace(self.first, self.last, LOOKED_AT).round())
-        before, after = self.sampled(times)
-        change = np.nanmax(np.abs(after - before), axis=(0, 2))
-        most = [float(times[change.argmax()])] if change.max() > 0 else []
-        return [
-            *(float(t) for t in self.frames[self.changed]),
-            *(stop[2] for stop in self.stops),
-            *most,
-        ]
+        """The frames of edited vertices and of stops."""
+        return [*map(float, self.frames[self.changed]), *(stop[2] for stop in self.stops)]
+
+    def change(self, frames: F64) -> F64:
+        """Return by how much the colours change at (k,) times: the largest of a channel, (k,)."""
+        before, after = self.sampled(frames)
+        found: F64 = np.nanmax(np.abs(after - before), axis=(0, 2))
+        return found
 
 
 @dataclass(frozen=True)
