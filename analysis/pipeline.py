@@ -389,6 +389,10 @@ def _with_useful_stops(
     Stops are of use if they lower the price, or if fewer pixels are lost: `LOST_SHARE` of a frame
     for each handle. Then they need not be worth their cost: the second item is how many are free.
     """
+
+    def priced(one: SkewPolytope) -> float:
+        return _price(one, run) + structure_search.rare_cost(one, run.frames)
+
     refined = [
         vertex_refinement.refine(one.polytope, run.frames, run.gamut, run.options, one.brief)
         for one in dict.fromkeys((tried[0], tried[-1]))
@@ -399,7 +403,7 @@ def _with_useful_stops(
             stop_insertion.lost_share(one, run.frames, run.gamut, run.options) for one in refined
         )
         stops = len(rich.vertices) - len(plain.vertices)
-        if before - after >= LOST_SHARE * stops or _price(rich, run) <= _price(plain, run):
+        if before - after >= LOST_SHARE * stops or priced(rich) <= priced(plain):
             yield rich, stops
     yield refined[0], 0
 

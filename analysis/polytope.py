@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +48,16 @@ class Section:
     last: float
     tracks: tuple[tuple[int, ...], ...]
     faces: I32
+
+
+class Slice(NamedTuple):
+    """A palette at one time: (n, 3) colours, triangles, and as in eq. 6 the (n, 2) vertices before
+    and after each colour and the weights of the later ones."""
+
+    rgb: F64
+    faces: I32
+    ends: I32
+    weights: F64
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -92,6 +103,18 @@ class SkewPolytope:
         return np.array(
             [[np.interp(time, t[:, 3], t[:, channel]) for channel in range(3)] for t in tracks]
         )
+
+    def slice_at(self, time: float) -> Slice:
+        """Return the slice of the block at a time; between blocks, of the nearest block."""
+        block = min(self.blocks, key=lambda b: max(b.first - time, time - b.last))
+        time = min(max(time, block.first), block.last)
+        ends, weights = [], []
+        for track in block.tracks:
+            at = np.interp(time, self.vertices[list(track), 3], range(len(track)))
+            ends.append((track[int(at)], track[math.ceil(at)]))
+            weights.append(at % 1)
+        rgb = self.colours_at(block, time)
+        return Slice(rgb, block.faces, np.array(ends, np.int32), np.array(weights))
 
     def extended_tracks(self) -> list[list[list[int]]]:
         """Return each block's tracks, extended by one vertex at either end.

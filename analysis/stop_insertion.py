@@ -127,7 +127,7 @@ class _Misfit:
         lost = np.zeros(len(frames))
         if options.reach:  # otherwise distant pixels count like all others
             for i in np.flatnonzero(rows[:, 4] > LOST * gamut.scale).tolist():
-                distance = _outside(_slice(polytope, float(frames[i].frame)), frames[i])
+                distance = _outside(polytope.slice_at(float(frames[i].frame)).rgb, frames[i])
                 counts = frames[i].coarse.counts[distance > LOST * gamut.scale]
                 lost[i] = counts.sum() / frames[i].pixels
         return cls(options.lambda_ * rows[:, 0] + rows[:, 1] + rows[:, 2], rows[:, 2], lost)
@@ -217,12 +217,6 @@ def _trials(
             changed, new = _with_stops(polytope, place, track, stops, len(peaks))
             if new:
                 yield _Trial(changed, new, len(peaks), share, span, held)
-
-
-def _slice(polytope: SkewPolytope, time: float) -> F64:
-    """Return (n, 3) colours of the block at a time; between blocks, of the nearest block."""
-    block = min(polytope.blocks, key=lambda b: max(b.first - time, time - b.last))
-    return polytope.colours_at(block, min(max(time, block.first), block.last))
 
 
 def _outside(rgb: F64, frame: FrameStatistics) -> F64:

@@ -2,7 +2,7 @@
 
 Input: polytopes to start from (the configurations of block merging, thinned out) and a static hull.
 Output: the polytope of the least price, refined on coarse colours. The price is what is minimised,
-eq. 12 with the terms for shape, plus `handle_cost` a vertex.
+eq. 12 with the terms for shape, plus `handle_cost` a vertex, plus `RARE_COST` a rare one.
 
 From each start a walk goes down from rich to poor. Each step takes away the vertex whose loss costs
 least, and all others move jointly to take over. Then the walk goes back to its best palette, takes
@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from palette4d.analysis import moves
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
+from palette4d.analysis.handle_use import rare_handles
 from palette4d.analysis.losses import loss_weights, shaped_weights, smoothness
 from palette4d.analysis.objective import frame_losses, refine_jointly
 from palette4d.analysis.options import AnalysisOptions
@@ -39,6 +40,8 @@ USUAL = AnalysisOptions()
 USUAL_COST = USUAL.handle_cost
 # A walk ends at a price this share above the least so far.
 PATIENCE = 0.08
+# A rare handle costs so much more, whatever `handle_cost` is.
+RARE_COST = USUAL_COST
 # Palettes whose price is this share above the least are refined before they are compared.
 CLOSE = 0.05
 # Of the colours that may go, those that cost least at once are tried.
@@ -96,14 +99,14 @@ def search(
         if price > least:
             break
         least = price
-    return _best(found, frames, gamut, options)
+    return best_of(found, frames, gamut, options)
 
 
 def _usual_price(one: Priced) -> float:
     return one.price(USUAL_COST)
 
 
-def _best(
+def best_of(
     found: Sequence[tuple[Priced, int | None]],
     frames: Sequence[FrameStatistics],
     gamut: Gamut,
@@ -111,24 +114,34 @@ def _best(
 ) -> tuple[int | None, SkewPolytope]:
     """Return the best of all that was found, measured on all frames, and its start."""
     everything = [one for one, _ in found]
-    bound = (1 + CLOSE) * choose(everything, options).price(options.handle_cost)
+    cost = options.handle_cost
+    best = choose(everything, options)
+    bound = (1 + CLOSE) * (best.price(cost) + rare_cost(best.polytope, frames))
     close: dict[tuple[int | None, tuple[int, ...]], Priced] = {}
     for one, at in found:
-        if one.price(options.handle_cost) <= bound and allowed(one, everything, options):
+        if one.price(cost) <= bound and allowed(one, everything, options):
             topology = at, tuple(len(block.tracks) for block in one.polytope.blocks)
             other = close.setdefault(topology, one)
-            if one.price(options.handle_cost) < other.price(options.handle_cost):
+            if one.price(cost) < other.price(cost):
                 close[topology] = one
-    best: tuple[float, int | None, SkewPolytope] | None = None
-    for (at, _), one in close.items():
-        refined = Priced(
-            *refine_jointly(one.polytope, frames, gamut, options, COMPARE_EVALUATIONS, True)
-        )
-        price = refined.price(options.handle_cost)
-        if best is None or price < best[0]:
-            best = price, at, refined.polytope
-    assert best is not None  # the static hull is always found
-    return best[1], best[2]
+    refined = [
+        (Priced(*refine_jointly(p.polytope, frames, gamut, options, COMPARE_EVALUATIONS, True)), at)
+        for (at, _), p in close.items()
+    ]
+    refined.sort(key=lambda found: found[0].price(cost))
+    least = math.inf
+    for one, at in refined:
+        if one.price(cost) >= least:
+            break  # rare handles are counted for the few palettes that may be the best
+        price = one.price(cost) + rare_cost(one.polytope, frames)
+        if price < least:
+            least, chosen = price, (at, one.polytope)
+    return chosen
+
+
+def rare_cost(polytope: SkewPolytope, frames: Sequence[FrameStatistics]) -> float:
+    """Return what the rare handles of a palette cost more than others."""
+    return RARE_COST * rare_handles(polytope, frames)
 
 
 def key_frames(

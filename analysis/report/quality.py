@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from palette4d.analysis.convex_hulls import concavity, narrow
 from palette4d.analysis.frame_statistics import FrameStatistics
+from palette4d.analysis.handle_use import handle_use
 from palette4d.analysis.losses import LOST, NO_FACES
 from palette4d.analysis.options import AnalysisOptions
 
@@ -20,9 +21,6 @@ from palette4d import _core
 
 F64 = NDArray[np.float64]
 
-# The use of handles is measured on this many evenly spaced frames: on all frames it would take
-# longer than the rest of the analysis.
-USE_FRAMES = 12
 # A pixel farther outside than one 8-bit step counts as outside in the report.
 VISIBLE = 1 / 255
 
@@ -174,22 +172,6 @@ def _least_used(
     polytope: _core.Polytope, slices: Sequence[_core.Slice], frames: Sequence[FrameStatistics]
 ) -> tuple[str, float]:
     """Return the vertex whose largest mean weight in any frame is least, and that weight."""
-    use = np.zeros(len(polytope.vertices))
-    count = len(slices)
-    chosen = set(np.linspace(0, count - 1, min(count, USE_FRAMES)).round().astype(int).tolist())
-    # A vertex weighs most at its own time.
-    times = np.array([f.frame for f in frames], float)
-    chosen |= {int(np.argmin(np.abs(times - t))) for t in polytope.vertices[:, 3]}
-    for at in sorted(chosen):
-        here, colours = slices[at], frames[at].coarse
-        if len(here.faces) == 0:  # a line or a point needs every colour
-            use[here.ends] = 1.0
-            continue
-        weights, _ = _core.palette_weights(colours.rgb, here.rgb, here.faces)
-        mean = colours.counts @ weights / colours.total
-        weight = np.zeros(len(use))
-        np.add.at(weight, here.ends[:, 0], mean * (1 - here.weights))
-        np.add.at(weight, here.ends[:, 1], mean * here.weights)
-        use = np.maximum(use, weight)
+    use = handle_use(polytope.vertices, slices.__getitem__, frames)
     least = int(np.argmin(use))
     return polytope.vertex_ids[least], float(use[least])

@@ -12,10 +12,11 @@ from palette4d.analysis import moves, pipeline
 from palette4d.analysis.convex_hulls import hull_mesh
 from palette4d.analysis.dense_polytope import DensePolytope
 from palette4d.analysis.frame_statistics import Gamut
-from palette4d.analysis.objective import Objective
+from palette4d.analysis.handle_use import rare_handles
+from palette4d.analysis.objective import Objective, refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import FramePalette, SkewPolytope
-from palette4d.analysis.structure_search import Priced, choose, key_frames, walk
+from palette4d.analysis.structure_search import RARE_COST, Priced, best_of, choose, key_frames, walk
 
 FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
 SIX = np.vstack([FOUR, [[0.8, 0.8, 0.1], [0.7, 0.7, 0.8]]])
@@ -70,6 +71,26 @@ def test_a_colour_that_does_not_pay_goes():
         options = AnalysisOptions(handle_cost=cost)
         found = choose(walk(full(palettes), frames, GAMUT, options, []), options).polytope
         assert len(found.blocks[0].tracks) == colours
+
+
+def test_a_rare_colour_goes_if_it_does_not_pay_for_being_rare():
+    pictures = [mixture(FOUR, i) for i in range(4)]
+    for picture in pictures:
+        picture.reshape(-1, 3)[-3:] = 0.9
+    frames = stats(pictures)
+    found = []
+    for colours in (np.vstack([FOUR, np.full(3, 0.9)]), FOUR):
+        hull = hull_mesh(colours)
+        polytope = DensePolytope((0, 3), [[FramePalette(hull.rgb, hull.faces)] * 2], []).polytope()
+        one = refine_jointly(polytope, frames, GAMUT, AnalysisOptions(), 200, coarse=True)
+        found.append((Priced(*one), 0))
+    (rich, _), (poor, _) = found
+    assert rare_handles(rich.polytope, frames) == 2
+    assert rare_handles(poor.polytope, frames) == 0
+    for gain, colours in ((1.0, 4), (3.0, 5)):  # of the rare colour, in rare handles' extra costs
+        options = AnalysisOptions(handle_cost=(poor.value - rich.value - gain * RARE_COST) / 2)
+        _, best = best_of(found, frames, GAMUT, options)
+        assert len(best.blocks[0].tracks) == colours
 
 
 def test_the_choice_weighs_vertices_against_the_loss():
