@@ -196,7 +196,7 @@ def _print_tracks(info: dict[str, Any]) -> None:
         print(f"{line}  {_some(track['vertices'])}{edited}".rstrip())
     first = info["tracks"][0]["name"]
     print(
-        "\nColours: of the largest edit, else where the name fits best. More: `info SIDECAR "
+        "\nColours: of the largest edit, else the most colourful one. More: `info SIDECAR "
         "--handles`.\n"
         f"`edit SIDECAR track {first} …` changes a track.\n"
         f"`render SIDECAR --output weight:{first} …` shows what a track is for"
