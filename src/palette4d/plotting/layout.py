@@ -479,8 +479,12 @@ def names_around(
     ways = np.stack([np.cos(turns), np.sin(turns)], axis=-1)
     for disc in sorted(discs, key=lambda disc: disc.kind == "plain"):
         half, tall = width(disc.id) / 2, 0.95 * size / 2
-        outward = ways @ (np.array([disc.x, disc.y]) - middle)
-        for farther, way in itertools.product(range(RINGS), np.argsort(-outward, kind="stable")):
+        outward = np.array([disc.x, disc.y]) - middle
+        inward = -ways @ outward / max(float(np.linalg.norm(outward)), 1e-9)
+        # Farther outwards rather than near inwards.
+        costs = np.arange(RINGS)[:, None] + inward
+        for place in np.argsort(costs, axis=None, kind="stable"):
+            farther, way = divmod(int(place), DIRECTIONS)
             away = disc.radius + COLLAR / 2 + 2 * tall * farther
             x, y = np.array([disc.x, disc.y]) + ways[way] * (away + np.array([half, tall]))
             box = (x - half, y - tall, x + half, y + tall)
