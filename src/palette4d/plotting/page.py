@@ -232,7 +232,7 @@ def _draw_notes(
     if shares:
         rows += " At the right: how much of the picture it moves, on average."
     if _blocks(palette) > 1:
-        rows += " Block: frames between which no colour splits or merges."
+        rows += " Block: frames in which no colour splits or merges."
     notes = [rows]
     if columns:
         solids = "Below the rows: the palette as a solid in the RGB cube (black below, white above)"
