@@ -101,8 +101,8 @@ def fit() -> None:
         p4d.plot(doc, f"plot{k}.png", frames=[30], clip=CLIP, width=2400)
         image = np.asarray(Image.open(f"plot{k}.png").convert("RGB"), dtype=np.float32) / 255
         side = image.shape[1] * 308 // 1100
-        middle = image.shape[1] // 2
-        cube = image[-side:, middle - side // 2 : middle + side // 2]
+        middle, notes = image.shape[1] // 2, image.shape[1] * 44 // 1200
+        cube = image[-notes - side : -notes, middle - side // 2 : middle + side // 2]
         show(axes, cube, 0.95 + 5.3 * k, 0.45, 4.8)
         figures = doc.fields()["quality"]["stages"][-1]
         write(axes, 3.35 + 5.3 * k, 0.25, f"{what}: {figures['vertices']} handles")

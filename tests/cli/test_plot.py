@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from palette4d import _core
 from palette4d.cli.main import main
+from palette4d.grade.document import Document
+from palette4d.grade.shares import Share
 from palette4d.plotting import page, style
 from palette4d.plotting.rows import PlottedPalette, arrange
 
@@ -227,6 +229,45 @@ def test_close_discs_make_way_and_ids_do_not_overlap(blocks: int) -> None:
     assert len(ids) >= 8
     boxes = [text.get_window_extent(renderer).padded(-1) for text in ids]
     assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
+
+
+@pytest.mark.parametrize("name", ["v1_split", "v1_merge", "v1_edited"])
+def test_polyhedra_and_rows_have_the_ids_of_tracks(name: str) -> None:
+    document = Document.load(GOLDEN / f"{name}.p4d.json")
+    tracks = {t.name: {*t.vertices, *t.edges} for t in document.tracks}
+    for frame in (0, 4.5, 9.5, 15, 20):
+        column = page.column(document.core, frame, None)
+        palette = document.palette(frame)
+        assert len(set(column.ids)) == len(palette.ids)  # every disc has a label of its own
+        for track, id_, rgb, shown in zip(
+            column.ids, palette.ids, palette.rgb, column.shape.rgb, strict=True
+        ):
+            assert id_ in tracks[track]
+            np.testing.assert_allclose(rgb, shown)
+    columns = [page.column(document.core, 4.5, None)]
+    shares = {track: Share(0.25, 0.5, 4.0) for track in tracks}
+    figure = page.build(document.core, columns, shares=shares)
+    texts = [text.get_text() for text in figure.axes[0].texts]
+    for track in tracks:  # in its row, and where it is beside its disc
+        assert any(track in text.split() for text in texts)
+    assert sum("25 %" in text for text in texts) == len(tracks)
+    assert "most at 4: 50 %" in texts
+    for id_ in columns[0].ids:
+        assert texts.count(id_) >= 2
+
+
+def test_the_legend_tells_what_is_there() -> None:
+    texts = []
+    for name in ("v1_tetrahedron", "v1_edited"):
+        sidecar = _core.read_sidecar(str(GOLDEN / f"{name}.p4d.json"))
+        axes = page.build(sidecar, [page.column(sidecar, 1, None)]).axes[0]
+        legend = [text.get_text() for text in axes.get_legend().get_texts()]
+        texts.append(" ".join([*legend, *(text.get_text() for text in axes.texts)]))
+    for word in ("edited", "stop", "lock", "arrows"):
+        assert word not in texts[0]
+        assert word in texts[1]
+    assert "RGB cube" in texts[0]
+    assert "pixels" not in texts[1]
 
 
 @pytest.mark.parametrize(

@@ -44,7 +44,27 @@ def test_a_track_keeps_its_number_and_the_lightest_of_one_name_comes_first() -> 
     handles = Handles(fields)
     named = dict(zip(handles.vertices, names, strict=True))
     called = [track.called for track in tracks_of(handles, named)]
-    assert called == ["red, 14-20", "green 1, 14-20", "green 2, 10-20", "yellow, 0-10"]
+    assert called == [
+        "deep blue > red, 0-20",
+        "dark red > deep blue > green, 0-20",
+        "black > green, 0-20",
+        "yellow > light grey, 0-20",
+    ]
+
+
+def test_a_track_is_called_by_the_colours_that_it_has() -> None:
+    steady = [(0, 0.6, 0.7, 1), (9, 0.1, 0.2, 1)]  # pale blue and blue are blue
+    there_and_back = [(0, 0.9, 0, 0), (4, 0, 0.8, 0), (9, 0.9, 0, 0)]
+    many = [(0, 0.95, 0.9, 0), (2, 0.9, 0.85, 0), (5, 0, 0.8, 0), (7, 0.5, 0.9, 0), (9, 0.9, 0, 0)]
+    fields = palette_of(steady, there_and_back, many)
+    names = vertex_colours(fields["vertices"], fields["edges"], "sRGB")
+    handles = Handles(fields)
+    tracks = tracks_of(handles, dict(zip(handles.vertices, names, strict=True)))
+    assert [track.called for track in tracks] == [
+        "blue, 0-9",
+        "red > green > red, 0-9",
+        "yellow > green > red, 0-9",
+    ]
 
 
 def test_names_are_of_the_unedited_colours_and_at_whole_frames() -> None:

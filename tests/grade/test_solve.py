@@ -210,7 +210,7 @@ def test_no_hold_is_proposed_that_takes_from_a_pick(fields: Fields) -> None:
     effect = solved(found, asked)[0].side_effect()
     assert effect.others > 0
     held = solved(found, asked, pick("p2", effect.most))[0].around_picks()["p1"]
-    assert held.taken["p2"] > 0.2
+    assert held.taken["p2"] > effects.TAKEN
     assert effect.holds == ()
 
 
@@ -280,7 +280,7 @@ def test_what_holds_take_of_the_colours_near_a_pick(fields: Fields) -> None:
     alone = solved(found, asked)[0].around_picks()["p1"]
     held = solved(found, asked, pick("p2", beside.tolist()))[0].around_picks()["p1"]
     assert (alone.frame, alone.taken) == (5, {})
-    assert held.taken["p2"] > 0.25
+    assert held.taken["p2"] > effects.TAKEN
     assert held.share == pytest.approx(alone.share * (1 - held.taken["p2"]))
 
 
@@ -407,6 +407,21 @@ def test_guarded_colours_stay(fields: Fields) -> None:
     document, _ = solved({**fields, "colours": [{"frame": 0, "rgbw": rows}]}, asked)
     assert np.abs(moved(document, (0.3, 0.3, 0.6), 5)).max() < 0.025
     assert np.abs(moved(document, lamp, 5)).max() < 0.15
+
+
+def test_a_larger_change_of_a_rare_colour_does_not_tint_a_street_more(fields: Fields) -> None:
+    rng = np.random.default_rng(0)
+    street = rng.uniform(0.3, 0.6, (40, 1)) + rng.normal(0, 0.05, (40, 3))
+    car, way = np.array([0.6, 0.25, 0.2]), np.array([-0.5, 0.1, 0.7])
+    rows = [[*car, 0.05], *([*colour, 0.02] for colour in street.tolist())]
+    tints = []
+    for part in (0.45, 0.9):
+        asked = pick("p1", car, car + part * way)
+        document, measured = solved({**fields, "colours": [{"frame": 0, "rgbw": rows}]}, asked)
+        assert measured["p1"]["residual"] < 0.005
+        changed = document.recolour(street[None].astype(np.float32), 5)[0]
+        tints.append(float(np.abs(changed - street).mean()))
+    assert tints[1] < 1.2 * tints[0]
 
 
 def test_two_targets_of_one_colour_are_named_and_stay_bounded(fields: Fields) -> None:

@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from palette4d import _core
-from palette4d.plotting.layout import Scale, Timeline, disc_names, half_bands
+from palette4d.plotting.layout import (
+    Disc,
+    Scale,
+    Timeline,
+    disc_names,
+    half_bands,
+    meet,
+    names_around,
+)
 from palette4d.plotting.rows import PlottedPalette, arrange
 
 GOLDEN = Path(__file__).resolve().parent.parent / "golden" / "sidecars"
@@ -99,6 +107,23 @@ def test_names_of_the_first_and_last_frame_are_beside_their_discs_where_they_fit
         )
         seen = {name.text for name in names if name.x < ends[0] or name.x > ends[1]}
         assert seen == (set(outer) if space > 30 else set())
+
+
+def test_names_around_discs_cover_nothing() -> None:
+    grey = np.full(3, 0.5)
+    random = np.random.default_rng(2)
+    places = np.vstack([random.normal(0, 4, (5, 2)), random.normal(60, 4, (3, 2))])
+    discs = [
+        Disc(f"v{k}", "plain", 0.0, -1, x, y, 5.0, x, grey, grey)
+        for k, (x, y) in enumerate(places.tolist())
+    ]
+    corner = (66.0, 50.0, 78.0, 70.0)
+    names = names_around(discs, 7.0, lambda text: 5.0 * len(text), [corner])
+    assert {name.text for name, _ in names} == {disc.id for disc in discs}
+    boxes = [(n.x - 5, n.y - 3.3, n.x + 5, n.y + 3.3) for n, _ in names]
+    boxes += [corner, *((d.x - 5, d.y - 5, d.x + 5, d.y + 5) for d in discs)]
+    for k, one in enumerate(boxes[: len(names)]):
+        assert not any(meet(one, other) for other in boxes[k + 1 :])
 
 
 def test_ticks_are_round_and_have_room() -> None:

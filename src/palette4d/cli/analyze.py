@@ -232,8 +232,9 @@ def _run(args: argparse.Namespace, progress: _ProgressFile) -> int:
         print(json.dumps({"sidecar": str(args.output)} | document.report | seconds, indent=2))
     elif not args.quiet:
         print("\n".join(analysis_report.lines(document, bars.seconds)))
-        colours = counted(len(document.fields()["polytope"]["vertices"]), "palette colour")
-        print(f"wrote {args.output}: {colours} to edit")
+        colours = counted(len(document.tracks), "palette colour")
+        handles = counted(len(document.fields()["polytope"]["vertices"]), "handle")
+        print(f"wrote {args.output}: {colours} through time, {handles}")
         print(f"next: palette4d plot {shlex.quote(str(args.output))} -o palette.png")
     return 0
 

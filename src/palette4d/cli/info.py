@@ -7,11 +7,12 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from palette4d.cli.swatches import row, swatch
-from palette4d.common.text import counted, hex_of
+from palette4d.common.text import counted, hex_of, percent
 
 if TYPE_CHECKING:
     from palette4d.grade.document import Document
     from palette4d.grade.palette import Palette
+    from palette4d.grade.shares import Share
     from palette4d.grade.tracks import Track
 
 EPILOG = """\
@@ -65,8 +66,13 @@ def run(args: argparse.Namespace) -> int:
 
 def info_of(document: "Document") -> dict[str, Any]:
     """Return the output of ``palette4d info --json``; docs/sidecar.md explains the names."""
+    from palette4d.grade.shares import track_shares
+    from palette4d.grade.solve import ClipAtTimes
+
     fields = document.fields()
     clip, polytope = fields["clip"], fields["polytope"]
+    tracks = document.tracks
+    shares = track_shares(ClipAtTimes(fields), tracks)
     frames = clip["frames"]
     edited = {entry["vertex"]: entry["rgb"] for entry in fields["edits"]["vertices"]}
     stops = fields["edits"]["stops"]
@@ -108,7 +114,10 @@ def info_of(document: "Document") -> dict[str, Any]:
         "locks": fields["edits"].get("locks", []),
         "versions": list(document.versions),
         "steps": len(document.history),
-        "tracks": [_track(document, track, on_edge, palette_of) for track in document.tracks],
+        "tracks": [
+            {**_track(document, track, on_edge, palette_of), **_share(shares.get(track.name))}
+            for track in tracks
+        ],
         "losses": stages[-1] if stages else {},
         "stages": stages,
         "palette": [
@@ -159,27 +168,39 @@ def _track(
     }
 
 
+def _share(share: "Share | None") -> dict[str, Any]:
+    """Return how much of the picture a track moves; None without the clip's colours."""
+    if share is None:
+        return {"share": None, "largest_share": None, "largest_share_frame": None}
+    most = {"largest_share": share.most, "largest_share_frame": share.frame}
+    return {"share": share.mean, **most}
+
+
 def _print_tracks(info: dict[str, Any]) -> None:
     """Print a line for each palette colour through time, before and after."""
     wide = max([5, *(len(track["name"]) for track in info["tracks"])])
     long = max(len(track["called"]) for track in info["tracks"])
     patch = swatch(None)
     head = f"{'track':<{wide}}  {'colour, frames':<{long}}"
-    print(f"\n{head}  {patch}{'clip':8} {patch}{'edited':8}  handles")
+    known = any(track["share"] is not None for track in info["tracks"])
+    column = f"  {'share':>6}" if known else ""
+    print(f"\n{head}  {patch}{'clip':8} {patch}{'edited':8}{column}  handles")
     for track in info["tracks"]:
         before, after = track["rgb"], track["edited_rgb"]
         line = f"{track['name']:<{wide}}  {track['called']:<{long}}  "
         line += f"{swatch(before)}{hex_of(before):8} "
         changed = before != after
         line += f"{swatch(after)}{hex_of(after):8}" if changed else patch + " " * 8
+        line += f"  {percent(track['share']):>6}" if known else ""
         edited = f"; edited {_some(track['edited'])}" if track["edited"] else ""
         print(f"{line}  {_some(track['vertices'])}{edited}".rstrip())
     first = info["tracks"][0]["name"]
     print(
-        "\nColours: of the largest edit, else where the name fits best. More: `info SIDECAR "
+        "\nColours: of the largest edit, else the most colourful one. More: `info SIDECAR "
         "--handles`.\n"
         f"`edit SIDECAR track {first} …` changes a track.\n"
-        f"`render SIDECAR --output weight:{first} …` shows what a track is for."
+        f"`render SIDECAR --output weight:{first} …` shows what a track is for"
+        + ("; its share is the mean of that." if known else ".")
     )
 
 

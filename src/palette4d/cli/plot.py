@@ -13,12 +13,13 @@ if TYPE_CHECKING:
     from palette4d.grade.document import Document
 
 EPILOG = """\
-Each row is a palette colour through time, each disc a palette vertex. An edited disc or band shows
-the colour before in its upper half and the colour after in its lower half. A smaller disc with two
-rings is a colour stop. Rows fork where a colour splits and join where colours merge. A disc without
-room moves aside; a line leads to its time.
-Below is the palette as a polyhedron in the RGB cube at some frames; with the clip also the frames,
-before and after the edits, and their pixels.
+Each row is a palette colour through time. At its left is the id of its track, which `info` lists
+and `edit track` takes. At its right is how much of the picture it moves. Each disc is a palette
+vertex. An edited disc or band shows the colour before in its upper half and the colour after in its
+lower half. A smaller disc with two rings is a colour stop. Rows fork where a colour splits and join
+where colours merge. A disc without room moves aside; a line leads to its time.
+Below is the palette as a polyhedron in the RGB cube at some frames, with the ids of tracks; with
+the clip also the frames, before and after the edits, and their pixels.
 
 examples:
   palette4d plot seasons.p4d.json -o seasons.png

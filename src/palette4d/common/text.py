@@ -15,6 +15,15 @@ def counted(count: int, one: str, several: str | None = None) -> str:
     return f"{count} {one if count == 1 else several or one + 's'}"
 
 
+def percent(share: float) -> str:
+    """Return a share of 1 with two or three digits.
+
+    >>> percent(0.123), percent(0.0567), percent(1)
+    ('12 %', '5.7 %', '100 %')
+    """
+    return f"{100 * share:.{0 if share >= 0.0995 else 1}f} %"
+
+
 #: The longest name of a shot or a series: with frame number and extensions it fits any disk.
 LONGEST_NAME = 120
 

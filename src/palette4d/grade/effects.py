@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 from palette4d import _core
 from palette4d.grade.bumps import alongs, bumped
 from palette4d.grade.edits import Colour, as_colour
-from palette4d.grade.picks import MOST_PICKS, all_picks
+from palette4d.grade.picks import ALIKE, MOST_PICKS, all_picks
 from palette4d.grade.solve import (
     LARGEST,
     LEAST_SHARE,
-    NEAR,
     NONE,
     OTHER,
     SHADE,
@@ -37,7 +36,7 @@ B = NDArray[np.bool_]
 # count from half of what counts elsewhere, where a pick has less than half of its effect.
 GREY = 0.1
 # So many holds are proposed at most, and none that takes more of what the colours near a pick get.
-MOST_HOLDS, TAKEN = 3, 0.2
+MOST_HOLDS, TAKEN = 3, 0.1
 
 
 @dataclass(frozen=True)
@@ -221,7 +220,10 @@ class _NearPick:
 def _near_picks(
     clip: ClipAtTimes, core: _core.Sidecar, problem: Problem, times: Sequence[float] = ()
 ) -> list[_NearPick]:
-    """Return each pick's surroundings at one of some times, the nearest to its own frame."""
+    """Return each pick's surroundings at one of some times, the nearest to its own frame.
+
+    They are about as near as pixels of the same thing.
+    """
     found = []
     for number, pick in enumerate(problem.picks):
         full = [t for t in times or problem.times if pick.strength_at(t, clip.step) == 1]
@@ -232,7 +234,7 @@ def _near_picks(
         # The picked colour itself counts where the stored colours have none near it.
         few = np.full((len(own), 1), LEAST_SHARE)
         rgbw = np.vstack([clip.colours_at(time), np.hstack([problem.centres(time)[own], few])])
-        near = problem.near(rgbw[:, :3], time, own, np.minimum(problem.radii[own], NEAR))
+        near = problem.near(rgbw[:, :3], time, own, np.minimum(problem.radii[own], 2 * ALIKE))
         shares = rgbw[:, 3] * near.max(axis=1)
         cut = _core.slice_at(core.polytope, time)
         weights = _core.palette_weights(rgbw[:, :3], cut.rgb, cut.faces)[0]

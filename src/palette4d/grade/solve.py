@@ -60,6 +60,9 @@ F64 = NDArray[np.float64]
 LEAST_SHARE = 5e-4
 # The guard's weight beside a pick that has all the pixels.
 GUARD = 1.1
+# A change of another colour is as visible beside a pick that asks for much. So from LARGE_CHANGE on
+# the guard no longer counts in shares of what is asked for.
+LARGE_CHANGE = 0.35
 # A change of a colour is noticed 1 + CHROMA (max - min) times less than that of a grey.
 CHROMA = 6.0
 # A guarded colour that would change by more than LARGE times the largest change that is asked for
@@ -92,6 +95,8 @@ ROUNDS, SMALL_MOVE, SMALL_CHANGE, FEW = 5, 0.03, 0.03, 0.1
 # Picks that nearly coincide and ask for different things: the bumps' sizes stay bounded by
 # 1 / (2 TIKHONOV) times the difference. A lone pick's residual is TIKHONOV^2 of its remainder.
 TIKHONOV = 0.1
+# The colours of a pick's spread count so much beside the picked one, which has to be met.
+SPREAD = 0.1
 
 # Frames are solved at least every STEP frames; in long clips at MOST_TIMES frames.
 STEP, MOST_TIMES = 4, 40
@@ -484,7 +489,8 @@ class Problem:
         for term, found in zip(terms, _least_squares(terms, links), strict=True):
             of, count = term.of, len(term.of.free)
             left = self.certain(of.time)[of.picked, None] * (term.wanted - term.rows @ found)
-            sizes = found[count:] + _interpolated(term.rows[:, count:], left)
+            weights = np.where(self.offsets[of.picked].any(axis=1), SPREAD, 1.0)
+            sizes = found[count:] + _interpolated(term.rows[:, count:], left, weights)
             sizes *= term.scale * of.local[:, None]
             by = term.scale * found[:count] * of.free[:, None]
             moves = dict(zip(dict.fromkeys(of.places), by, strict=True))
@@ -545,7 +551,7 @@ class Problem:
             # A pick of few pixels moves no palette colour that many pixels are mixed from.
             near = self.near(guarded[:, :3], time, picked, NEAR)
             pixels = float(guarded[:, 3] @ near.max(axis=1))
-            guard *= GUARD / max(pixels, LEAST_SHARE)
+            guard *= GUARD / max(pixels, LEAST_SHARE) * max(1.0, scale / LARGE_CHANGE) ** 2
         return _Terms(
             of,
             scale,
@@ -789,10 +795,11 @@ def _kept(times: Sequence[float], values: F64, borders: set[float]) -> list[floa
     return [times[i] for i in needed(times, values, fixed, STRAIGHT)] if values.any() else []
 
 
-def _interpolated(bumps: F64, left: F64) -> F64:
+def _interpolated(bumps: F64, left: F64, weights: F64) -> F64:
     """Return sizes of bumps that meet what is left at their centres, bounded (Tikhonov)."""
-    normal: NDArray[np.floating[Any]] = bumps.T @ bumps + TIKHONOV**2 * np.eye(len(bumps))
-    sizes: F64 = np.linalg.solve(normal, bumps.T @ left)
+    weighted = bumps.T * weights
+    normal: NDArray[np.floating[Any]] = weighted @ bumps + TIKHONOV**2 * np.eye(len(bumps))
+    sizes: F64 = np.linalg.solve(normal, weighted @ left)
     return sizes
 
 

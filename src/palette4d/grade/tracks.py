@@ -5,6 +5,7 @@ the chain; every other edge begins or ends another chain.
 """
 
 import itertools
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -149,10 +150,11 @@ class Track:
     name : str
         The id of its first vertex.
     called : str
-        Its name for people: the name of its most colourful vertex, and the frames at which it has
-        that colour, such as "deep red, 13-31". Pale blue is blue, too, but dark blue is not.
+        Its name for people: its colour and its frames, such as "deep red, 13-31". Where that
+        changes, its first and last colour, and the one that is farthest from both: "yellow > lime >
+        orange, 0-49". From blue to pale blue is no change, but to dark blue it is.
     at : float
-        The frame of that vertex; of a fork, the middle.
+        The frame of its most colourful vertex; of a fork, the middle.
     first, last : float
         The first and the last frame, with forks.
     vertices, edges : tuple of str
@@ -187,25 +189,32 @@ def tracks_of(handles: Handles, colours: Mapping[str, str]) -> list[Track]:
     tracks: list[Track] = []
     taken: dict[str, int] = {}
     for chain in chains_of(handles.vertices.values(), handles.edges.values()):
-        if chain.vertices:
-            strongest = max(chain.vertices, key=lambda v: max(rgb[v]) - min(rgb[v]))
-            run = next(r for r in runs_of(chain, frames, labels) if strongest in r.vertices)
-            colour, at, first, last = names[strongest], frames[strongest], run.first, run.last
-        else:  # a fork between two other tracks
+        shown = list(chain.vertices)
+        if not shown:  # a fork between two other tracks
             fork = handles.edges[edge_ids[chain.edges[0]]]
-            ends = [place[fork[end]] for end in ("from", "to")]
-            strongest = max(ends, key=lambda v: max(rgb[v]) - min(rgb[v]))
-            colour, first, last = plain(names[strongest]), chain.first, chain.last
-            at = (first + last) / 2
-        span = "-".join(dict.fromkeys(str(round(time)) for time in (first, last)))
+            shown = [place[fork[end]] for end in ("from", "to")]
+        strongest = max(shown, key=lambda v: max(rgb[v]) - min(rgb[v]))
+        first, last = shown[0], shown[-1]
+        others = [v for v in shown if labels[v] not in (labels[first], labels[last])]
+        # The colour of the track that is farthest from both its ends, if it has another name.
+        others = sorted(
+            others, key=lambda v: -min(math.dist(rgb[v], rgb[e]) for e in (first, last))
+        )
+        way = first, *others[:1], last
+        colour = names[strongest]
+        if len({labels[v] for v in way}) > 1:
+            runs = itertools.groupby(way, key=lambda v: labels[v])
+            colour = " > ".join(plain(names[next(run)]) for _, run in runs)
+        at = frames[strongest] if chain.vertices else (chain.first + chain.last) / 2
+        span = "-".join(dict.fromkeys(str(round(time)) for time in (chain.first, chain.last)))
         called = f"{colour}, {span}"
         taken[called] = taken.get(called, 0) + 1
         if taken[called] > 1:
             called = f"{plain(colour)} {taken[called]}, {span}"
         vertices = tuple(ids[vertex] for vertex in chain.vertices)
-        along = tuple(edge_ids[edge] for edge in chain.edges)
-        name = (vertices or along)[0]
-        tracks.append(Track(name, called, at, chain.first, chain.last, vertices, along))
+        edges = tuple(edge_ids[edge] for edge in chain.edges)
+        name = (vertices or edges)[0]
+        tracks.append(Track(name, called, at, chain.first, chain.last, vertices, edges))
     return tracks
 
 

@@ -63,6 +63,7 @@ def plot(
     from palette4d.common.errors import Palette4dError
     from palette4d.common.files import refuse_existing, replacing
     from palette4d.grade.document import Document
+    from palette4d.grade.shares import track_shares
     from palette4d.grade.solve import ClipAtTimes
     from palette4d.media.source_clip import frame_colours
     from palette4d.plotting import page, style
@@ -80,6 +81,7 @@ def plot(
         document = Document.load(document)
     graded = document.version(version)
     sidecar, stored = graded.core, ClipAtTimes(graded.fields())
+    shares = track_shares(stored, graded.tracks)
     against = None if before is None else document.version(before).core.edits
     names = ("before", "after") if before is None else (before or "active", version or "active")
     first, last = sidecar.polytope.first_frame, sidecar.polytope.last_frame
@@ -101,6 +103,6 @@ def plot(
         matplotlib.rc_context(style.RC),
         replacing(output, force=force) as temporary,
     ):
-        figure = page.build(sidecar, columns, against, names, graded.colour_names)
+        figure = page.build(sidecar, columns, against, names, graded.colour_names, shares)
         page.save(figure, temporary, output.suffix.lower()[1:], width)
     return [column.frame for column in columns if not column.pictures]

@@ -6,7 +6,7 @@ pixels). x is right. y is down; 0 is the top of the first row.
 
 import collections
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
@@ -28,6 +28,8 @@ PIECE = 2.5
 COLLAR = 2.6
 #: Half the width of a band, and the largest radius of a vertex, in rows.
 BAND, RADIUS = 0.17, 0.33
+#: Ids around a disc are tried in so many directions, at so many distances.
+DIRECTIONS, RINGS = 16, 4
 #: The radius of a stop, in radii of a vertex.
 STOP = 0.66
 
@@ -366,7 +368,6 @@ def disc_names(
     beside: tuple[float, float, float] | None = None,
     longer: Mapping[str, str] | None = None,
     ends: tuple[float, float] = (-np.inf, np.inf),
-    aside: bool = False,
 ) -> list[Label]:
     """Return the ids above or below their discs, edited ids first; ids without space are left out.
 
@@ -390,8 +391,6 @@ def disc_names(
         What to write after an id where there is still space.
     ends : (float, float)
         The smallest and largest x of these longer texts.
-    aside : bool
-        Ids may be at the right or left of their discs, too.
     """
     tall = 0.95 * size
 
@@ -411,7 +410,7 @@ def disc_names(
 
     def free(box: Box, own: str = "") -> bool:
         return box[3] < bottom and not any(
-            _meet(box, other)
+            meet(box, other)
             for column in across(box)
             for key, other in columns[column].items()
             if key != ("name", own)
@@ -427,8 +426,6 @@ def disc_names(
         text, away = shorten(disc.id), disc.radius + collar + 0.5
         half = width(text) / 2
         places = [(disc.x, disc.y + side * (away + tall / 2)) for side in (-1, 1)]
-        if aside:
-            places += [(disc.x + way * (away + half), disc.y) for way in (1, -1)]
         if beside is not None and disc.home in beside[:2] and away + 2 * half <= beside[2]:
             way = -1 if disc.home == beside[0] else 1
             places.insert(0, (disc.x + way * (away + half), disc.y))
@@ -453,5 +450,51 @@ def disc_names(
     return list(labels.values())
 
 
-def _meet(one: Box, two: Box) -> bool:
+def names_around(
+    discs: Sequence[Disc],
+    size: float,
+    width: Callable[[str], float],
+    taken: Iterable[Box] = (),
+) -> list[tuple[Label, Disc]]:
+    """Return the ids beside their discs, away from the middle of all; farther where it is tight.
+
+    Parameters
+    ----------
+    discs : sequence of Disc
+        What is drawn; names cover neither these nor each other. Those without space are left out.
+    size : float
+        The height of the text.
+    width : callable
+        The width of a text.
+    taken : iterable of Box
+        What else names do not cover.
+    """
+    middle = np.mean([(disc.x, disc.y) for disc in discs], axis=0)
+    boxes = list(taken)
+    for disc in discs:
+        reach = disc.radius + COLLAR / 2
+        boxes.append((disc.x - reach, disc.y - reach, disc.x + reach, disc.y + reach))
+    found = []
+    turns = np.linspace(0, 2 * np.pi, DIRECTIONS, endpoint=False)
+    ways = np.stack([np.cos(turns), np.sin(turns)], axis=-1)
+    for disc in sorted(discs, key=lambda disc: disc.kind == "plain"):
+        half, tall = width(disc.id) / 2, 0.95 * size / 2
+        outward = np.array([disc.x, disc.y]) - middle
+        inward = -ways @ outward / max(float(np.linalg.norm(outward)), 1e-9)
+        # Farther outwards rather than near inwards.
+        costs = np.arange(RINGS)[:, None] + inward
+        for place in np.argsort(costs, axis=None, kind="stable"):
+            farther, way = divmod(int(place), DIRECTIONS)
+            away = disc.radius + COLLAR / 2 + 2 * tall * farther
+            x, y = np.array([disc.x, disc.y]) + ways[way] * (away + np.array([half, tall]))
+            box = (x - half, y - tall, x + half, y + tall)
+            if not any(meet(box, other) for other in boxes):
+                boxes.append(box)
+                found.append((Label(disc.id, float(x), float(y), disc.kind != "plain"), disc))
+                break
+    return found
+
+
+def meet(one: Box, two: Box) -> bool:
+    """Whether two boxes overlap."""
     return one[0] < two[2] and two[0] < one[2] and one[1] < two[3] and two[1] < one[3]

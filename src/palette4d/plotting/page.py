@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from palette4d import _core
 from palette4d.common.text import counted
+from palette4d.grade.shares import Share
 from palette4d.plotting import polyhedron, style, timeline
-from palette4d.plotting.rows import PlottedPalette, arrange
+from palette4d.plotting.rows import PlottedPalette, arrange, track_ids
 from palette4d.plotting.solid import Shape, View, even_sample, extent_of
 
 F32 = NDArray[np.float32]
@@ -23,6 +24,8 @@ GUTTER = 14.0
 HEADER = 76.0
 #: Space for the lines between the timeline and the frames above and below it.
 LEADER = 30.0
+#: Space for the notes at the bottom.
+NOTE = 28.0
 #: Space between the pictures before and after the edits.
 GAP = 4.0
 
@@ -38,7 +41,7 @@ class Column:
     shape : Shape
         The sliced palette; with the clip, also pixels.
     ids : tuple of str
-        For each of its colours, the vertex of its track that is nearest in time.
+        The tracks of its colours.
     pictures : tuple of (h, w, 3) float32
         The clip's frame at reduced size, and its recolouring if the sidecar has edits. Empty
         without the clip.
@@ -81,8 +84,12 @@ def column(
     rgb, faces = np.asarray(palette.rgb), np.asarray(palette.faces)
     if against is not None:
         rgb = np.asarray(_core.edited_colours(sidecar.polytope, against, palette))
-    nearer = palette.ends[np.arange(len(rgb)), (palette.weights > 0.5).astype(int)]
-    ids = tuple(sidecar.polytope.vertex_ids[vertex] for vertex in nearer)
+    track_of = track_ids(sidecar.polytope)
+    vertices, edges = sidecar.polytope.vertex_ids, sidecar.polytope.edge_ids
+    ids = tuple(
+        track_of[vertices[ends[0]] if edge < 0 else edges[edge]]
+        for edge, ends in zip(palette.edges, palette.ends, strict=True)
+    )
     if image is None:
         return Column(frame, Shape(rgb, np.asarray(edited), faces), ids)
     shape = Shape(rgb, np.asarray(edited), faces, even_sample(image, pixels))
@@ -108,16 +115,18 @@ def build(
     against: _core.Edits | None = None,
     named: Sequence[str] = ("before", "after"),
     colours: Mapping[str, str] | None = None,
+    shares: Mapping[str, Share] | None = None,
 ) -> Any:
     """Lay out and draw the page; return a matplotlib Figure of `WIDTH` points.
 
-    `colours` has the names of the handles' colours by id.
+    `colours` has the names of the handles' colours, `shares` those of the tracks, by id.
     """
     from matplotlib.figure import Figure
 
     palette = PlottedPalette.of(sidecar, against)
     encoding = str(sidecar.clip["encoding"])
-    rows = arrange(palette.frames, palette.rgb, palette.edges)
+    clip_rgb = np.asarray(sidecar.polytope.vertices).reshape(-1, 4)[:, :3]
+    rows = arrange(palette.frames, clip_rgb, palette.edges)
     row_height = float(np.clip(1100.0 / max(rows.count, 1), 16.0, 50.0))
     panel = timeline.Panel(palette, rows, MARGIN, WIDTH - MARGIN, row_height)
 
@@ -130,7 +139,8 @@ def build(
     pictures = len(names) * (picture_height + GAP) - 2 + LEADER if shapes else 0.0
     cube = min(wide * 0.96, 300.0)
     height = HEADER + pictures + panel.height + MARGIN
-    height += LEADER + 38 + cube if columns else 0.0
+    height += LEADER + 46 + cube if columns else 0.0
+    height += NOTE
     top = height - HEADER
     panel.top = top - pictures
 
@@ -139,7 +149,8 @@ def build(
     axes.set(xlim=(0, WIDTH), ylim=(0, height), autoscale_on=False)
     axes.set_axis_off()
     _draw_heading(axes, sidecar, palette, height)
-    timeline.draw(axes, panel, encoding, colours or {})
+    _draw_notes(axes, palette, bool(shares), columns)
+    timeline.draw(axes, panel, encoding, colours or {}, shares or {})
     if shapes:
         for k, name in enumerate(names):
             y = top - (k + 0.5) * picture_height - GAP * k
@@ -153,7 +164,7 @@ def build(
             lower = upper - picture_width * picture.shape[0] / picture.shape[1]
             ends = (centre - picture_width / 2, centre + picture_width / 2, lower, upper)
             axes.imshow(style.shown(picture, encoding), extent=ends, aspect="auto", zorder=4)
-        middle = panel.bottom - LEADER - 30 - cube / 2
+        middle = panel.bottom - LEADER - 38 - cube / 2
         view = View.fit(extent, (centre, middle), cube)
         polyhedron.draw(axes, shown.shape, view, encoding, shown.ids)
     return figure
@@ -168,26 +179,27 @@ def _draw_heading(
     clip = sidecar.clip
     numerator, denominator = clip["rate"]
     ends = dict.fromkeys((style.number(palette.first), style.number(palette.last)))
+    blocks, edited = _blocks(palette), int(palette.changed.sum())
     facts = [
         f"frame{'s' if len(ends) > 1 else ''} {'–'.join(ends)}",
         f"{style.number(numerator / denominator)} fps",
         f"{clip['width']}×{clip['height']}",
-        str(clip["encoding"]),
+        str(clip["encoding"]) if clip["encoding"] != "unknown" else "encoding unknown",
         counted(len(palette.ids), "palette vertex", "palette vertices"),
-        counted(sum(not s["transition"] for s in palette.sections), "block"),
-        counted(int(palette.changed.sum()), "edited vertex", "edited vertices"),
-        counted(len(palette.stops), "stop"),
+        counted(blocks, "block") if blocks > 1 else "",
+        counted(edited, "edited vertex", "edited vertices") if edited else "",
+        counted(len(palette.stops), "stop") if palette.stops else "",
     ]
     line = style.printable("   ·   ".join(fact for fact in facts if fact), 200)
     title = {"fontsize": 17, "fontweight": "bold", "color": style.BRIGHT, "va": "center"}
     axes.text(MARGIN, height - 30, style.printable(clip["name"], 48), **title)
     axes.text(MARGIN, height - 52, line, fontsize=8.5, color=style.FAINT, va="center")
     grey, light = np.full(3, 0.42), np.full(3, 0.78)
-    entries = (
-        ("plain", 7.5, light, "palette vertex"),
-        ("edited", 7.5, grey, "edited: before above, after below"),
-        ("stop", 6.0, grey, "stop: a colour added between vertices"),
-    )
+    entries = [("plain", 7.5, light, "palette vertex")]
+    if edited:
+        entries.append(("edited", 7.5, grey, "edited: before above, after below"))
+    if palette.stops:
+        entries.append(("stop", 6.0, grey, "stop: a colour added between vertices"))
     # Discs outside the page, which the legend copies.
     handles = [
         timeline.disc(axes, np.nan, np.nan, radius, np.stack([before, light]), kind, 5)
@@ -200,7 +212,7 @@ def _draw_heading(
         loc="center right",
         bbox_to_anchor=(WIDTH - MARGIN, height - 30),
         bbox_transform=axes.transData,
-        ncols=3,
+        ncols=len(entries),
         fontsize=8.5,
         labelcolor=style.TEXT,
         frameon=False,
@@ -210,6 +222,32 @@ def _draw_heading(
         columnspacing=2.6,
     )
     legend.set_zorder(5)
+
+
+def _draw_notes(
+    axes: Any, palette: PlottedPalette, shares: bool, columns: Sequence[Column]
+) -> None:
+    """Say at the bottom of the page what its parts are."""
+    rows = "A row: one palette colour through time, with the id of its track at the left."
+    if shares:
+        rows += " At the right: how much of the picture it moves, on average."
+    if _blocks(palette) > 1:
+        rows += " Block: frames in which no colour splits or merges."
+    notes = [rows]
+    if columns:
+        solids = "Below the rows: the palette as a solid in the RGB cube (black below, white above)"
+        if any(column.shape.pixels is not None for column in columns):
+            solids += "; small points: the frame's pixels"
+        solids += "; white lines: the solid's edges"
+        if any((column.shape.rgb != column.shape.edited).any() for column in columns):
+            solids += "; arrows and dashed lines: after the edits"
+        notes.append(f"{solids}.")
+    for k, note in enumerate(reversed(notes)):
+        axes.text(MARGIN, MARGIN - 6 + 13 * k, note, fontsize=8.5, color=style.TEXT)
+
+
+def _blocks(palette: PlottedPalette) -> int:
+    return sum(not section["transition"] for section in palette.sections)
 
 
 def _draw_leaders(

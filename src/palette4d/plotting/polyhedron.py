@@ -4,7 +4,7 @@ The drawing order is from far to near: cube, far faces and edges, pixels, near f
 palette colours.
 """
 
-import math
+import functools
 from collections.abc import Sequence
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palette4d.plotting import style, timeline
-from palette4d.plotting.layout import Disc, Kind, disc_names
+from palette4d.plotting.layout import Disc, Kind, names_around
 from palette4d.plotting.solid import CORNERS, CUBE, Shape, View, facing
 from palette4d.plotting.timeline import disc
 
@@ -25,11 +25,11 @@ ID_SIZE = 6.5
 
 
 def draw(axes: Any, shape: Shape, view: View, encoding: str, ids: Sequence[str] = ()) -> None:
-    """Draw one polyhedron; `ids` are those of its colours."""
+    """Draw one polyhedron; `ids` are those of its colours' tracks."""
     from matplotlib.collections import LineCollection, TriMesh
     from matplotlib.tri import Triangulation
 
-    _draw_cube(axes, view)
+    letters = _draw_cube(axes, view)
     seen = view.project(shape.rgb)
     points, faces = seen[:, :2], shape.faces
     towards = facing(points, faces)
@@ -75,29 +75,34 @@ def draw(axes: Any, shape: Shape, view: View, encoding: str, ids: Sequence[str] 
         kind, radius = EDITED if index in moved else PLAIN
         x, y = points[index].tolist()
         disc(axes, x, y, radius, both[index], kind, 9)
-    _draw_ids(axes, points, shape, set(moved), ids)
+    _draw_ids(axes, points, shape, set(moved), ids, letters)
 
 
-def _draw_ids(axes: Any, points: F64, shape: Shape, moved: set[int], ids: Sequence[str]) -> None:
+def _draw_ids(
+    axes: Any,
+    points: F64,
+    shape: Shape,
+    moved: set[int],
+    ids: Sequence[str],
+    letters: Sequence[tuple[float, float]],
+) -> None:
     discs = []
     for index, (id_, (x, y)) in enumerate(zip(ids, points.tolist(), strict=False)):
         kind, radius = EDITED if index in moved else PLAIN
         colours = shape.rgb[index], shape.edited[index]
         # In a layout y is down.
-        discs.append(Disc(id_, kind, 0.0, -1, x, -y, radius, x, *colours))
-    names = disc_names(
-        discs,
-        ID_SIZE,
-        lambda text: timeline.text_width(text, ID_SIZE),
-        math.inf,
-        lambda text: style.printable(text, 14),
-        aside=True,
-    )
-    for name in names:
+        discs.append(Disc(style.printable(id_, 14), kind, 0.0, -1, x, -y, radius, x, *colours))
+    taken = [(x - 4, -y - 4, x + 4, -y + 4) for x, y in letters]
+    width = functools.partial(timeline.text_width, size=ID_SIZE)
+    for name, of in names_around(discs, ID_SIZE, width, taken):
+        # The id covers the line's other half.
+        line = {"color": style.GUIDE, "linewidth": 0.6, "zorder": 8.9}
+        axes.plot([of.x, name.x], [-of.y, -name.y], **line)
         timeline.draw_id(axes, name, -name.y, ID_SIZE, style.PAGE)
 
 
-def _draw_cube(axes: Any, view: View) -> None:
+def _draw_cube(axes: Any, view: View) -> list[tuple[float, float]]:
+    """Draw the RGB cube; return the places of the letters at its corners."""
     corners = view.project(CORNERS)
     farthest = int(np.argmin(corners[:, 2]))
     for ends in CUBE:
@@ -105,7 +110,10 @@ def _draw_cube(axes: Any, view: View) -> None:
         how = {"color": style.LINE, "linestyle": (0, (2, 3))} if hidden else {}
         line = {"color": style.GUIDE, "linewidth": 0.6, "zorder": 3, **how}
         axes.plot(*corners[list(ends), :2].T, **line)
+    places = []
     for bit, name in ((1, "R"), (2, "G"), (4, "B")):
         away = corners[bit, :2] - corners[0, :2]
         at = corners[bit, :2] + 9 * away / max(float(np.linalg.norm(away)), 1e-9)
         axes.text(*at, name, zorder=3, **style.CENTRED | {"fontsize": 7.5})
+        places.append((float(at[0]), float(at[1])))
+    return places

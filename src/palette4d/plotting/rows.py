@@ -157,6 +157,18 @@ class PlottedPalette:
         return found
 
 
+def track_ids(polytope: _core.Polytope) -> dict[str, str]:
+    """Return the id of the track of every vertex and edge: that of the track's first one."""
+    vertices = np.asarray(polytope.vertices, dtype=np.float64).reshape(-1, 4)
+    edges = [(int(a), int(b)) for a, b in np.asarray(polytope.edges).reshape(-1, 2)]
+    found: dict[str, str] = {}
+    for chain in find_chains(vertices[:, 3], vertices[:, :3], edges)[0]:
+        members = [polytope.vertex_ids[v] for v in chain.vertices]
+        members += [polytope.edge_ids[e] for e in chain.edges]
+        found |= dict.fromkeys(members, members[0])
+    return found
+
+
 @dataclass(frozen=True)
 class Rows:
     """Chains and their rows.

@@ -9,23 +9,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from palette4d.common.text import percent
+from palette4d.grade.shares import Share
 from palette4d.plotting import style
 from palette4d.plotting.layout import (
     BAND,
     COLLAR,
+    Box,
     Disc,
     Label,
     Scale,
     Timeline,
     disc_names,
     half_bands,
+    meet,
 )
-from palette4d.plotting.rows import PlottedPalette, Rows
+from palette4d.plotting.rows import PlottedPalette, Rows, track_ids
 
 F64 = NDArray[np.float64]
 
 #: Space for the block names above the rows, for the axis below them, and at the sides.
-HEAD, FOOT, SIDE = 34.0, 34.0, 46.0
+HEAD, FOOT, SIDE = 34.0, 34.0, 56.0
 
 
 class Panel:
@@ -75,7 +79,7 @@ def disc(
         how = {"markeredgewidth": 0, "linestyle": "none", "zorder": zorder, **how}
         return axes.plot([x], [y], marker=name, markersize=2 * size, **how)[0]
 
-    ring = style.RING if kind == "plain" else style.BRIGHT
+    ring = style.TEXT if kind == "plain" else style.BRIGHT
     upper, lower = (tuple(colour) for colour in halves)
     markers = [marker("o", radius + 1.9, markerfacecolor=style.INK)]
     if kind == "stop":  # a second ring tells a stop from a vertex
@@ -92,8 +96,17 @@ def disc(
     return (*markers, marker("o", radius, **rim))
 
 
-def draw(axes: Any, panel: Panel, encoding: str, colours: Mapping[str, str]) -> None:
-    """Draw the timeline; `colours` has the names of the discs' colours by id."""
+def draw(
+    axes: Any,
+    panel: Panel,
+    encoding: str,
+    colours: Mapping[str, str],
+    shares: Mapping[str, Share],
+) -> None:
+    """Draw the timeline.
+
+    `colours` has the names of the discs' colours, `shares` those of the tracks, by id.
+    """
     _draw_ground(axes, panel)
     _draw_axis(axes, panel)
     for rank, edge in enumerate(panel.layout.paths):
@@ -101,7 +114,8 @@ def draw(axes: Any, panel: Panel, encoding: str, colours: Mapping[str, str]) -> 
     discs = panel.layout.discs(panel.left + 4, panel.right - 4)
     for each in discs:
         _draw_disc(axes, panel, each, encoding)
-    _draw_ids(axes, panel, discs, colours)
+    names = _draw_ids(axes, panel, discs, colours)
+    _draw_tracks(axes, panel, discs, names, shares)
 
 
 def _draw_ground(axes: Any, panel: Panel) -> None:
@@ -128,7 +142,8 @@ def _draw_ground(axes: Any, panel: Panel) -> None:
         if not section.number:
             line = {"colors": style.LINE, "linewidth": 0.8, "zorder": 1.5}
             axes.vlines([x0, x1], panel.floor, panel.top - 1, **line)
-    for name in panel.layout.block_names(15 - HEAD, lambda text: text_width(text, 8)):
+    names = panel.layout.block_names(15 - HEAD, lambda text: text_width(text, 8))
+    for name in names if len(panel.layout.palette.sections) > 1 else ():
         axes.text(name.x, panel.y(name.y), name.text, zorder=3, **style.CENTRED)
 
 
@@ -174,7 +189,7 @@ def _draw_band(axes: Any, panel: Panel, edge: int, encoding: str, zorder: float)
         )
         band.set_gid(f"band-{palette.edge_ids[edge]}")
         axes.add_collection(band, autolim=False)
-    rims = [(upper, style.RIM), (lower, style.RIM)]
+    rims = [(upper, style.RING), (lower, style.RING)]
     rims += [(middle, style.INK)] if touched else []
     lines = LineCollection([rim for rim, _ in rims], colors=[grey for _, grey in rims])
     lines.set(linewidths=0.8, zorder=zorder + 0.001)
@@ -194,8 +209,10 @@ def _draw_disc(axes: Any, panel: Panel, shown: Disc, encoding: str) -> None:
     rim.set_gid(f"{'stop' if shown.kind == 'stop' else 'vertex'}-{shown.id}")
 
 
-def _draw_ids(axes: Any, panel: Panel, discs: list[Disc], colours: Mapping[str, str]) -> None:
-    size = float(np.clip(0.18 * panel.layout.row_height, 6.0, 8.0))
+def _draw_ids(
+    axes: Any, panel: Panel, discs: list[Disc], colours: Mapping[str, str]
+) -> list[Label]:
+    size = _id_size(panel)
     names = disc_names(
         discs,
         size,
@@ -207,6 +224,74 @@ def _draw_ids(axes: Any, panel: Panel, discs: list[Disc], colours: Mapping[str, 
     )
     for name in names:
         draw_id(axes, name, float(panel.y(name.y)), size, style.PANEL)
+    return names
+
+
+def _id_size(panel: Panel) -> float:
+    return float(np.clip(0.18 * panel.layout.row_height, 6.0, 8.0))
+
+
+def _draw_tracks(
+    axes: Any, panel: Panel, discs: list[Disc], names: list[Label], shares: Mapping[str, Share]
+) -> None:
+    """Write tracks' ids at the left of their rows, and at the right what they move.
+
+    Where a track begins or ends inside the clip, both are below its band.
+    """
+    layout, size = panel.layout, _id_size(panel)
+    palette = layout.palette
+    track_of = track_ids(palette.sidecar.polytope)
+    of_vertex = {disc.id: disc for disc in discs}
+    taken = [_box(disc.x, disc.y, 2 * disc.radius, 2 * disc.radius) for disc in discs]
+    taken += [_box(name.x, name.y, text_width(name.text, size), size) for name in names]
+
+    def beside(disc: Disc, way: int, text: str) -> bool:
+        """Write at the left (-1) or right (1) of the rows, if the text fits."""
+        x = disc.x + way * (disc.radius + 6)
+        end = x + way * text_width(text, size + 1)
+        if disc.home not in (layout.scale.left, layout.scale.right) or not (
+            panel.left <= end <= panel.right
+        ):
+            return False
+        how = {"fontsize": size + 1, "color": style.BRIGHT, "fontweight": "bold"}
+        align = {"ha": "left" if way > 0 else "right", "va": "center_baseline", "zorder": 20}
+        axes.text(x, float(panel.y(disc.y)), text, **how, **align)
+        return True
+
+    def below(x: float, y: float, way: int, text: str, colour: str) -> None:
+        """Write below a band at the left (-1) or right (1) of x, if the text fits."""
+        width = text_width(text, size)
+        box = _box(x + way * width / 2, y + BAND * layout.row_height + 0.8 * size, width, size)
+        if box[3] <= layout.height and not any(meet(box, other) for other in taken):
+            taken.append(box)
+            how = {"ha": "left" if way > 0 else "right", "va": "center_baseline", "zorder": 19}
+            y = float(panel.y((box[1] + box[3]) / 2))
+            axes.text(x, y, text, fontsize=size, color=colour, **how)
+
+    for chain in layout.rows.chains:
+        members = [palette.ids[vertex] for vertex in chain.vertices]
+        id_ = track_of[(members or [palette.edge_ids[edge] for edge in chain.edges])[0]]
+        share, name = shares.get(id_), style.printable(id_, 14)
+        said = [] if share is None else [percent(share.mean)]
+        most = (
+            "" if share is None else f"most at {style.number(share.frame)}: {percent(share.most)}"
+        )
+        if not members:
+            x, y = layout.at(chain.edges[0], (chain.first + chain.last) / 2)
+            below(x, y, 1, "  ".join([name, *said]), style.TEXT)
+            continue
+        first, last = of_vertex[members[0]], of_vertex[members[-1]]
+        if said and beside(last, 1, said[0]):
+            said = []
+            below(last.x - last.radius - 6, last.y, -1, most, style.FAINT)
+        named = beside(first, -1, name)
+        if said or not named:
+            words = "  ".join([*([] if named else [name]), *said])
+            below(first.x + first.radius + 6, first.y, 1, words, style.TEXT)
+
+
+def _box(x: float, y: float, width: float, height: float) -> Box:
+    return x - width / 2, y - height / 2, x + width / 2, y + height / 2
 
 
 def draw_id(axes: Any, name: Label, y: float, size: float, ground: str) -> None:

@@ -1,0 +1,64 @@
+"""How much of the picture each track moves."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from palette4d.cli.info import info_of
+from palette4d.grade.document import Document
+from palette4d.grade.shares import track_shares
+from palette4d.grade.solve import ClipAtTimes
+
+SPLIT = Path(__file__).resolve().parents[1] / "golden" / "sidecars" / "v1_split.p4d.json"
+
+
+def with_colours(colours: dict[int, list[list[float]]]) -> Document:
+    fields: dict[str, Any] = json.loads(SPLIT.read_text(encoding="utf-8"))
+    fields["colours"] = [{"frame": frame, "rgbw": rgbw} for frame, rgbw in colours.items()]
+    return Document(fields)
+
+
+def test_shares_are_the_mean_barycentric_weights() -> None:
+    # Until frame 9 the palette is a tetrahedron, in which weights are barycentric.
+    plain = Document.load(SPLIT)
+    random, colours, expected = np.random.default_rng(3), {}, {}
+    for frame in (0, 4, 8):
+        palette = plain.palette(frame)
+        assert len(palette.rgb) == 4
+        weights, pixels = random.dirichlet(np.ones(4), 5), random.dirichlet(np.ones(5))
+        colours[frame] = np.column_stack([weights @ palette.rgb, pixels]).tolist()
+        solved = np.linalg.solve(
+            np.vstack([palette.rgb.T, np.ones(4)]), np.vstack([palette.rgb.T @ weights.T, [1] * 5])
+        )
+        for id_, share in zip(palette.ids, solved @ pixels, strict=True):
+            track = next(t for t in plain.tracks if id_ in (*t.vertices, *t.edges))
+            expected.setdefault(track.name, {})[frame] = share
+    document = with_colours(colours)
+    found = track_shares(ClipAtTimes(document.fields()), document.tracks)
+    assert [*found] == [track.name for track in document.tracks]
+    for name, shares in expected.items():
+        assert found[name].mean == pytest.approx(np.mean([*shares.values()]), abs=1e-3)
+        assert found[name].most == pytest.approx(max(shares.values()), abs=1e-3)
+        assert found[name].frame == max(shares, key=lambda frame: shares[frame])
+    later = [share for name, share in found.items() if name not in expected]
+    assert later
+    assert all(share.mean == share.most == 0 for share in later)
+
+
+def test_info_has_the_shares(capsys: pytest.CaptureFixture[str]) -> None:
+    from palette4d.cli.info import _print_tracks
+
+    document = with_colours(
+        {0: [[0.5, 0.4, 0.3, 0.5], [0.3, 0.3, 0.3, 0.5]], 20: [[0.4] * 3 + [1]]}
+    )
+    info = info_of(document)
+    assert sum(track["share"] for track in info["tracks"]) == pytest.approx(1)
+    _print_tracks(info)
+    assert capsys.readouterr().out.count(" % ") == len(info["tracks"])
+    without = info_of(Document.load(SPLIT))
+    assert {track["share"] for track in without["tracks"]} == {None}
+    _print_tracks(without)
+    assert "share" not in capsys.readouterr().out.lower()
