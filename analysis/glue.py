@@ -21,9 +21,12 @@ from numpy.typing import NDArray
 from palette4d.analysis.polytope import FramePalette
 from scipy.spatial import ConvexHull, QhullError
 
+from palette4d import _core
+
 F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
 Bool = NDArray[np.bool_]
+Links = tuple[tuple[int, int], ...]
 
 # After this many nodes the search returns its best solution; real clips need far fewer.
 MOST_NODES = 200_000
@@ -44,7 +47,7 @@ class Glue:
     complete : whether the search saw every solution; otherwise the links are the best found.
     """
 
-    links: tuple[tuple[int, int], ...]
+    links: Links
     broken: int
     consistent: bool
     complete: bool = True
@@ -59,21 +62,18 @@ def glue(first: FramePalette, second: FramePalette) -> Glue:
         return Glue(links, 0, n == m and _same_topology(first, second, links))
     hull = hull_pairs(first.rgb, second.rgb)
     everything = np.ones_like(hull)
-    search = _Search(first, second, distance, hull, strict=True)
-    found = search.run()
+    found, complete = _search(first, second, distance, hull, strict=True)
     bound = np.inf if found is None else sum(float(distance[i, j]) for i, j in found[0])
-    wider = _Search(first, second, distance, everything, strict=True, bound=bound)
-    found = wider.run() or found
-    complete = search.complete and wider.complete
+    shorter, seen = _search(first, second, distance, everything, strict=True, bound=bound)
+    found, complete = shorter or found, complete and seen
     if found is not None:
         same = n == m and _same_topology(first, second, found[0])
         return Glue(found[0], 0, same, complete)
-    looser = _Search(first, second, distance, everything, strict=False)
-    found = looser.run()
+    found, seen = _search(first, second, distance, everything, strict=False)
     if found is None:
         links = _nearest_links(distance)
         found = links, _broken_edges(first, second, links)
-    return Glue(found[0], found[1], False, complete and looser.complete)
+    return Glue(found[0], found[1], False, complete and seen)
 
 
 def hull_pairs(first: F64, second: F64) -> Bool:
@@ -91,122 +91,29 @@ def hull_pairs(first: F64, second: F64) -> Bool:
     return out
 
 
-class _Search:
-    """Branch and bound: each colour of the first palette chooses the colours that it links to."""
-
-    def __init__(
-        self,
-        first: FramePalette,
-        second: FramePalette,
-        distance: F64,
-        allowed: Bool,
-        strict: bool,
-        bound: float = np.inf,
-    ) -> None:
-        self.n, self.m = distance.shape
-        self.strict = strict
-        self.distance = distance.tolist()
-        self.near_first: list[list[bool]] = first.adjacency().tolist()
-        self.near_second: list[list[bool]] = second.adjacency().tolist()
-        # Bits of an integer are a set of the second palette's colours. `around`: each colour with
-        # its neighbours; `linked`: the colours that each colour of the first palette links to.
-        self.around = [
-            1 << u | sum(1 << w for w in range(self.m) if self.near_second[u][w])
-            for u in range(self.m)
-        ]
-        self.linked = [0] * self.n
-        self.order = _breadth_first(first.adjacency())
-        self.choices = [self._choices(v, allowed[v]) for v in range(self.n)]
-        self.before = [
-            [w for w in self.order[:at] if self.near_first[v][w]] for at, v in enumerate(self.order)
-        ]
-        self.rest = [0.0] * (self.n + 1)  # the least cost of all later colours
-        for at in range(self.n - 1, -1, -1):
-            costs = [cost for cost, *_ in self.choices[self.order[at]]]
-            self.rest[at] = self.rest[at + 1] + (min(costs) if costs else np.inf)
-        self.chosen: list[tuple[int, ...]] = [()] * self.n
-        self.users: list[list[int]] = [[] for _ in range(self.m)]
-        self.best = bound  # only shorter solutions count
-        self.best_links: tuple[tuple[int, int], ...] | None = None
-        self.best_broken = 0
-        self.nodes = 0
-        self.complete = True
-
-    def _choices(self, v: int, allowed: Bool) -> list[tuple[float, tuple[int, ...], int, int]]:
-        """Return the sets of one to three colours that v may link to (topological rule 1 within
-        each set): the cost, the colours, and as bits the colours and those with neighbours."""
-        near = np.flatnonzero(allowed).tolist()
-        out = []
-        for size in (1, 2, 3):
-            for group in itertools.combinations(near, size):
-                if all(self.near_second[a][b] for a, b in itertools.combinations(group, 2)):
-                    bits = around = 0
-                    for u in group:
-                        bits |= 1 << u
-                        around |= self.around[u]
-                    out.append((sum(self.distance[v][u] for u in group), group, bits, around))
-        return sorted(out)
-
-    def run(self) -> tuple[tuple[tuple[int, int], ...], int] | None:
-        if np.isfinite(self.rest[0]):
-            self._descend(0, 0.0, 0)
-        return None if self.best_links is None else (self.best_links, self.best_broken)
-
-    def _fits(self, v: int, group: tuple[int, ...]) -> bool:
-        for u in group:
-            users = self.users[u]
-            if not users:
-                continue
-            # Inter-degree rule 2: u becomes a merging vertex; its partners must not split.
-            if len(group) > 1 or any(len(self.chosen[w]) > 1 for w in users):
-                return False
-            if not all(self.near_first[v][w] for w in users):  # topological rule 1
-                return False
-        return True
-
-    def _broken_back(self) -> int:
-        """Count the edges of the second palette that break topological rule 2."""
-        return sum(
-            self.near_second[a][b]
-            and not any(
-                v == w or self.near_first[v][w] for v in self.users[a] for w in self.users[b]
-            )
-            for a, b in itertools.combinations(range(self.m), 2)
-        )
-
-    def _descend(self, at: int, cost: float, broken: int) -> None:
-        self.nodes += 1
-        if self.nodes > MOST_NODES and (self.best_links is not None or self.nodes > 2 * MOST_NODES):
-            self.complete = False
-            return
-        if at == self.n:
-            if not all(self.users):  # inter-degree rule 1
-                return
-            back = self._broken_back()
-            if self.strict and back:
-                return
-            total = cost + BROKEN * back
-            if total < self.best:
-                self.best, self.best_broken = total, broken + back
-                self.best_links = tuple((v, u) for v in range(self.n) for u in self.chosen[v])
-            return
-        v = self.order[at]
-        for extra, group, bits, around in self.choices[v]:
-            if cost + extra + self.rest[at + 1] >= self.best:
-                break
-            if not self._fits(v, group):
-                continue
-            # Topological rule 2 for the intra-frame edges to the colours that have chosen.
-            wrong = sum(not around & self.linked[w] for w in self.before[at])
-            if self.strict and wrong:
-                continue
-            self.chosen[v], self.linked[v] = group, bits
-            for u in group:
-                self.users[u].append(v)
-            self._descend(at + 1, cost + extra + BROKEN * wrong, broken + wrong)
-            for u in group:
-                self.users[u].pop()
-            self.chosen[v], self.linked[v] = (), 0
+def _search(
+    first: FramePalette,
+    second: FramePalette,
+    distance: F64,
+    allowed: Bool,
+    strict: bool,
+    bound: float = np.inf,
+) -> tuple[tuple[Links, int] | None, bool]:
+    """Return the shortest links below a bound, if any, with the number of broken edges, and whether
+    every solution was seen."""
+    near = first.adjacency()
+    links, broken, complete = _core.find_links(
+        distance,
+        allowed,
+        near,
+        second.adjacency(),
+        _breadth_first(near),
+        strict=strict,
+        bound=bound,
+        broken_cost=BROKEN,
+        most_nodes=MOST_NODES,
+    )
+    return (tuple(links), broken) if links else None, complete
 
 
 def _breadth_first(adjacency: Bool) -> list[int]:
@@ -218,7 +125,7 @@ def _breadth_first(adjacency: Bool) -> list[int]:
     return order
 
 
-def _nearest_links(distance: F64) -> tuple[tuple[int, int], ...]:
+def _nearest_links(distance: F64) -> Links:
     """Match the smaller palette one-to-one at least total distance; the rest go to the nearest
     colour."""
     if distance.shape[0] > distance.shape[1]:
@@ -232,9 +139,7 @@ def _nearest_links(distance: F64) -> tuple[tuple[int, int], ...]:
     return tuple(sorted(links))
 
 
-def _same_topology(
-    first: FramePalette, second: FramePalette, links: tuple[tuple[int, int], ...]
-) -> bool:
+def _same_topology(first: FramePalette, second: FramePalette, links: Links) -> bool:
     if len(links) != len(first.rgb) or len({i for i, _ in links}) != len({j for _, j in links}):
         return False
     to = dict(links)
@@ -242,9 +147,7 @@ def _same_topology(
     return image == {_triangle(*map(int, face)) for face in second.faces}
 
 
-def _broken_edges(
-    first: FramePalette, second: FramePalette, links: tuple[tuple[int, int], ...]
-) -> int:
+def _broken_edges(first: FramePalette, second: FramePalette, links: Links) -> int:
     near, far = first.adjacency(), second.adjacency()
     broken = 0
     for one, other, pairs in ((near, far, links), (far, near, tuple((j, i) for i, j in links))):
@@ -261,9 +164,7 @@ def _triangle(a: int, b: int, c: int) -> tuple[int, int, int]:
     return min((a, b, c), (b, c, a), (c, a, b))
 
 
-def transition_faces(
-    first: FramePalette, second: FramePalette, links: tuple[tuple[int, int], ...]
-) -> I32:
+def transition_faces(first: FramePalette, second: FramePalette, links: Links) -> I32:
     """Return the (f, 3) triangles over the links: the topology between the two frames.
 
     If colours only split, it is the second palette's mesh; if they only merge, the first's. If

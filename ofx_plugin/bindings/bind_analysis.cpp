@@ -1,4 +1,4 @@
-// The analysis' hot loops: colour bins, colour trees, losses, progressive hulls.
+// The analysis' hot loops: colour bins, colour trees, losses, progressive hulls, links.
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
@@ -9,6 +9,7 @@
 #include "binders.hpp"
 #include "fit/colour_bins.hpp"
 #include "fit/colour_histogram.hpp"
+#include "fit/colour_links.hpp"
 #include "fit/colour_tree.hpp"
 #include "fit/palette_loss.hpp"
 #include "fit/polytope_loss.hpp"
@@ -46,6 +47,13 @@ struct PolytopeLoss {
     std::vector<BlockTopology> blocks;
     std::vector<FrameColours> frames;
 };
+
+using BoolArray = py::array_t<bool, py::array::c_style | py::array::forcecast>;
+
+template <class Value, class Array>
+std::vector<Value> flat(const Array& array) {
+    return {array.data(), array.data() + array.size()};
+}
 
 }  // namespace
 
@@ -181,4 +189,34 @@ void bind_analysis(py::module_& m) {
             return to_array(out);
         },
         py::arg("rgb"), py::arg("faces"), py::arg("target"));
+
+    m.def(
+        "find_links",
+        [](const DoubleArray& distance, const BoolArray& allowed, const BoolArray& near_first,
+           const BoolArray& near_second, std::vector<int> order, bool strict, double bound,
+           double broken_cost, int most_nodes) {
+            if (distance.ndim() != 2)
+                throw py::value_error("distance: found shape " + shape_text(distance) +
+                                      ", expected (n, m)");
+            const LinkProblem problem{static_cast<int>(distance.shape(0)),
+                                      static_cast<int>(distance.shape(1)),
+                                      flat<double>(distance),
+                                      flat<std::uint8_t>(allowed),
+                                      flat<std::uint8_t>(near_first),
+                                      flat<std::uint8_t>(near_second),
+                                      std::move(order),
+                                      strict,
+                                      bound,
+                                      broken_cost,
+                                      most_nodes};
+            ColourLinks out;
+            {
+                py::gil_scoped_release release;
+                out = find_links(problem);
+            }
+            return py::make_tuple(out.links, out.broken, out.complete);
+        },
+        py::arg("distance"), py::arg("allowed"), py::arg("near_first"), py::arg("near_second"),
+        py::arg("order"), py::kw_only(), py::arg("strict"), py::arg("bound"),
+        py::arg("broken_cost"), py::arg("most_nodes"));
 }

@@ -386,6 +386,24 @@ class PolytopeLoss:
     ) -> tuple[F64, F64]:
         """Rows R, C, shape, outside, largest distance of each frame; the summed (N, 4) gradient."""
 
+def find_links(
+    distance: F64,
+    allowed: NDArray[np.bool_],
+    near_first: NDArray[np.bool_],
+    near_second: NDArray[np.bool_],
+    order: Sequence[int],
+    *,
+    strict: bool,
+    bound: float,
+    broken_cost: float,
+    most_nodes: int,
+) -> tuple[list[tuple[int, int]], int, bool]:
+    """Shortest links of two palettes of n and m colours, among the allowed pairs (n, m).
+
+    The links (none without a solution), how many edges break topological rule 2, and whether every
+    solution was seen.
+    """
+
 def progressive_hull(rgb: ArrayLike, faces: ArrayLike, target: int) -> F64:
     """Simplify a closed convex mesh, (n, 3) and (f, 3), to at most `target` enclosing vertices."""
 

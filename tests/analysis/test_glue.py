@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 
 import numpy as np
@@ -9,6 +10,8 @@ import pytest
 from palette4d.analysis.convex_hulls import hull_mesh
 from palette4d.analysis.glue import glue, transition_faces
 from palette4d.analysis.polytope import FramePalette
+
+from palette4d import _core
 
 CUBE = np.array(list(itertools.product([0.2, 0.8], repeat=3)))
 
@@ -96,6 +99,33 @@ def test_rules_and_meshes_of_random_pairs(seed):
     assert closed(faces)
     assert len(faces) == 2 * (len(found.links) - 2)
     assert set(faces.ravel()) == set(range(len(found.links)))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_shorter_links_obey_the_rules(seed):
+    first, second = solid(seed, 4), solid(seed + 10, 5)
+    sets = [s for size in (1, 2, 3) for s in itertools.combinations(range(5), size)]
+    distance = np.linalg.norm(first.rgb[:, None] - second.rgb, axis=2)
+    costs = np.array([[row[list(s)].sum() for s in sets] for row in distance])
+    total = functools.reduce(np.add.outer, costs)  # of all choices of the four colours
+    found = sum(distance[i, j] for i, j in glue(first, second).links)
+    shorter = np.argwhere(total < found - 1e-9)
+    assert len(shorter) > 10
+    for choice in shorter:
+        links = [(i, j) for i, at in enumerate(choice) for j in sets[at]]
+        assert not all(rules_hold(first, second, links))
+
+
+@pytest.mark.parametrize(
+    ("allowed", "order"), [((3, 4), range(4)), ((4, 4), range(3)), ((4, 4), (0, 1, 1, 2))]
+)
+def test_arrays_that_do_not_fit_are_refused(allowed, order):
+    near = np.ones((4, 4), bool)
+    with pytest.raises(ValueError, match="links need matrices"):
+        _core.find_links(
+            np.ones((4, 4)), np.ones(allowed, bool), near, near, list(order),
+            strict=True, bound=1.0, broken_cost=1.0, most_nodes=9,
+        )  # fmt: skip
 
 
 def test_between_two_frames_the_mesh_meets_both_palettes():
