@@ -62,3 +62,12 @@ def test_info_has_the_shares(capsys: pytest.CaptureFixture[str]) -> None:
     assert {track["share"] for track in without["tracks"]} == {None}
     _print_tracks(without)
     assert "share" not in capsys.readouterr().out.lower()
+
+
+def test_a_frame_whose_colours_have_no_pixels_counts_for_nothing() -> None:
+    rows = {0: [[0.5, 0.4, 0.3, 1.0]], 10: [[0.3, 0.3, 0.3, 0.0]]}
+    shares = [
+        track_shares(ClipAtTimes(document.fields()), document.tracks)
+        for document in (with_colours(rows), with_colours({0: rows[0]}))
+    ]
+    assert shares[0] == shares[1]

@@ -142,7 +142,8 @@ class ClipAtTimes:
         self.polytope = self.core.polytope
         found = fields["clip"]["frames"]
         self.first, self.last, self.step = found["first"], found["last"], found["step"]
-        entries = fields.get("colours", ())
+        # Without pixels a frame has no colours, whatever a file says.
+        entries = [e for e in fields.get("colours", ()) if any(row[3] > 0 for row in e["rgbw"])]
         self.frames = [entry["frame"] for entry in entries]
         self.colours = [np.array(entry["rgbw"], float).reshape(-1, 4) for entry in entries]
         edits = fields["edits"]
