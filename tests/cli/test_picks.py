@@ -95,7 +95,9 @@ def test_pick_a_pixel_and_see_how_it_is_met(path: str, run: Run) -> None:
     assert "p1: pick at frame 0" in out
     assert re.search(r"follows its colour: #339933 at frame 0, #\w{6} at frame 5", out)
     assert re.search(r"at frame 5 it is 0\.\d\d away .* change p1 --until \d\b", out)  # yellow
-    assert re.search(r"the colours near it change \d\.\d\d times as much", out)
+    assert re.search(
+        r"the colours near it change \d\.\d\d times as much, all of its hue \d\.\d\d", out
+    )
     assert re.search(r"off by 0\.0\d+; \d+% the palette", out)
     assert re.search(r"\d+ of \d+ palette colours move", out)
     np.testing.assert_allclose(moved(path, 0, tuple(pick["rgb"])), (0.1, 0, 0), atol=0.01)
@@ -317,7 +319,7 @@ def test_a_colour_that_no_pixel_has_is_told(run: Run) -> None:
 def test_a_hold_that_takes_most_of_a_pick_is_named(run: Run) -> None:
     run("pick", "--frame", "2", "--colour", "0.36,0.6,0.3", "--by", "0.2,0,0", "--no-follow")
     near = run("hold", "--frame", "2", "--colour", "0.36,0.6,0.2", "--no-follow")[1]
-    assert re.search(r"the hold p2 takes \d+% of what the colours near p1 would get", near)
+    assert re.search(r"the hold p2 takes \d+% of what p1's colour and its shades would get", near)
     assert "the hold p2 takes" not in run("disable", "p2")[1]
 
 

@@ -284,6 +284,19 @@ def test_what_holds_take_of_the_colours_near_a_pick(fields: Fields) -> None:
     assert held.share == pytest.approx(alone.share * (1 - held.taken["p2"]))
 
 
+def test_how_much_the_shades_of_a_picked_colour_change(fields: Fields) -> None:
+    """All of the hue are counted by their pixels; greys have none."""
+    red, dark, green = (0.5, 0.2, 0.2), (0.15, 0.05, 0.06), (0.2, 0.45, 0.2)
+    rows = [[*red, 0.1], [*dark, 0.3], [*green, 0.6]]
+    found = {**fields, "colours": [{"frame": 0, "rgbw": rows}]}
+    document = solved(found, pick("p1", red, (0.5, 0.3, 0.2), radius=0.06))[0]
+    parts = [float(moved(document, c, 5)[1]) / 0.1 for c in (red, dark)]
+    assert document.around_picks()["p1"].shades == pytest.approx(
+        parts[0] / 4 + 3 * parts[1] / 4, abs=0.01
+    )
+    assert solved(found, pick("p1", MIDDLE, OTHER))[0].around_picks()["p1"].shades is None
+
+
 def test_a_path_is_followed_by_shift_or_by_colour(fields: Fields) -> None:
     path = [{"frame": 0, "rgb": [0.3, 0.3, 0.3]}, {"frame": 18, "rgb": [0.5, 0.4, 0.4]}]
     asked = pick("p1", (0.3, 0.3, 0.3), (0.4, 0.3, 0.3), frame=0, path=path)

@@ -354,8 +354,19 @@ def _told(
         if pick.worst is not None and pick.worst > max(2 * pick.residual, pick.tolerance):
             lines.append(f"  the farthest off at frame {pick.worst_frame:.0f}: by {pick.worst:.4f}")
         if pick.id in around:
-            lines.append(f"  the colours near it change {around[pick.id].share:.2f} times as much")
+            lines += _near(around[pick.id])
     return "\n".join(lines)
+
+
+def _near(around: Around) -> list[str]:
+    """Return how much of a pick's change the colours near it and its other shades get."""
+    line = f"  the colours near it change {around.share:.2f} times as much"
+    if around.shades is None:
+        return [line]
+    lines = [f"{line}, all of its hue {around.shades:.2f} times"]
+    if around.shades < around.share / 2:
+        lines.append("  note: if it has darker or lighter shades too, pick one of them as well")
+    return lines
 
 
 def _path(pick: Pick) -> list[str]:

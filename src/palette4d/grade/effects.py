@@ -35,7 +35,7 @@ B = NDArray[np.bool_]
 # A colour whose channels differ by less is a grey. Eyes see tints of greys first (CIE94): they
 # count from half of what counts elsewhere, where a pick has less than half of its effect.
 GREY = 0.1
-# So many holds are proposed at most, and none that takes more of what the colours near a pick get.
+# So many holds are proposed at most, and none that takes more of what the picked thing gets.
 MOST_HOLDS, TAKEN = 3, 0.1
 
 
@@ -55,7 +55,8 @@ class SideEffect:
         The other colour for which this matters most; its share of the pixels counts.
     holds : tuple of 3 floats
         Colours to hold, such as `most`, tried: with these holds fewer others change. A colour is
-        left out if its hold would take more than `TAKEN` of what the colours near a pick get.
+        left out if its hold would take more than `TAKEN` of what the colours near a pick, or of its
+        hue, get.
     left : float
         What of `others` is left with these holds.
     """
@@ -172,12 +173,16 @@ class Around:
         The pick's own frame, or the nearest one at which all of its change is asked for.
     share : float
         The mean share of the change, over the frame's pixels near the picked colour.
+    shades : float or None
+        The same over those of its hue, however dark or light. None for a grey.
     taken : dict of float
-        By the id of each hold: the share, 0..1, of what they would get without it.
+        By the id of each hold: the share, 0..1, that it takes of what they, or the darker and
+        lighter colours of their hue, would get without it.
     """
 
     frame: float
     share: float
+    shades: float | None
     taken: dict[str, float]
 
 
@@ -190,31 +195,56 @@ def surroundings(fields: Mapping[str, Any]) -> dict[str, Around]:
         for hold in near.held:
             id_ = problem.hold_at(hold[:3], near.time)
             taken[id_] = max(taken.get(id_, 0.0), near.taken(hold))
-        found[near.id] = Around(near.time, near.share(np.vstack([near.free, near.held])), taken)
+        done = near.done(np.vstack([near.free, near.held]))
+        shades = float(near.hue @ done) if near.hue.any() else None
+        found[near.id] = Around(near.time, float(near.shares @ done), shades, taken)
     return found
 
 
 @dataclass(frozen=True)
 class _NearPick:
-    """The colours near a pick, their shares, and what moves them: palette, bumps, and holds."""
+    """Colours, and what moves them: palette, bumps, and holds.
+
+    `shares` counts those near the pick, `hue` those of its hue, however dark or light.
+    """
 
     id: str
     time: float
     rgb: F64
     shares: F64
+    hue: F64
     along: F64
     moved: F64
     free: F64
     held: F64
 
-    def share(self, bumps: F64) -> float:
-        """Return the mean share of the pick's change that the colours get."""
-        return float(self.shares @ bumped(self.rgb, self.moved, bumps) @ self.along)
+    def done(self, bumps: F64) -> F64:
+        """Return which share of the pick's change each colour gets."""
+        return np.asarray(bumped(self.rgb, self.moved, bumps) @ self.along, np.float64)
 
     def taken(self, hold: F64) -> float:
-        """Return which share a hold takes of what the colours get without holds, 0..1."""
-        alone = self.share(self.free)
-        return 1 - self.share(np.vstack([self.free, hold])) / alone if alone > NONE else 0.0
+        """Return which share a hold takes of what the colours get without holds, 0..1.
+
+        Of those near the pick or of those of its hue, where it takes more.
+        """
+        alone, held = self.done(self.free), self.done(np.vstack([self.free, hold]))
+        both = np.array([self.shares, self.hue])
+        before, after = both @ alone, both @ held
+        return float((1 - after[before > NONE] / before[before > NONE]).max(initial=0.0))
+
+
+def _of_hue(rgb: F64, picked: F64) -> B:
+    """Return which colours have the hue of a picked one: shadows and highlights of the same thing.
+
+    Their chromaticity is as near to the picked one's as to grey's, or nearer. Greys have no hue.
+    """
+    found, own = (
+        (c - c.mean(axis=-1, keepdims=True)) / np.maximum(c.sum(axis=-1, keepdims=True), GREY)
+        for c in (rgb, picked)
+    )
+    away = np.linalg.norm(found - own, axis=-1)
+    most = np.minimum(np.linalg.norm(found, axis=-1), np.linalg.norm(own))
+    return np.asarray((away <= most) & (np.ptp(picked) >= GREY))
 
 
 def _near_picks(
@@ -243,7 +273,11 @@ def _near_picks(
         held = bumps[:, 7] > 0
         along = pick.change_at(time) / length**2
         rgb, shares = rgbw[:, :3], shares / shares.sum()
-        found.append(_NearPick(pick.id, time, rgb, shares, along, moved, bumps[~held], bumps[held]))
+        hue = rgbw[:, 3] * _of_hue(rgb, np.array(pick.colour_at(time)))
+        hue /= max(float(hue.sum()), NONE)
+        found.append(
+            _NearPick(pick.id, time, rgb, shares, hue, along, moved, bumps[~held], bumps[held])
+        )
     return found
 
 

@@ -40,8 +40,8 @@ def notes(
         found.append(f"of the others {hex_of(effect.most)} changes most. {_remedy(effect)}")
     for id_, near in around.items():
         found += [
-            f"the hold {hold} takes {taken:.0%} of what the colours near {id_} would get at frame "
-            f"{near.frame:.0f}. If that is too much, a smaller hold takes less: radius=0.05"
+            f"the hold {hold} takes {taken:.0%} of what {id_}'s colour and its shades would get at "
+            f"frame {near.frame:.0f}. If that is too much, a smaller hold takes less: radius=0.05"
             for hold, taken in near.taken.items()
             if taken > TAKEN
         ]
@@ -61,8 +61,8 @@ def notes(
 def _remedy(effect: SideEffect) -> str:
     if not effect.holds:
         return (
-            f"A hold of it would take more than {TAKEN:.0%} of what the colours near a pick get, "
-            "or would not help; a mask of the host parts them"
+            f"A hold of it would take more than {TAKEN:.0%} of what a picked colour and its shades "
+            "get, or would not help; a mask of the host parts them"
         )
     colours = " and ".join(hex_of(rgb) for rgb in effect.holds)
     return (
