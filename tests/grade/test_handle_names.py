@@ -33,7 +33,7 @@ def palette_of(*tracks: list[tuple[float, float, float, float]]) -> Any:
 def test_a_track_keeps_its_number_and_the_lightest_of_one_name_comes_first() -> None:
     fields = palette_of(
         [(0, 0, 0, 0.5), (9, 0, 0, 0.5), (20, 0.9, 0, 0)],
-        [(0, 0.1, 0, 0), (9, 0, 0, 0.6), (20, 0, 0.8, 0)],
+        [(0, 0.25, 0, 0), (9, 0, 0, 0.6), (20, 0, 0.8, 0)],
         [(0, 0.1, 0.1, 0.1), (20, 0, 0.8, 0)],
         [(0, 0.95, 0.9, 0), (20, 0.8, 0.8, 0.8)],
     )
@@ -63,7 +63,7 @@ def test_a_track_is_called_by_the_colours_that_it_has() -> None:
     assert [track.called for track in tracks] == [
         "blue, 0-9",
         "red > green > red, 0-9",
-        "yellow > green > red, 0-9",
+        "yellow > lime > red, 0-9",
     ]
 
 

@@ -214,6 +214,22 @@ def test_no_hold_is_proposed_that_takes_from_a_pick(fields: Fields) -> None:
     assert effect.holds == ()
 
 
+def test_no_hold_is_proposed_of_a_shadow_of_the_picked_thing(fields: Fields) -> None:
+    """The palette takes a red car's shadow along; it is not near the car, but of its hue."""
+    shadow, car, street = [0.2, 0.08, 0.09], (0.5, 0.2, 0.2), [0.3, 0.45, 0.5]
+    rows = [[*car, 0.1], [*shadow, 0.2], [*street, 0.7]]
+    found = {**fields, "colours": [{"frame": 5, "rgbw": rows}]}
+    edits = solved(found, pick("p1", car, (0.3, 0.3, 0.3)))[0].fields()["edits"]
+    edits["solution"]["vertices"] = [
+        {"vertex": vertex["id"], "by": [-0.1, 0.05, 0.05]}
+        for vertex in found["polytope"]["vertices"]
+    ]
+    effect = effects.side_effect({**found, "edits": edits}, 10 / 255)
+    assert effect.others == pytest.approx(0.9)
+    assert tuple(street) in effect.holds
+    assert tuple(shadow) not in effect.holds
+
+
 @pytest.mark.parametrize("seed", range(2))
 def test_a_hold_never_adds_to_a_change(fields: Fields, seed: int) -> None:
     """Of no colour, in no frame: neither of the held one nor of any other."""

@@ -96,7 +96,7 @@ TEST(status_says_what_was_loaded) {
     instance->set("sidecar", path);
     CHECK(instance->changed("sidecar") == kOfxStatOK);
     CHECK(instance->text("status") ==
-          "box: frames 10-20 at 24 fps, 16 palette vertices, 3 edits\n"
+          "box: frames 10-20 at 24 fps, 16 handles, 3 edits\n"
           "file " +
               path +
               "\n"

@@ -158,7 +158,7 @@ TEST(the_status_follows_the_file) {
     Scene scene;
     Instance& node = *scene.instance;
     const std::string path = sidecar(), whole = sidecar_text(), plain = sidecar_text(false);
-    const std::string good = "box: frames 10-20 at 24 fps, 16 palette vertices, ";
+    const std::string good = "box: frames 10-20 at 24 fps, 16 handles, ";
     node.set("sidecar", path);
     CHECK(node.changed("sidecar") == kOfxStatOK);
     CHECK(node.text("status").find(good + "3 edits\n") == 0);

@@ -220,10 +220,12 @@ def _print_head(info: dict[str, Any]) -> None:
     colours = info["input_space"] or info["encoding"]
     print(f"picture   {info['size'][0]} x {info['size'][1]}, {colours}{found_in}")
     print(
-        f"palette   {counted(info['vertices'], 'vertex', 'vertices')}, "
-        f"{counted(info['edges'], 'edge')}, {counted(info['blocks'], 'block')}: "
-        + ", ".join(f"{a:g}-{b:g}" for a, b in info["block_ranges"])
+        f"palette   {counted(len(info['tracks']), 'colour')} through time, "
+        f"{counted(info['vertices'], 'handle')}"
     )
+    if info["blocks"] > 1:
+        ranges = ", ".join(f"{a:g}-{b:g}" for a, b in info["block_ranges"])
+        print(f"blocks    {ranges}; colours split or merge between them")
     print(
         f"edits     {counted(info['edited_vertices'], 'vertex', 'vertices')}, "
         f"{counted(info['stops'], 'stop')}"

@@ -40,6 +40,8 @@ GREYS = (
 )
 #: Below these chromas a colour is a grey, or greyish.
 GREY, GREYISH = 0.025, 0.07
+#: Below this lightness every colour is black: nobody sees its hue.
+BLACK = 0.2
 #: Up to the first lightness a colour is dark, or deep if it is strong. From the second on it is
 #: pale, or light if it is strong; a vivid one has no modifier.
 DARK, LIGHT, STRONG, VIVID = 0.42, 0.78, 0.11, 0.13
@@ -61,7 +63,7 @@ def of_lch(lightness: float, chroma: float, hue: float) -> str:
     >>> of_lch(0.3, 0.12, 29)
     'deep red'
     """
-    if chroma < GREY or lightness < 0.12:
+    if chroma < GREY or lightness < BLACK:
         return next(name for end, name in GREYS if lightness < end or end == GREYS[-1][0])
     name = _hue(lightness, chroma, hue % 360)
     strong = chroma >= STRONG

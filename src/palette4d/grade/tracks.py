@@ -5,7 +5,6 @@ the chain; every other edge begins or ends another chain.
 """
 
 import itertools
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -151,7 +150,7 @@ class Track:
         The id of its first vertex.
     called : str
         Its name for people: its colour and its frames, such as "deep red, 13-31". Where that
-        changes, its first and last colour, and the one that is farthest from both: "yellow > lime >
+        changes, its first and last colour, and the most colourful of the others: "yellow > lime >
         orange, 0-49". From blue to pale blue is no change, but to dark blue it is.
     at : float
         The frame of its most colourful vertex; of a fork, the middle.
@@ -193,13 +192,9 @@ def tracks_of(handles: Handles, colours: Mapping[str, str]) -> list[Track]:
         if not shown:  # a fork between two other tracks
             fork = handles.edges[edge_ids[chain.edges[0]]]
             shown = [place[fork[end]] for end in ("from", "to")]
-        strongest = max(shown, key=lambda v: max(rgb[v]) - min(rgb[v]))
-        first, last = shown[0], shown[-1]
-        others = [v for v in shown if labels[v] not in (labels[first], labels[last])]
-        # The colour of the track that is farthest from both its ends, if it has another name.
-        others = sorted(
-            others, key=lambda v: -min(math.dist(rgb[v], rgb[e]) for e in (first, last))
-        )
+        by_strength = sorted(shown, key=lambda v: min(rgb[v]) - max(rgb[v]))
+        strongest, first, last = by_strength[0], shown[0], shown[-1]
+        others = [v for v in by_strength if labels[v] not in (labels[first], labels[last])]
         way = first, *others[:1], last
         colour = names[strongest]
         if len({labels[v] for v in way}) > 1:

@@ -180,14 +180,15 @@ def _draw_heading(
     numerator, denominator = clip["rate"]
     ends = dict.fromkeys((style.number(palette.first), style.number(palette.last)))
     blocks, edited = _blocks(palette), int(palette.changed.sum())
+    encoding = str(clip["encoding"])
     facts = [
         f"frame{'s' if len(ends) > 1 else ''} {'–'.join(ends)}",
         f"{style.number(numerator / denominator)} fps",
         f"{clip['width']}×{clip['height']}",
-        str(clip["encoding"]) if clip["encoding"] != "unknown" else "encoding unknown",
-        counted(len(palette.ids), "palette vertex", "palette vertices"),
+        encoding if encoding != "unknown" else "encoding unknown, shown as sRGB",
+        counted(len(palette.ids), "handle"),
         counted(blocks, "block") if blocks > 1 else "",
-        counted(edited, "edited vertex", "edited vertices") if edited else "",
+        f"{edited} edited" if edited else "",
         counted(len(palette.stops), "stop") if palette.stops else "",
     ]
     line = style.printable("   ·   ".join(fact for fact in facts if fact), 200)
@@ -195,11 +196,11 @@ def _draw_heading(
     axes.text(MARGIN, height - 30, style.printable(clip["name"], 48), **title)
     axes.text(MARGIN, height - 52, line, fontsize=8.5, color=style.FAINT, va="center")
     grey, light = np.full(3, 0.42), np.full(3, 0.78)
-    entries = [("plain", 7.5, light, "palette vertex")]
+    entries = [("plain", 7.5, light, "handle: a palette colour at a frame")]
     if edited:
         entries.append(("edited", 7.5, grey, "edited: before above, after below"))
     if palette.stops:
-        entries.append(("stop", 6.0, grey, "stop: a colour added between vertices"))
+        entries.append(("stop", 6.0, grey, "stop: a handle added by hand"))
     # Discs outside the page, which the legend copies.
     handles = [
         timeline.disc(axes, np.nan, np.nan, radius, np.stack([before, light]), kind, 5)
@@ -228,9 +229,9 @@ def _draw_notes(
     axes: Any, palette: PlottedPalette, shares: bool, columns: Sequence[Column]
 ) -> None:
     """Say at the bottom of the page what its parts are."""
-    rows = "A row: one palette colour through time, with the id of its track at the left."
+    rows = "A row: one palette colour through time; a scene's change may take it to another thing."
     if shares:
-        rows += " At the right: how much of the picture it moves, on average."
+        rows += " Percentages: how much of the picture it moves, on average and at most."
     if _blocks(palette) > 1:
         rows += " Block: frames in which no colour splits or merges."
     notes = [rows]
