@@ -2,15 +2,14 @@
 
 Input: a refined polytope and all frames of the clip. Output: the polytope with such stops. Merging
 takes the palettes of a block from frame to frame, and removal looks at the mean: both miss a colour
-that only a few frames have. Two kinds of frames get stops: those whose loss is far above the
-median's, and those with lost pixels (`LOST`).
+that only a few frames have. Frames with lost pixels (`LOST`) get stops.
 
-The colours outside the palette of such a frame get a stop on a track near them, with or without
-stops before and after that keep the rest of the track where it is. In the clip's first and last
-frame the vertex of the track itself takes the colour. A stop stays if it removes most of the
-frame's misfit and is worth its `handle_cost`. Where pixels are lost it need not be, as the cost
-judges the mean: the value of `Objective` may even rise by `WORTH`. Its edges count little in
-eq. 11, which would otherwise rather lose the colour than let it change quickly.
+The lost colours of such a frame get a stop on a track, with or without stops before and after that
+keep the rest of the track where it is. In the clip's first and last frame the vertex of the track
+itself takes the colour. A stop stays if it brings most of the lost pixels back. It need not be
+worth its `handle_cost`, which judges the mean: the value of `Objective` may even rise by `WORTH`.
+Its edges count little in eq. 11, which would otherwise rather lose the colour than let it change
+quickly.
 """
 
 from __future__ import annotations
@@ -21,7 +20,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d.analysis.convex_hulls import hull_planes
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
 from palette4d.analysis.losses import LOST, LOST_SHARE, reach_weights
 from palette4d.analysis.objective import LEAST_GAP, Objective, frame_losses, move
@@ -29,16 +27,15 @@ from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import SkewPolytope
 from scipy.spatial.distance import cdist
 
+from palette4d import _core
+
 F64 = NDArray[np.float64]
+I32 = NDArray[np.int32]
 
 MOST_ROUNDS = 10
-BAD = 3.0  # times the median frame's loss: such a frame gets a stop
-REMOVED = 0.5  # the least share of a misfit that a stop must remove
+REMOVED = 0.5  # the least share of the lost pixels that a stop must bring back
 WORTH = 0.04  # the most that lost pixels may raise the value of `Objective`
-SAME_COLOUR = 0.25  # lost colours within this distance belong together
 FARTHEST = 1000  # lost colours that are looked at
-TRIED = 8  # places for stops that are tried, the most promising first
-NEAREST = 8  # tracks that are tried: the nearest need not be the one to spare
 EVALUATIONS = 30
 
 
@@ -69,17 +66,12 @@ def insert_stops(
         if worst is None:
             break
         best: tuple[int, float, WithStops] | None = None
-        trials = [
-            trial
-            for trial in _trials(now.polytope, frames, misfit, worst, gamut)
-            if not options.vertices or len(trial.polytope.vertices) <= options.vertices
-        ]
-        # Those that are best before their stops move are tried.
-        trials.sort(key=lambda trial: _settled(now, trial, frames, gamut, options, 0)[1])
-        for trial in trials[:TRIED]:
+        for trial in _trials(now.polytope, frames, misfit, worst, gamut):
+            if options.vertices and len(trial.polytope.vertices) > options.vertices:
+                continue
             moved, change = _settled(now, trial, frames, gamut, options)
             price = change + options.handle_cost * len(trial.new)
-            if change > WORTH if trial.share else price > 0:
+            if change > WORTH:
                 continue
             rest = _Misfit.of(moved.polytope, [frames[i] for i in trial.span], gamut, options)
             removed = [misfit.removed(i, rest, at, trial.share) for at, i in enumerate(trial.span)]
@@ -106,10 +98,9 @@ def lost_share(
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Misfit:
-    """Of each frame: its loss (eq. 4 plus `reach`), the part of `reach` alone, and the share of its
-    pixels that are lost."""
+    """Of each frame: how far its distant pixels are outside (`reach`), and the share of its pixels
+    that are lost."""
 
-    loss: F64
     far: F64
     lost: F64
 
@@ -127,36 +118,21 @@ class _Misfit:
         lost = np.zeros(len(frames))
         if options.reach:  # otherwise distant pixels count like all others
             for i in np.flatnonzero(rows[:, 4] > LOST * gamut.scale).tolist():
-                distance = _outside(polytope.slice_at(float(frames[i].frame)).rgb, frames[i])
+                cut = polytope.slice_at(float(frames[i].frame))
+                distance = _outside(cut.rgb, cut.faces, frames[i])
                 counts = frames[i].coarse.counts[distance > LOST * gamut.scale]
                 lost[i] = counts.sum() / frames[i].pixels
-        return cls(options.lambda_ * rows[:, 0] + rows[:, 1] + rows[:, 2], rows[:, 2], lost)
-
-    @property
-    def usual(self) -> float:
-        """The median frame's loss."""
-        return float(np.median(self.loss))
+        return cls(rows[:, 2], lost)
 
     def worst(self, hopeless: set[int]) -> int | None:
         """Return the frame that needs a stop most, None if none does."""
-        for of, bad in (
-            (self.loss, self.loss > BAD * self.usual),
-            (self.far, self.lost >= LOST_SHARE),
-        ):
-            found = [i for i in np.flatnonzero(bad).tolist() if i not in hopeless]
-            if found:
-                return max(found, key=lambda i: of[i])
-        return None
+        bad = np.flatnonzero(self.lost >= LOST_SHARE).tolist()
+        return max((i for i in bad if i not in hopeless), key=lambda i: self.far[i], default=None)
 
     def removed(self, frame: int, rest: _Misfit, at: int, share: float) -> bool:
-        """Return whether most of a frame's misfit is gone in frame `at` of `rest`.
-
-        With `share`, of the pixels of one lost colour, that is the misfit that counts.
-        """
-        if share:
-            less = self.lost[frame] - rest.lost[at] >= REMOVED * min(share, self.lost[frame])
-            return bool(less and rest.far[at] <= self.far[frame])
-        return bool(rest.loss[at] <= self.loss[frame] - REMOVED * (self.loss[frame] - self.usual))
+        """Return whether most of the pixels of a lost colour are back in frame `at` of `rest`."""
+        less = self.lost[frame] - rest.lost[at] >= REMOVED * min(share, self.lost[frame])
+        return bool(less and rest.far[at] <= self.far[frame])
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -166,7 +142,7 @@ class _Trial:
     Attributes
     ----------
     new, peaks : the vertices of the stops; the first `peaks` of them have the missing colour.
-    share : the share of the frame's pixels with that lost colour, 0 if no pixels are lost.
+    share : the share of the frame's pixels with that lost colour.
     span : the frames (indices) whose misfit counts: all that lack nearly as much of the colour.
     held : whether the times of the peaks stay.
     """
@@ -193,25 +169,21 @@ def _trials(
         if not block.first <= time <= block.last or len(block.faces) == 0:
             continue
         rgb = polytope.colours_at(block, time)
-        target, share = _missing_colour(rgb, frame, gamut.scale)
-        if target is None:
+        target, share = _lost_colour(_outside(rgb, block.faces, frame), frame, gamut.scale)
+        if not share:
             continue
-        # The colour lasts as long as frames lack nearly as much as this one.
-        if share:
-            what, limit = misfit.far, misfit.far[worst] / 2
-        else:
-            what, limit = misfit.loss, (misfit.loss[worst] + misfit.usual) / 2
-        before = next((i for i in range(worst, -1, -1) if what[i] < limit), -1)
-        after = next((i for i in range(worst, len(what)) if what[i] < limit), len(what))
-        beside = [float(frames[i].frame) for i in (before, after) if 0 <= i < len(what)]
+        # The colour lasts as long as frames lack at least half as much as this one.
+        far, limit = misfit.far, misfit.far[worst] / 2
+        before = next((i for i in range(worst, -1, -1) if far[i] < limit), -1)
+        after = next((i for i in range(worst, len(far)) if far[i] < limit), len(far))
+        beside = [float(frames[i].frame) for i in (before, after) if 0 <= i < len(far)]
         lasting = [float(frames[i].frame) for i in (before + 1, after - 1)]
         # One stop; with stops that keep the track before and after; for as long as it lasts.
-        span = range(before + 1, after) if share else range(worst, worst + 1)
+        span = range(before + 1, after)
         shapes = [([time], [], False), ([time], beside, False)]
-        if share and lasting[0] < lasting[1]:
+        if lasting[0] < lasting[1]:
             shapes += [(lasting, beside, False), (lasting, beside, True)]
-        nearest = np.argsort(np.linalg.norm(rgb - target, axis=1), kind="stable")[:NEAREST]
-        for track, (peaks, pins, held) in itertools.product(nearest.tolist(), shapes):
+        for track, (peaks, pins, held) in itertools.product(range(len(rgb)), shapes):
             stops = [(*target.tolist(), at) for at in peaks]
             stops += [(*polytope.colours_at(block, at)[track], at) for at in pins]
             changed, new = _with_stops(polytope, place, track, stops, len(peaks))
@@ -219,34 +191,25 @@ def _trials(
                 yield _Trial(changed, new, len(peaks), share, span, held)
 
 
-def _outside(rgb: F64, frame: FrameStatistics) -> F64:
-    """Return how far each coarse colour lies outside a palette's hull; 0 without a volume."""
-    planes = hull_planes(rgb)
-    if planes is None:
-        return np.zeros(len(frame.coarse.counts))
-    distance: F64 = (frame.coarse.rgb @ planes[:, :3].T + planes[:, 3]).max(axis=1)
+def _outside(rgb: F64, faces: I32, frame: FrameStatistics) -> F64:
+    """Return how far each coarse colour lies outside a palette's solid."""
+    distance: F64 = _core.palette_weights(frame.coarse.rgb, rgb, faces)[1]
     return distance
 
 
-def _missing_colour(rgb: F64, frame: FrameStatistics, scale: float) -> tuple[F64 | None, float]:
-    """Return the mean of the colours farthest outside, None if none is outside, and the share of
-    the frame's pixels that have this colour and are lost."""
-    distance = _outside(rgb, frame)
+def _lost_colour(distance: F64, frame: FrameStatistics, scale: float) -> tuple[F64, float]:
+    """Return the mean of the lost colours that are near one of them, and their share of the pixels.
+
+    Of the one where pixels times distance outside add up to most.
+    """
     colours, counts = frame.coarse.rgb, frame.coarse.counts
-    order = np.argsort(-distance, kind="stable")
-    far = order[:FARTHEST]
+    far = np.argsort(-distance, kind="stable")[:FARTHEST]
     far = far[distance[far] > LOST * scale]
-    if counts[far].sum() >= LOST_SHARE * frame.pixels:
-        # One colour at a time: that of the most pixels and of those farthest outside.
-        near = cdist(colours[far], colours[far]) < SAME_COLOUR * scale
-        far = far[near[np.argmax(near @ (counts[far] * distance[far]))]]
-        return counts[far] @ colours[far] / counts[far].sum(), counts[far].sum() / frame.pixels
-    # A thousandth of the pixels decides, not the farthest one.
-    few = int(np.searchsorted(np.cumsum(counts[order]), frame.pixels / 1000)) + 1
-    far = order[:few][distance[order[:few]] > 0]
-    if len(far) == 0:
-        return None, 0.0
-    return counts[far] @ colours[far] / counts[far].sum(), 0.0
+    if not len(far):
+        return np.zeros(3), 0.0
+    near = cdist(colours[far], colours[far]) < LOST * scale
+    far = far[near[np.argmax(near @ (counts[far] * distance[far]))]]
+    return counts[far] @ colours[far] / counts[far].sum(), counts[far].sum() / frame.pixels
 
 
 def _with_stops(
@@ -292,12 +255,8 @@ def _settled(
     frames: Sequence[FrameStatistics],
     gamut: Gamut,
     options: AnalysisOptions,
-    evaluations: int = EVALUATIONS,
 ) -> tuple[WithStops, float]:
-    """Move the new vertices to their best places; return the polytope and the change in value.
-
-    With no `evaluations` they stay where they are.
-    """
+    """Move the new vertices to their best places; return the polytope and the change in value."""
     brief = (*now.brief, *trial.new[: trial.peaks])
     evaluate = Objective(trial.polytope, frames, options, gamut, True, brief)
     vertices = trial.polytope.vertices.copy()
@@ -312,8 +271,7 @@ def _settled(
         upper[:, 3] = np.minimum(upper[:, 3], times + span)
     if trial.held:
         lower[: trial.peaks, 3] = upper[: trial.peaks, 3] = times[: trial.peaks]
-    if evaluations:
-        vertices = move(evaluate, vertices, moving, which, (lower, upper), evaluations)
+    vertices = move(evaluate, vertices, moving, which, (lower, upper), EVALUATIONS)
     value, _ = evaluate(vertices, which, False)
     unchanged = Objective(now.polytope, frames, options, gamut, True, now.brief)
     before, _ = unchanged(now.polytope.vertices, which, False)

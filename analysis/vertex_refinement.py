@@ -21,10 +21,6 @@ from palette4d.analysis.polytope import SkewPolytope
 EVALUATIONS = 25
 # The longest step of a palette that is nearly right.
 GENTLE = 0.005
-# Distance to which look-alikes are pushed apart in a static hull that hardly moves.
-APART = 0.07
-# The factor of `convexity` for slices that are not convex.
-STIFFER = 10.0
 
 
 def refine(
@@ -34,17 +30,9 @@ def refine(
     options: AnalysisOptions,
     brief: tuple[int, ...] = (),
 ) -> SkewPolytope:
-    """Return the refined polytope; if it is not convex, refined again with more `convexity`.
-
-    The second result is taken if its deepest concavity is less. `brief` as in `Objective`.
-    """
+    """Return the refined polytope; `brief` as in `Objective`."""
     found, _ = refine_jointly(polytope, frames, gamut, options, EVALUATIONS, False, brief, GENTLE)
-    deepest = deepest_concavity(found, frames)
-    if not options.convexity or deepest <= CONCAVE:
-        return found
-    stiffer = dataclasses.replace(options, convexity=STIFFER * options.convexity)
-    again, _ = refine_jointly(found, frames, gamut, stiffer, EVALUATIONS, False, brief, GENTLE)
-    return again if deepest_concavity(again, frames) < deepest else found
+    return found
 
 
 def relax(
@@ -56,15 +44,13 @@ def relax(
 ) -> SkewPolytope:
     """Return a static hull whose colours may move in time, with L' of at most `bound`.
 
-    Where little moves the terms for shape cost more than the motion gains. So they count less and
-    less until L' is within the bound; else the static hull itself is the result.
+    Where little moves the terms for shape may cost more than the motion gains: then without them.
+    If that is not within the bound either, the static hull itself is the result.
     """
-    looser = dataclasses.replace(options, separation=min(options.separation, APART), reach=0.0)
     plain = dataclasses.replace(options, convexity=0.0, separation=0.0, reach=0.0)
-    for shape in (options, looser, plain):
+    for shape in (options, plain):
         found = refine(static, frames, gamut, shape)
-        if losses_of(found, frames, options).L_prime <= bound and (
-            deepest_concavity(found, frames) <= CONCAVE
-        ):
+        within = losses_of(found, frames, options).L_prime <= bound
+        if within and deepest_concavity(found, frames) <= CONCAVE:
             return found
     return static
