@@ -21,6 +21,8 @@ from palette4d.analysis.polytope import SkewPolytope
 EVALUATIONS = 25
 # The longest step of a palette that is nearly right.
 GENTLE = 0.005
+# The factor of `convexity` for slices that are not convex.
+STIFFER = 3.0
 
 
 def refine(
@@ -30,9 +32,17 @@ def refine(
     options: AnalysisOptions,
     brief: tuple[int, ...] = (),
 ) -> SkewPolytope:
-    """Return the refined polytope; `brief` as in `Objective`."""
+    """Return the refined polytope; if it is not convex, refined again with more `convexity`.
+
+    The second result is taken if its deepest concavity is less. `brief` as in `Objective`.
+    """
     found, _ = refine_jointly(polytope, frames, gamut, options, EVALUATIONS, False, brief, GENTLE)
-    return found
+    deepest = deepest_concavity(found, frames)
+    if not options.convexity or deepest <= CONCAVE:
+        return found
+    stiffer = dataclasses.replace(options, convexity=STIFFER * options.convexity)
+    again, _ = refine_jointly(found, frames, gamut, stiffer, EVALUATIONS, False, brief, GENTLE)
+    return again if deepest_concavity(again, frames) < deepest else found
 
 
 def relax(

@@ -327,7 +327,7 @@ def _told(
     if pick.start is not None or pick.until is not None:
         start = "the start" if pick.start is None else f"frame {pick.start:g}"
         until = "the end" if pick.until is None else f"frame {pick.until:g}"
-        fade = f", ramps of {pick.fade:g} frames" if pick.fade else ""
+        fade = f", ramps of {pick.fade:.3g} frames" if pick.fade else ""
         lines[0] += f"; from {start} until {until}{fade}"
     if not pick.enabled:
         return f"{lines[0]}; disabled"
@@ -335,10 +335,12 @@ def _told(
         lines.append(f"  note: frame {pick.frame:g} is outside of its range and does not change")
     if pick.path:
         lines += _path(pick)
-        if any(key.there == 0 for key in pick.path):
+        seen = pick.followed()[0]
+        if any(key.there == 0 for key in pick.path) and len(seen):
             lines.append(
-                "  it ends where the colour is lost among others, or hardly there; pick it with "
-                f"--with {pick.id} if you still see it"
+                f"  it is there from frame {seen[0]:g} to {seen[-1]:g}. Elsewhere its colour is "
+                "lost among others, or hardly there. Where you still see it: pick --frame T "
+                f"--pixel X,Y --with {pick.id}"
             )
     else:
         source = document.core.clip["source"]

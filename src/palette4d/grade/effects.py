@@ -35,8 +35,9 @@ B = NDArray[np.bool_]
 # A colour whose channels differ by less is a grey. Eyes see tints of greys first (CIE94): they
 # count from half of what counts elsewhere, where a pick has less than half of its effect.
 GREY = 0.1
-# So many holds are proposed at most, and none that takes more of what the picked thing gets.
-MOST_HOLDS, TAKEN = 3, 0.1
+# So many holds are proposed at most, none that takes more of what the picked thing gets, and none
+# that does not lower the number of others by this share of the picture.
+MOST_HOLDS, TAKEN, GAIN = 3, 0.1, 0.005
 
 
 @dataclass(frozen=True)
@@ -98,24 +99,25 @@ def side_effect(fields: Mapping[str, Any], least: float) -> SideEffect:
 def _with_holds(
     effect: SideEffect, at: _Colours, picks: Sequence[_NearPick], problem: Problem, least: float
 ) -> SideEffect:
-    """Return the effect with holds that were tried one after the other."""
+    """Return the effect with holds: each time the one that leaves the fewest others."""
     holds: list[Colour] = []
-    bumps, refused, left = at.bumps, np.zeros(len(at.rgb), bool), effect.others
+    bumps, left = at.bumps, effect.others
     while len(holds) < MOST_HOLDS:
-        counted, other, size = at.counted(bumps, least)
-        score = np.where(counted & other & ~refused, size * np.sqrt(at.shares), 0.0)
-        if not score.any():
+        counted, other, _ = at.counted(bumps, least)
+        tried = []
+        for number in np.flatnonzero(counted & other).tolist():
+            trial = np.vstack([bumps, _hold_row(problem, at.rgb[number], at.time)])
+            counted, other, _ = at.counted(trial, least)
+            tried.append((float(at.shares[counted & other].sum()), number, trial))
+        tried = sorted((one for one in tried if one[0] <= left - GAIN), key=lambda one: one[:2])
+        for rest, number, trial in tried:
+            rows = (_hold_row(problem, at.rgb[number], pick.time) for pick in picks)
+            if all(pick.taken(row) <= TAKEN for pick, row in zip(picks, rows, strict=True)):
+                holds.append(as_colour(at.rgb[number]))
+                bumps, left = trial, rest
+                break
+        else:
             break
-        worst = int(score.argmax())
-        refused[worst] = True
-        trial = np.vstack([bumps, _hold_row(problem, at.rgb[worst], at.time)])
-        if any(one.taken(_hold_row(problem, at.rgb[worst], one.time)) > TAKEN for one in picks):
-            continue
-        counted, other, _ = at.counted(trial, least)
-        rest = float(at.shares[counted & other].sum())
-        if rest < left:
-            holds.append(as_colour(at.rgb[worst]))
-            bumps, left = trial, rest
     return replace(effect, holds=tuple(holds), left=left)
 
 
