@@ -22,8 +22,8 @@ std::string describe(const Sidecar& sidecar) {
     text.imbue(std::locale::classic());
     text << clip.name << ": frames " << clip.first << "-" << clip.last << " at "
          << static_cast<double>(clip.rate_num) / static_cast<double>(clip.rate_den) << " fps, "
-         << counted(sidecar.polytope.vertices().size(), "handle", "handles")
-         << ", " << counted(edits, "edit", "edits");
+         << counted(sidecar.polytope.vertices().size(), "handle", "handles") << ", "
+         << counted(edits, "edit", "edits");
     const Solution& picks = sidecar.edits.solution;
     if (!picks.vertex_by.empty() || !picks.keys.empty() || !picks.bumps.empty()) {
         text << " and picks";
