@@ -230,6 +230,25 @@ def test_no_hold_is_proposed_of_a_shadow_of_the_picked_thing(fields: Fields) -> 
     assert tuple(shadow) not in effect.holds
 
 
+def test_the_holds_that_help_most_are_proposed(fields: Fields) -> None:
+    """Two blues that one hold keeps are more than a green; a few pixels are worth no hold."""
+    car, green, speck = (0.5, 0.2, 0.2), (0.2, 0.6, 0.2), (0.85, 0.85, 0.3)
+    blues = [(0.2, 0.2, 0.6), (0.2, 0.23, 0.6)]
+    shares = [(car, 0.047), (blues[0], 0.3), (blues[1], 0.3), (green, 0.35), (speck, 0.003)]
+    rows = [[*rgb, share] for rgb, share in shares]
+    found = {**fields, "colours": [{"frame": 5, "rgbw": rows}]}
+    edits = solved(found, pick("p1", car, (0.3, 0.3, 0.3), radius=0.05))[0].fields()["edits"]
+    edits["solution"]["vertices"] = [
+        {"vertex": vertex["id"], "by": [-0.06, 0.06, 0.06]}
+        for vertex in found["polytope"]["vertices"]
+    ]
+    effect = effects.side_effect({**found, "edits": edits}, 10 / 255)
+    assert effect.others == pytest.approx(0.953)
+    assert effect.holds[0] in blues
+    assert effect.holds[1:] == (green,)
+    assert effect.left == pytest.approx(0.003)
+
+
 @pytest.mark.parametrize("seed", range(2))
 def test_a_hold_never_adds_to_a_change(fields: Fields, seed: int) -> None:
     """Of no colour, in no frame: neither of the held one nor of any other."""

@@ -55,9 +55,9 @@ class SideEffect:
     most : 3 floats
         The other colour for which this matters most; its share of the pixels counts.
     holds : tuple of 3 floats
-        Colours to hold, such as `most`, tried: with these holds fewer others change. A colour is
-        left out if its hold would take more than `TAKEN` of what the colours near a pick, or of its
-        hue, get.
+        Colours to hold, tried: each leaves the fewest others. A colour is left out if its hold
+        would take more than `TAKEN` of what the colours near a pick, or of its hue, get, or would
+        help by less than `GAIN`.
     left : float
         What of `others` is left with these holds.
     """
