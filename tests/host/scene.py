@@ -166,9 +166,10 @@ class Scene:
         folder = folder or self.folder
 
         def written() -> list[Path]:
-            return sorted(folder.glob(pattern))
+            # A movie's file is there, and empty, before its first frame.
+            return sorted(path for path in folder.glob(pattern) if path.stat().st_size)
 
-        for old in written():
+        for old in folder.glob(pattern):
             old.unlink()
         environment = {"OFX_PLUGIN_PATH": str(self.plugins), **environment}
         said, _ = run_until_it_writes([str(self.melt), *words], folder, environment, written)
