@@ -55,15 +55,6 @@ def two_sided(polygon: NDArray[np.integer[Any]]) -> I32:
     return faces
 
 
-def hull_planes(rgb: F64) -> F64 | None:
-    """Return the (m, 4) outward planes of the hull of (n, 3) colours, None without volume."""
-    try:
-        planes: F64 = ConvexHull(rgb).equations
-    except QhullError:
-        return None
-    return planes
-
-
 def concavity(rgb: F64, faces: I32) -> float:
     """Return the share of its convex hull that a mesh lacks; 0 for a hull that is nearly flat."""
     volume = hull_volume(rgb)

@@ -335,8 +335,8 @@ def _told(
         lines.append(f"  note: frame {pick.frame:g} is outside of its range and does not change")
     if pick.path:
         lines += _path(pick)
-        seen = pick.followed()[0]
-        if any(key.there == 0 for key in pick.path) and len(seen):
+        seen = [key.frame for key in pick.path if key.there > 0]
+        if 0 < len(seen) < len(pick.path):
             lines.append(
                 f"  it is there from frame {seen[0]:g} to {seen[-1]:g}. Elsewhere its colour is "
                 "lost among others, or hardly there. Where you still see it: pick --frame T "

@@ -111,9 +111,9 @@ def _with_holds(
             tried.append((float(at.shares[counted & other].sum()), number, trial))
         tried = sorted((one for one in tried if one[0] <= left - GAIN), key=lambda one: one[:2])
         for rest, number, trial in tried:
-            rows = (_hold_row(problem, at.rgb[number], pick.time) for pick in picks)
-            if all(pick.taken(row) <= TAKEN for pick, row in zip(picks, rows, strict=True)):
-                holds.append(as_colour(at.rgb[number]))
+            rgb = at.rgb[number]
+            if all(one.taken(_hold_row(problem, rgb, one.time)) <= TAKEN for one in picks):
+                holds.append(as_colour(rgb))
                 bumps, left = trial, rest
                 break
         else:
