@@ -30,8 +30,12 @@ import drawn_clips
 import numpy as np
 from evaluator import say, table
 from palette4d.analysis import colour_statistics, pipeline
+from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
 from palette4d.analysis.handle_use import rare_handles
+from palette4d.analysis.losses import shaped_weights
+from palette4d.analysis.objective import frame_losses
 from palette4d.analysis.options import AnalysisOptions
+from palette4d.analysis.polytope import SkewPolytope
 from palette4d.analysis.structure_search import RARE_COST
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
@@ -65,14 +69,15 @@ class Result:
     """One analysis."""
 
     L_prime: float
+    terms: float
     handles: int
     rare: int
     blocks: int
     cpu: float
 
     def objective(self, cost: float = COST) -> float:
-        """L' plus the cost of the handles, and of rare ones."""
-        return self.L_prime + cost * self.handles + RARE_COST * self.rare
+        """L', the terms for shape, and the cost of the handles and of rare ones."""
+        return self.L_prime + self.terms + cost * self.handles + RARE_COST * self.rare
 
 
 def clips(args: argparse.Namespace) -> Iterator[tuple[str, Clip]]:
@@ -108,8 +113,17 @@ def analysed(clip: Clip, settings: Sequence[str]) -> dict[str, Result]:
         cpu = read + time.process_time() - started
         polytope, losses = analysis.polytope, analysis.stages[-1].losses
         counts = len(polytope.vertices), rare_handles(polytope, frames), len(polytope.blocks)
-        results[name] = Result(losses.L_prime, *counts, round(cpu, 2))
+        results[name] = Result(losses.L_prime, terms(polytope, frames), *counts, round(cpu, 2))
     return results
+
+
+def terms(polytope: SkewPolytope, frames: Sequence[FrameStatistics]) -> float:
+    """Return what the search adds to L' for convexity, separation and reach."""
+    weights = shaped_weights(AnalysisOptions(), Gamut.of(frames).scale)
+    rows = frame_losses(
+        polytope, frames, range(len(frames)), weights, AnalysisOptions(), coarse=False
+    )
+    return float(rows[:, 2].mean())
 
 
 def broken(results: dict[str, Result]) -> list[str]:
