@@ -26,7 +26,7 @@ from palette4d.analysis import moves
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
 from palette4d.analysis.handle_use import rare_handles
 from palette4d.analysis.losses import loss_weights, shaped_weights, smoothness
-from palette4d.analysis.objective import frame_losses, refine_jointly
+from palette4d.analysis.objective import frame_losses, losses_of, refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import SkewPolytope
 
@@ -40,11 +40,11 @@ USUAL = AnalysisOptions()
 USUAL_COST = USUAL.handle_cost
 # Prices this share above the least are hopeless: walks end, and no more blocks are tried.
 PATIENCE = 0.08
-# With another `handle_cost` than the usual one, walks end only at so many times that cost.
+# With a `handle_cost` above the usual one walks end only at so many times that cost.
 DEARER = 4
 # At the end palettes are refined in rounds on all frames: the evaluations of a round, and how far
-# above the least price a palette may be that goes on to the next round.
-ROUNDS = ((5, 0.02), (20, 0.0))
+# above the least price a palette may be that goes on.
+ROUNDS = ((5, 0.02), (20, 0.01))
 # A rare handle costs so much more, whatever `handle_cost` is.
 RARE_COST = USUAL_COST
 # Of the colours that may go, those that cost least at once are tried.
@@ -115,7 +115,10 @@ def best_of(
     gamut: Gamut,
     options: AnalysisOptions,
 ) -> tuple[int | None, SkewPolytope]:
-    """Return the best of all that was found, measured on all frames, and its start."""
+    """Return the best of all that was found, measured on all frames, and its start.
+
+    Of those whose prices are nearly equal at last it is the one with the least L' and handles.
+    """
     everything = [one for one, _ in found]
     cost = options.handle_cost
     best = choose(everything, options)
@@ -129,14 +132,19 @@ def best_of(
         ]
         close.sort(key=lambda found: found[0].price(cost))
         least = math.inf
-        for p, at in close:
+        for p, _ in close:
             if p.price(cost) >= least:
                 break  # rare handles are counted for the few palettes that may be the best
-            price = p.price(cost) + rare_cost(p.polytope, frames)
-            if price < least:
-                least, chosen = price, (at, p.polytope)
+            least = min(least, p.price(cost) + rare_cost(p.polytope, frames))
         bound = (1 + share) * least
-    return chosen
+
+    def reported(found: tuple[Priced, int | None]) -> float:
+        p = found[0]
+        value = losses_of(p.polytope, frames, options).L_prime
+        return value + cost * p.handles + rare_cost(p.polytope, frames)
+
+    chosen, at = min((f for f in close if f[0].price(cost) <= bound), key=reported)
+    return at, chosen.polytope
 
 
 def rare_cost(polytope: SkewPolytope, frames: Sequence[FrameStatistics]) -> float:
@@ -224,8 +232,8 @@ def hopeless(
 
     They are when prices have risen far since the best one `found` on this walk, or when the value
     alone, which rises as vertices go, is too much beside what is `known`: at the usual cost of a
-    handle and, for other options, at theirs too and at `DEARER` times their cost. So other options
-    look no less far, and a walk gets over a few bad palettes.
+    handle and, for other options, at theirs too, so that these look no less far. A dearer handle
+    counts `DEARER` times, so that a walk gets over a few bad palettes.
     """
     fewest = min(2 * min(len(block.tracks) for block in one.polytope.blocks), one.handles)
 
@@ -237,7 +245,7 @@ def hopeless(
         return risen or one.value + cost * fewest > least(known)
 
     cost = options.handle_cost
-    dear = USUAL_COST if cost == USUAL_COST else DEARER * cost
+    dear = DEARER * cost if cost > USUAL_COST else cost
     return at(USUAL_COST, USUAL) and at(cost, options) and at(dear, USUAL)
 
 

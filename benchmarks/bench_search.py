@@ -1,9 +1,9 @@
 """Does the default find what other settings of the same command find?
 
 Analyses clips with the defaults and with eleven other settings, and prints two tables: the
-objective (L' + 0.0025 a handle, 0.005 for a rare one) of the default and of the best setting with
-handles, blocks and user CPU, and where more of what is allowed gave less: more blocks or handles
-or a cheaper handle with a worse objective, a dearer handle with more handles.
+objective (L', the terms for shape, 0.0025 a handle, 0.005 for a rare one) of the default and of the
+best setting with handles, blocks and user CPU, and where more of what is allowed gave less: more
+blocks or handles or a cheaper handle with a worse objective, a dearer handle with more handles.
 
     python benchmarks/bench_search.py [CLIP[:A-B] ...] [--drawn NAME ...] [--stills PICTURE ...]
                                       [--default-only] [--noise] [--json FILE]
