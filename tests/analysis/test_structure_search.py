@@ -95,6 +95,16 @@ def test_a_rare_colour_goes_if_it_does_not_pay_for_being_rare():
         assert len(best.blocks[0].tracks) == colours
 
 
+def test_palettes_that_seem_nearly_equal_are_compared_on_all_frames():
+    palettes, frames = bend(9, 0.5, 4)
+    straight = DensePolytope((0, 8), [[palettes[0], palettes[8]]], []).polytope()
+    track = straight.blocks[0].tracks[1]
+    bent = straight.with_stop((track[0], track[1]), (*palettes[4].rgb[1].tolist(), 4.0))
+    seems = [(Priced(straight, 0.1), 0), (Priced(bent, 0.1), 0)]
+    _, best = best_of(seems, frames, GAMUT, AnalysisOptions())
+    assert len(best.vertices) == len(bent.vertices)
+
+
 def test_the_choice_weighs_vertices_against_the_loss():
     def step(count, value):
         return Priced(SkewPolytope(np.zeros((count, 4)), (), ()), value)
