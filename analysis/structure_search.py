@@ -6,9 +6,10 @@ eq. 12 with the terms for shape, plus `handle_cost` a vertex, plus `RARE_COST` a
 
 From each start a walk goes down from rich to poor. Each step takes away the vertex whose loss costs
 least, and all others move jointly to take over. Then the walk goes back to its best palette, takes
-a whole colour away (`moves`), and goes down again, until no poorer palette can be the best. The
-walks do not depend on `handle_cost`, `vertices` and `blocks`, which only choose among the palettes
-found. So a dearer handle never means more handles, and more of what is allowed nothing worse.
+a whole colour away (`moves`), and goes down again, until no poorer palette can be the best.
+`handle_cost`, `vertices` and `blocks` choose among the palettes found. A dearer handle and fewer
+vertices also lengthen the walks. So a dearer handle hardly ever means more handles, and more of
+what is allowed hardly ever anything worse (docs/lab/search.md).
 
 The paper's rule, a multiple of the loss before removal (section 5.4.2), does not measure the use of
 a vertex.
