@@ -34,7 +34,7 @@ from palette4d.analysis.polytope import SkewPolytope
 F64 = NDArray[np.float64]
 
 # Evaluations of joint moves: at the start of a walk, and after each step.
-FIRST_EVALUATIONS, EVALUATIONS = 30, 20
+FIRST_EVALUATIONS, EVALUATIONS = 50, 20
 STEP = 0.01
 # The palettes of a walk are compared at this cost, whatever `handle_cost` is.
 USUAL = AnalysisOptions()

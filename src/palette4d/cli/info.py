@@ -199,8 +199,8 @@ def _print_tracks(info: dict[str, Any]) -> None:
         "\nColours: of the largest edit, else the most colourful one. More: `info SIDECAR "
         "--handles`.\n"
         f"`edit SIDECAR track {first} …` changes a track.\n"
-        f"`render SIDECAR CLIP -o key.####.png --output weight:{first}` "
-        "shows a track's share of the picture."
+        f"`render SIDECAR CLIP -o key/#.png --output weight:{first}` shows what a track is for"
+        + ("; share: its mean." if known else ".")
     )
 
 
