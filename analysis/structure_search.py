@@ -6,10 +6,9 @@ eq. 12 with the terms for shape, plus `handle_cost` a vertex, plus `RARE_COST` a
 
 From each start a walk goes down from rich to poor. Each step takes away the vertex whose loss costs
 least, and all others move jointly to take over. Then the walk goes back to its best palette, takes
-a whole colour away (`moves`), and goes down again, until no poorer palette can be the best.
-`handle_cost`, `vertices` and `blocks` choose among the palettes found. A dearer handle and fewer
-vertices also lengthen the walks. So a dearer handle hardly ever means more handles, and more of
-what is allowed hardly ever anything worse (docs/lab/search.md).
+a whole colour away (`moves`), and goes down again, until no poorer palette can be the best. The
+walks do not depend on `handle_cost`, `vertices` and `blocks`, which only choose among the palettes
+found. So a dearer handle never means more handles, and more of what is allowed nothing worse.
 
 The paper's rule, a multiple of the loss before removal (section 5.4.2), does not measure the use of
 a vertex.
@@ -27,27 +26,24 @@ from palette4d.analysis import moves
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
 from palette4d.analysis.handle_use import rare_handles
 from palette4d.analysis.losses import loss_weights, shaped_weights, smoothness
-from palette4d.analysis.objective import frame_losses, losses_of, refine_jointly
+from palette4d.analysis.objective import frame_losses, refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import SkewPolytope
 
 F64 = NDArray[np.float64]
 
-# Evaluations of joint moves: at the start of a walk, and after each step.
-FIRST_EVALUATIONS, EVALUATIONS = 50, 20
+# Evaluations of joint moves: at the start of a walk, after each step, before palettes are compared.
+FIRST_EVALUATIONS, EVALUATIONS, COMPARE_EVALUATIONS = 50, 20, 40
 STEP = 0.01
 # The palettes of a walk are compared at this cost, whatever `handle_cost` is.
 USUAL = AnalysisOptions()
 USUAL_COST = USUAL.handle_cost
-# Prices this share above the least are hopeless: walks end, and no more blocks are tried.
+# A walk ends at a price this share above the least so far.
 PATIENCE = 0.08
-# With a `handle_cost` above the usual one walks end only at so many times that cost.
-DEARER = 4
-# At the end palettes are refined in rounds on all frames: the evaluations of a round, and how far
-# above the least price a palette may be that goes on.
-ROUNDS = ((5, 0.02), (20, 0.01))
 # A rare handle costs so much more, whatever `handle_cost` is.
 RARE_COST = USUAL_COST
+# Palettes whose price is this share above the least are refined before they are compared.
+CLOSE = 0.05
 # Of the colours that may go, those that cost least at once are tried.
 COLOURS_TRIED = 2
 # The search looks at these evenly spaced frames, and those with the largest losses.
@@ -81,8 +77,8 @@ def search(
 ) -> tuple[int | None, SkewPolytope]:
     """Return which start the best polytope comes from (None: the static hull), and the polytope.
 
-    The starts come in the order of their blocks. Those with more blocks than one that is far worse
-    than the best are not searched.
+    The starts come in the order of their blocks. A start with more blocks than one that did not
+    pay is not searched.
     """
     usual = few if len(few) <= EVEN_FRAMES else key_frames(static, few, options, EVEN_FRAMES)
     some = usual
@@ -96,13 +92,13 @@ def search(
         known = [one for one, _ in found]
         steps = walk(start, some, gamut, options, known)
         best = min(steps, key=_usual_price)
-        if _usual_price(best) < (1 + PATIENCE) * min(map(_usual_price, known)):
+        if _usual_price(best) < (1 + CLOSE) * min(map(_usual_price, known)):
             steps += walk(moves.enriched(best.polytope), some, gamut, options, [*known, *steps])
         found += [(one, at) for one in steps]
         price = min(map(_usual_price, steps))
-        if price > (1 + PATIENCE) * least:
+        if price > least:
             break
-        least = min(least, price)
+        least = price
     return best_of(found, frames, gamut, options)
 
 
@@ -116,36 +112,31 @@ def best_of(
     gamut: Gamut,
     options: AnalysisOptions,
 ) -> tuple[int | None, SkewPolytope]:
-    """Return the best of all that was found, measured on all frames, and its start.
-
-    Of those whose prices are nearly equal at last it is the one with the least L' and handles.
-    """
+    """Return the best of all that was found, measured on all frames, and its start."""
     everything = [one for one, _ in found]
     cost = options.handle_cost
     best = choose(everything, options)
-    bound = (1 + PATIENCE) * (best.price(cost) + rare_cost(best.polytope, frames))
-    close = [(p, at) for p, at in found if allowed(p, everything, options)]
-    for evaluations, share in ROUNDS:
-        close = [
-            (Priced(*refine_jointly(p.polytope, frames, gamut, options, evaluations, True)), at)
-            for p, at in close
-            if p.price(cost) <= bound
-        ]
-        close.sort(key=lambda found: found[0].price(cost))
-        least = math.inf
-        for p, _ in close:
-            if p.price(cost) >= least:
-                break  # rare handles are counted for the few palettes that may be the best
-            least = min(least, p.price(cost) + rare_cost(p.polytope, frames))
-        bound = (1 + share) * least
-
-    def reported(found: tuple[Priced, int | None]) -> float:
-        p = found[0]
-        value = losses_of(p.polytope, frames, options).L_prime
-        return value + cost * p.handles + rare_cost(p.polytope, frames)
-
-    chosen, at = min((f for f in close if f[0].price(cost) <= bound), key=reported)
-    return at, chosen.polytope
+    bound = (1 + CLOSE) * (best.price(cost) + rare_cost(best.polytope, frames))
+    close: dict[tuple[int | None, tuple[int, ...]], Priced] = {}
+    for one, at in found:
+        if one.price(cost) <= bound and allowed(one, everything, options):
+            topology = at, tuple(len(block.tracks) for block in one.polytope.blocks)
+            other = close.setdefault(topology, one)
+            if one.price(cost) < other.price(cost):
+                close[topology] = one
+    refined = [
+        (Priced(*refine_jointly(p.polytope, frames, gamut, options, COMPARE_EVALUATIONS, True)), at)
+        for (at, _), p in close.items()
+    ]
+    refined.sort(key=lambda found: found[0].price(cost))
+    least = math.inf
+    for one, at in refined:
+        if one.price(cost) >= least:
+            break  # rare handles are counted for the few palettes that may be the best
+        price = one.price(cost) + rare_cost(one.polytope, frames)
+        if price < least:
+            least, chosen = price, (at, one.polytope)
+    return chosen
 
 
 def rare_cost(polytope: SkewPolytope, frames: Sequence[FrameStatistics]) -> float:
@@ -231,10 +222,9 @@ def hopeless(
 ) -> bool:
     """Return whether palettes with fewer vertices are unlikely to be the best.
 
-    They are when prices have risen far since the best one `found` on this walk, or when the value
-    alone, which rises as vertices go, is too much beside what is `known`: at the usual cost of a
-    handle and, for other options, at theirs too, so that these look no less far. A dearer handle
-    counts `DEARER` times, so that a walk gets over a few bad palettes.
+    They are not when prices have risen far since the best one `found` on this walk, or when the
+    value alone, which rises as vertices go, is too much beside what is `known`: at the usual cost
+    of a handle and, for other options, at theirs too, so that these look no less far.
     """
     fewest = min(2 * min(len(block.tracks) for block in one.polytope.blocks), one.handles)
 
@@ -245,9 +235,7 @@ def hopeless(
         risen = one.price(cost) > (1 + PATIENCE) * least(found)
         return risen or one.value + cost * fewest > least(known)
 
-    cost = options.handle_cost
-    dear = DEARER * cost if cost > USUAL_COST else cost
-    return at(USUAL_COST, USUAL) and at(cost, options) and at(dear, USUAL)
+    return at(USUAL_COST, USUAL) and at(options.handle_cost, options)
 
 
 def allowed(one: Priced, found: Sequence[Priced], options: AnalysisOptions) -> bool:
