@@ -343,6 +343,25 @@ def test_nobody_waits_for_a_lock_on_a_new_file(old: Path, monkeypatch: pytest.Mo
     assert names(old.parent) == [old.name]
 
 
+def test_a_new_folder_that_another_process_removes_is_made_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Until it is locked, it may be taken for a leftover."""
+    real, removed = os.open, []
+
+    def opened(path: Path, *flags: int, **where: int | None) -> int:
+        if Path(path).parent == tmp_path and not removed:
+            removed.append(path)
+            Path(path).rmdir()
+        return real(path, *flags, **where)
+
+    monkeypatch.setattr(os, "open", opened)
+    with files.temporary_folder(tmp_path) as folder:
+        assert folder.is_dir()
+    assert removed
+    assert names(tmp_path) == []
+
+
 def test_without_locks_only_old_files_are_leftovers(
     old: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -172,7 +172,10 @@ def temporary_folder(parent: Path) -> Generator[Path]:
     while True:
         folder = _temporary_name(parent / "palette4d")
         folder.mkdir(0o700)
-        lock = None if sys.platform == "win32" else os.open(folder, os.O_RDONLY)
+        try:
+            lock = None if sys.platform == "win32" else os.open(folder, os.O_RDONLY)
+        except FileNotFoundError:  # Another process, which removes what is left over, was faster.
+            continue
         if lock is None or _is_locked(lock):
             break
         os.close(lock)
