@@ -314,9 +314,10 @@ def _skew(run: _Run) -> SkewPolytope:
     options = run.options
     hulls = [_static(run), *static_hull.plain_hulls(run.starts, run.frames, run.gamut, options)]
     convex = [h for h in hulls if h is hulls[0] or not _is_concave(h, run)]
-    simple = min(convex, key=lambda hull: _price(hull, run))
+    simple = min(convex, key=lambda hull: _price(hull, run, options.handle_cost))
     run.bound = run.losses(simple).L_prime
-    polytope = _searched(run, options, simple)
+    usual = min(convex, key=lambda hull: _price(hull, run, structure_search.USUAL_COST))
+    polytope = _searched(run, options, usual, simple)
     run.record("vertex_refinement", polytope)
     run.report("vertex_refinement", 1, 1)
     if 0 < options.vertices < len(polytope.vertices):
@@ -327,20 +328,24 @@ def _skew(run: _Run) -> SkewPolytope:
     return polytope
 
 
-def _price(polytope: SkewPolytope, run: _Run, free: int = 0) -> float:
+def _price(polytope: SkewPolytope, run: _Run, cost: float, free: int = 0) -> float:
     """Return L' and the cost of the handles but for those that are `free`."""
-    handles = len(polytope.vertices) - free
-    return run.losses(polytope).L_prime + run.options.handle_cost * handles
+    return run.losses(polytope).L_prime + cost * (len(polytope.vertices) - free)
 
 
 def _is_concave(polytope: SkewPolytope, run: _Run) -> bool:
     return deepest_concavity(polytope, run.frames) > CONCAVE
 
 
-def _searched(run: _Run, options: AnalysisOptions, simple: SkewPolytope) -> SkewPolytope:
-    """Run the stages from frame hulls to refinement; the result is never dearer than `simple`."""
+def _searched(
+    run: _Run, options: AnalysisOptions, static: SkewPolytope, simple: SkewPolytope
+) -> SkewPolytope:
+    """Run the stages from frame hulls to refinement; the result is never dearer than `simple`.
+
+    The search starts from `static`, which does not depend on `handle_cost`.
+    """
     frames, gamut = run.frames, run.gamut
-    few = structure_search.key_frames(simple, frames, options, structure_search.KEY_FRAMES)
+    few = structure_search.key_frames(static, frames, options, structure_search.KEY_FRAMES)
     blocks, first = _consistent_blocks(run, few)
     sequence = block_merging.merge_sequence(blocks, few, gamut, options)
     configurations = [merged for _, merged in run.counted("block_merging", sequence, len(blocks))]
@@ -357,17 +362,17 @@ def _searched(run: _Run, options: AnalysisOptions, simple: SkewPolytope) -> Skew
             yield starts[-1]
 
     begun = run.counted("vertex_removal", next_starts(), len(few_blocks))
-    at, found = structure_search.search(begun, simple, few, frames, gamut, options)
+    at, found = structure_search.search(begun, static, few, frames, gamut, options)
     with_stops = stop_insertion.insert_stops(found, frames, gamut, options)
     run.stages += [
         first,
-        run.result("block_merging", simple if at is None else starts[at]),
+        run.result("block_merging", static if at is None else starts[at]),
         run.result("vertex_removal", with_stops[-1].polytope),
     ]
     if at is not None and len(found.blocks) > 1:
         run.notes += notes[at]
     fits = not options.vertices or len(simple.vertices) <= options.vertices
-    bound = run.losses(simple).L_prime
+    bound, cost = run.losses(simple).L_prime, options.handle_cost
 
     def tries() -> Iterator[list[stop_insertion.WithStops]]:
         yield with_stops
@@ -376,7 +381,7 @@ def _searched(run: _Run, options: AnalysisOptions, simple: SkewPolytope) -> Skew
 
     for tried in tries():
         for polytope, free in _with_useful_stops(run, tried):
-            if not fits or _price(polytope, run, free) <= _price(simple, run):
+            if not fits or _price(polytope, run, cost, free) <= _price(simple, run, cost):
                 return polytope
     return tried[0].polytope
 
@@ -391,7 +396,8 @@ def _with_useful_stops(
     """
 
     def priced(one: SkewPolytope) -> float:
-        return _price(one, run) + structure_search.rare_cost(one, run.frames)
+        rare = structure_search.rare_cost(one, run.frames)
+        return _price(one, run, run.options.handle_cost) + rare
 
     refined = [
         vertex_refinement.refine(one.polytope, run.frames, run.gamut, run.options, one.brief)

@@ -234,7 +234,7 @@ def _with_stops(
             changed = dataclasses.replace(changed, vertices=vertices)
             added.append(end)
             continue
-        inside = max(block.first, times[0]) < stop[3] < min(block.last, times[-1])
+        inside = block.first <= stop[3] <= block.last and times[0] < stop[3] < times[-1]
         if not inside or np.abs(times - stop[3]).min() < 2 * LEAST_GAP:
             if i < peaks:
                 return polytope, []

@@ -6,9 +6,10 @@ eq. 12 with the terms for shape, plus `handle_cost` a vertex, plus `RARE_COST` a
 
 From each start a walk goes down from rich to poor. Each step takes away the vertex whose loss costs
 least, and all others move jointly to take over. Then the walk goes back to its best palette, takes
-a whole colour away (`moves`), and goes down again, until no poorer palette can be the best. The
-walks do not depend on `handle_cost`, `vertices` and `blocks`, which only choose among the palettes
-found. So a dearer handle never means more handles, and more of what is allowed nothing worse.
+a whole colour away (`moves`), and goes down again, until no poorer palette can be the best.
+`handle_cost`, `vertices` and `blocks` choose among the palettes found. A dearer handle and fewer
+vertices also lengthen the walks. So a dearer handle hardly ever means more handles, and more of
+what is allowed hardly ever anything worse (docs/lab/search.md).
 
 The paper's rule, a multiple of the loss before removal (section 5.4.2), does not measure the use of
 a vertex.
@@ -32,18 +33,23 @@ from palette4d.analysis.polytope import SkewPolytope
 
 F64 = NDArray[np.float64]
 
-# Evaluations of joint moves: at the start of a walk, after each step, before palettes are compared.
-FIRST_EVALUATIONS, EVALUATIONS, COMPARE_EVALUATIONS = 50, 20, 40
+# Evaluations of joint moves: at the start of a walk, and after each step.
+FIRST_EVALUATIONS, EVALUATIONS = 30, 20
 STEP = 0.01
 # The palettes of a walk are compared at this cost, whatever `handle_cost` is.
 USUAL = AnalysisOptions()
 USUAL_COST = USUAL.handle_cost
-# A walk ends at a price this share above the least so far.
+# Prices this share above the least are hopeless: walks end, and no more blocks are tried.
 PATIENCE = 0.08
+# With a `handle_cost` above the usual one walks end only at so many times that cost.
+DEARER = 4
+# At the end palettes are refined in rounds on all frames: the evaluations of a round, and how far
+# above the least price a palette may be to take part.
+ROUNDS = ((5, PATIENCE), (20, 0.02))
+# Stops are put into the best palette again if the last ones lowered its price by this share.
+WORTHWHILE = 0.01
 # A rare handle costs so much more, whatever `handle_cost` is.
 RARE_COST = USUAL_COST
-# Palettes whose price is this share above the least are refined before they are compared.
-CLOSE = 0.05
 # Of the colours that may go, those that cost least at once are tried.
 COLOURS_TRIED = 2
 # The search looks at these evenly spaced frames, and those with the largest losses.
@@ -77,8 +83,8 @@ def search(
 ) -> tuple[int | None, SkewPolytope]:
     """Return which start the best polytope comes from (None: the static hull), and the polytope.
 
-    The starts come in the order of their blocks. A start with more blocks than one that did not
-    pay is not searched.
+    The starts come in the order of their blocks. Those with more blocks than one that is far worse
+    than the best are not searched.
     """
     usual = few if len(few) <= EVEN_FRAMES else key_frames(static, few, options, EVEN_FRAMES)
     some = usual
@@ -92,13 +98,19 @@ def search(
         known = [one for one, _ in found]
         steps = walk(start, some, gamut, options, known)
         best = min(steps, key=_usual_price)
-        if _usual_price(best) < (1 + CLOSE) * min(map(_usual_price, known)):
-            steps += walk(moves.enriched(best.polytope), some, gamut, options, [*known, *steps])
+        while _usual_price(best) < (1 + PATIENCE) * min(map(_usual_price, known)):
+            rich = moves.enriched(best.polytope)
+            again = Priced(*refine_jointly(rich, some, gamut, options, FIRST_EVALUATIONS, True))
+            more = remove_singly(again, some, gamut, options, [*known, *steps])
+            steps += more
+            before, best = best, min(more, key=_usual_price)
+            if _usual_price(best) > (1 - WORTHWHILE) * _usual_price(before):
+                break
         found += [(one, at) for one in steps]
         price = min(map(_usual_price, steps))
-        if price > least:
+        if price > (1 + PATIENCE) * least:
             break
-        least = price
+        least = min(least, price)
     return best_of(found, frames, gamut, options)
 
 
@@ -116,26 +128,23 @@ def best_of(
     everything = [one for one, _ in found]
     cost = options.handle_cost
     best = choose(everything, options)
-    bound = (1 + CLOSE) * (best.price(cost) + rare_cost(best.polytope, frames))
-    close: dict[tuple[int | None, tuple[int, ...]], Priced] = {}
-    for one, at in found:
-        if one.price(cost) <= bound and allowed(one, everything, options):
-            topology = at, tuple(len(block.tracks) for block in one.polytope.blocks)
-            other = close.setdefault(topology, one)
-            if one.price(cost) < other.price(cost):
-                close[topology] = one
-    refined = [
-        (Priced(*refine_jointly(p.polytope, frames, gamut, options, COMPARE_EVALUATIONS, True)), at)
-        for (at, _), p in close.items()
-    ]
-    refined.sort(key=lambda found: found[0].price(cost))
-    least = math.inf
-    for one, at in refined:
-        if one.price(cost) >= least:
-            break  # rare handles are counted for the few palettes that may be the best
-        price = one.price(cost) + rare_cost(one.polytope, frames)
-        if price < least:
-            least, chosen = price, (at, one.polytope)
+    least = best.price(cost) + rare_cost(best.polytope, frames)
+    close = [(p, at) for p, at in found if allowed(p, everything, options)]
+    for evaluations, share in ROUNDS:
+        bound = (1 + share) * least
+        close = [
+            (Priced(*refine_jointly(p.polytope, frames, gamut, options, evaluations, True)), at)
+            for p, at in close
+            if p.price(cost) <= bound
+        ]
+        close.sort(key=lambda found: found[0].price(cost))
+        least = math.inf
+        for p, at in close:
+            if p.price(cost) >= least:
+                break  # rare handles are counted for the few palettes that may be the best
+            price = p.price(cost) + rare_cost(p.polytope, frames)
+            if price < least:
+                least, chosen = price, (at, p.polytope)
     return chosen
 
 
@@ -222,9 +231,10 @@ def hopeless(
 ) -> bool:
     """Return whether palettes with fewer vertices are unlikely to be the best.
 
-    They are not when prices have risen far since the best one `found` on this walk, or when the
-    value alone, which rises as vertices go, is too much beside what is `known`: at the usual cost
-    of a handle and, for other options, at theirs too, so that these look no less far.
+    They are when prices have risen far since the best one `found` on this walk, or when the value
+    alone, which rises as vertices go, is too much beside what is `known`: at the usual cost of a
+    handle and, for other options, at theirs too, so that these look no less far. A dearer handle
+    counts `DEARER` times, so that a walk gets over a few bad palettes.
     """
     fewest = min(2 * min(len(block.tracks) for block in one.polytope.blocks), one.handles)
 
@@ -235,7 +245,9 @@ def hopeless(
         risen = one.price(cost) > (1 + PATIENCE) * least(found)
         return risen or one.value + cost * fewest > least(known)
 
-    return at(USUAL_COST, USUAL) and at(options.handle_cost, options)
+    cost = options.handle_cost
+    dear = DEARER * cost if cost > USUAL_COST else cost
+    return at(USUAL_COST, USUAL) and at(cost, options) and at(dear, USUAL)
 
 
 def allowed(one: Priced, found: Sequence[Priced], options: AnalysisOptions) -> bool:

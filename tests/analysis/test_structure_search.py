@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import itertools
 
@@ -79,18 +80,29 @@ def test_a_rare_colour_goes_if_it_does_not_pay_for_being_rare():
         picture.reshape(-1, 3)[-3:] = 0.9
     frames = stats(pictures)
     found = []
+    paper = AnalysisOptions(convexity=0, separation=0, reach=0)  # prices are L' and handles alone
     for colours in (np.vstack([FOUR, np.full(3, 0.9)]), FOUR):
         hull = hull_mesh(colours)
         polytope = DensePolytope((0, 3), [[FramePalette(hull.rgb, hull.faces)] * 2], []).polytope()
-        one = refine_jointly(polytope, frames, GAMUT, AnalysisOptions(), 200, coarse=True)
-        found.append((Priced(*one), 0))
+        found.append((Priced(*refine_jointly(polytope, frames, GAMUT, paper, 200, coarse=True)), 0))
     (rich, _), (poor, _) = found
     assert rare_handles(rich.polytope, frames) == 2
     assert rare_handles(poor.polytope, frames) == 0
     for gain, colours in ((1.0, 4), (3.0, 5)):  # of the rare colour, in rare handles' extra costs
-        options = AnalysisOptions(handle_cost=(poor.value - rich.value - gain * RARE_COST) / 2)
+        cost = (poor.value - rich.value - gain * RARE_COST) / 2
+        options = dataclasses.replace(paper, handle_cost=cost)
         _, best = best_of(found, frames, GAMUT, options)
         assert len(best.blocks[0].tracks) == colours
+
+
+def test_palettes_that_seem_nearly_equal_are_compared_on_all_frames():
+    palettes, frames = bend(9, 0.5, 4)
+    straight = DensePolytope((0, 8), [[palettes[0], palettes[8]]], []).polytope()
+    track = straight.blocks[0].tracks[1]
+    bent = straight.with_stop((track[0], track[1]), (*palettes[4].rgb[1].tolist(), 4.0))
+    seems = [(Priced(straight, 0.1), 0), (Priced(bent, 0.1), 0)]
+    _, best = best_of(seems, frames, GAMUT, AnalysisOptions())
+    assert len(best.vertices) == len(bent.vertices)
 
 
 def test_the_choice_weighs_vertices_against_the_loss():
