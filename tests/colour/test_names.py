@@ -54,6 +54,7 @@ NAMES = {
     "#654321": "dark brown",
     "#b57edc": "purple",  # lavender
     "#dc143c": "red",  # crimson
+    "#80473e": "brown",
 }
 
 

@@ -28,8 +28,8 @@ HUES = (
     (354, "pink", 0.62, 0, "magenta"),
     (360, "pink", 0.61, 0, "red"),
 )
-#: Colours of these hues are beige from a lightness on and up to a chroma.
-BEIGE_HUES, BEIGE_LIGHT, BEIGE = (45, 112), 0.63, 0.1
+#: Hues from and to, lightnesses from and to, and the chroma up to which a colour has this name.
+MUTED = ((45, 112, 0.63, 9, 0.1, "beige"), (12, 38, 0.42, 0.63, 0.105, "brown"))
 #: Each grey ends at this lightness.
 GREYS = (
     (0.25, "black"),
@@ -48,8 +48,9 @@ DARK, LIGHT, STRONG, VIVID = 0.42, 0.78, 0.11, 0.13
 
 
 def _hue(lightness: float, chroma: float, hue: float) -> str:
-    if BEIGE_HUES[0] <= hue < BEIGE_HUES[1] and lightness > BEIGE_LIGHT and chroma < BEIGE:
-        return "beige"
+    for first, last, dark, light, most, name in MUTED:
+        if first <= hue < last and dark < lightness < light and chroma < most:
+            return name
     ends = [end for end, *_ in HUES]
     _, name, light, strong, other = HUES[bisect.bisect(ends[:-1], hue)]
     return name if lightness >= light and chroma >= strong else other
