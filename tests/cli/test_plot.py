@@ -251,7 +251,11 @@ def test_polyhedra_and_rows_have_the_ids_of_tracks(name: str) -> None:
     for track in tracks:  # in its row, and where it is beside its disc
         assert any(track in text.split() for text in texts)
     assert sum("25 %" in text for text in texts) == len(tracks)
-    assert "most at 4: 50 %" in texts
+    assert sum("most at 4: 50 %" in text for text in texts) == len(tracks)
+    renderer = FigureCanvasAgg(figure).get_renderer()
+    for text in figure.axes[0].texts:
+        box = text.get_window_extent(renderer)
+        assert figure.bbox.x0 <= box.x0 <= box.x1 <= figure.bbox.x1, text.get_text()
     for id_ in columns[0].ids:
         assert texts.count(id_) >= 2
 

@@ -249,24 +249,25 @@ def _draw_tracks(
         """Write at the left (-1) or right (1) of the rows, if the text fits."""
         x = disc.x + way * (disc.radius + 6)
         end = x + way * text_width(text, size + 1)
-        if disc.home not in (layout.scale.left, layout.scale.right) or not (
-            panel.left <= end <= panel.right
-        ):
+        border = layout.scale.left if way < 0 else layout.scale.right
+        if disc.home != border or not panel.left <= end <= panel.right:
             return False
         how = {"fontsize": size + 1, "color": style.BRIGHT, "fontweight": "bold"}
         align = {"ha": "left" if way > 0 else "right", "va": "center_baseline", "zorder": 20}
         axes.text(x, float(panel.y(disc.y)), text, **how, **align)
         return True
 
-    def below(x: float, y: float, way: int, text: str, colour: str) -> None:
+    def below(x: float, y: float, way: int, text: str, colour: str) -> bool:
         """Write below a band at the left (-1) or right (1) of x, if the text fits."""
         width = text_width(text, size)
         box = _box(x + way * width / 2, y + BAND * layout.row_height + 0.8 * size, width, size)
-        if box[3] <= layout.height and not any(meet(box, other) for other in taken):
-            taken.append(box)
-            how = {"ha": "left" if way > 0 else "right", "va": "center_baseline", "zorder": 19}
-            y = float(panel.y((box[1] + box[3]) / 2))
-            axes.text(x, y, text, fontsize=size, color=colour, **how)
+        if box[3] > layout.height or any(meet(box, other) for other in taken):
+            return False
+        taken.append(box)
+        how = {"ha": "left" if way > 0 else "right", "va": "center_baseline", "zorder": 19}
+        y = float(panel.y((box[1] + box[3]) / 2))
+        axes.text(x, y, text, fontsize=size, color=colour, **how)
+        return True
 
     for chain in layout.rows.chains:
         members = [palette.ids[vertex] for vertex in chain.vertices]
@@ -287,7 +288,9 @@ def _draw_tracks(
         named = beside(first, -1, name)
         if said or not named:
             words = "  ".join([*([] if named else [name]), *said])
-            below(first.x + first.radius + 6, first.y, 1, words, style.TEXT)
+            for text in dict.fromkeys((f"{words}  {most}" if said else words, words)):
+                if below(first.x + first.radius + 6, first.y, 1, text, style.TEXT):
+                    break
 
 
 def _box(x: float, y: float, width: float, height: float) -> Box:
