@@ -95,7 +95,7 @@ def test_a_highlight_gets_a_stop(lit):
         assert moved < 0.3
 
 
-@pytest.mark.parametrize("lit", [(9, 10, 11), (3, 16), (7, 8)])
+@pytest.mark.parametrize("lit", [(9, 10, 11), (3, 16), (7, 8), (8,), (15,)])
 def test_a_stop_is_on_all_tracks_that_run_along_its_edge(lit):
     """Edges go on across blocks: what is read back is what was made."""
     frames = clip(lit)
