@@ -218,6 +218,8 @@ def _print_head(info: dict[str, Any]) -> None:
     print(f"frames    {first} to {last}{step}{skipped}, {numerator / denominator:g} per second")
     found_in = f", palette in {info['encoding']}" if info["input_space"] else ""
     colours = info["input_space"] or info["encoding"]
+    if colours == "unknown":
+        colours = "encoding unknown, shown as sRGB"
     print(f"picture   {info['size'][0]} x {info['size'][1]}, {colours}{found_in}")
     print(
         f"palette   {counted(len(info['tracks']), 'colour')} through time, "
