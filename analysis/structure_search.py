@@ -46,6 +46,8 @@ DEARER = 4
 # At the end palettes are refined in rounds on all frames: the evaluations of a round, and how far
 # above the least price a palette may be to take part.
 ROUNDS = ((5, PATIENCE), (20, 0.02))
+# Prices that differ by this share count as the same: the last refinement changes them by as much.
+ALIKE = 0.005
 # Stops are put into the best palette again if the last ones lowered its price by this share.
 WORTHWHILE = 0.01
 # A rare handle costs so much more, whatever `handle_cost` is.
@@ -124,7 +126,10 @@ def best_of(
     gamut: Gamut,
     options: AnalysisOptions,
 ) -> tuple[int | None, SkewPolytope]:
-    """Return the best of all that was found, measured on all frames, and its start."""
+    """Return the best of all that was found, measured on all frames, and its start.
+
+    Of palettes of nearly the same price it is the one whose terms for shape are least.
+    """
     everything = [one for one, _ in found]
     cost = options.handle_cost
     best = choose(everything, options)
@@ -139,13 +144,22 @@ def best_of(
         ]
         close.sort(key=lambda found: found[0].price(cost))
         least = math.inf
-        for p, at in close:
+        for p, _ in close:
             if p.price(cost) >= least:
                 break  # rare handles are counted for the few palettes that may be the best
-            price = p.price(cost) + rare_cost(p.polytope, frames)
-            if price < least:
-                least, chosen = price, (at, p.polytope)
-    return chosen
+            least = min(least, p.price(cost) + rare_cost(p.polytope, frames))
+    bound = (1 + ALIKE) * least
+    alike = [f for f in close if f[0].price(cost) <= bound]
+    alike = [f for f in alike if f[0].price(cost) + rare_cost(f[0].polytope, frames) <= bound]
+
+    def shape(found: tuple[Priced, int | None]) -> float:
+        weights = shaped_weights(options, gamut.scale)
+        everywhere = range(len(frames))
+        rows = frame_losses(found[0].polytope, frames, everywhere, weights, options, coarse=True)
+        return float(rows[:, 2].mean())
+
+    chosen, at = min(alike, key=shape)
+    return at, chosen.polytope
 
 
 def rare_cost(polytope: SkewPolytope, frames: Sequence[FrameStatistics]) -> float:
