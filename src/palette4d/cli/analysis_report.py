@@ -61,7 +61,8 @@ def _palette(x: Mapping[str, Any]) -> dict[str, str]:
         if loss >= 0.0005
         else "every frame's L is below 0.001",
         "handles": handles,
-        "use": f"least used {x['least_used']}, up to {x['least_use']:.1%} of the picture",
+        "use": f"least used handle {x['least_used']}: by itself at most {x['least_use']:.1%} of a "
+        "frame; a track adds up its handles",
         "shape": f"{concave}{x['deepest_concavity_frame']}"
         if concavity >= 0.0005
         else "convex in every frame",

@@ -200,7 +200,7 @@ def _print_tracks(info: dict[str, Any]) -> None:
         "--handles`.\n"
         f"`edit SIDECAR track {first} …` changes a track.\n"
         f"`render SIDECAR CLIP -o key/#.png --output weight:{first}` shows what a track is for"
-        + ("; its share is the mean." if known else ".")
+        + ("; its share is the mean of its frames." if known else ".")
     )
 
 

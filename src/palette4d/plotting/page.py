@@ -231,7 +231,8 @@ def _draw_notes(
     """Say at the bottom of the page what its parts are."""
     rows = "A row: one palette colour through time; a scene's change may take it to another thing."
     if shares:
-        rows += " Percentages: how much of the picture it moves, on average and at most."
+        rows += " Percentages: how much of the picture all its handles move, on average over its"
+        rows += " frames and at most."
     if _blocks(palette) > 1:
         rows += " Block: frames in which no colour splits or merges."
     notes = [rows]
