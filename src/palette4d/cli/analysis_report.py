@@ -19,15 +19,16 @@ def lines(document: Document, seconds: Mapping[str, float]) -> list[str]:
     out = [f"{clip['name']}: {counted(len(frames), 'frame')}, {width}x{height}"]
     out.append(
         f"{'stage':<18} {'vertices':>8} {'blocks':>6} {'R':>8} {'C':>8} {'L':>8} {'K':>8} "
-        f"{'L_prime':>8} {'farthest':>8} {'seconds':>8}"
+        f"{'L_prime':>8} {'farthest':>8}"
     )
     for x in report["stages"]:
         out.append(
             f"{x['stage']:<18} {x['vertices']:>8} {x['blocks']:>6} {x['R']:>8.5f} {x['C']:>8.4f} "
-            f"{x['L']:>8.4f} {x['K']:>8.3f} {x['L_prime']:>8.4f} {x['max_distance']:>8.3f} "
-            f"{seconds.get(x['stage'], 0):>8.2f}"
+            f"{x['L']:>8.4f} {x['K']:>8.3f} {x['L_prime']:>8.4f} {x['max_distance']:>8.3f}"
         )
-    rows = {"outside": _outside(report), **_palette(report["palette"])}
+    columns = "R, farthest: distance of pixels outside; C: of handles to pixels; L: R and C; "
+    columns += "K: change in time; L_prime: all. Lower is better"
+    rows = {"columns": columns, "outside": _outside(report), **_palette(report["palette"])}
     rows["seconds"] = ", ".join(f"{stage} {took:.2f}" for stage, took in seconds.items())
     if report["colour_spaces"]:
         rows["colours"] = report["colour_spaces"]
