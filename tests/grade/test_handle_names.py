@@ -45,9 +45,9 @@ def test_a_track_keeps_its_number_and_the_lightest_of_one_name_comes_first() -> 
     named = dict(zip(handles.vertices, names, strict=True))
     called = [track.called for track in tracks_of(handles, named)]
     assert called == [
-        "deep blue > red, 0-20",
-        "dark red > deep blue > green, 0-20",
-        "black > green, 0-20",
+        "deep blue 2 > red, 0-20",
+        "dark red > deep blue 1 > green 1, 0-20",
+        "black > green 2, 0-20",
         "yellow > light grey, 0-20",
     ]
 
@@ -62,9 +62,17 @@ def test_a_track_is_called_by_the_colours_that_it_has() -> None:
     tracks = tracks_of(handles, dict(zip(handles.vertices, names, strict=True)))
     assert [track.called for track in tracks] == [
         "blue, 0-9",
-        "red > green > red, 0-9",
-        "yellow > lime > red, 0-9",
+        "red 1 > green 1 > red 1, 0-9",
+        "yellow > lime > red 2, 0-9",
     ]
+
+
+def test_a_fork_ends_before_the_vertex_of_another_track() -> None:
+    called = [
+        next(t.called for t in Document.load(SPLIT.with_name(name)).tracks if t.name == track)
+        for name, track in ((SPLIT.name, "v13"), ("v1_merge.p4d.json", "v5"))
+    ]
+    assert called == ["light grey, 10-20", "grey, 0-9"]
 
 
 def test_names_are_of_the_unedited_colours_and_at_whole_frames() -> None:

@@ -5,6 +5,7 @@ the chain; every other edge begins or ends another chain.
 """
 
 import itertools
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -151,7 +152,8 @@ class Track:
     called : str
         Its name for people: its colour and its frames, such as "deep red, 13-31". Where that
         changes, its first and last colour, and the most colourful of the others: "yellow > lime >
-        orange, 0-49". From blue to pale blue is no change, but to dark blue it is.
+        orange, 0-49". From blue to pale blue is no change, but to dark blue it is. The frames are
+        those at which the colour is the track's own, not at other tracks' vertices.
     at : float
         The frame of its most colourful vertex; of a fork, the middle.
     first, last : float
@@ -199,9 +201,13 @@ def tracks_of(handles: Handles, colours: Mapping[str, str]) -> list[Track]:
         colour = names[strongest]
         if len({labels[v] for v in way}) > 1:
             runs = itertools.groupby(way, key=lambda v: labels[v])
-            colour = " > ".join(plain(names[next(run)]) for _, run in runs)
+            colour = " > ".join(names[next(run)] for _, run in runs)
         at = frames[strongest] if chain.vertices else (chain.first + chain.last) / 2
-        span = "-".join(dict.fromkeys(str(round(time)) for time in (chain.first, chain.last)))
+        ends = [chain.first, chain.last]
+        if chain.vertices:  # at another track's vertex the colour is that track's
+            ends[0] = min(frames[chain.vertices[0]], math.floor(chain.first) + 1)
+            ends[1] = max(frames[chain.vertices[-1]], math.ceil(chain.last) - 1)
+        span = "-".join(dict.fromkeys(str(round(time)) for time in ends))
         called = f"{colour}, {span}"
         taken[called] = taken.get(called, 0) + 1
         if taken[called] > 1:
