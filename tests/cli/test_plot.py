@@ -260,6 +260,15 @@ def test_polyhedra_and_rows_have_the_ids_of_tracks(name: str) -> None:
         assert texts.count(id_) >= 2
 
 
+def test_pictures_and_solids_have_their_frame_numbers() -> None:
+    sidecar = _core.read_sidecar(str(GOLDEN / "v1_split.p4d.json"))
+    image = np.full((9, 16, 3), 0.4, np.float32)
+    for picture, times in ((None, 1), (image, 2)):
+        axes = page.build(sidecar, [page.column(sidecar, at, picture) for at in (3, 12.5)]).axes[0]
+        texts = [text.get_text() for text in axes.texts]
+        assert [texts.count("frame 3"), texts.count("frame 12.5")] == [times, times]
+
+
 def test_the_legend_tells_what_is_there() -> None:
     texts = []
     for name in ("v1_tetrahedron", "v1_edited"):

@@ -24,6 +24,8 @@ GUTTER = 14.0
 HEADER = 76.0
 #: Space for the lines between the timeline and the frames above and below it.
 LEADER = 30.0
+#: Space for the frame number above a polyhedron and below a picture.
+CAPTION = 18.0
 #: Space for the notes at the bottom.
 NOTE = 28.0
 #: Space between the pictures before and after the edits.
@@ -136,7 +138,7 @@ def build(
     picture_width = min(wide, 420.0, 260.0 / aspect if aspect else wide)
     picture_height = picture_width * aspect
     names = named if any(len(c.pictures) > 1 for c in columns) else ["clip"]
-    pictures = len(names) * (picture_height + GAP) - 2 + LEADER if shapes else 0.0
+    pictures = len(names) * (picture_height + GAP) - 2 + LEADER + CAPTION if shapes else 0.0
     cube = min(wide * 0.96, 300.0)
     height = HEADER + pictures + panel.height + MARGIN
     height += LEADER + 46 + cube if columns else 0.0
@@ -262,18 +264,16 @@ def _draw_leaders(
     x = float(panel.x(frame))
     dotted = {"linewidth": 0.7, "linestyle": (0, (1, 3)), "zorder": 2}
     axes.plot([x, x], [panel.floor, panel.top], color=style.GUIDE, **dotted)
-    ends = [(panel.bottom, panel.bottom - LEADER + 2)]
-    ends += [(panel.top, panel.top + LEADER - 2)] if above else []
-    for near, far in ends:
+    caption = {**style.CENTRED, "fontsize": 9, "color": style.TEXT, "zorder": 4}
+    for near, way in ((panel.bottom, -1), (panel.top, 1))[: 1 + above]:
+        far = near + way * (LEADER - 2)
         middle = (near + far) / 2
         curve = [(x, near), (x, middle), (centre, middle), (centre, far)]
         line = Line(curve, [Line.MOVETO, *[Line.CURVE4] * 3])
         how = {"fill": False, "edgecolor": style.GUIDE, "linewidth": 0.9, "zorder": 2}
         axes.add_patch(PathPatch(line, **how))
         axes.plot([x], [near], marker="o", markersize=3.4, color=style.FAINT, zorder=3)
-    caption = {**style.CENTRED, "fontsize": 9, "color": style.TEXT, "zorder": 4}
-    caption["bbox"] = {"facecolor": style.PAGE, "linewidth": 0, "pad": 1.5}
-    axes.text(centre, panel.bottom - LEADER - 9, f"frame {style.number(frame)}", **caption)
+        axes.text(centre, far + way * CAPTION / 2, f"frame {style.number(frame)}", **caption)
 
 
 def save(figure: Any, path: Path, kind: str, width: int) -> None:

@@ -114,6 +114,6 @@ def _draw_cube(axes: Any, view: View) -> list[tuple[float, float]]:
     for bit, name in ((1, "R"), (2, "G"), (4, "B")):
         away = corners[bit, :2] - corners[0, :2]
         at = corners[bit, :2] + 9 * away / max(float(np.linalg.norm(away)), 1e-9)
-        axes.text(*at, name, zorder=3, **style.CENTRED | {"fontsize": 7.5})
+        axes.text(*at, name, zorder=8, **style.CENTRED | {"fontsize": 7.5, "color": style.TEXT})
         places.append((float(at[0]), float(at[1])))
     return places

@@ -284,7 +284,7 @@ def _draw_tracks(
         first, last = of_vertex[members[0]], of_vertex[members[-1]]
         if said and beside(last, 1, said[0]):
             said = []
-            below(last.x - last.radius - 6, last.y, -1, most, style.FAINT)
+            below(last.x - last.radius - 6, last.y, -1, most, style.TEXT)
         named = beside(first, -1, name)
         if said or not named:
             words = "  ".join([*([] if named else [name]), *said])
