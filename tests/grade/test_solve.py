@@ -168,7 +168,7 @@ def test_the_frame_where_most_else_changes_is_named(fields: Fields) -> None:
     found = {**fields, "colours": [{"frame": 0, "rgbw": early}, {"frame": 18, "rgbw": late}]}
     document, _ = solved(found, pick("p1", MIDDLE, (0.6, 0.2, 0.4), frame=2, radius=0.3))
     effect = document.side_effect()
-    assert effect.frame > 8  # not where it was picked: there the wall is not yet
+    assert effect.frame >= 8  # not where it was picked: there the wall is not yet
     assert effect.others > 0
 
 

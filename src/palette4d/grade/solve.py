@@ -59,7 +59,7 @@ F64 = NDArray[np.float64]
 # A colour of few pixels counts as if it had this share of them: a lamp.
 LEAST_SHARE = 5e-4
 # The guard's weight beside a pick that has all the pixels.
-GUARD = 1.1
+GUARD = 1.15
 # A change of another colour is as visible beside a pick that asks for much. So from LARGE_CHANGE on
 # the guard no longer counts in shares of what is asked for.
 LARGE_CHANGE = 0.35
