@@ -21,6 +21,9 @@ from palette4d import _core
 
 F64 = NDArray[np.float64]
 
+# A hull is simplified to so many corners at most: more hinder the merging of frames.
+MOST_CORNERS = 8
+
 
 def frame_palette(
     colours: _core.ColourTree, gamut: Gamut, options: AnalysisOptions
@@ -29,17 +32,21 @@ def frame_palette(
     return refined(colours, simple_hull(colours, options), gamut, options)
 
 
-def simple_hull(colours: _core.ColourTree, options: AnalysisOptions) -> F64 | FramePalette:
-    """Return (n, 3) corners whose hull holds all colours, or the palette of flat colours."""
+def simple_hull(
+    colours: _core.ColourTree, options: AnalysisOptions, most: int = MOST_CORNERS
+) -> F64 | FramePalette:
+    """Return at most so many (n, 3) corners whose hull holds all colours, or the palette of flat
+    colours."""
     rgb = colours.rgb
-    flat = flat_palette(rgb, options)
+    most = min(most, options.palette_size)
+    flat = flat_palette(rgb, most)
     if flat is not None:
         return flat
     mesh = hull_mesh(rgb)
-    simple = _core.progressive_hull(mesh.rgb, mesh.faces, options.palette_size)
-    if len(simple) > options.palette_size:
+    simple = _core.progressive_hull(mesh.rgb, mesh.faces, most)
+    if len(simple) > most:
         # No edge of a sliver-thin hull can be contracted: use its extreme points instead.
-        simple = extreme_points(mesh.rgb, options.palette_size)
+        simple = extreme_points(mesh.rgb, most)
     return simple
 
 
@@ -94,11 +101,11 @@ def merge_close(points: F64, distance: float) -> F64:
     return points
 
 
-def flat_palette(points: F64, options: AnalysisOptions) -> FramePalette | None:
+def flat_palette(points: F64, most: int) -> FramePalette | None:
     """Return the palette of colours without volume, or None when they have one.
 
-    One colour for a point, two for a line, a two-sided polygon of at most `palette_size` corners
-    for a plane.
+    One colour for a point, two for a line, a two-sided polygon of at most `most` corners for
+    a plane.
     """
     centre = points.mean(axis=0)
     _, vectors = np.linalg.eigh((points - centre).T @ (points - centre))
@@ -113,7 +120,7 @@ def flat_palette(points: F64, options: AnalysisOptions) -> FramePalette | None:
     if extent[2] > 2 * THIN:
         return None
     polygon: NDArray[np.int32] = ConvexHull(along[:, :2]).vertices  # anticlockwise
-    while len(polygon) > max(3, options.palette_size):
+    while len(polygon) > max(3, most):
         polygon = np.delete(polygon, _least_corner(along[polygon, :2]))
     return FramePalette(points[polygon], two_sided(np.arange(len(polygon))))
 

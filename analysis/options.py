@@ -47,7 +47,9 @@ class AnalysisOptions:
         0.0025, 0, 1e6, "least gain in L' that justifies a handle; fewer handles if higher", _SKEW
     )
     blocks: int = _option(3, 1, 1e6, "most blocks (ranges of frames with one topology)", _SKEW)
-    palette_size: int = _option(8, 4, 24, "most colours of one frame's palette", _HULLS)
+    palette_size: int = _option(
+        14, 4, 24, "most colours of one frame's palette; a hull has no more than 8", _HULLS
+    )
     merge_distance: float = _option(
         0.1, 0, 1, "colours of a frame's hull closer than this are merged", _HULLS
     )

@@ -361,8 +361,11 @@ def _searched(
             starts.append(dense.polytope())
             yield starts[-1]
 
+    def ladder(some: Sequence[FrameStatistics]) -> Iterator[SkewPolytope]:
+        return static_hull.ladder(run.starts[0], some, gamut, options)
+
     begun = run.counted("vertex_removal", next_starts(), len(few_blocks))
-    at, found = structure_search.search(begun, static, few, frames, gamut, options)
+    at, found = structure_search.search(begun, static, ladder, few, frames, gamut, options)
     with_stops = stop_insertion.insert_stops(found, frames, gamut, options)
     run.stages += [
         first,

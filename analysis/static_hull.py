@@ -2,7 +2,8 @@
 
 Input: the colours of all frames. Output: `SkewPolytope`s of one block whose colours do not change.
 Each colour has one vertex at the first and one at the last frame, the keyframes of section 6.2.
-Refinement uses the loss of evenly spaced frames (eq. 8).
+Refinement uses the loss of evenly spaced frames (eq. 8). `ladder` is a start of the search: static
+palettes of fewer and fewer colours.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ from numpy.typing import NDArray
 from palette4d.analysis.convex_hulls import THIN, hull_mesh
 from palette4d.analysis.frame_hulls import refined, simple_hull
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut, pooled
-from palette4d.analysis.objective import refine_jointly
+from palette4d.analysis.losses import NO_FACES, shaped_weights
+from palette4d.analysis.moves import LEAST_COLOURS
+from palette4d.analysis.objective import frame_losses, refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import FramePalette, Section, SkewPolytope
 
@@ -32,8 +35,8 @@ EVEN_FRAMES = 24
 POOLED = 2
 # Static hulls start from all of these colours, a half, a quarter.
 STARTS = 3
-# In shorter clips little moves and a static hull is hard to beat, so all starts are tried.
-SHORT = 48
+# Of the colours of a rung that may go, those that cost least at once are tried.
+COLOURS_TRIED = 2
 
 
 def starts(frames: Sequence[FrameStatistics], options: AnalysisOptions) -> list[Start]:
@@ -64,8 +67,7 @@ def plain_hulls(
 ) -> Iterator[SkewPolytope]:
     """Yield static palettes of no more than `vertices`, refined for the paper's loss."""
     for plain in plain_options(options):
-        some = begin if len(frames) < SHORT else begin[:1]
-        for hull in static_hulls(some, frames, gamut, plain):
+        for hull in static_hulls(begin[:1], frames, gamut, plain):
             if not options.vertices or len(hull.vertices) <= options.vertices:
                 yield hull
 
@@ -91,25 +93,68 @@ def static_polytope(
     palette: FramePalette, frames: Sequence[FrameStatistics], gamut: Gamut, options: AnalysisOptions
 ) -> SkewPolytope:
     """Return the palette, refined, as a polytope that does not change with time."""
-    first, last = float(frames[0].frame), float(frames[-1].frame)
-    count = len(palette.rgb)
-
-    def polytope(vertices: F64, tracks: Sequence[tuple[int, ...]]) -> SkewPolytope:
-        return SkewPolytope(vertices, (Section(first, last, tuple(tracks), faces),), ())
-
-    faces = palette.faces
-    # A track of one vertex is a constant colour.
-    still = polytope(
-        np.column_stack([palette.rgb, np.full(count, first)]), [(i,) for i in range(count)]
-    )
     some = [*frames[: -1 : -(-len(frames) // EVEN_FRAMES)], frames[-1]]
-    still, _ = refine_jointly(still, some, gamut, options, EVALUATIONS, coarse=True)
-    faces = _unfolded(still.vertices[:, :3], faces)
-    if first == last:
-        return polytope(still.vertices, still.blocks[0].tracks)
+    still, _ = refine_jointly(_still(palette, some), some, gamut, options, EVALUATIONS, coarse=True)
+    rgb = still.vertices[:, :3]
+    return _lasting(FramePalette(rgb, _unfolded(rgb, palette.faces)), frames)
+
+
+def ladder(
+    begin: Start, frames: Sequence[FrameStatistics], gamut: Gamut, options: AnalysisOptions
+) -> Iterator[SkewPolytope]:
+    """Yield static palettes from `palette_size` colours down to four, each without one colour of
+    the last.
+
+    Colours that do not get to a corner of the palette go too. Nothing is yielded for colours
+    without volume.
+    """
+    colours, _ = begin
+    simple = simple_hull(colours, options, options.palette_size)
+    if isinstance(simple, FramePalette):
+        return
+    close = dataclasses.replace(options, merge_distance=0.0)
+    roomy = dataclasses.replace(options, refinement_box=2 * options.refinement_box)
+    weights = shaped_weights(options, gamut.scale, faces=False)
+
+    def bare(rgb: F64) -> SkewPolytope:
+        return _still(FramePalette(rgb, NO_FACES), frames)
+
+    def moved(rgb: F64) -> tuple[float, FramePalette]:
+        found, value = refine_jointly(bare(rgb), frames, gamut, roomy, EVALUATIONS, coarse=True)
+        return value, hull_mesh(found.vertices[:, :3])
+
+    def loss(rgb: F64) -> float:
+        some = range(0, len(frames), 2)
+        rows = frame_losses(bare(rgb), frames, some, weights, options, coarse=True)
+        return float((options.lambda_ * rows[:, 0] + rows[:, 1] + rows[:, 2]).sum())
+
+    poorer = [refined(colours, simple, gamut, close).rgb]
+    while poorer:
+        tried = sorted(poorer, key=loss)[:COLOURS_TRIED]
+        _, palette = min((moved(rgb) for rgb in tried), key=lambda found: found[0])
+        yield _lasting(palette, frames)
+        count = len(palette.rgb) if len(palette.rgb) > LEAST_COLOURS else 0
+        poorer = [np.delete(palette.rgb, i, axis=0) for i in range(count)]
+
+
+def _still(palette: FramePalette, frames: Sequence[FrameStatistics]) -> SkewPolytope:
+    """Return a palette as tracks of one vertex: constant colours."""
+    first, count = float(frames[0].frame), len(palette.rgb)
+    tracks = tuple((i,) for i in range(count))
+    section = Section(first, float(frames[-1].frame), tracks, palette.faces)
+    return SkewPolytope(np.column_stack([palette.rgb, np.full(count, first)]), (section,), ())
+
+
+def _lasting(palette: FramePalette, frames: Sequence[FrameStatistics]) -> SkewPolytope:
+    """Return a palette as tracks with a vertex in the first and one in the last frame."""
+    still, last, count = _still(palette, frames), float(frames[-1].frame), len(palette.rgb)
+    if last == still.blocks[0].first:
+        return still
     ends = still.vertices.copy()
     ends[:, 3] = last
-    return polytope(np.vstack([still.vertices, ends]), [(i, count + i) for i in range(count)])
+    tracks = tuple((i, count + i) for i in range(count))
+    section = dataclasses.replace(still.blocks[0], tracks=tracks)
+    return SkewPolytope(np.vstack([still.vertices, ends]), (section,), ())
 
 
 def _unfolded(rgb: F64, faces: NDArray[np.int32]) -> NDArray[np.int32]:

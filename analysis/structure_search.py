@@ -1,12 +1,13 @@
 """Structure search: the handles that are worth their cost.
 
-Input: polytopes to start from (the configurations of block merging, thinned out) and a static hull.
+Input: polytopes to start from (the configurations of block merging, thinned out), and static hulls.
 Output: the polytope of the least price, refined on coarse colours. The price is what is minimised,
 eq. 12 with the terms for shape, plus `handle_cost` a vertex, plus `RARE_COST` a rare one.
 
 From each start a walk goes down from rich to poor. Each step takes away the vertex whose loss costs
 least, and all others move jointly to take over. Then the walk goes back to its best palette, takes
-a whole colour away (`moves`), and goes down again, until no poorer palette can be the best.
+a whole colour away (`moves`), and goes down again, until no poorer palette can be the best. Stops
+are put into the best palettes, and single vertices removed again.
 `handle_cost`, `vertices` and `blocks` choose among the palettes found. A dearer handle and fewer
 vertices also lengthen the walks. So a dearer handle hardly ever means more handles, and more of
 what is allowed hardly ever anything worse (docs/lab/search.md).
@@ -19,7 +20,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,19 +34,20 @@ from palette4d.analysis.polytope import SkewPolytope
 
 F64 = NDArray[np.float64]
 
-# Evaluations of joint moves: at the start of a walk, and after each step.
-FIRST_EVALUATIONS, EVALUATIONS = 30, 20
+# Evaluations of joint moves: of static hulls, at the start of a walk, and after each step.
+RUNG_EVALUATIONS, FIRST_EVALUATIONS, EVALUATIONS = 50, 30, 20
 STEP = 0.01
 # The palettes of a walk are compared at this cost, whatever `handle_cost` is.
 USUAL = AnalysisOptions()
 USUAL_COST = USUAL.handle_cost
 # Prices this share above the least are hopeless: walks end, and no more blocks are tried.
 PATIENCE = 0.08
-# With a `handle_cost` above the usual one walks end only at so many times that cost.
+# With a dearer handle or fewer vertices walks end only at so many times the cost.
 DEARER = 4
 # At the end palettes are refined in rounds on all frames: the evaluations of a round, and how far
-# above the least price a palette may be to take part.
-ROUNDS = ((5, PATIENCE), (20, 0.02))
+# above the least price a palette may be to take part. So many with the same numbers of handles and
+# colours do.
+ROUNDS, OF_A_KIND = ((5, PATIENCE), (20, PATIENCE / 2)), 2
 # Prices that differ by this share count as the same: the last refinement changes them by as much.
 ALIKE = 0.005
 # Stops are put into the best palette again if the last ones lowered its price by this share.
@@ -78,42 +80,42 @@ class Priced:
 def search(
     starts: Iterable[SkewPolytope],
     static: SkewPolytope,
+    ladder: Callable[[Sequence[FrameStatistics]], Iterable[SkewPolytope]],
     few: Sequence[FrameStatistics],
     frames: Sequence[FrameStatistics],
     gamut: Gamut,
     options: AnalysisOptions,
 ) -> tuple[int | None, SkewPolytope]:
-    """Return which start the best polytope comes from (None: the static hull), and the polytope.
+    """Return which start the best polytope comes from (None: a static hull), and the polytope.
 
     The starts come in the order of their blocks. Those with more blocks than one that is far worse
-    than the best are not searched.
+    than the best are not searched. `ladder` returns further static hulls for frames.
     """
     usual = few if len(few) <= EVEN_FRAMES else key_frames(static, few, options, EVEN_FRAMES)
-    some = usual
-    found: list[tuple[Priced, int | None]]
-    found = [(one, None) for one in walk(static, some, gamut, options, [])]
+    found = [
+        Priced(*refine_jointly(rung, usual, gamut, options, RUNG_EVALUATIONS, True))
+        for rung in ladder(usual)
+    ]
+    found += walk(static, usual, gamut, options, found)
+    ways: list[tuple[int | None, Sequence[FrameStatistics], list[Priced]]] = [(None, usual, found)]
     least = math.inf
     for at, start in enumerate(starts):
         ends = {time for b in start.blocks for time in (b.first, b.last)}
         ends |= {frame.frame for frame in usual}
         some = [frame for frame in frames if frame.frame in ends]
-        known = [one for one, _ in found]
-        steps = walk(start, some, gamut, options, known)
-        best = min(steps, key=_usual_price)
-        while _usual_price(best) < (1 + PATIENCE) * min(map(_usual_price, known)):
-            rich = moves.enriched(best.polytope)
-            again = Priced(*refine_jointly(rich, some, gamut, options, FIRST_EVALUATIONS, True))
-            more = remove_singly(again, some, gamut, options, [*known, *steps])
-            steps += more
-            before, best = best, min(more, key=_usual_price)
-            if _usual_price(best) > (1 - WORTHWHILE) * _usual_price(before):
-                break
-        found += [(one, at) for one in steps]
+        steps = walk(start, some, gamut, options, [one for *_, way in ways for one in way])
+        ways.append((at, some, steps))
         price = min(map(_usual_price, steps))
         if price > (1 + PATIENCE) * least:
             break
         least = min(least, price)
-    return best_of(found, frames, gamut, options)
+    bound = (1 + PATIENCE) * min(_usual_price(one) for *_, way in ways for one in way)
+    for _, seen, way in ways:
+        best = min(way, key=_usual_price)
+        if _usual_price(best) < bound:
+            known = [one for *_, way in ways for one in way]
+            way += up_and_down(best, seen, gamut, options, known)
+    return best_of([(one, at) for at, _, way in ways for one in way], frames, gamut, options)
 
 
 def _usual_price(one: Priced) -> float:
@@ -132,25 +134,15 @@ def best_of(
     """
     everything = [one for one, _ in found]
     cost = options.handle_cost
-    best = choose(everything, options)
-    least = best.price(cost) + rare_cost(best.polytope, frames)
     close = [(p, at) for p, at in found if allowed(p, everything, options)]
     for evaluations, share in ROUNDS:
-        bound = (1 + share) * least
         close = [
             (Priced(*refine_jointly(p.polytope, frames, gamut, options, evaluations, True)), at)
-            for p, at in close
-            if p.price(cost) <= bound
+            for p, at in _close(close, cost, share)
         ]
-        close.sort(key=lambda found: found[0].price(cost))
-        least = math.inf
-        for p, _ in close:
-            if p.price(cost) >= least:
-                break  # rare handles are counted for the few palettes that may be the best
-            least = min(least, p.price(cost) + rare_cost(p.polytope, frames))
-    bound = (1 + ALIKE) * least
-    alike = [f for f in close if f[0].price(cost) <= bound]
-    alike = [f for f in alike if f[0].price(cost) + rare_cost(f[0].polytope, frames) <= bound]
+    prices = [p.price(cost) + rare_cost(p.polytope, frames) for p, _ in close]
+    bound = (1 + ALIKE) * min(prices)
+    alike = [one for one, price in zip(close, prices, strict=True) if price <= bound]
 
     def shape(found: tuple[Priced, int | None]) -> float:
         weights = shaped_weights(options, gamut.scale)
@@ -160,6 +152,19 @@ def best_of(
 
     chosen, at = min(alike, key=shape)
     return at, chosen.polytope
+
+
+def _close(
+    found: Sequence[tuple[Priced, int | None]], cost: float, share: float
+) -> list[tuple[Priced, int | None]]:
+    """Return the palettes near the least price, few of each number of handles and colours."""
+    bound = (1 + share) * min(one.price(cost) for one, _ in found)
+    best: dict[tuple[int, ...], list[tuple[Priced, int | None]]] = {}
+    for one, at in sorted(found, key=lambda found: found[0].price(cost)):
+        kind = (one.handles, *(len(block.tracks) for block in one.polytope.blocks))
+        if one.price(cost) <= bound:
+            best.setdefault(kind, []).append((one, at))
+    return [found for kind in best.values() for found in kind[:OF_A_KIND]]
 
 
 def rare_cost(polytope: SkewPolytope, frames: Sequence[FrameStatistics]) -> float:
@@ -214,6 +219,28 @@ def walk(
             return [*found, first]
 
 
+def up_and_down(
+    best: Priced,
+    frames: Sequence[FrameStatistics],
+    gamut: Gamut,
+    options: AnalysisOptions,
+    known: Sequence[Priced],
+) -> list[Priced]:
+    """Return what is found when stops are put into a palette and single vertices removed again.
+
+    Goes on with the best of these as long as that is worthwhile.
+    """
+    found: list[Priced] = []
+    while True:
+        rich = moves.enriched(best.polytope)
+        first = Priced(*refine_jointly(rich, frames, gamut, options, FIRST_EVALUATIONS, True))
+        steps = remove_singly(first, frames, gamut, options, [*known, *found])
+        found += steps
+        before, best = best, min(steps, key=_usual_price)
+        if _usual_price(best) > (1 - WORTHWHILE) * _usual_price(before):
+            return found
+
+
 def remove_singly(
     first: Priced,
     frames: Sequence[FrameStatistics],
@@ -247,8 +274,8 @@ def hopeless(
 
     They are when prices have risen far since the best one `found` on this walk, or when the value
     alone, which rises as vertices go, is too much beside what is `known`: at the usual cost of a
-    handle and, for other options, at theirs too, so that these look no less far. A dearer handle
-    counts `DEARER` times, so that a walk gets over a few bad palettes.
+    handle and, for other options, at theirs too, so that these look no less far. For dearer handles
+    and fewer vertices it counts `DEARER` times, so that a walk gets over a few bad palettes.
     """
     fewest = min(2 * min(len(block.tracks) for block in one.polytope.blocks), one.handles)
 
@@ -260,7 +287,7 @@ def hopeless(
         return risen or one.value + cost * fewest > least(known)
 
     cost = options.handle_cost
-    dear = DEARER * cost if cost > USUAL_COST else cost
+    dear = DEARER * cost if cost > USUAL_COST or options.vertices else cost
     return at(USUAL_COST, USUAL) and at(cost, options) and at(dear, USUAL)
 
 
@@ -268,12 +295,6 @@ def allowed(one: Priced, found: Sequence[Priced], options: AnalysisOptions) -> b
     """Return whether a palette has at most `vertices`, or is the smallest there is."""
     most = options.vertices or math.inf
     return one.handles <= max(most, min((x.handles for x in found), default=0))
-
-
-def choose(found: Sequence[Priced], options: AnalysisOptions) -> Priced:
-    """Return the allowed one of the least price."""
-    few = [one for one in found if allowed(one, found, options)]
-    return min(few, key=lambda one: one.price(options.handle_cost))
 
 
 def _dispensable(

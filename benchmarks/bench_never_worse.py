@@ -1,8 +1,8 @@
 """Is the default never worse than one static palette of the same clip?
 
 Analyses each clip, or piece of one, with the defaults and as static palettes: `--method static` as
-it is, and the plain hulls of `palette_size` colours that the default holds itself to, without the
-terms for shape, by L' and the cost of the handles. All of them are measured on every pixel.
+it is, and the plain hulls that the default holds itself to, without the terms for shape, by L' and
+the cost of the handles. All of them are measured on every pixel.
 
     python benchmarks/bench_never_worse.py CLIP[:A-B[xN]] ... [--evaluator PROGRAM]
 

@@ -1,6 +1,6 @@
 """Does the default find what other settings of the same command find?
 
-Analyses clips with the defaults and with eleven other settings, and prints two tables: the
+Analyses clips with the defaults and with other settings, and prints two tables: the
 objective (L', the terms for shape, 0.0025 a handle, 0.005 for a rare one) of the default and of the
 best setting with handles, blocks and user CPU, and where more of what is allowed gave less: more
 blocks or handles or a cheaper handle with a worse objective, a dearer handle with more handles.
@@ -53,6 +53,7 @@ SETTINGS: dict[str, dict[str, Any]] = {
     **{f"blocks={n}": {"blocks": n} for n in (1, 2, 5, 9)},
     **{f"vertices={n}": {"vertices": n} for n in (12, 16, 20, 24)},
     **{f"handle_cost={c:g}": {"handle_cost": c} for c in (0.001, 0.005, 0.01)},
+    **{f"palette_size={n}": {"palette_size": n} for n in (10, 12)},
 }
 # From the least to the most that is allowed.
 RICHER = (

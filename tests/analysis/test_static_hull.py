@@ -14,7 +14,7 @@ from palette4d.analysis.frame_statistics import Gamut, pooled
 from palette4d.analysis.losses import palette_loss
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import FramePalette
-from palette4d.analysis.static_hull import static_polytope
+from palette4d.analysis.static_hull import ladder, starts, static_polytope
 
 CORNERS = np.array(list(itertools.product((0.1, 0.9), repeat=3)))
 FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
@@ -74,3 +74,33 @@ def test_a_mesh_that_has_folded_is_unfolded():
     inside = FramePalette(np.vstack([other, CORNERS.mean(axis=0)]), mesh.faces)
     polytope = static_polytope(inside, frames, GAMUT, plain)
     np.testing.assert_array_equal(polytope.blocks[0].faces, mesh.faces)
+
+
+def rungs(pictures, options=OPTIONS):
+    frames = stats(pictures)
+    return list(ladder(starts(frames, options)[0], frames, GAMUT, options))
+
+
+def test_the_ladder_loses_the_colours_that_are_needed_least():
+    found = rungs([mixture(CORNERS, i) for i in range(3)])
+    counts = [len(rung.blocks[0].tracks) for rung in found]
+    assert counts == sorted(set(counts), reverse=True)
+    assert counts[0] >= 8
+    assert counts[-1] == 4
+    eight = found[counts.index(8)].vertices[:8, :3]
+    assert np.abs(eight[:, None] - CORNERS).max(axis=2).min(axis=1).max() < 0.05
+    for rung in found:
+        early, late = np.split(rung.vertices, 2)
+        np.testing.assert_array_equal(early[:, :3], late[:, :3])
+        assert set(early[:, 3]) == {0}
+        assert set(late[:, 3]) == {2}
+
+
+def test_the_ladder_begins_with_no_more_than_palette_size_colours():
+    few = dataclasses.replace(OPTIONS, palette_size=6)
+    found = rungs([mixture(CORNERS, i) for i in range(3)], few)
+    assert 4 < max(len(rung.blocks[0].tracks) for rung in found) <= 6
+
+
+def test_colours_without_volume_have_no_ladder():
+    assert rungs([constant([0.3, 0.4, 0.5])] * 3) == []

@@ -17,7 +17,14 @@ from palette4d.analysis.handle_use import rare_handles
 from palette4d.analysis.objective import Objective, refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import FramePalette, SkewPolytope
-from palette4d.analysis.structure_search import RARE_COST, Priced, best_of, choose, key_frames, walk
+from palette4d.analysis.structure_search import (
+    RARE_COST,
+    Priced,
+    allowed,
+    best_of,
+    key_frames,
+    walk,
+)
 
 FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
 SIX = np.vstack([FOUR, [[0.8, 0.8, 0.1], [0.7, 0.7, 0.8]]])
@@ -32,6 +39,11 @@ def bend(count, size, at, colours=FOUR):
         rgb[1, 2] += size * max(0, 1 - abs(i - at) / at)
         palettes.append(FramePalette(rgb, hull_mesh(colours).faces))
     return palettes, stats([mixture(p.rgb, i) for i, p in enumerate(palettes)])
+
+
+def choose(steps, options):
+    few = [one for one in steps if allowed(one, steps, options)]
+    return min(few, key=lambda one: one.price(options.handle_cost))
 
 
 def full(palettes):

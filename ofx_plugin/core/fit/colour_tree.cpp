@@ -148,9 +148,10 @@ private:
     }
 
     void add(const Nearest::Candidate& one) {
-        auto at = best_.end();
-        while (at != best_.begin() && (at - 1)->d2 > one.d2) --at;
-        best_.insert(at, one);
+        best_.push_back(one);
+        std::size_t at = best_.size() - 1;
+        for (; at > 0 && best_[at - 1].d2 > one.d2; --at) best_[at] = best_[at - 1];
+        best_[at] = one;
         have_ += tree_.counts_[one.point];
         while (have_ >= k_) {
             limit_ = best_.back().d2;

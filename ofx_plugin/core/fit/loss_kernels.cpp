@@ -50,11 +50,8 @@ PALETTE4D_INLINE void closest_edge(const palette4d::LossFacet* facets, const int
             const Numbers ax = all(side.along[0]), ay = all(side.along[1]), az = all(side.along[2]);
             const Numbers px = x - all(side.from[0]), py = y - all(side.from[1]),
                           pz = z - all(side.from[2]);
-            Numbers s = zero;
-            if (side.length2 > 0) {
-                s = ((px * ax + py * ay) + pz * az) / all(side.length2);
-                s = select(s < zero, zero, select(one < s, one, s));
-            }
+            Numbers s = ((px * ax + py * ay) + pz * az) * all(side.inverse_length2);
+            s = select(s < zero, zero, select(one < s, one, s));
             const Numbers dx = px - s * ax, dy = py - s * ay, dz = pz - s * az;
             const Numbers d2 = (dx * dx + dy * dy) + dz * dz;
             const LaneMask<double> nearer = seen & (d2 < nearest);
@@ -82,8 +79,7 @@ bool fall(const palette4d::LossFacet* facets, const int* which, int count,
             };
             const Numbers h = height_above(f, x, y, z);
             highest = max(highest, h);
-            const LaneMask<double> above = h > all(flat);
-            if (!any(above)) continue;
+            const LaneMask<double> above = h > all(flat);  // a branch would often be mispredicted
             const Numbers b = linear(f.slope[0], f.start[0]), c = linear(f.slope[1], f.start[1]);
             const LaneMask<double> here =
                 above & (b >= zero) & (c >= zero) & (b + c <= one) & (on < zero);

@@ -6,7 +6,8 @@ namespace palette4d {
 
 /// An edge between two corners, with precomputed values for the closest point.
 struct LossEdge {
-    double from[3], along[3], length2;
+    double from[3], along[3];
+    double inverse_length2;  ///< 0 for an edge without length
 };
 
 /// A supporting triangle, with precomputed values for the closest point: its plane, the barycentric

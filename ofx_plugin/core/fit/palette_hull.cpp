@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "model/vec3.hpp"
 
@@ -17,7 +18,9 @@ void set_corners(LossFacet& f, const std::vector<Vec3>& v, const Face& at) {
             f.edges[e].from[c] = from[c];
             f.edges[e].along[c] = along[c];
         }
-        f.edges[e].length2 = dot(along, along);
+        const double length2 = dot(along, along);
+        const bool some = length2 > std::numeric_limits<double>::min();
+        f.edges[e].inverse_length2 = some ? 1 / length2 : 0;
     }
 }
 

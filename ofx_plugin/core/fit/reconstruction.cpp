@@ -26,8 +26,7 @@ struct Closest {
 void try_edge(const Vec3& p, const LossFacet& f, int e, Closest& best) {
     const LossEdge& edge = f.edges[e];
     const Vec3 ab = vec3(edge.along), ap = p - vec3(edge.from);
-    double s = edge.length2 > 0 ? dot(ap, ab) / edge.length2 : 0;
-    s = std::clamp(s, 0.0, 1.0);
+    const double s = std::clamp(dot(ap, ab) * edge.inverse_length2, 0.0, 1.0);
     Vec3 d = ap;
     add(d, -s, ab);
     const double d2 = dot(d, d);
