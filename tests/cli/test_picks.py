@@ -229,8 +229,8 @@ def test_only_new_conflicts_are_told_in_full(run: Run) -> None:
 
 
 def test_what_limits_a_pick_is_told_in_options(run: Run) -> None:
-    words = ("--frame", "2", "--colour", "0.36,0.6,0.2", "--no-follow", "--radius", "0.001")
-    out = run("pick", *words, "--by", "0.5,-0.5,0.6")[1]
+    words = ("--frame", "0", "--colour", "0.36,0.6,0.2", "--no-follow", "--radius", "0.001")
+    out = run("pick", *words, "--by", "0.2,0.2,0.2")[1]
     assert "--radius widens" in out
     assert "radius=" not in out
 
