@@ -93,22 +93,9 @@ def smoothness(
 
     Edges without extent in time count as zero; a valid polytope has no such edges.
     """
-    gradient = np.zeros_like(vertices)
-    if len(edges) == 0:
-        return 0.0, gradient
-    u, v = edges[:, 0], edges[:, 1]
-    colour = vertices[v, :3] - vertices[u, :3]
-    dt = (vertices[v, 3] - vertices[u, 3]) / length
-    distance = np.linalg.norm(colour, axis=1)
-    steepness = (1.0 if weights is None else weights) / dt
-    slope = distance * steepness
-    unit = colour * (steepness / np.maximum(distance, 1e-12) / len(edges))[:, None]
-    np.add.at(gradient[:, :3], v, unit)
-    np.add.at(gradient[:, :3], u, -unit)
-    along = slope / dt / length / len(edges)
-    np.add.at(gradient[:, 3], v, -along)
-    np.add.at(gradient[:, 3], u, along)
-    return float(slope.mean()), gradient
+    return _core.smoothness(
+        vertices, edges, length, np.ones(len(edges)) if weights is None else weights
+    )
 
 
 def summarise(rows: F64, k: float, options: AnalysisOptions) -> Losses:

@@ -161,6 +161,26 @@ void bind_analysis(py::module_& m) {
             py::arg("gradient"));
 
     m.def(
+        "smoothness",
+        [](const py::object& vertices, const IntArray& edges, double length,
+           const py::object& weights) {
+            const std::vector<Vec4> v = vertices_from(vertices, "vertices");
+            const std::vector<double> factors = numbers_from(weights, "weights");
+            const py::ssize_t count = static_cast<py::ssize_t>(factors.size());
+            if (edges.ndim() != 2 || edges.shape(0) != count || edges.shape(1) != 2)
+                throw py::value_error("edges: found shape " + shape_text(edges) + ", expected (" +
+                                      std::to_string(count) + ", 2): one for each weight");
+            std::vector<TimeEdge> list;
+            list.reserve(factors.size());
+            for (py::ssize_t i = 0; i < count; ++i)
+                list.push_back({edges.at(i, 0), edges.at(i, 1), factors[i]});
+            std::vector<Vec4> gradient;
+            const double k = smoothness(v, list, length, &gradient);
+            return py::make_tuple(k, to_array(gradient));
+        },
+        py::arg("vertices"), py::arg("edges"), py::arg("length"), py::arg("weights"));
+
+    m.def(
         "colour_histogram",
         [](const py::object& rgb, const py::object& counts, int cells, double to_one,
            double above_one) {

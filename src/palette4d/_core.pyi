@@ -386,6 +386,11 @@ class PolytopeLoss:
     ) -> tuple[F64, F64]:
         """Rows R, C, shape, outside, largest distance of each frame; the summed (N, 4) gradient."""
 
+def smoothness(
+    vertices: ArrayLike, edges: I32, length: float, weights: ArrayLike
+) -> tuple[float, F64]:
+    """K of eq. 11 with a weight for each edge, and its (n, 4) gradient; `length` in frames."""
+
 def find_links(
     distance: F64,
     allowed: NDArray[np.bool_],

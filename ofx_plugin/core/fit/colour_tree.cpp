@@ -91,21 +91,21 @@ void ColourTree::build_levels(std::vector<Box> boxes) {
     std::tie(low_, high_) = boxes[0];
 }
 
-/// Candidates sorted by distance. The farthest group of ties is dropped once the rest suffices.
+/// Candidates sorted by distance.
 class ColourTree::Search {
 public:
     Search(const ColourTree& tree, const Vec3& v, double k, const LossKernels& kernels,
            Nearest& memory)
         : tree_(tree), v_(v), k_(k), kernels_(kernels), best_(memory.best) {
-        best_.clear();
         visit(tree.levels_.size() - 1, 0);
     }
 
     Vec3 mean() const {
-        const double last = best_.back().d2;
+        const double last = best_[count_ - 1].d2;
         double near = 0, tied = 0;
         Vec3 sum{0, 0, 0}, tied_sum{0, 0, 0};
-        for (const Nearest::Candidate& b : best_) {
+        for (std::size_t i = 0; i < count_; ++i) {
+            const Nearest::Candidate& b = best_[i];
             const double n = tree_.counts_[b.point];
             const bool tie = b.d2 >= last - kTie;
             (tie ? tied : near) += n;
@@ -142,25 +142,29 @@ private:
         const double* const channels[3] = {tree_.channel(0) + begin, tree_.channel(1) + begin,
                                            tree_.channel(2) + begin};
         alignas(64) double squared[kLeafSize];
-        kernels_.from_colours(channels, size, v_.data(), squared);
-        for (int i = 0; i < size; ++i)
-            if (squared[i] <= limit_ + kTie) add({squared[i], begin + i});
+        unsigned near = kernels_.from_colours(channels, size, v_.data(), limit_ + kTie, squared);
+        if (best_.size() < count_ + kLeafSize) best_.resize(2 * (count_ + kLeafSize));
+        Nearest::Candidate* const best = best_.data();
+        for (; near; near &= near - 1) {
+            const int i = __builtin_ctz(near);
+            std::size_t to = count_++;
+            for (; to > 0 && best[to - 1].d2 > squared[i]; --to) best[to] = best[to - 1];
+            best[to] = {squared[i], begin + i};
+            have_ += tree_.counts_[begin + i];
+        }
+        drop();
     }
 
-    void add(const Nearest::Candidate& one) {
-        best_.push_back(one);
-        std::size_t at = best_.size() - 1;
-        for (; at > 0 && best_[at - 1].d2 > one.d2; --at) best_[at] = best_[at - 1];
-        best_[at] = one;
-        have_ += tree_.counts_[one.point];
+    /// Drops the farthest groups of ties as long as the rest suffices.
+    void drop() {
         while (have_ >= k_) {
-            limit_ = best_.back().d2;
+            limit_ = best_[count_ - 1].d2;
             double group = 0;
-            std::size_t first = best_.size();
+            std::size_t first = count_;
             while (first > 0 && best_[first - 1].d2 >= limit_ - kTie)
                 group += tree_.counts_[best_[--first].point];
             if (first == 0 || have_ - group < k_) break;
-            best_.resize(first);
+            count_ = first;
             have_ -= group;
         }
     }
@@ -169,7 +173,8 @@ private:
     const Vec3& v_;
     const double k_;
     const LossKernels& kernels_;
-    std::vector<Nearest::Candidate>& best_;
+    std::vector<Nearest::Candidate>& best_;  // the first count_ of them
+    std::size_t count_ = 0;
     double have_ = 0;
     double limit_ = std::numeric_limits<double>::infinity();
 };

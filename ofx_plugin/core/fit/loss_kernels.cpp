@@ -31,43 +31,11 @@ PALETTE4D_INLINE Lanes<double> height_above(const palette4d::LossFacet& f, const
     return ((all(f.normal[0]) * x + all(f.normal[1]) * y) + all(f.normal[2]) * z) + all(f.offset);
 }
 
-/// The closest edge of the facets that a colour sees; the first one of equally close edges.
-PALETTE4D_INLINE void closest_edge(const palette4d::LossFacet* facets, const int* which, int count,
-                                   const Lanes<double>& x, const Lanes<double>& y,
-                                   const Lanes<double>& z, const LaneMask<double>& wanted,
-                                   double flat, Lanes<double>& distance, Lanes<double>& edge,
-                                   Lanes<double>& along) {
-    using Numbers = Lanes<double>;
-    const Numbers zero = all(0.0), one = all(1.0);
-    Numbers nearest = all(HUGE_VAL);
-    edge = along = zero;
-    for (int i = 0; i < count; ++i) {
-        const palette4d::LossFacet& f = facets[which[i]];
-        const LaneMask<double> seen = wanted & (height_above(f, x, y, z) > all(flat));
-        if (!any(seen)) continue;
-        for (int e = 0; e < 3; ++e) {
-            const palette4d::LossEdge& side = f.edges[e];
-            const Numbers ax = all(side.along[0]), ay = all(side.along[1]), az = all(side.along[2]);
-            const Numbers px = x - all(side.from[0]), py = y - all(side.from[1]),
-                          pz = z - all(side.from[2]);
-            Numbers s = ((px * ax + py * ay) + pz * az) * all(side.inverse_length2);
-            s = select(s < zero, zero, select(one < s, one, s));
-            const Numbers dx = px - s * ax, dy = py - s * ay, dz = pz - s * az;
-            const Numbers d2 = (dx * dx + dy * dy) + dz * dz;
-            const LaneMask<double> nearer = seen & (d2 < nearest);
-            nearest = select(nearer, d2, nearest);
-            edge = select(nearer, all(static_cast<double>(3 * which[i] + e)), edge);
-            along = select(nearer, s, along);
-        }
-    }
-    distance = select(wanted, sqrt(nearest), distance);
-}
-
-bool fall(const palette4d::LossFacet* facets, const int* which, int count,
+void fall(const palette4d::LossFacet* facets, const int* which, int count,
           const double* const* channels, int size, double flat, palette4d::LossLeaf& leaf) {
     using Numbers = Lanes<double>;
     const Numbers zero = all(0.0), one = all(1.0), none = all(-1.0);
-    bool some = false;
+    unsigned outside = 0, beside = 0;
     for (int at = 0; at < size; at += Numbers::kCount) {
         const Numbers x = load(channels[0] + at), y = load(channels[1] + at),
                       z = load(channels[2] + at);
@@ -77,7 +45,7 @@ bool fall(const palette4d::LossFacet* facets, const int* which, int count,
             const auto linear = [&](const double* slope, double start) {
                 return ((all(slope[0]) * x + all(slope[1]) * y) + all(slope[2]) * z) + all(start);
             };
-            const Numbers h = height_above(f, x, y, z);
+            const Numbers h = linear(f.normal, f.offset);
             highest = max(highest, h);
             const LaneMask<double> above = h > all(flat);  // a branch would often be mispredicted
             const Numbers b = linear(f.slope[0], f.start[0]), c = linear(f.slope[1], f.start[1]);
@@ -88,35 +56,88 @@ bool fall(const palette4d::LossFacet* facets, const int* which, int count,
             first = select(here, b, first);
             second = select(here, c, second);
         }
-        const LaneMask<double> outside = highest > all(flat), beside = outside & (on < zero);
-        some |= any(outside);
-        if (any(beside)) {
-            Numbers edge, along;
-            closest_edge(facets, which, count, x, y, z, beside, flat, distance, edge, along);
-            store(leaf.edge + at, edge);
-            store(leaf.along + at, along);
-        }
+        const LaneMask<double> out = highest > all(flat);
+        outside |= bits(out) << at;
+        beside |= bits(out & (on < zero)) << at;
         store(leaf.distance + at, distance);
         store(leaf.facet + at, on);
         store(leaf.share[0] + at, first);
         store(leaf.share[1] + at, second);
     }
-    return some;
+    const unsigned own = (1u << size) - 1;  // without the padding
+    leaf.outside = outside & own;
+    leaf.beside = beside & own;
 }
 
-void pull(const double* counts, int size, const palette4d::LossReach& reach,
-          palette4d::LossLeaf& leaf) {
+void to_edges(const palette4d::LossEdge* edges, int count, const double* const* channels, int size,
+              palette4d::LossLeaf& leaf) {
     using Numbers = Lanes<double>;
     const Numbers zero = all(0.0), one = all(1.0);
     for (int at = 0; at < size; at += Numbers::kCount) {
-        const Numbers n = load(counts + at), d = load(leaf.distance + at);
-        const Numbers cubed = all(reach.far) * d * d * d,
-                      bound = one / (one + cubed / all(reach.most));
-        const Numbers weight = cubed * bound;
-        store(leaf.weighted + at, n * d);
-        store(leaf.far_weighted + at, n * weight * d);
-        store(leaf.counted + at, select(d > all(reach.slight), n, zero));
+        const Numbers x = load(channels[0] + at), y = load(channels[1] + at),
+                      z = load(channels[2] + at);
+        Numbers nearest = all(HUGE_VAL), edge = zero, along = zero;
+        for (int i = 0; i < count; ++i) {
+            const palette4d::LossEdge& e = edges[i];
+            const Numbers ax = all(e.along[0]), ay = all(e.along[1]), az = all(e.along[2]);
+            const Numbers px = x - all(e.from[0]), py = y - all(e.from[1]), pz = z - all(e.from[2]);
+            Numbers s = ((px * ax + py * ay) + pz * az) * all(e.inverse_length2);
+            s = max(zero, min(one, s));
+            const Numbers dx = px - s * ax, dy = py - s * ay, dz = pz - s * az;
+            const Numbers d2 = (dx * dx + dy * dy) + dz * dz;
+            const LaneMask<double> nearer = d2 < nearest;
+            nearest = min(nearest, d2);
+            edge = select(nearer, all(static_cast<double>(i)), edge);
+            along = select(nearer, s, along);
+        }
+        store(leaf.distance + at, sqrt(nearest));
+        store(leaf.edge + at, edge);
+        store(leaf.along + at, along);
+    }
+}
+
+alignas(64) constexpr double kLane[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+static_assert(sizeof kLane / sizeof *kLane == palette4d::LossLeaf::kSize, "a number for each lane");
+
+void pull(const double* counts, int size, const palette4d::LossReach& reach,
+          palette4d::LossLeaf& leaf, palette4d::LossSums& sums) {
+    using Numbers = Lanes<double>;
+    const Numbers zero = all(0.0), one = all(1.0), slope = all(1 / reach.most);
+    for (int at = 0; at < palette4d::LossLeaf::kSize; at += Numbers::kCount) {
+        const LaneMask<double> own = load(kLane + at) < all(static_cast<double>(size));
+        const Numbers n = select(own, load(counts + at), zero),
+                      d = select(own, load(leaf.distance + at), zero);
+        const Numbers cubed = all(reach.far) * d * d * d, bound = one / (one + cubed * slope),
+                      weight = cubed * bound;
+        const auto add = [at](double* sum, const Numbers& part) {
+            store(sum + at, load(sum + at) + part);
+        };
+        add(sums.distance, n * d);
+        add(sums.far_distance, n * weight * d);
+        add(sums.counted, select(d > all(reach.slight), n, zero));
+        store(sums.most + at, max(load(sums.most + at), d));
         store(leaf.pull + at, n * (one + weight * (one + all(3.0) * bound)));
+    }
+}
+
+void press(const int* which, int count, const palette4d::LossLeaf& leaf,
+           palette4d::LossLoad* loads) {
+    using Numbers = Lanes<double>;
+    for (int at = 0; at < palette4d::LossLeaf::kSize; at += Numbers::kCount) {
+        const Numbers on = load(leaf.facet + at), all_of_it = load(leaf.pull + at),
+                      first = all_of_it * load(leaf.share[0] + at),
+                      second = all_of_it * load(leaf.share[1] + at);
+        for (int i = 0; i < count; ++i) {
+            const Numbers facet = all(static_cast<double>(which[i]));
+            const LaneMask<double> here = (on >= facet) & (on <= facet);
+            palette4d::LossLoad& to = loads[which[i]];
+            const auto add = [&](double* sum, const Numbers& part) {
+                store(sum + at, load(sum + at) + select(here, part, all(0.0)));
+            };
+            add(to.all, all_of_it);
+            add(to.corner[0], first);
+            add(to.corner[1], second);
+        }
     }
 }
 
@@ -137,17 +158,23 @@ void from_boxes(const double (*sides)[3][palette4d::LossKernels::kBoxes], const 
     }
 }
 
-void from_colours(const double* const* channels, int size, const double* colour, double* squared) {
+unsigned from_colours(const double* const* channels, int size, const double* colour, double limit,
+                      double* squared) {
     using Numbers = Lanes<double>;
+    unsigned near = 0;
     for (int at = 0; at < size; at += Numbers::kCount) {
         const Numbers x = load(channels[0] + at) - all(colour[0]),
                       y = load(channels[1] + at) - all(colour[1]),
                       z = load(channels[2] + at) - all(colour[2]);
-        store(squared + at, (x * x + y * y) + z * z);
+        const Numbers sum = (x * x + y * y) + z * z;
+        near |= bits(sum <= all(limit)) << at;
+        store(squared + at, sum);
     }
+    return near & ((1u << size) - 1);
 }
 
-constexpr palette4d::LossKernels kKernels = {&reach, &fall, &from_boxes, &from_colours, &pull};
+constexpr palette4d::LossKernels kKernels = {&reach, &fall,       &to_edges,    &pull,
+                                             &press, &from_boxes, &from_colours};
 
 }  // namespace
 

@@ -9,19 +9,16 @@
 namespace palette4d {
 namespace {
 
-void set_corners(LossFacet& f, const std::vector<Vec3>& v, const Face& at) {
-    for (int e = 0; e < 3; ++e) {
-        const Vec3& from = v[at[e]];
-        const Vec3 along = v[at[(e + 1) % 3]] - from;
-        f.at[e] = at[e];
-        for (int c = 0; c < 3; ++c) {
-            f.edges[e].from[c] = from[c];
-            f.edges[e].along[c] = along[c];
-        }
-        const double length2 = dot(along, along);
-        const bool some = length2 > std::numeric_limits<double>::min();
-        f.edges[e].inverse_length2 = some ? 1 / length2 : 0;
+LossEdge edge_of(const std::vector<Vec3>& v, int from, int to) {
+    const Vec3 along = v[to] - v[from];
+    const double length2 = dot(along, along);
+    const bool some = length2 > std::numeric_limits<double>::min();
+    LossEdge edge{{from, to}, {}, {}, some ? 1 / length2 : 0};
+    for (int c = 0; c < 3; ++c) {
+        edge.from[c] = v[from][c];
+        edge.along[c] = along[c];
     }
+    return edge;
 }
 
 LossFacet facet_of(const std::vector<Vec3>& v, const Face& at, const Vec3& normal, double offset) {
@@ -29,9 +26,7 @@ LossFacet facet_of(const std::vector<Vec3>& v, const Face& at, const Vec3& norma
     const Vec3 n = cross(ab, ac);
     const double scale = 1 / dot(n, n);
     const Vec3 slope[2] = {scale * cross(ac, n), scale * cross(n, ab)};
-    LossFacet f{};
-    set_corners(f, v, at);
-    f.offset = offset;
+    LossFacet f{{at[0], at[1], at[2]}, {}, {}, offset, {}, {}};
     for (int c = 0; c < 3; ++c) {
         f.normal[c] = normal[c];
         f.high[c] = normal[c] > 0;
@@ -41,17 +36,11 @@ LossFacet facet_of(const std::vector<Vec3>& v, const Face& at, const Vec3& norma
     return f;
 }
 
-/// A segment, as a degenerate triangle.
-LossFacet segment_of(const std::vector<Vec3>& v, int from, int to) {
-    LossFacet f{};
-    set_corners(f, v, {from, from, to});
-    return f;
-}
-
 }  // namespace
 
 void PaletteHull::build(const std::vector<Vec3>& v) {
     facets.clear();
+    edges.clear();
     solid = false;
     const int n = static_cast<int>(v.size());
     for (int i = 0; i < n; ++i)
@@ -79,11 +68,20 @@ void PaletteHull::build(const std::vector<Vec3>& v) {
                     solid = solid || low < -kFlat;
                 }
             }
-    if (solid || !facets.empty()) return;
-    // All on a line (or one colour): the segments between all pairs.
-    for (int i = 0; i < n; ++i)
-        for (int j = i; j < n; ++j)
-            if (i != j || n == 1) facets.push_back(segment_of(v, i, j));
+    if (facets.empty())  // all on a line, or one colour: the segments between all pairs
+        for (int i = 0; i < n; ++i)
+            for (int j = i; j < n; ++j)
+                if (i != j || n == 1) facets.push_back({{i, i, j}, {}, {}, 0, {}, {}});
+    for (const LossFacet& f : facets)
+        for (int e = 0; e < 3; ++e) {
+            const int from = std::min(f.at[e], f.at[(e + 1) % 3]),
+                      to = std::max(f.at[e], f.at[(e + 1) % 3]);
+            const auto same = [from, to](const LossEdge& edge) {
+                return edge.at[0] == from && edge.at[1] == to;
+            };
+            if (std::none_of(edges.begin(), edges.end(), same))
+                edges.push_back(edge_of(v, from, to));
+        }
 }
 
 }  // namespace palette4d

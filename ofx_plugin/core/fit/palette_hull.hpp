@@ -14,9 +14,11 @@ constexpr double kFlat = 1e-9;
 
 /// All vertex triples that support the hull. Coplanar vertices give overlapping triangles, which is
 /// harmless for closest points. `solid` is false for flat palettes: every triple is then a facet.
-/// For colours on a line, every pair is a degenerate triangle.
+/// For colours on a line, every pair is a degenerate triangle. `edges` has each side of a facet
+/// once.
 struct PaletteHull {
     std::vector<LossFacet> facets;
+    std::vector<LossEdge> edges;
     bool solid = false;
 
     void build(const std::vector<Vec3>& palette);

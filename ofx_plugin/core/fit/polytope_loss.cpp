@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "model/vec3.hpp"
 #include "threads/share_rows.hpp"
 
 namespace palette4d {
@@ -119,6 +120,37 @@ std::vector<FrameLoss> polytope_loss(const std::vector<Vec4>& vertices,
                 for (int c = 0; c < 4; ++c) (*gradient)[vertex][c] += g[c];
     }
     return losses;
+}
+
+double smoothness(const std::vector<Vec4>& vertices, const std::vector<TimeEdge>& edges,
+                  double length, std::vector<Vec4>* gradient) {
+    if (gradient) gradient->assign(vertices.size(), Vec4{0, 0, 0, 0});
+    const int vertex_count = static_cast<int>(vertices.size());
+    const double edge_count = static_cast<double>(edges.size());
+    double sum = 0;
+    for (const TimeEdge& edge : edges) {
+        if (std::min(edge.from, edge.to) < 0 || std::max(edge.from, edge.to) >= vertex_count)
+            throw std::invalid_argument("an edge from vertex " + std::to_string(edge.from) +
+                                        " to " + std::to_string(edge.to) + " of " +
+                                        std::to_string(vertex_count));
+        const Vec4 &a = vertices[edge.from], &b = vertices[edge.to];
+        const double dt = b[3] - a[3];
+        if (!(dt > 0)) continue;
+        const Vec3 change{b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+        const double distance = norm(change), steepness = edge.weight * length / dt,
+                     slope = distance * steepness;
+        sum += slope;
+        if (!gradient) continue;
+        Vec4 &early = (*gradient)[edge.from], &late = (*gradient)[edge.to];
+        for (int c = 0; c < 3; ++c) {
+            const double by = change[c] * steepness / std::max(distance, 1e-12) / edge_count;
+            late[c] += by;
+            early[c] -= by;
+        }
+        late[3] -= slope / dt / edge_count;
+        early[3] += slope / dt / edge_count;
+    }
+    return edges.empty() ? 0 : sum / edge_count;
 }
 
 }  // namespace palette4d

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "model/vec3.hpp"
 
@@ -23,33 +24,27 @@ struct Closest {
     Vec3 weight{1, 0, 0};
 };
 
-void try_edge(const Vec3& p, const LossFacet& f, int e, Closest& best) {
-    const LossEdge& edge = f.edges[e];
+void try_edge(const Vec3& p, const LossEdge& edge, Closest& best) {
     const Vec3 ab = vec3(edge.along), ap = p - vec3(edge.from);
     const double s = std::clamp(dot(ap, ab) * edge.inverse_length2, 0.0, 1.0);
     Vec3 d = ap;
     add(d, -s, ab);
     const double d2 = dot(d, d);
-    const int a = f.at[e], b = f.at[(e + 1) % 3];
+    const int a = edge.at[0], b = edge.at[1];
     if (d2 < best.d2) best = {d2, {a, b, b}, {1 - s, s, 0}};
 }
 
+/// The foot of the perpendicular, if it lies on the facet.
 void try_facet(const Vec3& p, const std::vector<Vec3>& v, const LossFacet& f, Closest& best) {
     const int* const at = f.at;
     const Vec3 ab = v[at[1]] - v[at[0]], ac = v[at[2]] - v[at[0]], ap = p - v[at[0]];
     const Vec3 n = cross(ab, ac);
     const double nn = dot(n, n);
-    if (nn > 1e-28) {
-        const double wb = dot(cross(ap, ac), n) / nn;
-        const double wc = dot(cross(ab, ap), n) / nn;
-        if (wb >= 0 && wc >= 0 && wb + wc <= 1) {
-            const double h = dot(ap, n);
-            const double d2 = h * h / nn;
-            if (d2 < best.d2) best = {d2, {at[0], at[1], at[2]}, {1 - wb - wc, wb, wc}};
-            return;
-        }
-    }
-    for (int e = 0; e < 3; ++e) try_edge(p, f, e, best);
+    if (!(nn > 1e-28)) return;
+    const double wb = dot(cross(ap, ac), n) / nn, wc = dot(cross(ab, ap), n) / nn;
+    if (!(wb >= 0 && wc >= 0 && wb + wc <= 1)) return;
+    const double h = dot(ap, n), d2 = h * h / nn;
+    if (d2 < best.d2) best = {d2, {at[0], at[1], at[2]}, {1 - wb - wc, wb, wc}};
 }
 
 /// Sums count * distance over the pixels outside.
@@ -79,13 +74,17 @@ public:
             int* const all = scratch_.facets.data() + levels * facets;
             for (std::size_t i = 0; i < facets; ++i) all[i] = static_cast<int>(i);
             visit(levels - 1, 0, all, static_cast<int>(facets));
+            finish_beside();
         } else {
             flat();
         }
-        loss.R = sum_ / colours_.total();
-        loss.E = far_sum_ / colours_.total();
-        loss.outside = count_ / colours_.total();
-        loss.max_distance = max_;
+        const auto total = [](const double* lanes) {
+            return std::accumulate(lanes, lanes + kLeaf, 0.0);
+        };
+        loss.R = total(sums_.distance) / colours_.total();
+        loss.E = total(sums_.far_distance) / colours_.total();
+        loss.outside = total(sums_.counted) / colours_.total();
+        loss.max_distance = *std::max_element(sums_.most, sums_.most + kLeaf);
         if (gradient_) finish_gradient();
     }
 
@@ -120,33 +119,31 @@ private:
         const int begin = colours_.leaf_starts()[at], size = colours_.leaf_starts()[at + 1] - begin;
         const double* const channels[3] = {colours_.channel(0) + begin, colours_.channel(1) + begin,
                                            colours_.channel(2) + begin};
-        if (!kernels_.fall(hull_.facets.data(), facets, count, channels, size, kFlat, leaf_))
-            return;
-        kernels_.pull(colours_.counts() + begin, size, reach_, leaf_);
-        add_up(size);
-        if (!gradient_) return;
-        // Lists instead of branches: those would be mispredicted for every second colour.
-        int straight[kLeaf], beside[kLeaf], straight_count = 0, beside_count = 0;
-        for (int i = 0; i < size; ++i) {
-            const bool outside = leaf_.distance[i] > 0, on = leaf_.facet[i] >= 0;
-            straight[straight_count] = beside[beside_count] = i;
-            straight_count += on;
-            beside_count += outside && !on;
+        kernels_.fall(hull_.facets.data(), facets, count, channels, size, kFlat, leaf_);
+        if (!leaf_.outside) return;
+        kernels_.pull(colours_.counts() + begin, size, reach_, leaf_, sums_);
+        if (gradient_) kernels_.press(facets, count, leaf_, scratch_.loads.data());
+        for (unsigned left = leaf_.beside; left; left &= left - 1) {
+            const int i = begin + __builtin_ctz(left);
+            for (int c = 0; c < 3; ++c) beside_[c][beside_count_] = colours_.channel(c)[i];
+            beside_[3][beside_count_] = colours_.counts()[i];
+            if (++beside_count_ == kLeaf) finish_beside();
         }
-        for (int n = 0; n < straight_count; ++n) {
-            const int i = straight[n];
-            ReconstructionScratch::Load& load =
-                scratch_.loads[static_cast<std::size_t>(leaf_.facet[i])];
-            load.all += leaf_.pull[i];
-            for (int c = 0; c < 2; ++c) load.corner[c] += leaf_.pull[i] * leaf_.share[c][i];
-        }
-        for (int n = 0; n < beside_count; ++n) {
-            const int i = beside[n], edge = static_cast<int>(leaf_.edge[i]), e = edge % 3;
-            const LossFacet& f = hull_.facets[static_cast<std::size_t>(edge / 3)];
+    }
+
+    /// The closest points of the colours beside the facets lie on edges of the hull.
+    void finish_beside() {
+        const double* const channels[3] = {beside_[0], beside_[1], beside_[2]};
+        kernels_.to_edges(hull_.edges.data(), static_cast<int>(hull_.edges.size()), channels,
+                          beside_count_, leaf_);
+        kernels_.pull(beside_[3], beside_count_, reach_, leaf_, sums_);
+        for (int i = 0; gradient_ && i < beside_count_; ++i) {
+            const LossEdge& edge = hull_.edges[static_cast<std::size_t>(leaf_.edge[i])];
             const double s = leaf_.along[i];
-            add_gradient<2>(i, colours_.rgb(begin + i), {f.at[e], f.at[(e + 1) % 3], 0},
-                            {1 - s, s, 0});
+            add_gradient<2>(i, {beside_[0][i], beside_[1][i], beside_[2][i]},
+                            {edge.at[0], edge.at[1], 0}, {1 - s, s, 0});
         }
+        beside_count_ = 0;
     }
 
     /// The palette is flat: tests all colours against all facets, which have no inside.
@@ -158,31 +155,16 @@ private:
             for (int i = 0; i < size; ++i) {
                 const Vec3 p = colours_.rgb(begin + i);
                 for (const LossFacet& f : hull_.facets) try_facet(p, v_, f, closest[i]);
+                for (const LossEdge& edge : hull_.edges) try_edge(p, edge, closest[i]);
                 // An empty palette has no facets.
                 leaf_.distance[i] = std::isfinite(closest[i].d2) ? std::sqrt(closest[i].d2) : 0;
             }
-            kernels_.pull(colours_.counts() + begin, size, reach_, leaf_);
-            add_up(size);
+            kernels_.pull(colours_.counts() + begin, size, reach_, leaf_, sums_);
             if (!gradient_) continue;
             for (int i = 0; i < size; ++i)
                 if (leaf_.distance[i] > 0)
                     add_gradient<3>(i, colours_.rgb(begin + i), closest[i].at, closest[i].weight);
         }
-    }
-
-    /// Colours inside add zeros, which do not change the sums.
-    void add_up(int size) {
-        double sum = sum_, far_sum = far_sum_, count = count_, most = max_;
-        for (int i = 0; i < size; ++i) {
-            sum += leaf_.weighted[i];
-            far_sum += leaf_.far_weighted[i];
-            count += leaf_.counted[i];
-            most = std::max(most, leaf_.distance[i]);
-        }
-        sum_ = sum;
-        far_sum_ = far_sum;
-        count_ = count;
-        max_ = most;
     }
 
     /// Adds the gradient of the leaf's i-th colour, whose closest point lies between `count`
@@ -199,9 +181,15 @@ private:
         for (std::size_t i = 0; i < hull_.facets.size(); ++i) {
             const LossFacet& f = hull_.facets[i];
             const Vec3 normal = vec3(f.normal);
-            const ReconstructionScratch::Load& load = scratch_.loads[i];
-            add((*gradient_)[f.at[0]], load.corner[0] + load.corner[1] - load.all, normal);
-            for (int c = 0; c < 2; ++c) add((*gradient_)[f.at[c + 1]], -load.corner[c], normal);
+            double at_corners[3] = {0, 0, 0};
+            const LossLoad& load = scratch_.loads[i];
+            for (int lane = 0; lane < kLeaf; ++lane) {
+                const double first = load.corner[0][lane], second = load.corner[1][lane];
+                at_corners[0] += first + second - load.all[lane];
+                at_corners[1] -= first;
+                at_corners[2] -= second;
+            }
+            for (int c = 0; c < 3; ++c) add((*gradient_)[f.at[c]], at_corners[c], normal);
         }
         for (Vec3& g : *gradient_)
             for (double& x : g) x /= colours_.total();
@@ -215,7 +203,9 @@ private:
     ReconstructionScratch& scratch_;
     std::vector<Vec3>* gradient_;
     LossLeaf leaf_{};
-    double sum_ = 0, far_sum_ = 0, count_ = 0, max_ = 0;
+    LossSums sums_{};
+    alignas(64) double beside_[4][kLeaf] = {};  // colours and counts that wait for finish_beside()
+    int beside_count_ = 0;
 };
 
 }  // namespace

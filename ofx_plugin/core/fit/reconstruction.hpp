@@ -11,16 +11,9 @@ namespace palette4d {
 
 /// Memory that is reused from one reconstruction to the next.
 struct ReconstructionScratch {
-    /// How the colours above a facet pull at it, in total and at corners 1 and 2. With the normal,
-    /// this gives their gradient.
-    struct Load {
-        double all = 0;
-        double corner[2] = {0, 0};
-    };
-
     std::vector<int> facets;        // one list per level of the tree
     std::vector<unsigned> reached;  // one list per level too
-    std::vector<Load> loads;        // one per facet
+    std::vector<LossLoad> loads;    // one per facet
 };
 
 /// Sets R, E, outside and max_distance of `loss`, with `reach` and `slight` of the weights.

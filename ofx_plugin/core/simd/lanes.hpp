@@ -15,8 +15,9 @@
 #define PALETTE4D_LANES_X86
 #endif
 #if defined(__AVX512F__) && !defined(__clang__)
-// False alarm in GCC 12's header: _mm512_min_pd and others use _mm512_undefined_pd() on purpose.
+// False alarms in GCC 12's header: _mm512_min_pd and others use _mm512_undefined_pd() on purpose.
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
+#pragma GCC diagnostic ignored "-Wuninitialized"
 #endif
 
 #define PALETTE4D_INLINE inline __attribute__((always_inline))

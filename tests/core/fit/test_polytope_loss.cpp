@@ -214,3 +214,28 @@ TEST(problems_in_any_thread_reach_the_caller) {
         }
     }
 }
+
+TEST(smoothness_is_the_mean_speed_of_the_edges) {
+    // 0.5 in half of the clip's 10 frames, with half its weight; 0.3 in a fifth of them.
+    const std::vector<Vec4> vertices{{0, 0, 0, 0}, {0.3, 0.4, 0, 5}, {0.3, 0.4, 0.3, 7}};
+    std::vector<TimeEdge> edges{{0, 1, 0.5}, {1, 2, 1}};
+    std::vector<Vec4> gradient;
+    CHECK_NEAR(smoothness(vertices, edges, 10, &gradient), (0.5 * 1 + 1.5) / 2, 1e-12);
+    CHECK_EQUAL(gradient.size(), vertices.size());
+    for (std::size_t i = 0; i < vertices.size(); ++i)
+        for (std::size_t c = 0; c < 4; ++c) {
+            std::vector<Vec4> up = vertices, down = vertices;
+            up[i][c] += 1e-6;
+            down[i][c] -= 1e-6;
+            const double slope =
+                (smoothness(up, edges, 10, nullptr) - smoothness(down, edges, 10, nullptr)) / 2e-6;
+            CHECK_NEAR(gradient[i][c], slope, 1e-6);
+        }
+    edges.push_back({2, 2, 1});  // without extent in time
+    CHECK_NEAR(smoothness(vertices, edges, 10, &gradient), 2.0 / 3, 1e-12);
+    for (const Vec4& g : gradient)
+        for (const double x : g) CHECK(std::isfinite(x));
+    CHECK_EQUAL(smoothness(vertices, {}, 10, &gradient), 0.0);
+    for (const int vertex : {-1, 3})
+        CHECK_THROWS(std::invalid_argument, smoothness(vertices, {{0, vertex, 1}}, 10, nullptr));
+}
