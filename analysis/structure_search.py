@@ -35,7 +35,7 @@ from palette4d.analysis.polytope import SkewPolytope
 F64 = NDArray[np.float64]
 
 # Evaluations of joint moves: of static hulls, at the start of a walk, and after each step.
-RUNG_EVALUATIONS, FIRST_EVALUATIONS, EVALUATIONS = 50, 30, 20
+RUNG_EVALUATIONS, FIRST_EVALUATIONS, EVALUATIONS = 50, 30, 15
 STEP = 0.01
 # The palettes of a walk are compared at this cost, whatever `handle_cost` is.
 USUAL = AnalysisOptions()
@@ -47,7 +47,7 @@ DEARER = 4
 # At the end palettes are refined in rounds on all frames: the evaluations of a round, and how far
 # above the least price a palette may be to take part. So many with the same numbers of handles and
 # colours do.
-ROUNDS, OF_A_KIND = ((5, PATIENCE), (20, PATIENCE / 2)), 2
+ROUNDS, OF_A_KIND = ((5, 0.06), (20, 0.03)), 2
 # Prices that differ by this share count as the same: the last refinement changes them by as much.
 ALIKE = 0.005
 # Stops are put into the best palette again if the last ones lowered its price by this share.
@@ -57,7 +57,7 @@ RARE_COST = USUAL_COST
 # Of the colours that may go, those that cost least at once are tried.
 COLOURS_TRIED = 2
 # The search looks at these evenly spaced frames, and those with the largest losses.
-KEY_FRAMES, EVEN_FRAMES, WORST_FRAMES = 48, 16, 8
+KEY_FRAMES, EVEN_FRAMES, WORST_FRAMES = 48, 12, 6
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -140,18 +140,23 @@ def best_of(
             (Priced(*refine_jointly(p.polytope, frames, gamut, options, evaluations, True)), at)
             for p, at in _close(close, cost, share)
         ]
-    prices = [p.price(cost) + rare_cost(p.polytope, frames) for p, _ in close]
-    bound = (1 + ALIKE) * min(prices)
-    alike = [one for one, price in zip(close, prices, strict=True) if price <= bound]
+    # No rare handles are counted where the price is too high without their cost.
+    least, priced = math.inf, []
+    for one, at in sorted(close, key=lambda found: found[0].price(cost)):
+        if one.price(cost) <= (1 + ALIKE) * least:
+            price = one.price(cost) + rare_cost(one.polytope, frames)
+            least = min(least, price)
+            priced.append((price, one.polytope, at))
 
-    def shape(found: tuple[Priced, int | None]) -> float:
+    def shape(polytope: SkewPolytope) -> float:
         weights = shaped_weights(options, gamut.scale)
         everywhere = range(len(frames))
-        rows = frame_losses(found[0].polytope, frames, everywhere, weights, options, coarse=True)
+        rows = frame_losses(polytope, frames, everywhere, weights, options, coarse=True)
         return float(rows[:, 2].mean())
 
-    chosen, at = min(alike, key=shape)
-    return at, chosen.polytope
+    alike = [(p, at) for price, p, at in priced if price <= (1 + ALIKE) * least]
+    chosen, at = min(alike, key=lambda found: shape(found[0]))
+    return at, chosen
 
 
 def _close(
