@@ -242,8 +242,9 @@ def test_no_worker_yet_is_told_and_waited_for(
     assert f"`dask worker {made.address}`" in told
 
 
+@pytest.mark.parametrize("pause", [0, 2])  # after 2 seconds all are done, but only one is fetched
 def test_a_farm_that_loses_all_workers_ends_with_an_error(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], pause: int
 ) -> None:
     path = os.pathsep.join(
         [str(Path(__file__).resolve().parents[1]), os.environ.get("PYTHONPATH", "")]
@@ -256,6 +257,8 @@ def test_a_farm_that_loses_all_workers_ends_with_an_error(
         found: dict[int, object] = {}
 
         def take(key: int, result: object) -> None:
+            if not found:
+                time.sleep(pause)
             found[key] = result
             made.kill(made.workers["w0"])
 

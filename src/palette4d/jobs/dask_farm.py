@@ -95,8 +95,7 @@ def run(
             futures.append(client.submit(_piece, work, task, config, key=name, pure=False))
         _check_workers(client, address)
         try:
-            for future in _finished(client, futures, address):
-                found = _outcome(future)
+            for future, found in _finished(client, futures, address):
                 with later_interrupts():
                     take(keys.pop(future.key), found)
                 future.release()  # results may be large
@@ -132,32 +131,36 @@ def _piece(work: Callable[[Task, int], Result], task: Task, config: str | None) 
                 os.environ["OCIO"] = before
 
 
-def _finished(client: Any, futures: list[Any], address: str) -> Iterator[Any]:
-    """Yield each future when it is done; end early if the farm keeps no worker."""
+def _finished(client: Any, futures: list[Any], address: str) -> Iterator[tuple[Any, Any]]:
+    """Yield each future and its outcome when it is done; end early if the farm keeps no worker."""
     done: queue.SimpleQueue[Any] = queue.SimpleQueue()
     for future in futures:
         future.add_done_callback(done.put)
     told, seen = False, time.monotonic()
     left = len(futures)
     while left:
-        try:
+        with contextlib.suppress(queue.Empty):
             future = done.get(timeout=WATCHED_EVERY)
-        except queue.Empty:
-            waited = time.monotonic() - seen
-            if _has_worker(client):
+            try:
+                found = _outcome(client, future)
+            except _LostError:
+                future.add_done_callback(done.put)  # until another worker does it again
+            else:
                 told, seen = False, time.monotonic()
-            elif waited >= WORKERS_WITHIN:
-                return
-            elif not told:
-                told = True
-                _say(
-                    "palette4d: note: the farm has no worker any more; start one with `dask worker "
-                    f"{address}` (waiting for {WORKERS_WITHIN - waited:.0f} more seconds)"
-                )
-        else:
+                left -= 1
+                yield future, found
+                continue
+        waited = time.monotonic() - seen
+        if _has_worker(client):
             told, seen = False, time.monotonic()
-            left -= 1
-            yield future
+        elif waited >= WORKERS_WITHIN:
+            return
+        elif not told:
+            told = True
+            _say(
+                "palette4d: note: the farm has no worker any more; start one with `dask worker "
+                f"{address}` (waiting for {WORKERS_WITHIN - waited:.0f} more seconds)"
+            )
 
 
 def _has_worker(client: Any) -> bool:
@@ -173,13 +176,30 @@ def _version() -> str:
     return _core.__version__
 
 
-def _outcome(future: Any) -> Any:
+class _LostError(Exception):
+    """The last worker ended before its result was fetched."""
+
+
+def _outcome(client: Any, future: Any) -> Any:
+    """Fetch a result from its worker, which may take its time as long as the farm has workers."""
     import asyncio
 
     from distributed import KilledWorker
 
+    def fetched() -> Any:
+        wait = WATCHED_EVERY
+        while True:
+            try:
+                return future.result(timeout=wait)
+            except TimeoutError:
+                if future.status == "error":  # the task's own
+                    raise
+                if not _has_worker(client):
+                    raise _LostError from None
+                wait *= 2  # a large result is fetched from its start again
+
     try:
-        return outcome(future.result)
+        return outcome(fetched)
     except KilledWorker:
         return Failed(
             "every worker that tried it was ended from outside (too little memory?); run the same "
