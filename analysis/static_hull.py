@@ -17,7 +17,7 @@ from palette4d.analysis.convex_hulls import THIN, hull_mesh
 from palette4d.analysis.frame_hulls import refined, simple_hull
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut, pooled
 from palette4d.analysis.losses import NO_FACES, shaped_weights
-from palette4d.analysis.moves import LEAST_COLOURS
+from palette4d.analysis.moves import COLOURS_TRIED, LEAST_COLOURS
 from palette4d.analysis.objective import frame_losses, refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import FramePalette, Section, SkewPolytope
@@ -35,8 +35,6 @@ EVEN_FRAMES = 24
 POOLED = 2
 # Static hulls start from all of these colours, a half, a quarter.
 STARTS = 3
-# Of the colours of a rung that may go, those that cost least at once are tried.
-COLOURS_TRIED = 2
 
 
 def starts(frames: Sequence[FrameStatistics], options: AnalysisOptions) -> list[Start]:

@@ -54,8 +54,6 @@ ALIKE = 0.005
 WORTHWHILE = 0.01
 # A rare handle costs so much more, whatever `handle_cost` is.
 RARE_COST = USUAL_COST
-# Of the colours that may go, those that cost least at once are tried.
-COLOURS_TRIED = 2
 # The search looks at these evenly spaced frames, and those with the largest losses.
 KEY_FRAMES, EVEN_FRAMES, WORST_FRAMES = 48, 12, 6
 
@@ -98,23 +96,26 @@ def search(
     ]
     found += walk(static, usual, gamut, options, found)
     ways: list[tuple[int | None, Sequence[FrameStatistics], list[Priced]]] = [(None, usual, found)]
+
+    def known() -> list[Priced]:
+        return [one for *_, way in ways for one in way]
+
     least = math.inf
     for at, start in enumerate(starts):
         ends = {time for b in start.blocks for time in (b.first, b.last)}
         ends |= {frame.frame for frame in usual}
         some = [frame for frame in frames if frame.frame in ends]
-        steps = walk(start, some, gamut, options, [one for *_, way in ways for one in way])
+        steps = walk(start, some, gamut, options, known())
         ways.append((at, some, steps))
         price = min(map(_usual_price, steps))
         if price > (1 + PATIENCE) * least:
             break
         least = min(least, price)
-    bound = (1 + PATIENCE) * min(_usual_price(one) for *_, way in ways for one in way)
+    bound = (1 + PATIENCE) * min(map(_usual_price, known()))
     for _, seen, way in ways:
         best = min(way, key=_usual_price)
         if _usual_price(best) < bound:
-            known = [one for *_, way in ways for one in way]
-            way += up_and_down(best, seen, gamut, options, known)
+            way += up_and_down(best, seen, gamut, options, known())
     return best_of([(one, at) for at, _, way in ways for one in way], frames, gamut, options)
 
 
@@ -317,7 +318,7 @@ def _dispensable(
         rows = frame_losses(rest, frames, few, weights, options, coarse=True)
         rise = float((options.lambda_ * rows[:, 0] + rows[:, 1] + rows[:, 2]).sum())
         rises.append((rise, chain))
-    return [chain for _, chain in sorted(rises)[:COLOURS_TRIED]]
+    return [chain for _, chain in sorted(rises)[: moves.COLOURS_TRIED]]
 
 
 def _cheapest(

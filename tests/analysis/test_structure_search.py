@@ -16,7 +16,7 @@ from palette4d.analysis.frame_statistics import Gamut
 from palette4d.analysis.handle_use import rare_handles
 from palette4d.analysis.objective import Objective, refine_jointly
 from palette4d.analysis.options import AnalysisOptions
-from palette4d.analysis.polytope import FramePalette, SkewPolytope
+from palette4d.analysis.polytope import FramePalette
 from palette4d.analysis.structure_search import (
     RARE_COST,
     Priced,
@@ -107,25 +107,31 @@ def test_a_rare_colour_goes_if_it_does_not_pay_for_being_rare():
         assert len(best.blocks[0].tracks) == colours
 
 
-def test_palettes_that_seem_nearly_equal_are_compared_on_all_frames():
+def straight_and_bent(at=4):
+    """Frames with a bend at frame 4; a palette without it, and one with a stop at frame `at`."""
     palettes, frames = bend(9, 0.5, 4)
     straight = DensePolytope((0, 8), [[palettes[0], palettes[8]]], []).polytope()
     track = straight.blocks[0].tracks[1]
-    bent = straight.with_stop((track[0], track[1]), (*palettes[4].rgb[1].tolist(), 4.0))
+    stop = (*palettes[at].rgb[1].tolist(), float(at))
+    return frames, straight, straight.with_stop((track[0], track[1]), stop)
+
+
+@pytest.mark.parametrize(
+    ("options", "stops"), [({}, 1), ({"handle_cost": 0.5}, 0), ({"vertices": 8}, 0)]
+)
+def test_palettes_that_seem_nearly_equal_are_compared_on_all_frames(options, stops):
+    frames, straight, bent = straight_and_bent()
     seems = [(Priced(straight, 0.1), 0), (Priced(bent, 0.1), 0)]
-    _, best = best_of(seems, frames, GAMUT, AnalysisOptions())
-    assert len(best.vertices) == len(bent.vertices)
+    _, best = best_of(seems, frames, GAMUT, AnalysisOptions(**options))
+    assert len(best.vertices) == len(straight.vertices) + stops
 
 
-def test_the_choice_weighs_vertices_against_the_loss():
-    def step(count, value):
-        return Priced(SkewPolytope(np.zeros((count, 4)), (), ()), value)
-
-    steps = [step(20, 0.100), step(15, 0.105), step(10, 0.150)]
-    for cost, count in ((0.0, 20), (0.0005, 20), (0.002, 15), (0.02, 10)):
-        assert choose(steps, AnalysisOptions(handle_cost=cost)).handles == count
-    for most, count in ((30, 15), (14, 10), (10, 10), (4, 10)):
-        assert choose(steps, AnalysisOptions(vertices=most)).handles == count
+def test_of_many_palettes_of_a_kind_the_best_are_compared():
+    frames, _, good = straight_and_bent()
+    worse = [straight_and_bent(at)[2] for at in (1, 2, 6, 7)]
+    seems = [(Priced(polytope, 0.1), at) for at, polytope in enumerate(worse)]
+    at, _ = best_of([*seems, (Priced(good, 0.099), 9)], frames, GAMUT, AnalysisOptions())
+    assert at == 9
 
 
 def check(polytope):
