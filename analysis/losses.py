@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import math
 import os
 import weakref
 from collections.abc import Callable
@@ -30,9 +31,10 @@ STOPPED = (
 # A pixel farther outside than this is lost: edits of the palette do not reach it. A smaller share
 # of a frame counts as hot pixels or glints.
 LOST, LOST_SHARE = 0.25, 1e-4
-# `descend`: the longest step, in colour or in parts of the clip; how much of the mean and of the
-# mean square of the gradient a step keeps; a square of the gradient that counts as zero.
-STEP, MEAN, SQUARE, TINY = 0.02, 0.9, 0.99, 1e-18
+# `descend`: the longest step, in colour or in parts of the clip; which step is the first as long;
+# how much of the mean and of the mean square of the gradient a step keeps; a square of the gradient
+# that counts as zero.
+STEP, WARM_UP, MEAN, SQUARE, TINY = 0.012, 3, 0.65, 0.9, 1e-18
 NO_FACES: I32 = np.zeros((0, 3), np.int32)
 
 
@@ -187,26 +189,25 @@ def minimise(
 
 
 def descend(
-    objective: ValueAndGradient,
+    slope: Callable[[F64, int], F64],
     x: F64,
     low: F64,
     high: F64,
-    evaluations: int,
+    steps: int,
     longest: float = STEP,
 ) -> F64:
-    """Minimise a function inside a box by so many gradient steps; return the best point of all.
+    """Minimise a function inside a box by so many gradient steps; return the last point.
 
-    Steps follow Adam (Kingma and Ba 2015) and shrink to nothing. No line search can fail at a kink,
-    where `minimise` ends early: with many colours there are kinks everywhere.
+    `slope(x, k)` is the gradient for step k. It may be of another part of the function each time.
+    Steps follow Adam (Kingma and Ba 2015); they grow at first, then shrink to nothing. No line
+    search can fail at a kink, where `minimise` ends early: with many colours there are kinks
+    everywhere.
     """
-    best_value, best = np.inf, x
     mean, square = np.zeros_like(x), np.zeros_like(x)
-    for k in range(1, evaluations + 1):
-        value, slope = objective(x)
-        if value < best_value:
-            best_value, best = value, x
-        mean += (1 - MEAN) * (slope - mean)
-        square += (1 - SQUARE) * (slope**2 - square)
-        length = longest * (1 - k / evaluations) / (1 - MEAN**k)
+    for k in range(1, steps + 1):
+        gradient = slope(x, k)
+        mean += (1 - MEAN) * (gradient - mean)
+        square += (1 - SQUARE) * (gradient**2 - square)
+        length = longest * min(1, k / WARM_UP) * math.sqrt(1 - k / (steps + 1)) / (1 - MEAN**k)
         x = np.clip(x - length * mean / np.sqrt(square / (1 - SQUARE**k) + TINY), low, high)
-    return best
+    return x

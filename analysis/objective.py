@@ -1,14 +1,13 @@
 """Eq. 12 as a function of the vertices of a polytope, and joint moves of vertices that lower it.
 
 Vertex refinement (section 5.5), the structure search and the static hull share this module. It
-knows the boxes of the vertices and the frames that a vertex affects. It minimises with NLopt and
-the core's exact gradient.
+knows the boxes of the vertices and the frames that a vertex affects. It minimises with the core's
+exact gradient.
 """
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,6 @@ from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
 from palette4d.analysis.losses import (
     STEP,
     Losses,
-    ValueAndGradient,
     descend,
     loss_weights,
     minimise,
@@ -31,12 +29,13 @@ from palette4d.analysis.polytope import SkewPolytope
 from palette4d import _core
 
 F64 = NDArray[np.float64]
-Minimiser = Callable[[ValueAndGradient, F64, F64, F64, int], F64]
 
 # Least distance in frames between two vertices of a track: a steeper change would be a cut.
 LEAST_GAP = 0.5
 # Weight in eq. 11 of the edges to and from a colour that exists for a short time only.
 BRIEF = 0.25
+# A joint step looks at a part of the frames: one of at most so many, of at least so many frames.
+MOST_PARTS, FEWEST_OF_A_PART = 4, 3
 
 
 def loss_of(
@@ -82,30 +81,38 @@ def refine_jointly(
     frames: Sequence[FrameStatistics],
     gamut: Gamut,
     options: AnalysisOptions,
-    most_evaluations: int,
+    steps: int,
     coarse: bool,
     brief: Collection[int] = (),
-    step: float = STEP,
+    longest: float = STEP,
 ) -> tuple[SkewPolytope, float]:
     """Move all vertices together in their boxes; return the polytope and the value of `Objective`.
 
-    The value is never above the value of the given polytope, clipped to the gamut. Vertices in
-    `brief` (see `Objective`) keep their times: the mean over all frames would shorten such a
-    colour.
+    Each step looks at every n-th frame, another choice each time. The value is never above the
+    value of the given polytope, clipped to the gamut. Vertices in `brief` (see `Objective`) keep
+    their times: the mean over all frames would shorten such a colour.
     """
     evaluate = Objective(polytope, frames, options, gamut, coarse, brief)
-    vertices = polytope.vertices.copy()
-    vertices[:, :3] = gamut.clip(vertices[:, :3])
     evaluate.fixed[list(brief)] = True
-    box = evaluate.box(vertices, range(len(vertices)), share=0.5)
-    moving = np.arange(len(vertices))
-    for by in (functools.partial(descend, longest=step), minimise_closely):
-        # Near a minimum the first steps of `descend` may lead away for good.
-        moved = move(evaluate, vertices, moving, evaluate.everything, box, most_evaluations, by)
-        if not np.array_equal(moved, vertices):
-            break
-    vertices = moved
-    return polytope.with_vertices(vertices), evaluate(vertices, evaluate.everything, False)[0]
+    start = polytope.vertices.copy()
+    start[:, :3] = gamut.clip(start[:, :3])
+    box = evaluate.box(start, range(len(start)), share=0.5)
+    parts = max(1, min(MOST_PARTS, len(frames) // FEWEST_OF_A_PART))
+
+    def slope(x: F64, step: int) -> F64:
+        some = evaluate.everything[step % parts :: parts]
+        _, gradient = evaluate(x * evaluate.scale, some, for_all=True)
+        return gradient * evaluate.scale
+
+    low, high = (bound / evaluate.scale for bound in box)
+    moved = descend(slope, start / evaluate.scale, low, high, steps, longest) * evaluate.scale
+    vertices = evaluate.with_fixed_times(np.clip(moved, *box), start)
+    value, _ = evaluate(vertices, evaluate.everything, False)
+    if value >= evaluate(start, evaluate.everything, False)[0]:
+        # The best place is so near, maybe at a kink, that steps lead away from it.
+        vertices = move_all(evaluate, start, max(1, steps // parts))
+        value, _ = evaluate(vertices, evaluate.everything, False)
+    return polytope.with_vertices(vertices), value
 
 
 def move_all(evaluate: Objective, vertices: F64, most_evaluations: int) -> F64:
@@ -116,11 +123,6 @@ def move_all(evaluate: Objective, vertices: F64, most_evaluations: int) -> F64:
     return move(evaluate, vertices, moving, evaluate.everything, box, most_evaluations)
 
 
-def minimise_closely(objective: ValueAndGradient, x: F64, low: F64, high: F64, most: int) -> F64:
-    """Minimise with NLopt until little changes: the paper's refinement."""
-    return minimise(objective, x, low, high, most, tolerance=1e-5)
-
-
 def move(
     evaluate: Objective,
     vertices: F64,
@@ -128,9 +130,11 @@ def move(
     which: list[int],
     box: tuple[F64, F64],
     most_evaluations: int,
-    by: Minimiser = minimise_closely,
 ) -> F64:
-    """Return the vertices with those in `moving` at their best place in the box."""
+    """Return the vertices with those in `moving` at their best place in the box.
+
+    NLopt minimises until little changes: the paper's refinement.
+    """
 
     def objective(x: F64) -> tuple[float, F64]:
         trial = vertices.copy()
@@ -140,13 +144,11 @@ def move(
 
     start = (vertices[moving] / evaluate.scale).ravel()
     lower, upper = ((bound / evaluate.scale).ravel() for bound in box)
-    best = by(objective, start, lower, upper, most_evaluations)
+    best = minimise(objective, start, lower, upper, most_evaluations, tolerance=1e-5)
     out = vertices.copy()
     # Scaling rounds; the clip keeps a vertex at the edge of its box inside its block.
     out[moving] = np.clip(best.reshape(-1, 4) * evaluate.scale, *box)
-    fixed = evaluate.fixed[moving]
-    out[moving[fixed], 3] = vertices[moving[fixed], 3]
-    return out
+    return evaluate.with_fixed_times(out, vertices)
 
 
 class Objective:
@@ -184,22 +186,30 @@ class Objective:
             self.block[inside] = b.first, b.last
 
     def __call__(
-        self, vertices: F64, which: list[int], with_gradient: bool = True
+        self, vertices: F64, which: list[int], with_gradient: bool = True, for_all: bool = False
     ) -> tuple[float, F64]:
-        """Return sum over `which` of L / N + gamma K (+ shape), and the gradient if wanted."""
+        """Return sum over `which` of L / N + gamma K (+ shape), and the gradient if wanted.
+
+        N is the number of all frames, or with `for_all` of those in `which`, which stand for them.
+        """
         o = self.options
         rows, gradient = self.loss.evaluate(
             vertices, which, self.weights, self.threads, with_gradient
         )
         sums = rows.sum(axis=0)
-        count = len(self.everything)
+        count = len(which if for_all else self.everything)
         value = (o.lambda_ * sums[0] + sums[1] + sums[2]) / count
         gradient = gradient / count if with_gradient else np.zeros_like(vertices)
-        if o.gamma and count > 1:
+        if o.gamma and len(self.everything) > 1:
             k, slope = smoothness(vertices, self.edges, self.length, self.quick)
             value += o.gamma * k
             gradient += o.gamma * slope
         return float(value), gradient
+
+    def with_fixed_times(self, moved: F64, vertices: F64) -> F64:
+        """Return moved vertices with the times of `vertices` where these may not change."""
+        moved[self.fixed, 3] = vertices[self.fixed, 3]
+        return moved
 
     def touched(self, vertices: F64, moving: Sequence[int]) -> list[int]:
         """Return the frames whose slices the vertices in `moving` affect, wherever they move."""

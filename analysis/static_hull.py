@@ -9,7 +9,7 @@ palettes of fewer and fewer colours.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,7 @@ F64 = NDArray[np.float64]
 #: Colours, and their `simple_hull`.
 Start = tuple[_core.ColourTree, F64 | FramePalette]
 
-EVALUATIONS = 50
+STEPS = 30
 # The colours of these evenly spaced frames decide.
 EVEN_FRAMES = 24
 # All frames together keep this many times the coarse colours of one frame.
@@ -92,7 +92,7 @@ def static_polytope(
 ) -> SkewPolytope:
     """Return the palette, refined, as a polytope that does not change with time."""
     some = [*frames[: -1 : -(-len(frames) // EVEN_FRAMES)], frames[-1]]
-    still, _ = refine_jointly(_still(palette, some), some, gamut, options, EVALUATIONS, coarse=True)
+    still, _ = refine_jointly(_still(palette, some), some, gamut, options, STEPS, coarse=True)
     rgb = still.vertices[:, :3]
     return _lasting(FramePalette(rgb, _unfolded(rgb, palette.faces)), frames)
 
@@ -101,7 +101,7 @@ def ladder(
     begin: Start, frames: Sequence[FrameStatistics], gamut: Gamut, options: AnalysisOptions
 ) -> Iterator[SkewPolytope]:
     """Yield static palettes from `palette_size` colours down to four, each without one colour of
-    the last.
+    the last; first without `convexity`, then with it.
 
     Colours that do not get to a corner of the palette go too. Nothing is yielded for colours
     without volume.
@@ -110,29 +110,37 @@ def ladder(
     simple = simple_hull(colours, options, options.palette_size)
     if isinstance(simple, FramePalette):
         return
-    close = dataclasses.replace(options, merge_distance=0.0)
+    first = refined(colours, simple, gamut, dataclasses.replace(options, merge_distance=0.0)).rgb
     roomy = dataclasses.replace(options, refinement_box=2 * options.refinement_box)
     weights = shaped_weights(options, gamut.scale, faces=False)
 
     def bare(rgb: F64) -> SkewPolytope:
         return _still(FramePalette(rgb, NO_FACES), frames)
 
-    def moved(rgb: F64) -> tuple[float, FramePalette]:
-        found, value = refine_jointly(bare(rgb), frames, gamut, roomy, EVALUATIONS, coarse=True)
-        return value, hull_mesh(found.vertices[:, :3])
-
     def loss(rgb: F64) -> float:
         some = range(0, len(frames), 2)
         rows = frame_losses(bare(rgb), frames, some, weights, options, coarse=True)
         return float((options.lambda_ * rows[:, 0] + rows[:, 1] + rows[:, 2]).sum())
 
-    poorer = [refined(colours, simple, gamut, close).rgb]
-    while poorer:
-        tried = sorted(poorer, key=loss)[:COLOURS_TRIED]
-        _, palette = min((moved(rgb) for rgb in tried), key=lambda found: found[0])
+    def rungs(start: Callable[[F64], SkewPolytope]) -> Iterator[FramePalette]:
+        poorer = [first]
+        while poorer:
+            tried = [start(rgb) for rgb in sorted(poorer, key=loss)[:COLOURS_TRIED]]
+            moved = (refine_jointly(p, frames, gamut, roomy, STEPS, coarse=True) for p in tried)
+            found, _ = min(moved, key=lambda one: one[1])
+            palette = hull_mesh(found.vertices[:, :3])
+            yield palette
+            count = len(palette.rgb) if len(palette.rgb) > LEAST_COLOURS else 0
+            poorer = [np.delete(palette.rgb, i, axis=0) for i in range(count)]
+
+    # With faces, `convexity` keeps colours from falling into the solid, where they are lost.
+    best: dict[int, FramePalette] = {}
+    for start in (bare, lambda rgb: _still(hull_mesh(rgb), frames)):
+        for palette in rungs(start):
+            other = best.setdefault(len(palette.rgb), palette)
+            best[len(palette.rgb)] = min(other, palette, key=lambda one: loss(one.rgb))
+    for _, palette in sorted(best.items(), reverse=True):
         yield _lasting(palette, frames)
-        count = len(palette.rgb) if len(palette.rgb) > LEAST_COLOURS else 0
-        poorer = [np.delete(palette.rgb, i, axis=0) for i in range(count)]
 
 
 def _still(palette: FramePalette, frames: Sequence[FrameStatistics]) -> SkewPolytope:

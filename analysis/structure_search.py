@@ -34,9 +34,8 @@ from palette4d.analysis.polytope import SkewPolytope
 
 F64 = NDArray[np.float64]
 
-# Evaluations of joint moves: of static hulls, at the start of a walk, and after each step.
-RUNG_EVALUATIONS, FIRST_EVALUATIONS, EVALUATIONS = 50, 30, 15
-STEP = 0.01
+# Gradient steps of joint moves: at the start of a walk, and after each removal.
+FIRST_STEPS, STEPS = 30, 15
 # The palettes of a walk are compared at this cost, whatever `handle_cost` is.
 USUAL = AnalysisOptions()
 USUAL_COST = USUAL.handle_cost
@@ -44,7 +43,7 @@ USUAL_COST = USUAL.handle_cost
 PATIENCE = 0.08
 # With a dearer handle or fewer vertices walks end only at so many times the cost.
 DEARER = 4
-# At the end palettes are refined in rounds on all frames: the evaluations of a round, and how far
+# At the end palettes are refined in rounds on all frames: the steps of a round, and how far
 # above the least price a palette may be to take part. So many with the same numbers of handles and
 # colours do.
 ROUNDS, OF_A_KIND = ((5, 0.06), (20, 0.03)), 2
@@ -91,10 +90,9 @@ def search(
     """
     usual = few if len(few) <= EVEN_FRAMES else key_frames(static, few, options, EVEN_FRAMES)
     found = [
-        Priced(*refine_jointly(rung, usual, gamut, options, RUNG_EVALUATIONS, True))
-        for rung in ladder(usual)
+        Priced(*refine_jointly(rung, usual, gamut, options, FIRST_STEPS, True))
+        for rung in (static, *ladder(usual))
     ]
-    found += walk(static, usual, gamut, options, found)
     ways: list[tuple[int | None, Sequence[FrameStatistics], list[Priced]]] = [(None, usual, found)]
 
     def known() -> list[Priced]:
@@ -131,14 +129,15 @@ def best_of(
 ) -> tuple[int | None, SkewPolytope]:
     """Return the best of all that was found, measured on all frames, and its start.
 
-    Of palettes of nearly the same price it is the one whose terms for shape are least.
+    Of palettes of nearly the same price it is one with the fewest handles, and of these the one
+    whose terms for shape are least.
     """
     everything = [one for one, _ in found]
     cost = options.handle_cost
     close = [(p, at) for p, at in found if allowed(p, everything, options)]
-    for evaluations, share in ROUNDS:
+    for count, share in ROUNDS:
         close = [
-            (Priced(*refine_jointly(p.polytope, frames, gamut, options, evaluations, True)), at)
+            (Priced(*refine_jointly(p.polytope, frames, gamut, options, count, True)), at)
             for p, at in _close(close, cost, share)
         ]
     # No rare handles are counted where the price is too high without their cost.
@@ -149,14 +148,14 @@ def best_of(
             least = min(least, price)
             priced.append((price, one.polytope, at))
 
-    def shape(polytope: SkewPolytope) -> float:
+    def plainness(polytope: SkewPolytope) -> tuple[int, float]:
         weights = shaped_weights(options, gamut.scale)
         everywhere = range(len(frames))
         rows = frame_losses(polytope, frames, everywhere, weights, options, coarse=True)
-        return float(rows[:, 2].mean())
+        return len(polytope.vertices), float(rows[:, 2].mean())
 
     alike = [(p, at) for price, p, at in priced if price <= (1 + ALIKE) * least]
-    chosen, at = min(alike, key=lambda found: shape(found[0]))
+    chosen, at = min(alike, key=lambda found: plainness(found[0]))
     return at, chosen
 
 
@@ -186,11 +185,9 @@ def key_frames(
 ) -> list[FrameStatistics]:
     """Return frames that stand for all: evenly spaced, and those that one palette fits worst."""
     count = len(frames)
-    chosen = set(range(0, count, max(1, -(-count // even)))) | {count - 1}
-    rows = frame_losses(static, frames, range(count), loss_weights(options), options, coarse=True)
-    losses = options.lambda_ * rows[:, 0] + rows[:, 1]
-    chosen |= set(np.argsort(-losses, kind="stable")[:WORST_FRAMES].tolist())
-    return [frames[i] for i in sorted(chosen)]
+    chosen = {frame.frame for frame in [*frames[:: -(-count // even)], frames[-1]]}
+    chosen |= set(_worst_first(static, frames, options)[:WORST_FRAMES])
+    return [frame for frame in frames if frame.frame in chosen]
 
 
 def walk(
@@ -206,7 +203,7 @@ def walk(
     `known`. `frames` may be a choice of the clip's frames.
     """
     found: list[Priced] = []
-    first = Priced(*refine_jointly(polytope, frames, gamut, options, FIRST_EVALUATIONS, True))
+    first = Priced(*refine_jointly(polytope, frames, gamut, options, FIRST_STEPS, True))
     while True:
         steps = remove_singly(first, frames, gamut, options, [*known, *found])
         found += steps
@@ -218,7 +215,7 @@ def walk(
         if not poorer:
             return found
         first = min(
-            (Priced(*refine_jointly(p, frames, gamut, options, EVALUATIONS, True)) for p in poorer),
+            (Priced(*refine_jointly(p, frames, gamut, options, STEPS, True)) for p in poorer),
             key=lambda one: one.value,
         )
         if hopeless(first, found, [*known, *found], options):
@@ -234,17 +231,31 @@ def up_and_down(
 ) -> list[Priced]:
     """Return what is found when stops are put into a palette and single vertices removed again.
 
-    Goes on with the best of these as long as that is worthwhile.
+    Stops are put into the middle of each edge, or if that does not help, at the frames that fit
+    worst. Goes on with the best of these as long as one of the two is worthwhile.
     """
     found: list[Priced] = []
-    while True:
-        rich = moves.enriched(best.polytope)
-        first = Priced(*refine_jointly(rich, frames, gamut, options, FIRST_EVALUATIONS, True))
+    tries = 0
+    while tries < 2:
+        times = _worst_first(best.polytope, frames, options) if tries else ()
+        rich = moves.enriched(best.polytope, times)
+        first = Priced(*refine_jointly(rich, frames, gamut, options, FIRST_STEPS, True))
         steps = remove_singly(first, frames, gamut, options, [*known, *found])
         found += steps
-        before, best = best, min(steps, key=_usual_price)
-        if _usual_price(best) > (1 - WORTHWHILE) * _usual_price(before):
-            return found
+        new = min(steps, key=_usual_price)
+        tries = 0 if _usual_price(new) <= (1 - WORTHWHILE) * _usual_price(best) else tries + 1
+        best = min(best, new, key=_usual_price)
+    return found
+
+
+def _worst_first(
+    polytope: SkewPolytope, frames: Sequence[FrameStatistics], options: AnalysisOptions
+) -> list[float]:
+    """Return the times of frames, the one with the largest loss first."""
+    everything = range(len(frames))
+    rows = frame_losses(polytope, frames, everything, loss_weights(options), options, coarse=True)
+    order = np.argsort(-(options.lambda_ * rows[:, 0] + rows[:, 1]), kind="stable")
+    return [float(frames[i].frame) for i in order]
 
 
 def remove_singly(
@@ -267,9 +278,7 @@ def remove_singly(
         rest = last.polytope
         for vertex in sorted(cheapest[: max(1, len(cheapest) // 3)], reverse=True):
             rest = rest.without(vertex)
-        found.append(
-            Priced(*refine_jointly(rest, frames, gamut, options, EVALUATIONS, True, step=STEP))
-        )
+        found.append(Priced(*refine_jointly(rest, frames, gamut, options, STEPS, True)))
     return found
 
 

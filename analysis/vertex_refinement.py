@@ -18,7 +18,7 @@ from palette4d.analysis.objective import losses_of, refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import SkewPolytope
 
-EVALUATIONS = 25
+STEPS = 25
 # The longest step of a palette that is nearly right.
 GENTLE = 0.005
 # The factor of `convexity` for slices that are not convex.
@@ -36,12 +36,12 @@ def refine(
 
     The second result is taken if its deepest concavity is less. `brief` as in `Objective`.
     """
-    found, _ = refine_jointly(polytope, frames, gamut, options, EVALUATIONS, False, brief, GENTLE)
+    found, _ = refine_jointly(polytope, frames, gamut, options, STEPS, False, brief, GENTLE)
     deepest = deepest_concavity(found, frames)
     if not options.convexity or deepest <= CONCAVE:
         return found
     stiffer = dataclasses.replace(options, convexity=STIFFER * options.convexity)
-    again, _ = refine_jointly(found, frames, gamut, stiffer, EVALUATIONS, False, brief, GENTLE)
+    again, _ = refine_jointly(found, frames, gamut, stiffer, STEPS, False, brief, GENTLE)
     return again if deepest_concavity(again, frames) < deepest else found
 
 

@@ -14,7 +14,7 @@ from palette4d.analysis.frame_statistics import Gamut
 from palette4d.analysis.objective import losses_of, refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Section, SkewPolytope
-from palette4d.analysis.vertex_refinement import EVALUATIONS, GENTLE, refine, relax
+from palette4d.analysis.vertex_refinement import GENTLE, STEPS, refine, relax
 
 CUBE = np.array(list(itertools.product((0.1, 0.9), repeat=3)))
 FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
@@ -43,10 +43,10 @@ def frames():
 
 def test_slices_that_are_not_convex_are_refined_again(frames):
     start = cube_with_apex()
-    once, _ = refine_jointly(start, frames, GAMUT, LIMP, EVALUATIONS, False, (), GENTLE)
+    once, _ = refine_jointly(start, frames, GAMUT, LIMP, STEPS, False, (), GENTLE)
     assert deepest_concavity(once, frames) > CONCAVE
     free = dataclasses.replace(LIMP, convexity=0.0)
-    once, _ = refine_jointly(start, frames, GAMUT, free, EVALUATIONS, False, (), GENTLE)
+    once, _ = refine_jointly(start, frames, GAMUT, free, STEPS, False, (), GENTLE)
     assert deepest_concavity(once, frames) > CONCAVE
     # Without `convexity` nobody asks for it.
     found = refine(start, frames, GAMUT, free)
