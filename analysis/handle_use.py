@@ -37,8 +37,8 @@ def handle_use(
 ) -> F64:
     """Return the largest mean weight of each vertex in any frame.
 
-    `slice_of` returns the slice of a frame (index). No more frames are looked at when all vertices
-    have `enough`.
+    `slice_of` returns the slice of a frame (index). Frames are left out all of whose vertices have
+    `enough`.
     """
     use = np.zeros(len(vertices))
     times = np.array([f.frame for f in frames], float)
@@ -46,9 +46,9 @@ def handle_use(
     nearest = [int(np.argmin(np.abs(times - t))) for t in vertices[:, 3]]
     even = np.linspace(0, len(frames) - 1, min(len(frames), USE_FRAMES)).round().astype(int)
     for at in dict.fromkeys([*nearest, *even.tolist()]):
-        if (use >= enough).all():
-            break
         here, colours = slice_of(at), frames[at].coarse
+        if (use[here.ends] >= enough).all():
+            continue
         if len(here.faces) == 0:  # a line or a point needs every colour
             use[here.ends] = 1.0
             continue

@@ -108,7 +108,7 @@ def refine_jointly(
     moved = descend(slope, start / evaluate.scale, low, high, steps, longest) * evaluate.scale
     vertices = evaluate.with_fixed_times(np.clip(moved, *box), start)
     value, _ = evaluate(vertices, evaluate.everything, False)
-    if value >= evaluate(start, evaluate.everything, False)[0]:
+    if steps and value >= evaluate(start, evaluate.everything, False)[0]:
         # The best place is so near, maybe at a kink, that steps lead away from it.
         vertices = move_all(evaluate, start, max(1, steps // parts))
         value, _ = evaluate(vertices, evaluate.everything, False)

@@ -39,10 +39,9 @@ STARTS = 3
 
 def starts(frames: Sequence[FrameStatistics], options: AnalysisOptions) -> list[Start]:
     """Return the starts of all static palettes."""
-    colours = [
-        pooled([f.coarse for f in frames], POOLED * options.coarse_colours // 2**start)
-        for start in range(STARTS)
-    ]
+    colours = [pooled([f.coarse for f in frames], POOLED * options.coarse_colours)]
+    while len(colours) < STARTS:
+        colours.append(pooled(colours[-1:], max(1, len(colours[-1]) // 2)))
     return [(tree, simple_hull(tree, options)) for tree in colours]
 
 

@@ -27,8 +27,8 @@ from numpy.typing import NDArray
 from palette4d.analysis import moves
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
 from palette4d.analysis.handle_use import rare_handles
-from palette4d.analysis.losses import loss_weights, shaped_weights, smoothness
-from palette4d.analysis.objective import frame_losses, refine_jointly
+from palette4d.analysis.losses import loss_weights, shaped_weights, smoothness, thread_count
+from palette4d.analysis.objective import frame_losses, loss_of, refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import SkewPolytope
 
@@ -43,18 +43,19 @@ USUAL_COST = USUAL.handle_cost
 PATIENCE = 0.08
 # With a dearer handle or fewer vertices walks end only at so many times the cost.
 DEARER = 4
-# At the end palettes are refined in rounds on all frames: the steps of a round, and how far
-# above the least price a palette may be to take part. So many with the same numbers of handles and
-# colours do.
-ROUNDS, OF_A_KIND = ((5, 0.06), (20, 0.03)), 2
+# At the end palettes are refined in rounds, on more frames than before: the steps of a round, and
+# how far above the least price a palette may be to take part. So many with the same numbers of
+# handles and colours do.
+ROUNDS, OF_A_KIND = ((0, 0.5), (5, 0.06), (20, 0.03)), 2
 # Prices that differ by this share count as the same: the last refinement changes them by as much.
 ALIKE = 0.005
 # Stops are put into the best palette again if the last ones lowered its price by this share.
 WORTHWHILE = 0.01
 # A rare handle costs so much more, whatever `handle_cost` is.
 RARE_COST = USUAL_COST
-# The search looks at these evenly spaced frames, and those with the largest losses.
-KEY_FRAMES, EVEN_FRAMES, WORST_FRAMES = 48, 12, 6
+# So many evenly spaced frames are looked at, by merging and by walks, and so many others with the
+# largest losses.
+KEY_FRAMES, EVEN_FRAMES, WORST_FRAMES = 48, 9, 9
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -109,12 +110,10 @@ def search(
         if price > (1 + PATIENCE) * least:
             break
         least = min(least, price)
-    bound = (1 + PATIENCE) * min(map(_usual_price, known()))
     for _, seen, way in ways:
-        best = min(way, key=_usual_price)
-        if _usual_price(best) < bound:
-            way += up_and_down(best, seen, gamut, options, known())
-    return best_of([(one, at) for at, _, way in ways for one in way], frames, gamut, options)
+        way += up_and_down(min(way, key=_usual_price), seen, gamut, options, known())
+    everything = [(one, at) for at, _, way in ways for one in way]
+    return best_of(everything, few, frames, gamut, options)
 
 
 def _usual_price(one: Priced) -> float:
@@ -123,12 +122,14 @@ def _usual_price(one: Priced) -> float:
 
 def best_of(
     found: Sequence[tuple[Priced, int | None]],
+    few: Sequence[FrameStatistics],
     frames: Sequence[FrameStatistics],
     gamut: Gamut,
     options: AnalysisOptions,
 ) -> tuple[int | None, SkewPolytope]:
     """Return the best of all that was found, measured on all frames, and its start.
 
+    The first rounds look at a `few` frames, more than the walks.
     Of palettes of nearly the same price it is one with the fewest handles, and of these the one
     whose terms for shape are least.
     """
@@ -136,8 +137,9 @@ def best_of(
     cost = options.handle_cost
     close = [(p, at) for p, at in found if allowed(p, everything, options)]
     for count, share in ROUNDS:
+        seen = frames if (count, share) == ROUNDS[-1] else few
         close = [
-            (Priced(*refine_jointly(p.polytope, frames, gamut, options, count, True)), at)
+            (Priced(*refine_jointly(p.polytope, seen, gamut, options, count, True)), at)
             for p, at in _close(close, cost, share)
         ]
     # No rare handles are counted where the price is too high without their cost.
@@ -183,11 +185,18 @@ def key_frames(
     options: AnalysisOptions,
     even: int,
 ) -> list[FrameStatistics]:
-    """Return frames that stand for all: evenly spaced, and those that one palette fits worst."""
-    count = len(frames)
-    chosen = {frame.frame for frame in [*frames[:: -(-count // even)], frames[-1]]}
-    chosen |= set(_worst_first(static, frames, options)[:WORST_FRAMES])
-    return [frame for frame in frames if frame.frame in chosen]
+    """Return frames that stand for all: evenly spaced, and those that one palette fits worst.
+
+    The frames before and after these count too: otherwise a palette that fits a flash might change
+    long before it.
+    """
+    chosen = {*range(0, len(frames), -(-len(frames) // even)), len(frames) - 1}
+    most = len(chosen) + WORST_FRAMES
+    for worst in _worst_first(static, frames, options):
+        if len(chosen) >= most:
+            break
+        chosen |= {worst - 1, worst, worst + 1} & set(range(len(frames)))
+    return [frames[i] for i in sorted(chosen)]
 
 
 def walk(
@@ -235,27 +244,33 @@ def up_and_down(
     worst. Goes on with the best of these as long as one of the two is worthwhile.
     """
     found: list[Priced] = []
-    tries = 0
-    while tries < 2:
-        times = _worst_first(best.polytope, frames, options) if tries else ()
+    least = min(map(_usual_price, known))
+    times: Sequence[float] = ()
+    while True:
         rich = moves.enriched(best.polytope, times)
         first = Priced(*refine_jointly(rich, frames, gamut, options, FIRST_STEPS, True))
         steps = remove_singly(first, frames, gamut, options, [*known, *found])
         found += steps
-        new = min(steps, key=_usual_price)
-        tries = 0 if _usual_price(new) <= (1 - WORTHWHILE) * _usual_price(best) else tries + 1
-        best = min(best, new, key=_usual_price)
-    return found
+        before, best = best, min(best, *steps, key=_usual_price)
+        if _usual_price(best) <= (1 - WORTHWHILE) * _usual_price(before):
+            times = ()
+        elif times or _usual_price(best) > (1 + PATIENCE) * least:
+            return found
+        else:
+            worst = _worst_first(best.polytope, frames, options)
+            times = [float(frames[i].frame) for i in worst]
 
 
 def _worst_first(
     polytope: SkewPolytope, frames: Sequence[FrameStatistics], options: AnalysisOptions
-) -> list[float]:
-    """Return the times of frames, the one with the largest loss first."""
+) -> list[int]:
+    """Return the indices of frames, the one with the largest loss first."""
     everything = range(len(frames))
     rows = frame_losses(polytope, frames, everything, loss_weights(options), options, coarse=True)
-    order = np.argsort(-(options.lambda_ * rows[:, 0] + rows[:, 1]), kind="stable")
-    return [float(frames[i].frame) for i in order]
+    order: list[int] = np.argsort(
+        -options.lambda_ * rows[:, 0] - rows[:, 1], kind="stable"
+    ).tolist()
+    return order
 
 
 def remove_singly(
@@ -338,23 +353,27 @@ def _cheapest(
 ) -> list[int]:
     """Return removable vertices, the least needed first, no two of them neighbours in time."""
     times = np.array([frame.frame for frame in frames], float)
-    length = polytope.length()
+    vertices, edges, length = polytope.vertices, polytope.edges(), polytope.length()
     before, after = polytope.neighbours()
+    loss = loss_of(polytope, frames, coarse=True)
+    weights = shaped_weights(options, gamut.scale)
 
-    def losses(of: SkewPolytope, which: Sequence[int]) -> F64:
-        weights = shaped_weights(options, gamut.scale)
-        rows = frame_losses(of, frames, which, weights, options, coarse=True)
+    def losses(of: F64, which: Sequence[int]) -> F64:
+        rows, _ = loss.evaluate(of, which, weights, thread_count(options), False)
         total: F64 = options.lambda_ * rows[:, 0] + rows[:, 1] + rows[:, 2]
         return total
 
-    now = losses(polytope, range(len(frames)))
+    now = losses(vertices, range(len(frames)))
     order = []
     for vertex in polytope.removable():
-        rest = polytope.without(vertex)
-        start, end = polytope.vertices[[before[vertex][0], after[vertex][0]], 3]
-        which = np.flatnonzero((times > start) & (times < end)).tolist()
+        (early,), (late,) = before[vertex], after[vertex]
+        start, end = vertices[early], vertices[late]
+        rest = vertices.copy()  # with the vertex on the edge between its neighbours
+        rest[vertex] = start + (rest[vertex, 3] - start[3]) / (end[3] - start[3]) * (end - start)
+        which = np.flatnonzero((times > start[3]) & (times < end[3])).tolist()
         rise = float((losses(rest, which) - now[which]).sum()) / len(frames) if which else 0.0
-        k, _ = smoothness(rest.vertices, rest.edges(), length)
+        others = edges[(edges != vertex).all(axis=1)]
+        k, _ = smoothness(rest, np.vstack([others, np.int32([[early, late]])]), length)
         order.append((rise + options.gamma * k, vertex))
     chosen: list[int] = []
     busy: set[int] = set()

@@ -16,7 +16,7 @@ import sys
 import numpy as np
 import pytest
 from palette4d.analysis import colour_statistics
-from palette4d.analysis.losses import LOST, loss_weights, smoothness, summarise
+from palette4d.analysis.losses import LOST_SHARE, loss_weights, smoothness, summarise
 from palette4d.analysis.options import AnalysisOptions
 from scipy.spatial import ConvexHull
 
@@ -107,7 +107,7 @@ def some_frames(clip, folder):
 def test_the_default_result_of_seasons(seasons, judge, measured, tmp_path):
     path = tmp_path / "seasons.p4d.json"
     command = [sys.executable, "-m", "palette4d", "analyze", str(seasons), "-o", str(path)]
-    subprocess.run([*command, "--quiet"], check=True)
+    report = subprocess.run([*command, "--json"], check=True, capture_output=True).stdout
     clip = some_frames(seasons, tmp_path)
     numbers, colours = exact_colours(clip, measured)
     palette = measured.TimedPalette.of_sidecar(path)
@@ -127,9 +127,11 @@ def test_the_default_result_of_seasons(seasons, judge, measured, tmp_path):
     mean = result["mean"]
     assert len(polytope.vertices) <= 20
     stated = json.loads(path.read_text())["quality"]["stages"][-1]
-    assert stated["L_prime"] <= 0.094
+    assert stated["L_prime"] <= 0.09
     assert stated["outside_1_255"] <= 0.025
-    assert stated["max_distance"] <= LOST  # no pixel is lost
+    # No colour is lost: in no frame as many as six of 264,480 pixels.
+    assert max(frame["lost"] for frame in json.loads(report)["frames"]) < LOST_SHARE / 5
+    assert stated["max_distance"] <= 0.26
     # What the sidecar and the benchmarks state is the same.
     assert stated["K"] == pytest.approx(mean["K"], abs=AGREE)
     figures = measured.measure(str(clip), {"default": palette})["default"]

@@ -103,7 +103,7 @@ def test_a_rare_colour_goes_if_it_does_not_pay_for_being_rare():
     for gain, colours in ((1.0, 4), (3.0, 5)):  # of the rare colour, in rare handles' extra costs
         cost = (poor.value - rich.value - gain * RARE_COST) / 2
         options = dataclasses.replace(paper, handle_cost=cost)
-        _, best = best_of(found, frames, GAMUT, options)
+        _, best = best_of(found, frames, frames, GAMUT, options)
         assert len(best.blocks[0].tracks) == colours
 
 
@@ -117,12 +117,12 @@ def straight_and_bent(at=4):
 
 
 @pytest.mark.parametrize(
-    ("options", "stops"), [({}, 1), ({"handle_cost": 0.5}, 0), ({"vertices": 8}, 0)]
+    ("options", "stops"), [({}, 1), ({"handle_cost": 5.0}, 0), ({"vertices": 8}, 0)]
 )
 def test_palettes_that_seem_nearly_equal_are_compared_on_all_frames(options, stops):
     frames, straight, bent = straight_and_bent()
     seems = [(Priced(straight, 0.1), 0), (Priced(bent, 0.1), 0)]
-    _, best = best_of(seems, frames, GAMUT, AnalysisOptions(**options))
+    _, best = best_of(seems, frames, frames, GAMUT, AnalysisOptions(**options))
     assert len(best.vertices) == len(straight.vertices) + stops
 
 
@@ -130,7 +130,7 @@ def test_of_many_palettes_of_a_kind_the_best_are_compared():
     frames, _, good = straight_and_bent()
     worse = [straight_and_bent(at)[2] for at in (1, 2, 6, 7)]
     seems = [(Priced(polytope, 0.1), at) for at, polytope in enumerate(worse)]
-    at, _ = best_of([*seems, (Priced(good, 0.099), 9)], frames, GAMUT, AnalysisOptions())
+    at, _ = best_of([*seems, (Priced(good, 0.099), 9)], frames, frames, GAMUT, AnalysisOptions())
     assert at == 9
 
 
