@@ -53,16 +53,22 @@ def _representing(clip: ClipAtTimes, times: Sequence[float], *, alike: bool) -> 
             apart[i, k] = apart[k, i] = across - own[i] - own[k]
     step = np.mean([2 * _mean_distance(c, c + STEP) for c in colours]) - 2 * np.mean(own)
     least = step if alike else 0.0
-    # Of frames of the same colours those far from others in time stay.
+    # A long gap counts like other colours; of frames of the same colours those far in time stay.
     when = np.asarray(times) / max(np.ptp(times), 1)
-    apart = apart + 1e-9 * np.abs(when[:, None] - when)
+    gap = np.abs(when[:, None] - when)
+    apart = apart + 1e-9 * gap
+    apart_too_in_time = apart + apart.mean() * gap
     kept = list(range(count))
+
+    def missed(gone: int, by: F64) -> F64:
+        nearest: F64 = by[:, [k for k in kept if k != gone]].min(axis=1)
+        return nearest
+
     while len(kept) > 2:
-        near = [apart[:, [j for j in kept if j != k]].min(axis=1) for k in kept[1:-1]]
-        gone = int(np.argmin([each.sum() for each in near]))
-        if len(kept) <= SHOWN and near[gone].max() > least:
+        gone = min(kept[1:-1], key=lambda k: missed(k, apart_too_in_time).sum())
+        if len(kept) <= SHOWN and missed(gone, apart).max() > least:
             break
-        del kept[1 + gone]
+        kept.remove(gone)
     return [times[k] for k in kept]
 
 
