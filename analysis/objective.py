@@ -35,7 +35,7 @@ LEAST_GAP = 0.5
 # Weight in eq. 11 of the edges to and from a colour that exists for a short time only.
 BRIEF = 0.25
 # A joint step looks at a part of the frames: one of at most so many, of at least so many frames.
-MOST_PARTS, FEWEST_OF_A_PART = 4, 3
+MOST_PARTS, FEWEST_OF_A_PART = 3, 3
 
 
 def loss_of(
@@ -102,7 +102,8 @@ def refine_jointly(
     def slope(x: F64, step: int) -> F64:
         some = evaluate.everything[step % parts :: parts]
         _, gradient = evaluate(x * evaluate.scale, some, for_all=True)
-        return gradient * evaluate.scale
+        scaled: F64 = gradient * evaluate.scale
+        return scaled
 
     low, high = (bound / evaluate.scale for bound in box)
     moved = descend(slope, start / evaluate.scale, low, high, steps, longest) * evaluate.scale

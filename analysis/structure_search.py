@@ -43,9 +43,9 @@ USUAL_COST = USUAL.handle_cost
 PATIENCE = 0.08
 # With a dearer handle or fewer vertices walks end only at so many times the cost.
 DEARER = 4
-# At the end palettes are refined in rounds, on more frames than before: the steps of a round, and
-# how far above the least price a palette may be to take part. So many with the same numbers of
-# handles and colours do.
+# At the end palettes are refined in rounds, on more frames than before and on all frames in the
+# last one: the steps of a round, and how far above the least price a palette may be to take part.
+# So many with the same numbers of handles and colours do.
 ROUNDS, OF_A_KIND = ((0, 0.5), (5, 0.06), (20, 0.03)), 2
 # Prices that differ by this share count as the same: the last refinement changes them by as much.
 ALIKE = 0.005
@@ -55,7 +55,7 @@ WORTHWHILE = 0.01
 RARE_COST = USUAL_COST
 # So many evenly spaced frames are looked at, by merging and by walks, and so many others with the
 # largest losses.
-KEY_FRAMES, EVEN_FRAMES, WORST_FRAMES = 48, 9, 9
+KEY_FRAMES, EVEN_FRAMES, WORST_FRAMES = 48, 16, 8
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -129,17 +129,15 @@ def best_of(
 ) -> tuple[int | None, SkewPolytope]:
     """Return the best of all that was found, measured on all frames, and its start.
 
-    The first rounds look at a `few` frames, more than the walks.
-    Of palettes of nearly the same price it is one with the fewest handles, and of these the one
-    whose terms for shape are least.
+    The first rounds look at a `few` frames, more than the walks. Of palettes of nearly the same
+    price it is one with the fewest handles, and of these the one whose terms for shape are least.
     """
     everything = [one for one, _ in found]
     cost = options.handle_cost
     close = [(p, at) for p, at in found if allowed(p, everything, options)]
-    for count, share in ROUNDS:
-        seen = frames if (count, share) == ROUNDS[-1] else few
+    for (steps, share), seen in zip(ROUNDS, (few, few, frames), strict=True):
         close = [
-            (Priced(*refine_jointly(p.polytope, seen, gamut, options, count, True)), at)
+            (Priced(*refine_jointly(p.polytope, seen, gamut, options, steps, True)), at)
             for p, at in _close(close, cost, share)
         ]
     # No rare handles are counted where the price is too high without their cost.
@@ -373,7 +371,7 @@ def _cheapest(
         which = np.flatnonzero((times > start[3]) & (times < end[3])).tolist()
         rise = float((losses(rest, which) - now[which]).sum()) / len(frames) if which else 0.0
         others = edges[(edges != vertex).all(axis=1)]
-        k, _ = smoothness(rest, np.vstack([others, np.int32([[early, late]])]), length)
+        k, _ = smoothness(rest, np.vstack([others, np.array([[early, late]], np.int32)]), length)
         order.append((rise + options.gamma * k, vertex))
     chosen: list[int] = []
     busy: set[int] = set()

@@ -15,8 +15,8 @@ import sys
 
 import numpy as np
 import pytest
-from palette4d.analysis import colour_statistics
-from palette4d.analysis.losses import LOST_SHARE, loss_weights, smoothness, summarise
+from palette4d.analysis import colour_statistics, pipeline
+from palette4d.analysis.losses import LOST, loss_weights, smoothness, summarise
 from palette4d.analysis.options import AnalysisOptions
 from scipy.spatial import ConvexHull
 
@@ -107,7 +107,7 @@ def some_frames(clip, folder):
 def test_the_default_result_of_seasons(seasons, judge, measured, tmp_path):
     path = tmp_path / "seasons.p4d.json"
     command = [sys.executable, "-m", "palette4d", "analyze", str(seasons), "-o", str(path)]
-    report = subprocess.run([*command, "--json"], check=True, capture_output=True).stdout
+    subprocess.run([*command, "--quiet"], check=True)
     clip = some_frames(seasons, tmp_path)
     numbers, colours = exact_colours(clip, measured)
     palette = measured.TimedPalette.of_sidecar(path)
@@ -129,9 +129,7 @@ def test_the_default_result_of_seasons(seasons, judge, measured, tmp_path):
     stated = json.loads(path.read_text())["quality"]["stages"][-1]
     assert stated["L_prime"] <= 0.09
     assert stated["outside_1_255"] <= 0.025
-    # No colour is lost: in no frame as many as six of 264,480 pixels.
-    assert max(frame["lost"] for frame in json.loads(report)["frames"]) < LOST_SHARE / 5
-    assert stated["max_distance"] <= 0.26
+    assert stated["max_distance"] <= LOST  # no pixel is lost
     # What the sidecar and the benchmarks state is the same.
     assert stated["K"] == pytest.approx(mean["K"], abs=AGREE)
     figures = measured.measure(str(clip), {"default": palette})["default"]
@@ -140,6 +138,14 @@ def test_the_default_result_of_seasons(seasons, judge, measured, tmp_path):
     np.testing.assert_allclose(found, [mean[name] for name in names], rtol=0, atol=AGREE)
     assert (figures.vertices, figures.blocks) == (mean["vertices4d"], mean["blocks"])
     assert figures.colours == pytest.approx(mean["vertices"])
+
+
+@pytest.mark.parametrize(("method", "most"), [("paper", 0.1), ("static", 0.135)])
+def test_what_the_default_is_compared_with_stays_good(seasons, method, most):
+    """Hulls are simplified edge by edge: their colours in another order gave the paper's rules L'
+    0.154, and the static palette 0.144."""
+    found = pipeline.analyze(open_clip(str(seasons)), AnalysisOptions(method=method))
+    assert found.stages[-1].losses.L_prime <= most
 
 
 def bad_palette(first, last):

@@ -1,12 +1,8 @@
 #include "fit/colour_tree.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdint>
-#include <cstring>
 #include <limits>
-#include <numeric>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
@@ -22,118 +18,55 @@ constexpr double kTie = 1e-12;
 
 }  // namespace
 
-/// Splits colours at their median again and again, along the longest side of their box.
-class ColourTree::Builder {
-public:
-    static constexpr int kAxes = 3;
-
-    explicit Builder(const std::vector<Vec3>& rgb) : rgb_(rgb), before_(rgb.size()) {
-        spare_.resize(rgb.size());
-        for (int c = 0; c < kAxes; ++c) sort_along(c);
-        split(0, static_cast<int>(rgb.size()));
-    }
-
-    std::vector<int> leaf_starts;  ///< as in ColourTree, without size()
-    std::vector<Box> boxes;        ///< of the leaves
-
-    /// The colours' indices, leaf by leaf.
-    const std::vector<int>& order() const { return sorted_[0]; }
-
-private:
-    /// A radix sort. Single precision will do: any split gives a tree.
-    void sort_along(int axis) {
-        constexpr int kDigit = 11, kValues = 1 << kDigit, kBits = 32;
-        std::vector<std::uint32_t> keys;
-        for (const Vec3& colour : rgb_) {
-            const auto value = static_cast<float>(colour[axis]);
-            std::uint32_t bits;
-            std::memcpy(&bits, &value, sizeof bits);
-            keys.push_back(bits >> (kBits - 1) ? ~bits : bits | 1u << (kBits - 1));
-        }
-        std::vector<int>& sorted = sorted_[axis];
-        sorted.resize(rgb_.size());
-        std::iota(sorted.begin(), sorted.end(), 0);
-        for (int shift = 0; shift < kBits; shift += kDigit) {
-            std::array<int, kValues + 1> at{};
-            for (const std::uint32_t key : keys) ++at[(key >> shift) % kValues + 1];
-            std::partial_sum(at.begin(), at.end(), at.begin());
-            for (const int i : sorted) spare_[at[(keys[i] >> shift) % kValues]++] = i;
-            sorted.swap(spare_);
-        }
-    }
-
-    void split(int begin, int end) {
-        if (end - begin <= kLeafSize) {
-            leaf_starts.push_back(begin);
-            boxes.push_back(box_of(begin, end));
-            return;
-        }
-        int axis = 0;
-        double longest = -1;
-        for (int c = 0; c < kAxes; ++c) {
-            const double length = rgb_[sorted_[c][end - 1]][c] - rgb_[sorted_[c][begin]][c];
-            if (length > longest) {
-                longest = length;
-                axis = c;
-            }
-        }
-        const int middle = begin + (end - begin) / 2;
-        for (int i = begin; i < end; ++i) before_[sorted_[axis][i]] = i < middle;
-        for (int c = 0; c < kAxes; ++c)
-            if (c != axis) divide(sorted_[c], begin, end);
-        split(begin, middle);
-        split(middle, end);
-    }
-
-    /// Moves what is before the median to the front; both parts stay sorted.
-    void divide(std::vector<int>& sorted, int begin, int end) {
-        int front = begin, back = 0;
-        for (int i = begin; i < end; ++i) {
-            const int colour = sorted[i];
-            sorted[front] = spare_[back] = colour;  // without a branch
-            front += before_[colour];
-            back += !before_[colour];
-        }
-        std::copy_n(spare_.begin(), back, sorted.begin() + front);
-    }
-
-    Box box_of(int begin, int end) const {
-        Box box{rgb_[order()[begin]], rgb_[order()[begin]]};
-        auto& [low, high] = box;
-        for (int i = begin; i < end; ++i)
-            for (int c = 0; c < kAxes; ++c) {
-                low[c] = std::min(low[c], rgb_[order()[i]][c]);
-                high[c] = std::max(high[c], rgb_[order()[i]][c]);
-            }
-        return box;
-    }
-
-    const std::vector<Vec3>& rgb_;
-    std::array<std::vector<int>, kAxes> sorted_;  // indices, sorted along each axis in each part
-    std::vector<std::uint8_t> before_;            // of each colour: whether it is before the median
-    std::vector<int> spare_;
-};
-
-ColourTree::ColourTree(const std::vector<Vec3>& rgb, const std::vector<double>& counts)
-    : size_(rgb.size()) {
+ColourTree::ColourTree(std::vector<Vec3> rgb, std::vector<double> counts) : size_(rgb.size()) {
     if (rgb.empty() || rgb.size() != counts.size())
         throw std::invalid_argument("a colour tree needs as many counts as colours, at least one");
     for (std::size_t i = 0; i < rgb.size(); ++i) {
         if (!(counts[i] > 0) || !std::isfinite(counts[i]) || !finite(rgb[i]))
             throw std::invalid_argument("a colour tree needs finite colours and positive counts");
     }
-    Builder builder(rgb);
-    leaf_starts_ = std::move(builder.leaf_starts);
+    std::vector<Colour> order(rgb.size());
+    for (std::size_t i = 0; i < rgb.size(); ++i) order[i].index = static_cast<int>(i);
+    std::vector<Box> leaves;
+    build(0, static_cast<int>(rgb.size()), rgb, order, leaves);
     leaf_starts_.push_back(static_cast<int>(size_));
-    build_levels(std::move(builder.boxes));
-    counts_.resize(size_ + kLeafSize);
-    for (auto& channel : channel_) channel.resize(size_ + kLeafSize);
-    for (std::size_t i = 0; i < size_; ++i) {
-        const auto from = static_cast<std::size_t>(builder.order()[i]);
-        for (std::size_t c = 0; c < channel_.size(); ++c) channel_[c][i] = rgb[from][c];
-        counts_[i] = counts[from];
+    build_levels(std::move(leaves));
+    counts_.resize(rgb.size() + kLeafSize);
+    for (int c = 0; c < 3; ++c) {
+        channel_[c].resize(rgb.size() + kLeafSize);
+        for (std::size_t i = 0; i < order.size(); ++i) channel_[c][i] = rgb[order[i].index][c];
+    }
+    for (std::size_t i = 0; i < order.size(); ++i) {
+        counts_[i] = counts[order[i].index];
         total_ += counts_[i];
     }
+}
+
+void ColourTree::build(int begin, int end, const std::vector<Vec3>& rgb, std::vector<Colour>& order,
+                       std::vector<Box>& leaves) {
+    Box box{rgb[order[begin].index], rgb[order[begin].index]};
+    auto& [low, high] = box;
+    for (int i = begin; i < end; ++i)
+        for (int c = 0; c < 3; ++c) {
+            low[c] = std::min(low[c], rgb[order[i].index][c]);
+            high[c] = std::max(high[c], rgb[order[i].index][c]);
+        }
+    if (end - begin <= kLeafSize) {
+        leaf_starts_.push_back(begin);
+        leaves.push_back(box);
+        return;
+    }
+    int axis = 0;
+    for (int c = 1; c < 3; ++c)
+        if (high[c] - low[c] > high[axis] - low[axis]) axis = c;
+    const int middle = begin + (end - begin) / 2;
+    for (int i = begin; i < end; ++i) order[i].along = rgb[order[i].index][axis];
+    std::nth_element(order.begin() + begin, order.begin() + middle, order.begin() + end,
+                     [](const Colour& a, const Colour& b) {
+                         return (a.along < b.along) | ((a.along == b.along) & (a.index < b.index));
+                     });
+    build(begin, middle, rgb, order, leaves);
+    build(middle, end, rgb, order, leaves);
 }
 
 /// A level's boxes: first the leaves, then one around each group of the level before.

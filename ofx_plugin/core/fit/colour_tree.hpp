@@ -34,7 +34,7 @@ public:
     };
 
     /// n colours (finite) and n positive counts. Throws std::invalid_argument otherwise.
-    ColourTree(const std::vector<Vec3>& rgb, const std::vector<double>& counts);
+    ColourTree(std::vector<Vec3> rgb, std::vector<double> counts);
 
     /// The mean of the k pixels nearest to v (v_N of eq. 3), or of all pixels when there are fewer.
     /// Pixels tied at the k-th distance share the remaining count, so their order does not matter.
@@ -58,9 +58,14 @@ public:
     double total() const { return total_; }
 
 private:
-    class Builder;
+    struct Colour {
+        double along;  ///< its place along the axis that is split
+        int index;     ///< index in the given order
+    };
     class Search;
     using Box = std::pair<Vec3, Vec3>;  // low and high
+    void build(int begin, int end, const std::vector<Vec3>& rgb, std::vector<Colour>& order,
+               std::vector<Box>& leaves);
     void build_levels(std::vector<Box> boxes);
 
     std::size_t size_ = 0;
