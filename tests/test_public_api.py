@@ -39,7 +39,7 @@ GOLDEN = Path(__file__).resolve().parent / "golden" / "sidecars"
 def clip_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """shot.####.png, frames 1 to 48 of the sample clip, and shot.mov of the first 13."""
     folder = tmp_path_factory.mktemp("clip")
-    scene = Scene(16, 9)
+    scene = Scene(32, 18)
     pictures = [np.clip(scene.picture(i / 47), 0, 1) for i in range(48)]
     codes = [np.rint(picture * 255).astype(np.uint8) for picture in pictures]
     for i, picture in enumerate(codes):
