@@ -99,11 +99,11 @@ def static_polytope(
 def ladder(
     begin: Start, frames: Sequence[FrameStatistics], gamut: Gamut, options: AnalysisOptions
 ) -> Iterator[SkewPolytope]:
-    """Yield static palettes from `palette_size` colours down to four, each without one colour of
-    the last; first without `convexity`, then with it.
+    """Yield static palettes from `palette_size` colours down to four.
 
-    Colours that do not get to a corner of the palette go too. Nothing is yielded for colours
-    without volume.
+    Each lacks one colour of the one before. Of two such ladders, without `convexity` and with it,
+    the better palette of each number of colours is yielded. Colours that do not get to a corner of
+    the palette go too. Nothing is yielded for colours without volume.
     """
     colours, _ = begin
     simple = simple_hull(colours, options, options.palette_size)
