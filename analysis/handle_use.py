@@ -37,7 +37,7 @@ def handle_use(
 ) -> F64:
     """Return the largest mean weight of each vertex in any frame.
 
-    `slice_of` returns the slice of a frame (index). Frames are left out all of whose vertices have
+    `slice_of` returns the slice of a frame (index). A frame is left out if all its vertices have
     `enough`.
     """
     use = np.zeros(len(vertices))

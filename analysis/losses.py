@@ -31,8 +31,8 @@ STOPPED = (
 # A pixel farther outside than this is lost: edits of the palette do not reach it. A smaller share
 # of a frame counts as hot pixels or glints.
 LOST, LOST_SHARE = 0.25, 1e-4
-# `descend`: the longest step, in colour or in parts of the clip; which step is the first as long;
-# how much of the mean and of the mean square of the gradient a step keeps; a square of the gradient
+# `descend`: the longest step, in colour or in parts of the clip; how many steps grow up to it; how
+# much of the mean and of the mean square of the gradient a step keeps; a square of the gradient
 # that counts as zero.
 STEP, WARM_UP, MEAN, SQUARE, TINY = 0.012, 3, 0.65, 0.9, 1e-18
 NO_FACES: I32 = np.zeros((0, 3), np.int32)

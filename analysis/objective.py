@@ -34,7 +34,8 @@ F64 = NDArray[np.float64]
 LEAST_GAP = 0.5
 # Weight in eq. 11 of the edges to and from a colour that exists for a short time only.
 BRIEF = 0.25
-# A joint step looks at a part of the frames: one of at most so many, of at least so many frames.
+# A joint step looks at one part of the frames. There are at most so many parts, each of at least so
+# many frames.
 MOST_PARTS, FEWEST_OF_A_PART = 3, 3
 
 

@@ -4,10 +4,11 @@ Input: polytopes to start from (the configurations of block merging, thinned out
 Output: the polytope of the least price, refined on coarse colours. The price is what is minimised,
 eq. 12 with the terms for shape, plus `handle_cost` a vertex, plus `RARE_COST` a rare one.
 
-From each start a walk goes down from rich to poor. Each step takes away the vertex whose loss costs
-least, and all others move jointly to take over. Then the walk goes back to its best palette, takes
-a whole colour away (`moves`), and goes down again, until no poorer palette can be the best. Stops
-are put into the best palettes, and single vertices removed again.
+Static hulls are refined. From each other start a walk goes down from rich to poor. Each step takes
+away the vertex whose loss costs least, and all others move jointly to take over. Then the walk goes
+back to its best palette, takes a whole colour away (`moves`), and goes down again, until no poorer
+palette can be the best. Stops are put into the best palette of each start, and single vertices
+removed again.
 `handle_cost`, `vertices` and `blocks` choose among the palettes found. A dearer handle and fewer
 vertices also lengthen the walks. So a dearer handle hardly ever means more handles, and more of
 what is allowed hardly ever anything worse (docs/lab/search.md).

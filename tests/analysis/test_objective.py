@@ -83,6 +83,16 @@ def test_joint_refinement_finds_the_bend_and_never_worsens(frames):
     np.testing.assert_array_equal(same.vertices, start.vertices)
 
 
+def test_parts_of_the_frames_stand_for_all(frames):
+    options = AnalysisOptions()
+    start = bent(5.3)
+    evaluate = Objective(start, frames[:9], options, GAMUT, coarse=True)
+    whole = evaluate(start.vertices, list(range(9)))
+    parts = [evaluate(start.vertices, list(range(i, 9, 3)), for_all=True) for i in range(3)]
+    assert np.mean([value for value, _ in parts]) == pytest.approx(whole[0])
+    np.testing.assert_allclose(np.mean([slope for _, slope in parts], axis=0), whole[1], atol=1e-12)
+
+
 def test_what_is_there_for_a_moment_stays_where_it_is_in_time(frames):
     start = bent(5.3)  # the bend is at 4
     found, _ = refine_jointly(start, frames, GAMUT, AnalysisOptions(), 100, True, brief=(8,))

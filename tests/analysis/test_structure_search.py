@@ -13,7 +13,7 @@ from palette4d.analysis import moves, pipeline
 from palette4d.analysis.convex_hulls import hull_mesh
 from palette4d.analysis.dense_polytope import DensePolytope
 from palette4d.analysis.frame_statistics import Gamut
-from palette4d.analysis.handle_use import rare_handles
+from palette4d.analysis.handle_use import RARE, handle_use, rare_handles
 from palette4d.analysis.objective import Objective, refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import FramePalette
@@ -124,6 +124,28 @@ def test_palettes_that_seem_nearly_equal_are_compared_on_all_frames(options, sto
     seems = [(Priced(straight, 0.1), 0), (Priced(bent, 0.1), 0)]
     _, best = best_of(seems, frames, frames, GAMUT, AnalysisOptions(**options))
     assert len(best.vertices) == len(straight.vertices) + stops
+
+
+def test_of_palettes_that_cost_the_same_the_one_with_the_fewest_handles_is_taken():
+    frames = stats([mixture(SIX, i) for i in range(9)])  # which do not change
+    mesh = hull_mesh(FOUR)
+    plain = DensePolytope((0, 8), [[FramePalette(mesh.rgb, mesh.faces)] * 2], []).polytope()
+    richer = moves.enriched(plain)
+    for order in ((plain, richer), (richer, plain)):
+        seems = [(Priced(polytope, 0.1), 0) for polytope in order]
+        _, best = best_of(seems, frames, frames, GAMUT, AnalysisOptions(handle_cost=0.0))
+        assert len(best.vertices) == len(plain.vertices)
+
+
+def test_rare_handles_need_not_be_looked_at_in_all_frames():
+    pictures = [mixture(FOUR, i) for i in range(4)]
+    for picture in pictures:
+        picture.reshape(-1, 3)[-3:] = 0.9
+    frames = stats(pictures)
+    hull = hull_mesh(np.vstack([FOUR, np.full(3, 0.9)]))
+    polytope = full([FramePalette(hull.rgb, hull.faces)] * 4)
+    use = handle_use(polytope.vertices, lambda at: polytope.slice_at(float(at)), frames)
+    assert rare_handles(polytope, frames) == (use < RARE).sum() == 4
 
 
 def test_of_many_palettes_of_a_kind_the_best_are_compared():

@@ -69,6 +69,13 @@ def test_a_slow_change_is_shown_evenly() -> None:
     assert np.diff(shown).max() <= 15
 
 
+def test_a_quick_change_leaves_pictures_for_the_rest() -> None:
+    reds = [*np.linspace(0, 0.8, 6), *np.linspace(0.81, 0.95, 15)]
+    shown = default_frames(palette_through(100), clip_through(pictures(reds)))
+    assert len(shown) == 6
+    assert np.diff(shown).max() <= 40
+
+
 def test_without_colours_of_the_clip_frames_are_even() -> None:
     shown = default_frames(palette_through(50), clip_through(pictures([0.3]), stored=False))
     assert len(shown) == 6
