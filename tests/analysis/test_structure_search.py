@@ -146,6 +146,9 @@ def test_rare_handles_need_not_be_looked_at_in_all_frames():
     polytope = full([FramePalette(hull.rgb, hull.faces)] * 4)
     use = handle_use(polytope.vertices, lambda at: polytope.slice_at(float(at)), frames)
     assert rare_handles(polytope, frames) == (use < RARE).sum() == 4
+    # The stop is in one frame with vertices that are known to have enough.
+    frames, _, bent = straight_and_bent()
+    assert rare_handles(bent, frames) == 0
 
 
 def test_of_many_palettes_of_a_kind_the_best_are_compared():

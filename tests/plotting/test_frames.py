@@ -70,7 +70,7 @@ def test_a_slow_change_is_shown_evenly() -> None:
 
 
 def test_a_quick_change_leaves_pictures_for_the_rest() -> None:
-    reds = [*np.linspace(0, 0.8, 6), *np.linspace(0.81, 0.95, 15)]
+    reds = [*np.linspace(0, 0.8, 6), *np.linspace(0.81, 0.85, 15)]
     shown = default_frames(palette_through(100), clip_through(pictures(reds)))
     assert len(shown) == 6
     assert np.diff(shown).max() <= 40
