@@ -12,6 +12,7 @@ import concurrent.futures
 import dataclasses
 import functools
 import itertools
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, TypeVar
 
@@ -31,7 +32,6 @@ from palette4d.analysis import (
 )
 from palette4d.analysis.baselines import paper_thresholds, rgbt_hull
 from palette4d.analysis.block_merging import Block
-from palette4d.analysis.convex_hulls import CONCAVE, deepest_concavity
 from palette4d.analysis.dense_polytope import DensePolytope
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
 from palette4d.analysis.losses import LOST_SHARE, Losses, thread_count
@@ -279,9 +279,9 @@ class _Run:
         self.measured: dict[SkewPolytope, Losses] = {}
 
     @functools.cached_property
-    def starts(self) -> list[static_hull.Start]:
-        """The starts of static palettes."""
-        return static_hull.starts(self.frames, self.options)
+    def ladder(self) -> list[static_hull.Rung]:
+        """Static palettes of fewer and fewer colours."""
+        return static_hull.ladder(self.frames, self.gamut, self.options)
 
     def counter(self, stage: str) -> Callable[[int, int], object]:
         """Return the progress callback of one stage."""
@@ -312,11 +312,12 @@ class _Run:
 def _skew(run: _Run) -> SkewPolytope:
     """Sections 5.2 to 5.5. Each handle of the result is worth its cost (the default method)."""
     options = run.options
-    hulls = [_static(run), *static_hull.plain_hulls(run.starts, run.frames, run.gamut, options)]
-    convex = [h for h in hulls if h is hulls[0] or not _is_concave(h, run)]
-    simple = min(convex, key=lambda hull: _price(hull, run, options.handle_cost))
+    usual = _static(run)  # does not depend on `handle_cost`
+    fewest = len(run.ladder[-1].polytope.vertices)
+    most = max(options.vertices, fewest) if options.vertices else math.inf
+    allowed = [rung for rung in run.ladder if len(rung.polytope.vertices) <= most]
+    simple = min(allowed, key=lambda rung: rung.price(options.handle_cost)).polytope
     run.bound = run.losses(simple).L_prime
-    usual = min(convex, key=lambda hull: _price(hull, run, structure_search.USUAL_COST))
     polytope = _searched(run, options, usual, simple)
     run.record("vertex_refinement", polytope)
     run.report("vertex_refinement", 1, 1)
@@ -331,10 +332,6 @@ def _skew(run: _Run) -> SkewPolytope:
 def _price(polytope: SkewPolytope, run: _Run, cost: float, free: int = 0) -> float:
     """Return L' and the cost of the handles but for those that are `free`."""
     return run.losses(polytope).L_prime + cost * (len(polytope.vertices) - free)
-
-
-def _is_concave(polytope: SkewPolytope, run: _Run) -> bool:
-    return deepest_concavity(polytope, run.frames) > CONCAVE
 
 
 def _searched(
@@ -361,11 +358,9 @@ def _searched(
             starts.append(dense.polytope())
             yield starts[-1]
 
-    def ladder(some: Sequence[FrameStatistics]) -> Iterator[SkewPolytope]:
-        return static_hull.ladder(run.starts[0], some, gamut, options)
-
+    rungs = [rung.polytope for rung in run.ladder]
     begun = run.counted("vertex_removal", next_starts(), len(few_blocks))
-    at, found = structure_search.search(begun, static, ladder, few, frames, gamut, options)
+    at, found = structure_search.search(begun, static, rungs, few, frames, gamut, options)
     with_stops = stop_insertion.insert_stops(found, frames, gamut, options)
     run.stages += [
         first,
@@ -486,10 +481,9 @@ def _paper(run: _Run) -> SkewPolytope:
 
 
 def _static(run: _Run) -> SkewPolytope:
-    """One palette for the whole clip (section 6.2), the best of several starts."""
-    hulls = static_hull.static_hulls(run.starts, run.frames, run.gamut, run.options)
-    found = list(run.counted("static_hull", hulls, static_hull.STARTS))
-    polytope = min(found, key=lambda hull: run.losses(hull).L_prime)
+    """One palette for the whole clip (section 6.2): the one of the least price."""
+    polytope = min(run.ladder, key=lambda rung: rung.price(structure_search.USUAL_COST)).polytope
+    run.report("static_hull", 1, 1)
     run.record("static_hull", polytope)
     return polytope
 

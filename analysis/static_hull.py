@@ -1,9 +1,9 @@
 """One palette for the whole clip: the static, refined RGB hull of section 6.2.
 
-Input: the colours of all frames. Output: `SkewPolytope`s of one block whose colours do not change.
-Each colour has one vertex at the first and one at the last frame, the keyframes of section 6.2.
-Refinement uses the loss of evenly spaced frames (eq. 8). `ladder` is a start of the search: static
-palettes of fewer and fewer colours.
+Input: the colours of all frames. Output: a ladder of static palettes, `SkewPolytope`s of one block
+whose colours do not change. Each colour has one vertex at the first and one at the last frame, the
+keyframes of section 6.2. The first has `palette_size` colours, each other one fewer. The ladder is
+a start of the structure search; its palette of the least price is the method `static`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from palette4d.analysis.convex_hulls import THIN, hull_mesh
+from palette4d.analysis.convex_hulls import hull_mesh
 from palette4d.analysis.frame_hulls import refined, simple_hull
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut, pooled
 from palette4d.analysis.losses import NO_FACES, shaped_weights
@@ -22,124 +22,72 @@ from palette4d.analysis.objective import frame_losses, refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import FramePalette, Section, SkewPolytope
 
-from palette4d import _core
-
 F64 = NDArray[np.float64]
-#: Colours, and their `simple_hull`.
-Start = tuple[_core.ColourTree, F64 | FramePalette]
 
 STEPS = 30
 # The colours of these evenly spaced frames decide.
 EVEN_FRAMES = 24
-# All frames together keep this many times the coarse colours of one frame.
+# They start from so many times the coarse colours of one frame.
 POOLED = 2
-# Static hulls start from all of these colours, a half, a quarter.
-STARTS = 3
 
 
-def starts(frames: Sequence[FrameStatistics], options: AnalysisOptions) -> list[Start]:
-    """Return the starts of all static palettes."""
-    colours = [pooled([f.coarse for f in frames], POOLED * options.coarse_colours)]
-    while len(colours) < STARTS:
-        colours.append(pooled(colours[-1:], max(1, len(colours[-1]) // 2)))
-    return [(tree, simple_hull(tree, options)) for tree in colours]
+@dataclasses.dataclass(frozen=True, eq=False)
+class Rung:
+    """A static palette, and its loss on coarse colours: eq. 8 with the terms for shape."""
+
+    polytope: SkewPolytope
+    loss: float
+
+    def price(self, cost: float) -> float:
+        """Return the loss plus the cost of the vertices."""
+        return self.loss + cost * len(self.polytope.vertices)
 
 
-def static_hulls(
-    begin: Sequence[Start],
-    frames: Sequence[FrameStatistics],
-    gamut: Gamut,
-    options: AnalysisOptions,
-) -> Iterator[SkewPolytope]:
-    """Yield refined static palettes from several starts."""
-    for colours, simple in begin:
-        yield static_polytope(refined(colours, simple, gamut, options), frames, gamut, options)
-
-
-def plain_hulls(
-    begin: Sequence[Start],
-    frames: Sequence[FrameStatistics],
-    gamut: Gamut,
-    options: AnalysisOptions,
-) -> Iterator[SkewPolytope]:
-    """Yield static palettes of no more than `vertices`, refined for the paper's loss."""
-    for plain in plain_options(options):
-        for hull in static_hulls(begin[:1], frames, gamut, plain):
-            if not options.vertices or len(hull.vertices) <= options.vertices:
-                yield hull
-
-
-def plain_options(options: AnalysisOptions) -> Iterator[AnalysisOptions]:
-    """Yield options with wide boxes and without shape terms. Each is by far the best on some clips.
-
-    The second keeps `convexity`; the third starts farther from the simplified hull.
-    """
-    for convexity, start in ((0.0, 1.0), (options.convexity, 1.0), (0.0, 2.0)):
-        yield dataclasses.replace(
-            options,
-            convexity=convexity,
-            separation=0.0,
-            reach=0.0,
-            merge_distance=0.0,
-            hull_box=start * options.hull_box,
-            refinement_box=max(options.refinement_box, 2 * options.hull_box),
-        )
-
-
-def static_polytope(
-    palette: FramePalette, frames: Sequence[FrameStatistics], gamut: Gamut, options: AnalysisOptions
-) -> SkewPolytope:
-    """Return the palette, refined, as a polytope that does not change with time."""
-    some = [*frames[: -1 : -(-len(frames) // EVEN_FRAMES)], frames[-1]]
-    still, _ = refine_jointly(_still(palette, some), some, gamut, options, STEPS, coarse=True)
-    rgb = still.vertices[:, :3]
-    return _lasting(FramePalette(rgb, _unfolded(rgb, palette.faces)), frames)
-
-
-def ladder(
-    begin: Start, frames: Sequence[FrameStatistics], gamut: Gamut, options: AnalysisOptions
-) -> Iterator[SkewPolytope]:
-    """Yield static palettes from `palette_size` colours down to four.
+def ladder(frames: Sequence[FrameStatistics], gamut: Gamut, options: AnalysisOptions) -> list[Rung]:
+    """Return static palettes from `palette_size` colours down to four.
 
     Each lacks one colour of the one before. Of two such ladders, without `convexity` and with it,
-    the better palette of each number of colours is yielded. Colours that do not get to a corner of
-    the palette go too. Nothing is yielded for colours without volume.
+    the better palette of each number of colours is returned. Colours that do not get to a corner of
+    the palette go too. Colours without volume have one palette.
     """
-    colours, _ = begin
-    simple = simple_hull(colours, options, options.palette_size)
-    if isinstance(simple, FramePalette):
-        return
-    first = refined(colours, simple, gamut, dataclasses.replace(options, merge_distance=0.0)).rgb
+    some = [*frames[: -1 : -(-len(frames) // EVEN_FRAMES)], frames[-1]]
+    colours = pooled([f.coarse for f in frames], POOLED * options.coarse_colours)
     roomy = dataclasses.replace(options, refinement_box=2 * options.refinement_box)
     weights = shaped_weights(options, gamut.scale, faces=False)
 
     def bare(rgb: F64) -> SkewPolytope:
-        return _still(FramePalette(rgb, NO_FACES), frames)
+        return _still(FramePalette(rgb, NO_FACES), some)
 
-    def loss(rgb: F64) -> float:
-        some = range(0, len(frames), 2)
-        rows = frame_losses(bare(rgb), frames, some, weights, options, coarse=True)
-        return float((options.lambda_ * rows[:, 0] + rows[:, 1] + rows[:, 2]).sum())
+    def loss(rgb: F64, every: int = 1) -> float:
+        rows = frame_losses(
+            bare(rgb), some, range(0, len(some), every), weights, options, coarse=True
+        )
+        return float((options.lambda_ * rows[:, 0] + rows[:, 1] + rows[:, 2]).mean())
 
-    def rungs(start: Callable[[F64], SkewPolytope]) -> Iterator[FramePalette]:
+    def rungs(first: F64, start: Callable[[F64], SkewPolytope]) -> Iterator[FramePalette]:
         poorer = [first]
         while poorer:
-            tried = [start(rgb) for rgb in sorted(poorer, key=loss)[:COLOURS_TRIED]]
-            moved = (refine_jointly(p, frames, gamut, roomy, STEPS, coarse=True) for p in tried)
+            poorer.sort(key=lambda rgb: loss(rgb, every=2))
+            tried = (start(rgb) for rgb in poorer[:COLOURS_TRIED])
+            moved = (refine_jointly(p, some, gamut, roomy, STEPS, coarse=True) for p in tried)
             found, _ = min(moved, key=lambda one: one[1])
             palette = hull_mesh(found.vertices[:, :3])
             yield palette
             count = len(palette.rgb) if len(palette.rgb) > LEAST_COLOURS else 0
             poorer = [np.delete(palette.rgb, i, axis=0) for i in range(count)]
 
+    simple = simple_hull(colours, options, options.palette_size)
+    if isinstance(simple, FramePalette):
+        return [Rung(_lasting(simple, frames), loss(simple.rgb))]
+    first = refined(colours, simple, gamut, dataclasses.replace(options, merge_distance=0.0)).rgb
+    best: dict[int, tuple[float, FramePalette]] = {}
     # With faces, `convexity` keeps colours from falling into the solid, where they are lost.
-    best: dict[int, FramePalette] = {}
-    for start in (bare, lambda rgb: _still(hull_mesh(rgb), frames)):
-        for palette in rungs(start):
-            other = best.setdefault(len(palette.rgb), palette)
-            best[len(palette.rgb)] = min(other, palette, key=lambda one: loss(one.rgb))
-    for _, palette in sorted(best.items(), reverse=True):
-        yield _lasting(palette, frames)
+    for start in (bare, lambda rgb: _still(hull_mesh(rgb), some)):
+        for palette in rungs(first, start):
+            count, value = len(palette.rgb), loss(palette.rgb)
+            if count not in best or value < best[count][0]:
+                best[count] = value, palette
+    return [Rung(_lasting(best[n][1], frames), best[n][0]) for n in sorted(best, reverse=True)]
 
 
 def _still(palette: FramePalette, frames: Sequence[FrameStatistics]) -> SkewPolytope:
@@ -160,15 +108,3 @@ def _lasting(palette: FramePalette, frames: Sequence[FrameStatistics]) -> SkewPo
     tracks = tuple((i, count + i) for i in range(count))
     section = dataclasses.replace(still.blocks[0], tracks=tracks)
     return SkewPolytope(np.vstack([still.vertices, ends]), (section,), ())
-
-
-def _unfolded(rgb: F64, faces: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return the faces of the colours' convex hull, if every colour is a corner of it.
-
-    The losses measure the convex hull only: without `convexity` the mesh may fold.
-    """
-    spread = np.linalg.svd(rgb - rgb.mean(axis=0), compute_uv=False)
-    if len(rgb) < 4 or spread[2] < THIN:
-        return faces
-    mesh = hull_mesh(rgb)
-    return mesh.faces if len(mesh.rgb) == len(rgb) else faces

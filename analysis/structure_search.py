@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,7 +79,7 @@ class Priced:
 def search(
     starts: Iterable[SkewPolytope],
     static: SkewPolytope,
-    ladder: Callable[[Sequence[FrameStatistics]], Iterable[SkewPolytope]],
+    rungs: Sequence[SkewPolytope],
     few: Sequence[FrameStatistics],
     frames: Sequence[FrameStatistics],
     gamut: Gamut,
@@ -88,12 +88,11 @@ def search(
     """Return which start the best polytope comes from (None: a static hull), and the polytope.
 
     The starts come in the order of their blocks. Those with more blocks than one that is far worse
-    than the best are not searched. `ladder` returns further static hulls for frames.
+    than the best are not searched. `rungs` are static hulls; `static` is the best of them.
     """
     usual = few if len(few) <= EVEN_FRAMES else key_frames(static, few, options, EVEN_FRAMES)
     found = [
-        Priced(*refine_jointly(rung, usual, gamut, options, FIRST_STEPS, True))
-        for rung in (static, *ladder(usual))
+        Priced(*refine_jointly(rung, usual, gamut, options, FIRST_STEPS, True)) for rung in rungs
     ]
     ways: list[tuple[int | None, Sequence[FrameStatistics], list[Priced]]] = [(None, usual, found)]
 
