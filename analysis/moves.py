@@ -8,7 +8,7 @@ drawn into a neighbouring one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,20 +87,13 @@ def without_chain(
     )
 
 
-def enriched(polytope: SkewPolytope, times: Sequence[float] = ()) -> SkewPolytope:
-    """Return the polytope with a stop on every edge of more than two frames.
-
-    It is at the first of `times` that is a frame away from the edge's ends, or in the middle.
-    """
+def enriched(polytope: SkewPolytope) -> SkewPolytope:
+    """Return the polytope with a stop in the middle of every edge of more than two frames."""
     for u, v in polytope.edges().tolist():
         start, end = polytope.vertices[[u, v]]
-        length = end[3] - start[3]
-        if length <= LONG_EDGE:
-            continue
-        inside = (time for time in times if start[3] + 1 <= time <= end[3] - 1)
-        share = (next(inside, (start[3] + end[3]) / 2) - start[3]) / length
-        stop = start + share * (end - start)
-        if any(block.first < stop[3] < block.last for block in polytope.blocks):
+        stop = (start + end) / 2
+        inside = any(block.first < stop[3] < block.last for block in polytope.blocks)
+        if end[3] - start[3] > LONG_EDGE and inside:
             polytope = polytope.with_stop((u, v), stop.tolist())
     return polytope
 

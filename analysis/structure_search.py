@@ -20,6 +20,7 @@ a vertex.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Iterable, Sequence
 
@@ -140,23 +141,24 @@ def best_of(
             (Priced(*refine_jointly(p.polytope, seen, gamut, options, steps, True)), at)
             for p, at in _close(close, cost, share)
         ]
-    # No rare handles are counted where the price is too high without their cost.
-    least, priced = math.inf, []
-    for one, at in sorted(close, key=lambda found: found[0].price(cost)):
-        if one.price(cost) <= (1 + ALIKE) * least:
-            price = one.price(cost) + rare_cost(one.polytope, frames)
-            least = min(least, price)
-            priced.append((price, one.polytope, at))
+    close.sort(key=lambda found: found[0].price(cost))
+    # Counting rare handles takes time, so they are counted where it decides only.
+    whole = functools.cache(lambda one: one.price(cost) + rare_cost(one.polytope, frames))
+    least = math.inf
+    for one, _ in close:
+        if one.price(cost) < least:
+            least = min(least, whole(one))
 
-    def plainness(polytope: SkewPolytope) -> tuple[int, float]:
+    def plainness(one: Priced) -> tuple[int, float]:
         weights = shaped_weights(options, gamut.scale)
         everywhere = range(len(frames))
-        rows = frame_losses(polytope, frames, everywhere, weights, options, coarse=True)
-        return len(polytope.vertices), float(rows[:, 2].mean())
+        rows = frame_losses(one.polytope, frames, everywhere, weights, options, coarse=True)
+        return one.handles, float(rows[:, 2].mean())
 
-    alike = [(p, at) for price, p, at in priced if price <= (1 + ALIKE) * least]
-    chosen, at = min(alike, key=lambda found: plainness(found[0]))
-    return at, chosen
+    alike = [found for found in close if found[0].price(cost) <= (1 + ALIKE) * least]
+    alike.sort(key=lambda found: plainness(found[0]))
+    chosen, at = next(found for found in alike if whole(found[0]) <= (1 + ALIKE) * least)
+    return at, chosen.polytope
 
 
 def _close(
@@ -190,10 +192,13 @@ def key_frames(
     """
     chosen = {*range(0, len(frames), -(-len(frames) // even)), len(frames) - 1}
     most = len(chosen) + WORST_FRAMES
-    for worst in _worst_first(static, frames, options):
+    everything = range(len(frames))
+    rows = frame_losses(static, frames, everything, loss_weights(options), options, coarse=True)
+    loss = options.lambda_ * rows[:, 0] + rows[:, 1]
+    for worst in np.argsort(-loss, kind="stable").tolist():
         if len(chosen) >= most:
             break
-        chosen |= {worst - 1, worst, worst + 1} & set(range(len(frames)))
+        chosen |= {worst - 1, worst, worst + 1} & set(everything)
     return [frames[i] for i in sorted(chosen)]
 
 
@@ -238,37 +243,18 @@ def up_and_down(
 ) -> list[Priced]:
     """Return what is found when stops are put into a palette and single vertices removed again.
 
-    Stops are put into the middle of each edge, or if that does not help, at the frames that fit
-    worst. Goes on with the best of these as long as one of the two is worthwhile.
+    Stops are put into the middle of each edge. Goes on with the best of what is found as long as
+    that is worthwhile.
     """
     found: list[Priced] = []
-    least = min(map(_usual_price, known))
-    times: Sequence[float] = ()
     while True:
-        rich = moves.enriched(best.polytope, times)
+        rich = moves.enriched(best.polytope)
         first = Priced(*refine_jointly(rich, frames, gamut, options, FIRST_STEPS, True))
         steps = remove_singly(first, frames, gamut, options, [*known, *found])
         found += steps
         before, best = best, min(best, *steps, key=_usual_price)
-        if _usual_price(best) <= (1 - WORTHWHILE) * _usual_price(before):
-            times = ()
-        elif times or _usual_price(best) > (1 + PATIENCE) * least:
+        if _usual_price(best) > (1 - WORTHWHILE) * _usual_price(before):
             return found
-        else:
-            worst = _worst_first(best.polytope, frames, options)
-            times = [float(frames[i].frame) for i in worst]
-
-
-def _worst_first(
-    polytope: SkewPolytope, frames: Sequence[FrameStatistics], options: AnalysisOptions
-) -> list[int]:
-    """Return the indices of frames, the one with the largest loss first."""
-    everything = range(len(frames))
-    rows = frame_losses(polytope, frames, everything, loss_weights(options), options, coarse=True)
-    order: list[int] = np.argsort(
-        -options.lambda_ * rows[:, 0] - rows[:, 1], kind="stable"
-    ).tolist()
-    return order
 
 
 def remove_singly(
