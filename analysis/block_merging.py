@@ -20,7 +20,7 @@ from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import FramePalette
 
 # Evaluations per frame are few: refinement starts from the neighbour's refined palette.
-EVALUATIONS = 30
+EVALUATIONS = 16
 # A frame keeps its neighbour's palette if their losses differ by less than this share.
 SAME = 1e-3
 

@@ -19,8 +19,6 @@ I32 = NDArray[np.int32]
 
 # A solid has at least this many colours.
 LEAST_COLOURS = 4
-# Of the colours that may go, those that cost least at once are tried.
-COLOURS_TRIED = 2
 # An edge of at most so many frames gets no stop.
 LONG_EDGE = 2
 # Times of a section at which the meshes after a move are compared.

@@ -369,19 +369,11 @@ def _searched(
     ]
     if at is not None and len(found.blocks) > 1:
         run.notes += notes[at]
-    fits = not options.vertices or len(simple.vertices) <= options.vertices
-    bound, cost = run.losses(simple).L_prime, options.handle_cost
-
-    def tries() -> Iterator[list[stop_insertion.WithStops]]:
-        yield with_stops
-        relaxed = vertex_refinement.relax(simple, frames, gamut, options, bound)
-        yield stop_insertion.insert_stops(relaxed, frames, gamut, options)
-
-    for tried in tries():
-        for polytope, free in _with_useful_stops(run, tried):
-            if not fits or _price(polytope, run, cost, free) <= _price(simple, run, cost):
-                return polytope
-    return tried[0].polytope
+    cost = options.handle_cost
+    for polytope, free in _with_useful_stops(run, with_stops):
+        if _price(polytope, run, cost, free) <= _price(simple, run, cost):
+            return polytope
+    return simple
 
 
 def _with_useful_stops(

@@ -17,14 +17,14 @@ from palette4d.analysis.convex_hulls import hull_mesh
 from palette4d.analysis.frame_hulls import refined, simple_hull
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut, pooled
 from palette4d.analysis.losses import NO_FACES, shaped_weights
-from palette4d.analysis.moves import COLOURS_TRIED, LEAST_COLOURS
+from palette4d.analysis.moves import LEAST_COLOURS
 from palette4d.analysis.objective import frame_losses, refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import FramePalette, Section, SkewPolytope
 
 F64 = NDArray[np.float64]
 
-STEPS = 30
+STEPS = 40
 # The colours of these evenly spaced frames decide.
 EVEN_FRAMES = 24
 # They start from so many times the coarse colours of one frame.
@@ -65,16 +65,16 @@ def ladder(frames: Sequence[FrameStatistics], gamut: Gamut, options: AnalysisOpt
         return float((options.lambda_ * rows[:, 0] + rows[:, 1] + rows[:, 2]).mean())
 
     def rungs(first: F64, start: Callable[[F64], SkewPolytope]) -> Iterator[FramePalette]:
-        poorer = [first]
-        while poorer:
-            poorer.sort(key=lambda rgb: loss(rgb, every=2))
-            tried = (start(rgb) for rgb in poorer[:COLOURS_TRIED])
-            moved = (refine_jointly(p, some, gamut, roomy, STEPS, coarse=True) for p in tried)
-            found, _ = min(moved, key=lambda one: one[1])
+        rgb = first
+        while True:
+            found, _ = refine_jointly(start(rgb), some, gamut, roomy, STEPS, coarse=True)
             palette = hull_mesh(found.vertices[:, :3])
             yield palette
-            count = len(palette.rgb) if len(palette.rgb) > LEAST_COLOURS else 0
-            poorer = [np.delete(palette.rgb, i, axis=0) for i in range(count)]
+            count = len(palette.rgb)
+            if count <= LEAST_COLOURS:
+                return
+            poorer = (np.delete(palette.rgb, i, axis=0) for i in range(count))
+            rgb = min(poorer, key=lambda rest: loss(rest, every=2))
 
     simple = simple_hull(colours, options, options.palette_size)
     if isinstance(simple, FramePalette):

@@ -37,7 +37,7 @@ from palette4d.analysis.polytope import SkewPolytope
 F64 = NDArray[np.float64]
 
 # Gradient steps of joint moves: at the start of a walk, and after each removal.
-FIRST_STEPS, STEPS = 30, 15
+FIRST_STEPS, STEPS = 20, 15
 # The palettes of a walk are compared at this cost, whatever `handle_cost` is.
 USUAL = AnalysisOptions()
 USUAL_COST = USUAL.handle_cost
@@ -48,7 +48,7 @@ DEARER = 4
 # At the end palettes are refined in rounds, on more frames than before and on all frames in the
 # last one: the steps of a round, and how far above the least price a palette may be to take part.
 # So many with the same numbers of handles and colours do.
-ROUNDS, OF_A_KIND = ((0, 0.5), (5, 0.06), (20, 0.03)), 2
+ROUNDS, OF_A_KIND = ((0, 0.5), (5, 0.05), (20, 0.02)), 2
 # Prices that differ by this share count as the same: the last refinement changes them by as much.
 ALIKE = 0.005
 # Stops are put into the best palette again if the last ones lowered its price by this share.
@@ -58,6 +58,8 @@ RARE_COST = USUAL_COST
 # So many evenly spaced frames are looked at, by merging and by walks, and so many others with the
 # largest losses.
 KEY_FRAMES, EVEN_FRAMES, WORST_FRAMES = 48, 16, 8
+# Frames in which palettes without one of their colours are compared.
+COMPARED = 8
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -220,16 +222,11 @@ def walk(
         steps = remove_singly(first, frames, gamut, options, [*known, *found])
         found += steps
         best = min(steps, key=lambda one: one.price(USUAL_COST))
-        poorer = [
-            moves.without_chain(best.polytope, chain)
-            for chain in _dispensable(best.polytope, frames, gamut, options)
-        ]
-        if not poorer:
+        chain = _dispensable(best.polytope, frames, gamut, options)
+        if chain is None:
             return found
-        first = min(
-            (Priced(*refine_jointly(p, frames, gamut, options, STEPS, True)) for p in poorer),
-            key=lambda one: one.value,
-        )
+        poorer = moves.without_chain(best.polytope, chain)
+        first = Priced(*refine_jointly(poorer, frames, gamut, options, STEPS, True))
         if hopeless(first, found, [*known, *found], options):
             return [*found, first]
 
@@ -316,17 +313,17 @@ def _dispensable(
     frames: Sequence[FrameStatistics],
     gamut: Gamut,
     options: AnalysisOptions,
-) -> list[tuple[int, ...]]:
-    """Return chains whose loss costs least before the others take over."""
+) -> tuple[int, ...] | None:
+    """Return the chain whose loss costs least before the others take over, if any may go."""
     weights = shaped_weights(options, gamut.scale, faces=False)
-    few = range(0, len(frames), max(1, len(frames) // WORST_FRAMES))
-    rises = []
-    for chain in moves.chains(polytope):
+    few = range(0, len(frames), -(-len(frames) // COMPARED))
+
+    def loss(chain: tuple[int, ...]) -> float:
         rest = moves.without_chain(polytope, chain, any_mesh=True)
         rows = frame_losses(rest, frames, few, weights, options, coarse=True)
-        rise = float((options.lambda_ * rows[:, 0] + rows[:, 1] + rows[:, 2]).sum())
-        rises.append((rise, chain))
-    return [chain for _, chain in sorted(rises)[: moves.COLOURS_TRIED]]
+        return float((options.lambda_ * rows[:, 0] + rows[:, 1] + rows[:, 2]).sum())
+
+    return min(moves.chains(polytope), key=loss, default=None)
 
 
 def _cheapest(

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 from palette4d.analysis.convex_hulls import CONCAVE, deepest_concavity
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
-from palette4d.analysis.objective import losses_of, refine_jointly
+from palette4d.analysis.objective import refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import SkewPolytope
 
@@ -43,24 +43,3 @@ def refine(
     stiffer = dataclasses.replace(options, convexity=STIFFER * options.convexity)
     again, _ = refine_jointly(found, frames, gamut, stiffer, STEPS, False, brief, GENTLE)
     return again if deepest_concavity(again, frames) < deepest else found
-
-
-def relax(
-    static: SkewPolytope,
-    frames: Sequence[FrameStatistics],
-    gamut: Gamut,
-    options: AnalysisOptions,
-    bound: float,
-) -> SkewPolytope:
-    """Return a static hull whose colours may move in time, with L' of at most `bound`.
-
-    Where little moves the terms for shape may cost more than the motion gains: then without them.
-    If that is not within the bound either, the static hull itself is the result.
-    """
-    plain = dataclasses.replace(options, convexity=0.0, separation=0.0, reach=0.0)
-    for shape in (options, plain):
-        found = refine(static, frames, gamut, shape)
-        within = losses_of(found, frames, options).L_prime <= bound
-        if within and deepest_concavity(found, frames) <= CONCAVE:
-            return found
-    return static

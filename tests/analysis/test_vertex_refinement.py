@@ -1,4 +1,4 @@
-"""Vertex refinement: the loss falls, slices become convex, a static hull stays within its bound."""
+"""Vertex refinement: the loss falls, slices become convex."""
 
 from __future__ import annotations
 
@@ -7,14 +7,13 @@ import itertools
 
 import numpy as np
 import pytest
-from analysis_frames import mixture, noise, stats
-from palette4d.analysis import static_hull
+from analysis_frames import noise, stats
 from palette4d.analysis.convex_hulls import CONCAVE, deepest_concavity, hull_mesh
 from palette4d.analysis.frame_statistics import Gamut
-from palette4d.analysis.objective import losses_of, refine_jointly
+from palette4d.analysis.objective import refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import Section, SkewPolytope
-from palette4d.analysis.vertex_refinement import GENTLE, STEPS, refine, relax
+from palette4d.analysis.vertex_refinement import GENTLE, STEPS, refine
 
 CUBE = np.array(list(itertools.product((0.1, 0.9), repeat=3)))
 FOUR = np.array([[0.1, 0.1, 0.1], [0.9, 0.2, 0.2], [0.2, 0.9, 0.2], [0.2, 0.2, 0.9]])
@@ -52,16 +51,3 @@ def test_slices_that_are_not_convex_are_refined_again(frames):
     found = refine(start, frames, GAMUT, free)
     np.testing.assert_array_equal(found.vertices, once.vertices)
     assert deepest_concavity(refine(start, frames, GAMUT, LIMP), frames) < CONCAVE
-
-
-def test_a_static_hull_that_may_move_stays_within_its_bound():
-    frames = stats([mixture(FOUR + 0.01 * i, i, 3000) for i in range(3)])
-    options = AnalysisOptions()
-    hull = min(
-        static_hull.plain_hulls(static_hull.starts(frames, options), frames, GAMUT, options),
-        key=lambda one: losses_of(one, frames, options).L_prime,
-    )
-    bound = losses_of(hull, frames, options).L_prime
-    found = relax(hull, frames, GAMUT, options, bound)
-    assert losses_of(found, frames, options).L_prime <= bound
-    assert relax(hull, frames, GAMUT, options, 0.0) is hull  # nothing is so good
