@@ -20,7 +20,7 @@ from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import FramePalette
 
 # Evaluations per frame are few: refinement starts from the neighbour's refined palette.
-EVALUATIONS = 16
+EVALUATIONS = 30
 # A frame keeps its neighbour's palette if their losses differ by less than this share.
 SAME = 1e-3
 

@@ -60,7 +60,7 @@ class AnalysisOptions:
     reach: float = _option(
         0.1, 0, 10, "pixels this far outside count twice; 0: once, as in the paper", _HULLS
     )
-    colours: int = _option(16384, 64, 1e8, "most colours kept per frame, for the losses")
+    colours: int = _option(32768, 64, 1e8, "most colours kept per frame, for the losses")
     coarse_colours: int = _option(
         2048, 64, 1e8, "the same for hulls, merging and removal; up to twice as many in short clips"
     )

@@ -80,8 +80,8 @@ class Found:
     polytope : the palette.
     stages : vertices, blocks and losses after each stage.
     notes : notes and warnings for the user.
-    bound : L' of the best convex static palette, which the result never exceeds; None for methods
-        without this bound.
+    bound : L' of the static palette of the least price, by which the result is never dearer; None
+        for methods without this bound.
     """
 
     polytope: SkewPolytope

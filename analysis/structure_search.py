@@ -48,7 +48,7 @@ DEARER = 4
 # At the end palettes are refined in rounds, on more frames than before and on all frames in the
 # last one: the steps of a round, and how far above the least price a palette may be to take part.
 # So many with the same numbers of handles and colours do.
-ROUNDS, OF_A_KIND = ((0, 0.5), (5, 0.05), (20, 0.02)), 2
+ROUNDS, OF_A_KIND = ((0, 0.5), (5, 0.05), (30, 0.02)), 2
 # Prices that differ by this share count as the same: the last refinement changes them by as much.
 ALIKE = 0.005
 # Stops are put into the best palette again if the last ones lowered its price by this share.

@@ -140,10 +140,10 @@ def test_the_default_result_of_seasons(seasons, judge, measured, tmp_path):
     assert figures.colours == pytest.approx(mean["vertices"])
 
 
-@pytest.mark.parametrize(("method", "most"), [("paper", 0.1), ("static", 0.135)])
+@pytest.mark.parametrize(("method", "most"), [("paper", 0.1), ("static", 0.102)])
 def test_what_the_default_is_compared_with_stays_good(seasons, method, most):
     """Hulls are simplified edge by edge: their colours in another order gave the paper's rules L'
-    0.154, and the static palette 0.144."""
+    0.154. Static palettes hardly depend on it."""
     found = pipeline.analyze(open_clip(str(seasons)), AnalysisOptions(method=method))
     assert found.stages[-1].losses.L_prime <= most
 
