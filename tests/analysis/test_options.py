@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from analysis_frames import mixture, stats
+from analysis_frames import mixture, noise, stats
 from palette4d.analysis.options import (
     METHODS,
     OPTIONS,
@@ -41,12 +41,14 @@ OTHERS = {
 }
 
 
-def result(**options):
-    palette = find_polytope(FRAMES, AnalysisOptions(**options))
+def result(frames, **options):
+    palette = find_polytope(frames, AnalysisOptions(**options))
     return palette.polytope.vertices.tolist(), [stage.row() for stage in palette.stages]
 
 
+# Frames whose hulls have five corners, and frames whose hulls have too many for a palette.
 FRAMES = stats([mixture(CORNERS * (0.6 + 0.4 * np.sin(i)) + 0.02 * i, i, 300) for i in range(4)])
+MANY = stats([noise(i) for i in range(4)])
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -56,7 +58,7 @@ def test_an_option_without_effect_is_refused_and_has_none(method):
         with pytest.raises(Palette4dError, match=f"{name} has no effect"):
             check_methods(method, {name: value})
     check_methods(method, {name: OTHERS[name] for name in OTHERS.keys() - ignored.keys()})
-    assert result(method=method, **ignored) == result(method=method)
+    assert result(FRAMES, method=method, **ignored) == result(FRAMES, method=method)
 
 
 @pytest.mark.parametrize(
@@ -64,7 +66,8 @@ def test_an_option_without_effect_is_refused_and_has_none(method):
     [(m, o) for o in OTHERS for m in ("static", "rgbt") if m in OPTIONS[o].methods],
 )
 def test_an_option_of_a_method_has_an_effect(method, option):
-    assert result(method=method, **{option: OTHERS[option]}) != result(method=method)
+    found, usual = (result(MANY, method=method, **one) for one in ({option: OTHERS[option]}, {}))
+    assert found != usual
 
 
 @pytest.mark.parametrize("name", OPTIONS)
