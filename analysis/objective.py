@@ -210,8 +210,9 @@ class Objective:
 
     def with_fixed_times(self, moved: F64, vertices: F64) -> F64:
         """Return moved vertices with the times of `vertices` where these may not change."""
-        moved[self.fixed, 3] = vertices[self.fixed, 3]
-        return moved
+        out = moved.copy()
+        out[self.fixed, 3] = vertices[self.fixed, 3]
+        return out
 
     def touched(self, vertices: F64, moving: Sequence[int]) -> list[int]:
         """Return the frames whose slices the vertices in `moving` affect, wherever they move."""

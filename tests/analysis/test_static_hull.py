@@ -7,7 +7,7 @@ import itertools
 
 import numpy as np
 import pytest
-from analysis_frames import constant, mixture, stats
+from analysis_frames import constant, mixture, noise, stats
 from palette4d.analysis.convex_hulls import deepest_concavity
 from palette4d.analysis.frame_statistics import Gamut, pooled
 from palette4d.analysis.losses import palette_loss
@@ -71,6 +71,13 @@ def test_every_palette_is_convex(convexity):
     frames = stats(pictures)
     for rung in rungs(pictures, dataclasses.replace(OPTIONS, convexity=convexity)):
         assert deepest_concavity(rung.polytope, frames) < 1e-9
+
+
+def test_no_rung_is_missing():
+    """Without `convexity` colours fall into the solid, several at once."""
+    found = rungs([noise(i) for i in range(3)])
+    counts = [len(rung.polytope.blocks[0].tracks) for rung in found]
+    assert counts == list(range(OPTIONS.palette_size, 3, -1))
 
 
 def test_the_ladder_begins_with_no_more_than_palette_size_colours():
