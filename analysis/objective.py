@@ -7,6 +7,7 @@ exact gradient.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Collection, Sequence
 
 import numpy as np
@@ -37,6 +38,23 @@ BRIEF = 0.25
 # A joint step looks at one part of the frames. There are at most so many parts, each of at least so
 # many frames.
 MOST_PARTS, FEWEST_OF_A_PART = 3, 3
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Priced:
+    """A refined polytope, and its value: eq. 12 with the terms for shape, on some frames."""
+
+    polytope: SkewPolytope
+    value: float
+
+    @property
+    def handles(self) -> int:
+        """The number of vertices."""
+        return len(self.polytope.vertices)
+
+    def price(self, cost: float) -> float:
+        """Return the value plus the cost of the vertices."""
+        return self.value + cost * self.handles
 
 
 def loss_of(

@@ -12,7 +12,6 @@ import concurrent.futures
 import dataclasses
 import functools
 import itertools
-import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, TypeVar
 
@@ -35,7 +34,7 @@ from palette4d.analysis.block_merging import Block
 from palette4d.analysis.dense_polytope import DensePolytope
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
 from palette4d.analysis.losses import LOST_SHARE, Losses, thread_count
-from palette4d.analysis.objective import losses_of
+from palette4d.analysis.objective import Priced, losses_of
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import FramePalette, SkewPolytope
 from palette4d.analysis.report import advice, quality
@@ -279,7 +278,7 @@ class _Run:
         self.measured: dict[SkewPolytope, Losses] = {}
 
     @functools.cached_property
-    def ladder(self) -> list[static_hull.Rung]:
+    def ladder(self) -> list[Priced]:
         """Static palettes of fewer and fewer colours."""
         return static_hull.ladder(self.frames, self.gamut, self.options)
 
@@ -313,10 +312,8 @@ def _skew(run: _Run) -> SkewPolytope:
     """Sections 5.2 to 5.5. Each handle of the result is worth its cost (the default method)."""
     options = run.options
     usual = _static(run)  # does not depend on `handle_cost`
-    fewest = len(run.ladder[-1].polytope.vertices)
-    most = max(options.vertices, fewest) if options.vertices else math.inf
-    allowed = [rung for rung in run.ladder if len(rung.polytope.vertices) <= most]
-    simple = min(allowed, key=lambda rung: rung.price(options.handle_cost)).polytope
+    rungs = [rung for rung in run.ladder if structure_search.allowed(rung, run.ladder, options)]
+    simple = min(rungs, key=lambda rung: rung.price(options.handle_cost)).polytope
     run.bound = run.losses(simple).L_prime
     polytope = _searched(run, options, usual, simple)
     run.record("vertex_refinement", polytope)
@@ -473,7 +470,7 @@ def _paper(run: _Run) -> SkewPolytope:
 
 
 def _static(run: _Run) -> SkewPolytope:
-    """One palette for the whole clip (section 6.2): the one of the least price."""
+    """One palette for the whole clip (section 6.2): that of the least price."""
     polytope = min(run.ladder, key=lambda rung: rung.price(structure_search.USUAL_COST)).polytope
     run.report("static_hull", 1, 1)
     run.record("static_hull", polytope)

@@ -18,7 +18,7 @@ from palette4d.analysis.frame_hulls import refined, simple_hull
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut, pooled
 from palette4d.analysis.losses import NO_FACES, shaped_weights
 from palette4d.analysis.moves import LEAST_COLOURS
-from palette4d.analysis.objective import frame_losses, refine_jointly
+from palette4d.analysis.objective import Priced, frame_losses, refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import FramePalette, Section, SkewPolytope
 
@@ -31,20 +31,10 @@ EVEN_FRAMES = 24
 POOLED = 2
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Rung:
-    """A static palette, and its loss on coarse colours: eq. 8 with the terms for shape."""
-
-    polytope: SkewPolytope
-    loss: float
-
-    def price(self, cost: float) -> float:
-        """Return the loss plus the cost of the vertices."""
-        return self.loss + cost * len(self.polytope.vertices)
-
-
-def ladder(frames: Sequence[FrameStatistics], gamut: Gamut, options: AnalysisOptions) -> list[Rung]:
-    """Return static palettes from `palette_size` colours down to four.
+def ladder(
+    frames: Sequence[FrameStatistics], gamut: Gamut, options: AnalysisOptions
+) -> list[Priced]:
+    """Return static palettes from `palette_size` colours down to four, with their values.
 
     Each lacks one colour of the one before. Of two such ladders, without `convexity` and with it,
     the better palette of each number of colours is returned. Colours that do not get to a corner of
@@ -78,7 +68,7 @@ def ladder(frames: Sequence[FrameStatistics], gamut: Gamut, options: AnalysisOpt
 
     simple = simple_hull(colours, options, options.palette_size)
     if isinstance(simple, FramePalette):
-        return [Rung(_lasting(simple, frames), loss(simple.rgb))]
+        return [Priced(_lasting(simple, frames), loss(simple.rgb))]
     first = refined(colours, simple, gamut, dataclasses.replace(options, merge_distance=0.0)).rgb
     best: dict[int, tuple[float, FramePalette]] = {}
     # With faces, `convexity` keeps colours from falling into the solid, where they are lost.
@@ -87,7 +77,7 @@ def ladder(frames: Sequence[FrameStatistics], gamut: Gamut, options: AnalysisOpt
             count, value = len(palette.rgb), loss(palette.rgb)
             if count not in best or value < best[count][0]:
                 best[count] = value, palette
-    return [Rung(_lasting(best[n][1], frames), best[n][0]) for n in sorted(best, reverse=True)]
+    return [Priced(_lasting(best[n][1], frames), best[n][0]) for n in sorted(best, reverse=True)]
 
 
 def _still(palette: FramePalette, frames: Sequence[FrameStatistics]) -> SkewPolytope:

@@ -19,7 +19,6 @@ a vertex.
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import math
 from collections.abc import Iterable, Sequence
@@ -30,7 +29,7 @@ from palette4d.analysis import moves
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
 from palette4d.analysis.handle_use import rare_handles
 from palette4d.analysis.losses import loss_weights, shaped_weights, smoothness, thread_count
-from palette4d.analysis.objective import frame_losses, loss_of, refine_jointly
+from palette4d.analysis.objective import Priced, frame_losses, loss_of, refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import SkewPolytope
 
@@ -60,23 +59,6 @@ RARE_COST = USUAL_COST
 KEY_FRAMES, EVEN_FRAMES, WORST_FRAMES = 48, 16, 8
 # Frames in which palettes without one of their colours are compared.
 COMPARED = 8
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Priced:
-    """A refined polytope, and its value: eq. 12 with the terms for shape, on some frames."""
-
-    polytope: SkewPolytope
-    value: float
-
-    @property
-    def handles(self) -> int:
-        """The number of vertices."""
-        return len(self.polytope.vertices)
-
-    def price(self, cost: float) -> float:
-        """Return the value plus the cost of the vertices."""
-        return self.value + cost * self.handles
 
 
 def search(

@@ -62,7 +62,7 @@ def test_the_loss_is_that_of_the_palette_in_all_frames():
     for rung in rungs(pictures, paper):
         rgb = rung.polytope.slice_at(2.0).rgb
         losses = [palette_loss(frame.coarse, rgb, paper) for frame in stats(pictures)]
-        assert rung.loss == pytest.approx(np.mean(losses))
+        assert rung.value == pytest.approx(np.mean(losses))
 
 
 @pytest.mark.parametrize("convexity", [0.0, OPTIONS.convexity])
