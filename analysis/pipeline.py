@@ -79,14 +79,11 @@ class Found:
     polytope : the palette.
     stages : vertices, blocks and losses after each stage.
     notes : notes and warnings for the user.
-    bound : L' of the static palette of the least price, by which the result is never dearer; None
-        for methods without this bound.
     """
 
     polytope: SkewPolytope
     stages: tuple[StageResult, ...]
     notes: tuple[str, ...]
-    bound: float | None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -108,7 +105,6 @@ class Analysis(Found):
         """Return what `analyze --json` prints; docs/palettes.md explains the names."""
         return {
             "stages": [stage.row() for stage in self.stages],
-            "held_to_L_prime": self.bound,
             "palette": self.report.figures(),
             "frames": [dataclasses.asdict(fit) for fit in self.report.fits],
             "colour_spaces": self.colours,
@@ -207,7 +203,6 @@ def analyze(
         found.polytope,
         found.stages,
         tuple(notes),
-        found.bound,
         document=document,
         report=report,
         colours=colour_space.described(used),
@@ -257,7 +252,7 @@ def find_polytope(
     run = _Run(frames, options, progress)
     methods = {"skew": _skew, "paper": _paper, "static": _static, "rgbt": _rgbt}
     polytope = methods[options.method](run).later(first)
-    return Found(polytope, tuple(run.stages), tuple(run.notes), run.bound)
+    return Found(polytope, tuple(run.stages), tuple(run.notes))
 
 
 class _Run:
@@ -274,7 +269,6 @@ class _Run:
         self.report = progress or (lambda stage, done, total: None)
         self.stages: list[StageResult] = []
         self.notes: list[str] = []
-        self.bound: float | None = None
         self.measured: dict[SkewPolytope, Losses] = {}
 
     @functools.cached_property
@@ -314,7 +308,6 @@ def _skew(run: _Run) -> SkewPolytope:
     usual = _static(run)  # does not depend on `handle_cost`
     rungs = [rung for rung in run.ladder if structure_search.allowed(rung, run.ladder, options)]
     simple = min(rungs, key=lambda rung: rung.price(options.handle_cost)).polytope
-    run.bound = run.losses(simple).L_prime
     polytope = _searched(run, options, usual, simple)
     run.record("vertex_refinement", polytope)
     run.report("vertex_refinement", 1, 1)

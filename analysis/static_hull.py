@@ -54,8 +54,7 @@ def ladder(
         )
         return float((options.lambda_ * rows[:, 0] + rows[:, 1] + rows[:, 2]).mean())
 
-    def rungs(first: F64, start: Callable[[F64], SkewPolytope]) -> Iterator[FramePalette]:
-        rgb = first
+    def rungs(rgb: F64, start: Callable[[F64], SkewPolytope]) -> Iterator[FramePalette]:
         while True:
             found, _ = refine_jointly(start(rgb), some, gamut, roomy, STEPS, coarse=True)
             palette = hull_mesh(found.vertices[:, :3])

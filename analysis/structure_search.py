@@ -126,7 +126,7 @@ def best_of(
             for p, at in _close(close, cost, share)
         ]
     close.sort(key=lambda found: found[0].price(cost))
-    # Counting rare handles takes time, so they are counted where it decides only.
+    # Rare handles are counted only where they decide: counting is slow.
     whole = functools.cache(lambda one: one.price(cost) + rare_cost(one.polytope, frames))
     least = math.inf
     for one, _ in close:

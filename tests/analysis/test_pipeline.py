@@ -9,7 +9,7 @@ import weakref
 import numpy as np
 import pytest
 from analysis_frames import constant, grey, mixture, noise, stats
-from palette4d.analysis import colour_statistics, pipeline
+from palette4d.analysis import colour_statistics, pipeline, structure_search
 from palette4d.analysis.options import METHODS, AnalysisOptions
 
 from palette4d import _core
@@ -185,6 +185,15 @@ def test_the_default_is_never_worse_than_a_static_hull(name):
     for options in PLAIN:
         plain = pipeline.find_polytope(frames, options).stages[-1]
         assert analysis.stages[-1].losses.L_prime <= plain.losses.L_prime + 1e-12
+
+
+def test_a_search_without_success_ends_with_the_static_palette(monkeypatch):
+    def four_colours(starts, static, rungs, *rest):
+        return None, rungs[-1]
+
+    monkeypatch.setattr(structure_search, "search", four_colours)
+    stages = pipeline.find_polytope(stats(MOVING["noise that grows"]), AnalysisOptions()).stages
+    assert stages[-1].losses == stages[0].losses
 
 
 @pytest.mark.parametrize(("first", "last"), [(0, 1), (10, 13)])
