@@ -58,7 +58,7 @@ RARE_COST = USUAL_COST
 # largest losses.
 KEY_FRAMES, EVEN_FRAMES, WORST_FRAMES = 48, 16, 8
 # Frames in which palettes without one of their colours are compared.
-COMPARED = 8
+CHAIN_FRAMES = 8
 
 
 def search(
@@ -298,7 +298,7 @@ def _dispensable(
 ) -> tuple[int, ...] | None:
     """Return the chain whose loss costs least before the others take over, if any may go."""
     weights = shaped_weights(options, gamut.scale, faces=False)
-    few = range(0, len(frames), -(-len(frames) // COMPARED))
+    few = range(0, len(frames), -(-len(frames) // CHAIN_FRAMES))
 
     def loss(chain: tuple[int, ...]) -> float:
         rest = moves.without_chain(polytope, chain, any_mesh=True)

@@ -11,33 +11,34 @@
 namespace palette4d {
 namespace {
 
-/// Sum over the mesh's edges of six times the volume by which its two faces fold inwards.
+/// Sum over the mesh's edges of six times the volume by which its two faces fold inwards. `across`
+/// is memory: the third corner of the face with each directed edge.
 double concavity(const std::vector<Vec3>& v, const std::vector<Face>& faces, double scale,
-                 std::vector<Vec3>* gradient) {
+                 std::vector<int>& across, std::vector<Vec3>* gradient) {
+    const std::size_t n = v.size();
+    across.assign(n * n, -1);
+    for (const Face& f : faces)
+        for (int e = 0; e < 3; ++e) across[n * f[e] + f[(e + 1) % 3]] = f[(e + 2) % 3];
     double sum = 0;
     for (const Face& f : faces)
         for (int e = 0; e < 3; ++e) {
             const int a = f[e], b = f[(e + 1) % 3], c = f[(e + 2) % 3];
             if (a > b) continue;  // each edge once
-            for (const Face& g : faces)
-                for (int m = 0; m < 3; ++m) {
-                    if (g[m] != b || g[(m + 1) % 3] != a) continue;
-                    const int d = g[(m + 2) % 3];
-                    if (d == c) continue;
-                    const Vec3 ab = v[b] - v[a], ac = v[c] - v[a], ad = v[d] - v[a];
-                    const Vec3 gd = cross(ab, ac);
-                    const double volume = dot(gd, ad);
-                    if (volume <= 0) continue;  // d lies below the face: convex here
-                    sum += volume;
-                    if (!gradient) continue;
-                    const Vec3 gb = cross(ac, ad), gc = cross(ad, ab);
-                    add((*gradient)[b], scale, gb);
-                    add((*gradient)[c], scale, gc);
-                    add((*gradient)[d], scale, gd);
-                    add((*gradient)[a], -scale, gb);
-                    add((*gradient)[a], -scale, gc);
-                    add((*gradient)[a], -scale, gd);
-                }
+            const int d = across[n * b + a];
+            if (d < 0 || d == c) continue;
+            const Vec3 ab = v[b] - v[a], ac = v[c] - v[a], ad = v[d] - v[a];
+            const Vec3 gd = cross(ab, ac);
+            const double volume = dot(gd, ad);
+            if (volume <= 0) continue;  // d lies below the face: convex here
+            sum += volume;
+            if (!gradient) continue;
+            const Vec3 gb = cross(ac, ad), gc = cross(ad, ab);
+            add((*gradient)[b], scale, gb);
+            add((*gradient)[c], scale, gc);
+            add((*gradient)[d], scale, gd);
+            add((*gradient)[a], -scale, gb);
+            add((*gradient)[a], -scale, gc);
+            add((*gradient)[a], -scale, gd);
         }
     return sum;
 }
@@ -79,6 +80,7 @@ FrameLoss palette_loss(const ColourTree& colours, const std::vector<Vec3>& palet
         PaletteHull hull;
         ReconstructionScratch reconstruction;
         ColourTree::Nearest nearest;
+        std::vector<int> across;
     };
     thread_local Scratch of_this_thread;
     Scratch& scratch = of_this_thread;  // once: each use of a thread_local may be a call
@@ -98,10 +100,8 @@ FrameLoss palette_loss(const ColourTree& colours, const std::vector<Vec3>& palet
         loss.C += length / n;
         if (gradient && length > 1e-12) add((*gradient)[i], 1 / (n * length), d);
     }
-    if (weights.convexity > 0)
-        loss.D = concavity(palette, faces, weights.convexity, gradient);
-    else
-        loss.D = concavity(palette, faces, 0, nullptr);
+    loss.D = concavity(palette, faces, weights.convexity, scratch.across,
+                       weights.convexity > 0 ? gradient : nullptr);
     const double separation = separation_within(colours, weights.separation);
     if (separation > 0) loss.S = closeness(palette, separation, gradient);
     return loss;
