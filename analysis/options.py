@@ -20,12 +20,17 @@ METHODS = {
     "rgbt": "a convex hull in RGB and time",
 }
 
+#: The method of `like`, the palette of an earlier version.
+LIKE = "like"
+
 _SKEW, _PAPER = ("skew",), ("paper",)
 _POLYTOPES, _HULLS = ("skew", "paper"), ("skew", "paper", "static")
+_MOVED = (*_HULLS, LIKE)
+_ALL = (*METHODS, LIKE)
 
 
 def _option(
-    default: float, low: float, high: float, text: str, methods: tuple[str, ...] = tuple(METHODS)
+    default: float, low: float, high: float, text: str, methods: tuple[str, ...] = _ALL
 ) -> Any:
     metadata = {"default": default, "low": low, "high": high, "text": text, "methods": methods}
     return dataclasses.field(default=default, metadata=metadata)
@@ -54,11 +59,11 @@ class AnalysisOptions:
         0.1, 0, 1, "colours of a frame's hull closer than this are merged", _POLYTOPES
     )
     separation: float = _option(
-        0.15, 0, 1, "palette colours closer than this repel each other; 0: the paper", _HULLS
+        0.15, 0, 1, "palette colours closer than this repel each other; 0: the paper", _MOVED
     )
-    convexity: float = _option(3.0, 0, 1e6, "weight of convex palettes; 0: the paper", _HULLS)
+    convexity: float = _option(3.0, 0, 1e6, "weight of convex palettes; 0: the paper", _MOVED)
     reach: float = _option(
-        0.1, 0, 10, "pixels this far outside count twice; 0: once, as in the paper", _HULLS
+        0.1, 0, 10, "pixels this far outside count twice; 0: once, as in the paper", _MOVED
     )
     colours: int = _option(32768, 64, 1e8, "most colours kept per frame, for the losses")
     coarse_colours: int = _option(
@@ -68,7 +73,7 @@ class AnalysisOptions:
     lambda_: float = _option(50.0, 0, 1e6, "weight of the reconstruction loss, eq. 4")
     k: float = _option(50.0, 1, 1e9, "pixels that a palette colour is compared with, eq. 3")
     gamma: float = _option(
-        0.01, 0, 1e6, "weight of smoothness in time, eq. 12", (*_POLYTOPES, "rgbt")
+        0.01, 0, 1e6, "weight of smoothness in time, eq. 12", (*_POLYTOPES, "rgbt", LIKE)
     )
     alpha: float = _option(10.0, 0, 1e6, "merging: weight of a block's length, eq. 10", _POLYTOPES)
     beta: float = _option(1.0, 0, 1e6, "merging: weight of a palette's size, eq. 10", _POLYTOPES)
@@ -76,7 +81,7 @@ class AnalysisOptions:
         0.15, 0, 10, "how far a colour may move when a frame's hull is refined", _HULLS
     )
     refinement_box: float = _option(
-        0.1, 0, 10, "how far a colour may move in vertex refinement, section 5.5", _HULLS
+        0.1, 0, 10, "how far a colour may move in vertex refinement, section 5.5", _MOVED
     )
     eta1: float = _option(
         3.5, 1, 1e6, "merging stops above this multiple of the first loss, section 5.3.3", _PAPER
@@ -91,7 +96,7 @@ class AnalysisOptions:
 
     def __post_init__(self) -> None:
         """Refuse values outside their limits."""
-        if self.method not in METHODS:
+        if self.method not in _ALL:
             raise Palette4dError(
                 f"option method: found {self.method!r}, expected one of {', '.join(METHODS)}"
             )
@@ -190,6 +195,10 @@ def check_methods(method: str, given: dict[str, Any]) -> None:
     """
     for name, option in OPTIONS.items():
         if option.field in given and method not in option.methods:
+            if method == LIKE:
+                raise Palette4dError(
+                    f"{name} has no effect with like=…, which keeps a palette's colours and stops"
+                )
             raise Palette4dError(
                 f'{name} has no effect with method="{method}"; expected '
                 f"{' or '.join(option.methods)}"

@@ -4,6 +4,7 @@ clip -> colour_statistics -> frame_hulls -> glue -> block_merging -> vertex_remo
 -> structure_search -> stop_insertion -> vertex_refinement -> polytope -> sidecar document
 
 `static_hull` is a start of the search and a method; `baselines` holds the other methods.
+`earlier_palette` takes the place of the stages between statistics and refinement for `like`.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import concurrent.futures
 import dataclasses
 import functools
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -21,6 +22,7 @@ from palette4d.analysis import (
     block_merging,
     clip_colours,
     colour_statistics,
+    earlier_palette,
     frame_hulls,
     glue,
     static_hull,
@@ -34,8 +36,8 @@ from palette4d.analysis.block_merging import Block
 from palette4d.analysis.dense_polytope import DensePolytope
 from palette4d.analysis.frame_statistics import FrameStatistics, Gamut
 from palette4d.analysis.losses import LOST_SHARE, Losses, thread_count
-from palette4d.analysis.objective import Priced, losses_of
-from palette4d.analysis.options import AnalysisOptions
+from palette4d.analysis.objective import Priced, losses_of, refine_jointly
+from palette4d.analysis.options import LIKE, AnalysisOptions
 from palette4d.analysis.polytope import FramePalette, SkewPolytope
 from palette4d.analysis.report import advice, quality
 from palette4d.analysis.report.quality import Report
@@ -51,6 +53,8 @@ from palette4d.media.clip_base import Clip, describe, even_step
 from palette4d.media.colour_space import SpaceOptions
 
 T = TypeVar("T")
+# Gradient steps of an earlier palette on the coarse colours, before vertex refinement.
+MOVING_STEPS = 30
 Progress = Callable[[str, int, int], object]
 """Called as progress(stage, done, total)."""
 
@@ -119,6 +123,7 @@ def analyze(
     *,
     spaces: SpaceOptions | None = None,
     allow_cuts: bool = False,
+    like: Mapping[str, Any] | None = None,
 ) -> Analysis:
     """Find the time-varying palette of a clip.
 
@@ -131,12 +136,15 @@ def analyze(
     progress : called as progress(stage, done, total).
     spaces : colour spaces of the clip and of its palette; by default those of $OCIO, if it is set.
     allow_cuts : analyse a clip with sudden cuts as one shot.
+    like : the sidecar document of an earlier version of the clip, for the method `LIKE`: its
+        palette is moved to this clip's colours.
 
     Raises
     ------
     Palette4dError
         When a frame cannot be read, the frames are not evenly spaced, no frame has a pixel that
-        counts, or the clip has sudden cuts and `allow_cuts` is not set.
+        counts, the clip has sudden cuts and `allow_cuts` is not set, or the palette of `like` is
+        for frames or colours of another kind.
     """
     options = options or AnalysisOptions()
     clip = clip if isinstance(clip, Clip) else ArrayClip(clip)
@@ -148,6 +156,7 @@ def analyze(
             f"the frames {describe(clip.frames)} are not evenly spaced; expected one step between "
             "all frames, such as 1-10 or 1-10x3"
         )
+    earlier = earlier_palette.read(like, clip) if like is not None else None
     tell = progress or (lambda stage, done, total: None)
     gathered = colour_statistics.gather_clip(
         clip, options, lambda done, total: tell("colour_statistics", done, total)
@@ -158,7 +167,7 @@ def analyze(
         if not allow_cuts:
             raise Palette4dError(f"{clip.source}: {cuts.refusal(clip.frames, starts)}")
         missing.append(cuts.note(starts))
-    found = find_polytope(usable, options, tell)
+    found = find_polytope(usable, options, tell, earlier)
     document = sidecar.new_document(
         {
             "name": clip.name,
@@ -173,7 +182,7 @@ def analyze(
             "size": [clip.width, clip.height],
             "encoding": clip.encoding,
         },
-        found.polytope.fields(),
+        found.polytope.fields(by_time=like is None),
         {
             "stages": [stage.row() for stage in found.stages],
             "options": options.recorded(),
@@ -198,6 +207,8 @@ def analyze(
     names = vertex_colours(vertices, edges, document["clip"]["encoding"])
     for vertex, name in zip(vertices, names, strict=True):
         vertex["name"] = name
+    if like is not None:
+        notes += earlier_palette.fit(like, found.stages[-1].losses.L_prime)
     notes += [*gathered.notes, *missing, *found.notes, *warnings]
     return Analysis(
         found.polytope,
@@ -243,15 +254,26 @@ def _usable(
 
 
 def find_polytope(
-    frames: Sequence[FrameStatistics], options: AnalysisOptions, progress: Progress | None = None
+    frames: Sequence[FrameStatistics],
+    options: AnalysisOptions,
+    progress: Progress | None = None,
+    earlier: SkewPolytope | None = None,
 ) -> Found:
-    """Run the stages after `colour_statistics` on at least one frame, in order of time."""
+    """Run the stages after `colour_statistics` on at least one frame, in order of time.
+
+    `earlier` is the palette that the method `LIKE` moves.
+    """
     # Times from 0 on: how frames are numbered must not show, not even by rounding.
     first = frames[0].frame
     frames = [dataclasses.replace(one, frame=one.frame - first) for one in frames]
     run = _Run(frames, options, progress)
-    methods = {"skew": _skew, "paper": _paper, "static": _static, "rgbt": _rgbt}
-    polytope = methods[options.method](run).later(first)
+    if options.method == LIKE:
+        assert earlier is not None
+        polytope = _moved(run, earlier.later(-first))
+    else:
+        methods = {"skew": _skew, "paper": _paper, "static": _static, "rgbt": _rgbt}
+        polytope = methods[options.method](run)
+    polytope = polytope.later(first)
     return Found(polytope, tuple(run.stages), tuple(run.notes))
 
 
@@ -316,6 +338,17 @@ def _skew(run: _Run) -> SkewPolytope:
             f"the palette has {len(polytope.vertices)} vertices, not {options.vertices}: it has at "
             "least four colours, and each of them two vertices"
         )
+    return polytope
+
+
+def _moved(run: _Run, earlier: SkewPolytope) -> SkewPolytope:
+    """The palette of an earlier version, before and after it is moved."""
+    frames, gamut, options = run.frames, run.gamut, run.options
+    run.record("earlier_palette", earlier)
+    near, _ = refine_jointly(earlier, frames, gamut, options, MOVING_STEPS, coarse=True)
+    polytope = vertex_refinement.refine(near, frames, gamut, options)
+    run.record("vertex_refinement", polytope)
+    run.report("vertex_refinement", 1, 1)
     return polytope
 
 

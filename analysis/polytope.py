@@ -214,14 +214,15 @@ class SkewPolytope:
             tuple(section(t) for t in self.transitions),
         )
 
-    def fields(self) -> dict[str, Any]:
+    def fields(self, by_time: bool = True) -> dict[str, Any]:
         """Return the sidecar's "polytope": ids v1, v2, … and e1, e2, … in order of time.
 
-        Only this function assigns ids; edits refer to them.
+        Only this function assigns ids; edits refer to them. Without `by_time` they are in order of
+        the vertices: a palette that was read and moved keeps its ids.
         """
-        order = sorted(
-            range(len(self.vertices)), key=lambda i: (self.vertices[i, 3], *self.vertices[i, :3], i)
-        )
+        order = list(range(len(self.vertices)))
+        if by_time:
+            order.sort(key=lambda i: (self.vertices[i, 3], *self.vertices[i, :3], i))
         name = {index: f"v{place}" for place, index in enumerate(order, 1)}
         place = {index: at for at, index in enumerate(order)}
         edges = sorted((place[int(u)], place[int(v)]) for u, v in self.edges())

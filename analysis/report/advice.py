@@ -11,7 +11,7 @@ from collections.abc import Mapping
 
 from palette4d.analysis.convex_hulls import CONCAVE
 from palette4d.analysis.losses import LOST_SHARE
-from palette4d.analysis.options import OPTIONS, AnalysisOptions
+from palette4d.analysis.options import LIKE, OPTIONS, AnalysisOptions
 from palette4d.analysis.report.quality import Report
 
 from palette4d.common.text import counted
@@ -29,8 +29,9 @@ AT_ONCE = {"gamma": 0.0003, "handle_cost": 0.001, "blocks": 9}
 # No display-referred picture and no log encoding has larger code values.
 BRIGHT = 2.0
 
-#: The remedy for the palettes of other methods.
+#: The remedies for the palettes of other methods, and for those of earlier versions.
 DEFAULT = 'take the default method="skew"'
+ANEW = "leave out like=…, so that a palette is found anew"
 PARTS = "analyse parts of the clip by themselves with frames=…"
 
 
@@ -67,6 +68,11 @@ def warnings(
     return tuple(text for text in found if text)
 
 
+def _simplest(options: AnalysisOptions) -> str:
+    """Return the remedy for a palette that the default method did not find."""
+    return ANEW if options.method == LIKE else DEFAULT
+
+
 def _fit(x: Report, options: AnalysisOptions) -> str:
     """Frames that the palette fits loosely."""
     bad = [f.frame for f in x.fits if max(BAD_L, BAD_FRAME * x.median_loss) < f.L]
@@ -81,7 +87,7 @@ def _fit(x: Report, options: AnalysisOptions) -> str:
     else:
         return ""
     if options.method != "skew":
-        ways = DEFAULT
+        ways = _simplest(options)
     elif options.vertices:
         ways = f"raise vertices=…, or {PARTS}"
     elif bad:
@@ -108,7 +114,7 @@ def _lost(x: Report, options: AnalysisOptions, farthest: Mapping[str, float]) ->
     if frame.lost < LOST_SHARE or not nearer:
         return ""
     where = " and ".join(f"{words} {distance:.2f}" for words, distance in nearer.items())
-    ways = DEFAULT
+    ways = _simplest(options)
     if options.method == "skew":
         reach = options.reach / 2 or OPTIONS["reach"].default
         ways = (
@@ -127,7 +133,7 @@ def _lookalikes(x: Report, options: AnalysisOptions) -> str:
     if x.closest is None or x.closest[0] >= LOOKALIKE:
         return ""
     distance, frame, one, other = x.closest
-    ways = DEFAULT
+    ways = _simplest(options)
     if options.method == "skew":
         ways = (
             "lower the setting palette_size, or raise separation or merge_distance; or, if little "
@@ -152,7 +158,7 @@ def _unused(x: Report, options: AnalysisOptions) -> str:
     handle, use = x.least_used
     if use >= UNUSED:
         return ""
-    ways = DEFAULT
+    ways = _simplest(options)
     if options.method == "skew":
         ways = "raise handle_cost=…, or ask for fewer vertices=…"
     return f"the handle {handle} weighs less than {UNUSED:.1%} in every frame: {ways}"

@@ -103,6 +103,7 @@ def analyze(
     palette_space: str | None = None,
     ocio_config: str | None = None,
     method: str = "skew",
+    like: "str | os.PathLike[str] | Document | None" = None,
     progress: Callable[[str, int, int], object] | None = None,
     **settings: float,
 ) -> "Document":
@@ -130,6 +131,9 @@ def analyze(
         Called as ``progress(stage, done, total)``, for example `print`.
     method : {"skew", "paper", "static", "rgbt"}
         Use the default; the others are for comparison.
+    like : str, path or Document, optional
+        The sidecar of an earlier version of the clip, as long as this one. Its palette keeps its
+        colours and stops, and they move to this clip's colours; nothing is searched.
     **settings
         The settings of `palette4d analyze --help-all`, such as ``vertices=16``; write "lambda" as
         ``lambda_``.
@@ -143,16 +147,21 @@ def analyze(
     ------
     Palette4dError
         The clip cannot be read, its frames are not evenly spaced, it has sudden cuts, or a setting
-        is unknown or out of range.
+        is unknown or out of range; `like` is unusable, or does not fit the clip.
     """
     from palette4d.analysis import pipeline
-    from palette4d.analysis.options import AnalysisOptions
+    from palette4d.analysis.options import LIKE, AnalysisOptions
     from palette4d.grade.document import Document
     from palette4d.media.array_clip import ArrayClip
     from palette4d.media.clip import Clip, open_clip
     from palette4d.media.colour_space import SpaceOptions
 
-    options = AnalysisOptions.of(method, settings)
+    if like is not None and method != "skew":
+        raise Palette4dError(
+            f'like=… moves a palette, and method="{method}" finds one: give one of them'
+        )
+    options = AnalysisOptions.of(method if like is None else LIKE, settings)
+    earlier = load(like) if isinstance(like, str | os.PathLike) else like
     if isinstance(clip, str | os.PathLike):
         opened: Clip = open_clip(
             os.fspath(clip), frames=frames, rate=rate, skip_bad_frames=skip_bad_frames
@@ -165,5 +174,6 @@ def analyze(
         progress,
         spaces=SpaceOptions(input_space, palette_space, ocio_config),
         allow_cuts=allow_cuts,
+        like=None if earlier is None else earlier.fields(),
     )
     return Document(found.document, found.notes, found.figures())

@@ -93,6 +93,28 @@ def test_edits_are_not_lost(clip, tmp_path, capsys):
     assert json.loads(out.read_text())["edits"] == {"vertices": [], "stops": []}
 
 
+def test_a_new_version_keeps_handles_and_grade(clip, tmp_path, capsys):
+    out = tmp_path / "shot.p4d.json"
+    assert main.main(["analyze", str(clip), "-o", str(out), "--quiet"]) == 0
+    graded = ["edit", str(out), "set", "--near", "0.9,0.2,0.2", "--frame", "1001"]
+    assert main.main([*graded, "--rgb", "0.2", "0.2", "0.9"]) == 0
+    old = json.loads(out.read_text())
+    for i in range(6):
+        write_image(clip / f"shot.{1001 + i}.png", mixture(CORNERS + 0.01 * i, 100 + i))
+    again = ["analyze", str(clip), "-o", str(out), "--like", str(out), "--keep-edits"]
+    assert main.main(again) == 0
+    assert "earlier_palette" in capsys.readouterr().out
+    new = json.loads(out.read_text())
+    assert [v["id"] for v in new["polytope"]["vertices"]] == [
+        v["id"] for v in old["polytope"]["vertices"]
+    ]
+    assert new["polytope"]["edges"] == old["polytope"]["edges"]
+    assert new["polytope"] != old["polytope"]
+    one, other = ({v["vertex"]: v["rgb"] for v in d["edits"]["vertices"]} for d in (old, new))
+    assert one.keys() <= other.keys()
+    assert all(np.allclose(one[name], other[name], atol=0.03) for name in one)
+
+
 def test_bad_frames(clip, tmp_path, capsys):
     out = tmp_path / "shot.p4d.json"
     (clip / "shot.1003.png").write_bytes((clip / "shot.1003.png").read_bytes()[:60])
@@ -261,6 +283,19 @@ def test_options_of_another_method_are_wrong_usage(clip, tmp_path, method, given
     assert stop.value.code == 2
     error = capsys.readouterr().err
     assert f"{named} has no effect with --method {method}" in error
+    assert not out.exists()
+
+
+def test_like_is_for_one_clip_and_a_sidecar(clip, tmp_path, capsys):
+    out = tmp_path / "shot.p4d.json"
+    command = ["analyze", str(clip), "-o", str(out), "--like", str(tmp_path / "none.p4d.json")]
+    assert main.main(command) == 1
+    assert "none.p4d.json" in capsys.readouterr().err
+    for wrong in (["--vertices", "12"], ["--method", "paper"], ["--detect-shots"]):
+        with pytest.raises(SystemExit) as ended:
+            main.main([*command, *wrong])
+        assert ended.value.code == 2
+        assert "--like" in capsys.readouterr().err
     assert not out.exists()
 
 

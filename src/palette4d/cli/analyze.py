@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from palette4d import analyze
-from palette4d.analysis.options import METHODS, OPTIONS, check_methods, parse_setting
+from palette4d.analysis.options import LIKE, METHODS, OPTIONS, check_methods, parse_setting
 from palette4d.cli import analysis_report, analyze_shots
 from palette4d.cli.messages import as_fields, as_options, tell
 from palette4d.cli.progress import progress_bar
@@ -33,12 +33,14 @@ examples:
   palette4d analyze take3.mov -o take3.p4d.json --vertices 16
   palette4d analyze cg.####.exr -o cg.p4d.json --input-space ACEScg
   palette4d analyze edit.otio --media plates/ -o shots
+  palette4d analyze v002.####.exr -o v002.p4d.json --like v001.p4d.json
 """
 
 # The options of the first help screen; --help-all shows all of them.
 FRONT = (
     *("clip", "output", "frames", "input_space", "palette_space", "ocio_config"),
-    *("detect_shots", "media", "method", "vertices", "settings", "json", "quiet", "help", "all"),
+    *("detect_shots", "media", "like", "method", "vertices", "settings", "json", "quiet"),
+    *("help", "all"),
 )
 
 DESCRIPTION_ALL = """
@@ -83,7 +85,7 @@ def _settings_help() -> list[str]:
     for name, option in OPTIONS.items():
         if name == "vertices":  # it has its own option
             continue
-        of = "" if len(option.methods) == len(METHODS) else f"; {', '.join(option.methods)}"
+        of = "" if set(METHODS) <= set(option.methods) else f"; {', '.join(option.methods)}"
         lines.append(f"  {name:<19} {option.text}")
         limits = f"{option.low:.10g} to {option.high:.10g}, default {option.default:g}{of}"
         lines.append(f"  {'':<19} ({limits})")
@@ -163,6 +165,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="; ".join(f"{name}: {text}" for name, text in METHODS.items()),
     )
     parser.add_argument(
+        "--like",
+        metavar="OLD",
+        type=Path,
+        help="keep the colours and stops of an earlier version's sidecar, moved to this clip",
+    )
+    parser.add_argument(
         "--set",
         dest="settings",
         metavar="NAME=VALUE",
@@ -221,7 +229,9 @@ def _run(args: argparse.Namespace, progress: _ProgressFile) -> int:
             bars(stage, done, total)
             progress(stage, done, total)
 
-        document = analyze(args.clip, frames=args.frames, progress=tell_both, **settings)
+        document = analyze(
+            args.clip, frames=args.frames, like=args.like, progress=tell_both, **settings
+        )
     finally:
         bars.close()
     document.save(args.output, on_edits=on_edits)
@@ -244,8 +254,10 @@ def _settings(args: argparse.Namespace) -> dict[str, Any]:
     given: dict[str, Any] = dict(map(parse_setting, args.settings))
     if args.vertices is not None:
         given["vertices"] = args.vertices
+    if args.like is not None and args.method != "skew":
+        args.usage_error("--like moves a palette, and --method finds one: give one of them")
     try:
-        check_methods(args.method, given)
+        check_methods(args.method if args.like is None else LIKE, given)
     except Palette4dError as error:
         args.usage_error(as_options(str(error)))
     spaces = ("input_space", "palette_space", "ocio_config")

@@ -89,6 +89,8 @@ def is_show(args: argparse.Namespace) -> bool:
         return False
     if edit and args.detect_shots:
         args.usage_error("--detect-shots splits a movie; an edit already has its shots")
+    if args.like is not None:
+        args.usage_error("--like is for one clip; each shot's palette is found anew")
     if edit and args.frames is not None:
         args.usage_error("--frames is for one clip; an edit defines the frames of each clip")
     if args.output.name.endswith(".json"):

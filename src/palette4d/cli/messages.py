@@ -54,6 +54,7 @@ _FIELDS = {
     "ocio_config": texts.CONFIG,
     "vertices": texts.VERTICES,
     "method": texts.METHOD,
+    "like": texts.LIKE,
 }
 
 

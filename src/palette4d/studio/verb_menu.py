@@ -87,6 +87,7 @@ class VerbMenu:
                 Field("", texts.CLIP, "open", clip, hint=texts.CLIP_HINT),
                 Field("-o", texts.SIDECAR, "save", out),
                 Field("--frames", texts.FRAMES, hint=texts.FRAMES_HINT),
+                Field("--like", texts.LIKE, "open", hint=texts.LIKE_HINT),
                 *self._search_fields(),
                 Field("", texts.EDITS, "choice", edits, EDITS, names=texts.EDITS_NAMES),
                 Field("--detect-shots", texts.DETECT_SHOTS, "check"),

@@ -1,0 +1,72 @@
+"""The palette of an earlier version of a clip, which moves to the colours of the new one.
+
+A new search may end at other handles although only the grain of the clip has changed: palettes of
+nearly the same price change places. A moved palette keeps its colours and stops. Input: a sidecar
+document. Output: its `SkewPolytope`, at the times of the new version.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from palette4d.analysis.polytope import Section, SkewPolytope
+
+from palette4d.common.errors import Palette4dError
+from palette4d.media.clip_base import Clip, describe
+
+# A palette fits worse if L' is so many times that of its own clip.
+WORSE = 1.25
+
+
+def read(document: Mapping[str, Any], clip: Clip) -> SkewPolytope:
+    """Return the palette of a sidecar document, at the times of a clip of the same length.
+
+    Raises
+    ------
+    Palette4dError
+        When the clip has another length, or its palette would have another encoding.
+    """
+    name, old = document["clip"]["name"], document["clip"]
+    first, last = old["frames"]["first"], old["frames"]["last"]
+    if last - first != clip.frames[-1] - clip.frames[0]:
+        raise Palette4dError(
+            f"like: the palette of {name} covers the frames {first}-{last}, and the clip has "
+            f"{describe(clip.frames)}; expected a clip of the same length, or frames=… of it"
+        )
+    if clip.encoding != old["encoding"] and "unknown" not in (clip.encoding, old["encoding"]):
+        raise Palette4dError(
+            f"like: the palette of {name} is in {old['encoding']}, and this one would be in "
+            f"{clip.encoding}; expected the same, see palette_space=…"
+        )
+    return _polytope(document["polytope"]).later(clip.frames[0] - first)
+
+
+def _polytope(fields: Mapping[str, Any]) -> SkewPolytope:
+    """Return the sidecar's "polytope"; the inverse of `SkewPolytope.fields`."""
+    place = {vertex["id"]: at for at, vertex in enumerate(fields["vertices"])}
+
+    def section(of: Mapping[str, Any], first: float, last: float) -> Section:
+        tracks = tuple(tuple(place[one] for one in track) for track in of["tracks"])
+        return Section(first, last, tracks, np.array(of["faces"], np.int32).reshape(-1, 3))
+
+    blocks = tuple(section(b, float(b["first"]), float(b["last"])) for b in fields["blocks"])
+    between = zip(fields["transitions"], blocks, blocks[1:], strict=False)
+    return SkewPolytope(
+        np.array([[*v["rgb"], v["frame"]] for v in fields["vertices"]], float),
+        blocks,
+        tuple(section(of, before.last, after.first) for of, before, after in between),
+    )
+
+
+def fit(document: Mapping[str, Any], loss: float) -> list[str]:
+    """Return a note if the palette of a document fits another clip, with the `loss` L', worse."""
+    stages = document.get("quality", {}).get("stages") or [{}]
+    own = stages[-1].get("L_prime")  # other programs need not write it
+    if not isinstance(own, float) or loss <= WORSE * own:
+        return []
+    return [
+        f"the palette of {document['clip']['name']} fits this clip worse (L_prime {loss:.3f}) "
+        f"than its own ({own:.3f}); leave out like=… to find a new one"
+    ]
