@@ -28,8 +28,8 @@ def read(document: Mapping[str, Any], clip: Clip) -> SkewPolytope:
     Palette4dError
         When the clip has another length, or its palette would have another encoding.
     """
-    name, old = document["clip"]["name"], document["clip"]
-    first, last = old["frames"]["first"], old["frames"]["last"]
+    old = document["clip"]
+    name, first, last = old["name"], old["frames"]["first"], old["frames"]["last"]
     if last - first != clip.frames[-1] - clip.frames[0]:
         raise Palette4dError(
             f"like: the palette of {name} covers the frames {first}-{last}, and the clip has "
