@@ -32,19 +32,21 @@ def read(document: Mapping[str, Any], clip: Clip) -> SkewPolytope:
     name, first, last = old["name"], old["frames"]["first"], old["frames"]["last"]
     if last - first != clip.frames[-1] - clip.frames[0]:
         raise Palette4dError(
-            f"like: the palette of {name} covers the frames {first}-{last}, and the clip has "
-            f"{describe(clip.frames)}; expected a clip of the same length, or frames=… of it"
+            f"like=…: the palette of {name} covers the frames {first}-{last}, and the clip has "
+            f"{describe(clip.frames)}; expected as many. Leave out like=…, and copy the grade to "
+            "the new palette"
         )
     if clip.encoding != old["encoding"] and "unknown" not in (clip.encoding, old["encoding"]):
         raise Palette4dError(
-            f"like: the palette of {name} is in {old['encoding']}, and this one would be in "
-            f"{clip.encoding}; expected the same, see palette_space=…"
+            f"like=…: the palette of {name} is in {old['encoding']}, and this one would be in "
+            f"{clip.encoding}; expected the same: give the colour spaces of the earlier analysis, "
+            "or none if it had none"
         )
     return _polytope(document["polytope"]).later(clip.frames[0] - first)
 
 
 def _polytope(fields: Mapping[str, Any]) -> SkewPolytope:
-    """Return the sidecar's "polytope"; the inverse of `SkewPolytope.fields`."""
+    """Return the polytope of a sidecar's "polytope"; the inverse of `fields_of`."""
     place = {vertex["id"]: at for at, vertex in enumerate(fields["vertices"])}
 
     def section(of: Mapping[str, Any], first: float, last: float) -> Section:
@@ -60,13 +62,42 @@ def _polytope(fields: Mapping[str, Any]) -> SkewPolytope:
     )
 
 
-def fit(document: Mapping[str, Any], loss: float) -> list[str]:
-    """Return a note if the palette of a document fits another clip, with the `loss` L', worse."""
+def fields_of(polytope: SkewPolytope, document: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the sidecar's "polytope" of a moved palette, with the ids of the document's."""
+    old, fields = document["polytope"], polytope.fields(by_time=False)
+    pairs = zip(fields["vertices"], old["vertices"], strict=True)
+    ids = {new["id"]: vertex["id"] for new, vertex in pairs}
+
+    def named(sections: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        return [{**s, "tracks": [[ids[v] for v in t] for t in s["tracks"]]} for s in sections]
+
+    return {
+        "vertices": [{**v, "id": ids[v["id"]]} for v in fields["vertices"]],
+        "edges": [{name: edge[name] for name in ("id", "from", "to")} for edge in old["edges"]],
+        "blocks": named(fields["blocks"]),
+        "transitions": named(fields["transitions"]),
+    }
+
+
+def fit(document: Mapping[str, Any], new: Mapping[str, Any], loss: float) -> list[str]:
+    """Return notes if the palette of a document fits a new version, with the `loss` L', worse.
+
+    `new` is the document of the new version.
+    """
+    notes = []
+    before, after = (
+        d["clip"].get("conversion", {}).get("input_space", "the palette's space")
+        for d in (document, new)
+    )
+    if before != after:
+        notes.append(f"this version is read as {after}, the earlier one was as {before}")
+    options, now = (d.get("quality", {}).get("options", {}) for d in (document, new))
     stages = document.get("quality", {}).get("stages") or [{}]
     own = stages[-1].get("L_prime")  # other programs need not write it
-    if not isinstance(own, float) or loss <= WORSE * own:
-        return []
-    return [
-        f"the palette of {document['clip']['name']} fits this clip worse (L_prime {loss:.3f}) "
-        f"than its own ({own:.3f}); leave out like=… to find a new one"
-    ]
+    same = all(options.get(name) == now.get(name) for name in ("lambda", "k", "gamma"))
+    if same and isinstance(own, float) and loss > WORSE * own:
+        notes.append(
+            f"the earlier palette fits this version worse (L_prime {loss:.3f}) than its own "
+            f"({own:.3f}); leave out like=… to find a new one"
+        )
+    return notes

@@ -197,7 +197,7 @@ def check_methods(method: str, given: dict[str, Any]) -> None:
         if option.field in given and method not in option.methods:
             if method == LIKE:
                 raise Palette4dError(
-                    f"{name} has no effect with like=…, which keeps a palette's colours and stops"
+                    f"{name} has no effect with like=…, which keeps the handles; leave one out"
                 )
             raise Palette4dError(
                 f'{name} has no effect with method="{method}"; expected '

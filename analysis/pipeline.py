@@ -168,6 +168,8 @@ def analyze(
             raise Palette4dError(f"{clip.source}: {cuts.refusal(clip.frames, starts)}")
         missing.append(cuts.note(starts))
     found = find_polytope(usable, options, tell, earlier)
+    polytope = found.polytope
+    fields = polytope.fields() if like is None else earlier_palette.fields_of(polytope, like)
     document = sidecar.new_document(
         {
             "name": clip.name,
@@ -182,7 +184,7 @@ def analyze(
             "size": [clip.width, clip.height],
             "encoding": clip.encoding,
         },
-        found.polytope.fields(by_time=like is None),
+        fields,
         {
             "stages": [stage.row() for stage in found.stages],
             "options": options.recorded(),
@@ -208,7 +210,7 @@ def analyze(
     for vertex, name in zip(vertices, names, strict=True):
         vertex["name"] = name
     if like is not None:
-        notes += earlier_palette.fit(like, found.stages[-1].losses.L_prime)
+        notes += earlier_palette.fit(like, document, found.stages[-1].losses.L_prime)
     notes += [*gathered.notes, *missing, *found.notes, *warnings]
     return Analysis(
         found.polytope,
@@ -268,7 +270,8 @@ def find_polytope(
     frames = [dataclasses.replace(one, frame=one.frame - first) for one in frames]
     run = _Run(frames, options, progress)
     if options.method == LIKE:
-        assert earlier is not None
+        if earlier is None:
+            raise Palette4dError('method="like" needs the palette of an earlier version: like=…')
         polytope = _moved(run, earlier.later(-first))
     else:
         methods = {"skew": _skew, "paper": _paper, "static": _static, "rgbt": _rgbt}

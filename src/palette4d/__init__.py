@@ -162,6 +162,8 @@ def analyze(
         )
     options = AnalysisOptions.of(method if like is None else LIKE, settings)
     earlier = load(like) if isinstance(like, str | os.PathLike) else like
+    if not isinstance(earlier, Document | None):
+        raise Palette4dError(f"like: found {type(like).__name__}, expected a sidecar or a Document")
     if isinstance(clip, str | os.PathLike):
         opened: Clip = open_clip(
             os.fspath(clip), frames=frames, rate=rate, skip_bad_frames=skip_bad_frames

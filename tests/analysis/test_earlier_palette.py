@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import any_clips
 import numpy as np
 import pytest
@@ -47,7 +49,8 @@ def colours(document, frame):
 def test_a_palette_is_read_as_it_was_written(name, method):
     clip = ArrayClip(CLIPS[name])
     document = pipeline.analyze(clip, AnalysisOptions(method=method), allow_cuts=True).document
-    assert earlier_palette.read(document, clip).fields(False) == plain(document["polytope"])
+    read = earlier_palette.read(document, clip)
+    assert earlier_palette.fields_of(read, document) == plain(document["polytope"])
 
 
 @pytest.mark.parametrize("name", CLIPS)
@@ -76,12 +79,28 @@ def test_the_palette_follows_a_darker_version_at_other_frame_numbers():
     assert new.document["quality"]["options"]["method"] == LIKE
 
 
+def test_ids_and_their_order_stay():
+    frames = np.array(any_clips.frames(8))
+    old = palette4d.analyze(frames).fields()
+    text = sidecar.dumps(old).replace('"v3"', '"red"').replace('"e3"', '"long"')
+    renamed = json.loads(text)
+    for part in ("vertices", "edges"):
+        renamed["polytope"][part].reverse()
+    new = palette4d.analyze(frames, like=palette4d.Document(renamed)).fields()["polytope"]
+    for part, name in (("vertices", "id"), ("edges", "id")):
+        found = [one[name] for one in new[part]]
+        assert found == [one[name] for one in renamed["polytope"][part]]
+    at = {v["id"]: v["rgb"] for v in new["vertices"]}
+    before = {v["id"]: v["rgb"] for v in renamed["polytope"]["vertices"]}
+    assert all(np.allclose(at[id_], before[id_], atol=0.05) for id_ in before)
+
+
 def test_a_palette_that_fits_worse_is_reported():
     old = palette4d.analyze(np.array(any_clips.frames(8)))
     other = np.array([noise(i) for i in range(8)])
     notes = palette4d.analyze(other, like=old, allow_cuts=True).notes
-    assert any("fits this clip worse" in note for note in notes)
-    assert not any("fits this clip worse" in note for note in old.notes)
+    assert any("fits this version worse" in note for note in notes)
+    assert not any("fits this version worse" in note for note in old.notes)
 
 
 def test_what_does_not_fit_is_refused():
@@ -93,6 +112,10 @@ def test_what_does_not_fit_is_refused():
         palette4d.analyze(frames, like=old, method="static")
     with pytest.raises(Palette4dError, match="vertices has no effect"):
         palette4d.analyze(frames, like=old, vertices=12)
+    with pytest.raises(Palette4dError, match="found dict, expected a sidecar"):
+        palette4d.analyze(frames, like=old.fields())
+    with pytest.raises(Palette4dError, match="needs the palette of an earlier version"):
+        palette4d.analyze(frames, method=LIKE)
     clip = ArrayClip(frames)
     document = old.fields()
     clip.encoding, document["clip"]["encoding"] = "ACEScct", "sRGB"

@@ -10,7 +10,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import IO, Any
 
-from palette4d import analyze
+from palette4d import analyze, load
 from palette4d.analysis.options import LIKE, METHODS, OPTIONS, check_methods, parse_setting
 from palette4d.cli import analysis_report, analyze_shots
 from palette4d.cli.messages import as_fields, as_options, tell
@@ -245,7 +245,10 @@ def _run(args: argparse.Namespace, progress: _ProgressFile) -> int:
         colours = counted(len(document.tracks), "palette colour")
         handles = counted(len(document.fields()["polytope"]["vertices"]), "handle")
         print(f"wrote {args.output}: {colours} through time, {handles}")
-        print(f"next: palette4d plot {shlex.quote(str(args.output))} -o palette.png")
+        out = shlex.quote(str(args.output))
+        print(f"next: palette4d plot {out} -o palette.png")
+        if args.like is not None and load(args.like).edited and not document.edited:
+            print(f"      palette4d edit {out} copy {shlex.quote(str(args.like))}")
     return 0
 
 

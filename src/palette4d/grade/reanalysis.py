@@ -4,8 +4,9 @@ import itertools
 from pathlib import Path
 from typing import Any
 
+from palette4d.common.errors import SidecarError
 from palette4d.common.files import link_target, replacing
-from palette4d.grade import sidecar
+from palette4d.grade import edits, sidecar
 from palette4d.grade.document import Document
 from palette4d.grade.sidecar import Fields, OnEdits
 
@@ -13,8 +14,9 @@ from palette4d.grade.sidecar import Fields, OnEdits
 def save(fields: Fields, path: Path, *, on_edits: OnEdits = "refuse") -> tuple[Fields, list[str]]:
     """Write the sidecar of a new analysis; return it as written, and notes for the user.
 
-    With `on_edits` "keep" and another palette than before, the grade is copied to the new palette,
-    with its versions and picks, and the old file is kept under another name.
+    With `on_edits` "keep" and another palette than before, the edits stay with their handles if
+    these are the same (`analyze --like`). Else the grade is copied to the new palette, with its
+    versions and picks, and the old file is kept under another name.
 
     Parameters
     ----------
@@ -33,6 +35,8 @@ def save(fields: Fields, path: Path, *, on_edits: OnEdits = "refuse") -> tuple[F
         return sidecar.save(fields, target, on_edits=on_edits), []
     read = sidecar.read_bytes(target)
     former, new = Document.load(target), Document(fields)
+    if (moved := _with_same_handles(former.fields(), new)) is not None:
+        return sidecar.save(moved, target, on_edits="drop", replaces=read), []
     notes = []
     with new.one_step("copy the grade of the former analysis"):
         for name in former.versions:
@@ -50,6 +54,33 @@ def save(fields: Fields, path: Path, *, on_edits: OnEdits = "refuse") -> tuple[F
     notes.append(f"the former palette with its edits is kept in {kept.name}")
     members: dict[str, Any] = {**new.fields(), "extra": fields.get("extra") or old["extra"]}
     return sidecar.save(members, target, on_edits="drop", replaces=read), notes
+
+
+def _with_same_handles(old: Fields, new: Document) -> Fields | None:
+    """Return the new document with the old edits, if it has the same handles and they fit."""
+    fields = new.fields()
+    if _handles(old) != _handles(fields):
+        return None
+    try:
+        state = sidecar.state_of(old)
+        for (kind, name), version in state.items():
+            if kind == "version":  # its picks are solved again, too
+                state[kind, name] = new.at(edits.from_fields(version)).fields()["edits"]
+        found = new.at(state).fields()
+        found |= {name: old[name] for name in ("history",) if name in old}
+        found["extra"] = fields.get("extra") or old["extra"]
+        sidecar.validate(found)
+    except SidecarError:  # a handle has moved in time beyond an edit
+        return None
+    return found
+
+
+def _handles(document: Fields) -> tuple[Any, ...]:
+    """Return what edits refer to: handles, edges, and frames."""
+    polytope, frames = document["polytope"], document["clip"]["frames"]
+    vertices = {vertex["id"] for vertex in polytope["vertices"]}
+    edges = {(edge["id"], edge["from"], edge["to"]) for edge in polytope["edges"]}
+    return vertices, edges, frames["first"], frames["last"], document["clip"]["encoding"]
 
 
 def _former(target: Path, content: bytes) -> Path:
