@@ -194,6 +194,49 @@ def test_a_new_analysis_with_another_palette_gets_the_grade(tmp_path: Path) -> N
     assert (tmp_path / "clip.former2.p4d.json").exists()
 
 
+def test_edits_stay_with_the_same_handles(tmp_path: Path) -> None:
+    path = tmp_path / "clip.p4d.json"
+    document = Document(members("split"))
+    seen = document.palette(8).rgb.mean(axis=0).tolist()
+    document.pick(frame=8, colour=seen, by=(0.2, 0, 0))
+    document.save_version("picked")
+    document.set("v1", rgb=(1, 0, 0))
+    document.save(path)
+    old = document.fields()
+    moved = members("split")
+    moved["edits"] = {"vertices": [], "stops": []}
+    for vertex in moved["polytope"]["vertices"]:
+        vertex["rgb"] = [0.9 * value for value in vertex["rgb"]]
+    new = Document(moved)
+    new.save(path, on_edits="keep")
+    assert not new.notes
+    found = Document.load(path)
+    assert found.fields()["polytope"] == moved["polytope"]
+    assert found.settings == document.settings
+    assert found.history == document.history
+    assert found.fields()["edits"]["solution"] != old["edits"]["solution"]
+    image = np.array(seen, dtype=np.float32)[None, None]
+    for one in (found, found.version("picked")):  # solved again for the moved palette
+        assert one.picks[0].residual < 0.01
+        assert one.recolour(image, 8)[0, 0] == pytest.approx(np.add(seen, (0.2, 0, 0)), abs=0.02)
+    assert not (tmp_path / "clip.former.p4d.json").exists()
+
+
+def test_the_grade_is_copied_if_a_handle_moves_in_time_beyond_a_stop(tmp_path: Path) -> None:
+    path = tmp_path / "clip.p4d.json"
+    document = Document(members("edge_through_boundary"))
+    document.stop("e2", frame=4, rgb=(1, 0, 0))
+    document.save(path)
+    moved = members("edge_through_boundary")
+    moved["edits"] = {"vertices": [], "stops": []}
+    (middle,) = (v for v in moved["polytope"]["vertices"] if v["id"] == "v5")
+    middle["frame"] = 3
+    new = Document(moved)
+    new.save(path, on_edits="keep")
+    assert any("the grade was copied" in note for note in new.notes)
+    assert (tmp_path / "clip.former.p4d.json").exists()
+
+
 def test_picks_are_copied_and_solved_again() -> None:
     source = Document(members("split"))
     seen = source.palette(8).rgb.mean(axis=0).tolist()
