@@ -205,6 +205,7 @@ def test_edits_stay_with_the_same_handles(tmp_path: Path) -> None:
     old = document.fields()
     moved = members("split")
     moved["edits"] = {"vertices": [], "stops": []}
+    moved["quality"] = {"stages": [], "options": {"method": "like"}, "versions": {}}
     for vertex in moved["polytope"]["vertices"]:
         vertex["rgb"] = [0.9 * value for value in vertex["rgb"]]
     new = Document(moved)
@@ -222,6 +223,18 @@ def test_edits_stay_with_the_same_handles(tmp_path: Path) -> None:
     assert not (tmp_path / "clip.former.p4d.json").exists()
 
 
+def test_ids_of_a_palette_that_was_found_anew_say_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "clip.p4d.json"
+    graded().save(path)
+    found = members("split")  # the same ids and edges, and v1 and v2 have changed places
+    found["edits"] = {"vertices": [], "stops": []}
+    one, two = found["polytope"]["vertices"][:2]
+    one["rgb"], two["rgb"] = two["rgb"], one["rgb"]
+    new = Document(found)
+    new.save(path, on_edits="keep")
+    assert any("the grade was copied" in note for note in new.notes)
+
+
 def test_the_grade_is_copied_if_a_handle_moves_in_time_beyond_a_stop(tmp_path: Path) -> None:
     path = tmp_path / "clip.p4d.json"
     document = Document(members("edge_through_boundary"))
@@ -229,6 +242,7 @@ def test_the_grade_is_copied_if_a_handle_moves_in_time_beyond_a_stop(tmp_path: P
     document.save(path)
     moved = members("edge_through_boundary")
     moved["edits"] = {"vertices": [], "stops": []}
+    moved["quality"] = {"stages": [], "options": {"method": "like"}, "versions": {}}
     (middle,) = (v for v in moved["polytope"]["vertices"] if v["id"] == "v5")
     middle["frame"] = 3
     new = Document(moved)

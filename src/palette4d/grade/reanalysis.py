@@ -10,6 +10,9 @@ from palette4d.grade import edits, sidecar
 from palette4d.grade.document import Document
 from palette4d.grade.sidecar import Fields, OnEdits
 
+#: `quality.options.method` of a palette that `analyze --like` moved.
+_MOVED = "like"
+
 
 def save(fields: Fields, path: Path, *, on_edits: OnEdits = "refuse") -> tuple[Fields, list[str]]:
     """Write the sidecar of a new analysis; return it as written, and notes for the user.
@@ -57,9 +60,14 @@ def save(fields: Fields, path: Path, *, on_edits: OnEdits = "refuse") -> tuple[F
 
 
 def _with_same_handles(old: Fields, new: Document) -> Fields | None:
-    """Return the new document with the old edits, if it has the same handles and they fit."""
+    """Return the new document with the old edits, if its palette is the old one, moved, and they
+    fit.
+
+    Two palettes that were found may have the same ids for other colours.
+    """
     fields = new.fields()
-    if _handles(old) != _handles(fields):
+    method = fields.get("quality", {}).get("options", {}).get("method")
+    if method != _MOVED or _handles(old) != _handles(fields):
         return None
     try:
         state = sidecar.state_of(old)
@@ -76,11 +84,12 @@ def _with_same_handles(old: Fields, new: Document) -> Fields | None:
 
 
 def _handles(document: Fields) -> tuple[Any, ...]:
-    """Return what edits refer to: handles, edges, and frames."""
+    """Return what edits refer to, and what the moves of a palette keep."""
     polytope, frames = document["polytope"], document["clip"]["frames"]
     vertices = {vertex["id"] for vertex in polytope["vertices"]}
     edges = {(edge["id"], edge["from"], edge["to"]) for edge in polytope["edges"]}
-    return vertices, edges, frames["first"], frames["last"], document["clip"]["encoding"]
+    faces = [block["faces"] for block in polytope["blocks"]]
+    return vertices, edges, faces, frames["first"], frames["last"], document["clip"]["encoding"]
 
 
 def _former(target: Path, content: bytes) -> Path:
