@@ -64,40 +64,18 @@ def _polytope(fields: Mapping[str, Any]) -> SkewPolytope:
 
 def fields_of(polytope: SkewPolytope, document: Mapping[str, Any]) -> dict[str, Any]:
     """Return the sidecar's "polytope" of a moved palette, with the ids of the document's."""
-    old, fields = document["polytope"], polytope.fields(by_time=False)
-    pairs = zip(fields["vertices"], old["vertices"], strict=True)
-    ids = {new["id"]: vertex["id"] for new, vertex in pairs}
-
-    def named(sections: list[dict[str, Any]]) -> list[dict[str, Any]]:
-        return [{**s, "tracks": [[ids[v] for v in t] for t in s["tracks"]]} for s in sections]
-
-    return {
-        "vertices": [{**v, "id": ids[v["id"]]} for v in fields["vertices"]],
-        "edges": [{name: edge[name] for name in ("id", "from", "to")} for edge in old["edges"]],
-        "blocks": named(fields["blocks"]),
-        "transitions": named(fields["transitions"]),
-    }
+    old = document["polytope"]
+    edges = [{name: edge[name] for name in ("id", "from", "to")} for edge in old["edges"]]
+    return {**polytope.fields([vertex["id"] for vertex in old["vertices"]]), "edges": edges}
 
 
-def fit(document: Mapping[str, Any], new: Mapping[str, Any], loss: float) -> list[str]:
-    """Return notes if the palette of a document fits a new version, with the `loss` L', worse.
-
-    `new` is the document of the new version.
-    """
-    notes = []
-    before, after = (
-        d["clip"].get("conversion", {}).get("input_space", "the palette's space")
-        for d in (document, new)
-    )
-    if before != after:
-        notes.append(f"this version is read as {after}, the earlier one was as {before}")
-    options, now = (d.get("quality", {}).get("options", {}) for d in (document, new))
+def fit(document: Mapping[str, Any], loss: float) -> list[str]:
+    """Return a note if L' of a moved palette, `loss`, is much more than with its own clip."""
     stages = document.get("quality", {}).get("stages") or [{}]
     own = stages[-1].get("L_prime")  # other programs need not write it
-    same = all(options.get(name) == now.get(name) for name in ("lambda", "k", "gamma"))
-    if same and isinstance(own, float) and loss > WORSE * own:
-        notes.append(
-            f"the earlier palette fits this version worse (L_prime {loss:.3f}) than its own "
-            f"({own:.3f}); leave out like=… to find a new one"
-        )
-    return notes
+    if not isinstance(own, float) or loss <= WORSE * own:
+        return []
+    return [
+        f"the earlier palette fits this version worse (L_prime {loss:.3f}) than its own "
+        f"({own:.3f}); leave out like=… to find a new one"
+    ]

@@ -210,7 +210,7 @@ def analyze(
     for vertex, name in zip(vertices, names, strict=True):
         vertex["name"] = name
     if like is not None:
-        notes += earlier_palette.fit(like, document, found.stages[-1].losses.L_prime)
+        notes += earlier_palette.fit(like, found.stages[-1].losses.L_prime)
     notes += [*gathered.notes, *missing, *found.notes, *warnings]
     return Analysis(
         found.polytope,

@@ -214,16 +214,17 @@ class SkewPolytope:
             tuple(section(t) for t in self.transitions),
         )
 
-    def fields(self, by_time: bool = True) -> dict[str, Any]:
+    def fields(self, ids: Sequence[str] = ()) -> dict[str, Any]:
         """Return the sidecar's "polytope": ids v1, v2, … and e1, e2, … in order of time.
 
-        Only this function assigns ids; edits refer to them. Without `by_time` they are in order of
-        the vertices: a palette that was read and moved keeps its ids.
+        Only this function makes ids; edits refer to them. With the `ids` of all vertices it keeps
+        these, and the vertices' order.
         """
         order = list(range(len(self.vertices)))
-        if by_time:
+        if not ids:
             order.sort(key=lambda i: (self.vertices[i, 3], *self.vertices[i, :3], i))
-        name = {index: f"v{place}" for place, index in enumerate(order, 1)}
+            ids = [f"v{at}" for at in range(1, len(order) + 1)]
+        name = dict(zip(order, ids, strict=True))
         place = {index: at for at, index in enumerate(order)}
         edges = sorted((place[int(u)], place[int(v)]) for u, v in self.edges())
         return {

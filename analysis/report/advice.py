@@ -68,8 +68,8 @@ def warnings(
     return tuple(text for text in found if text)
 
 
-def _simplest(options: AnalysisOptions) -> str:
-    """Return the remedy for a palette that the default method did not find."""
+def _another(options: AnalysisOptions) -> str:
+    """Return the remedy for a palette of another method: the default one."""
     return ANEW if options.method == LIKE else DEFAULT
 
 
@@ -87,7 +87,7 @@ def _fit(x: Report, options: AnalysisOptions) -> str:
     else:
         return ""
     if options.method != "skew":
-        ways = _simplest(options)
+        ways = _another(options)
     elif options.vertices:
         ways = f"raise vertices=…, or {PARTS}"
     elif bad:
@@ -114,7 +114,7 @@ def _lost(x: Report, options: AnalysisOptions, farthest: Mapping[str, float]) ->
     if frame.lost < LOST_SHARE or not nearer:
         return ""
     where = " and ".join(f"{words} {distance:.2f}" for words, distance in nearer.items())
-    ways = _simplest(options)
+    ways = _another(options)
     if options.method == "skew":
         reach = options.reach / 2 or OPTIONS["reach"].default
         ways = (
@@ -133,7 +133,7 @@ def _lookalikes(x: Report, options: AnalysisOptions) -> str:
     if x.closest is None or x.closest[0] >= LOOKALIKE:
         return ""
     distance, frame, one, other = x.closest
-    ways = _simplest(options)
+    ways = _another(options)
     if options.method == "skew":
         ways = (
             "lower the setting palette_size, or raise separation or merge_distance; or, if little "
@@ -158,7 +158,7 @@ def _unused(x: Report, options: AnalysisOptions) -> str:
     handle, use = x.least_used
     if use >= UNUSED:
         return ""
-    ways = _simplest(options)
+    ways = _another(options)
     if options.method == "skew":
         ways = "raise handle_cost=…, or ask for fewer vertices=…"
     return f"the handle {handle} weighs less than {UNUSED:.1%} in every frame: {ways}"

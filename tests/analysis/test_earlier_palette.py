@@ -87,9 +87,8 @@ def test_ids_and_their_order_stay():
     for part in ("vertices", "edges"):
         renamed["polytope"][part].reverse()
     new = palette4d.analyze(frames, like=palette4d.Document(renamed)).fields()["polytope"]
-    for part, name in (("vertices", "id"), ("edges", "id")):
-        found = [one[name] for one in new[part]]
-        assert found == [one[name] for one in renamed["polytope"][part]]
+    for part in ("vertices", "edges"):
+        assert [one["id"] for one in new[part]] == [one["id"] for one in renamed["polytope"][part]]
     at = {v["id"]: v["rgb"] for v in new["vertices"]}
     before = {v["id"]: v["rgb"] for v in renamed["polytope"]["vertices"]}
     assert all(np.allclose(at[id_], before[id_], atol=0.05) for id_ in before)
