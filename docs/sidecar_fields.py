@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parent.parent
 SCHEMAS = ROOT / "src" / "palette4d"
 PAGE = ROOT / "docs" / "sidecar.md"
 PAGES = {
-    PAGE: SCHEMAS / "sidecar_v1.schema.json",
+    PAGE: SCHEMAS / "sidecar_v2.schema.json",
     ROOT / "docs" / "files.md": SCHEMAS / "shots_v1.schema.json",
 }
 BEGIN = "<!-- begin: written by python docs/sidecar_fields.py -->"

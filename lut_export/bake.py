@@ -8,6 +8,7 @@ repeats this with larger LUTs until the error is small enough.
 import hashlib
 import json
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,14 @@ from numpy.typing import NDArray
 from palette4d.lut_export import cdl as cdls
 from palette4d.lut_export import lut3d
 from palette4d.lut_export import shaper as shapers
-from palette4d.lut_export.bake_error import SEEN, Measure, load
+from palette4d.lut_export.bake_error import (
+    SEEN,
+    DeltaE,
+    Measure,
+    Reader,
+    largest_delta_e,
+    load,
+)
 from palette4d.lut_export.formats import LutFormat, format_of, with_shaper
 from palette4d.lut_export.frame_edit import frame_edit
 from palette4d.lut_export.measured_write import (
@@ -84,6 +92,11 @@ class BakeResult:
     error : float
         The largest relative error on the clip's colours, or on the dense grid without a clip.
         ``max_error`` limits it.
+    has_picks : bool
+        The edit has picks.
+    clean_up : DeltaE or None
+        How far the file is from the picture with Clean up, which only the node and `render` have;
+        None without picks or without a clip.
     """
 
     output: str
@@ -108,6 +121,8 @@ class BakeResult:
     clip: Measure | None
     clip_frame: int | None
     error: float
+    has_picks: bool = False
+    clean_up: DeltaE | None = None
 
     @property
     def visible(self) -> bool:
@@ -120,7 +135,7 @@ def bake(
     frame: float,
     path: str | os.PathLike[str],
     *,
-    size: int = 33,
+    size: int | None = None,
     strength: float = 1.0,
     format: str | None = None,
     shaper: Choice = "auto",
@@ -142,8 +157,8 @@ def bake(
         The time, a frame number of the clip; fractions are allowed.
     path : path
         The file to write; its extension chooses the format unless `format` does.
-    size : int
-        Samples a side, 2..129.
+    size : int, optional
+        Samples a side, 2..129. By default 33, and 65 with picks or where 33 shows.
     strength : float
         0..1, as in the node.
     format : str, optional
@@ -242,6 +257,18 @@ def bake(
         clip=on_clip,
         clip_frame=image_frame if on_clip is not None else None,
         error=judged(grid, on_clip),
+        has_picks=job.edit.has_picks,
+        clean_up=_beside_clean_up(job, readers) if on_clip is not None else None,
+    )
+
+
+def _beside_clean_up(job: Job, readers: Mapping[str, Reader]) -> DeltaE | None:
+    """Compare the file with the cleaned-up picture; None without picks."""
+    if job.image is None or not job.edit.has_picks:
+        return None
+    picture = np.ascontiguousarray(job.image)
+    return largest_delta_e(
+        picture, job.edit.apply(picture, job.threads, clean_up=1), readers, job.viewing
     )
 
 
@@ -277,8 +304,9 @@ def check_settings(
     frame_edit(sidecar, frame, settings.strength)
     if format_.is_cdl:
         return
-    lut3d.check_size(settings.size)
-    format_.check_size(settings.size)
+    if settings.size is not None:
+        lut3d.check_size(settings.size)
+        format_.check_size(settings.size)
     kind = settings.shaper
     if settings.domain is not None:
         if kind == "auto":

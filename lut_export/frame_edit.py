@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
-from palette4d.grade.bumps import bumped
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -33,24 +32,18 @@ def check_frame(sidecar: _core.Sidecar, frame: float) -> None:
 
 @dataclass(frozen=True)
 class FrameEdit:
-    """p' = p + strength * (sum_i w_i(q(p)) (v'_i - v_i) + bumps at p), the edit at one time.
+    """The edit at one time: palette colours and picks.
 
     Attributes
     ----------
-    palette : (n, 3) float64; the slice's colours before the edit (eq. 5).
-    edited : (n, 3) float64; the same colours after the edit.
-    faces : (f, 3) int32; the slice's triangles.
     strength : 0 leaves colours alone, 1 is the edit.
-    bumps : (b, 8) float64; what moves besides the palette, and holds (`bumped`).
+    has_picks : whether there are picks, whose mattes need a finer LUT.
     recolourer : the node's own code for the edit.
     conversion : from the colours' space to the palette's space; None if they are the same.
     """
 
-    palette: F64
-    edited: F64
-    faces: NDArray[np.int32]
     strength: float
-    bumps: F64
+    has_picks: bool
     recolourer: _core.Recolourer
     conversion: _core.ColourConversion | None = None
 
@@ -59,8 +52,21 @@ class FrameEdit:
         """Whether nothing changes."""
         return self.recolourer.identity or self.strength == 0
 
-    def apply(self, colours: F32, threads: int = 0) -> F32:
-        """Return the node's result for (h, w, 3) float32 colours; 0 threads: one per processor."""
+    def apply(self, colours: F32, threads: int = 0, clean_up: float = 0.0) -> F32:
+        """Return the node's result for (h, w, 3) float32 colours; 0 threads: one per processor.
+
+        `clean_up` needs a picture: it looks at neighbouring pixels.
+        """
+        if clean_up:
+            return _core.draw(
+                colours,
+                "recoloured",
+                self.recolourer,
+                strength=self.strength,
+                clean_up=clean_up,
+                threads=threads,
+                conversion=self.conversion,
+            )
         return self.recolourer.apply(
             colours, strength=self.strength, threads=threads, conversion=self.conversion
         )
@@ -71,12 +77,11 @@ class FrameEdit:
         if self.identity:
             return points
         at = points if self.conversion is None else self.conversion.to_palette(points)
-        weights, _ = _core.palette_weights(at, self.palette, self.faces)
-        step = self.strength * bumped(at, weights @ (self.edited - self.palette), self.bumps)
+        found = self.recolourer.displaced(at, strength=self.strength)
         if self.conversion is None:
-            return points + step
-        moved = (step != 0).any(axis=1, keepdims=True)
-        return np.where(moved, self.conversion.to_clip(at + step), points)
+            return found
+        moved = (found != at).any(axis=1, keepdims=True)
+        return np.where(moved, self.conversion.to_clip(found), points)
 
 
 def frame_edit(
@@ -95,13 +100,10 @@ def frame_edit(
         raise Palette4dError(f"strength {strength} is not possible; expected 0 to 1")
     palette = _core.slice_at(sidecar.polytope, frame)
     edited = _core.edited_colours(sidecar.polytope, sidecar.edits, palette)
-    bumps = sidecar.edits.bumps_at(palette.frame)
+    picks = sidecar.picks_at(palette.frame)
     return FrameEdit(
-        palette=palette.rgb,
-        edited=edited,
-        faces=palette.faces,
         strength=float(strength),
-        bumps=bumps,
-        recolourer=_core.Recolourer(palette.rgb, edited, palette.faces, bumps=bumps),
+        has_picks=bool(picks.count),
+        recolourer=_core.Recolourer(palette.rgb, edited, palette.faces, picks=picks),
         conversion=conversion,
     )

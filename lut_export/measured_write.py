@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from palette4d.lut_export import cdl as cdls
 from palette4d.lut_export import lut3d
 from palette4d.lut_export.bake_error import (
+    SEEN,
     Measure,
     Reader,
     figures_text,
@@ -31,6 +32,10 @@ from palette4d.colour.difference import Viewing
 from palette4d.common.errors import Palette4dError
 
 F32 = NDArray[np.float32]
+#: Samples a side of a LUT whose size is not given: of handles alone, and with picks. It grows up to
+#: USUAL while the error can be seen on the clip's frame.
+PALETTE_SIZE, PICKS_SIZE, USUAL = 33, 65, 65
+
 Content = lut3d.Lut3D | cdls.Cdl
 
 #: The namespace of the files' ids (RFC 9562, version 5), chosen once for this project.
@@ -41,7 +46,7 @@ NAMESPACE = uuid.UUID("09823ba4-0bc8-43a9-995d-cb9a6abeb5b3")
 class BakeSettings:
     """The settings of a bake at any frame; `bake` explains the members."""
 
-    size: int = 33
+    size: int | None = None
     strength: float = 1.0
     format: str | None = None
     shaper: Choice = "auto"
@@ -67,6 +72,13 @@ class Job:
     viewing: Viewing
     image: F32 | None
     image_frame: int | None
+
+    @property
+    def size(self) -> int:
+        """The samples a side to begin with: mattes of picks have finer edges than the palette."""
+        if self.settings.size is not None:
+            return self.settings.size
+        return PICKS_SIZE if self.edit.has_picks else PALETTE_SIZE
 
     @property
     def steps(self) -> tuple[Step, ...]:
@@ -113,7 +125,7 @@ class Job:
 
 def grow(job: Job, path: Path) -> tuple[Content, dict[str, Reader], Measure, Measure | None]:
     """Write files with larger and larger LUTs until the error is small enough."""
-    limit, size = job.settings.max_error, job.settings.size
+    limit, size = job.settings.max_error, job.size
     while True:
         content = job.content(size)
         job.write(path, content, describe(job, content, None))
@@ -121,9 +133,12 @@ def grow(job: Job, path: Path) -> tuple[Content, dict[str, Reader], Measure, Mea
         grid = job.measured(job.dense(), readers)
         assert grid is not None  # the grid's colours are finite
         clip = None if job.image is None else job.measured(job.image, readers)
-        if limit is None or judged(grid, clip) <= limit:
-            return content, readers, grid, clip
         larger = None if job.format.is_cdl else job.format.larger(size)
+        seen = clip is not None and clip.visible > SEEN
+        if limit is None and (job.settings.size or not seen or larger is None or size >= USUAL):
+            return content, readers, grid, clip
+        if limit is not None and judged(grid, clip) <= limit:
+            return content, readers, grid, clip
         if larger is None:
             raise Palette4dError(_too_far(job, size, grid, clip))
         size = larger

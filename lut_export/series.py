@@ -121,25 +121,21 @@ def stops(sidecar: _core.Sidecar) -> tuple[int, ...]:
     """Return the frames between which the grade changes along a line.
 
     These are the frames of the stops, of the edited palette colours and of their neighbours, where
-    an edit begins or ends, and the same of the solution of picks. A smooth ramp and a bump that
-    follows its colour have more between them, a held edit its last frame. Each time is rounded to a
+    an edit begins or ends, and those of picks: of their paths and ramps. A smooth ramp has more
+    between them, a held edit its last frame. Each time is rounded to a
     frame. A sidecar without edits is refused.
     """
     polytope, edits = sidecar.polytope, sidecar.edits
     index = {name: i for i, name in enumerate(polytope.vertex_ids)}
     edges = dict(zip(polytope.edge_ids, polytope.edges.tolist(), strict=True))
-    solution = edits.solution
     edited = {index[name] for name in edits.vertex_rgb}
-    edited |= {index[entry["vertex"]] for entry in solution["vertices"]}
     around = edited | {end for ends in edges.values() if edited & set(ends) for end in ends}
-    marks = [*edits.stops, *solution["keys"]]
+    marks = edits.stops
     around |= {end for mark in marks for end in edges[mark["edge"]]}
     times = [float(mark["frame"]) for mark in marks]
     times += [float(polytope.vertices[i, 3]) for i in around]
     times += [time for edge in edges for time in _ramp_times(sidecar, edge)]
-    times += [time for bump in solution["bumps"] for time in _bump_times(bump)]
-    holds = solution.get("holds", []) if times else []
-    times += [float(key["frame"]) for hold in holds for key in hold["keys"]]
+    times += edits.pick_times if times or not edits.empty else []
     if not times:
         raise Palette4dError(
             "nothing is edited in this sidecar, so that there are no stops; edit it, or choose "
@@ -188,18 +184,6 @@ def _ramp_times(sidecar: _core.Sidecar, edge: str) -> list[float]:
             result += bends(start, end)
         elif ramp == "hold" and start < math.ceil(end) - 1:
             result.append(math.ceil(end) - 1.0)
-    return result
-
-
-def _bump_times(bump: dict[str, Any]) -> list[float]:
-    """Return the times of a bump's keys, and those that it needs while its centre moves."""
-    result = [float(key["frame"]) for key in bump["keys"]]
-    for before, after in itertools.pairwise(bump["keys"]):
-        span = after["frame"] - before["frame"]
-        steps = math.ceil(4 * math.dist(before["rgb"], after["rgb"]) / bump["radius"])
-        steps = min(steps, math.ceil(span))
-        if any(before["by"]) or any(after["by"]):
-            result += [before["frame"] + span * i / steps for i in range(1, steps)]
     return result
 
 

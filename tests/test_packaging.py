@@ -90,7 +90,7 @@ def test_package_comes_from_the_wheel(wheel: Path) -> None:
         "palette4d/py.typed",
         "palette4d/analysis/__init__.py",
         "palette4d/lut_export/__init__.py",
-        "palette4d/sidecar_v1.schema.json",
+        "palette4d/sidecar_v2.schema.json",
         "palette4d/shots_v1.schema.json",
     ],
 )

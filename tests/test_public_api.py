@@ -15,6 +15,7 @@ import palette4d
 from palette4d.demo.scene import Scene
 
 PUBLIC = {
+    "Area",
     "Document",
     "Palette4dError",
     "SidecarError",

@@ -16,7 +16,7 @@ ROOMS: dict[str, set[str]] = {
     "core/sidecar": {"model", "convert"},
     "core/recolour": {"simd", "threads", "model", "convert"},
     "core/lattice": {"simd", "model", "convert", "recolour"},
-    "core/output": {"threads", "model", "convert", "recolour"},
+    "core/output": {"simd", "threads", "model", "convert", "recolour"},
     "core/fit": {"simd", "threads", "model"},
     "node": {"model", "convert", "sidecar", "recolour", "lattice", "output"},
 }

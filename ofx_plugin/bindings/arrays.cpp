@@ -102,19 +102,6 @@ std::vector<Face> faces_from(const py::object& object) {
     return faces;
 }
 
-std::vector<Bump> bumps_from(const py::object& object) {
-    std::vector<Bump> bumps;
-    if (object.is_none()) return bumps;
-    for (const auto& row : rows_from<11>(object, "bumps")) {
-        bumps.push_back({{row[0], row[1], row[2]},
-                         row[3],
-                         {row[4], row[5], row[6]},
-                         row[7],
-                         {row[8], row[9], row[10]}});
-    }
-    return bumps;
-}
-
 DoubleArray to_array(const std::vector<double>& numbers) {
     return DoubleArray(static_cast<py::ssize_t>(numbers.size()), numbers.data());
 }
@@ -123,15 +110,6 @@ DoubleArray to_array(const std::vector<Vec3>& colours) { return rows_to_array(co
 
 DoubleArray to_array(const std::vector<std::array<double, 4>>& vertices) {
     return rows_to_array(vertices);
-}
-
-DoubleArray to_array(const std::vector<Bump>& bumps) {
-    std::vector<std::array<double, 11>> rows;
-    for (const auto& [centre, radius, by, keep, along] : bumps) {
-        rows.push_back({centre[0], centre[1], centre[2], radius, by[0], by[1], by[2], keep,
-                        along[0], along[1], along[2]});
-    }
-    return rows_to_array(rows);
 }
 
 IntArray to_array(const std::vector<Face>& faces) {

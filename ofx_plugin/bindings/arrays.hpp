@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "model/edits.hpp"
 #include "model/polytope.hpp"
 
 namespace py = pybind11;
@@ -28,16 +27,12 @@ std::vector<std::array<double, 4>> vertices_from(const py::object& object, const
 std::vector<double> numbers_from(const py::object& object, const char* what);
 /// (f, 3) integers; an empty array of any shape means no faces.
 std::vector<Face> faces_from(const py::object& object);
-/// (n, 11): centre, radius, displacement, keep, along. None means no bumps.
-std::vector<Bump> bumps_from(const py::object& object);
 /// (n,) float64.
 DoubleArray to_array(const std::vector<double>& numbers);
 /// (n, 3) float64.
 DoubleArray to_array(const std::vector<Vec3>& colours);
 /// (n, 4) float64.
 DoubleArray to_array(const std::vector<std::array<double, 4>>& vertices);
-/// (n, 11) float64, as bumps_from() takes it.
-DoubleArray to_array(const std::vector<Bump>& bumps);
 /// (f, 3) int32.
 IntArray to_array(const std::vector<Face>& faces);
 /// Requires (h, w, 3 or 4) float32 with packed pixels in each row; rows may have any stride. `what`

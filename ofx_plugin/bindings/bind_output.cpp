@@ -19,11 +19,12 @@ Output output_from(const std::string& name) {
     static const std::map<std::string, Output> all = {{"recoloured", Output::kRecoloured},
                                                       {"weight", Output::kWeight},
                                                       {"palette", Output::kPalette},
-                                                      {"outside", Output::kOutside}};
+                                                      {"outside", Output::kOutside},
+                                                      {"pick", Output::kPick}};
     const auto found = all.find(name);
     if (found == all.end()) {
         throw py::value_error("output: found '" + name +
-                              "', expected 'recoloured', 'weight', 'palette' or 'outside'");
+                              "', expected 'recoloured', 'weight', 'palette', 'outside' or 'pick'");
     }
     return found->second;
 }
@@ -32,17 +33,19 @@ py::array draw(const py::array& image, const std::string& output,
                const std::shared_ptr<const Recolourer>& map, const py::object& original,
                const py::object& edited, double strength, double keep_lightness,
                const Vec3& lightness, double mix, bool matte_in_alpha, double outside_at,
-               bool premultiplied, int threads, const ColourConversion* conversion) {
+               double clean_up, bool premultiplied, int threads,
+               const ColourConversion* conversion) {
     require_image(image, "image");
     if (threads < 0) throw py::value_error("threads: found less than 0, expected 0 or more");
     if (!(outside_at > 0)) throw py::value_error("outside_at: expected a number above 0");
+    if (!(clean_up >= 0 && clean_up <= 1)) throw py::value_error("clean_up: expected 0 to 1");
     Drawing drawing;
     drawing.options = {output_from(output), matte_in_alpha, outside_at, strength,
-                       keep_lightness,      lightness,      mix};
+                       keep_lightness,      lightness,      mix,        clean_up};
     if (drawing.options.is_matte()) {
         drawing.reader = map;
     } else if (map->moves()) {
-        drawing.edit = map;
+        drawing.edit = drawing.exact = map;
     }
     if (drawing.options.output == Output::kPalette) {
         drawing.original = colours_from(original, "original");
@@ -70,7 +73,7 @@ void bind_output(py::module_& module) {
                py::arg("strength") = 1.0, py::arg("keep_lightness") = 0.0,
                py::arg("lightness") = Vec3{0, 0, 0}, py::arg("mix") = 1.0,
                py::arg("matte_in_alpha") = false, py::arg("outside_at") = 0.05,
-               py::arg("premultiplied") = false, py::arg("threads") = 1,
+               py::arg("clean_up") = 1.0, py::arg("premultiplied") = false, py::arg("threads") = 1,
                py::arg("conversion") = py::none(),
                "(h, w, 3 or 4) float32 in and out: what the node draws for a frame.");
     module.def("luminance_weights", &luminance_weights, py::arg("encoding"),

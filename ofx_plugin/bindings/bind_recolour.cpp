@@ -108,18 +108,31 @@ py::array_t<float> straight_colours(const py::array& image, bool premultiplied) 
 void bind_recolour(py::module_& module) {
     py::class_<Recolourer, std::shared_ptr<Recolourer>>(
         module, "Recolourer",
-        "One frame's recolouring: p' = p + strength * (sum_i w_i(q) (v'_i - v_i) + bumps at p).")
+        "One frame's recolouring: p' = p + strength * (h(p) sum_i w_i(q) (v'_i - v_i) + picks at "
+        "p).")
         .def(py::init([](const py::object& original, const py::object& edited,
-                         const py::object& faces, const py::object& bumps) {
-                 return std::make_unique<Recolourer>(colours_from(original, "original"),
-                                                     colours_from(edited, "edited"),
-                                                     faces_from(faces), bumps_from(bumps));
+                         const py::object& faces, const FramePicks* picks) {
+                 return std::make_unique<Recolourer>(
+                     colours_from(original, "original"), colours_from(edited, "edited"),
+                     faces_from(faces), picks ? *picks : FramePicks());
              }),
              py::arg("original"), py::arg("edited"), py::arg("faces"), py::kw_only(),
-             py::arg("bumps") = py::none())
+             py::arg("picks") = py::none())
         .def_property_readonly(
             "identity", [](const Recolourer& self) { return !self.moves(); },
             "True when no colour moves: apply() then copies bit for bit.")
+        .def(
+            "displaced",
+            [](const Recolourer& self, const py::object& colours, double strength) {
+                std::vector<Vec3> result = colours_from(colours, "colours");
+                {
+                    const py::gil_scoped_release unlocked;
+                    for (Vec3& colour : result) colour = self.displaced(colour, strength);
+                }
+                return to_array(result);
+            },
+            py::arg("colours"), py::kw_only(), py::arg("strength") = 1.0,
+            "(n, 3) float64 in and out, in double; colours that are not finite stay.")
         .def("apply", &apply<Recolourer>, py::arg("image"), py::kw_only(),
              py::arg("strength") = 1.0, py::arg("premultiplied") = false, py::arg("threads") = 1,
              py::arg("out") = py::none(), py::arg("precision") = "double",

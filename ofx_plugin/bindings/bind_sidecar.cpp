@@ -11,15 +11,13 @@
 
 #include "arrays.hpp"
 #include "binders.hpp"
-#include "model/ramps.hpp"
+#include "recolour/frame_picks.hpp"
 #include "sidecar/sidecar.hpp"
 
 using palette4d::Edits;
 using palette4d::Ramp;
 using palette4d::Sidecar;
 using palette4d::Vec3;
-using palette4d::bindings::DoubleArray;
-using palette4d::bindings::to_array;
 
 namespace {
 
@@ -130,72 +128,32 @@ py::list stops_of(const NamedEdits& self) {
     return result;
 }
 
-py::dict solution_of(const NamedEdits& self) {
-    const palette4d::Solution& solution = self.solution;
-    py::list vertices, keys, bumps, holds;
-    for (std::size_t i = 0; i < solution.vertex_by.size(); ++i) {
-        if (solution.vertex_by[i] == Vec3{0, 0, 0}) continue;
-        py::dict entry;
-        entry["vertex"] = self.vertex_ids[i];
-        entry["by"] = as_tuple(solution.vertex_by[i]);
-        vertices.append(entry);
-    }
-    for (const auto& key : solution.keys) {
-        py::dict entry;
-        entry["edge"] = self.edge_ids[static_cast<std::size_t>(key.edge)];
-        entry["frame"] = key.frame;
-        entry["by"] = as_tuple(key.by);
-        keys.append(entry);
-    }
-    for (const auto& bump : solution.bumps) {
-        py::list steps;
-        for (const auto& key : bump.keys) {
-            py::dict step;
-            step["frame"] = key.frame;
-            step["rgb"] = as_tuple(key.centre);
-            step["by"] = as_tuple(key.by);
-            steps.append(step);
-        }
-        py::dict entry;
-        entry["radius"] = bump.radius;
-        entry["keys"] = steps;
-        if (bump.shade < 1) entry["shade"] = bump.shade;
-        bumps.append(entry);
-    }
-    for (const auto& hold : solution.holds) {
-        py::list steps;
-        for (const auto& key : hold.keys) {
-            py::dict step;
-            step["frame"] = key.frame;
-            step["rgb"] = as_tuple(key.centre);
-            step["radius"] = key.radius;
-            step["keep"] = key.keep;
-            steps.append(step);
-        }
-        py::dict entry;
-        entry["keys"] = steps;
-        if (hold.shade < 1) entry["shade"] = hold.shade;
-        holds.append(entry);
-    }
-    py::dict result;
-    result["vertices"] = vertices;
-    result["keys"] = keys;
-    result["bumps"] = bumps;
-    if (!solution.holds.empty()) result["holds"] = holds;
-    return result;
-}
-
 bool empty(const NamedEdits& self) {
-    const palette4d::Solution& solution = self.solution;
     return std::none_of(self.vertex_rgb.begin(), self.vertex_rgb.end(),
                         [](const auto& rgb) { return rgb.has_value(); }) &&
-           self.stops.empty() && solution.vertex_by.empty() && solution.keys.empty() &&
-           solution.bumps.empty();
+           self.stops.empty() &&
+           std::none_of(self.picks.begin(), self.picks.end(),
+                        [](const palette4d::Pick& pick) { return pick.enabled && !pick.hold; });
 }
 
-DoubleArray bumps_of(const Edits& self, double frame) {
-    if (std::isnan(frame)) throw py::value_error("bumps_at: frame is not a number");
-    return to_array(palette4d::bumps_at(self, frame));
+/// Times between which enabled picks and holds go along lines: of their paths and ramps.
+std::vector<double> pick_times_of(const NamedEdits& self) {
+    std::vector<double> times;
+    for (const palette4d::Pick& pick : self.picks) {
+        if (!pick.enabled) continue;
+        times.push_back(pick.frame);
+        for (const palette4d::PathKey& key : pick.path) times.push_back(key.frame);
+        const double ramp = std::max(pick.fade, self.frame_step);
+        if (pick.from) times.insert(times.end(), {*pick.from - ramp, *pick.from});
+        if (pick.until) times.insert(times.end(), {*pick.until, *pick.until + ramp});
+    }
+    return times;
+}
+
+double clamped(const BoundSidecar& self, double frame) {
+    if (std::isnan(frame)) throw py::value_error("found a frame that is not a number");
+    const palette4d::Polytope& polytope = self.sidecar.polytope;
+    return std::clamp(frame, polytope.first_frame(), polytope.last_frame());
 }
 
 /// (name, edits) of each version.
@@ -216,18 +174,23 @@ void bind_sidecar(py::module_& module) {
     module.attr("SIDECAR_VERSION") = palette4d::kSidecarVersion;
 
     py::class_<Edits>(module, "_Edits");
-    py::class_<NamedEdits, Edits>(
-        module, "Edits",
-        "Edited colours of vertices, colour stops on edges, and the solution of the picks.")
+    py::class_<NamedEdits, Edits>(module, "Edits",
+                                  "Edited colours of vertices, colour stops on edges, and picks.")
         .def_property_readonly("vertex_rgb", &vertex_rgb_of)
         .def_property_readonly("vertex_ramp", &vertex_ramp_of)
         .def_property_readonly("stops", &stops_of)
         .def_property_readonly("ramp",
                                [](const NamedEdits& self) { return name_of(self.default_ramp); })
-        .def_property_readonly("solution", &solution_of)
         .def_property_readonly("empty", &empty)
-        .def("bumps_at", &bumps_of, py::arg("frame"),
-             "(n, 11) float64: centre, radius, displacement, keep and along of bumps and holds.");
+        .def_property_readonly("pick_times", &pick_times_of)
+        .def(
+            "picks_at",
+            [](const NamedEdits& self, double frame) {
+                if (std::isnan(frame)) throw py::value_error("found a frame that is not a number");
+                const py::gil_scoped_release unlocked;
+                return palette4d::picks_at(self, frame);
+            },
+            py::arg("frame"), "The picks and holds of a frame.");
 
     py::class_<BoundSidecar>(module, "Sidecar", "A validated sidecar file.")
         .def_property_readonly("clip", &clip_of)
@@ -239,13 +202,22 @@ void bind_sidecar(py::module_& module) {
             py::return_value_policy::reference_internal)
         .def_property_readonly("versions", &versions_of)
         .def(
-            "bumps_at",
+            "picks_at",
             [](const BoundSidecar& self, double frame) {
-                const palette4d::Polytope& polytope = self.sidecar.polytope;
-                return bumps_of(self.edits,
-                                std::clamp(frame, polytope.first_frame(), polytope.last_frame()));
+                const double at = clamped(self, frame);
+                const py::gil_scoped_release unlocked;
+                return palette4d::picks_at(self.edits, at);
             },
-            py::arg("frame"), "The bumps of the active edits; outside the clip, at its ends.")
+            py::arg("frame"), "The picks and holds of a frame; outside the clip, at its ends.")
+        .def(
+            "pick_matte_at",
+            [](const BoundSidecar& self, const std::string& id, double frame) {
+                const double at = clamped(self, frame);
+                const py::gil_scoped_release unlocked;
+                return palette4d::matte_at(self.edits, id, at);
+            },
+            py::arg("id"), py::arg("frame"),
+            "One pick or hold, which adds its share of the change to each channel.")
         .def_property_readonly("conversion", [](const BoundSidecar& self) {
             // Shared with the sidecar; Python cannot modify it.
             return std::const_pointer_cast<palette4d::ClipConversion>(self.sidecar.conversion);

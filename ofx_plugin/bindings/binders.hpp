@@ -8,6 +8,7 @@ namespace py = pybind11;
 void bind_errors(py::module_& module);      ///< SidecarError, and the one exception translator
 void bind_polytope(py::module_& module);    ///< Polytope
 void bind_conversion(py::module_& module);  ///< ColourConversion, ClipConversion
+void bind_picks(py::module_& module);       ///< FramePicks, mattes and their learning
 void bind_sidecar(py::module_& module);     ///< Edits, Sidecar, read_sidecar, parse_sidecar
 void bind_slice(py::module_& module);       ///< Slice, slice_at, edited_colours, readers
 void bind_mvc(py::module_& module);         ///< mean value coordinates and palette weights

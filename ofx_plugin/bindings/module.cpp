@@ -9,6 +9,7 @@ PYBIND11_MODULE(_core, module) {
     bind_errors(module);
     bind_polytope(module);
     bind_conversion(module);
+    bind_picks(module);
     bind_sidecar(module);
     bind_slice(module);
     bind_mvc(module);

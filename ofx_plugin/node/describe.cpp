@@ -64,7 +64,8 @@ OfxStatus describe(const Suites& suites, OfxImageEffectHandle effect) {
         0};
     const std::optional<Properties> node = describe_effect(suites, effect, about);
     if (!node) return kOfxStatFailed;
-    // A pixel's result depends on that pixel only, so a host may bake the node into a LUT.
+    // A pixel's result depends on that pixel only, so a host may bake the node into a LUT, but for
+    // the clean-up of picks: a render for a LUT leaves it out.
     node->set_string(kOfxImageEffectPropNoSpatialAwareness, "true");
     describe_colour(*node);
     return kOfxStatOK;

@@ -37,14 +37,15 @@ void draw(const Image& in, const Image& out, const OfxRectI& area, const NodeDra
     const OfxRectI covered = intersect(area, in.bounds);
     clear_around(out, area, covered);
     if (is_empty(covered)) return;
-    const bool edit_alone = options.edit_alone() && !drawing.mask;
-    if (edit_alone && in.depth == Depth::kFloat) {
+    const bool edit_alone = drawing.edit_alone() && !drawing.mask;
+    if (options.output == Output::kRecoloured && options.keep == 0 && options.mix == 1 &&
+        !drawing.mask && in.depth == Depth::kFloat) {
         const int width = covered.x2 - covered.x1, height = covered.y2 - covered.y1;
         draw_edit({reinterpret_cast<const float*>(in.at(covered.x1, covered.y1)), width, height,
                    in.channels, in.row_bytes},
                   {reinterpret_cast<float*>(out.at(covered.x1, covered.y1)), width, height,
                    out.channels, out.row_bytes},
-                  in.premultiplied, drawing);
+                  in.premultiplied, drawing, {covered.x1, covered.y1, width, 1});
         return;
     }
     const auto channels = static_cast<std::size_t>(in.channels);
@@ -62,7 +63,9 @@ void draw(const Image& in, const Image& out, const OfxRectI& area, const NodeDra
         if (in.opaque && options.is_matte() && options.in_alpha) {
             for (std::size_t i = channels - 1; i < count; i += channels) source[i] = 1;
         }
-        const Pixels pixels{source.data(), drawn, count / channels, channels, in.premultiplied};
+        const Pixels pixels{source.data(),    drawn,
+                            count / channels, channels,
+                            in.premultiplied, {rows.x1, rows.y1, rows.x2 - rows.x1, 1}};
         draw_pixels(pixels, drawing);
         for (int r = rows.y1; options.output == Output::kPalette && r < rows.y2; ++r) {
             draw_strip(drawn + row * static_cast<std::size_t>(r - rows.y1), rows.x1, rows.x2, r,

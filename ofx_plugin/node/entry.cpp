@@ -26,6 +26,9 @@ OfxStatus grade_action(const Suites& host, const char* action, OfxImageEffectHan
     const auto is = [action](const char* name) { return std::strcmp(action, name) == 0; };
     if (is(kOfxImageEffectActionRender)) return render(host, effect, in);
     if (is(kOfxImageEffectActionIsIdentity)) return is_identity(host, effect, in, out);
+    if (is(kOfxImageEffectActionGetRegionsOfInterest)) {
+        return regions_of_interest(host, effect, in, out);
+    }
     if (is(kOfxImageEffectActionGetClipPreferences)) {
         return clip_preferences(host, effect, out);
     }
@@ -83,7 +86,7 @@ void remember_host(OfxHost* host) { set_host(host); }
 
 // Raise a version when its parameters change: hosts cache the description under it.
 OfxPlugin g_plugins[] = {
-    {kOfxImageEffectPluginApi, kOfxImageEffectPluginApiVersion, "org.palette4d.Palette4D", 1, 4,
+    {kOfxImageEffectPluginApi, kOfxImageEffectPluginApiVersion, "org.palette4d.Palette4D", 1, 5,
      &remember_host, &main_entry<&grade_action>},
     {kOfxImageEffectPluginApi, kOfxImageEffectPluginApiVersion, "org.palette4d.Analyse", 1, 0,
      &remember_host, &main_entry<&analyse_action>}};

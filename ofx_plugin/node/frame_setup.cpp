@@ -26,6 +26,24 @@ void add_note(FrameSetup& setup, const std::string& note) {
     setup.note += note;
 }
 
+/// The index of the pick p<number>, or -1.
+int pick_at(const Sidecar& sidecar, int number) {
+    const std::vector<Pick>& picks = sidecar.edits.picks;
+    const std::string id = "p" + std::to_string(number);
+    for (std::size_t i = 0; i < picks.size(); ++i) {
+        if (picks[i].id == id) return static_cast<int>(i);
+    }
+    return -1;
+}
+
+/// "one of p1, p2"
+std::string ids_of(const std::vector<Pick>& picks) {
+    if (picks.empty()) return "a sidecar with picks";
+    std::string ids;
+    for (const Pick& pick : picks) ids += (ids.empty() ? "one of " : ", ") + pick.id;
+    return ids;
+}
+
 /// Prepares the chosen output. Throws what slicing throws.
 void prepare(FrameSetup& setup, const Params& params, const OutputSettings& settings,
              LoadedSidecar& loaded, double frame, OfxTime time, Interpolation interpolation) {
@@ -64,11 +82,23 @@ void prepare(FrameSetup& setup, const Params& params, const OutputSettings& sett
         drawing.reader = loaded.weight_at(frame, handle);
         return;
     }
+    if (settings.output == Output::kPick) {
+        const int pick = pick_at(sidecar, settings.pick);
+        if (pick < 0) {
+            setup.passes = true;
+            setup.problem = "Matte of a pick: the sidecar has no pick p" +
+                            std::to_string(settings.pick) + ", expected " +
+                            ids_of(sidecar.edits.picks) + "; choose another number as Pick";
+            return;
+        }
+        drawing.reader = loaded.pick_at(frame, pick);
+        return;
+    }
     EditsAt edits = edits_at(params, sidecar, time);
     add_note(setup, edits.note);
     const std::shared_ptr<const Recolourer> exact = loaded.recolourer_at(frame, edits.edits);
     if (exact->moves() && settings.strength != 0) {
-        drawing.edit = exact;
+        drawing.edit = drawing.exact = exact;
         if (interpolation == Interpolation::kAlways ||
             (interpolation == Interpolation::kWithoutConversion && !drawing.conversion)) {
             try {

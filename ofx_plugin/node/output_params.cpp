@@ -18,8 +18,8 @@ double clamped(const std::optional<double>& value, double initial, double low, d
 
 Output output_of(const std::optional<int>& choice) {
     const int number = choice.value_or(0);
-    return number > 0 && number <= static_cast<int>(Output::kOutside) ? static_cast<Output>(number)
-                                                                      : Output::kRecoloured;
+    return number > 0 && number <= static_cast<int>(Output::kPick) ? static_cast<Output>(number)
+                                                                   : Output::kRecoloured;
 }
 
 }  // namespace
@@ -30,15 +30,19 @@ void define_output_params(ParamDefiner& define) {
                    "Recoloured: the graded picture. Weight of a handle: a soft key that follows "
                    "one palette colour through time. Palette: the graded picture with this frame's "
                    "palette at the bottom, original colours above and new colours below. Outside: "
-                   "a matte of the colours outside the palette."},
-                  {"Recoloured", "Weight of a handle", "Palette", "Outside"});
+                   "a matte of the colours outside the palette. Matte of a pick: what a pick or "
+                   "hold takes."},
+                  {"Recoloured", "Weight of a handle", "Palette", "Outside", "Matte of a pick"});
     define.integer({kParamWeightOf, "Handle",
                     "The handle for Weight of a handle: 2 is the handle of Use 2 below."},
                    {1, 1, 100000, 1, 32});
+    define.integer({kParamPick, "Pick", "The pick or hold for Matte of a pick: 1 is p1."},
+                   {1, 1, 100000, 1, 32});
     define.choice(
         {kParamMatteIn, "Matte in",
-         "Picture: outputs the matte (Weight of a handle or Outside) as a grey picture. Alpha: "
-         "keeps the picture's colours and multiplies its alpha (1 if opaque) by the matte."},
+         "Picture: outputs the matte (Weight of a handle, Outside or Matte of a pick) as a grey "
+         "picture. Alpha: keeps the picture's colours and multiplies its alpha (1 if opaque) by "
+         "the matte."},
         {"Picture", "Alpha"});
     define.number(
         {kParamOutsideReach, "Outside at",
@@ -59,6 +63,10 @@ void define_output_params(ParamDefiner& define) {
                    "Scene-linear: linear light, for a palette in sRGB, Rec.709 or another display "
                    "encoding. The handles' colours are then linear too."},
                   {"Input space", "Palette space", "Scene-linear"});
+    define.number({kParamCleanUp, "Clean up",
+                   "How much of the change by picks follows the picture's edges: removes codec "
+                   "blocks, soft chroma and rims. 0 none, 1 all."},
+                  {1, 0, 1, 0, 1}, 0.01, 3, true);
     define.number({kParamMix, "Mix", "Blends from the source (0) to the output (1)."},
                   {1, 0, 1, 0, 1}, 0.01, 3, true);
     define.end_group();
@@ -68,6 +76,7 @@ OutputSettings output_settings_at(const Params& params, OfxTime time) {
     OutputSettings settings;
     settings.output = output_of(params.int_at(kParamOutput, time));
     settings.weight_of = params.int_at(kParamWeightOf, time).value_or(1);
+    settings.pick = params.int_at(kParamPick, time).value_or(1);
     settings.in_alpha = params.int_at(kParamMatteIn, time).value_or(0) == 1;
     // Some hosts do not keep a parameter inside its range.
     settings.reach = clamped(params.double_at(kParamOutsideReach, time), 0.05, 1e-4, 100);
@@ -81,6 +90,7 @@ OutputSettings output_settings_at(const Params& params, OfxTime time) {
     }
     settings.in_palette_space = params.int_at(kParamPictureIn, time).value_or(0) == 1;
     settings.scene_linear = params.int_at(kParamPictureIn, time).value_or(0) == 2;
+    settings.clean_up = clamped(params.double_at(kParamCleanUp, time), 1, 0, 1);
     settings.mix = clamped(params.double_at(kParamMix, time), 1, 0, 1);
     return settings;
 }

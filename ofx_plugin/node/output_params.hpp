@@ -15,10 +15,12 @@ namespace palette4d::node {
 /// Its options are those of Output, in order.
 inline constexpr const char* kParamOutput = "output";
 inline constexpr const char* kParamWeightOf = "weightOf";
+inline constexpr const char* kParamPick = "pick";
 inline constexpr const char* kParamMatteIn = "matteIn";
 inline constexpr const char* kParamOutsideReach = "outsideReach";
 inline constexpr const char* kParamKeepLightness = "keepLightness";
 inline constexpr const char* kParamLightnessOf = "lightnessOf";
+inline constexpr const char* kParamCleanUp = "cleanUp";
 inline constexpr const char* kParamMix = "mix";
 inline constexpr const char* kParamPictureIn = "pictureIn";
 
@@ -26,6 +28,7 @@ void define_output_params(ParamDefiner& define);
 
 struct OutputSettings : DrawingOptions {
     int weight_of = 1;          ///< a slot, counted from 1; beyond the last slot the nth handle
+    int pick = 1;               ///< the number of a pick's id
     bool own_lightness = true;  ///< weights follow the sidecar's encoding, not the user's choice
     bool in_palette_space = false;  ///< the picture is already in the palette's code values
     bool scene_linear = false;      ///< the picture and the host's colours are scene-linear

@@ -1,14 +1,25 @@
 #include "render.hpp"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
 #include <exception>
+#include <functional>
+#include <memory>
 #include <new>
 #include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "clip_image.hpp"
 #include "describe.hpp"
 #include "frame_setup.hpp"
 #include "instance.hpp"
+#include "output_params.hpp"
 #include "pixels.hpp"
+#include "sidecar_choice.hpp"
 #include "speed_mode.hpp"
 #include "threads.hpp"
 
@@ -24,16 +35,94 @@ bool is_paint(const Suites& suites, OfxImageEffectHandle effect) {
                kOfxImageEffectContextPaint;
 }
 
+/// Horizontal and vertical render scale.
+struct Scale {
+    double x = 1, y = 1;
+};
+
+Scale scale_of(const Properties& in_args) {
+    const auto one = [&](int index) {
+        const double scale = in_args.get_double(kOfxImageEffectPropRenderScale, index).value_or(1);
+        return std::isfinite(scale) && scale > 0 ? scale : 1;
+    };
+    return {one(0), one(1)};
+}
+
+/// Whether both images have memory in common.
+bool overlap(const Image& a, const Image& b) {
+    const auto span = [](const Image& image) {
+        const char* const first = image.at(image.bounds.x1, image.bounds.y1);
+        const char* const last = image.at(image.bounds.x1, image.bounds.y2 - 1);
+        const std::ptrdiff_t row =
+            static_cast<std::ptrdiff_t>(image.bounds.x2 - image.bounds.x1) * image.pixel_bytes;
+        const std::less<const char*> before;
+        return before(first, last) ? std::make_pair(first, last + row)
+                                   : std::make_pair(last, first + row);
+    };
+    const auto [a1, a2] = span(a);
+    const auto [b1, b2] = span(b);
+    const std::less<const char*> before;
+    return before(a1, b2) && before(b1, a2);
+}
+
+/// The source in memory of its own.
+struct Copied {
+    Image image;
+    std::vector<char> memory;
+
+    explicit Copied(const Image& from) : image(from) {
+        image.row_bytes =
+            static_cast<std::ptrdiff_t>(from.bounds.x2 - from.bounds.x1) * from.pixel_bytes;
+        memory.resize(static_cast<std::size_t>(image.row_bytes) *
+                      static_cast<std::size_t>(from.bounds.y2 - from.bounds.y1));
+        image.data = memory.data();
+        copy(from, image, from.bounds);
+    }
+};
+
+Area area_of(const OfxRectI& rect) { return {rect.x1, rect.y1, rect.x2, rect.y2}; }
+
+/// Filters what picks do in the window. The source should reach regions_of_interest() beyond it;
+/// where a host gives less, the filter sees what there is.
+std::shared_ptr<const CleanUp> cleaned_up(const Suites& suites, const Image& in,
+                                          const OfxRectI& window, const NodeDrawing& drawing,
+                                          const Scale& scale, const std::function<bool()>& stop) {
+    const std::shared_ptr<CleanUp> clean_up =
+        make_clean_up(drawing, {in.channels, in.premultiplied},
+                      {area_of(in.definition), area_of(in.bounds), area_of(window),
+                       clean_up_cell(scale.x), clean_up_cell(scale.y)});
+    if (!clean_up) return nullptr;
+    const auto read = [&](int y, int x1, int x2, float* space) -> const float* {
+        if (in.depth == Depth::kFloat) return reinterpret_cast<const float*>(in.at(x1, y));
+        read_floats(in, {x1, y, x2, y + 1}, space);
+        return space;
+    };
+    const auto share = [&](int count, const std::function<void(int)>& work) {
+        for_each_band(suites, 0, count, [&](int i, int) { work(i); }, stop, 1);
+    };
+    clean_up->prepare(read, thread_count(suites), share);
+    return clean_up;
+}
+
 /// Draws the window. On an exception it copies the source and rethrows.
-OfxStatus draw_window(const Suites& suites, OfxImageEffectHandle effect, const Image& in,
-                      const Image& out, const OfxRectI& window, const FrameSetup& setup) {
+OfxStatus draw_window(const Suites& suites, OfxImageEffectHandle effect, const Image& source,
+                      const Image& out, const OfxRectI& window, const Scale& scale,
+                      FrameSetup& setup) {
+    const auto stop = [&] { return suites.effect->abort && suites.effect->abort(effect) != 0; };
     try {
+        Image in = source;
+        std::optional<Copied> copied;
+        setup.drawing.clean_up = cleaned_up(suites, in, window, setup.drawing, scale, stop);
+        if (setup.drawing.clean_up && overlap(source, out)) {
+            // What is drawn must not change what the filter's neighbours read.
+            in = copied.emplace(source).image;
+        }
         for_each_band(
             suites, window.y1, window.y2,
             [&](int y1, int y2) { draw(in, out, {window.x1, y1, window.x2, y2}, setup.drawing); },
-            [&] { return suites.effect->abort && suites.effect->abort(effect) != 0; });
+            stop);
     } catch (...) {
-        copy(in, out, window);
+        copy(source, out, window);
         throw;
     }
     return kOfxStatOK;
@@ -55,6 +144,43 @@ OfxStatus is_identity(const Suites& suites, OfxImageEffectHandle effect, const P
         return kOfxStatReplyDefault;
     }
     out_args.set_double(kOfxPropTime, *time);  // hosts that refuse this use the current time anyway
+    return kOfxStatOK;
+}
+
+OfxStatus regions_of_interest(const Suites& suites, OfxImageEffectHandle effect,
+                              const Properties& in_args, const Properties& out_args) {
+    const std::optional<double> time = in_args.get_double(kOfxPropTime);
+    if (!time) return kOfxStatReplyDefault;
+    std::array<double, 4> region{};
+    for (std::size_t i = 0; i < region.size(); ++i) {
+        const auto side =
+            in_args.get_double(kOfxImageEffectPropRegionOfInterest, static_cast<int>(i));
+        if (!side) return kOfxStatReplyDefault;
+        region[i] = *side;
+    }
+    const Params params(suites, effect);
+    const OutputSettings settings = output_settings_at(params, *time);
+    const bool other_matte = settings.is_matte() && settings.output != Output::kPick;
+    if (settings.clean_up == 0 || settings.passes() || other_matte) return kOfxStatReplyDefault;
+    const Chosen chosen = chosen_sidecar(params);
+    if (!chosen.sidecar() || chosen.sidecar()->edits.picks.empty()) return kOfxStatReplyDefault;
+    OfxImageClipHandle clip = nullptr;
+    OfxPropertySetHandle handle = nullptr;
+    if (!suites.effect->clipGetHandle ||
+        suites.effect->clipGetHandle(effect, kOfxImageEffectSimpleSourceClipName, &clip, &handle) !=
+            kOfxStatOK) {
+        handle = nullptr;
+    }
+    const double aspect =
+        Properties(suites, handle).get_double(kOfxImagePropPixelAspectRatio).value_or(1);
+    // From pixels to canonical coordinates.
+    const Scale scale = scale_of(in_args);
+    const double x = clean_up_support(clean_up_cell(scale.x)) * std::max(aspect, 0.0) / scale.x;
+    const double y = clean_up_support(clean_up_cell(scale.y)) / scale.y;
+    const std::string name =
+        std::string("OfxImageClipPropRoI_") + kOfxImageEffectSimpleSourceClipName;
+    out_args.set_doubles(name.c_str(),
+                         {region[0] - x, region[1] - y, region[2] + x, region[3] + y});
     return kOfxStatOK;
 }
 
@@ -98,12 +224,14 @@ OfxStatus render(const Suites& suites, OfxImageEffectHandle effect, const Proper
     const OfxRectI& whole = out.definition;
     setup.drawing.picture = {whole.x1, whole.y1, whole.x2, whole.y2};
     // A host that bakes a LUT wants colours only, so no mattes and no strip.
-    if (in_args.get_string(kOfxImageEffectPropNoSpatialAwareness) == "true" &&
-        setup.drawing.options.output == Output::kPalette) {
-        setup.drawing.options.output = Output::kRecoloured;
-        if (!setup.drawing.edit) {
-            copy(in, out, window);
-            return kOfxStatOK;
+    if (in_args.get_string(kOfxImageEffectPropNoSpatialAwareness) == "true") {
+        setup.drawing.options.clean_up = 0;
+        if (setup.drawing.options.output == Output::kPalette) {
+            setup.drawing.options.output = Output::kRecoloured;
+            if (!setup.drawing.edit) {
+                copy(in, out, window);
+                return kOfxStatOK;
+            }
         }
     }
     std::optional<ClipImage> brush;
@@ -115,7 +243,7 @@ OfxStatus render(const Suites& suites, OfxImageEffectHandle effect, const Proper
         }
         setup.drawing.mask = &*brush->pixels();
     }
-    return draw_window(suites, effect, in, out, window, setup);
+    return draw_window(suites, effect, in, out, window, scale_of(in_args), setup);
 }
 
 }  // namespace palette4d::node

@@ -261,6 +261,10 @@ std::shared_ptr<const Recolourer> LoadedSidecar::surface_at(double frame) {
     return prepared({frame, Purpose::kSurface, 0, {}});
 }
 
+std::shared_ptr<const Recolourer> LoadedSidecar::pick_at(double frame, int pick) {
+    return prepared({frame, Purpose::kPick, pick, {}});
+}
+
 std::pair<std::vector<Vec3>, std::vector<Vec3>> LoadedSidecar::palette_at(
     double frame, const AppliedEdits& edits) const {
     Slice slice = slice_at(sidecar_.polytope, frame);
@@ -357,12 +361,12 @@ std::shared_ptr<const Recolourer> LoadedSidecar::prepare(const Key& key) const {
     const auto& [frame, purpose, handle, edits] = key;
     Slice slice = slice_at(sidecar_.polytope, frame);
     std::vector<Vec3> edited;
-    std::vector<Bump> bumps;
+    FramePicks picks;
     switch (purpose) {
         case Purpose::kEdit: {
             const Edits all = all_of(sidecar_, edits);
             edited = edited_colours(sidecar_.polytope, all, slice);
-            bumps = bumps_at(all, slice.frame);
+            picks = picks_at(all, slice.frame);
             break;
         }
         case Purpose::kWeight:
@@ -371,9 +375,15 @@ std::shared_ptr<const Recolourer> LoadedSidecar::prepare(const Key& key) const {
         case Purpose::kSurface:
             edited = surface_reader(slice);
             break;
+        case Purpose::kPick:
+            edited = slice.rgb;
+            picks =
+                matte_at(sidecar_.edits, sidecar_.edits.picks[static_cast<std::size_t>(handle)].id,
+                         slice.frame);
+            break;
     }
     return std::make_shared<const Recolourer>(std::move(slice.rgb), edited, std::move(slice.faces),
-                                              std::move(bumps));
+                                              std::move(picks));
 }
 
 SidecarResult load_sidecar(const std::string& path) {

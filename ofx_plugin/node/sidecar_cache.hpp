@@ -53,13 +53,15 @@ public:
     std::shared_ptr<const Recolourer> weight_at(double frame, int handle);
     /// The same, but it adds the closest colour of the palette (lineage.hpp).
     std::shared_ptr<const Recolourer> surface_at(double frame);
+    /// The same, but it adds a pick's share of its change to all channels; by the pick's index.
+    std::shared_ptr<const Recolourer> pick_at(double frame, int pick);
     /// The palette's original and edited colours at a frame.
     std::pair<std::vector<Vec3>, std::vector<Vec3>> palette_at(double frame,
                                                                const AppliedEdits& edits) const;
 
 private:
     /// What a prepared palette is for.
-    enum class Purpose { kEdit, kWeight, kSurface };
+    enum class Purpose { kEdit, kWeight, kSurface, kPick };
     using Key = std::tuple<double, Purpose, int, AppliedEdits>;
     struct Prepared {
         std::mutex building;

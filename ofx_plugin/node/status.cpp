@@ -24,10 +24,9 @@ std::string describe(const Sidecar& sidecar) {
          << static_cast<double>(clip.rate_num) / static_cast<double>(clip.rate_den) << " fps, "
          << counted(sidecar.polytope.vertices().size(), "handle", "handles") << ", "
          << counted(edits, "edit", "edits");
-    const Solution& picks = sidecar.edits.solution;
-    if (!picks.vertex_by.empty() || !picks.keys.empty() || !picks.bumps.empty()) {
-        text << " and picks";
-    }
+    std::size_t picks = 0;
+    for (const Pick& pick : sidecar.edits.picks) picks += pick.enabled;
+    if (picks > 0) text << ", " << counted(picks, "pick or hold", "picks and holds");
     return text.str();
 }
 

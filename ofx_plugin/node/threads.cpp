@@ -9,11 +9,8 @@
 namespace palette4d::node {
 namespace {
 
-// Small enough to notice an abort soon and to share evenly; large enough for low overhead.
-constexpr int kBandRows = 16;
-
 struct Work {
-    int first, last;
+    int first, last, band_rows;
     std::int64_t bands;
     const std::function<void(int, int)>& band;
     const std::function<bool()>& stop;
@@ -31,8 +28,8 @@ struct Work {
                     stopped = true;
                     return;
                 }
-                const std::int64_t y1 = first + index * kBandRows;
-                const std::int64_t y2 = std::min<std::int64_t>(last, y1 + kBandRows);
+                const std::int64_t y1 = first + index * band_rows;
+                const std::int64_t y2 = std::min<std::int64_t>(last, y1 + band_rows);
                 band(static_cast<int>(y1), static_cast<int>(y2));
             } catch (...) {
                 // Exceptions must not enter the host's threads.
@@ -48,20 +45,25 @@ void run_band(unsigned int, unsigned int, void* work) { static_cast<Work*>(work)
 
 }  // namespace
 
-void for_each_band(const Suites& suites, int first, int last,
-                   const std::function<void(int, int)>& band, const std::function<bool()>& stop) {
-    const std::int64_t rows = static_cast<std::int64_t>(last) - first;
-    if (rows <= 0) return;
-    Work work{first, last, (rows + kBandRows - 1) / kBandRows, band, stop};
+int thread_count(const Suites& suites) {
     const OfxMultiThreadSuiteV1* host = suites.thread;
     unsigned int processors = 1;
     if (host && host->multiThread && host->multiThreadNumCPUs &&
         host->multiThreadNumCPUs(&processors) != kOfxStatOK) {
         processors = 1;
     }
+    return static_cast<int>(std::clamp(processors, 1u, 1024u));
+}
+
+void for_each_band(const Suites& suites, int first, int last,
+                   const std::function<void(int, int)>& band, const std::function<bool()>& stop,
+                   int band_rows) {
+    const std::int64_t rows = static_cast<std::int64_t>(last) - first;
+    if (rows <= 0) return;
+    Work work{first, last, band_rows, (rows + band_rows - 1) / band_rows, band, stop};
     const auto wanted =
-        static_cast<unsigned int>(std::min<std::int64_t>(work.bands, std::min(processors, 1024u)));
-    if (wanted > 1) host->multiThread(&run_band, wanted, &work);
+        static_cast<unsigned int>(std::min<std::int64_t>(work.bands, thread_count(suites)));
+    if (wanted > 1) suites.thread->multiThread(&run_band, wanted, &work);
     // Does the rest where a host refused or started fewer threads; usually nothing.
     work.run();
     if (work.error) std::rethrow_exception(work.error);

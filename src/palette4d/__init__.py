@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from palette4d._core import __version__
     from palette4d.demo.scene import sample_clip
     from palette4d.grade.document import Document
+    from palette4d.grade.picks import Area
     from palette4d.grade.rendering import render
     from palette4d.hosts.install import install_plugin
     from palette4d.lut_export.bake import bake
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from palette4d.shows.exports import config, export
 
 __all__ = [
+    "Area",
     "Document",
     "Palette4dError",
     "SidecarError",
@@ -52,6 +54,7 @@ __all__ = [
 ]
 
 _HOMES = {
+    "Area": "palette4d.grade.picks",
     "Document": "palette4d.grade.document",
     "__version__": "palette4d._core",
     "analyze_shots": "palette4d.shows.analysis",

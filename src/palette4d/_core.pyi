@@ -12,6 +12,7 @@ from palette4d.common.errors import SidecarError as SidecarError
 F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
 I32 = NDArray[np.int32]
+U8 = NDArray[np.uint8]
 
 __version__: str
 SIDECAR_VERSION: int
@@ -38,7 +39,7 @@ class Polytope:
     def last_frame(self) -> float: ...
 
 class Edits:
-    """Edited colours of vertices, colour stops on edges, and the solution of the picks."""
+    """Edited colours of vertices, colour stops on edges, and picks."""
 
     @property
     def vertex_rgb(self) -> dict[str, tuple[float, float, float]]: ...
@@ -52,13 +53,13 @@ class Edits:
     def ramp(self) -> str:
         """The ramp of all other handles: "linear", "smooth" or "hold"."""
     @property
-    def solution(self) -> dict[str, Any]:
-        """The members in the file, without vertices that do not move."""
-    @property
     def empty(self) -> bool:
-        """Whether nothing is edited: no vertex, no stop and no solution."""
-    def bumps_at(self, frame: float) -> F64:
-        """(n, 11) float64: centre (3), radius, displacement (3), keep, along (3); holds last."""
+        """Whether nothing is edited: no vertex, no stop and no pick that is switched on."""
+    @property
+    def pick_times(self) -> list[float]:
+        """Frames of enabled picks: their own, those of paths, and the ends of ranges and fades."""
+    def picks_at(self, frame: float) -> FramePicks:
+        """The picks and holds that ask for something at a frame."""
 
 class ColourConversion:
     """A chain of matrices and curves; see docs/sidecar.md."""
@@ -98,8 +99,13 @@ class Sidecar:
     @property
     def versions(self) -> list[tuple[str, Edits]]:
         """Names and edits of the kept versions, in the file's order."""
-    def bumps_at(self, frame: float) -> F64:
-        """The bumps of the active edits; outside the clip, those at its ends."""
+    def picks_at(self, frame: float) -> FramePicks:
+        """The picks and holds of the active edits; outside the clip, those at its ends."""
+    def pick_matte_at(self, id: str, frame: float) -> FramePicks:
+        """One pick or hold, which adds its share of the change to each channel.
+
+        Empty for an unknown id, and where the pick asks for nothing.
+        """
     @property
     def conversion(self) -> ClipConversion | None:
         """None where the palette is in the clip's own numbers."""
@@ -145,12 +151,77 @@ def palette_weights(points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> tupl
 def polytope_weights(points: ArrayLike, polytope: Polytope, frame: float) -> F64:
     """Eq. 7: (m, 3) colours at one time -> (m, N) weights of the N polytope vertices."""
 
-class Recolourer:
-    """One frame's recolouring: p' = p + strength * (sum_i w_i(q) (v'_i - v_i) + bumps at p).
+class FramePicks:
+    """The picks and holds of one frame, for a `Recolourer`.
 
-    `bumps` is (n, 11), as `Edits.bumps_at` gives it. A bump moves p by b times its displacement,
-    with v = p - centre and b = max(0, 1 - (|v|^2 - (along . v)^2) / radius^2)^3. Where `keep` is
-    above 0, it multiplies what all others move p by 1 - keep (1 - (1 - b)^3): a hold.
+    A pick is (colour, change, strength, matte): the picked colour there and its whole change, in
+    the palette's code values, how much of the change is asked for (above 0, at most 1), and a
+    (96, 96, 16) float32 matte, 0 to 1, over two axes of saturation and lightness. `left` is such a
+    grid too, of what holds leave of the palette's changes. `display` is (from, to, values): a curve
+    from the palette's code values to those of a display, linear between evenly spaced values.
+
+    ValueError for another shape or a curve without a length.
+    """
+
+    def __init__(
+        self,
+        picks: Sequence[tuple[Sequence[float], Sequence[float], float, F32]],
+        *,
+        left: F32 | None = ...,
+        display: tuple[float, float, Sequence[float]] | None = ...,
+    ) -> None: ...
+    @property
+    def picks(self) -> list[tuple[list[float], list[float], float, F32]]: ...
+    @property
+    def count(self) -> int: ...
+    @property
+    def largest(self) -> float:
+        """The largest change of a channel that a pick asks for."""
+    @property
+    def left(self) -> F32 | None: ...
+
+def pick_points(
+    colours: ArrayLike, display: tuple[float, float, Sequence[float]] | None = ...
+) -> F64:
+    """Return (n, 3) points of (n, 3) palette code values: two of saturation, and lightness."""
+
+def hue_matte(picked: Sequence[float]) -> U8:
+    """Return the (96, 96, 16) log odds of all colours of a display colour's hue, 0 to 126."""
+
+def learn_matte(
+    frames: Sequence[
+        tuple[
+            F32,
+            Sequence[float],
+            Sequence[tuple[Sequence[tuple[float, float]], float]],
+            Sequence[tuple[Sequence[tuple[float, float]], float]],
+            bool,
+        ]
+    ],
+    picked: Sequence[float],
+    *,
+    holds: Sequence[Sequence[float]] = ...,
+    display: tuple[float, float, Sequence[float]] | None = ...,
+) -> dict[str, Any]:
+    """Learn a pick's matte over colours from frames of its clip.
+
+    A frame is an (h, w, 3) picture in the palette's code values (NaN: no colour), the picked colour
+    there, areas of the object and of the background, and whether the object is where its areas are.
+    An area is (points, half width), in pixels. The first frame is the one that was clicked on, and
+    `picked` the colour there. `holds` are colours to keep.
+
+    Returns odds, (96, 96, 16) uint8 log odds, 0 to 126; found, whether the first frame shows the
+    object; and of that: share (of the frame), borders (0 to 4, those that it touches), far (share
+    of its colours that are far from the pick). ValueError without frames or pixels, and for areas
+    that are not finite.
+    """
+
+class Recolourer:
+    """One frame's recolouring: p' = p + strength * (h(p) sum_i w_i(q) (v'_i - v_i) + picks at p).
+
+    h is what holds leave, 0 to 1. A pick adds its matte, times the amount of its colour in p, times
+    the part of its change that the palette does not do. Of several picks it is the mean of these,
+    weighted by the mattes and by how near p is.
     """
 
     def __init__(
@@ -159,10 +230,12 @@ class Recolourer:
         edited: ArrayLike,
         faces: ArrayLike,
         *,
-        bumps: ArrayLike | None = ...,
+        picks: FramePicks | None = ...,
     ) -> None: ...
     @property
     def identity(self) -> bool: ...
+    def displaced(self, colours: ArrayLike, *, strength: float = ...) -> F64:
+        """(n, 3) float64 in and out, in double; colours that are not finite stay."""
     def apply(
         self,
         image: NDArray[np.float32],
@@ -217,7 +290,7 @@ class Lattice:
 
 def draw(
     image: NDArray[np.float32],
-    output: Literal["recoloured", "weight", "palette", "outside"],
+    output: Literal["recoloured", "weight", "palette", "outside", "pick"],
     map: Recolourer,
     *,
     original: ArrayLike | None = ...,
@@ -228,13 +301,16 @@ def draw(
     mix: float = ...,
     matte_in_alpha: bool = ...,
     outside_at: float = ...,
+    clean_up: float = ...,
     premultiplied: bool = ...,
     threads: int = ...,
     conversion: ColourConversion | None = ...,
 ) -> F32:
     """Return what the node draws for a frame, (h, w, 3 or 4) float32 as the image.
 
-    `map` holds the edit, or for a matte what `weight_reader` or `surface_reader` returns.
+    `map` holds the edit, or for a matte what `weight_reader`, `surface_reader` or
+    `Sidecar.pick_matte_at` returns. `clean_up` is the share of the change by picks that is filtered
+    along the picture's edges.
     `original` and `edited` are the (n, 3) colours of "palette". `lightness` are three weights.
     """
 

@@ -106,14 +106,29 @@ def test_versions_do_not_multiply_the_memory() -> None:
     assert len(_core.parse_sidecar(json.dumps(document), "many").versions) == 1000
 
 
-@pytest.mark.parametrize("name", ["bumps", "holds"])
-def test_no_more_bumps_than_the_solver_makes(name: str) -> None:
-    document = golden("picks_and_holds")
-    found = document["edits"]["solution"][name]
-    found *= 1001 // len(found) + 1
+def test_no_more_picks_than_a_frame_can_have() -> None:
+    document = golden("picks")
+    pick = document["edits"]["picks"][0]
+    document["edits"]["picks"] = [{**pick, "id": f"p{i}", "path": []} for i in range(1001)]
     error = refusal(document)
-    assert error.pointer == f"/edits/solution/{name}"
-    assert error.expected == f"at most 1000 {name}"
+    assert error.pointer == "/edits/picks"
+    assert error.expected == "at most 1000 picks and holds"
+    del document["edits"]["picks"][1000:]
+    assert not _core.parse_sidecar(json.dumps(document), "many").edits.empty
+
+
+def test_picks_of_many_versions_take_little_memory() -> None:
+    """Each would take 150 KB for its matte, if it were made."""
+    document = golden("one_colour")
+    picks = [
+        {"id": f"p{i}", "kind": "hold", "frame": 0, "rgb": [0, 0, i / 500]} for i in range(500)
+    ]
+    edits = {"vertices": [], "stops": [], "picks": picks}
+    document["versions"] = [{"name": f"v{i}", "edits": edits} for i in range(100)]
+    resource = pytest.importorskip("resource")
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    assert len(_core.parse_sidecar(json.dumps(document), "many").versions) == 100
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 500_000
 
 
 def test_transitions_fill_the_time_between_blocks() -> None:

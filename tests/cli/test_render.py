@@ -24,6 +24,7 @@ from palette4d.media.frame_writer import FramePattern, sample_type, write_frame
 
 GOLDEN = Path(__file__).resolve().parent.parent / "golden" / "sidecars"
 EDITED, PLAIN = GOLDEN / "v1_edited.p4d.json", GOLDEN / "v1_split.p4d.json"
+PICKS = GOLDEN / "v2_picks.p4d.json"
 
 
 def run(*words: object) -> int:
@@ -57,8 +58,7 @@ def by_core(frame: float, pixels: np.ndarray, *, strength: float = 1.0, premulti
     palette = _core.slice_at(sidecar.polytope, frame)
     edited = _core.edited_colours(sidecar.polytope, sidecar.edits, palette)
     assert not np.array_equal(edited, palette.rgb)
-    bumps = sidecar.edits.bumps_at(palette.frame)
-    recolourer = _core.Recolourer(palette.rgb, edited, palette.faces, bumps=bumps)
+    recolourer = _core.Recolourer(palette.rgb, edited, palette.faces)
     return recolourer.apply(
         pixels, strength=strength, premultiplied=premultiplied, threads=1, precision="single"
     )
@@ -533,7 +533,32 @@ def test_the_palette_and_the_lightness_are_the_documents(tmp_path):
     np.testing.assert_array_equal(stored(tmp_path / "o.exr")[1], expected)
 
 
-@pytest.mark.parametrize("show", ["weight", "weight:", "matte", "outside:v1"])
+def test_output_writes_the_matte_of_a_pick(tmp_path):
+    pixels = colours(40, 60, 3)
+    source = write_image(tmp_path / "c.0002.exr", pixels)
+    words = ("--output", "pick:p1", "--clean-up", 0.5)
+    assert run(PICKS, source, "-o", tmp_path / "o.exr", *words) == 0
+    expected = Document.load(PICKS).matte(pixels, 2, "pick:p1", clean_up=0.5)
+    np.testing.assert_array_equal(stored(tmp_path / "o.exr")[1], np.stack([expected] * 3, axis=2))
+    assert expected.max() > 0
+    with pytest.raises(Palette4dError, match="p9"):
+        run(PICKS, source, "-o", tmp_path / "p.exr", "--output", "pick:p9")
+
+
+def test_picks_are_cleaned_up_as_asked(tmp_path):
+    pixels = colours(40, 60, 3)
+    source = write_image(tmp_path / "c.0002.exr", pixels)
+    document, written = Document.load(PICKS), []
+    for amount in (None, 0, 0.5):
+        words = () if amount is None else ("--clean-up", amount)
+        assert run(PICKS, source, "-o", tmp_path / "o.exr", *words, "--force") == 0
+        written.append(stored(tmp_path / "o.exr")[1])
+        expected = document.recolour(pixels, 2, clean_up=1 if amount is None else amount)
+        np.testing.assert_array_equal(written[-1], expected)
+    assert not np.array_equal(written[0], written[1])
+
+
+@pytest.mark.parametrize("show", ["weight", "weight:", "pick", "pick:", "matte", "outside:v1"])
 def test_an_output_that_does_not_exist_is_wrong_usage(tmp_path, show, capsys):
     with pytest.raises(SystemExit) as stopped:
         run(EDITED, tmp_path, "-o", tmp_path / "o.exr", "--output", show)

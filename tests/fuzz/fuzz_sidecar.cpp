@@ -16,15 +16,17 @@ namespace {
 using namespace palette4d;
 
 /// A frame of a sidecar that was accepted: whatever it holds, nothing may come of it but numbers.
-void use(const Sidecar& sidecar, const Edits& edits, double frame) {
+/// Picks take most of the time, hence not at each frame.
+void use(const Sidecar& sidecar, const Edits& edits, double frame, bool with_picks) {
     const Slice slice = slice_at(sidecar.polytope, frame);
     const std::vector<Handle> handles = handles_of(sidecar.polytope, edits);
     const Lineage lineage(sidecar.polytope, edits, static_cast<int>(handles.size()) - 1);
     const Recolourer edit(slice.rgb, edited_colours(sidecar.polytope, edits, slice), slice.faces,
-                          bumps_at(edits, slice.frame));
+                          with_picks ? picks_at(edits, slice.frame) : FramePicks());
     const Recolourer weight(slice.rgb, weight_reader(slice, lineage), slice.faces);
     const float pixels[3][4] = {{0.2f, 0.4f, 0.6f, 1}, {-1, 7, 0.5f, 0.5f}, {0, 0, 0, 0}};
     float result[3][4];
+    if (with_picks && !edits.picks.empty()) matte_at(edits, edits.picks[0].id, slice.frame);
     for (const Recolourer* recolourer : {&edit, &weight}) {
         RecolourOptions options;
         options.premultiplied = true;
@@ -43,9 +45,9 @@ std::string outcome_of(const std::uint8_t* data, std::size_t size) {
         for (const double part : {0.0, 0.31, 0.5, 1.0, 2.0}) {
             try {
                 const double frame = first + part * (last - first);
-                use(sidecar, sidecar.edits, frame);
+                use(sidecar, sidecar.edits, frame, part == 0.31);
                 for (const NamedVersion& version : sidecar.versions) {
-                    use(sidecar, version.edits, frame);
+                    use(sidecar, version.edits, frame, part == 0.31);
                 }
             } catch (const std::invalid_argument&) {
                 // The node says so and passes the picture through.

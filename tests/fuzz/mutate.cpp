@@ -69,8 +69,9 @@ private:
             "//",         "NaN",       "Infinity",  "[[[[[[[[",
             "\"id\"",     "\"rgb\"",   "\"frame\"", "\"faces\"",
             "\"tracks\"", "\"stops\"", "\"edge\"",  "\"version\"",
-            "\"ramp\"",   "\"hold\"",  "\"by\"",    "\"keys\"",
-            "\"radius\"", "\"bumps\"", "\"picks\"", "\"smooth\""};
+            "\"ramp\"",   "\"hold\"",  "\"matte\"", "\"path\"",
+            "\"radius\"", "\"areas\"", "\"picks\"", "\"smooth\"",
+            "\"mattes\"", "\"grids\"", "eNrt",      "=="};
         static const std::vector<std::string> kNumbers = {
             "0",          "-0",          "1",
             "-1",         "2",           "3",

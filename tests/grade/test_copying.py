@@ -202,7 +202,6 @@ def test_edits_stay_with_the_same_handles(tmp_path: Path) -> None:
     document.save_version("picked")
     document.set("v1", rgb=(1, 0, 0))
     document.save(path)
-    old = document.fields()
     moved = members("split")
     moved["edits"] = {"vertices": [], "stops": []}
     moved["quality"] = {"stages": [], "options": {"method": "like"}, "versions": {}}
@@ -215,10 +214,9 @@ def test_edits_stay_with_the_same_handles(tmp_path: Path) -> None:
     assert found.fields()["polytope"] == moved["polytope"]
     assert found.settings == document.settings
     assert found.history == document.history
-    assert found.fields()["edits"]["solution"] != old["edits"]["solution"]
+    assert found.picks == document.picks
     image = np.array(seen, dtype=np.float32)[None, None]
-    for one in (found, found.version("picked")):  # solved again for the moved palette
-        assert one.picks[0].residual < 0.01
+    for one in (found, found.version("picked")):
         assert one.recolour(image, 8)[0, 0] == pytest.approx(np.add(seen, (0.2, 0, 0)), abs=0.02)
     assert not (tmp_path / "clip.former.p4d.json").exists()
 
@@ -251,7 +249,7 @@ def test_the_grade_is_copied_if_a_handle_moves_in_time_beyond_a_stop(tmp_path: P
     assert (tmp_path / "clip.former.p4d.json").exists()
 
 
-def test_picks_are_copied_and_solved_again() -> None:
+def test_picks_are_copied() -> None:
     source = Document(members("split"))
     seen = source.palette(8).rgb.mean(axis=0).tolist()
     source.pick(frame=8, colour=seen, by=(0.2, 0, 0), follow=False, start=4, until=10, fade=2)
@@ -259,7 +257,6 @@ def test_picks_are_copied_and_solved_again() -> None:
     fit = target.copy_from(source)
     (pick,) = target.picks
     assert (pick.frame, pick.start, pick.until, pick.fade) == (116, 108, 120, 4)
-    assert pick.residual is not None
     assert not target.settings
     image = np.array(seen, dtype=np.float32)[None, None]
     changed = target.recolour(image, 116)[0, 0] - image[0, 0]

@@ -13,7 +13,8 @@ import pytest
 from palette4d.common.errors import Palette4dError
 from palette4d.grade.document import Document
 
-EDITED = Path(__file__).resolve().parents[1] / "golden" / "sidecars" / "v1_edited.p4d.json"
+GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
+EDITED, PICKS = GOLDEN / "v1_edited.p4d.json", GOLDEN / "v2_picks.p4d.json"
 
 
 @pytest.fixture
@@ -73,7 +74,10 @@ def test_kept_lightness_is_the_images(document, image):
         ({"show": "weight:"}, "weight:ID"),
         ({"show": "outside:v1"}, "outside"),
         ({"show": "weight:nothing"}, "nothing"),
-        ({"show": "weight:p1"}, "picks and holds have no matte"),
+        ({"show": "pick"}, "pick:ID"),
+        ({"show": "pick:"}, "pick:ID"),
+        ({"show": "pick:p1"}, "there is no pick or hold 'p1'; there are none"),
+        ({"clean_up": 1.1}, "clean up 1.1, expected 0 to 1"),
         ({"keep_lightness": 1.5}, "0 to 1"),
         ({"mix": float("nan")}, "0 to 1"),
         ({"strength": -0.1}, "0 to 1"),
@@ -86,6 +90,49 @@ def test_kept_lightness_is_the_images(document, image):
 def test_other_values_are_refused(document, image, given, said):
     with pytest.raises(Palette4dError, match=said):
         document.recolour(image, 3, **given)
+
+
+@pytest.fixture
+def picked() -> Document:
+    return Document.load(PICKS)
+
+
+@pytest.fixture
+def pair(picked) -> np.ndarray:
+    """The colour of pick p1, left, and another one, right, both with noise."""
+    noise = np.random.default_rng(2).normal(0, 0.01, (40, 80, 3))
+    image = np.broadcast_to(picked.picks[0].rgb, (40, 80, 3)) + noise
+    image[:, 40:] = (0.7, 0.15, 0.1) + noise[:, 40:]
+    return image.astype(np.float32)
+
+
+def test_the_matte_of_a_pick_is_1_at_its_colour(picked, pair):
+    matte = picked.matte(pair, 2, "pick:p1")
+    assert matte.shape == (40, 80)
+    assert matte[:, :36].mean() == pytest.approx(1, abs=0.05)
+    assert matte[:, 64:].max() == 0
+    held = picked.matte(pair, 2, "pick:p3")
+    assert held[:, 44:].mean() == pytest.approx(1, abs=0.05)
+    # A pick that is off takes nothing.
+    assert picked.matte(pair, 2, "pick:p2").max() == 0
+
+
+def test_cleaning_up_follows_the_picture_and_leaves_far_colours_alone(picked, pair):
+    plain, cleaned = (picked.recolour(pair, 2, clean_up=amount) - pair for amount in (0, 1))
+    assert np.abs(plain[:, :40]).max() > 0.1
+    assert 0 < cleaned[:, 5:35].std((0, 1)).max() < plain[:, 5:35].std((0, 1)).max()
+    middle = np.s_[:, 5:35]
+    np.testing.assert_allclose(cleaned[middle].mean((0, 1)), plain[middle].mean((0, 1)), atol=5e-3)
+    assert not cleaned[:, 64:].any()
+    half = picked.recolour(pair, 2, clean_up=0.5) - pair
+    np.testing.assert_allclose(half, (plain + cleaned) / 2, atol=1e-6)
+
+
+def test_an_unknown_pick_is_told_with_those_there_are(picked, pair):
+    with pytest.raises(Palette4dError, match=r"no pick or hold 'p9'; expected p1 or p2 or p3"):
+        picked.matte(pair, 2, "pick:p9")
+    with pytest.raises(Palette4dError, match=r"'pick:p1'"):
+        picked.matte(pair, 2, "weight:p1")
 
 
 @pytest.mark.parametrize("show", ["palette", "recoloured"])

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from palette4d.cli.info import info_of
+from palette4d.grade.clip_colours import ClipColours
 from palette4d.grade.document import Document
 from palette4d.grade.shares import track_shares
-from palette4d.grade.solve import ClipAtTimes
 
 SPLIT = Path(__file__).resolve().parents[1] / "golden" / "sidecars" / "v1_split.p4d.json"
 
@@ -37,7 +37,7 @@ def test_shares_are_the_mean_barycentric_weights() -> None:
             track = next(t for t in plain.tracks if id_ in (*t.vertices, *t.edges))
             expected.setdefault(track.name, {})[frame] = share
     document = with_colours(colours)
-    found = track_shares(ClipAtTimes(document.fields()), document.tracks)
+    found = track_shares(ClipColours(document.core.polytope, document.fields()), document.tracks)
     assert [*found] == [track.name for track in document.tracks]
     for name, shares in expected.items():
         assert found[name].mean == pytest.approx(np.mean([*shares.values()]), abs=1e-3)
@@ -52,7 +52,7 @@ def test_only_frames_that_have_the_track_count() -> None:
     # The light grey track begins after frame 9.
     grey = [[0.4, 0.4, 0.45, 1.0]]
     shares = [
-        track_shares(ClipAtTimes(document.fields()), document.tracks)
+        track_shares(ClipColours(document.core.polytope, document.fields()), document.tracks)
         for document in (with_colours({0: grey, 5: grey, 15: grey}), with_colours({15: grey}))
     ]
     assert shares[0]["v13"] == shares[1]["v13"]
@@ -79,7 +79,7 @@ def test_info_has_the_shares(capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_frame_whose_colours_have_no_pixels_counts_for_nothing() -> None:
     rows = {0: [[0.5, 0.4, 0.3, 1.0]], 10: [[0.3, 0.3, 0.3, 0.0]]}
     shares = [
-        track_shares(ClipAtTimes(document.fields()), document.tracks)
+        track_shares(ClipColours(document.core.polytope, document.fields()), document.tracks)
         for document in (with_colours(rows), with_colours({0: rows[0]}))
     ]
     assert shares[0] == shares[1]

@@ -11,15 +11,19 @@ import pytest
 
 from palette4d import Palette4dError, SidecarError, _core
 from palette4d.grade import sidecar
+from palette4d.grade.document import Document
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "sidecars"
-FILES = sorted(GOLDEN.glob("v1_*.p4d.json"))
+FILES = sorted(GOLDEN.glob("v*_*.p4d.json"))
+PICKS_OF_VERSION_1 = {
+    f"v1_{name}.p4d.json" for name in ("one_colour_bump", "picks", "picks_and_holds")
+}
 
-Document = dict[str, Any]
+Fields = dict[str, Any]
 PICK = {"kind": "pick", "frame": 0, "rgb": [0, 0, 0], "to": [1, 1, 1]}
 
 
-def golden(name: str) -> Document:
+def golden(name: str) -> Fields:
     return sidecar.load(GOLDEN / f"v1_{name}.p4d.json")
 
 
@@ -36,10 +40,18 @@ def edited(tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
 def test_golden_files_are_written_as_they_are(path: Path, tmp_path: Path) -> None:
-    document = sidecar.load(path)
-    sidecar.save(document, tmp_path / "out.p4d.json")
-    assert (tmp_path / "out.p4d.json").read_bytes() == path.read_bytes()
+    sidecar.save(sidecar.load(path), tmp_path / "out.p4d.json")
+    written = (tmp_path / "out.p4d.json").read_bytes()
     assert names(tmp_path) == ["out.p4d.json"]
+    if path.name in PICKS_OF_VERSION_1:
+        assert b"solution" in path.read_bytes()
+        assert b"solution" not in written
+        document = Document.load(path)
+        assert document.fields()["version"] == (2 if document.picks else 1)
+        Document(document.fields()).save(tmp_path / "again.p4d.json")
+        assert Document.load(tmp_path / "again.p4d.json").picks == document.picks
+        return
+    assert written == path.read_bytes()
 
 
 def test_equal_documents_give_equal_text() -> None:

@@ -124,26 +124,44 @@ void fill(strict::Picture& picture, unsigned seed, bool odd_values) {
     }
 }
 
+std::vector<unsigned char> drawn(palette4d::Drawing drawing, const strict::Picture& picture,
+                                 const OfxRectI& area) {
+    using namespace palette4d;
+    const strict::Layout& layout = picture.layout();
+    const int width = layout.width(), height = layout.height();
+    const std::vector<float> values = floats(layout, picture.pixels(layout.bounds));
+    std::vector<float> result(values.size());
+    const auto row = static_cast<std::ptrdiff_t>(width) * layout.channels;
+    // The core's pictures begin at the top.
+    const std::ptrdiff_t top = row * (height - 1), stride = -row * 4;
+    draw_picture({values.data() + top, width, height, layout.channels, stride},
+                 {result.data() + top, width, height, layout.channels, stride}, std::move(drawing),
+                 layout.premultiplication == std::string(kOfxImagePreMultiplied), 1);
+    std::vector<float> part;
+    for (int y = area.y1; y < area.y2; ++y) {
+        const auto* const from = result.data() + (y - layout.bounds.y1) * row +
+                                 (area.x1 - layout.bounds.x1) * layout.channels;
+        part.insert(part.end(), from, from + (area.x2 - area.x1) * layout.channels);
+    }
+    return stored(layout, part);
+}
+
 std::vector<unsigned char> recoloured(const palette4d::Sidecar& sidecar, double frame,
                                       const strict::Picture& picture, const OfxRectI& area,
-                                      double strength) {
+                                      double strength, double clean_up) {
     using namespace palette4d;
     const Slice slice = slice_at(sidecar.polytope, frame);
-    const Recolourer recolourer(slice.rgb, edited_colours(sidecar.polytope, sidecar.edits, slice),
-                                slice.faces, bumps_at(sidecar.edits, slice.frame));
-    const std::vector<unsigned char> pixels = picture.pixels(area);
-    const strict::Layout& layout = picture.layout();
-    const int width = area.x2 - area.x1, height = area.y2 - area.y1;
-    std::vector<float> values = floats(layout, pixels);
-    const std::ptrdiff_t stride = static_cast<std::ptrdiff_t>(width) * layout.channels * 4;
-    RecolourOptions options;
-    options.strength = strength;
-    options.premultiplied =
-        layout.channels == 4 && layout.premultiplication == kOfxImagePreMultiplied;
-    if (sidecar.conversion) options.conversion = &sidecar.conversion->steps;
-    recolourer.apply({values.data(), width, height, layout.channels, stride},
-                     {values.data(), width, height, layout.channels, stride}, options);
-    return stored(layout, values);
+    Drawing drawing;
+    drawing.exact = std::make_shared<const Recolourer>(
+        slice.rgb, edited_colours(sidecar.polytope, sidecar.edits, slice), slice.faces,
+        picks_at(sidecar.edits, slice.frame));
+    drawing.edit = drawing.exact;
+    drawing.options.strength = strength;
+    drawing.options.clean_up = clean_up;
+    if (sidecar.conversion) {
+        drawing.conversion = {sidecar.conversion, &sidecar.conversion->steps};
+    }
+    return drawn(std::move(drawing), picture, area);
 }
 
 OfxRectI rect(int x1, int y1, int x2, int y2) { return {x1, y1, x2, y2}; }
@@ -209,6 +227,7 @@ unsigned nearest_half(float value) {
     const double step = std::ldexp(1, std::max(exponent, -13) - 11);
     const double rounded = size > 1e6 ? 1e6 : std::nearbyint(size / step) * step;
     if (rounded >= 65536) return sign | 0x7c00;
+    if (rounded == 0) return sign;
     std::frexp(rounded, &exponent);
     if (exponent <= -14) return sign | static_cast<unsigned>(std::ldexp(rounded, 24));
     return sign | (static_cast<unsigned>(exponent + 14) << 10) |

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "model/ramps.hpp"
+#include "output/drawing.hpp"
 #include "recolour/recolour.hpp"
 #include "sidecar/sidecar.hpp"
 #include "strict_host.hpp"
@@ -70,7 +71,10 @@ void fill(strict::Picture& picture, unsigned seed = 1, bool odd_values = true);
 /// sidecar's, and so is the conversion.
 std::vector<unsigned char> recoloured(const palette4d::Sidecar& sidecar, double frame,
                                       const strict::Picture& picture, const OfxRectI& area,
-                                      double strength = 1);
+                                      double strength = 1, double clean_up = 1);
+/// The same of any drawing.
+std::vector<unsigned char> drawn(palette4d::Drawing drawing, const strict::Picture& picture,
+                                 const OfxRectI& area);
 
 OfxRectI rect(int x1, int y1, int x2, int y2);
 

@@ -48,11 +48,11 @@ def recolour(
     """What the core makes of a frame, clamped to 0..1 as files of integers are."""
     cut = _core.slice_at(sidecar.polytope, frame)
     edited = _core.edited_colours(sidecar.polytope, sidecar.edits, cut)
-    bumps = sidecar.edits.bumps_at(cut.frame)
-    recolourer = _core.Recolourer(cut.rgb, edited, cut.faces, bumps=bumps)
+    picks = sidecar.picks_at(cut.frame)
+    recolourer = _core.Recolourer(cut.rgb, edited, cut.faces, picks=picks)
     top = np.float32(np.iinfo(image.dtype).max)
     values = image.astype(np.float32) / top
-    return np.clip(recolourer.apply(values, strength=strength, precision="single"), 0, 1)
+    return np.clip(_core.draw(values, "recoloured", recolourer, strength=strength), 0, 1)
 
 
 # Seconds until the first frame, twice as long at each new try, and until the last.

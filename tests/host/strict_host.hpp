@@ -372,6 +372,9 @@ public:
     OfxStatus clip_preferences(bool& frame_varying);
     /// All that GetClipPreferences says.
     OfxStatus clip_preferences(OfxPropertySetStruct& out);
+    /// kOfxImageEffectActionGetRegionsOfInterest: the source's, in canonical coordinates, of
+    /// `region`, which is left as it is where the plugin asks for no more.
+    OfxStatus region_of_interest(double time, double scale, std::array<double, 4>& region);
     /// kOfxImageEffectActionGetOutputColourspace.
     OfxStatus output_colourspace(std::string& name);
     /// Renders `window`; null source: the host has no picture. Checks images and guards afterwards.

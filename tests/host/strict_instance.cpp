@@ -306,6 +306,21 @@ OfxStatus Instance::is_identity(double time, std::string& clip, double& clip_tim
     return status;
 }
 
+OfxStatus Instance::region_of_interest(double time, double scale, std::array<double, 4>& region) {
+    OfxPropertySetStruct in(kInArgs), out(kOutArgs);
+    const std::vector<Value> asked(region.begin(), region.end());
+    in.put(kOfxPropTime, time);
+    in.put_all(kOfxImageEffectPropRenderScale, {scale, scale});
+    in.put_all(kOfxImageEffectPropRegionOfInterest, asked);
+    out.put_all("OfxImageClipPropRoI_Source", asked);
+    const OfxStatus status =
+        plugin_.call(kOfxImageEffectActionGetRegionsOfInterest, &effect_, &in, &out);
+    for (std::size_t i = 0; i < region.size(); ++i) {
+        region[i] = out.number("OfxImageClipPropRoI_Source", i);
+    }
+    return status;
+}
+
 OfxStatus Instance::output_colourspace(std::string& name) {
     OfxPropertySetStruct in(kInArgs), out(kOutArgs);
     in.put_all(kOfxImageClipPropPreferredColourspaces, {std::string("ofx_scene_linear")});

@@ -102,6 +102,8 @@ const std::map<std::string, Rule>& rules() {
 
         {kOfxImageEffectPropRenderWindow, {kInt, 4, kInArgs, 0}},
         {kOfxImageEffectPropRenderScale, {kDouble, 2, kInArgs | kImage, 0}},
+        {kOfxImageEffectPropRegionOfInterest, {kDouble, 4, kInArgs, 0}},
+        {"OfxImageClipPropRoI_Source", {kDouble, 4, kOutArgs, kOutArgs}},
         {kOfxImageEffectPropFieldToRender, {kString, 1, kInArgs, 0}},
         {kOfxImageEffectPropFrameStep, {kDouble, 1, kInArgs, 0}},
         {kOfxImageEffectPropSequentialRenderStatus, {kInt, 1, kInArgs, 0}},

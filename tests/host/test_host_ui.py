@@ -135,7 +135,7 @@ def test_shotcut_has_the_nodes_parameters(node: Described) -> None:
 def test_shotcuts_sliders_are_shares(node: Described) -> None:
     ui = shotcut.filter_files("1.2.3")["ui.qml"]
     sliders = re.findall(r"SliderSpinner \{\n +id: (\w+)", ui)
-    assert sliders == ["strength", "keepLightness", "mix"]
+    assert sliders == ["strength", "keepLightness", "cleanUp", "mix"]
     for name in sliders:
         assert (node[name]["min"], node[name]["max"]) == (0, 1)
     assert ui.count("maximumValue: 100") == len(sliders)

@@ -47,7 +47,9 @@ class Node(StrictNode):
         sidecar = self.folder / "p4d.json"
         sidecar.write_text(json.dumps(document), encoding="utf-8")
         alpha = ("--premultiplied", int(premultiplied))
-        return self.render(sidecar, frame, image, "--strength", strength, *alpha)
+        # The reference has colours alone: a pixel's neighbours change nothing.
+        alone = ("--set", "cleanUp=0")
+        return self.render(sidecar, frame, image, "--strength", strength, *alpha, *alone)
 
 
 @pytest.fixture
@@ -166,13 +168,35 @@ OUTPUTS: list[tuple[dict[str, Any], list[str]]] = [
 ]
 
 
-@pytest.mark.parametrize("name", ["v1_edited", "v1_scene_linear", "v1_picks"])
+#: The same for picks.
+OF_PICKS: list[tuple[dict[str, Any], list[str]]] = [
+    ({}, []),
+    ({"clean_up": 0.0}, ["cleanUp=0"]),
+    (
+        {"clean_up": 0.4, "strength": 0.7, "keep_lightness": 0.5, "mix": 0.9},
+        ["cleanUp=0.4", "strength=0.7", "keepLightness=0.5", "mix=0.9"],
+    ),
+    ({"show": "palette"}, ["output=2"]),
+    ({"show": "pick:p1"}, ["output=4"]),
+    (
+        {"show": "pick:p3", "clean_up": 0.0, "mix": 0.5},
+        ["output=4", "pick=3", "cleanUp=0", "mix=0.5"],
+    ),
+    ({"show": "pick:p1", "matte_in": "alpha"}, ["output=4", "matteIn=1"]),
+]
+
+
 @pytest.mark.parametrize(
-    ("channels", "premultiplied", "given", "parameters"),
+    ("channels", "premultiplied", "name", "given", "parameters"),
     [
-        (channels, premultiplied, given, parameters)
+        (channels, premultiplied, name, given, parameters)
         for channels, premultiplied in SHAPES
-        for given, parameters in OUTPUTS
+        for names, outputs in (
+            (("v1_edited", "v1_scene_linear", "v1_picks"), OUTPUTS),
+            (("v2_picks",), OF_PICKS),
+        )
+        for name in names
+        for given, parameters in outputs
         # For a matte in alpha the node asks its host for RGBA.
         if channels == 4 or given.get("matte_in") != "alpha"
     ],
@@ -195,7 +219,7 @@ def test_every_output_of_the_node_is_the_documents(
     given = {key: v.format(**ids) if key == "show" else v for key, v in given.items()}
     sets = [word for each in parameters for word in ("--set", each.format(**ids))]
     changed = False
-    for frame in (3.0, 6.25):
+    for frame in (3.0, 2.25 if name == "v2_picks" else 6.25):
         # The driver's rows count upwards.
         found = node.render(
             path,

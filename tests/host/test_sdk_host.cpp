@@ -51,7 +51,7 @@ std::vector<float> recoloured(const palette4d::Sidecar& sidecar, const palette4d
     palette4d::Slice slice = palette4d::slice_at(sidecar.polytope, frame);
     const auto edited = palette4d::edited_colours(sidecar.polytope, edits, slice);
     const palette4d::Recolourer recolourer(slice.rgb, edited, slice.faces,
-                                           palette4d::bumps_at(edits, slice.frame));
+                                           palette4d::picks_at(edits, slice.frame));
     std::vector<float> pixels = source_pixels();
     recolourer.apply({pixels.data(), kWidth, kHeight, 4, kWidth * 16},
                      {pixels.data(), kWidth, kHeight, 4, kWidth * 16}, {});

@@ -1,4 +1,4 @@
-// The solution of picks and the versions of a sidecar's edits, in the node.
+// Picks and the versions of a sidecar's edits, in the node.
 #include <cstring>
 
 #include "harness.hpp"
@@ -10,24 +10,22 @@ using palette4d::Vec3;
 
 namespace {
 
-/// A bump that moves most colours of the test picture, a hold, a vertex that moves too, and two
-/// versions.
-const std::string kSolution =
-    R"("solution": {"vertices": [{"vertex": "v2", "by": [0.125, 0, -0.0625]}], "keys": [],
-    "bumps": [{"radius": 1.5, "shade": 0.75, "keys": [{"frame": 11, "rgb": [0.5, 0.5, 0.5], "by": [0.25, -0.125, 0]},
-    {"frame": 19, "rgb": [0.4, 0.5, 0.6], "by": [0, 0.125, 0.25]}]}],
-    "holds": [{"shade": 0.5, "keys": [{"frame": 9, "rgb": [0.5, 0.25, 0.5], "radius": 0.5, "keep": 1}]}]})";
+/// A pick that moves with the clip and a hold.
+const std::string kPicks =
+    R"("picks": [{"id": "p1", "kind": "pick", "frame": 12, "rgb": [0.75, 0.25, 0.25],
+    "to": [0.25, 0.5, 0.75], "path": [{"frame": 11, "rgb": [0.75, 0.25, 0.25]},
+    {"frame": 19, "rgb": [0.5, 0.25, 0.75]}]},
+    {"id": "p2", "kind": "hold", "frame": 9, "rgb": [0.5, 0.75, 0.25]}])";
 
-std::string text_with(const std::string& solution, const std::string& versions) {
+std::string text_with(const std::string& picks, const std::string& versions) {
     std::string text = sidecar_text();
     const std::size_t edits = text.find("\"edits\": {") + 10;
-    text.insert(edits, solution + ", ");
+    text.insert(edits, picks + ", ");
     return text.insert(text.find("\"edits\""), "\"versions\": [" + versions + "], ");
 }
 
 const std::string kVersions = R"({"name": "warm 'Gr\u00fcn", "edits": {"vertices": [],
-    "stops": [], )" + kSolution +
-                              R"(}}, {"name": "plain", "edits": {"vertices": [], "stops": []}})";
+    "stops": [], )" + kPicks + R"(}}, {"name": "plain", "edits": {"vertices": [], "stops": []}})";
 
 struct Scene : Ready {
     Layout layout;
@@ -51,29 +49,29 @@ struct Scene : Ready {
 
 }  // namespace
 
-TEST(the_node_applies_the_solution_of_the_picks) {
-    Scene scene(text_with(kSolution, ""));
+TEST(the_node_applies_the_picks) {
+    Scene scene(text_with(kPicks, ""));
     scene.set("mode", 1);
     palette4d::Edits without = scene.parsed.edits;
-    without.solution = {};
+    without.picks.clear();
     for (const double time : {0.0, 2.0, 5.5, 10.0}) {
         const auto found = scene.render(time);
         CHECK(found == scene.expected(scene.parsed.edits, 10 + time));
         CHECK(found != scene.expected(without, 10 + time));
     }
     CHECK(scene.instance->changed("reload") == kOfxStatOK);
-    CHECK(scene.instance->text("status").find("3 edits and picks\n") != std::string::npos);
-    // Rewritten with another solution.
-    std::string other = kSolution;
-    other.replace(other.find("0.25, -0.125"), 12, "0.50, -0.125");
+    CHECK(scene.instance->text("status").find("3 edits, 2 picks and holds\n") != std::string::npos);
+    // Rewritten with another pick.
+    std::string other = kPicks;
+    other.replace(other.find("0.25, 0.5, 0.75"), 15, "0.25, 0.5, 0.50");
     write("clip.p4d.json", text_with(other, ""));
     const auto found = scene.render();
     CHECK(found != scene.expected(scene.parsed.edits));
     CHECK(found == scene.expected(palette4d::read_sidecar(scene.path).edits));
 }
 
-TEST(colours_from_the_host_keep_the_solution) {
-    Scene scene(text_with(kSolution, ""));
+TEST(colours_from_the_host_keep_the_picks) {
+    Scene scene(text_with(kPicks, ""));
     scene.set("mode", 1);
     scene.set("handle02On", 1);
     scene.set("handle02", std::array<double, 3>{0.75, 0.25, 0.5});
@@ -81,7 +79,7 @@ TEST(colours_from_the_host_keep_the_solution) {
         return palette4d::with_colours(scene.parsed.polytope, scene.parsed.edits, keep,
                                        {{1, {0.75, 0.25, 0.5}}});
     };
-    CHECK(!with(true).solution.bumps.empty() && with(false).solution.bumps.empty());
+    CHECK(!with(true).picks.empty() && with(false).picks.empty());
     CHECK(scene.render() == scene.expected(with(true)));
     // The host's edits alone: the picks are the sidecar's.
     scene.set("editsFrom", 1);
@@ -90,7 +88,7 @@ TEST(colours_from_the_host_keep_the_solution) {
 }
 
 TEST(mattes_are_of_the_palette_alone) {
-    Scene plain(sidecar_text()), solved(text_with(kSolution, ""));
+    Scene plain(sidecar_text()), solved(text_with(kPicks, ""));
     for (const int output : {1, 3}) {  // the weight of a handle, and what lies outside
         std::vector<unsigned char> found[2];
         for (Scene* scene : {&plain, &solved}) {
@@ -104,7 +102,7 @@ TEST(mattes_are_of_the_palette_alone) {
 }
 
 TEST(the_user_chooses_a_version) {
-    Scene scene(text_with(kSolution, kVersions));
+    Scene scene(text_with(kPicks, kVersions));
     scene.set("mode", 1);
     const auto active = scene.render();
     CHECK(active == scene.expected(scene.parsed.edits));
@@ -127,7 +125,7 @@ TEST(the_user_chooses_a_version) {
 }
 
 TEST(a_version_that_is_not_there_is_said) {
-    Scene scene(text_with(kSolution, kVersions));
+    Scene scene(text_with(kPicks, kVersions));
     scene.set("version", std::string("warn"));
     CHECK(scene.render() == scene.unchanged());
     for (const char* word : {"'warn'", "'warm 'Gr\u00fcn'", "'plain'"}) {
@@ -136,12 +134,12 @@ TEST(a_version_that_is_not_there_is_said) {
     CHECK(scene.instance->changed("version") == kOfxStatOK);
     CHECK(scene.instance->text("status") == scene.message());
     // It comes back with the file.
-    std::string text = text_with(kSolution, kVersions);
+    std::string text = text_with(kPicks, kVersions);
     text.replace(text.find("\"plain\""), 7, "\"warn\"");
     write("clip.p4d.json", text);
     scene.set("mode", 1);
     CHECK(scene.render() == scene.unchanged() && scene.message().empty());
-    write("clip.p4d.json", text_with(kSolution, ""));
+    write("clip.p4d.json", text_with(kPicks, ""));
     CHECK(scene.render() == scene.unchanged());
     EXPECT(scene.message().find("no versions") != std::string::npos, scene.message());
     scene.set("version", std::string());

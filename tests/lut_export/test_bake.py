@@ -39,8 +39,8 @@ def exact(sidecar: Path, frame: float, colours: F32, strength: float = 1.0) -> F
     read = _core.read_sidecar(str(sidecar))
     palette = _core.slice_at(read.polytope, frame)
     edited = _core.edited_colours(read.polytope, read.edits, palette)
-    bumps = read.edits.bumps_at(palette.frame)
-    recolourer = _core.Recolourer(palette.rgb, edited, palette.faces, bumps=bumps)
+    picks = read.picks_at(palette.frame)
+    recolourer = _core.Recolourer(palette.rgb, edited, palette.faces, picks=picks)
     return recolourer.apply(colours, strength=strength)
 
 

@@ -23,7 +23,7 @@ from palette4d.lut_export import series
 from palette4d.lut_export.frame_edit import frame_edit
 from palette4d.lut_export.measured_write import BakeSettings
 from palette4d.lut_export.series import Request, Series
-from parity.cases import bump, edited, solution, split_merge_document
+from parity.cases import edited, split_merge_document
 
 from palette4d import Palette4dError, _core
 from palette4d.common.errors import WriteError
@@ -300,10 +300,9 @@ class TestStops:
     def test_between_them_an_edit_is_a_line(self, ramp: str) -> None:
         stops = [("ea", 9, (0.0, 0.0, 1.0)), ("ea", 21, (0.5, 1.0, 0.0))]
         document = edited(split_merge_document(), {"a1": (1.0, 1.0, 0.0)}, stops, ramp=ramp)
-        document["edits"]["solution"] = solution({"b0": (0.1, 0, 0)}, [("ea", 4, (0, 0.3, 0))], [])
         sidecar = _core.parse_sidecar(json.dumps(document))
         times = series.stops(sidecar)
-        assert {0, 4, 9, 21, 30} <= set(times)
+        assert {0, 9, 21, 30} <= set(times)
         assert len(times) < (31 if ramp == "smooth" else 15)
 
         def moved(frame: float) -> NDArray[np.float64]:
@@ -316,20 +315,14 @@ class TestStops:
                 line = moved(start) + share * (moved(end) - moved(start))
                 np.testing.assert_allclose(moved(frame), line, rtol=0, atol=0.01)
 
-    def test_bumps_have_their_keys_and_more_while_they_follow_a_colour(self) -> None:
-        still = bump(0.5, (12, (0.5, 0.5, 0.5), (0, 0, 0)), (15, (0.5, 0.5, 0.5), (0.1, 0, 0)))
-        moving = bump(0.2, (18, (0.5, 0.5, 0.5), (0.1, 0, 0)), (26, (0.5, 0.5, 0.7), (0.1, 0, 0)))
+    def test_picks_have_the_times_of_their_paths_and_ramps(self) -> None:
         document = edited(split_merge_document(), {}, [])
-        document["edits"]["solution"] = solution({}, [], [still, moving])
-        assert series.stops(_core.parse_sidecar(json.dumps(document))) == (
-            12,
-            15,
-            18,
-            20,
-            22,
-            24,
-            26,
-        )
+        path = [{"frame": frame, "rgb": [0.5, 0.5, 0.5]} for frame in (12, 18)]
+        pick = {"id": "p1", "kind": "pick", "frame": 15, "rgb": [0.5, 0.5, 0.5], "path": path}
+        pick |= {"to": [0.6, 0.5, 0.5], "from": 10, "fade": 4, "until": 20}
+        document["edits"]["picks"] = [pick, pick | {"id": "p2", "frame": 3, "enabled": False}]
+        times = series.stops(_core.parse_sidecar(json.dumps(document)))
+        assert times == (6, 10, 12, 15, 18, 20, 24)
 
     def test_nothing_edited(self, write_sidecar: Callable[..., Path]) -> None:
         with pytest.raises(Palette4dError, match="nothing is edited"):

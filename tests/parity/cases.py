@@ -6,8 +6,10 @@ palettes with points to weigh, and `picture()` an image with everything awkward 
 
 from __future__ import annotations
 
+import base64
 import copy
 import itertools
+import zlib
 from dataclasses import dataclass
 from typing import Any
 
@@ -82,34 +84,52 @@ def edited(
     return result
 
 
-def bump(radius: float, *keys: tuple[float, Colour, Colour], **shade: float) -> dict[str, Any]:
-    """A bump of a solution: its keys are frame, centre and displacement."""
-    return {
-        "radius": radius,
-        **shade,
-        "keys": [{"frame": t, "rgb": list(rgb), "by": list(by)} for t, rgb, by in keys],
-    }
+def pick(name: str, rgb: Colour, to: Colour, **more: Any) -> dict[str, Any]:
+    """A pick of a colour at frame 0; a path's keys are frame, colour and how much is there."""
+    if "path" in more:
+        path = [{"frame": t, "rgb": list(at), "there": there} for t, at, there in more["path"]]
+        more = {**more, "path": path}
+    return {"id": name, "kind": "pick", "frame": 0, "rgb": list(rgb), "to": list(to), **more}
 
 
-def hold(*keys: tuple[float, Colour, float, float], **shade: float) -> dict[str, Any]:
-    """A hold of a solution: its keys are frame, centre, radius and keep."""
-    names = ("frame", "rgb", "radius", "keep")
-    return {"keys": [dict(zip(names, key, strict=True)) for key in keys], **shade}
+def hold(name: str, rgb: Colour, **more: Any) -> dict[str, Any]:
+    """A hold of a colour."""
+    return {**pick(name, rgb, rgb, **more), "kind": "hold"}
 
 
-def solution(
-    vertices: dict[str, Colour],
-    keys: list[tuple[str, float, Colour]],
-    bumps: list[dict[str, Any]],
-    holds: list[dict[str, Any]] | None = None,
-) -> dict[str, Any]:
-    """A solution of picks."""
-    return {
-        "vertices": [{"vertex": name, "by": list(by)} for name, by in vertices.items()],
-        "keys": [{"edge": edge, "frame": t, "by": list(by)} for edge, t, by in keys],
-        "bumps": bumps,
-        **({"holds": holds} if holds else {}),
-    }
+def coded(odds: NDArray[np.uint8]) -> str:
+    """A learned matte as sidecars have it: differences of (96, 96, 16) log odds, 0 to 126."""
+    steps = np.diff(odds.ravel(), prepend=np.uint8(0))
+    return base64.b64encode(zlib.compress(steps.tobytes())).decode("ascii")
+
+
+def learned_odds(seed: int) -> NDArray[np.uint8]:
+    """Log odds like those of a learned matte: some soft blobs, and nothing elsewhere."""
+    rng = np.random.default_rng(seed)
+    nodes = np.stack(np.meshgrid(*(np.arange(n) for n in (96, 96, 16)), indexing="ij"), axis=-1)
+    odds = np.zeros((96, 96, 16))
+    for _ in range(5):
+        centre, size = rng.uniform((25, 25, 2), (70, 70, 13)), rng.uniform((6, 6, 2), (25, 25, 8))
+        odds = np.maximum(odds, 126 - 90 * (((nodes - centre) / size) ** 2).sum(axis=-1))
+    return odds.round().astype(np.uint8)
+
+
+def picked(
+    base: Document,
+    picks: list[dict[str, Any]],
+    grids: dict[str, NDArray[np.uint8]] | None = None,
+    display: tuple[float, float, list[float]] | None = None,
+) -> Document:
+    """The same sidecar in version 2, with picks, learned mattes and a curve to a display."""
+    result = copy.deepcopy(base)
+    result["version"] = 2
+    result["edits"]["picks"] = picks
+    mattes: dict[str, Any] = {"grids": {name: coded(odds) for name, odds in (grids or {}).items()}}
+    if display:
+        mattes["display"] = dict(zip(("from", "to", "values"), display, strict=True))
+    if grids or display:
+        result["mattes"] = mattes
+    return result
 
 
 def still_document() -> Document:
@@ -252,6 +272,46 @@ STOPS: list[tuple[str, float, Colour]] = [
 ]
 
 
+def picked_documents() -> dict[str, Document]:
+    """Sidecars with picks by name."""
+    still, colour, changes = still_document(), colour_document(), split_merge_document()
+    red = pick("red", (0.6, 0.3, 0.2), (0.4, 0.3, 0.6))
+    green = pick("green", (0.3, 0.6, 0.25), (0.6, 0.6, 0.1), softness=1, reach=2)
+    pale = pick("pale", (0.9, 0.92, 0.88), (0.8, 0.7, 0.9), softness=0, lightness=[0.4, 1])
+    black = pick("black", (0.0, 0.0, 0.0), (0.1, 0.05, 0.0), lightness=[0, 0.2])
+    moving = pick(
+        "moving", (0.3, 0.3, 0.7), (0.2, 0.6, 0.6),
+        path=[(2, (0.3, 0.3, 0.7), 1), (12, (0.25, 0.4, 0.6), 0.5), (25, (0.4, 0.4, 0.5), 1)],
+    )  # fmt: skip
+    # At other frames than its own it becomes one colour, and it is asked for from 9 to 20 only.
+    ranged = {**red, "toward": "colour", "from": 9, "until": 20, "fade": 3}
+    kept = hold("kept", (0.5, 0.4, 0.25), reach=-1)
+    fading = hold("fading", (0.2, 0.2, 0.6), until=12, fade=10)
+    off = {**green, "id": "off", "enabled": False}
+    log = [float(x) for x in np.linspace(0, 1, 33) ** 0.5]
+    return {
+        "still-pick": picked(still, [red]),
+        "still-picks": picked(still, [red, green, pale, black, off]),
+        "still-holds": picked(still, [kept, red, hold("grey", (0.4, 0.4, 0.4))]),
+        "still-learned": picked(
+            edited(still, {"v2": (0.3, 0.8, 0.1)}, []),
+            [{**red, "matte": "a"}, {**green, "matte": "b", "softness": 0.2, "reach": -0.7},
+             hold("kept", (0.2, 0.5, 0.3), matte="c")],
+            {"a": learned_odds(1), "b": learned_odds(2), "c": learned_odds(3)},
+        ),
+        "colour-picks": picked(colour, [moving, black, fading]),
+        "colour-curve": picked(colour, [red, fading], None, (-0.25, 1.5, log)),
+        "changes-picks": picked(
+            edited(changes, {"d1": (0.3, 0.0, 0.7)}, [("ea", 9, (0.0, 0.2, 0.1))], ramp="smooth"),
+            [ranged, moving, pale],
+        ),
+        "changes-holds": picked(
+            edited(changes, {"a1": (0.9, 0.3, 0.1), "a0": (0.1, 0.05, 0.0)}, []),
+            [fading, moving, kept],
+        ),
+    }  # fmt: skip
+
+
 def all_documents() -> dict[str, Document]:
     """Sidecars by name."""
     changes = split_merge_document()
@@ -289,68 +349,7 @@ def all_documents() -> dict[str, Document]:
             {"a1": "linear", "stop1": "smooth", "bm": "linear"},
             ramp="hold",
         ),
-        "changes-picks": edited(
-            changes,
-            {"d1": (0.3, 0.0, 0.7)},
-            [("ea", 9, (0.0, 0.2, 0.1))],
-            ramp="smooth",
-            solution=solution(
-                {"bm": (0.1, -0.05, 0.0), "d1": (-0.05, 0.1, 0.02), "m1": (0.0, 0.1, 0.1)},
-                [
-                    ("ea", 12, (0.1, 0.0, -0.1)),
-                    ("ea", 6.5, (0.0, 0.05, 0.0)),
-                    ("dm", 22, (0.2, 0.0, 0.0)),
-                ],
-                [
-                    bump(
-                        0.5,
-                        (0, (0.3, 0.4, 0.5), (0.0, 0.0, 0.0)),
-                        (5, (0.4, 0.4, 0.4), (0.2, -0.1, 0.1)),
-                        (22, (0.6, 0.5, 0.3), (0.1, 0.1, -0.2)),
-                        (25, (0.6, 0.5, 0.3), (0.0, 0.0, 0.0)),
-                    ),
-                    bump(0.08, (11, (0.5, 0.5, 0.5), (-0.3, 0.0, 0.2))),
-                    bump(3.0, (30, (0.0, 1.0, 0.0), (0.05, -0.1, 0.0))),
-                ],
-            ),
-        ),
-        "still-bumps": edited(
-            still_document(),
-            {},
-            [],
-            solution=solution({}, [], [bump(0.7, (7, (0.4, 0.3, 0.2), (0.1, -0.2, 0.05)))]),
-        ),
-        "colour-bumps": edited(
-            colour_document(),
-            {},
-            [],
-            solution=solution({}, [], [bump(0.9, (0, (0.4, 0.3, 0.2), (0.1, -0.2, 0.05)))]),
-        ),
-        "colour-holds": edited(
-            colour_document(),
-            {},
-            [],
-            solution=solution(
-                {},
-                [],
-                [bump(0.9, (0, (0.4, 0.3, 0.2), (0.1, -0.2, 0.05)))],
-                [
-                    hold((0, (0.6, 0.3, 0.3), 0.4, 0.5)),
-                    hold((0, (0.2, 0.2, 0.2), 0.5, 1), shade=0.5),
-                ],
-            ),
-        ),
-        "changes-holds": edited(
-            changes,
-            {"a1": (0.9, 0.3, 0.1)},
-            [],
-            solution=solution(
-                {},
-                [],
-                [bump(0.5, (15, (0.5, 0.4, 0.3), (0.2, -0.1, 0.1)), shade=0.55)],
-                [hold((10, (0.4, 0.4, 0.4), 0.3, 0), (20, (0.6, 0.5, 0.3), 0.6, 1), shade=0.7)],
-            ),
-        ),
+        **picked_documents(),
         "changes-back": edited(changes, {"b0": (1.0, 0.0, 0.0)}, []),
     }
 
@@ -383,9 +382,9 @@ def frames_of(name: str) -> list[float]:
     marks = {vertex["frame"] for vertex in polytope["vertices"]}
     marks |= {block[end] for block in polytope["blocks"] for end in ("first", "last")}
     marks |= {stop["frame"] for stop in DOCUMENTS[name]["edits"]["stops"]}
-    solution = DOCUMENTS[name]["edits"].get("solution", {"keys": [], "bumps": []})
-    marks |= {key["frame"] for key in solution["keys"]}
-    marks |= {key["frame"] for bump in solution["bumps"] for key in bump["keys"]}
+    for pick in DOCUMENTS[name]["edits"].get("picks", ()):
+        marks |= {key["frame"] for key in pick.get("path", ())}
+        marks |= {pick[end] for end in ("from", "until") if end in pick}
     times = sorted(float(mark) for mark in marks)
     between = [a + 0.37 * (b - a) for a, b in itertools.pairwise(times)]
     beside = [mark + side for mark in times for side in (-NUDGE, NUDGE)]

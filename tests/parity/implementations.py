@@ -92,8 +92,8 @@ class Reference:
         original = reference.slice_rgb(document, frame)
         faces = reference.slice_faces(document, frame)
         edited = reference.edited_colours(document, frame)
-        bumps = reference.bumps_at(document, frame)
-        return reference.recolour(image, original, edited, faces, strength, premultiplied, bumps)
+        picks = reference.picks_at(document, frame)
+        return reference.recolour(image, original, edited, faces, strength, premultiplied, picks)
 
 
 class Core:
@@ -129,8 +129,8 @@ class Core:
         sidecar = self.sidecar(document)
         cut = _core.slice_at(sidecar.polytope, frame)
         edited = _core.edited_colours(sidecar.polytope, sidecar.edits, cut)
-        bumps = sidecar.edits.bumps_at(cut.frame)
-        return _core.Recolourer(cut.rgb, edited, cut.faces, bumps=bumps)
+        picks = sidecar.picks_at(cut.frame)
+        return _core.Recolourer(cut.rgb, edited, cut.faces, picks=picks)
 
     def mvc(self, points: ArrayLike, rgb: ArrayLike, faces: ArrayLike) -> F64:
         return _core.mean_value_coordinates(points, rgb, faces)

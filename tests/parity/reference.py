@@ -7,15 +7,18 @@ cases of `cases.py` run on it and on the compiled core; where they differ, one o
 
 from __future__ import annotations
 
+import base64
 import functools
 import itertools
-from collections.abc import Sequence
+import zlib
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 F64 = NDArray[np.float64]
+F32 = NDArray[np.float32]
 Document = dict[str, Any]
 
 ON_SURFACE = 1e-11  # distances that count as none
@@ -169,21 +172,8 @@ def smooth(document: Document, edge: dict[str, Any], frame: float) -> F64:
     )
 
 
-def solved(document: Document, earlier: str, later: str, frame: float) -> F64:
-    """The solution's displacement between two vertices."""
-    solution = document["edits"].get("solution", {"vertices": [], "keys": []})
-    moved = {entry["vertex"]: entry["by"] for entry in solution["vertices"]}
-    if earlier == later:
-        return np.array(moved.get(earlier, (0, 0, 0)), float)
-    vertices, edge = vertices_by_id(document), edge_between(document, earlier, later)
-    knots = [(vertices[name]["frame"], moved.get(name, (0, 0, 0))) for name in (earlier, later)]
-    knots += [(k["frame"], k["by"]) for k in solution["keys"] if k["edge"] == edge["id"]]
-    times, values = zip(*sorted(knots), strict=True)
-    return np.array([np.interp(frame, times, channel) for channel in zip(*values, strict=True)])
-
-
 def edited_colours(document: Document, frame: float) -> F64:
-    """(n, 3) palette colours at a frame after the edits: handles, ramps, and the solution."""
+    """(n, 3) palette colours at a frame after the edits: handles and ramps."""
     frame = clamped(document, frame)
     vertices, edits = vertices_by_id(document), document["edits"]
     new = {edit["vertex"]: edit["rgb"] for edit in edits["vertices"]}
@@ -217,36 +207,229 @@ def edited_colours(document: Document, frame: float) -> F64:
                     row = original + smooth(document, edge, frame)
                 else:
                     row = original + dict(displacements(document, edge))[start]
-        rows.append(row + solved(document, earlier, later, frame))
+        rows.append(row)
     return np.array(rows).reshape(-1, 3)
 
 
-Bump = tuple[F64, float, F64, float, F64]
+# Picks -------------------------------------------------------------------------------------------
+
+GRID = (96, 96, 16)  # two axes of saturation within +-0.7, and lightness 0 to 1
+LEAST, MOST = np.array([-0.7, -0.7, 0.0]), np.array([0.7, 0.7, 1.0])
+NODES = np.stack(
+    np.meshgrid(*(np.linspace(*ends) for ends in zip(LEAST, MOST, GRID, strict=True)),
+                indexing="ij"), axis=-1,
+)  # fmt: skip
+NOISE, NEAR, LEAST_LIGHT = 0.04, 0.05, 0.02  # chroma, saturation, lightness
 
 
-def bumps_at(document: Document, frame: float) -> list[Bump]:
-    """Centre, radius, displacement, keep and along of every bump and hold at a frame."""
-    frame = clamped(document, frame)
-    solution = document["edits"].get("solution", {"bumps": []})
+@dataclass(frozen=True)
+class Picked:
+    """One pick at a frame: where it is, what it asks for, and its matte, (96, 96, 16)."""
 
-    def along(centre: F64, entry: Document) -> F64:
-        longer = np.sqrt(1 - entry.get("shade", 1) ** 2)
-        return longer / max(float(np.linalg.norm(centre)), 0.6) * centre
+    colour: F64
+    change: F64
+    strength: float
+    matte: F32
 
-    found = []
-    for bump in solution["bumps"]:
-        keys = bump["keys"]
-        times = [key["frame"] for key in keys]
-        rows = np.array([[*key["rgb"], *key["by"]] for key in keys])
-        now = np.array([np.interp(frame, times, column) for column in rows.T])
-        found.append((now[:3], float(bump["radius"]), now[3:], 0.0, along(now[:3], bump)))
-    for hold in solution.get("holds", []):
-        keys = hold["keys"]
-        times = [key["frame"] for key in keys]
-        rows = np.array([[*key["rgb"], key["radius"], key["keep"]] for key in keys])
-        now = np.array([np.interp(frame, times, column) for column in rows.T])
-        found.append((now[:3], float(now[3]), np.zeros(3), float(now[4]), along(now[:3], hold)))
+
+@dataclass(frozen=True)
+class Picks:
+    """All picks at a frame, what holds leave of the palette's changes, and the display's curve."""
+
+    picks: list[Picked] = field(default_factory=list)
+    left: F32 | None = None
+    curve: tuple[float, float, list[float]] | None = None
+
+
+def shown(colour: ArrayLike, curve: tuple[float, float, list[float]] | None) -> F64:
+    """A display's code values of the palette's."""
+    at = np.asarray(colour, float)
+    if curve is None:
+        return at
+    return np.interp(at, np.linspace(curve[0], curve[1], len(curve[2])), curve[2])
+
+
+def chroma(display: F64) -> F64:
+    """The part of a colour across grey, along orange and along green against blue."""
+    axes = np.array([[2, -1, -1], [0, 1, -1]]) / np.sqrt([[6], [2]])
+    return axes @ display
+
+
+def point(display: F64) -> F64:
+    """Saturation, two coordinates, and lightness."""
+    lightness = max(*display, 0.0)
+    return np.array([*(chroma(display) / (lightness + 0.2)), lightness])
+
+
+def apart2(a: F64, b: F64) -> Any:
+    """Squared distances of points."""
+    return (((a - b) * (1, 1, 0.4)) ** 2).sum(axis=-1)
+
+
+def smooth_step(x: Any, low: float, high: float) -> Any:
+    """0 up to `low`, 1 from `high` on."""
+    t = np.clip((x - low) / (high - low), 0, 1)
+    return t * t * (3 - 2 * t)
+
+
+def certainty(display: F64) -> float:
+    """How certain a colour's hue is."""
+    square = float(chroma(display) @ chroma(display))
+    return square / (square + NOISE**2)
+
+
+def amount(display: F64, of: F64) -> float:
+    """How much of a picked colour is in another one."""
+    toward, own = chroma(of), chroma(display)
+    hue = max(toward @ own, 0.0) / (toward @ toward + NOISE**2)
+    hue *= smooth_step(own @ own, 0, NOISE**2)
+    picked, grey = (np.clip(colour.mean(), 0, 1) for colour in (of, display))
+    light = min(
+        (grey + LEAST_LIGHT) / (picked + LEAST_LIGHT),
+        (1 - grey + LEAST_LIGHT) / (1 - picked + LEAST_LIGHT),
+        1.0,
+    )
+    found = float(hue + (1 - certainty(of)) * light)
+    return 2 - 1 / found if found > 1 else found
+
+
+def between(grid: NDArray[Any], at: F64) -> Any:
+    """Values of a grid at points (..., 3), linear between its nodes and level beyond them."""
+    steps = np.array(GRID) - 1
+    place = np.clip((at - LEAST) / (MOST - LEAST) * steps, 0, steps)
+    low = np.minimum(place.astype(int), steps - 1)
+    part = place - low
+    found = 0.0
+    for corner in itertools.product((0, 1), repeat=3):
+        weight = np.prod(np.where(corner, part, 1 - part), axis=-1)
+        found = found + weight * grid[tuple(np.moveaxis(low + corner, -1, 0))].astype(float)
     return found
+
+
+def hue_odds(display: F64) -> NDArray[np.int_]:
+    """(96, 96, 16) the matte of a hue, 0 to 126."""
+    own, certain = point(display), certainty(display)
+    saturation = NODES[..., :2]
+    direction = chroma(display) / max(float(np.linalg.norm(chroma(display))), 1e-9)
+    along = saturation @ direction
+    aside2 = (saturation**2).sum(axis=-1) - along**2
+    width2 = NEAR**2 + (0.4452 * np.maximum(along, 0)) ** 2
+    cone = aside2 / width2 + (np.minimum(along, 0) / NEAR) ** 2
+    ball = ((saturation - own[:2]) ** 2).sum(axis=-1) / (1.5 * NEAR) ** 2
+    ball = ball + ((NODES[..., 2] - own[2]) / 0.3) ** 2
+    membership = np.exp(-(certain * cone + (1 - certain) * ball) / 2).astype(np.float32)
+    m = np.clip(membership.astype(float), 1e-9, 1 - 1e-9)
+    odds = np.clip(np.log(m / (1 - m)) * 63 / 6, -63, 63)
+    return (63 + np.trunc(odds + np.copysign(0.5, odds))).astype(int)
+
+
+def odds_of(document: Document, pick: Document, display: F64) -> NDArray[np.int_]:
+    """(96, 96, 16) the learned matte of a pick, or that of its hue."""
+    if "matte" not in pick:
+        return hue_odds(display)
+    coded = document["mattes"]["grids"][pick["matte"]]
+    steps = np.frombuffer(zlib.decompress(base64.b64decode(coded)), np.uint8)
+    return (np.cumsum(steps, dtype=int) % 256).reshape(GRID)
+
+
+def frame_matte(document: Document, pick: Document, first: F64, now: F64) -> F32:
+    """A pick's matte with its sliders, moved along with its colour; without holds."""
+    odds = odds_of(document, pick, first)
+    membership = 1 / (1 + np.exp(-((odds - 63) * 6 / 63 + pick.get("reach", 0))))
+    half = max(0.6 * pick.get("softness", 0.5), 1e-3)
+    matte = smooth_step(np.where(odds == 0, 0, membership), max(0.4 - half, 0.02), 0.4 + half)
+    matte = matte.astype(np.float32)
+    away = point(now) - point(first)
+    if apart2(point(now), point(first)) > 1e-10:
+        reach2 = (6.5 * NEAR) ** 2
+        along = np.maximum(1 - apart2(NODES, point(now)) / reach2, 0) ** 2
+        moved = between(matte, NODES - along[..., None] * away).astype(np.float32)
+        matte = np.where(along > 0, moved, matte)
+    # The colour itself is the thing's.
+    steps = np.array(GRID) - 1
+    place = np.clip((point(now) - LEAST) / (MOST - LEAST) * steps, 0, steps - 1e-9).astype(int)
+    u, v, light = np.minimum(place, steps - 1)
+    matte[u : u + 2, v : v + 2, light : light + 2] = 1
+    darkest, lightest = pick.get("lightness", (0, 1))
+    taken = np.ones(GRID[2])
+    levels = NODES[0, 0, :, 2]
+    if darkest > 0:
+        taken = smooth_step(levels, darkest - 0.1, darkest)
+    if lightest < 1:
+        taken = taken * (1 - smooth_step(levels, lightest, lightest + 0.1))
+    return matte * taken.astype(np.float32)
+
+
+def on_path(pick: Document, frame: float) -> tuple[F64, float]:
+    """A pick's colour at a frame, and how much of it is there."""
+    path = pick.get("path")
+    if not path:
+        return np.array(pick["rgb"], float), 1.0
+    times = [key["frame"] for key in path]
+    rows = [[*key["rgb"], key.get("there", 1)] for key in path]
+    now = np.array([np.interp(frame, times, column) for column in zip(*rows, strict=True)])
+    return now[:3], float(now[3])
+
+
+def strength_of(pick: Document, frame: float, step: float) -> float:
+    """How much of a pick's change is asked for at a frame."""
+    if not pick.get("enabled", True):
+        return 0.0
+    ramp = max(pick.get("fade", 0), step)
+    early = (pick.get("from", -np.inf) - frame) / ramp
+    late = (frame - pick.get("until", np.inf)) / ramp
+    return float(np.clip(1 - max(early, late), 0, 1)) * on_path(pick, frame)[1]
+
+
+def change_of(pick: Document, frame: float) -> F64:
+    """What a pick asks for at a frame."""
+    rgb, to = np.array(pick["rgb"], float), np.array(pick["to"], float)
+    now = on_path(pick, frame)[0]
+    if pick.get("toward", "shift") == "colour":
+        return to - now
+    known = np.array([rgb, to, *(key["rgb"] for key in pick.get("path", ()))])
+    low = np.minimum(known.min(axis=0), 0)
+    high = 1 if known.max() <= 1 else np.inf
+    part = 1.0 if now.max() >= rgb.max() else max(now.max(), 0) / max(rgb.max(), 1e-9)
+    for c in range(3):
+        change = to[c] - rgb[c]
+        if abs(change) > 1e-9:
+            room = now[c] - low[c] if change < 0 else high - now[c]
+            part = min(part, room / abs(change))
+    return max(part, 0) * (to - rgb)
+
+
+def picks_at(document: Document, frame: float) -> Picks:
+    """The picks and holds that ask for something at a frame."""
+    frame = clamped(document, frame)
+    curve = None
+    if "display" in document.get("mattes", {}):
+        display = document["mattes"]["display"]
+        curve = display["from"], display["to"], display["values"]
+    holds: list[tuple[F64, float]] = []
+    left: F32 | None = None
+    found: list[Picked] = []
+    for kind in ("hold", "pick"):
+        for pick in document["edits"].get("picks", ()):
+            strength = strength_of(pick, frame, document["clip"]["frames"]["step"])
+            if pick["kind"] != kind or strength <= 0:
+                continue
+            colour = on_path(pick, frame)[0]
+            now = shown(colour, curve)
+            matte = frame_matte(document, pick, shown(pick["rgb"], curve), now)
+            if kind == "hold":
+                kept = np.float32(1) - np.float32(strength) * matte
+                left = kept if left is None else left * kept
+                holds.append((point(now), strength))
+                continue
+            spared = np.ones(GRID)
+            for hold, how_much in holds:
+                to_hold, to_pick = apart2(NODES, hold), apart2(NODES, point(now))
+                share = smooth_step(to_hold / np.maximum(to_hold + to_pick, 1e-9), 0, 0.5)
+                spared *= 1 - how_much * (1 - share)
+            matte = matte * spared.astype(np.float32)
+            found.append(Picked(colour, change_of(pick, frame), strength, matte))
+    return Picks(found, left, curve)
 
 
 # Weights -----------------------------------------------------------------------------------------
@@ -414,10 +597,38 @@ def recolour(
     faces: ArrayLike,
     strength: float = 1.0,
     premultiplied: bool = False,
-    bumps: Sequence[Bump] = (),
+    picks: Picks | None = None,
 ) -> NDArray[np.float32]:
-    """p' = p + strength (sum_i w_i(q) (v'_i - v_i) + bumps) for an (h, w, 3 or 4) image."""
+    """p' = p + strength (h sum_i w_i(q) (v'_i - v_i) + picks) for an (h, w, 3 or 4) image.
+
+    A pick's matte m, times the amount a of its colour, times its change d; of several picks the
+    mean of m a d, weighted by m and by closeness. Each d is what the palette leaves to do.
+    """
+    picks = picks or Picks()
     displacement = np.asarray(edited, float) - np.asarray(original, float)
+
+    def held(colour: F64) -> F64:
+        weights, _ = palette_weights([colour], original, faces)
+        moved = weights[0] @ displacement
+        if picks.left is not None and moved.any():
+            moved = between(picks.left, point(shown(colour, picks.curve))) * moved
+        return np.asarray(moved)
+
+    missing = [pick.strength * (pick.change - held(pick.colour)) for pick in picks.picks]
+
+    def moved_by_picks(colour: F64) -> F64:
+        total, shares = np.zeros(3), []
+        display = shown(colour, picks.curve)
+        for pick, change in zip(picks.picks, missing, strict=True):
+            target = shown(pick.colour, picks.curve)
+            matte = float(between(pick.matte, point(display)))
+            near = matte * pick.strength / (apart2(point(display), point(target)) + 1e-6)
+            share = near if len(picks.picks) > 1 else 1.0
+            part = matte * amount(display, target) / amount(target, target)
+            total += share * part * change
+            shares.append(share)
+        return total / max(sum(shares), 1e-30)
+
     result = image.copy()
     for y in range(image.shape[0]):
         for x in range(image.shape[1]):
@@ -428,14 +639,7 @@ def recolour(
             own = straight(p, alpha)
             if not np.isfinite(own).all():
                 continue
-            weights, _ = palette_weights([own], original, faces)
-            moved = weights[0] @ displacement
-            for centre, radius, by, keep, along in bumps:
-                away = own - centre
-                distance2 = float(away @ away - (along @ away) ** 2)
-                part = max(1 - distance2 / radius**2, 0.0) ** 3
-                moved = (moved + part * by) * (1 - (1 - (1 - part) ** 3) * keep)
-            moved = alpha * strength * moved
+            moved = alpha * strength * (held(own) + moved_by_picks(own))
             for channel in range(3):
                 if moved[channel] != 0:
                     result[y, x, channel] = np.float32(p[channel] + moved[channel])

@@ -6,13 +6,16 @@ import copy
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from parity.cases import (
     DOCUMENTS,
     EDITED,
     FAST_TOLERANCE,
     PICTURE_TOLERANCE,
     UNEDITED,
+    picked_documents,
     picture,
+    random_hull,
     same_bits,
     times_of,
 )
@@ -26,7 +29,16 @@ from parity.implementations import (
     Implementation,
     Lattice,
 )
-from parity.reference import bumps_at
+from parity.reference import (
+    Picked,
+    Picks,
+    between,
+    hue_odds,
+    picks_at,
+    point,
+    recolour,
+    shown,
+)
 
 from palette4d import _core
 
@@ -143,34 +155,100 @@ def test_rounds_are_rare_where_the_implementations_differ() -> None:
     assert same_bits(result, expected).mean() > 0.98
 
 
-@pytest.mark.parametrize("name", ["still-bumps", "colour-bumps"])
-def test_colours_beyond_all_bumps_keep_their_bits(name: str) -> None:
-    image = picture(3)
+PICKED = sorted(picked_documents())
+
+
+@pytest.mark.parametrize("name", PICKED)
+def test_the_core_has_the_picks_of_the_reference(name: str) -> None:
+    document = DOCUMENTS[name]
     for frame in times_of(name):
-        (centre, radius, *_), *_ = bumps_at(DOCUMENTS[name], frame)
-        away = np.linalg.norm(image - centre, axis=2)
-        beyond = ~(away < radius * (1 - 1e-6))  # NaN too
-        assert 0 < beyond.sum() < beyond.size
+        expected, found = picks_at(document, frame), CORE.sidecar(document).picks_at(frame)
+        assert len(found.picks) == len(expected.picks)
+        for wanted, (colour, change, strength, matte) in zip(
+            expected.picks, found.picks, strict=True
+        ):
+            np.testing.assert_allclose(colour, wanted.colour, rtol=0, atol=1e-15)
+            np.testing.assert_allclose(change, wanted.change, rtol=0, atol=1e-15)
+            assert strength == pytest.approx(wanted.strength, abs=1e-15)
+            np.testing.assert_allclose(matte, wanted.matte, rtol=0, atol=1e-6)
+        assert (found.left is None) == (expected.left is None)
+        if found.left is not None:
+            np.testing.assert_allclose(found.left, expected.left, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("colour", [(0.6, 0.3, 0.2), (0.5, 0.52, 0.5), (0, 0, 0), (0.1, 0.2, 1.4)])
+def test_the_core_has_the_hue_mattes_of_the_reference(colour: tuple[float, float, float]) -> None:
+    found, expected = _core.hue_matte(colour), hue_odds(np.array(colour, float))
+    # Where a value is half a step, rounding decides.
+    assert np.abs(found.astype(int) - expected).max() <= 1
+    assert (found != expected).sum() <= 3
+
+
+@pytest.mark.parametrize("name", PICKED)
+def test_colours_beyond_all_mattes_keep_their_bits(name: str) -> None:
+    """No palette colour moves here, or only where the mattes are."""
+    document = copy.deepcopy(DOCUMENTS[name])
+    document["edits"]["vertices"] = document["edits"]["stops"] = []
+    image, finite = picture(3), np.isfinite(picture(3)).all(axis=2)
+    for frame in times_of(name):
+        picks = picks_at(document, frame)
+        taken = np.zeros(finite.shape)
+        for y, x in zip(*np.nonzero(finite), strict=True):
+            at = point(shown(image[y, x], picks.curve))
+            taken[y, x] = sum(between(pick.matte, at) for pick in picks.picks)
+        beyond = taken < 1e-12
+        assert beyond.sum() > 0
         for code in (CORE, FAST, LATTICE):
-            found = code.recolour(image, DOCUMENTS[name], frame)
+            found = code.recolour(image, document, frame)
             assert same_bits(found, image)[beyond].all()
-            assert not same_bits(found, image)[~beyond].all(axis=1).any()
+            if (~beyond).any():
+                assert not same_bits(found, image)[~beyond].all(axis=1).all()
 
 
-def test_bumps_add_to_what_the_palette_does() -> None:
-    """The same picture without and with bumps differs by them alone."""
-    document, frame, image = DOCUMENTS["changes-picks"], 12.5, picture(3)
-    finite = np.isfinite(image).all(axis=2)
-    plain = copy.deepcopy(document)
-    plain["edits"]["solution"]["bumps"] = []
-    colours = image[finite].astype(float)
-    wanted = np.zeros_like(colours)
-    for centre, radius, by, *_ in bumps_at(document, frame):
-        within = 1 - ((colours - centre) ** 2).sum(axis=1, keepdims=True) / radius**2
-        wanted += np.maximum(within, 0) ** 3 * by
-    for code in (CORE, FAST, LATTICE):
-        found, without = (
-            code.recolour(image, d, frame)[finite].astype(float) for d in (document, plain)
-        )
-        near = np.abs(colours).max(axis=1) < 10
-        np.testing.assert_allclose((found - without)[near], wanted[near], rtol=0, atol=1e-6)
+@pytest.mark.parametrize("name", ["still-pick", "still-picks", "still-learned", "colour-curve"])
+def test_picked_colours_meet_their_targets(name: str) -> None:
+    document, frame = DOCUMENTS[name], 7.0
+    picks = picks_at(document, frame)
+    image = np.array([[pick.colour for pick in picks.picks]], np.float32)
+    targets = np.array([[pick.colour + pick.change for pick in picks.picks]])
+    for code in (REFERENCE, CORE, FAST, LATTICE):
+        found = code.recolour(image, document, frame)
+        tolerance = _core.LATTICE_TOLERANCE if code is LATTICE else 2e-4
+        np.testing.assert_allclose(found, targets, rtol=0, atol=tolerance)
+
+
+@pytest.mark.parametrize("curve", [None, (-0.5, 1.5, [0.0, 0.1, 0.5, 0.7, 1.0])])
+@pytest.mark.parametrize("count", [1, 2, 5])
+@pytest.mark.parametrize("held", [False, True])
+def test_picks_of_any_mattes_are_as_the_reference_has_them(
+    count: int, held: bool, curve: tuple[float, float, list[float]] | None
+) -> None:
+    rng = np.random.default_rng(count + 10 * held)
+    rgb, faces = random_hull(3, 8)
+    edited = rgb + rng.uniform(-0.2, 0.2, rgb.shape)
+
+    def matte() -> NDArray[np.float32]:
+        coarse = rng.uniform(-1, 1.5, (12, 12, 4)).clip(0, 1)
+        return np.kron(coarse, np.ones((8, 8, 4))).astype(np.float32)
+
+    picks = [
+        Picked(rng.uniform(0, 1, 3), rng.uniform(-0.3, 0.3, 3), rng.uniform(0.1, 1), matte())
+        for _ in range(count)
+    ]
+    left = matte() if held else None
+    given = [(tuple(p.colour), tuple(p.change), p.strength, p.matte) for p in picks]
+    recolourer = _core.Recolourer(
+        rgb, edited, faces, picks=_core.FramePicks(given, left=left, display=curve)
+    )
+    image = picture(4)
+    expected = recolour(image, rgb, edited, faces, 0.8, True, Picks(picks, left, curve))
+    found = recolourer.apply(image, strength=0.8, premultiplied=True, precision="double")
+    np.testing.assert_allclose(found, expected, **PICTURE_TOLERANCE)
+    fast = recolourer.apply(image, strength=0.8, premultiplied=True, precision="single")
+    np.testing.assert_allclose(fast, expected, **FAST_TOLERANCE)
+    for name in _core.instruction_sets():
+        for precision, wanted in (("single", fast), ("double", found)):
+            again = recolourer.apply(
+                image, strength=0.8, premultiplied=True, precision=precision, instructions=name
+            )
+            assert same_bits(again, wanted).all()

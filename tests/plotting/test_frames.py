@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from palette4d.grade.clip_colours import ClipColours
 from palette4d.grade.document import Document
-from palette4d.grade.solve import ClipAtTimes
 from palette4d.plotting.frames import default_frames
 from palette4d.plotting.rows import PlottedPalette
 
@@ -102,9 +102,10 @@ def test_edits_only_add_frames(edited: list[float], added: list[int]) -> None:
 
 def test_the_largest_change_is_shown() -> None:
     document = Document.load(SPLIT)
-    before = default_frames(PlottedPalette.of(document.core), ClipAtTimes(document.fields()))
+    stored = ClipColours(document.core.polytope, document.fields())
+    before = default_frames(PlottedPalette.of(document.core), stored)
     at = next(t for t in range(5, 18) if not {t, t + 1} & set(before))
     colour = document.palette(at).rgb[0]
     document.pick(at, colour=colour, by=(0.2, 0, 0), start=at, until=at, follow=False)
-    after = default_frames(PlottedPalette.of(document.core), ClipAtTimes(document.fields()))
+    after = default_frames(PlottedPalette.of(document.core), stored)
     assert sorted({*before, at}) == after

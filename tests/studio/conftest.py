@@ -77,7 +77,7 @@ def settle(qtbot: Any) -> Callable[[Window], None]:
             and picture.request.look == session.looked
             and picture.request.sides == frozenset(window.viewer.sides)
             and picture.request.region == window.viewer.region()
-            and picture.request.matte == session.hover
+            and picture.request.matte == session.shown_matte
             and picture.request.against == window.viewer._before_key()
         )
 

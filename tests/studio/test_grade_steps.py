@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PySide6.QtCore import QEvent, QPointF, Qt
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QMouseEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QMenu, QWidget
@@ -25,6 +25,7 @@ LEFT = Qt.MouseButton.LeftButton
 NO_KEYS = Qt.KeyboardModifier.NoModifier
 ALT = Qt.KeyboardModifier.AltModifier
 CONTROL = Qt.KeyboardModifier.ControlModifier
+SHIFT = Qt.KeyboardModifier.ShiftModifier
 FRAME = 6
 Row = tuple[str, Callable[[], object], Callable[[], Sequence[object]]]
 
@@ -194,7 +195,54 @@ def rows(hand: Hand) -> Iterator[Row]:
 
     yield "menu: acts", menu(texts.ACTS), lambda: ["disable", "p1"]
     yield "menu: acts again", menu(texts.ACTS), lambda: ["enable", "p1"]
-    yield "menu: palette", menu(texts.PALETTE_ONLY), lambda: ["change", "p1", "--global-only"]
+    yield "menu: its hue", menu(texts.WHOLE_HUE), lambda: ["change", "p1", "--whole-hue"]
+    panel = inspector.panel
+    yield (
+        "its own colours again",
+        lambda: QTest.mouseClick(panel.whole_hue, LEFT, pos=QPoint(6, 6)),
+        lambda: ["change", "p1", "--no-whole-hue"],
+    )
+    yield (
+        "type a reach",
+        lambda: panel.boxes["reach"].setValue(1.5),
+        lambda: ["change", "p1", "--reach", 1.5],
+    )
+    yield (
+        "drag the softness",
+        lambda: drag(panel.bars["softness"], QPointF(20, 8), QPointF(60, 8)),
+        lambda: ["change", "p1", "--softness", hand.pick_of("p1").softness],
+    )
+    yield (
+        "drag the least lightness",
+        lambda: drag(panel.lightness, QPointF(6, 8), QPointF(30, 8)),
+        lambda: [
+            *("change", "p1", "--lightness"),
+            ",".join(map(repr, hand.pick_of("p1").lightness)),
+        ],
+    )
+
+    def stroke() -> list[object]:
+        area = hand.pick_of("p1").areas[0]
+        points = [f"{x:g},{y:g}" for x, y in area.points]
+        return ["area", "p1", "--frame", FRAME, "--stroke", *points, "--width", 2 * area.radius]
+
+    yield (
+        "Shift-drag a stroke",
+        lambda: drag(viewer, hand.pixel(20, 20), hand.pixel(60, 24), SHIFT),
+        stroke,
+    )
+    yield (
+        "add to it by a click",
+        lambda: (
+            QTest.mouseClick(panel.add, LEFT),
+            QTest.mouseClick(viewer, LEFT, NO_KEYS, hand.pixel(12, 8).toPoint()),
+            QTest.mouseClick(panel.add, LEFT),
+        ),
+        lambda: [
+            *("area", "p1", "--frame", FRAME, "--pixel", "12,8"),
+            *("--box", round(2 * hand.pick_of("p1").areas[1].radius)),
+        ],
+    )
     yield (
         "menu: the same colour",
         menu(texts.SAME_COLOUR),
@@ -212,6 +260,18 @@ def rows(hand: Hand) -> Iterator[Row]:
             0, Qt.CheckState.Unchecked
         ),
         lambda: ["disable", "p2"],
+    )
+    yield (
+        "the list: a hold off",
+        lambda: window.inspector.picks.list.topLevelItem(1).setCheckState(
+            0, Qt.CheckState.Unchecked
+        ),
+        lambda: ["disable", "p3"],
+    )
+    yield (
+        "the list: a hold on",
+        lambda: window.inspector.picks.list.topLevelItem(1).setCheckState(0, Qt.CheckState.Checked),
+        lambda: ["enable", "p3"],
     )
     yield (
         "Del on picks",
@@ -315,7 +375,7 @@ def test_every_gesture_leaves_the_bytes_of_its_verb(
         gesture()
         qtbot.waitUntil(
             lambda revision=revision: (
-                session.revision > revision and not session.dragging and not session.solving
+                session.revision > revision and not session.dragging and not session.following
             ),
             timeout=30_000,
         )

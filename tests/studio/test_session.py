@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
@@ -81,37 +81,6 @@ def test_a_drag_writes_only_what_is_dropped(session: Session, sidecar: Path) -> 
     assert palette4d.load(sidecar).colour(id_) == palette4d.load(
         GOLDEN / "v1_tetrahedron.p4d.json"
     ).colour(id_)
-
-
-def test_views_see_an_edit_when_its_picks_are_solved_beside_them(sidecar: Path) -> None:
-    shutil.copy(GOLDEN / "v1_picks.p4d.json", sidecar)
-    session, waiting = Session(), list[Callable[[], object]]()
-    session.open_sidecar(sidecar)
-    session.beside = waiting.append
-
-    def shown() -> tuple[float, ...] | None:
-        assert session.document is not None
-        assert session.document.solved
-        return session.document.picks[0].to
-
-    assert session.document is not None
-    was, id_ = shown(), session.document.picks[0].id
-    session.drag(lambda document: document.change_pick(id_, to=(0.25, 0.5, 0.75)))
-    assert shown() == was
-    waiting.pop()()
-    assert shown() == (0.25, 0.5, 0.75)
-    session.drop()  # solved already
-    assert not waiting
-    session.undo()
-    session.redo()
-    session.undo()
-    assert session.solving
-    assert shown() == (0.25, 0.5, 0.75)
-    for solve in waiting:
-        solve()
-    assert not session.solving
-    assert shown() == was
-    session.close()
 
 
 def test_a_cancelled_drag_leaves_nothing(session: Session, sidecar: Path) -> None:

@@ -23,12 +23,12 @@ public:
           strength_(static_cast<float>(options.strength)),
           premultiplied_(options.premultiplied),
           channels_(channels),
-          bumps_(store.bumps()),
-          set_bumps_(kernels_of<BumpKernels>(options.instructions).set),
+          picks_(store.picks()),
+          set_picks_(kernels_of<PickKernels>(options.instructions).set),
           exact_(float_worker(recolourer, options, channels, true)),
           builder_(store, options.instructions) {
         waiting_.reserve(kMostLeft + kWaiting);
-        std::fill(std::begin(bumped_[3]), std::end(bumped_[3]), 1.0f);
+        std::fill(std::begin(picked_[3]), std::end(picked_[3]), 1.0f);
     }
 
     void row(const float* in, float* out, int width) override {
@@ -97,11 +97,11 @@ private:
             others |= kernels_.choose_sides(store_.planes(), b, count);
         }
         kernels_.weigh(b, count);
-        const bool bumps = bumps_.count > 0 && set_bumps_(bumps_, b.colour, bumped_, count);
-        if (bumps) hold(count);
+        const bool picks = !picks_.empty() && set_picks_(picks_, b.colour, picked_, count);
+        if (picks) hold(count);
         if (blocks_++ % kSampleEvery == 0) sample(static_cast<int>(blocks_ % count));
         kernels_.blend(store_.nodes(), b, count, from, to, channels_, strength_, premultiplied_);
-        if (bumps) add_bumps(to, count);
+        if (picks) add_picks(to, count);
         interpolated_ += count;
         if ((others & kLatticeKind) == 0) return true;
         for (int i = 0; i < count; ++i) {
@@ -116,15 +116,15 @@ private:
     /// Holds scale what the palette does.
     void hold(int count) {
         for (int k = 0; k < 4; ++k) {
-            for (int i = 0; i < count; ++i) block_.weight[k][i] *= bumped_[3][i];
+            for (int i = 0; i < count; ++i) block_.weight[k][i] *= picked_[3][i];
         }
     }
 
-    /// Moves the block's interpolated pixels by bumped_.
-    void add_bumps(float* to, int count) const {
+    /// Moves the block's interpolated pixels by picked_.
+    void add_picks(float* to, int count) const {
         int chosen[kSize], chosen_count = 0;  // no branch: it would be mispredicted
         for (int i = 0; i < count; ++i) {
-            const bool moves = (bumped_[0][i] != 0) | (bumped_[1][i] != 0) | (bumped_[2][i] != 0);
+            const bool moves = (picked_[0][i] != 0) | (picked_[1][i] != 0) | (picked_[2][i] != 0);
             chosen[chosen_count] = i;
             chosen_count += moves & ((block_.state[i] & kLatticeKind) == kLatticeGood);
         }
@@ -132,7 +132,7 @@ private:
             float* const pixel = to + chosen[k] * channels_;
             const float by = premultiplied_ ? pixel[3] * strength_ : strength_;
             for (int c = 0; c < 3; ++c) {
-                const float moved = bumped_[c][chosen[k]];
+                const float moved = picked_[c][chosen[k]];
                 if (moved != 0) pixel[c] += by * moved;
             }
         }
@@ -187,9 +187,8 @@ private:
             }
             sampled_.push_back(block_.colour[c][i]);
             sampled_moves_.push_back(moved);
-            sampled_bumps_.push_back(bumped_[c][i]);
         }
-        sampled_scales_.push_back(bumped_[3][i]);
+        sampled_scales_.push_back(picked_[3][i]);
         if (sampled_.size() >= 3 * 1024) check_samples();
     }
 
@@ -197,16 +196,14 @@ private:
         const float* const exact = builder_.displacements(sampled_.data(), sampled_.size() / 3);
         double largest = 0;
         for (std::size_t i = 0; i < sampled_.size(); ++i) {
-            const double displacement = static_cast<double>(exact[i] * sampled_scales_[i / 3]),
-                         bump = static_cast<double>(sampled_bumps_[i]);
+            const double displacement = static_cast<double>(exact[i] * sampled_scales_[i / 3]);
             largest = std::max(
-                largest, lattice_error(static_cast<double>(sampled_[i]), displacement + bump,
+                largest, lattice_error(static_cast<double>(sampled_[i]), displacement,
                                        static_cast<double>(sampled_moves_[i]) - displacement));
         }
         store_.saw_error(largest);
         sampled_.clear();
         sampled_moves_.clear();
-        sampled_bumps_.clear();
         sampled_scales_.clear();
     }
 
@@ -215,16 +212,16 @@ private:
     const float strength_;
     const bool premultiplied_;
     const int channels_;
-    const BumpPlan<float> bumps_;
-    decltype(BumpKernels::set) const set_bumps_;
+    const PickPlan<float> picks_;
+    decltype(PickKernels::set) const set_picks_;
     std::unique_ptr<FloatWorker> exact_;
     Store::Builder builder_;
     LatticeBlock block_{};
-    /// What the bumps do to the block's colours, and what holds leave of what the palette does.
-    alignas(64) float bumped_[4][kSize]{};
+    /// What picks do to the block's colours, and what holds leave of what the palette does.
+    alignas(64) float picked_[4][kSize]{};
     std::vector<Waiting> waiting_;
     std::size_t left_ = 0;  ///< blocks still waiting after the last do_waiting()
-    std::vector<float> sampled_, sampled_moves_, sampled_bumps_, sampled_scales_;
+    std::vector<float> sampled_, sampled_moves_, sampled_scales_;
     long long interpolated_ = 0, blocks_ = 0;
 };
 

@@ -21,11 +21,11 @@ namespace palette4d {
 /// interpolation. Its nodes then hold mean value coordinates extended beyond the surface. So cells
 /// that the surface crosses interpolate smoothly.
 ///
-/// Bumps and holds are not interpolated: they are evaluated at each colour.
+/// Picks and holds are not interpolated: they are evaluated at each colour.
 class Lattice final : public ColourMap {
 public:
-    /// Bound of |interpolated - exact| / max(|exact|, 0.1) for each channel. Probes use a tighter
-    /// tolerance, since the error between them is larger.
+    /// Bound of |interpolated - exact| / max(|exact|, 0.1) for each channel, without picks. Probes
+    /// use a tighter tolerance, since the error between them is larger.
     static constexpr double kTolerance = 0.002;
 
     /// Throws std::invalid_argument for null.

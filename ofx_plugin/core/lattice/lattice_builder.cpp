@@ -21,39 +21,20 @@ constexpr float kSurely = 0.75f;
 /// cell is probed at all these middles.
 constexpr float kMostCreased = 0.0006f;
 
-/// The unit of relative errors, as in lattice_error(). `moved` is the palette's displacement, to
-/// which the bumps add, and which holds scale.
-Four size_of(Four colour, Four moved, const BumpPlan<float>& bumps) {
-    Four exact = colour + moved;
-    for (int b = 0; b < bumps.count; ++b) {
-        const BumpPlan<float>::One& bump = bumps.bumps[b];
-        float distance2 = 0, along = 0;
-        for (int c = 0; c < 3; ++c) {
-            const float away = bump.high[c] - colour[c];
-            distance2 += away * away;
-            along += bump.along[c] * away;
-        }
-        const float t = std::max(0.0f, 1 - (distance2 - along * along) * bump.inverse_radius2);
-        const float weight = t * t * t, rest = 1 - weight;
-        if (bump.keep > 0) {
-            exact = colour + (1 - bump.keep * (1 - rest * rest * rest)) * (exact - colour);
-            continue;
-        }
-        for (int c = 0; c < 3; ++c) exact[c] += weight * bump.by[c];
-    }
+/// The unit of relative errors, as in lattice_error(). `moved` is the palette's displacement.
+Four size_of(Four colour, Four moved) {
+    const Four exact = colour + moved;
     const Four least = all_four(0.1f);
     return where_negative(colour * exact, least, max(abs(exact), least));
 }
 
-Four relative(Four error, Four colour, Four moved, const BumpPlan<float>& bumps) {
-    return abs(error) / size_of(colour, moved, bumps);
-}
+Four relative(Four error, Four colour, Four moved) { return abs(error) / size_of(colour, moved); }
 
 /// Whether the displacement below the plane, extended above it, agrees with the affine one there.
 /// Tests one of the eight parts of a cube of 3 x 3 x 3 nodes; `columns` are the affine function.
 template <class ColourOf>
 bool goes_on(const LatticePlane& plane, const float* columns, int part, const Four* moved,
-             const ColourOf& colour_of, const BumpPlan<float>& bumps) {
+             const ColourOf& colour_of) {
     Four off{};
     for (int corner = 0; corner < 8; ++corner) {
         const int node = 9 * (bit(part, 0) + bit(corner, 0)) + 3 * (bit(part, 1) + bit(corner, 1)) +
@@ -64,7 +45,7 @@ bool goes_on(const LatticePlane& plane, const float* columns, int part, const Fo
         if (height < 0) continue;
         Four exact = load_four(columns);
         for (int c = 0; c < 3; ++c) exact = exact + colour[c] * load_four(columns + 4 * (c + 1));
-        off = max(off, relative(moved[node] - exact, colour, exact, bumps));
+        off = max(off, relative(moved[node] - exact, colour, exact));
     }
     return largest_of(off) <= kMostBeyond;
 }
@@ -237,7 +218,7 @@ void Lattice::Store::Builder::judge(const LatticePlace& place, float half, const
     };
     Four allowed[kBrickNodes];
     for (int n = 0; n < kBrickNodes; ++n)
-        allowed[n] = kMostSmoothInLine * size_of(colour_of(n), moved[n], store_.bumps());
+        allowed[n] = kMostSmoothInLine * size_of(colour_of(n), moved[n]);
     Four beyond[Lines::kCount], farthest = all_four(-1);
     for (std::size_t i = 0; i < Lines::kCount; ++i) {
         const auto [middle, step] = kLines.all[i];
@@ -260,7 +241,7 @@ void Lattice::Store::Builder::judge(const LatticePlace& place, float half, const
         const LatticePlane& plane = store_.planes_[static_cast<std::size_t>(within[part].plane)];
         const int face = plane.sides[1] / 8;  // of the face
         if (goes_on(plane, store_.node(kLatticeFirstRegion + 4 * face), static_cast<int>(part),
-                    moved, colour_of, store_.bumps())) {
+                    moved, colour_of)) {
             states[part] = kGood;
         }
     }
@@ -393,7 +374,7 @@ float Lattice::Store::Builder::error_of(const Job& job, const float* moved, std:
         const Four colour =
             colour_at(store_.low_, store_.step_, load_four(job.place.at) + job.half * halves);
         const Four value = 0.5f * (corners[probe.ends[0]] + corners[probe.ends[1]]);
-        worst = max(worst, relative(max(abs(value - exact), twist), colour, exact, store_.bumps()));
+        worst = max(worst, relative(max(abs(value - exact), twist), colour, exact));
     }
     return largest_of(worst);
 }

@@ -71,7 +71,7 @@ public:
     const LatticeDomain& domain() const { return domain_; }
     const float* nodes() const { return nodes_; }
     const LatticePlane* planes() const { return planes_.data(); }
-    BumpPlan<float> bumps() const { return recolourer_.plan().single.bumps.plan(); }
+    PickPlan<float> picks() const { return recolourer_.plan().single.picks.plan(); }
     /// The state of a cell or part by its number.
     State& state(int number) { return states_[static_cast<std::size_t>(number)]; }
 
@@ -119,7 +119,7 @@ public:
     /// On return nothing of this list is kClaimed any more.
     void run() noexcept;
 
-    /// Evaluates `count` colours at strength 1, without bumps. Returns (count, 3) floats; one more
+    /// Evaluates `count` colours at strength 1, without picks. Returns (count, 3) floats; one more
     /// is readable.
     const float* displacements(const float* colours, std::size_t count);
 
@@ -165,7 +165,7 @@ private:
     }
 
     /// With PaletteRegions, mean value coordinates even outside; without, the exact displacements.
-    /// Bumps are never interpolated.
+    /// Picks are never interpolated.
     const float* node_displacements(const float* colours, std::size_t count);
 
     Store& store_;

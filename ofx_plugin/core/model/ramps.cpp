@@ -21,14 +21,6 @@ struct Knot {
     Vec3 by;
 };
 
-/// Below this length of a colour, its shades are less and less certain: all are near black.
-constexpr double kDark = 0.6;
-
-/// Bump::along of a bump at a colour: the ray from black through it has its shades.
-Vec3 along(const Vec3& centre, double shade) {
-    return std::sqrt(1 - shade * shade) / std::max(norm(centre), kDark) * centre;
-}
-
 bool still(const Vec3& by) { return by == Vec3{0, 0, 0}; }
 
 /// The displacements of one polytope's handles, and which handles are around a frame.
@@ -175,51 +167,11 @@ private:
     const std::vector<int>& order_;
 };
 
-/// The solution's displacement of a palette colour.
-Vec3 solved(const Polytope& polytope, const Solution& solution, const SlicePoint& point,
-            double frame) {
-    const auto of_vertex = [&](int vertex) {
-        return solution.vertex_by.empty() ? Vec3{0, 0, 0} : solution.vertex_by[vertex];
-    };
-    if (point.edge < 0) return of_vertex(point.from);
-    const auto& keys = solution.keys;
-    const auto later = std::upper_bound(keys.begin(), keys.end(), std::pair(point.edge, frame),
-                                        [](const auto& place, const Solution::Key& key) {
-                                            return place < std::pair(key.edge, key.frame);
-                                        });
-    const auto on_edge = [&](auto key) { return key->edge == point.edge ? &*key : nullptr; };
-    const Solution::Key* before = later == keys.begin() ? nullptr : on_edge(later - 1);
-    const Solution::Key* after = later == keys.end() ? nullptr : on_edge(later);
-    if (before == nullptr && after == nullptr) {
-        return mixed(of_vertex(point.from), of_vertex(point.to), point.weight);
-    }
-    return mixed(before ? before->by : of_vertex(point.from),
-                 after ? after->by : of_vertex(point.to),
-                 weight_between(before ? before->frame : polytope.vertices()[point.from].frame,
-                                after ? after->frame : polytope.vertices()[point.to].frame, frame));
-}
-
 void require_vertices(const char* what, std::size_t found, const Polytope& polytope) {
     if (found == 0 || found == polytope.vertices().size()) return;
     throw std::invalid_argument("edited_colours: " + std::string(what) + " of " +
                                 std::to_string(found) + " vertices, expected " +
                                 std::to_string(polytope.vertices().size()));
-}
-
-/// The keys before and after a frame, and the weight of the latter.
-template <class Key>
-struct Around {
-    const Key &a, &b;
-    double weight;
-};
-
-template <class Key>
-Around<Key> around(const std::vector<Key>& keys, double frame) {
-    const auto after = std::upper_bound(keys.begin(), keys.end(), frame,
-                                        [](double t, const Key& key) { return t < key.frame; });
-    const Key& b = after == keys.end() ? keys.back() : *after;
-    const Key& a = after == keys.begin() ? b : *(after - 1);
-    return {a, b, &a == &b ? 0.0 : weight_between(a.frame, b.frame, frame)};
 }
 
 }  // namespace
@@ -236,7 +188,6 @@ std::vector<int> order_of(const std::vector<Stop>& stops) {
 std::vector<Vec3> edited_colours(const Polytope& polytope, const Edits& edits, const Slice& slice) {
     require_vertices("edits", edits.vertex_rgb.size(), polytope);
     require_vertices("ramps", edits.vertex_ramp.size(), polytope);
-    require_vertices("a solution", edits.solution.vertex_by.size(), polytope);
     const auto& vertices = polytope.vertices();
     const Displacements displacements(polytope, edits);
     const auto edited = [&](int vertex) {
@@ -278,26 +229,6 @@ std::vector<Vec3> edited_colours(const Polytope& polytope, const Edits& edits, c
     std::vector<Vec3> result = slice.rgb;
     for (std::size_t i = 0; i < result.size(); ++i) {
         result[i] = by_handles(slice.where[i], slice.rgb[i]);
-        const Vec3 by = solved(polytope, edits.solution, slice.where[i], slice.frame);
-        if (!still(by)) result[i] = result[i] + by;
-    }
-    return result;
-}
-
-std::vector<Bump> bumps_at(const Edits& edits, double frame) {
-    std::vector<Bump> result;
-    for (const Solution::MovingBump& bump : edits.solution.bumps) {
-        const auto [a, b, weight] = around(bump.keys, frame);
-        const Vec3 by = mixed(a.by, b.by, weight);
-        const Vec3 centre = mixed(a.centre, b.centre, weight);
-        if (!still(by)) result.push_back({centre, bump.radius, by, 0, along(centre, bump.shade)});
-    }
-    for (const Solution::MovingHold& hold : edits.solution.holds) {
-        const auto [a, b, weight] = around(hold.keys, frame);
-        const double keep = (1 - weight) * a.keep + weight * b.keep;
-        const double radius = (1 - weight) * a.radius + weight * b.radius;
-        const Vec3 centre = mixed(a.centre, b.centre, weight);
-        if (keep > 0) result.push_back({centre, radius, {}, keep, along(centre, hold.shade)});
     }
     return result;
 }

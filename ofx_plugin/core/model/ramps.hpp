@@ -1,5 +1,4 @@
-// Edits through time: what the handles of a polytope and the solution of its picks do to the
-// palette of a frame.
+// Edits through time: what the handles of a polytope do to the palette of a frame.
 #pragma once
 
 #include <vector>
@@ -13,12 +12,8 @@ namespace palette4d {
 std::vector<int> order_of(const std::vector<Stop>& stops);
 
 /// The edited colours of a slice's n vertices: displacements go from handle to handle along a ramp,
-/// and the solution is added. Bit-identical to slice.rgb[i] where nothing on the edge moves. Throws
+/// Bit-identical to slice.rgb[i] where nothing on the edge moves. Throws
 /// std::invalid_argument for edits of another number of vertices.
 std::vector<Vec3> edited_colours(const Polytope& polytope, const Edits& edits, const Slice& slice);
-
-/// The bumps that move colours at a frame, then the holds. Bumps are not bound to the clip: pass
-/// slice.frame.
-std::vector<Bump> bumps_at(const Edits& edits, double frame);
 
 }  // namespace palette4d

@@ -4,7 +4,11 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <limits>
+#include <thread>
 
+#include "model/vec3.hpp"
 #include "threads/share_rows.hpp"
 
 namespace palette4d {
@@ -73,13 +77,14 @@ double weight_of(const float* colour, const float* read, const Recolourer& reade
     return exact[static_cast<std::size_t>(c)] - colour[c];
 }
 
-/// The matte of one colour, 0 to 1; `read` is the colour plus what the reader adds.
-double matte_of(const float* colour, const float* read, const Drawing& drawing) {
+/// The matte of one colour, 0 to 1; `read` is the colour plus what the reader adds, and `cleaned`
+/// what cleaning up adds to that.
+double matte_of(const float* colour, const float* read, float cleaned, const Drawing& drawing) {
     const DrawingOptions& options = drawing.options;
     if (options.output == Output::kOutside && infinite(colour)) return 1;
     if (!finite_pixel(colour) || !finite_pixel(read)) return 0;
-    if (options.output == Output::kWeight) {
-        return std::clamp(weight_of(colour, read, *drawing.reader), 0.0, 1.0);
+    if (options.output != Output::kOutside) {
+        return std::clamp(weight_of(colour, read, *drawing.reader) + cleaned, 0.0, 1.0);
     }
     double square = 0;
     for (std::size_t c = 0; c < 3; ++c) {
@@ -89,6 +94,21 @@ double matte_of(const float* colour, const float* read, const Drawing& drawing) 
     return std::clamp((std::sqrt(square) - kAtSurface) / options.reach, 0.0, 1.0);
 }
 
+/// CleanUp::change() of all pixels; empty where it is 0 for all.
+std::vector<float> changes_of(const Pixels& pixels, const Drawing& drawing, double own) {
+    if (!drawing.clean_up) return {};
+    const auto width = static_cast<std::size_t>(pixels.place.width);
+    std::vector<float> changes(pixels.count * 3);
+    bool some = false;
+    int y = pixels.place.y;
+    for (std::size_t at = 0; at < pixels.count; at += width, y += pixels.place.step) {
+        some |= drawing.clean_up->change(pixels.source + at * pixels.channels, pixels.place.x, y,
+                                         pixels.place.width, own, &changes[at * 3]);
+    }
+    if (!some) changes.clear();
+    return changes;
+}
+
 void draw_matte(const Pixels& pixels, const Drawing& drawing) {
     const std::vector<float> straight = straight_colours(pixels, drawing.conversion.get());
     std::vector<float> read(straight.size());
@@ -96,11 +116,13 @@ void draw_matte(const Pixels& pixels, const Drawing& drawing) {
     const auto stride = static_cast<std::ptrdiff_t>(straight.size() * sizeof(float));
     drawing.reader->apply({straight.data(), width, 1, 3, stride},
                           {read.data(), width, 1, 3, stride}, {});
+    const std::vector<float> cleaned = changes_of(pixels, drawing, -drawing.options.clean_up);
     const bool in_alpha = drawing.options.in_alpha && pixels.channels == 4;
     for (std::size_t i = 0; i < pixels.count; ++i) {
         const float* from = pixels.source + i * pixels.channels;
         float* to = pixels.result + i * pixels.channels;
-        const double matte = matte_of(&straight[i * 3], &read[i * 3], drawing);
+        const float change = cleaned.empty() ? 0.0f : cleaned[i * 3];
+        const double matte = matte_of(&straight[i * 3], &read[i * 3], change, drawing);
         if (pixels.channels == 4) to[3] = from[3];
         const double alpha = pixels.premultiplied ? from[3] : 1.0;
         for (std::size_t c = 0; c < 3; ++c) {
@@ -112,17 +134,144 @@ void draw_matte(const Pixels& pixels, const Drawing& drawing) {
     }
 }
 
+const float* pixel_row(const ConstImageView& view, int y) {
+    return reinterpret_cast<const float*>(reinterpret_cast<const char*>(view.data) +
+                                          view.row_bytes * y);
+}
+float* pixel_row(const ImageView& view, int y) {
+    return reinterpret_cast<float*>(reinterpret_cast<char*>(view.data) + view.row_bytes * y);
+}
+
+void copy_pixels(const ConstImageView& in, const ImageView& out) {
+    const auto row = static_cast<std::size_t>(in.width) * static_cast<std::size_t>(in.channels);
+    for (int y = 0; y < in.height; ++y) std::copy_n(pixel_row(in, y), row, pixel_row(out, y));
+}
+
+/// What draw_cleaned() and draw_converted() take of the unfiltered displacement of picks: the edit
+/// has all of it where the palette moves, and is not drawn where only picks move colours.
+double own_share(const Drawing& drawing) {
+    const double amount = drawing.clean_up->amount();
+    return drawing.exact->palette_moves() ? -amount : 1 - amount;
+}
+
+/// Adds strength times `change`, times alpha where premultiplied, to a row of pixels. Channels that
+/// do not move keep their bits, even a negative zero.
+void add_steps(const std::vector<float>& change, bool premultiplied, float strength, int channels,
+               float* to) {
+    const std::size_t count = change.size();
+    if (channels == 3) {
+        for (std::size_t i = 0; i < count; ++i) {
+            const float step = strength * change[i], moved = to[i] + step;
+            to[i] = step != 0 ? moved : to[i];
+        }
+        return;
+    }
+    for (std::size_t i = 0; i < count; i += 3, to += channels) {
+        const float by = premultiplied ? to[3] * strength : strength;
+        for (std::size_t c = 0; c < 3; ++c) {
+            const float step = by * change[i + c], moved = to[c] + step;
+            to[c] = step != 0 ? moved : to[c];
+        }
+    }
+}
+
+/// The edit with Drawing::clean_up, without a conversion.
+void draw_cleaned(const ConstImageView& in, const ImageView& out, bool premultiplied,
+                  const Drawing& drawing, const RowPlace& place) {
+    if (drawing.exact->palette_moves()) {
+        RecolourOptions options;
+        options.strength = drawing.options.strength;
+        options.premultiplied = premultiplied;
+        drawing.edit->apply(in, out, options);
+    } else {
+        copy_pixels(in, out);
+    }
+    const double own = own_share(drawing);
+    const auto strength = static_cast<float>(drawing.options.strength);
+    std::vector<float> change(static_cast<std::size_t>(in.width) * 3);
+    for (int y = 0; y < in.height; ++y) {
+        const float* const from = pixel_row(in, y);
+        if (!drawing.clean_up->change(from, place.x, place.y + place.step * y, in.width, own,
+                                      change.data())) {
+            continue;
+        }
+        add_steps(change, premultiplied, strength, in.channels, pixel_row(out, y));
+    }
+}
+
+/// The same through a conversion: the steps are added to the palette's code values.
+void draw_converted(const ConstImageView& in, const ImageView& out, bool premultiplied,
+                    const Drawing& drawing, const RowPlace& place) {
+    constexpr double kLargest = std::numeric_limits<float>::max();
+    const ColourConversion& conversion = *drawing.conversion;
+    const double own = own_share(drawing), strength = drawing.options.strength;
+    const auto width = static_cast<std::size_t>(in.width);
+    const auto channels = static_cast<std::size_t>(in.channels);
+    std::vector<float> change(width * 3), before(width * 3), after(width * 3);
+    RecolourOptions options;
+    options.strength = strength;
+    copy_pixels(in, out);
+    for (int y = 0; y < in.height; ++y) {
+        const float* const from = pixel_row(in, y);
+        const bool cleaned = drawing.clean_up->change(from, place.x, place.y + place.step * y,
+                                                      in.width, own, change.data());
+        if (!cleaned && !drawing.exact->palette_moves()) continue;
+        if (!cleaned) std::fill(change.begin(), change.end(), 0.0f);
+        const Pixels row{from, nullptr, width, channels, premultiplied};
+        before = straight_colours(row, &conversion);
+        after = before;
+        if (drawing.exact->palette_moves()) {
+            drawing.edit->apply({before.data(), in.width, 1, 3, 0},
+                                {after.data(), in.width, 1, 3, 0}, options);
+        }
+        float* to = pixel_row(out, y);
+        for (std::size_t i = 0; i < width; ++i, to += channels) {
+            const float* const pixel = from + i * channels;
+            if (!recolourable(pixel, premultiplied) || !finite_pixel(&before[3 * i])) continue;
+            Vec3 step;
+            for (std::size_t c = 0; c < 3; ++c) {
+                step[c] = static_cast<double>(after[3 * i + c]) - before[3 * i + c] +
+                          strength * change[3 * i + c];
+            }
+            if (step == Vec3{0, 0, 0}) continue;
+            // The step is added to the unrounded value, as without cleaning up.
+            const Vec3 colour = conversion.to_clip(
+                conversion.to_palette(straight_colour(pixel, premultiplied)) + step);
+            if (!finite(colour)) continue;
+            const double alpha = premultiplied ? pixel[3] : 1.0;
+            for (std::size_t c = 0; c < 3; ++c) {
+                to[c] = static_cast<float>(std::clamp(alpha * colour[c], -kLargest, kLargest));
+            }
+        }
+    }
+}
+
 }  // namespace
 
+std::shared_ptr<CleanUp> make_clean_up(const Drawing& drawing, CleanUp::Format format,
+                                       const CleanUp::Place& place) {
+    const DrawingOptions& options = drawing.options;
+    const bool matte = options.output == Output::kPick;
+    const std::shared_ptr<const Recolourer>& map = matte ? drawing.reader : drawing.exact;
+    if (options.clean_up == 0 || options.passes() || (options.is_matte() && !matte) || !map ||
+        map->picks().picks.empty() || (!matte && options.strength == 0)) {
+        return nullptr;
+    }
+    return std::make_shared<CleanUp>(map, drawing.conversion, options.clean_up, format, place);
+}
+
 void draw_edit(const ConstImageView& in, const ImageView& out, bool premultiplied,
-               const Drawing& drawing) {
-    if (!drawing.edit) {
-        if (in.data == out.data) return;
-        for (int y = 0; y < in.height; ++y) {
-            const char* from = reinterpret_cast<const char*>(in.data) + in.row_bytes * y;
-            char* to = reinterpret_cast<char*>(out.data) + out.row_bytes * y;
-            std::copy_n(from, sizeof(float) * static_cast<std::size_t>(in.width * in.channels), to);
+               const Drawing& drawing, const RowPlace& place) {
+    if (drawing.clean_up) {
+        if (drawing.conversion) {
+            draw_converted(in, out, premultiplied, drawing, place);
+        } else {
+            draw_cleaned(in, out, premultiplied, drawing, place);
         }
+        return;
+    }
+    if (!drawing.edit) {
+        if (in.data != out.data) copy_pixels(in, out);
         return;
     }
     RecolourOptions options;
@@ -137,10 +286,13 @@ void draw_pixels(const Pixels& pixels, const Drawing& drawing) {
     if (options.is_matte()) {
         draw_matte(pixels, drawing);
     } else {
-        const auto width = static_cast<int>(pixels.count);
         const auto channels = static_cast<int>(pixels.channels);
-        draw_edit({pixels.source, width, 1, channels, 0}, {pixels.result, width, 1, channels, 0},
-                  pixels.premultiplied, drawing);
+        const auto all = static_cast<int>(pixels.count);
+        const int width = drawing.clean_up ? pixels.place.width : all;
+        const auto stride = static_cast<std::ptrdiff_t>(sizeof(float) * pixels.channels) * width;
+        draw_edit({pixels.source, width, all / width, channels, stride},
+                  {pixels.result, width, all / width, channels, stride}, pixels.premultiplied,
+                  drawing, pixels.place);
         if (options.keep > 0) keep_lightness(pixels, options);
     }
     if (options.mix < 1) mix_in_source(pixels, options.mix, {});
@@ -183,7 +335,7 @@ void draw_picture(const ConstImageView& in, const ImageView& out, Drawing drawin
     const DrawingOptions& options = drawing.options;
     if (options.passes()) {
         drawing.options = {};
-        drawing.edit = nullptr;
+        drawing.edit = drawing.exact = nullptr;
     }
     const auto channels = static_cast<std::size_t>(in.channels);
     const std::size_t row = static_cast<std::size_t>(in.width) * channels;
@@ -191,18 +343,39 @@ void draw_picture(const ConstImageView& in, const ImageView& out, Drawing drawin
     drawing.picture = {0, 0, in.width, in.height};
     if (row == 0) return;
     const bool packed = in.row_bytes == row_bytes && out.row_bytes == row_bytes;
+    const auto row_at = [&](int y) {
+        return pixel_row(in, in.height - 1 - y);
+    };  // y counts upwards
+    if (const auto clean_up = make_clean_up(drawing, {in.channels, premultiplied},
+                                            {drawing.picture, drawing.picture, drawing.picture,
+                                             clean_up_cell(1), clean_up_cell(1)})) {
+        const unsigned processors = std::max(1u, std::thread::hardware_concurrency());
+        const int strips = threads == 0 ? static_cast<int>(processors) : threads;
+        clean_up->prepare([&](int y, int x1, int, float*) { return row_at(y) + x1 * in.channels; },
+                          strips,
+                          [&](int count, const std::function<void(int)>& work) {
+                              share_rows(count, threads, [&](const NextRow& next) {
+                                  for (int i = next(); i >= 0; i = next()) work(i);
+                              });
+                          });
+        drawing.clean_up = clean_up;
+    }
     const int at_once = packed ? kRowsAtOnce : 1;
     const int bands = (in.height + at_once - 1) / at_once;
     share_rows(bands, threads, [&](const NextRow& next) {
         for (int band = next(); band >= 0; band = next()) {
             const int first = band * at_once, last = std::min(first + at_once, in.height);
-            const auto* from = reinterpret_cast<const float*>(
-                reinterpret_cast<const char*>(in.data) + in.row_bytes * first);
-            auto* to =
-                reinterpret_cast<float*>(reinterpret_cast<char*>(out.data) + out.row_bytes * first);
+            const float* const from = pixel_row(in, first);
+            float* const to = pixel_row(out, first);
             const std::size_t count =
                 static_cast<std::size_t>(last - first) * static_cast<std::size_t>(in.width);
-            draw_pixels({from, to, count, channels, premultiplied}, drawing);
+            draw_pixels({from,
+                         to,
+                         count,
+                         channels,
+                         premultiplied,
+                         {0, in.height - 1 - first, in.width, -1}},
+                        drawing);
             if (options.output != Output::kPalette) continue;
             for (int y = first; y < last; ++y) {
                 draw_strip(to + row * static_cast<std::size_t>(y - first), 0, in.width,

@@ -7,13 +7,14 @@
 #include <vector>
 
 #include "convert/colour_conversion.hpp"
+#include "output/clean_up.hpp"
 #include "recolour/recolour.hpp"
 #include "recolour/recolour_image.hpp"
 
 namespace palette4d {
 
 /// Hosts save these numbers: never change them.
-enum class Output { kRecoloured, kWeight, kPalette, kOutside };
+enum class Output { kRecoloured, kWeight, kPalette, kOutside, kPick };
 
 struct DrawingOptions {
     Output output = Output::kRecoloured;
@@ -23,17 +24,13 @@ struct DrawingOptions {
     double keep = 0;          ///< share of the source's lightness to keep, 0 to 1
     Vec3 lightness{0, 0, 0};  ///< weights of red, green and blue; they sum to 1
     double mix = 1;           ///< 0 the source, 1 the output
+    double clean_up = 1;      ///< share of the filtered displacement of picks, 0 to 1
 
     /// The output is the source, whatever the other options are.
     bool passes() const { return mix == 0 || (output == Output::kRecoloured && strength == 0); }
-    bool is_matte() const { return output == Output::kWeight || output == Output::kOutside; }
-    /// The recoloured picture, which nothing is added to.
-    bool edit_alone() const { return output == Output::kRecoloured && keep == 0 && mix == 1; }
-};
-
-/// A part of the plane of pixels; y counts upwards, and x2 and y2 are outside.
-struct Area {
-    int x1, y1, x2, y2;
+    bool is_matte() const {
+        return output == Output::kWeight || output == Output::kOutside || output == Output::kPick;
+    }
 };
 
 /// What one frame draws. Read-only, so that threads share it.
@@ -41,7 +38,9 @@ struct Drawing {
     DrawingOptions options;
     /// The edit, exact or interpolated; null where colours do not change.
     std::shared_ptr<const ColourMap> edit;
-    /// For mattes: weight_reader() or surface_reader().
+    /// The exact edit; its picks are cleaned up. Null where colours do not change.
+    std::shared_ptr<const Recolourer> exact;
+    /// For mattes: weight_reader(), surface_reader() or matte_at().
     std::shared_ptr<const Recolourer> reader;
     /// From the picture's code values to the palette's; null where they are equal.
     std::shared_ptr<const ColourConversion> conversion;
@@ -49,22 +48,43 @@ struct Drawing {
     /// whole picture, which has the strip at its bottom.
     std::vector<Vec3> original, edited;
     Area picture{};
+    /// From make_clean_up(); null: nothing is cleaned up.
+    std::shared_ptr<const CleanUp> clean_up;
+
+    /// Nothing but `edit` is drawn.
+    bool edit_alone() const {
+        return options.output == Output::kRecoloured && options.keep == 0 && options.mix == 1 &&
+               !clean_up;
+    }
+};
+
+/// Where rows of pixels lie in the plane.
+struct RowPlace {
+    int x, y;   ///< of the first pixel
+    int width;  ///< of a row
+    int step;   ///< from a row's y to the next one's: 1 or -1
 };
 
 /// Float pixels without gaps, with three or four channels.
 struct Pixels {
     const float* source;
-    float* result;  ///< may be the source where options.edit_alone()
+    float* result;  ///< may be the source where Drawing::edit_alone()
     std::size_t count;
     std::size_t channels;
     bool premultiplied;
+    RowPlace place{};  ///< for Drawing::clean_up only
 };
 
+/// The filter of a drawing, before CleanUp::prepare(); null where no pick is drawn, or none is
+/// cleaned up.
+std::shared_ptr<CleanUp> make_clean_up(const Drawing& drawing, CleanUp::Format format,
+                                       const CleanUp::Place& place);
 /// Draws the edit alone, row by row, whatever gaps are between rows; copies where there is no edit.
-/// `in` and `out` have the same size and channels, and may be the same.
+/// `in` and `out` have the same size and channels, and may be the same without Drawing::clean_up.
 void draw_edit(const ConstImageView& in, const ImageView& out, bool premultiplied,
-               const Drawing& drawing);
-/// Draws all but the strip of Output::kPalette. A pixel's result depends on that pixel alone.
+               const Drawing& drawing, const RowPlace& place);
+/// Draws all but the strip of Output::kPalette. A pixel's result depends on that pixel and
+/// Drawing::clean_up alone.
 void draw_pixels(const Pixels& pixels, const Drawing& drawing);
 /// Draws the strip into a row, pixels x1 to x2 of row y, if the strip covers that row.
 void draw_strip(float* row, int x1, int x2, int y, std::size_t channels, const Drawing& drawing);

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "model/vec3.hpp"
+#include "recolour/recolour_plan.hpp"
 
 namespace palette4d {
 namespace {
@@ -24,12 +25,13 @@ std::size_t slot(const Vec3& p) {
 }  // namespace
 
 DoubleWorker::DoubleWorker(const Recolourer& recolourer, const RecolourOptions& options,
-                           int channels, bool bumps)
+                           int channels, bool picks)
     : recolourer_(recolourer),
       strength_(options.strength),
       divide_(options.premultiplied),
       channels_(channels),
-      bumps_(bumps),
+      picks_(picks && !recolourer.plan().twofold.picks.plan().empty()),
+      plan_(recolourer.plan().twofold.picks.plan()),
       weights_(recolourer.original().size()) {}
 
 void DoubleWorker::row(const float* from, float* to, int width) {
@@ -60,7 +62,7 @@ const Vec3& DoubleWorker::displacement(const Vec3& p) {
     Entry& entry = memory_[slot(p)];
     if (!entry.known || entry.colour != p) {
         Vec3 moved = recolourer_.palette_displacement(p, weights_, workspace_);
-        if (bumps_) moved = recolourer_.with_bumps(p, moved);
+        if (picks_) moved = with_picks(recolourer_.picks_, plan_, p, moved);
         entry = {p, moved, true};
     }
     return entry.displacement;

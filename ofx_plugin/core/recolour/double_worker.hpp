@@ -12,9 +12,9 @@ namespace palette4d {
 /// on the colour alone, so the cache does not change results.
 class DoubleWorker final : public RowWorker {
 public:
-    /// `recolourer` must outlive this and move some colour. Its bumps count only with `bumps`.
+    /// `recolourer` must outlive this and move some colour. Its picks count only with `picks`.
     DoubleWorker(const Recolourer& recolourer, const RecolourOptions& options, int channels,
-                 bool bumps);
+                 bool picks);
 
     void row(const float* from, float* to, int width) override;
     void finish() override {}
@@ -34,7 +34,8 @@ private:
     const double strength_;
     const bool divide_;
     const int channels_;
-    const bool bumps_;
+    const bool picks_;
+    const PickPlan<double> plan_;
     std::vector<double> weights_;
     PaletteBody::Workspace workspace_;
     std::vector<Entry> memory_;

@@ -22,6 +22,8 @@ void all_inside(const Plan<T>&, Block<T>& block, int count, T, T, T*) {
 template <class T>
 void stay(const Plan<T>&, Block<T>& block, int, T, T*) {
     for (T(&channel)[Block<T>::kSize] : block.moved) std::fill(channel, std::end(channel), T(0));
+    // All are known, whatever the block held before.
+    std::fill_n(block.verdict, Block<T>::kSize, T(1));
 }
 
 /// Collects pixels in blocks and sorts them into inside and outside the palette; one kernel for
@@ -29,15 +31,15 @@ void stay(const Plan<T>&, Block<T>& block, int, T, T*) {
 /// stage: float, double, one by one. A pixel's stage depends on its colour alone.
 class Pipeline final : public FloatWorker {
 public:
-    Pipeline(const Recolourer& recolourer, const RecolourOptions& options, int channels, bool bumps)
+    Pipeline(const Recolourer& recolourer, const RecolourOptions& options, int channels, bool picks)
         : divide_(options.premultiplied),
           channels_(channels),
-          one_by_one_(recolourer, options, channels, bumps),
+          one_by_one_(recolourer, options, channels, picks),
           twofold_(recolourer.plan().twofold, kernels_of<MvcKernels>(options.instructions).twofold,
-                   bumps ? kernels_of<BumpKernels>(options.instructions).add_twofold : nullptr,
+                   picks ? kernels_of<PickKernels>(options.instructions).add_twofold : nullptr,
                    options, one_by_one_),
           single_(recolourer.plan().single, kernels_of<MvcKernels>(options.instructions).single,
-                  bumps ? kernels_of<BumpKernels>(options.instructions).add_single : nullptr,
+                  picks ? kernels_of<PickKernels>(options.instructions).add_single : nullptr,
                   options, twofold_) {}
 
     void row(const float* from, float* to, int width) override {
@@ -74,20 +76,20 @@ public:
 private:
     template <class T, class Next>
     class Stage {
-        using AddBumps = void (*)(const BumpPlan<T>&, BumpKernels::Channels<const T>,
-                                  BumpKernels::Channels<const T>, BumpKernels::Channels<T>, int);
+        using AddPicks = void (*)(const PickPlan<T>&, PickKernels::Channels<const T>,
+                                  PickKernels::Channels<T>, int);
 
     public:
-        /// Without `add_bumps` there are none.
-        Stage(const PlanOf<T>& plan, const Kernels<T>& kernels, AddBumps add_bumps,
+        /// Without `add_picks` there are none.
+        Stage(const PlanOf<T>& plan, const Kernels<T>& kernels, AddPicks add_picks,
               const RecolourOptions& options, Next& next)
             : plan_(plan.palette.plan()),
               usable_(plan.palette.usable()),
               kernels_(usable_ && plan_.mover_count == 0
                            ? Kernels<T>{&all_inside<T>, &stay<T>, &stay<T>, kernels.move}
                            : kernels),
-              bumps_(plan.bumps.plan()),
-              add_bumps_(bumps_.count > 0 ? add_bumps : nullptr),
+              picks_(plan.picks.plan()),
+              add_picks_(picks_.empty() ? nullptr : add_picks),
               strength_(static_cast<T>(options.strength)),
               divide_(options.premultiplied),
               // Half of the guaranteed tolerance; the other half is for rounding the result.
@@ -175,6 +177,8 @@ private:
 
     private:
         static constexpr int kSize = Block<T>::kSize;
+        /// Above this, differences of channels have too few digits for the amounts of picks.
+        static constexpr T kLargestPicked = 8;
         using Kernel = void (*)(const Plan<T>&, Block<T>&, int, T, T*);
 
         struct Batch {
@@ -195,7 +199,15 @@ private:
 
         void displace(Kernel kernel, Block<T>& block, int count) {
             kernel(plan_, block, count, tolerance_, scratch_.data());
-            if (add_bumps_) add_bumps_(bumps_, block.high, block.low, block.moved, count);
+            if (add_picks_) {
+                add_picks_(picks_, block.high, block.moved, count);
+                for (int i = 0; sizeof(T) == sizeof(float) && i < count; ++i) {
+                    const T size =
+                        std::max(std::abs(block.high[0][i]),
+                                 std::max(std::abs(block.high[1][i]), std::abs(block.high[2][i])));
+                    if (!(size <= kLargestPicked)) block.verdict[i] = 0;
+                }
+            }
             kernels_.move(block, count, strength_, divide_);
         }
 
@@ -266,8 +278,8 @@ private:
         const Plan<T>& plan_;
         const bool usable_;
         const Kernels<T> kernels_;
-        const BumpPlan<T> bumps_;
-        const AddBumps add_bumps_;
+        const PickPlan<T> picks_;
+        const AddPicks add_picks_;
         const T strength_;
         const bool divide_;
         const T tolerance_;
@@ -290,8 +302,8 @@ private:
 
 std::unique_ptr<FloatWorker> float_worker(const Recolourer& recolourer,
                                           const RecolourOptions& options, int channels,
-                                          bool bumps) {
-    return std::make_unique<Pipeline>(recolourer, options, channels, bumps);
+                                          bool picks) {
+    return std::make_unique<Pipeline>(recolourer, options, channels, picks);
 }
 
 }  // namespace palette4d

@@ -13,8 +13,8 @@ public:
     virtual void pixel(const float* from, float* to) = 0;
 };
 
-/// `recolourer` must outlive the worker and move some colour. Its bumps count only with `bumps`.
+/// `recolourer` must outlive the worker and move some colour. Its picks count only with `picks`.
 std::unique_ptr<FloatWorker> float_worker(const Recolourer& recolourer,
-                                          const RecolourOptions& options, int channels, bool bumps);
+                                          const RecolourOptions& options, int channels, bool picks);
 
 }  // namespace palette4d

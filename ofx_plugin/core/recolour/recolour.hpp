@@ -1,11 +1,11 @@
-// Recolouring of images: p' = p + strength * (sum_i w_i(q) (v'_i - v_i) + the bumps at p),
-// where holds scale the sum in the brackets.
+// Recolouring of images: p' = p + strength * (h(p) sum_i w_i(q) (v'_i - v_i) + the picks at p),
+// where h is what holds leave.
 #pragma once
 
 #include <memory>
 #include <vector>
 
-#include "model/edits.hpp"
+#include "recolour/frame_picks.hpp"
 #include "recolour/mvc.hpp"
 #include "recolour/recolour_image.hpp"
 
@@ -16,18 +16,18 @@ struct RecolourPlan;
 /// Prepared once per frame; const, so many threads share it.
 class Recolourer final : public ColourMap {
 public:
-    /// n original and n edited colours, the faces between them, and any bumps, all finite. Throws
+    /// n original and n edited colours, the faces between them, and any picks, all finite. Throws
     /// std::invalid_argument when they do not match.
     Recolourer(std::vector<Vec3> original, const std::vector<Vec3>& edited, std::vector<Face> faces,
-               std::vector<Bump> bumps = {});
+               FramePicks picks = {});
     ~Recolourer() override;
     Recolourer(const Recolourer&) = delete;
     Recolourer& operator=(const Recolourer&) = delete;
 
-    bool moves() const override { return palette_moves() || !bumps_.empty(); }
+    bool moves() const override { return palette_moves() || !picks_.picks.empty(); }
     /// Whether some vertex moves.
     bool palette_moves() const { return !displaced_.empty(); }
-    const std::vector<Bump>& bumps() const { return bumps_; }
+    const FramePicks& picks() const { return picks_; }
     std::unique_ptr<RowWorker> worker(const RecolourOptions& options, int channels) const override;
     const std::vector<Vec3>& original() const { return body_.rgb(); }
     /// For the core's own sources; the plan exists only where some colour moves.
@@ -40,16 +40,13 @@ public:
 private:
     friend class DoubleWorker;
 
-    /// At strength 1, without bumps. `p` must be finite; `weights` has one element per vertex.
+    /// At strength 1, without picks. `p` must be finite; `weights` has one element per vertex.
     Vec3 palette_displacement(const Vec3& p, std::vector<double>& weights,
                               PaletteBody::Workspace& workspace) const;
-    /// The displacement of p at strength 1, of which the palette does `moved`.
-    Vec3 with_bumps(const Vec3& p, const Vec3& moved) const;
-
     PaletteBody body_;
     std::vector<Vec3> displacement_;  ///< edited - original, one per vertex
     std::vector<int> displaced_;      ///< indices of the vertices that move
-    std::vector<Bump> bumps_;         ///< those that move a colour, then the holds
+    FramePicks picks_;
     std::unique_ptr<const RecolourPlan> plan_;
 };
 

@@ -177,26 +177,7 @@ void PlanMemory<T>::add_surface(const PaletteBody& body, const std::vector<Vec3>
     }
 }
 
-template <class T>
-BumpMemory<T>::BumpMemory(const std::vector<Bump>& bumps) {
-    for (const Bump& bump : bumps) {
-        typename BumpPlan<T>::One one;
-        split(bump.centre, one.high, one.low);
-        const double inverse = 1 / (bump.radius * bump.radius);
-        one.inverse_radius2 = static_cast<T>(inverse);
-        round(bump.along, one.along);
-        // Less by more than the kernels' rounding.
-        one.inverse_reach2 =
-            static_cast<T>(inverse * std::max(0.0, 1 - dot(bump.along, bump.along) - 1e-5));
-        round(bump.by, one.by);
-        one.keep = static_cast<T>(bump.keep);
-        bumps_.push_back(one);
-    }
-}
-
 template class PlanMemory<float>;
 template class PlanMemory<double>;
-template class BumpMemory<float>;
-template class BumpMemory<double>;
 
 }  // namespace palette4d

@@ -4,8 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "model/edits.hpp"
-#include "recolour/bump_kernels.hpp"
+#include "recolour/frame_picks.hpp"
 #include "recolour/mvc.hpp"
 #include "recolour/mvc_kernels.hpp"
 
@@ -42,20 +41,6 @@ private:
 extern template class PlanMemory<float>;
 extern template class PlanMemory<double>;
 
-/// The memory that a BumpPlan points to.
-template <class T>
-class BumpMemory {
-public:
-    explicit BumpMemory(const std::vector<Bump>& bumps);
-    BumpPlan<T> plan() const { return {bumps_.data(), static_cast<int>(bumps_.size())}; }
-
-private:
-    std::vector<typename BumpPlan<T>::One> bumps_;
-};
-
-extern template class BumpMemory<float>;
-extern template class BumpMemory<double>;
-
 /// Scratch memory for kernels, aligned.
 template <class T>
 class Scratch {
@@ -76,15 +61,15 @@ private:
 template <class T>
 struct PlanOf {
     PlanMemory<T> palette;
-    BumpMemory<T> bumps;
+    PickMemory<T> picks;
 };
 
 /// The plans of one palette and edit in both precisions.
 struct RecolourPlan {
     RecolourPlan(const PaletteBody& body, const std::vector<Vec3>& displacement,
-                 const std::vector<Bump>& bumps)
-        : single{{body, displacement}, BumpMemory<float>(bumps)},
-          twofold{{body, displacement}, BumpMemory<double>(bumps)} {}
+                 const FramePicks& picks, const std::vector<Vec3>& done)
+        : single{{body, displacement}, {picks, done}},
+          twofold{{body, displacement}, {picks, done}} {}
     PlanOf<float> single;
     PlanOf<double> twofold;
 };

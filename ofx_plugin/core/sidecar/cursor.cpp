@@ -89,6 +89,17 @@ void Cursor::require_members(std::initializer_list<const char*> names,
     for (const char* name : names) member(name);
 }
 
+std::vector<std::string> Cursor::names(const char* of, std::size_t most) const {
+    require_object();
+    if (value_->size() > most) {
+        fail(std::to_string(value_->size()) + " " + of,
+             "at most " + std::to_string(most) + " " + of);
+    }
+    std::vector<std::string> found;
+    for (const auto& [name, unused] : value_->items()) found.push_back(name);
+    return found;
+}
+
 void Cursor::require_scalars() const {
     require_object();
     for (const auto& [name, value] : value_->items()) {
@@ -102,6 +113,15 @@ void Cursor::require_scalars() const {
 std::size_t Cursor::list(const char* of) const {
     if (!value_->is_array()) wrong(std::string("a list of ") + of);
     return value_->size();
+}
+
+std::size_t Cursor::list(const char* of, std::size_t most, std::size_t others) const {
+    const std::size_t count = list(of);
+    if (count + others > most) {
+        fail(std::to_string(count + others) + " " + of,
+             "at most " + std::to_string(most) + " " + of);
+    }
+    return count;
 }
 
 std::string Cursor::text() const {

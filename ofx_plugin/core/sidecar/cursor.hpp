@@ -8,6 +8,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "model/polytope.hpp"
 
@@ -38,11 +39,15 @@ public:
     /// Requires an object with exactly the members `names`; those in `optional` may be missing.
     void require_members(std::initializer_list<const char*> names,
                          std::initializer_list<const char*> optional = {}) const;
+    /// The names of an object's members, at most `most`.
+    std::vector<std::string> names(const char* of, std::size_t most) const;
     /// Requires an object with any names, whose values are numbers, texts, true, false or null.
     void require_scalars() const;
 
     /// The number of elements of a list.
     std::size_t list(const char* of) const;
+    /// The same of a list that with the `others` may have at most `most` elements.
+    std::size_t list(const char* of, std::size_t most, std::size_t others = 0) const;
     std::string text() const;
     /// One of a few texts; its position among them.
     std::size_t choice(std::initializer_list<const char*> texts) const;

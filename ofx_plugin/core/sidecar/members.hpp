@@ -7,6 +7,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "model/picks.hpp"
 #include "sidecar/cursor.hpp"
 #include "sidecar/sidecar.hpp"
 
@@ -31,10 +32,24 @@ void claim(std::set<std::string>& taken, const Cursor& where, const std::string&
 Polytope read_polytope(const Cursor& where, const ClipInfo& clip, const std::string& file,
                        Ids& ids);
 
-Edits read_edits(const Cursor& where, const Polytope& polytope, const Ids& ids);
+/// What all picks of a file share.
+struct PickMattes {
+    std::unordered_map<std::string, std::shared_ptr<const Matte>> grids;
+    std::shared_ptr<const DisplayCurve> display;
+    int version = 0;        ///< of the file
+    double frame_step = 1;  ///< Edits::frame_step
+
+    /// Null for an unknown id.
+    std::shared_ptr<const Matte> of(const std::string& id) const;
+};
+PickMattes read_mattes(const Cursor& root, int version);
+std::vector<Pick> read_picks(const Cursor& where, const PickMattes& mattes);
+
+Edits read_edits(const Cursor& where, const Polytope& polytope, const Ids& ids,
+                 const PickMattes& mattes);
 std::vector<NamedVersion> read_versions(const Cursor& where, const Polytope& polytope,
-                                        const Ids& ids);
-/// Checks the clip's weighted colours, which only the solver of picks reads.
+                                        const Ids& ids, const PickMattes& mattes);
+/// Checks the clip's weighted colours, which only Python reads.
 void check_colours(const Cursor& colours);
 
 }  // namespace palette4d

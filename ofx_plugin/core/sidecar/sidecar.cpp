@@ -12,7 +12,7 @@
 namespace palette4d {
 namespace {
 
-void read_head(const Cursor& root) {
+int read_head(const Cursor& root) {
     root.require_object();
     const Cursor schema = root.member("schema");
     if (schema.text() != "palette4d.sidecar") schema.wrong("\"palette4d.sidecar\"");
@@ -25,9 +25,10 @@ void read_head(const Cursor& root) {
     }
     root.require_members(
         {"schema", "version", "generator", "clip", "polytope", "quality", "edits", "extra"},
-        {"colours", "versions", "history"});
+        {"colours", "versions", "history", "mattes"});
     root.member("generator").text();
     root.member("extra").require_object();
+    return static_cast<int>(number);
 }
 
 void read_quality(const Cursor& quality) {
@@ -48,7 +49,7 @@ Sidecar parse_sidecar(const std::string& text, const std::string& name) {
     const nlohmann::json tree = json_tree(text, name);
     const Cursor root(tree, name);
     Sidecar sidecar;
-    read_head(root);
+    const int version = read_head(root);
     sidecar.clip = read_clip(root.member("clip"));
     const Cursor clip = root.member("clip");
     if (clip.has("conversion")) {
@@ -57,9 +58,11 @@ Sidecar parse_sidecar(const std::string& text, const std::string& name) {
     Ids ids;
     sidecar.polytope = read_polytope(root.member("polytope"), sidecar.clip, name, ids);
     read_quality(root.member("quality"));
-    sidecar.edits = read_edits(root.member("edits"), sidecar.polytope, ids);
+    PickMattes mattes = read_mattes(root, version);
+    mattes.frame_step = static_cast<double>(sidecar.clip.step);
+    sidecar.edits = read_edits(root.member("edits"), sidecar.polytope, ids, mattes);
     if (root.has("versions")) {
-        sidecar.versions = read_versions(root.member("versions"), sidecar.polytope, ids);
+        sidecar.versions = read_versions(root.member("versions"), sidecar.polytope, ids, mattes);
     }
     if (root.has("colours")) check_colours(root.member("colours"));
     if (root.has("history")) root.member("history").require_object();

@@ -45,7 +45,7 @@ struct Sidecar {
     std::shared_ptr<const ClipConversion> conversion;
 };
 
-inline constexpr int kSidecarVersion = 1;
+inline constexpr int kSidecarVersion = 2;
 inline constexpr std::uint64_t kMaxSidecarBytes = 64u << 20;
 
 /// Reads and validates a file (UTF-8 path). Throws SidecarError; checks every count and index.

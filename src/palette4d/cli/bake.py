@@ -150,6 +150,7 @@ def report(result: BakeResult) -> Iterator[str]:
 
 def warnings(result: BakeResult, format_: LutFormat) -> Iterator[str]:
     """Yield the notes and warnings for the user."""
+    from palette4d.colour.difference import VISIBLE
     from palette4d.lut_export.bake import nearer
     from palette4d.lut_export.bake_error import stated
     from palette4d.lut_export.formats import shaper_warning, with_shaper
@@ -170,6 +171,18 @@ def warnings(result: BakeResult, format_: LutFormat) -> Iterator[str]:
             what = f"{clip.outside_domain:.3%} of the frame's colours are"
         domain = f"{shaper.low:g} to {shaper.high:g}"
         yield f"{what} outside {domain}, where the LUT clamps; {help_}"
+    if result.cdl is not None and result.has_picks:
+        yield (
+            "a CDL moves all colours alike, so that it holds no mattes of picks; a 3D LUT (.clf, "
+            ".cube) does"
+        )
+    if result.clean_up is not None and result.cdl is None and result.clean_up.most > VISIBLE:
+        found = result.clean_up
+        yield (
+            "no LUT has Clean up: from the picture of the node and `palette4d render` the file is "
+            f"off by a deltaE 2000 of {stated(found.mean)} on average, 99 % of the pixels by at "
+            f"most {stated(found.most)}"
+        )
     if clip and result.visible:
         yield (
             f"the error can be seen: {clip.visible:.2%} of the frame's pixels are off by a deltaE "

@@ -66,13 +66,13 @@ def run(args: argparse.Namespace) -> int:
 
 def info_of(document: "Document") -> dict[str, Any]:
     """Return the output of ``palette4d info --json``; docs/sidecar.md explains the names."""
+    from palette4d.grade.clip_colours import ClipColours
     from palette4d.grade.shares import track_shares
-    from palette4d.grade.solve import ClipAtTimes
 
     fields = document.fields()
     clip, polytope = fields["clip"], fields["polytope"]
     tracks = document.tracks
-    shares = track_shares(ClipAtTimes(fields), tracks)
+    shares = track_shares(ClipColours(document.core.polytope, fields), tracks)
     frames = clip["frames"]
     edited = {entry["vertex"]: entry["rgb"] for entry in fields["edits"]["vertices"]}
     stops = fields["edits"]["stops"]

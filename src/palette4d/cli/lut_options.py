@@ -22,8 +22,8 @@ def add_lut_options(parser: argparse.ArgumentParser, default: str | None, *, spa
     add = parser.add_argument
     by = "by the extension" if default is None else default
     add("--format", type=checked(str, format_named), default=default, help=f"default: {by}")
-    size = "samples a side, 2 to 129 (default 33)"
-    add("--size", metavar="N", type=whole(2, 129), default=33, help=size)
+    size = "samples a side, 2 to 129 (default 33; 65 with picks or where 33 shows)"
+    add("--size", metavar="N", type=whole(2, 129), help=size)
     shapers = ("auto", "none", "linear", "log")
     shaper = "1D shaper for code values beyond 0..1: %(choices)s (default auto)"
     add("--shaper", choices=shapers, metavar="KIND", default="auto", help=shaper)

@@ -1,4 +1,4 @@
-"""The actions of `edit` for picks: pick, hold, change, enable, disable, unpick, lock, picks."""
+"""The actions of `edit` for picks: pick, hold, area, change, enable, unpick, lock, picks, …"""
 
 from __future__ import annotations
 
@@ -8,23 +8,24 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from palette4d import load
-from palette4d.cli.messages import as_options, tell
+from palette4d.cli.messages import tell
 from palette4d.cli.swatches import shown, swatch
 from palette4d.common.arguments import ColourAction, number, whole
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import counted, hex_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable
 
     from palette4d.grade.document import Document
-    from palette4d.grade.effects import Around
     from palette4d.grade.picks import Pick
 
     Action = Callable[[str, str, str], argparse.ArgumentParser]
 
 _WHERE = "--frame T (--colour C | --pixel X,Y [--box N])"
 _WHEN = "[--from A] [--until B] [--fade N]"
+_RANGE = ("start", "until", "fade")
+_MATTE = ("reach", "softness", "lightness", "whole_hue")
 
 
 def add_actions(action: Action) -> None:
@@ -32,17 +33,39 @@ def add_actions(action: Action) -> None:
     pick = action(
         "pick",
         f"{_WHERE} (--to C2 | --by DR,DG,DB | --with ID) {_WHEN}",
-        "change a colour of the clip into another one, and little else. The pick follows its "
-        "colour through the clip. All picks and holds are solved together: the palette does what "
-        "it can, a small neighbourhood of the colour the rest. With --with, say where the colour "
-        "of an earlier pick is at another frame.",
+        "change a thing's colour into another one, and nothing else. What is connected with the "
+        "place is the thing: its colours are learned from the frame and from a few others, and "
+        "followed through the clip. With --with, say where the colour of an earlier pick is at "
+        "another frame.",
     )
     hold = action(
         "hold",
         f"{_WHERE} [--with ID] {_WHEN}",
-        "keep a colour of the clip as it is, whatever picks and handles do. A hold follows its "
-        "colour as a pick does.",
+        "keep a thing's colour as it is, whatever picks and handles do. A hold follows its colour "
+        "as a pick does.",
     )
+    area = action(
+        "area",
+        "ID --frame T (--pixel X,Y [--box N] | --stroke X,Y [X,Y …] [--width N])",
+        "a box or a stroke of a frame belongs to a pick or hold too; it learns again.",
+    )
+    area.add_argument("id", metavar="ID", help="p1, p2, …")
+    area.add_argument("--frame", type=number(), required=True, metavar="T", help="the frame")
+    where = area.add_mutually_exclusive_group(required=True)
+    where.add_argument("--pixel", type=_pixel, metavar="X,Y", help="the middle of a box")
+    where.add_argument(
+        "--stroke", type=_pixel, nargs="+", metavar="X,Y", help="the points of a brush stroke"
+    )
+    area.add_argument(
+        "--box", type=whole(1), metavar="N", help="with --pixel: N x N pixels (default 9)"
+    )
+    area.add_argument(
+        "--width", type=number(1, 1e6), metavar="N", help="of the brush, in pixels (default 9)"
+    )
+    area.add_argument(
+        "--clip", metavar="CLIP", help="the clip (default: the sidecar's, if it is there)"
+    )
+    area.set_defaults(run=run_area)
     for parser, name in ((pick, "pick"), (hold, "hold")):
         _add_where(parser)
         _add_how(parser)
@@ -51,7 +74,9 @@ def add_actions(action: Action) -> None:
         )
         parser.set_defaults(run=run_pick)
     _add_new(pick)
-    hold.set_defaults(to=None, by=None, toward=None, global_only=None)
+    hold.set_defaults(
+        to=None, by=None, toward=None, whole_hue=None, reach=None, softness=None, lightness=None
+    )
     _add_change(action)
     for name, text in (
         ("enable", "switch picks and holds on again."),
@@ -61,10 +86,16 @@ def add_actions(action: Action) -> None:
         parser = action(name, "ID [ID …]", text)
         parser.add_argument("ids", nargs="+", metavar="ID", help="p1, p2, …")
         parser.set_defaults(run=run_switch)
-    lock = action("lock", "ID [ID …]", "keep vertices and stops where they are when picks are met.")
+    lock = action(
+        "lock",
+        "ID [ID …]",
+        "keep vertices and stops where they are when tracks or the palette move.",
+    )
     lock.add_argument("ids", nargs="+", metavar="ID", help="a vertex or a stop")
     lock.set_defaults(run=run_lock)
-    unlock = action("unlock", "ID [ID …]", "let picks move these vertices and stops again.")
+    unlock = action(
+        "unlock", "ID [ID …]", "let tracks and the palette move these vertices and stops again."
+    )
     unlock.add_argument("ids", nargs="+", metavar="ID", help="a locked vertex or stop")
     unlock.set_defaults(run=run_lock)
     picks = action("picks", "[--json]", "list the picks, holds and locks.")
@@ -123,10 +154,24 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
         choices=("shift", "colour"),
         help="at other frames: the same change (shift, default), or the same new colour",
     )
-    parser.add_argument(
-        "--global-only",
+    add = parser.add_argument
+    add(
+        "--reach",
+        type=number(-8, 8),
+        metavar="R",
+        help="log odds: above 0 it takes more colours, below 0 fewer (default 0)",
+    )
+    add("--softness", type=number(0, 1), metavar="S", help="of the matte's edge (default 0.5)")
+    add(
+        "--lightness",
+        type=_span,
+        metavar="A,B",
+        help="change only what is this light, 0..1 (default 0,1)",
+    )
+    add(
+        "--whole-hue",
         action=argparse.BooleanOptionalAction,
-        help="move palette colours only",
+        help="take all of its hue, as a qualifier does; learn nothing",
     )
 
 
@@ -139,12 +184,6 @@ def _add_how(parser: argparse.ArgumentParser) -> None:
         type=number(0, 1e9),
         metavar="N",
         help="ramps of N frames before A and after B; beyond them nothing changes (default 0)",
-    )
-    add(
-        "--radius",
-        type=number(1e-4, 1e6),
-        metavar="R",
-        help="where the local neighbourhood ends, in code values (default: grows with the change)",
     )
     add(
         "--follow",
@@ -176,10 +215,36 @@ def _pixel(text: str) -> tuple[float, float]:
     return x, y
 
 
+def _span(text: str) -> tuple[float, float]:
+    try:
+        low, high = (float(part) for part in text.split(","))
+    except ValueError:
+        low, high = 1.0, 0.0
+    if not 0 <= low < high <= 1:
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected A,B within 0 to 1, as 0.2,1")
+    return low, high
+
+
+def run_area(args: argparse.Namespace) -> int:
+    """Add a box or a stroke to a pick or hold."""
+    from palette4d.grade.picks import Area
+
+    if args.box is not None and args.stroke is not None:
+        raise Palette4dError("found --box with --stroke, expected --width")
+    if args.width is not None and args.pixel is not None:
+        raise Palette4dError("found --width with --pixel, expected --box")
+    document = load(args.sidecar)
+    points = (args.pixel,) if args.stroke is None else tuple(args.stroke)
+    size = (args.box if args.stroke is None else args.width) or 9
+    document.add_area(args.id, Area(args.frame, points, size / 2), clip=args.clip)
+    document.save()
+    _print_pick(document, args.id, args.clip)
+    return 0
+
+
 def run_pick(args: argparse.Namespace) -> int:
     """Add a pick or a hold, or correct the path of one."""
     document = load(args.sidecar)
-    before = _unmet(document)
     where: dict[str, Any] = {
         "colour": args.colour,
         "pixel": args.pixel,
@@ -187,15 +252,7 @@ def run_pick(args: argparse.Namespace) -> int:
         "clip": args.clip,
         "any_value": args.float,
     }
-    how = {
-        "start": args.start,
-        "until": args.until,
-        "fade": args.fade,
-        "radius": args.radius,
-        "toward": args.toward,
-        "global_only": args.global_only,
-        "follow": args.follow,
-    }
+    how = {name: getattr(args, name) for name in (*_RANGE, *_MATTE, "toward", "follow")}
     given = {name: value for name, value in how.items() if value is not None}
     with _bar(args) as progress:
         if args.same is not None:
@@ -217,18 +274,15 @@ def run_pick(args: argparse.Namespace) -> int:
                 args.frame, **where, to=args.to, by=args.by, **given, progress=progress
             )
     document.save()
-    for line in document.pick_warnings(found.id, args.clip):
-        tell("warning", line)
-    _print_pick(document, found.id, before, followed=args.follow is not False)
+    _print_pick(document, found.id, args.clip, followed=args.follow is not False)
     return 0
 
 
 def run_change(args: argparse.Namespace) -> int:
     """Change a pick or hold."""
     document = load(args.sidecar)
-    before = _unmet(document)
     old = next((pick for pick in document.picks if pick.id == args.id), None)
-    parts = ("frame", "to", "start", "until", "fade", "radius", "toward", "global_only", "follow")
+    parts = ("frame", "to", *_RANGE, *_MATTE, "toward", "follow")
     changes: dict[str, Any] = {
         name: value for name in parts if (value := getattr(args, name)) is not None
     }
@@ -249,16 +303,13 @@ def run_change(args: argparse.Namespace) -> int:
             args.id, any_value=args.float, clip=args.clip, progress=progress, **changes
         )
     document.save()
-    for line in document.pick_warnings(found.id, args.clip):
-        tell("warning", line)
-    _print_pick(document, found.id, before, followed=args.follow is not False)
+    _print_pick(document, found.id, args.clip, followed=args.follow is not False)
     return 0
 
 
 def run_switch(args: argparse.Namespace) -> int:
     """Enable, disable or remove picks and holds."""
     document = load(args.sidecar)
-    before = _unmet(document)
     ids = list(dict.fromkeys(args.ids))
     if args.action == "unpick":
         document.unpick(*ids)
@@ -269,18 +320,15 @@ def run_switch(args: argparse.Namespace) -> int:
     document.save()
     done = {"unpick": "removed", "enable": "enabled", "disable": "disabled"}[args.action]
     print(f"{done}: {', '.join(ids)}")
-    _print_notes(document, document.around_picks(), before)
     return 0
 
 
 def run_lock(args: argparse.Namespace) -> int:
     """Lock or unlock handles."""
     document = load(args.sidecar)
-    before = _unmet(document)
     (document.lock if args.action == "lock" else document.unlock)(*args.ids)
     document.save()
     print(f"{args.action}ed: {', '.join(map(document.named, dict.fromkeys(args.ids)))}")
-    _print_notes(document, document.around_picks(), before)
     return 0
 
 
@@ -292,36 +340,28 @@ def run_picks(args: argparse.Namespace) -> int:
         listed = {"picks": edits.get("picks", []), "locks": edits.get("locks", [])}
         print(json.dumps(listed, allow_nan=False))
         return 0
-    around = document.around_picks()
     for pick in document.picks:
-        print(_told(document, pick, around))
+        print(_told(document, pick))
     if document.locks:
         print(f"locked: {', '.join(map(document.named, document.locks))}")
     if not document.picks and not document.locks:
         print("no picks, holds or locks")
-    _print_notes(document, around)
     return 0
 
 
-def _unmet(document: Document) -> dict[frozenset[str], str]:
-    from palette4d.grade.picks import unmet
-
-    return unmet(document.picks, document.frames[2])
-
-
-def _print_pick(
-    document: Document, id_: str, before: Iterable[frozenset[str]], followed: bool
-) -> None:
+def _print_pick(document: Document, id_: str, clip: str | None, followed: bool = False) -> None:
+    """Print what was asked, and what it does in its frame."""
+    for line in document.pick_warnings(id_, clip):
+        tell("warning", line)
     found = next(pick for pick in document.picks if pick.id == id_)
-    around = document.around_picks()
-    print(_told(document, found, around, followed))
-    _print_notes(document, around, [ids for ids in before if id_ not in ids])
+    print(_told(document, found, followed))
+    answer = document.answer(id_, clip) if found.enabled else None
+    for line in () if answer is None else answer.lines(id_):
+        print(f"  {line}")
 
 
-def _told(
-    document: Document, pick: Pick, around: Mapping[str, Around], followed: bool = False
-) -> str:
-    """Return a pick or hold for people: what was asked, and how it is met."""
+def _told(document: Document, pick: Pick, followed: bool = False) -> str:
+    """Return a pick or hold for people: what was asked, and its path."""
     asked = shown(pick.rgb) + (f" -> {shown(pick.to)}" if pick.to is not None else " stays")
     lines = [f"{pick.id}: {pick.kind} at frame {pick.frame:g}: {asked}"]
     if pick.start is not None or pick.until is not None:
@@ -346,29 +386,18 @@ def _told(
         source = document.core.clip["source"]
         why = f": the clip {source!r} was not found; give it with --clip" if followed else ""
         lines.append(f"  is at the same colour in all frames{why}")
-    if pick.residual is not None and pick.share is not None:
-        line = f"  off by {pick.residual:.4f}"
-        if pick.kind == "pick":
-            rest = f"{1 - pick.share:.0%} its neighbourhood"
-            rest = "its neighbourhood left out" if pick.global_only else rest
-            line += f"; {pick.share:.0%} the palette, {rest}"
-        lines.append(line)
-        if pick.worst is not None and pick.worst > max(2 * pick.residual, pick.tolerance):
-            lines.append(f"  the farthest off at frame {pick.worst_frame:.0f}: by {pick.worst:.4f}")
-        if pick.id in around:
-            lines += _near(around[pick.id])
+    if pick.kind == "pick" and not pick.whole_hue and pick.matte is None:
+        lines.append("  takes all of its hue: its colours could not be learned from the clip")
+    shown_as = [
+        f"reach {pick.reach:g}" * (pick.reach != 0),
+        f"softness {pick.softness:g}" * (pick.softness != 0.5),
+        "lightness {:g} to {:g}".format(*pick.lightness) * (pick.lightness != (0, 1)),
+        "all of its hue" * pick.whole_hue,
+        counted(len(pick.areas), "more area") * bool(pick.areas),
+    ]
+    if any(shown_as):
+        lines.append(f"  {', '.join(filter(None, shown_as))}")
     return "\n".join(lines)
-
-
-def _near(around: Around) -> list[str]:
-    """Return how much of a pick's change the colours near it and its other shades get."""
-    line = f"  the colours near it change {around.share:.2f} times as much"
-    if around.shades is None:
-        return [line]
-    lines = [f"{line}, all of its hue {around.shades:.2f} times"]
-    if around.shades < around.share / 2:
-        lines.append("  note: if it has darker or lighter shades too, pick one of them as well")
-    return lines
 
 
 def _path(pick: Pick) -> list[str]:
@@ -393,31 +422,6 @@ def _path(pick: Pick) -> list[str]:
             f"{pick.id} {' '.join(limits)}"
         )
     return lines
-
-
-def _print_notes(
-    document: Document, around: Mapping[str, Around], told: Iterable[frozenset[str]] = ()
-) -> None:
-    """Print what the solution moves, and what it does not meet; in short what was `told`."""
-    from palette4d.grade.pick_notes import MANY, changed
-
-    if not any(pick.enabled for pick in document.picks):
-        return
-    moved, among = document.moved_by_picks()
-    print(f"{moved} of {counted(among, 'palette colour')} {'moves' if moved == 1 else 'move'}")
-    effect = document.side_effect()
-    print(changed(effect))
-    for line in document.pick_notes(effect, around):
-        print(f"note: {as_options(line)}")
-    for rgb in effect.holds if effect.others > MANY else ():
-        colour = ",".join(f"{value:.4f}" for value in rgb)
-        print(f"  hold --frame {effect.frame:.0f} --colour {colour}")
-    lines = _unmet(document)
-    for ids, line in lines.items():
-        if ids not in told:
-            print(f"not met: {as_options(line)}")
-    if old := [" and ".join(sorted(ids)) for ids in lines if ids in told]:
-        print(f"not met, as before: {', '.join(old)}; `picks` says why")
 
 
 def _box(args: argparse.Namespace) -> int | None:

@@ -27,11 +27,21 @@ examples:
   palette4d render clip.p4d.json clip/ -o review.mp4 --compare wipe
   palette4d render clip.p4d.json beach.%04d.dpx -o graded/beach.####.png --frames 1001-1100x2
   palette4d render clip.p4d.json clip/ -o still.png --frames 24 --strength 0.5
-  palette4d render clip.p4d.json clip/ -o key/sky.####.exr --output weight:v5"""
+  palette4d render clip.p4d.json clip/ -o key/sky.####.exr --output weight:v5
+  palette4d render clip.p4d.json clip/ -o key/shirt.####.exr --output pick:p1"""
 
 
 # What `Document.recolour` draws.
-DRAWN = ("show", "strength", "keep_lightness", "lightness_of", "mix", "matte_in", "outside_at")
+DRAWN = (
+    "show",
+    "strength",
+    "keep_lightness",
+    "lightness_of",
+    "mix",
+    "matte_in",
+    "outside_at",
+    "clean_up",
+)
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -83,8 +93,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         default="recoloured",
         metavar="WHAT",
         help="weight:ID, a soft key of a vertex or stop that follows its colour through time; "
-        "outside, a matte of the colours outside the palette; palette, the edit with the frame's "
-        "palette below, old colours above new (default: the edit)",
+        "pick:ID, the matte of a pick or hold; outside, a matte of the colours outside the "
+        "palette; palette, the edit with the frame's palette below, old colours above new "
+        "(default: the edit)",
     )
     parser.add_argument(
         "--matte-in",
@@ -113,6 +124,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         default="auto",
         help="whose luminance weights define lightness (default auto: the clip's colour space, or "
         "Rec.709 if it is unknown)",
+    )
+    parser.add_argument(
+        "--clean-up",
+        type=number(0, 1),
+        default=1.0,
+        metavar="C",
+        help="how much of the change by picks is filtered along the picture's edges, so that codec "
+        "blocks, soft chroma and rims do not show: 0 none, 1 all (default 1)",
     )
     parser.add_argument(
         "--mix",
@@ -150,12 +169,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def _show(text: str) -> str:
-    """Argparse type of --output; the sidecar decides whether it has the handle."""
-    if text in ("recoloured", "outside", "palette") or re.fullmatch("weight:.+", text):
+    """Argparse type of --output; the sidecar decides whether it has the handle or pick."""
+    if text in ("recoloured", "outside", "palette") or re.fullmatch("(weight|pick):.+", text):
         return text
     raise argparse.ArgumentTypeError(
-        f"found {text!r}, expected weight:ID with the id of a vertex or stop, outside or palette; "
-        "-o names the files"
+        f"found {text!r}, expected weight:ID with the id of a vertex or stop, pick:ID with that of "
+        "a pick or hold, outside or palette; -o names the files"
     )
 
 

@@ -1,10 +1,10 @@
-"""Making picks: the colour at a pixel, and the path of a colour through its clip."""
+"""Making picks: the colour at a pixel, what its matte is learned from, and its path."""
 
 from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +18,7 @@ from palette4d.common.text import hex_of
 from palette4d.grade import follow
 from palette4d.grade.edits import Colour, as_colour
 from palette4d.grade.follow import Progress
+from palette4d.grade.mattes import Display, Learned, learn
 from palette4d.grade.picks import ALIKE, PathKey, Pick
 from palette4d.media.clip_base import describe
 from palette4d.media.source_clip import find_clip, nearest_frame
@@ -25,15 +26,17 @@ from palette4d.media.source_clip import find_clip, nearest_frame
 if TYPE_CHECKING:
     from palette4d.media.clip_base import Clip
 
+F32 = NDArray[np.float32]
 Given = str | os.PathLike[str] | None
 DIGITS = 6
 
-#: A box has a spread if more than 1 - MOST_COLOURS of its pixels are farther than WIDE from the
-#: mean. It is told by at most MOST_SPREAD further colours.
-WIDE, MOST_COLOURS, MOST_SPREAD = 0.04, 0.9, 2
 #: A frame whose colours differ by more than this from the analysed ones is of another clip: those
 #: of one clip differ by up to 0.13, nearly all of others by more than 0.2 (docs/lab/picks.md).
 OTHER_CLIP = 0.16
+#: A colour of another clip is here if a connected region of this share of a frame has it.
+LEAST_REGION = 5e-4
+#: Differences of saturation, twice, and of lightness, within which two clips' colours are the same.
+SAME_COLOUR = (0.05, 0.05, 0.15)
 
 
 class ClipOfPicks:
@@ -60,6 +63,8 @@ class ClipOfPicks:
     ) -> None:
         self._fields, self._conversion = clip, conversion
         self._sidecar, self._given = sidecar or Path("unsaved.p4d.json"), given
+        self._read: dict[int, F32] = {}
+        self._clip: Clip | None = None
 
     def open(self) -> Clip | None:
         """Return the clip, or None if none was given and the sidecar's clip is not there.
@@ -69,6 +74,8 @@ class ClipOfPicks:
         Palette4dError
             The given clip cannot be opened, or the clip is not the sidecar's.
         """
+        if self._clip is not None:
+            return self._clip
         given = None if self._given is None else os.fspath(self._given)
         clip = find_clip(self._sidecar, self._fields, given)
         if clip is None:
@@ -88,15 +95,12 @@ class ClipOfPicks:
                 f"{missing[0]} of the palette's clip ({known[0]} to {known[-1]}): it is another "
                 "clip. Give the palette's clip as clip=…, or pick by colour=… with follow=False"
             )
+        self._clip = clip
         return clip
 
-    def colours(
-        self, frame: float, pixel: tuple[float, float], box: int
-    ) -> tuple[Colour, tuple[Colour, ...]]:
-        """Return the mean colour of a box around a pixel, and its spread (`Pick.spread`)."""
-        found = self.box(frame, pixel, box)
-        mean = np.round(found.mean(axis=0), DIGITS)
-        return as_colour(mean), tuple(as_colour(offset) for offset in _spread(found - mean))
+    def colour(self, frame: float, pixel: tuple[float, float], box: int) -> Colour:
+        """Return the mean colour of a box around a pixel, in the palette's code values."""
+        return as_colour(np.round(self.box(frame, pixel, box).mean(axis=0), DIGITS))
 
     def box(self, frame: float, pixel: tuple[float, float], box: int) -> NDArray[np.float64]:
         """Return the (n, 3) colours of a box around a pixel, in the palette's code values.
@@ -112,16 +116,8 @@ class ClipOfPicks:
                 f"the clip {self._fields['source']!r} is not there, so that its pixels cannot be "
                 "read; give clip=…, or the colour itself with colour=…"
             )
-        if frame not in clip.frames:
-            raise Palette4dError(
-                f"{clip.source} has no frame {frame:g}; expected one of {describe(clip.frames)}"
-            )
+        self.check_places(frame, [pixel])
         x, y = pixel
-        if not (0 <= x < clip.width and 0 <= y < clip.height):
-            raise Palette4dError(
-                f"the pixel {x:g},{y:g} lies outside the picture; expected 0,0 (top left) to "
-                f"{clip.width - 1},{clip.height - 1}"
-            )
         most = max(clip.width, clip.height)
         if not 1 <= box <= most:
             raise Palette4dError(f"found a box of {box} pixels, expected 1 to {most}")
@@ -136,6 +132,73 @@ class ClipOfPicks:
                 "a finite number. Pick another pixel, or a larger box=…"
             )
         return found if self._conversion is None else self._conversion.to_palette(found)
+
+    def check_places(self, frame: float, pixels: Iterable[tuple[float, float]]) -> None:
+        """Refuse a frame or pixels that the clip does not have; without a clip, nothing."""
+        clip = self.open()
+        if clip is None:
+            return
+        if frame not in clip.frames:
+            raise Palette4dError(
+                f"{clip.source} has no frame {frame:g}; expected one of {describe(clip.frames)}"
+            )
+        for x, y in pixels:
+            if not (0 <= x < clip.width and 0 <= y < clip.height):
+                raise Palette4dError(
+                    f"the pixel {x:g},{y:g} lies outside the picture; expected 0,0 (top left) to "
+                    f"{clip.width - 1},{clip.height - 1}"
+                )
+
+    def read(self, frame: int) -> F32:
+        """Return a frame's straight colours, (h, w, 3) in the palette's code values."""
+        if frame not in self._read:
+            clip = self.open()
+            assert clip is not None
+            colours = clip.straight_colours(clip.read(frame))
+            if self._conversion is not None:
+                colours = np.asarray(self._conversion.to_palette(colours), np.float32)
+            self._read[frame] = np.ascontiguousarray(colours)
+        return self._read[frame]
+
+    def learn(self, pick: Pick, holds: Sequence[Pick], display: Display | None) -> Learned | None:
+        """Learn the matte of a pick or hold; None where the clip is not there."""
+        clip = self.open()
+        if clip is None:
+            return None
+        first, last = self._fields["frames"]["first"], self._fields["frames"]["last"]
+        frames = [frame for frame in clip.frames if first <= frame <= last]
+        return learn(pick, holds, frames, self.read, display)
+
+    def at_home(self, pick: Pick, display: Display | None) -> Pick | None:
+        """Return a pick of another clip with its colour in this one; None if it is not here.
+
+        It is here where a region of pixels, connected, has nearly the colour: the largest one
+        becomes the pick's place.
+        """
+        from scipy import ndimage
+
+        clip = self.open()
+        assert clip is not None
+        frame = nearest_frame(clip, pick.frame)
+        pixels = self.read(frame)
+        real = np.asarray(np.isfinite(pixels).all(axis=2))
+        points = _core.pick_points(np.where(real[..., None], pixels, 0).reshape(-1, 3), display)
+        away = np.abs(points - _core.pick_points([pick.rgb], display)) < SAME_COLOUR
+        alike = away.all(axis=1).reshape(real.shape) & real
+        labels, count = ndimage.label(ndimage.binary_opening(alike))
+        if not count:
+            return None
+        sizes = np.bincount(labels.ravel())
+        sizes[0] = 0
+        largest = labels == sizes.argmax()
+        if largest.mean() < LEAST_REGION:
+            return None
+        depth = ndimage.distance_transform_cdt(np.pad(largest, 1))[1:-1, 1:-1]
+        row, column = np.unravel_index(int(depth.argmax()), depth.shape)
+        box = int(min(2 * int(depth.max()) - 1, 15))
+        place = (int(column), int(row))
+        rgb = self.colour(frame, place, box)
+        return replace(pick, frame=frame, rgb=rgb, pixel=place, box=box)
 
     def warnings(self, pick: Pick, stored: Sequence[NDArray[np.float64]]) -> tuple[str, ...]:
         """Return what speaks against a pick's clip and its colour.
@@ -193,23 +256,6 @@ def _unlike(
         square = ((colours[:, None] - rgbw[:, :3]) ** 2).sum(axis=2)
         both.append(shares / shares.sum() @ np.exp(square / (-2 * ALIKE**2)))
     return float(np.abs(both[0] - both[1]) @ rgbw[:, 3] / ((both[0] + both[1]) @ rgbw[:, 3]))
-
-
-def _spread(offsets: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return (n, 3) offsets, so that most of a box's colours are near one of them or the mean.
-
-    A box of one colour needs none; a box that spans a gradient gets its ends.
-    """
-    points = np.zeros((1, 3))
-    while len(points) <= MOST_SPREAD:
-        away = np.linalg.norm(offsets[:, None] - points, axis=2).min(axis=1)
-        far = np.quantile(away, MOST_COLOURS, method="lower")
-        if far < WIDE:
-            break
-        candidate = offsets[np.flatnonzero(away == far)[0]]
-        near = np.linalg.norm(offsets - candidate, axis=1) < away
-        points = np.vstack([points, offsets[near].mean(axis=0)])
-    return np.round(points[1:], DIGITS)
 
 
 def corrected(pick: Pick, frame: float, rgb: Colour) -> Pick:

@@ -1,8 +1,8 @@
 """Copied grades: another palette gets the look of a graded palette.
 
 Each handle of the target gets the colour that the source's grade makes of its colour at the
-corresponding time. Stops are added where the change along an edge is not linear. Picks are copied
-and solved again, so that they stay picks.
+corresponding time. Stops are added where the change along an edge is not linear. Picks are learned
+again from the target's clip: there their colour is, connected, or they are not copied.
 """
 
 from collections.abc import Callable, Iterator
@@ -53,12 +53,15 @@ class Fit:
     foreign : float
         The share of the colours, 0..1, that are farther than `NEAR` from the source's palette:
         there the source's grade says little.
+    left_out : tuple of str
+        The picks whose colour is not in the target's clip, with what they are, for people.
     """
 
     change: float
     mean: float
     largest: float
     foreign: float
+    left_out: tuple[str, ...] = ()
 
     @property
     def fits(self) -> bool:
@@ -77,6 +80,11 @@ class Fit:
         if self.foreign >= 0.005:
             text += (
                 f"; {self.foreign:.0%} of the clip's colours are not in the other clip's palette"
+            )
+        if self.left_out:
+            text += (
+                f"; not copied, since nothing connected has the colour here: "
+                f"{', '.join(self.left_out)}"
             )
         return text
 
@@ -109,8 +117,10 @@ class Match:
         return self.back(1.0) - self.back(0.0)
 
 
-def copied(target: "Document", source: "Document", time: Time = "relative") -> dict[Key, Any]:
-    """Return the state of a document with the grade of another document.
+def copied(
+    target: "Document", source: "Document", time: Time = "relative"
+) -> tuple[dict[Key, Any], list[Pick]]:
+    """Return the state of a document with the handles of another document, and its picks there.
 
     Parameters
     ----------
@@ -126,20 +136,23 @@ def copied(target: "Document", source: "Document", time: Time = "relative") -> d
         The frame is outside of the source's clip, or no config converts between the colour spaces.
     """
     match = _match(target, source, time)
-    picks = [value for (kind, _), value in source.state.items() if kind == "pick"]
-    own = {key: value for key, value in source.state.items() if key[0] in ("handle", "ramp")}
-    graded = _grade(match, source.at(own))
-    state: dict[Key, Any] = dict(_handles(target, graded))
+    state: dict[Key, Any] = dict(_handles(target, _grade(match, _handles_of(source))))
     into = between(source.encoding, target.encoding, _configs(target, source))
-    for pick in picks:
-        if (found := _pick(match, pick, into)) is not None:
-            state["pick", found["id"]] = found
-    return state
+    picks = [value for (kind, _), value in source.state.items() if kind == "pick"]
+    found = (_pick(match, pick, into) for pick in picks)
+    return state, [Pick.from_fields(pick) for pick in found if pick is not None]
+
+
+def _handles_of(source: "Document") -> "Document":
+    """Return a document with the edits of the handles alone."""
+    own = {key: value for key, value in source.state.items() if key[0] in ("handle", "ramp")}
+    return source.at(own)
 
 
 def fit(target: "Document", source: "Document", time: Time = "relative") -> Fit:
-    """Measure how near a document's grade is to another document's grade on its colours."""
+    """Measure how near the handles' grade of a document is to that of another on its colours."""
     match = _match(target, source, time)
+    target, source = _handles_of(target), _handles_of(source)
     graded = _grade(match, source)
     into = between(target.encoding, source.encoding, _configs(target, source))
     figures = []
@@ -271,14 +284,11 @@ def _pick(match: Match, pick: dict[str, Any], into: Any) -> dict[str, Any] | Non
         nearest = first + step * round((match.back(frame) - first) / step)
         return min(max(nearest, first), last)
 
-    left_out = ("pixel", "box", "path", "from", "until", "fade")  # of the other clip
+    # Of the other clip:
+    left_out = ("pixel", "box", "areas", "path", "from", "until", "fade", "matte")
     found = {name: value for name, value in pick.items() if name not in left_out}
     if "to" in pick:
         found["to"] = colour(pick["to"])
-    if "spread" in pick:
-        base, own = np.array(pick["rgb"]), np.array(colour(pick["rgb"]))
-        ends = [np.array(colour((base + offset).tolist())) for offset in pick["spread"]]
-        found["spread"] = [list(as_colour((end - own).tolist())) for end in ends]
     path = pick.get("path", ())
     if match.time == "relative":
         found |= {"frame": time(pick["frame"]), "rgb": colour(pick["rgb"])}

@@ -19,7 +19,6 @@ from palette4d.common.locking import locked
 from palette4d.common.text import counted
 from palette4d.grade import edits, sidecar
 from palette4d.grade.copying import Fit, Time, copied, fit
-from palette4d.grade.edited_palette import stored_solution
 from palette4d.grade.edits import Key, State
 from palette4d.grade.handle_edits import HandleEdits
 from palette4d.grade.pick_edits import PickEdits
@@ -162,11 +161,17 @@ class Document(HandleEdits, PickEdits):
         names = (name[: LONGEST_NAME - 4] + more for more in _suffixes())
         return next(each for each in names if ("version", each) not in self._state)
 
-    def copy_from(self, source: "Document", *, time: Time = "relative") -> Fit:
+    def copy_from(
+        self,
+        source: "Document",
+        *,
+        time: Time = "relative",
+        clip: str | os.PathLike[str] | None = None,
+    ) -> Fit:
         """Take over the grade of another document, as one step.
 
         Each handle gets the colour that the other grade makes of its colour at the corresponding
-        time. Picks are copied and solved again. Active edits that no version holds are kept as the
+        time. Picks are learned again there. Active edits that no version holds are kept as the
         version "before copy".
 
         Parameters
@@ -176,6 +181,8 @@ class Document(HandleEdits, PickEdits):
         time : "relative" or float
             "relative": the first frame gets the look of the first frame, the last that of the last.
             A frame: all frames get the look of this frame of `source`.
+        clip : path, optional
+            This document's clip, which picks are learned from; default: the sidecar's.
 
         Returns
         -------
@@ -197,12 +204,13 @@ class Document(HandleEdits, PickEdits):
             raise Palette4dError(
                 f"{source._name} has no edits; expected a graded palette to copy from"
             )
-        state = copied(self, source, time)
+        state, picks = copied(self, source, time)
         versions, _ = self._versions_with_active("before copy")
         locks = {key: value for key, value in self._state.items() if key[0] == "lock"}
         with self.one_step(f"copy the grade of {source._fields['clip']['name']}"):
             self.apply(edits.difference(self._state, {**state, **locks, **versions}, ""))
-            return fit(self, source, time)
+            left_out = self._take_picks(picks, clip)
+            return replace(fit(self, source, time), left_out=left_out)
 
     def same_edits(self) -> tuple[str, ...]:
         """Return the names of the versions that hold the active edits."""
@@ -223,6 +231,12 @@ class Document(HandleEdits, PickEdits):
         found.forget_history()
         return found
 
+    def with_mattes_of(self, fields: Mapping[str, Any]) -> "Document":
+        """Return a document that also knows the mattes in a sidecar's members."""
+        found = copy.copy(self)
+        found._mattes = {**fields.get("mattes", {}).get("grids", {}), **self._mattes}
+        return found
+
     def version(self, name: str) -> "Document":
         """Return a document with the edits of a version as the active edits; "" returns this one.
 
@@ -232,9 +246,7 @@ class Document(HandleEdits, PickEdits):
             return self
         fields = self._version(name)
         others = {key: value for key, value in self._state.items() if key[0] == "version"}
-        found = self.at({**edits.from_fields(fields), **others})
-        found._solved = stored_solution(fields)
-        return found
+        return self.at({**edits.from_fields(fields), **others})
 
     def _version(self, name: str) -> Fields:
         found: Fields | None = self._state.get(("version", name))
@@ -321,6 +333,7 @@ class Document(HandleEdits, PickEdits):
         new = Document.__new__(Document)
         new.path, new.notes = self.path, self.notes
         new._start(found, _core.parse_sidecar(found, self._name))
+        new._mattes = {**self._mattes, **new._mattes}
         if new._fields["polytope"] != self._fields["polytope"]:
             raise Palette4dError(
                 f"{self._name}: the clip was analysed again since this palette was loaded, and the "

@@ -10,10 +10,11 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
-from palette4d.grade import edits, sidecar
+from palette4d.grade import sidecar
 from palette4d.grade.edits import (
     RAMP,
     Colour,
@@ -30,8 +31,8 @@ from palette4d.grade.sidecar import Fields
 from palette4d.grade.steps import Steps
 from palette4d.grade.tracks import Track, tracks_of
 
-#: A member `edits.solution`, and the measured members of each pick by its id.
-Solved = tuple[Fields, dict[str, Fields]]
+if TYPE_CHECKING:
+    from palette4d.grade.mattes import Display
 
 #: Names of scene-linear colour spaces: "Linear", "lin_rec709", "ACEScg", "ACES2065-1", ...
 _LINEAR = re.compile(r"\blin(ear)?(\b|_)|scene.linear|acescg|aces2065", re.IGNORECASE)
@@ -50,11 +51,7 @@ class EditedPalette(Steps):
 
     def _become(self, state: State) -> None:
         super()._become(state)
-        # What follows from the state, on demand: the core's view, without the picks too, and the
-        # solution of the picks.
-        self._core: _core.Sidecar | None = None
-        self._own: _core.Sidecar | None = None
-        self._solved: Solved | None = None
+        self._core: _core.Sidecar | None = None  # the core's view, on demand
         self._settings: dict[str, Setting] = {
             id_: value for (kind, id_), value in state.items() if kind == "handle"
         }
@@ -63,8 +60,9 @@ class EditedPalette(Steps):
         self._fields: Fields = sidecar.fields_of(data)
         self._from_input = core.conversion
         self._handles = Handles(self._fields["polytope"])
+        self._mattes: dict[str, str] = dict(self._fields.get("mattes", {}).get("grids", {}))
         self._become(sidecar.state_of(self._fields))
-        self._core, self._solved = core, stored_solution(self._fields["edits"])
+        self._core = core
         self._done, self._undone = sidecar.history_of(self._fields, self._name)
         self._mark_saved()
 
@@ -84,19 +82,6 @@ class EditedPalette(Steps):
         return self._core
 
     @property
-    def solved(self) -> bool:
-        """Whether the solution of the picks is known, so that nothing waits for it."""
-        picks = (value for (kind, _), value in self._state.items() if kind == "pick")
-        return self._solved is not None or not any(pick.get("enabled", True) for pick in picks)
-
-    def take_solution(self, other: "EditedPalette") -> None:
-        """Take over the solution of another document of this palette with the same edits."""
-        if self._solved is None and other._active() == self._active():
-            self._solved = other._solved
-            if other._state == self._state:
-                self._core = other._core
-
-    @property
     def _name(self) -> str:
         return "<document>" if self.path is None else str(self.path)
 
@@ -108,15 +93,13 @@ class EditedPalette(Steps):
         """Return the sidecar's members; they share values with the document."""
         ids = (vertex["id"] for vertex in self._fields["polytope"]["vertices"])
         fields = sidecar.with_state(self._fields, self._state, ids)
-        if self._solved is None:
-            self._solved = _solve(fields)
-        solution, measured = self._solved
-        found = fields["edits"]
-        if measured:
-            found["picks"] = [{**p, **measured.get(p["id"], {})} for p in found["picks"]]
-        if solution:
-            found["solution"] = solution
-        return sidecar.with_history(fields, self._done, self._undone)
+        fields = sidecar.with_history(fields, self._done, self._undone)
+        return sidecar.with_mattes(fields, self._mattes, self._display_of_clip)
+
+    def _display_of_clip(self) -> "Display | None":
+        from palette4d.grade.mattes import display_curve
+
+        return display_curve(self.encoding)
 
     @property
     def frames(self) -> tuple[int, int, int]:
@@ -299,24 +282,6 @@ class EditedPalette(Steps):
                 f"{edge} itself, without frame=…"
             )
         self._handles.check_inside(edge, frame)
-
-
-def stored_solution(found: Fields) -> Solved:
-    """Return the solution in a sidecar's member "edits", and what it measured of each pick."""
-    measured = {
-        pick["id"]: {name: pick[name] for name in edits.MEASURED if name in pick}
-        for pick in found.get("picks", ())
-    }
-    return found.get("solution", {}), measured
-
-
-def _solve(fields: Fields) -> Solved:
-    """Return the solution of the picks in a sidecar's members, and what it measured of each."""
-    if not any(pick.get("enabled", True) for pick in fields["edits"].get("picks", ())):
-        return {}, {}
-    from palette4d.grade import solve
-
-    return solve.solve(fields)
 
 
 def text_of(colour: Colour) -> str:

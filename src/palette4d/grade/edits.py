@@ -5,7 +5,7 @@ A state maps keys to values. A key is a kind and an id:
 - ``("handle", id)``: a `Setting` of a palette vertex or of a colour stop. A vertex without one
   keeps its own colour; a stop without one does not exist.
 - ``("ramp", "")``: the clip's ramp between handles, one of `RAMPS`; absent: "linear".
-- ``("pick", id)``: a pick or a hold, as the sidecar's JSON object without its measured members.
+- ``("pick", id)``: a pick or a hold, as the sidecar's JSON object.
 - ``("lock", id)``: True for a handle that does not move.
 - ``("version", name)``: the sidecar's member "edits" of a named version.
 
@@ -35,8 +35,8 @@ RAMP: Key = ("ramp", "")
 #: The largest absolute code value that the file format allows (docs/sidecar.md).
 LARGEST_COLOUR = 1e6
 
-#: Members of a pick that solving measures; they are no part of the state.
-MEASURED = ("residual", "worst", "worst_frame", "global")
+#: Members of picks in files of version 1, in which they moved palette colours.
+FORMER = ("radius", "global_only", "spread", "residual", "worst", "worst_frame", "global")
 
 #: Limits of the history in a file: its steps, and their characters as JSON.
 MOST_STEPS, MOST_TEXT = 200, 256_000
@@ -347,14 +347,14 @@ def from_fields(fields: Mapping[str, Any]) -> dict[Key, Any]:
     if fields.get("ramp", "linear") != "linear":
         state[RAMP] = as_ramp(fields["ramp"])
     for pick in fields.get("picks", ()):
-        state["pick", pick["id"]] = {n: v for n, v in pick.items() if n not in MEASURED}
+        state["pick", pick["id"]] = {n: v for n, v in pick.items() if n not in FORMER}
     for id_ in fields.get("locks", ()):
         state["lock", id_] = True
     return state
 
 
 def to_fields(state: State, vertex_ids: Iterable[str]) -> dict[str, Any]:
-    """Return a sidecar's member "edits", without its solution.
+    """Return a sidecar's member "edits".
 
     Vertices have the palette's order; stops, picks and locks have the order of their ids.
     """
@@ -417,11 +417,11 @@ def _pick(value: Any) -> dict[str, Any]:
     from palette4d.grade.picks import Pick  # which needs this module
 
     found = Pick.from_fields(value)
-    for name in ("frame", "from", "until", "fade", "radius"):
+    for name in ("frame", "from", "until", "fade", "reach", "softness"):
         _number(value, name)
     if found.kind not in ("pick", "hold") or found.frame is None:
         raise ValueError(f"found the pick {found.id!r}, expected its kind and frame")
-    return dict(value.items())
+    return {name: item for name, item in value.items() if name not in FORMER}
 
 
 def _true(value: Any) -> bool:

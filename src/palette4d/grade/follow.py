@@ -38,6 +38,8 @@ HOME, SAME = 0.5, 2
 #: Where more than LOST times as many pixels as at first are near, the colour is another thing's, as
 #: in the night, where all is dark. From there on it has ended, unless it comes back to its start.
 LOST = 7.0
+#: A colour this far from its start is another one: there it must have as many pixels, by SAME.
+FAR = 0.5
 #: Where fewer than one in GONE of the pixels at first is near, its object is not in the picture:
 #: what is left is others, and the change would be theirs.
 GONE = 20.0
@@ -110,7 +112,10 @@ def paths(
             raise Palette4dError(
                 f"frame {frame} of {clip.source} has no pixel that can be followed"
             )
-    found = _smoothed(_joined(frames, colours, known), [frames.index(frame) for frame in known])
+    joined = _joined(frames, colours, known)
+    if len(known) == 1:
+        joined[:, :3] = _without_drift(joined[:, :3], np.array(starts[0][1]))
+    found = _smoothed(joined, [frames.index(frame) for frame in known])
     found[:, 3] = np.clip((found[:, 3] - BARELY) / (1 - 2 * BARELY), 0.0, 1.0)
     kept = needed(frames, found, map(frames.index, known), STRAIGHT, MOST_KEYS)
     return tuple(
@@ -186,11 +191,29 @@ def _followed(colours: Sequence[tuple[F64, F64]], start: F64) -> F64:
             there = there + HOME * max(0.0, 1 - (1 - same) * SAME) * (still - there)
         path.append(there)
         found = _near(there, *after)
-        lost = home is not None and found is not None and found[1] > LOST * home[1]
+        # The farther it has gone, the more it must be as large as at first: else it has slid over
+        # to another thing.
+        far = min(1.0, float(np.linalg.norm(there - start)) / FAR)
+        most, least = LOST ** (1 - far) * SAME**far, far / SAME
+        size = 1.0 if home is None or found is None else found[1] / home[1]
+        lost = size > most or size < least
         back = float(np.linalg.norm(there - start)) < ALIKE
         alive = not lost and (back or alive)
         seen.append(float(alive and GONE * _alike(there, *after) >= pixels))
     return np.column_stack([path, seen])
+
+
+def _without_drift(path: F64, start: F64) -> F64:
+    """Return (n, 3) colours of a path that stays at its start while it is as near as `ALIKE`.
+
+    So far the mean of one thing's pixels moves in a still light, as others pass by. From twice as
+    far on the path is as it was found.
+    """
+    away = path - start
+    length = np.linalg.norm(away, axis=1, keepdims=True)
+    part = np.clip(length / ALIKE - 1, 0.0, 1.0)
+    kept: F64 = start + away * part * part * (3 - 2 * part)
+    return kept
 
 
 def _alike(colour: F64, rgb: F64, counts: F64) -> float:

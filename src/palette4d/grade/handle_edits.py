@@ -4,10 +4,9 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import TypedDict, Unpack
 
-from palette4d import _core
 from palette4d.colour.oklch import Adjustment, adjuster
 from palette4d.common.errors import Palette4dError
-from palette4d.grade import colour_moves, edits, sidecar
+from palette4d.grade import colour_moves, edits
 from palette4d.grade.edited_palette import EditedPalette, text_of
 from palette4d.grade.edits import RAMP, Change, Colour, Edit, Key, Ramp, Setting, as_colour, as_ramp
 from palette4d.grade.handles import unknown
@@ -246,17 +245,21 @@ class HandleEdits(EditedPalette):
         elif within is not None or track:
             name, way = f"track {id}", way_of(self._handles, (stop and stop.edge) or id)
         elif id in self._handles.edges:
-            new = as_colour(move(self._own_colour(id, self.frame_of(id, frame))))
+            new = as_colour(move(self._colour_on_edge(id, self.frame_of(id, frame))))
             return (self._stop(id, self.frame_of(id, frame), new, known),)
         else:
             name, way = id, ({id}, set())
         changed = colour_moves.moved(
-            *(self._handles, self._settings, way, move, self._own_colour),
+            *(self._handles, self._settings, way, move, self._colour_on_edge),
             within=within,
             ramp=known,
             clip_ramp=self.ramp,
             exact=None if id is None or rgb is None or frame is None else (id, frame),
         )
+        if track or id is None:
+            # Locked handles stay. One that is named itself moves.
+            locked = {n for kind, n in self._state if kind == "lock" and n != id}
+            changed = {n: setting for n, setting in changed.items() if n not in locked}
         if within is not None:
             what += f" {colour_moves.range_text(start, until)}"
         changes = [Change("handle", n, self._settings.get(n), v) for n, v in changed.items()]
@@ -285,7 +288,7 @@ class HandleEdits(EditedPalette):
                 "chroma and lightness"
             )
         new, at = self._checked(rgb, any_value), self.frame_of(id, frame)
-        before = self._own_colour(id, at) if id in self._handles.edges else self.colour(id)
+        before = self._colour_on_edge(id, at) if id in self._handles.edges else self.colour(id)
         return colour_moves.shift_to(before, new), f"to {text_of(new)}"
 
     def _offset(self, by: Iterable[float], any_value: bool) -> Colour:
@@ -294,15 +297,9 @@ class HandleEdits(EditedPalette):
             self.check_code_values(offset, "offset")
         return offset
 
-    def _own_colour(self, edge: str, frame: float) -> Colour:
-        """Return the colour of an edge at a frame, without the solution of the picks."""
-        if self._own is None:
-            fields = self._members()
-            own = {n: v for n, v in fields["edits"].items() if n not in ("picks", "solution")}
-            if own != fields["edits"]:
-                data = sidecar.encoded({**fields, "edits": own})
-                self._own = _core.parse_sidecar(data, self._name)
-        palette = palette_at(self._own or self.core, frame)
+    def _colour_on_edge(self, edge: str, frame: float) -> Colour:
+        """Return the colour of an edge at a frame, its ends included."""
+        palette = palette_at(self.core, frame)
         return as_colour(palette.edited[palette.ids.index(edge)])
 
     def reset(self, id: str | None = None) -> None:

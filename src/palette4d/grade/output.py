@@ -3,7 +3,7 @@
 The names and their meaning are those of the node's parameters, and the core draws for both.
 """
 
-import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -28,6 +28,8 @@ LIGHTNESS_OF = {
     "rec601": "Rec.601",
 }
 LEAST_REACH, MOST_REACH = 1e-4, 100.0
+#: The kinds of output that an id follows.
+_OF_ID = ("weight", "pick")
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,9 @@ class Output:
         "picture": a matte is a grey picture. "alpha": it multiplies alpha.
     outside_at : float
         The distance from the palette, in its code values, at which "outside" is 1.
+    clean_up : float
+        The share of the change by picks that is filtered along the picture's edges, 0..1, so that
+        codec blocks, soft chroma and rims do not show.
 
     Raises
     ------
@@ -66,18 +71,19 @@ class Output:
     mix: float = 1.0
     matte_in: Literal["picture", "alpha"] = "picture"
     outside_at: float = 0.05
+    clean_up: float = 1.0
 
     def __post_init__(self) -> None:
         """Check the values."""
         kind = self.kind
-        if kind not in ("recoloured", "weight", "outside", "palette") or (
-            kind == "weight" and not self.handle
+        if kind not in ("recoloured", *_OF_ID, "outside", "palette") or (
+            kind in _OF_ID and not self.id
         ):
             raise Palette4dError(
                 f"found {self.show!r} to show, expected 'recoloured', 'weight:ID' with the id of "
-                "a vertex or stop, 'outside' or 'palette'"
+                "a vertex or stop, 'pick:ID' with that of a pick or hold, 'outside' or 'palette'"
             )
-        for name in ("strength", "keep_lightness", "mix"):
+        for name in ("strength", "keep_lightness", "mix", "clean_up"):
             if not 0 <= getattr(self, name) <= 1:
                 raise Palette4dError(
                     f"found the {name.replace('_', ' ')} {getattr(self, name)}, expected 0 to 1"
@@ -98,19 +104,19 @@ class Output:
 
     @property
     def kind(self) -> str:
-        """`show` without the handle's id."""
+        """`show` without the id."""
         kind, colon, _ = self.show.partition(":")
-        return kind if colon == "" or kind == "weight" else self.show
+        return kind if colon == "" or kind in _OF_ID else self.show
 
     @property
-    def handle(self) -> str:
-        """The id of the handle whose weight is shown, or ""."""
+    def id(self) -> str:
+        """The id of the handle whose weight is shown, or of the pick whose matte is; or ""."""
         return self.show.partition(":")[2]
 
     @property
     def in_alpha(self) -> bool:
         """Whether the output needs an alpha channel."""
-        return self.kind in ("weight", "outside") and self.matte_in == "alpha"
+        return self.kind in (*_OF_ID, "outside") and self.matte_in == "alpha"
 
     def draw(
         self,
@@ -119,24 +125,27 @@ class Output:
         palette: Palette,
         edit: _core.Recolourer,
         *,
+        picks: Sequence[str] = (),
         premultiplied: bool,
         space: Space,
         threads: int,
     ) -> F32:
         """Draw a frame, (h, w, 3 or 4) float32, with its palette and its edit.
 
+        `picks` are the ids of the picks and holds.
+
         Raises
         ------
         Palette4dError
-            The sidecar has no such handle.
+            The sidecar has no such handle, pick or hold.
         """
         own = sidecar.conversion if space == "input" else None
         encoding = own.input_space if own else sidecar.clip["encoding"]
-        reader = self._reader(sidecar, palette.frame)
+        map = self._reader(sidecar, palette, picks) or edit
         return _core.draw(
             image,
             self.kind,  # type: ignore[arg-type]  # __post_init__ has checked it
-            edit if reader is None else _core.Recolourer(palette.rgb, reader, palette.faces),
+            map,
             original=palette.rgb,
             edited=palette.edited,
             strength=self.strength,
@@ -145,24 +154,36 @@ class Output:
             mix=self.mix,
             matte_in_alpha=self.in_alpha,
             outside_at=self.outside_at,
+            clean_up=self.clean_up,
             premultiplied=premultiplied,
             threads=threads,
             conversion=own.steps if own else None,
         )
 
-    def _reader(self, sidecar: _core.Sidecar, frame: float) -> NDArray[np.float64] | None:
-        """Return the edited colours that draw a matte, (n, 3); None without a matte."""
-        polytope, edits = sidecar.polytope, sidecar.edits
-        if self.kind == "outside":
-            return _core.surface_reader(_core.slice_at(polytope, frame))
-        if self.kind != "weight":
+    def _reader(
+        self, sidecar: _core.Sidecar, palette: Palette, picks: Sequence[str]
+    ) -> _core.Recolourer | None:
+        """Return what draws a matte; None without one."""
+        polytope, edits, frame = sidecar.polytope, sidecar.edits, palette.frame
+        found = None
+        if self.kind == "pick":
+            if self.id not in picks:
+                known = f"expected {' or '.join(picks)}" if picks else "there are none"
+                raise Palette4dError(f"there is no pick or hold {self.id!r}; {known}")
+            found, edited = sidecar.pick_matte_at(self.id, frame), palette.rgb
+        elif self.kind == "outside":
+            edited = _core.surface_reader(_core.slice_at(polytope, frame))
+        elif self.kind == "weight":
+            ids = [*polytope.vertex_ids, *(stop["id"] for stop in edits.stops)]
+            if self.id in picks:
+                raise Palette4dError(
+                    f"found {self.show!r}, expected the id of a vertex or stop; the matte of a "
+                    f"pick is 'pick:{self.id}'"
+                )
+            if self.id not in ids:
+                raise unknown(self.id, "vertex or stop", ids)
+            slice = _core.slice_at(polytope, frame)
+            edited = _core.weight_reader(polytope, edits, slice, self.id)
+        else:
             return None
-        ids = [*polytope.vertex_ids, *(stop["id"] for stop in edits.stops)]
-        if self.handle not in ids and re.fullmatch(r"p\d+", self.handle):
-            raise Palette4dError(
-                f"found {self.show!r}, expected the id of a vertex or stop: picks and holds have "
-                "no matte, handles have. `palette4d info SIDECAR --handles` lists them"
-            )
-        if self.handle not in ids:
-            raise unknown(self.handle, "vertex or stop", ids)
-        return _core.weight_reader(polytope, edits, _core.slice_at(polytope, frame), self.handle)
+        return _core.Recolourer(palette.rgb, edited, palette.faces, picks=found)

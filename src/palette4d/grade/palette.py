@@ -30,8 +30,6 @@ class Palette:
         The vertices before and after each colour in time; the same twice if it lies on a vertex.
     weights : (n,) float64
         The share of the vertex after it, 0..1 (eq. 6).
-    bumps : (b, 11) float64
-        What moves besides the palette, and holds, as `_core.Recolourer` takes them.
     """
 
     frame: float
@@ -41,7 +39,6 @@ class Palette:
     faces: NDArray[np.int32]
     ends: tuple[tuple[str, str], ...]
     weights: NDArray[np.float64]
-    bumps: NDArray[np.float64]
 
     def nearest(self, colour: Colour) -> tuple[int, float]:
         """Return the index of the edited colour nearest to a colour, and their RGB distance."""
@@ -112,5 +109,4 @@ def palette_at(sidecar: _core.Sidecar, frame: float) -> Palette:
         faces=cut.faces,
         ends=ends,
         weights=cut.weights,
-        bumps=sidecar.edits.bumps_at(cut.frame),
     )

@@ -1,34 +1,38 @@
 """Picks and holds of a palette: made, changed, removed; and what they do."""
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import hex_of
 from palette4d.grade import edits
 from palette4d.grade.colour_moves import range_text
-from palette4d.grade.edits import Colour, as_colour
+from palette4d.grade.edits import Change, Colour, Edit, as_colour
 from palette4d.grade.handles import unknown
-from palette4d.grade.picks import MOST_PICKS, Pick, Toward, all_picks, check_range
+from palette4d.grade.picks import MOST_PICKS, Area, Pick, Toward, all_picks, check
 from palette4d.grade.recolouring import Recolouring
 
 if TYPE_CHECKING:
+    from palette4d.grade.answer import Answer
     from palette4d.grade.clip_of_picks import ClipOfPicks
-    from palette4d.grade.effects import Around, SideEffect
+
+Path = str | os.PathLike[str]
+#: A picked colour that is farther than this from what was asked, 3 of 255, is told.
+MET = 0.012
+Progress = Callable[[int, int], object]
 
 
 class PickEdits(Recolouring):
-    """The picks and locks of a palette. `solve` finds what they move."""
+    """The picks and locks of a palette. `mattes` learns what colours they take."""
 
     @property
     def picks(self) -> tuple[Pick, ...]:
-        """The picks and holds, with their measured residuals, in the order of their ids."""
-        return all_picks(self._members()["edits"])
+        """The picks and holds, in the order of their ids."""
+        return all_picks(edits.to_fields(self._state, ()))
 
     def pick(
         self,
@@ -37,22 +41,26 @@ class PickEdits(Recolouring):
         colour: Iterable[float] | str | None = None,
         pixel: tuple[float, float] | None = None,
         box: int = 1,
+        areas: Sequence[Area] = (),
         to: Iterable[float] | str | None = None,
         by: Iterable[float] | None = None,
-        clip: str | os.PathLike[str] | None = None,
+        clip: Path | None = None,
         follow: bool = True,
         toward: Toward = "shift",
         start: float | None = None,
         until: float | None = None,
         fade: float = 0.0,
-        radius: float | None = None,
-        global_only: bool = False,
+        whole_hue: bool = False,
+        reach: float = 0.0,
+        softness: float = 0.5,
+        lightness: tuple[float, float] = (0.0, 1.0),
         any_value: bool = False,
-        progress: Callable[[int, int], object] | None = None,
+        progress: Progress | None = None,
     ) -> Pick:
-        """Change a colour of the clip into another one, and little else.
+        """Change a thing's colour into another one, and nothing else.
 
-        All picks and holds are solved together, again after every edit (docs/grading.md).
+        Which colours are the thing's is learned from the frame and from a few further frames of the
+        clip: what is connected with the picked place is the thing (docs/grading.md).
 
         Parameters
         ----------
@@ -64,10 +72,12 @@ class PickEdits(Recolouring):
             Instead of `colour`: a pixel of the clip's frame, x from the left, y from the top.
         box : int
             With `pixel`: the side of the box around it whose mean is picked.
+        areas : sequence of Area
+            More parts of the thing: boxes and strokes.
         to, by : 3 floats
             The new colour, or the change; one of them.
         clip : path, optional
-            The clip; default: the sidecar's.
+            The clip; default: the sidecar's. Without a clip the pick takes all of its hue.
         follow : bool
             Follow the colour through the clip. Without the clip, or without this, the pick is at
             the same colour in all frames.
@@ -77,10 +87,14 @@ class PickEdits(Recolouring):
             First and last frame with the full change; default: the clip's.
         fade : float
             Frames of the ramps before `start` and after `until`; beyond them nothing changes.
-        radius : float, optional
-            Where the local remainder ends, in code values.
-        global_only : bool
-            No local remainder: only palette colours move.
+        whole_hue : bool
+            Take all colours of the hue, as a qualifier does; learn nothing.
+        reach : float
+            Log odds, -8..8: above 0 the pick takes more colours, below 0 fewer.
+        softness : float
+            How soft the matte is, 0..1.
+        lightness : (float, float)
+            The lowest and the highest lightness that change.
         any_value : bool
             Take colours such as 255 128 0 as they are.
         progress : callable, optional
@@ -89,7 +103,7 @@ class PickEdits(Recolouring):
         Returns
         -------
         Pick
-            With its id and its path. `picks` has it with what solving measures.
+            With its id and its path.
 
         Raises
         ------
@@ -107,10 +121,9 @@ class PickEdits(Recolouring):
                 f"found {'neither' if to is None else 'both'} of the new colour (to) and the "
                 "change (by), expected one of them"
             )
-        found = replace(at, kind="pick", to=new, toward=toward, start=start, until=until)
-        found = replace(found, fade=fade, radius=radius, global_only=global_only)
-        if radius is not None:
-            _needs_radius(found)
+        found = replace(at, kind="pick", to=new, toward=toward, start=start, until=until, fade=fade)
+        found = replace(found, areas=tuple(areas), whole_hue=whole_hue)
+        found = replace(found, reach=reach, softness=softness, lightness=lightness)
         return self._add_pick(found, clip, follow, progress)
 
     def hold(
@@ -120,18 +133,18 @@ class PickEdits(Recolouring):
         colour: Iterable[float] | str | None = None,
         pixel: tuple[float, float] | None = None,
         box: int = 1,
-        clip: str | os.PathLike[str] | None = None,
+        areas: Sequence[Area] = (),
+        clip: Path | None = None,
         follow: bool = True,
         start: float | None = None,
         until: float | None = None,
         fade: float = 0.0,
-        radius: float | None = None,
         any_value: bool = False,
-        progress: Callable[[int, int], object] | None = None,
+        progress: Progress | None = None,
     ) -> Pick:
-        """Keep a colour of the clip as it is, whatever picks and handles do; as `pick`."""
+        """Keep a thing's colour as it is, whatever picks and handles do; as `pick`."""
         at = self._picked(frame, colour, pixel, box, clip, any_value)
-        found = replace(at, start=start, until=until, fade=fade, radius=radius)
+        found = replace(at, start=start, until=until, fade=fade, areas=tuple(areas))
         return self._add_pick(found, clip, follow, progress)
 
     def correct_path(
@@ -142,9 +155,9 @@ class PickEdits(Recolouring):
         colour: Iterable[float] | str | None = None,
         pixel: tuple[float, float] | None = None,
         box: int = 1,
-        clip: str | os.PathLike[str] | None = None,
+        clip: Path | None = None,
         any_value: bool = False,
-        progress: Callable[[int, int], object] | None = None,
+        progress: Progress | None = None,
     ) -> Pick:
         """Say where the colour of a pick or hold is at another frame; it is followed again.
 
@@ -155,10 +168,32 @@ class PickEdits(Recolouring):
 
         at = self._picked(frame, colour, pixel, box, clip, any_value)
         found = corrected(self._pick(id), at.frame, at.rgb)
-        found = replace(found, path=self._clip_of_picks(clip).path(found, progress))
-        self._put(
-            "pick", id, found.to_fields(), f"correct {id}: {hex_of(at.rgb)} at frame {frame:g}"
-        )
+        of_clip = self._clip_of_picks(clip)
+        found = replace(found, path=of_clip.path(found, progress))
+        label = f"correct {id}: {hex_of(at.rgb)} at frame {frame:g}"
+        self._put_learned(found, of_clip, label)
+        return self._pick(id)
+
+    def add_area(
+        self,
+        id: str,
+        area: Area,
+        *,
+        clip: Path | None = None,
+    ) -> Pick:
+        """Say that a box or a stroke of a frame belongs to a pick or hold too; it learns again."""
+        old = self._pick(id)
+        self.check_frame(area.frame)
+        of_clip = self._clip_of_picks(clip)
+        if of_clip.open() is None:
+            raise Palette4dError(
+                f"the clip {self._fields['clip']['source']!r} is not there, so that nothing can be "
+                "learned from its pixels; give clip=…"
+            )
+        of_clip.check_places(area.frame, area.points)
+        found = replace(old, areas=(*old.areas, area), whole_hue=False)
+        what = "a box" if len(area.points) == 1 else "a stroke"
+        self._put_learned(found, of_clip, f"add {what} at frame {area.frame:g} to {id}")
         return self._pick(id)
 
     def change_pick(
@@ -168,14 +203,15 @@ class PickEdits(Recolouring):
         by: Iterable[float] | None = None,
         follow: bool | None = None,
         any_value: bool = False,
-        clip: str | os.PathLike[str] | None = None,
-        progress: Callable[[int, int], object] | None = None,
+        clip: Path | None = None,
+        progress: Progress | None = None,
         **changes: Any,
     ) -> Pick:
-        """Change a pick or hold: any of the attributes of `Pick` but id, kind and path.
+        """Change a pick or hold: any of the attributes of `Pick` but id, kind, path and matte.
 
         `by` gives the new colour as offsets from the picked colour. A new `frame`, `rgb` or range
-        is followed again, if the pick was followed. `follow` begins or ends that.
+        is followed again, if the pick was followed. `follow` begins or ends that. Where its place
+        or a hold changes, mattes are learned again.
         """
         old = self._pick(id)
         if by is not None:
@@ -184,12 +220,11 @@ class PickEdits(Recolouring):
         for name in ("rgb", "to"):
             if name in changes:
                 changes[name] = self._checked(changes[name], any_value)
-        if old.kind == "hold" and (bad := {"to", "toward", "global_only"} & changes.keys()):
+        bad = {"to", "toward", "whole_hue", "reach", "softness", "lightness"} & changes.keys()
+        if old.kind == "hold" and bad:
             raise Palette4dError(f"{id} is a hold, which has no {' and no '.join(sorted(bad))}")
         new = replace(old, **changes)
         self._check_pick(new)
-        if changes.get("radius") is not None:
-            _needs_radius(new)
         moved = {"frame", "rgb", "start", "until", "fade"} & changes.keys()
         if follow is False:
             new = replace(new, path=())
@@ -200,17 +235,23 @@ class PickEdits(Recolouring):
         label = f"change {id}: {_changed(old, new)}"
         if old.enabled != new.enabled:
             label = f"{'enable' if new.enabled else 'disable'} {id}"
-        self._put("pick", id, new.to_fields(), label)
+        learns = moved or {"pixel", "box", "areas", "whole_hue"} & changes.keys()
+        if learns or follow is not None or (new.kind == "hold" and old.enabled != new.enabled):
+            self._put_learned(new, self._clip_of_picks(clip), label)
+        else:
+            self._put("pick", id, new.to_fields(), label)
         return self._pick(id)
 
-    def unpick(self, *ids: str) -> None:
-        """Remove picks and holds."""
-        for id_ in ids:
-            self._pick(id_)
-        self._remove([("pick", id_) for id_ in dict.fromkeys(ids)], f"remove {' '.join(ids)}")
+    def unpick(self, *ids: str, clip: Path | None = None) -> None:
+        """Remove picks and holds. Without a hold, the others' mattes are learned again."""
+        holds = any(self._pick(id_).kind == "hold" for id_ in ids)
+        with self.one_step(f"remove {' '.join(ids)}"):
+            self._remove([("pick", id_) for id_ in dict.fromkeys(ids)], "")
+            if holds:
+                self._learn_again(self._clip_of_picks(clip))
 
     def lock(self, *ids: str) -> None:
-        """Keep vertices and stops where they are: picks do not move them."""
+        """Keep vertices and stops where they are: moves of tracks and of the palette leave them."""
         for id_ in ids:
             if id_ not in self._settings:
                 self._handles.vertex(id_, self._settings)
@@ -219,7 +260,7 @@ class PickEdits(Recolouring):
                 self._put("lock", id_, True, "")
 
     def unlock(self, *ids: str) -> None:
-        """Let picks move these vertices and stops again."""
+        """Let tracks and the palette move these vertices and stops again."""
         for id_ in ids:
             if ("lock", id_) not in self._state:
                 locked = [known for kind, known in self._state if kind == "lock"]
@@ -228,108 +269,62 @@ class PickEdits(Recolouring):
 
     @property
     def locks(self) -> tuple[str, ...]:
-        """The ids of the handles that picks do not move."""
+        """The ids of the handles that stay when tracks or the palette move."""
         return tuple(edits.to_fields(self._state, ()).get("locks", ()))
 
-    @property
-    def has_clip_colours(self) -> bool:
-        """Whether the sidecar has colours of its clip; without, picks guard the palette's only."""
-        return bool(self._fields.get("colours"))
+    def answer(self, id: str, clip: Path | None = None) -> "Answer | None":
+        """Return what a pick takes of its frame, what else it takes, and what would help.
 
-    def moved_by_picks(self) -> tuple[int, int]:
-        """Return how many tracks picks move by more than 1/255, and how many there are."""
-        solution = self._members()["edits"].get("solution", {"vertices": [], "keys": []})
-        moved = {
-            entry.get("vertex") or entry["edge"]
-            for entry in (*solution["vertices"], *solution["keys"])
-            if max(map(abs, entry["by"])) > 1 / 255
-        }
-        tracks = [{*track.vertices, *track.edges} for track in self.tracks]
-        return sum(not moved.isdisjoint(track) for track in tracks), len(tracks)
-
-    def side_effect(self, *, least: float = 10 / 255) -> "SideEffect":
-        """Return which share of the pixels picks change by more than `least` in a channel.
-
-        It says how much of it is not near a picked colour, and which colour to hold.
+        None where the clip is not there.
         """
-        from palette4d.grade import effects
+        from palette4d.grade import answer
 
-        return effects.side_effect(self._members(), least)
+        return answer.of(self, self._pick(id), self._clip_of_picks(clip))
 
-    def around_picks(self) -> "dict[str, Around]":
-        """Return what the clip's colours near each enabled pick get of its change, by its id."""
-        from palette4d.grade import effects
+    def pick_warnings(self, id: str, clip: Path | None = None) -> tuple[str, ...]:
+        """Return what speaks against the clip of a pick or hold, and its colour."""
+        from palette4d.grade.clip_colours import ClipColours
 
-        return effects.surroundings(self._members())
-
-    def pick_notes(
-        self,
-        effect: "SideEffect | None" = None,
-        around: "Mapping[str, Around] | None" = None,
-    ) -> list[str]:
-        """Return what speaks against the enabled picks, and what helps, one sentence or two each.
-
-        `effect` and `around` are those of `side_effect` and `around_picks`, if they are at hand.
-        """
-        from palette4d.grade.pick_notes import notes
-
-        enabled = [pick for pick in self.picks if pick.enabled]
-        if not enabled:
-            return []
-        return notes(
-            enabled,
-            effect or self.side_effect(),
-            self.around_picks() if around is None else around,
-            scene_linear=self.scene_linear,
-            has_clip_colours=self.has_clip_colours,
-        )
-
-    def pick_warnings(self, id: str, clip: str | os.PathLike[str] | None = None) -> tuple[str, ...]:
-        """Return what speaks against the clip of a pick or hold, its colour and its box."""
-        from palette4d.grade.clip_of_picks import MOST_COLOURS
-        from palette4d.grade.solve import ClipAtTimes
-
-        pick, known = self._pick(id), ClipAtTimes(self._members())
+        pick = self._pick(id)
+        known = ClipColours(self.core.polytope, self._fields)
         stored = [known.colours_at(pick.frame), *known.colours] if known.colours else []
-        of_clip = self._clip_of_picks(clip)
-        found = of_clip.warnings(pick, stored)
-        if pick.pixel is None or pick.box is None or pick.box == 1 or of_clip.open() is None:
-            return found
-        missed = self._missed(pick, of_clip.box(pick.frame, pick.pixel, pick.box))
-        if missed <= 1 - MOST_COLOURS:
-            return found
-        what = "get less than half of the change"
-        if pick.kind == "hold":
-            what = "still change by more than 10 of 255"
-        return (
-            *found,
-            f"{missed:.0%} of the pixels in the box of {id} {what}: they have other colours. "
-            f"{pick.kind.capitalize()} them too, or choose a smaller box=…",
-        )
+        found = self._clip_of_picks(clip).warnings(pick, stored)
+        found += self._unmet(pick)
+        outside = pick.to is not None and not all(-0.05 <= value <= 1.05 for value in pick.to)
+        if outside and not self.scene_linear:
+            found += (f"the new colour of {id} lies far outside 0..1; most files clip it",)
+        return found
 
-    def _missed(self, pick: Pick, colours: NDArray[np.float64]) -> float:
-        """Return which share of (n, 3) colours does not do what a pick of them asks for."""
-        image = colours[None].astype(np.float32)
-        done = (self.recolour(image, pick.frame, space="palette") - image)[0]
-        if pick.kind == "hold":
-            return float((np.abs(done).max(axis=1) > 10 / 255).mean())
-        if pick.strength_at(pick.frame, self.frames[2]) < 1:
-            return 0.0
-        change = pick.change_at(pick.frame)
-        return float((done @ change < 0.5 * change @ change).mean())
+    def _unmet(self, pick: Pick) -> tuple[str, ...]:
+        """Return a line if a picked colour does not become what is asked, with the likely cause."""
+        step = self.frames[2]
+        if not pick.enabled or pick.strength_at(pick.frame, step) < 1:
+            return ()
+        image = np.array(pick.rgb, np.float32)[None, None]
+        found = self.recolour(image, pick.frame, space="palette", clean_up=0)[0, 0]
+        off = float(np.linalg.norm(found - pick.rgb - pick.change_at(pick.frame)))
+        others = [p for p in self.picks if p.enabled and p.id != pick.id]
+        if off <= MET or not others:
+            return ()
+        away = [float(np.linalg.norm(p.colour_at(pick.frame) - pick.rgb)) for p in others]
+        near = others[int(np.argmin(away))]
+        return (
+            f"{pick.id} is off by {off:.3f}: {near.id} has nearly the same colour, {min(away):.3f} "
+            f"away, and asks for something else. Change or disable one of {pick.id} and {near.id}",
+        )
 
     def colour_of_pixel(
         self,
         frame: float,
         pixel: tuple[float, float],
         box: int = 1,
-        clip: str | os.PathLike[str] | None = None,
+        clip: Path | None = None,
     ) -> Colour:
         """Return the mean colour of a box around a pixel of the clip, in the palette's values."""
         self.check_frame(frame)
-        return self._clip_of_picks(clip).colours(frame, pixel, box)[0]
+        return self._clip_of_picks(clip).colour(frame, pixel, box)
 
-    def _clip_of_picks(self, clip: str | os.PathLike[str] | None) -> "ClipOfPicks":
+    def _clip_of_picks(self, clip: Path | None) -> "ClipOfPicks":
         from palette4d.grade.clip_of_picks import ClipOfPicks
 
         conversion = self._conversion("input")
@@ -341,7 +336,7 @@ class PickEdits(Recolouring):
         colour: Iterable[float] | str | None,
         pixel: tuple[float, float] | None,
         box: int,
-        clip: str | os.PathLike[str] | None,
+        clip: Path | None,
         any_value: bool,
     ) -> Pick:
         """Return a hold of a colour at a frame."""
@@ -349,8 +344,8 @@ class PickEdits(Recolouring):
         if colour is not None and pixel is None:
             return Pick("", "hold", frame, self._checked(colour, any_value))
         if colour is None and pixel is not None:
-            rgb, spread = self._clip_of_picks(clip).colours(frame, pixel, box)
-            return Pick("", "hold", frame, rgb, pixel=pixel, box=box, spread=spread)
+            rgb = self._clip_of_picks(clip).colour(frame, pixel, box)
+            return Pick("", "hold", frame, rgb, pixel=pixel, box=box)
         raise Palette4dError(
             f"found {'neither' if colour is None else 'both'} of a colour and a pixel, expected "
             "one of them"
@@ -359,7 +354,7 @@ class PickEdits(Recolouring):
     def _add_pick(
         self,
         found: Pick,
-        clip: str | os.PathLike[str] | None,
+        clip: Path | None,
         follow: bool,
         progress: Callable[[int, int], object] | None,
     ) -> Pick:
@@ -369,26 +364,78 @@ class PickEdits(Recolouring):
         if enabled >= MOST_PICKS:
             raise Palette4dError(
                 f"there are {enabled} picks and holds, and at most {MOST_PICKS} can be "
-                "solved together; remove or disable some (`unpick`, `disable`)"
+                "enabled; remove or disable some (`unpick`, `disable`)"
             )
         self._check_pick(found)
+        of_clip = self._clip_of_picks(clip)
+        for area in found.areas:
+            of_clip.check_places(area.frame, area.points)
         if follow:
-            found = replace(found, path=self._clip_of_picks(clip).path(found, progress))
+            found = replace(found, path=of_clip.path(found, progress))
         for kind, id_ in self._state:
             if kind == "pick" and _same(self._pick(id_), found):
                 off = "" if self._pick(id_).enabled else f", disabled: `enable {id_}`"
                 raise Palette4dError(f"{id_} is this {found.kind} already{off}; nothing was added")
         taken = (id_ for kind, id_ in self._state if kind == "pick")
         found = replace(found, id=edits.new_id("p", taken))
-        self._put("pick", found.id, found.to_fields(), f"{found.kind} {found.id}: {_asked(found)}")
+        self._put_learned(found, of_clip, f"{found.kind} {found.id}: {_asked(found)}")
         return self._pick(found.id)
+
+    def _take_picks(self, picks: Iterable[Pick], clip: Path | None) -> tuple[str, ...]:
+        """Take over picks of another clip, learned here; return those whose colour is not here.
+
+        Without the clip they take all of their hue, as they cannot be learned.
+        """
+        of_clip = self._clip_of_picks(clip)
+        left_out = []
+        # Holds first: they are background for the picks.
+        for pick in sorted(picks, key=lambda pick: pick.kind == "pick"):
+            if of_clip.open() is None or pick.whole_hue:
+                found: Pick | None = pick
+            else:
+                found = of_clip.at_home(pick, self._display_of_clip())
+            if found is None:
+                left_out.append(f"{pick.id} ({_asked(pick)})")
+                continue
+            if of_clip.open() is not None:
+                found = replace(found, path=of_clip.path(replace(found, path=())))
+            self._put("pick", pick.id, self._learned(found, of_clip).to_fields(), "")
+        return tuple(left_out)
+
+    def _put_learned(self, pick: Pick, of_clip: "ClipOfPicks", label: str) -> None:
+        """Set a pick or hold with a new matte, as one step; a hold changes the others' mattes."""
+        learned = self._learned(pick, of_clip)
+        with self.one_step(label):
+            self._put("pick", pick.id, learned.to_fields(), "")
+            if pick.kind == "hold":
+                self._learn_again(of_clip)
+
+    def _learn_again(self, of_clip: "ClipOfPicks") -> None:
+        """Learn the mattes of all picks again, where the clip is there: their holds changed."""
+        changes = []
+        for old in self.picks:
+            if old.kind == "pick" and (new := self._learned(old, of_clip)) != old:
+                changes.append(Change("pick", old.id, old.to_fields(), new.to_fields()))
+        self.apply(Edit(tuple(changes), ""))
+
+    def _learned(self, pick: Pick, of_clip: "ClipOfPicks") -> Pick:
+        """Return a pick with the matte of its colour; without the clip it keeps the one it has."""
+        if pick.whole_hue:
+            return replace(pick, matte=None)
+        others = self.picks if pick.kind == "pick" else ()
+        holds = [p for p in others if p.kind == "hold" and p.enabled and p.id != pick.id]
+        learned = of_clip.learn(pick, holds, self._display_of_clip())
+        if learned is None:
+            return pick
+        self._mattes[learned.id] = learned.text
+        return replace(pick, matte=learned.id if learned.found else None)
 
     def _check_pick(self, found: Pick) -> None:
         self.check_frame(found.frame)
-        check_range(found, self.frames)
+        check(found, self.frames)
 
     def _pick(self, id_: str) -> Pick:
-        """Return a pick as the user asked for it; nothing is solved."""
+        """Return a pick or hold by its id."""
         found = self._state.get(("pick", id_))
         if found is None:
             known = [known for kind, known in self._state if kind == "pick"]
@@ -396,18 +443,11 @@ class PickEdits(Recolouring):
         return Pick.from_fields(found)
 
 
-def _needs_radius(found: Pick) -> None:
-    if found.global_only:
-        raise Palette4dError(
-            "found a radius for a pick that moves palette colours only (global_only=True), which "
-            "has no neighbourhood; leave out one of the two"
-        )
-
-
 def _same(old: Pick, new: Pick) -> bool:
     """Return whether two picks ask for the same, whatever paths were found or corrected."""
     unlike = bool(old.path) != bool(new.path)
-    return not unlike and replace(old, path=(), enabled=True) == replace(new, id=old.id, path=())
+    mine = replace(old, path=(), enabled=True, matte=None)
+    return not unlike and mine == replace(new, id=old.id, path=(), matte=None)
 
 
 def _changed(old: Pick, new: Pick) -> str:
@@ -420,9 +460,11 @@ def _changed(old: Pick, new: Pick) -> str:
             if pick.start is None and pick.until is None
             else range_text(pick.start, pick.until),
             f"fades of {pick.fade:g} frames",
-            "default radius" if pick.radius is None else f"radius {pick.radius:g}",
             f"the same {'new colour' if pick.toward == 'colour' else 'change'} at all frames",
-            "the palette alone" if pick.global_only else "the palette and near colours",
+            "all of its hue" if pick.whole_hue else "learned colours",
+            f"reach {pick.reach:g}",
+            f"softness {pick.softness:g}",
+            f"lightness {pick.lightness[0]:g} to {pick.lightness[1]:g}",
             "followed" if pick.path else "not followed",
         )
         for pick in (old, new)

@@ -1,13 +1,14 @@
 """Picks and holds: colours of the clip that change or stay, as the user asked.
 
-A pick or a hold is stored in the sidecar's ``edits.picks``. `grade.solve` finds the displacements
-that meet all of them; `grade.follow` finds where a picked colour is at other frames.
+A pick is a matte over colours times the amount of the picked colour times a change. The matte is
+learned from frames of the clip (`grade.mattes`); the core computes the rest for each pixel
+(`core/recolour/frame_picks.hpp`). `grade.follow` finds where a picked colour is at other frames.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
@@ -22,19 +23,15 @@ F64 = NDArray[np.float64]
 Kind = Literal["pick", "hold"]
 Toward = Literal["shift", "colour"]
 
-#: More enabled picks and holds than this are refused: solving and recolouring would be slow.
+#: More enabled picks and holds than this are refused: each costs time for each pixel.
 MOST_PICKS = 100
 
 #: Pixels within about this distance of a picked colour are taken for the same thing's: it is the
 #: standard deviation when a colour is followed.
 ALIKE = 0.08
 
-#: A residual above this, 3 of 255, is told, and above this share of the change.
-MET, MET_PART = 0.012, 0.02
-
-#: Two picks nearer than this in colour are named together if one of them is not met. Below half a
-#: step of 8 bits they have the same colour.
-NEAR, SAME = 0.2, 0.5 / 255
+#: The largest absolute `Pick.reach`: beyond, a matte takes all or nothing.
+MOST_REACH = 8.0
 
 
 @dataclass(frozen=True)
@@ -57,6 +54,25 @@ class PathKey:
 
 
 @dataclass(frozen=True)
+class Area:
+    """A part of the picked object: a box, or a stroke of a brush.
+
+    Attributes
+    ----------
+    frame : float
+        The frame that it was drawn on.
+    points : tuple of (x, y)
+        Pixels, x from the left, y from the top: one for a box, more for a stroke.
+    radius : float
+        Half of the box's side, or of the brush's width, in pixels.
+    """
+
+    frame: float
+    points: tuple[tuple[float, float], ...]
+    radius: float
+
+
+@dataclass(frozen=True)
 class Pick:
     """A colour that changes (kind "pick") or stays (kind "hold").
 
@@ -76,24 +92,23 @@ class Pick:
         First and last frame with the full change; None: the clip's first and last.
     fade : float
         Frames of the ramps before `start` and after `until`.
-    radius : float or None
-        Where the local remainder ends, in the palette's code values; None: chosen by the solver.
-    global_only : bool
-        No local remainder; picks only.
     enabled : bool
     path : tuple of PathKey
         Where the colour is at other frames, linear between the keys; empty: always `rgb`.
     pixel, box : (x, y) and int, or None
         The pixel and the side of the box around it whose mean was picked.
-    spread : tuple of 3 floats
-        Offsets from the picked colour to other colours of the box, where they differ much.
-    residual : float or None
-        How far the result is from what was asked at `frame`, or at the next frame where the change
-        is full.
-    worst, worst_frame : float or None
-        The largest such distance of all frames, and where.
-    share : float or None
-        Share, 0..1, of the change that the palette does; the local remainder does the rest.
+    areas : tuple of Area
+        More parts of the object, which its matte is learned from.
+    matte : str or None
+        The id of the learned matte; None: all colours of its hue.
+    whole_hue : bool
+        Takes all of its hue on purpose, as a qualifier does: nothing is learned.
+    reach : float
+        Log odds added to the matte, -8..8: above 0 it takes more colours, below 0 fewer.
+    softness : float
+        How soft the matte is, 0..1.
+    lightness : (float, float)
+        The lowest and the highest lightness (largest channel, display code values) that change.
     """
 
     id: str
@@ -105,22 +120,22 @@ class Pick:
     start: float | None = None
     until: float | None = None
     fade: float = 0.0
-    radius: float | None = None
-    global_only: bool = False
     enabled: bool = True
     path: tuple[PathKey, ...] = ()
     pixel: tuple[float, float] | None = None
     box: int | None = None
-    spread: tuple[Colour, ...] = ()
-    residual: float | None = None
-    worst: float | None = None
-    worst_frame: float | None = None
-    share: float | None = None
+    areas: tuple[Area, ...] = ()
+    matte: str | None = None
+    whole_hue: bool = False
+    reach: float = 0.0
+    softness: float = 0.5
+    lightness: tuple[float, float] = (0.0, 1.0)
 
     @classmethod
     def from_fields(cls, fields: Mapping[str, Any]) -> Pick:
         """Return the pick of an entry of a sidecar's ``edits.picks``."""
         to, pixel = fields.get("to"), fields.get("pixel")
+        lowest, highest = fields.get("lightness", (0.0, 1.0))
         return cls(
             id=fields["id"],
             kind=fields["kind"],
@@ -131,8 +146,6 @@ class Pick:
             start=fields.get("from"),
             until=fields.get("until"),
             fade=fields.get("fade", 0.0),
-            radius=fields.get("radius"),
-            global_only=fields.get("global_only", False),
             enabled=fields.get("enabled", True),
             path=tuple(
                 PathKey(
@@ -145,20 +158,32 @@ class Pick:
             ),
             pixel=None if pixel is None else (pixel[0], pixel[1]),
             box=fields.get("box"),
-            spread=tuple(as_colour(offset) for offset in fields.get("spread", ())),
-            residual=fields.get("residual"),
-            worst=fields.get("worst"),
-            worst_frame=fields.get("worst_frame"),
-            share=fields.get("global"),
+            areas=tuple(
+                Area(area["frame"], tuple((x, y) for x, y in area["points"]), area["radius"])
+                for area in fields.get("areas", ())
+            ),
+            matte=fields.get("matte"),
+            whole_hue=fields.get("whole_hue", False),
+            reach=fields.get("reach", 0.0),
+            softness=fields.get("softness", 0.5),
+            lightness=(lowest, highest),
         )
 
     def to_fields(self) -> dict[str, Any]:
-        """Return the pick as the user asked for it, without what was measured."""
+        """Return the pick as an entry of a sidecar's ``edits.picks``; defaults are left out."""
         path = [
             {"frame": _number(key.frame), "rgb": list(key.rgb)}
             | ({"given": True} if key.given else {})
             | ({"there": key.there} if key.there < 1 else {})
             for key in self.path
+        ]
+        areas = [
+            {
+                "frame": _number(area.frame),
+                "points": [[_number(value) for value in point] for point in area.points],
+                "radius": _number(area.radius),
+            }
+            for area in self.areas
         ]
         every: dict[str, Any] = {
             "id": self.id,
@@ -170,13 +195,16 @@ class Pick:
             "from": None if self.start is None else _number(self.start),
             "until": None if self.until is None else _number(self.until),
             "fade": _number(self.fade) or None,
-            "radius": self.radius,
-            "global_only": self.global_only or None,
             "enabled": None if self.enabled else False,
             "path": path or None,
             "pixel": None if self.pixel is None else [_number(value) for value in self.pixel],
             "box": self.box,
-            "spread": [list(offset) for offset in self.spread] or None,
+            "areas": areas or None,
+            "matte": self.matte,
+            "whole_hue": self.whole_hue or None,
+            "reach": self.reach or None,
+            "softness": None if self.softness == 0.5 else self.softness,
+            "lightness": None if self.lightness == (0.0, 1.0) else list(self.lightness),
         }
         return {name: value for name, value in every.items() if value is not None}
 
@@ -235,7 +263,8 @@ class Pick:
             return new - colour
         change: F64 = new - old
         # The change that makes a wall blue by day would make its night black a bright blue.
-        light = min(1.0, max(0.0, float(colour.max())) / max(float(old.max()), 1e-9))
+        now, picked = float(colour.max()), float(old.max())
+        light = max(0.0, now) / max(picked, 1e-9) if now < picked else 1.0
         low, high = self._limits
         room = np.where(change < 0, colour - low, high - colour)
         size = np.abs(change)
@@ -246,12 +275,6 @@ class Pick:
         """Return whether a frame lies in the range or its ramps."""
         begin, start, until, end = self.knots(step)
         return start <= frame <= until or begin < frame < end
-
-    @property
-    def tolerance(self) -> float:
-        """The largest residual of a pick that counts as met."""
-        change = np.zeros(3) if self.to is None else np.subtract(self.to, self.rgb)
-        return max(MET, MET_PART * float(np.linalg.norm(change)))
 
     def knots(self, step: float) -> tuple[float, float, float, float]:
         """Return where the change begins, is full, is full for the last time, and ends.
@@ -281,68 +304,8 @@ def all_picks(fields: Mapping[str, Any]) -> tuple[Pick, ...]:
     return tuple(Pick.from_fields(entry) for entry in fields.get("picks", ()))
 
 
-def unmet(picks: Iterable[Pick], step: float) -> dict[frozenset[str], str]:
-    """Return a line for each enabled pick and hold that is not met, with the likely cause.
-
-    The keys are the ids. Two that contradict each other have one line, under both ids.
-    """
-    enabled = [pick for pick in picks if pick.enabled]
-    lines: dict[frozenset[str], str] = {}
-    for number, pick in enumerate(enabled):
-        _, start, until, _ = pick.knots(step)
-        frame, at, off = min(max(pick.frame, start), until), "", pick.residual
-        if pick.worst_frame is not None and (off is None or off <= pick.tolerance):
-            frame, at, off = pick.worst_frame, f" at frame {pick.worst_frame:.0f}", pick.worst
-        if number >= MOST_PICKS:
-            lines[frozenset({pick.id})] = (
-                f"{pick.id} is not solved: only the first {MOST_PICKS} enabled picks and holds "
-                "are. Disable or remove some"
-            )
-        elif off is not None and off > pick.tolerance:
-            rival = _rival(pick, enabled, frame, step)
-            ids = frozenset({pick.id, rival[0]} if rival else {pick.id})
-            cause = _cause(pick, enabled) if rival is None else rival[1]
-            lines.setdefault(ids, f"{pick.id} is off by {off:.3f}{at}{cause}")
-    return lines
-
-
-def _rival(pick: Pick, others: Sequence[Pick], frame: float, step: float) -> tuple[str, str] | None:
-    """Return the id of the pick that stands most in a pick's way at a frame, and what to say."""
-    rivals = []
-    for other in others:
-        if other.id != pick.id and other.strength_at(frame, step) > 0:
-            away = float(np.linalg.norm(pick.colour_at(frame) - other.colour_at(frame)))
-            apart = float(np.linalg.norm(pick.change_at(frame) - other.change_at(frame)))
-            if away < NEAR and apart > away:
-                rivals.append((away, other.id, apart, other.frame))
-    if not rivals:
-        return None
-    away, id_, apart, picked = min(rivals)
-    near = f"at frame {frame:.0f} the colour of {id_} is only {away:.3f} away"
-    if away < SAME:
-        at = "" if pick.frame == picked else f" at frame {frame:.0f}"
-        near = (
-            f"{pick.id}, picked at frame {pick.frame:g}, and {id_}, picked at frame {picked:g}, "
-            f"have the same colour{at}"
-        )
-    return id_, (
-        f": {near}, and the two ask for changes that differ by {apart:.3f}. Change or disable one "
-        f"of {pick.id} and {id_}"
-    )
-
-
-def _cause(pick: Pick, others: Sequence[Pick]) -> str:
-    if pick.global_only:
-        return ": the palette alone cannot express it; its neighbourhood is left out"
-    if pick.to is not None and any(not -0.05 <= value <= 1.05 for value in pick.to):
-        return ": its new colour lies far outside 0..1"
-    if len(others) > 1:
-        return ": picks and holds nearby, or locked handles, limit it"
-    return ": near colours of the clip, which want to stay, limit it; radius=… widens the change"
-
-
-def check_range(pick: Pick, frames: tuple[int, int, int]) -> None:
-    """Refuse a pick whose range is empty or outside the clip, or whose radius is not positive.
+def check(pick: Pick, frames: tuple[int, int, int]) -> None:
+    """Refuse a pick whose range is empty or outside the clip, or whose values are out of range.
 
     Raises
     ------
@@ -364,9 +327,17 @@ def check_range(pick: Pick, frames: tuple[int, int, int]) -> None:
         )
     if not 0 <= pick.fade <= 1e9:
         raise Palette4dError(f"found a fade of {pick.fade:g} frames, expected 0 or more")
-    if pick.radius is not None and not 1e-4 <= pick.radius <= 1e6:
+    if not -MOST_REACH <= pick.reach <= MOST_REACH:
         raise Palette4dError(
-            f"found the radius {pick.radius:g}, expected 0.0001 or more, such as 0.2"
+            f"found the reach {pick.reach:g}, expected {-MOST_REACH:g} to {MOST_REACH:g}, such as 1"
+        )
+    if not 0 <= pick.softness <= 1:
+        raise Palette4dError(f"found the softness {pick.softness:g}, expected 0 to 1")
+    lowest, highest = pick.lightness
+    if not 0 <= lowest < highest <= 1:
+        raise Palette4dError(
+            f"found the lightness {lowest:g} to {highest:g}, expected a lowest below a highest, "
+            "both within 0 to 1"
         )
     if pick.toward not in ("shift", "colour"):
         raise Palette4dError(f"found toward {pick.toward!r}, expected 'shift' or 'colour'")

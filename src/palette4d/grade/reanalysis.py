@@ -72,9 +72,9 @@ def _with_same_handles(old: Fields, new: Document) -> Fields | None:
     try:
         state = sidecar.state_of(old)
         for (kind, name), version in state.items():
-            if kind == "version":  # its picks are solved again, too
+            if kind == "version":
                 state[kind, name] = new.at(edits.from_fields(version)).fields()["edits"]
-        found = new.at(state).fields()
+        found = new.with_mattes_of(old).at(state).fields()
         found |= {name: old[name] for name in ("history",) if name in old}
         found["extra"] = fields.get("extra") or old["extra"]
         sidecar.validate(found)

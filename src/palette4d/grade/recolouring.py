@@ -30,6 +30,7 @@ class Recolouring(EditedPalette):
         show: str = "recoloured",
         matte_in: Literal["picture", "alpha"] = "picture",
         outside_at: float = 0.05,
+        clean_up: float = 1.0,
         premultiplied: bool = False,
         space: Literal["input", "palette"] = "input",
         threads: int = 0,
@@ -51,12 +52,17 @@ class Recolouring(EditedPalette):
         mix : float
             0 is the image, 1 the output.
         show : str
-            "recoloured"; "weight:ID", a soft key of a vertex or stop; "outside", a matte of the
-            colours outside the palette; "palette", the recoloured picture above its palette.
+            "recoloured"; "weight:ID", a soft key of a vertex or stop; "pick:ID", the matte of a
+            pick or hold; "outside", a matte of the colours outside the palette; "palette", the
+            recoloured picture above its palette.
         matte_in : {"picture", "alpha"}
             A key or matte as a grey picture, or multiplied into alpha.
         outside_at : float
             The distance from the palette, in its code values, at which "outside" is 1.
+        clean_up : float
+            The share of the change by picks that is filtered along the picture's edges, 0..1, so
+            that codec blocks, soft chroma and rims do not show. The image must be the whole
+            picture: its lower left corner is where the filter's cells begin.
         premultiplied : bool
             Colours are multiplied by alpha.
         space : {"input", "palette"}
@@ -69,18 +75,21 @@ class Recolouring(EditedPalette):
         (h, w, 3 or 4) float32
             A new array. Without edits it equals `image` bit by bit.
         """
-        output = Output(show, strength, keep_lightness, lightness_of, mix, matte_in, outside_at)
+        output = Output(
+            show, strength, keep_lightness, lightness_of, mix, matte_in, outside_at, clean_up
+        )
         pixels = _checked_image(image)
         palette = self.palette(frame)
         self._conversion(space)  # an error for a space that the sidecar lacks
         recolourer = _core.Recolourer(
-            palette.rgb, palette.edited, palette.faces, bumps=palette.bumps
+            palette.rgb, palette.edited, palette.faces, picks=self.core.picks_at(palette.frame)
         )
         return output.draw(
             pixels,
             self.core,
             palette,
             recolourer,
+            picks=[id_ for kind, id_ in self._state if kind == "pick"],
             premultiplied=premultiplied,
             space=space,
             threads=threads,
@@ -93,6 +102,7 @@ class Recolouring(EditedPalette):
         show: str,
         *,
         outside_at: float = 0.05,
+        clean_up: float = 1.0,
         space: Literal["input", "palette"] = "input",
         threads: int = 0,
     ) -> F32:
@@ -103,9 +113,9 @@ class Recolouring(EditedPalette):
         image : (h, w, 3 or 4) float32
             As in `recolour`; colours are not multiplied by alpha, and alpha is ignored.
         show : str
-            "weight:ID", a soft key of a vertex or stop, which follows its colour through time, or
-            "outside", the colours outside the palette.
-        frame, outside_at, space, threads
+            "weight:ID", a soft key of a vertex or stop, which follows its colour through time;
+            "pick:ID", the matte of a pick or hold; or "outside", the colours outside the palette.
+        frame, outside_at, clean_up, space, threads
             As in `recolour`.
 
         Returns
@@ -114,10 +124,18 @@ class Recolouring(EditedPalette):
             0..1.
         """
         if show == "palette" or show == "recoloured":
-            raise Palette4dError(f"found {show!r}, expected a matte: 'weight:ID' or 'outside'")
+            raise Palette4dError(
+                f"found {show!r}, expected a matte: 'weight:ID', 'pick:ID' or 'outside'"
+            )
         colours = np.ascontiguousarray(_checked_image(image)[..., :3])
         drawn = self.recolour(
-            colours, frame, show=show, outside_at=outside_at, space=space, threads=threads
+            colours,
+            frame,
+            show=show,
+            outside_at=outside_at,
+            clean_up=clean_up,
+            space=space,
+            threads=threads,
         )
         return np.ascontiguousarray(drawn[..., 0])
 

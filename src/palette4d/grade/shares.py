@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palette4d import _core
-from palette4d.grade.solve import ClipAtTimes
+from palette4d.grade.clip_colours import ClipColours
 from palette4d.grade.tracks import Track
 
 F64 = NDArray[np.float64]
@@ -30,7 +30,7 @@ class Share:
     frame: float
 
 
-def track_shares(clip: ClipAtTimes, tracks: Iterable[Track]) -> dict[str, Share]:
+def track_shares(clip: ClipColours, tracks: Iterable[Track]) -> dict[str, Share]:
     """Return the shares of tracks by their names; empty without stored colours of the clip."""
     tracks = list(tracks)
     row_of = {id_: row for row, t in enumerate(tracks) for id_ in (*t.vertices, *t.edges)}

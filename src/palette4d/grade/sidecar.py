@@ -4,12 +4,13 @@ Input and output are a sidecar's members as plain dicts and lists; `docs/sidecar
 The core (`palette4d._core`) validates every text before it is written.
 """
 
+import itertools
 import json
 import os
 import stat
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -20,6 +21,9 @@ from palette4d.common.locking import locked
 from palette4d.common.text import counted
 from palette4d.grade import edits
 from palette4d.media.clip_sequence import IMAGE_EXTENSIONS, MOVIE_EXTENSIONS
+
+if TYPE_CHECKING:
+    from palette4d.grade.mattes import Display
 
 Fields = dict[str, Any]
 OnEdits = Literal["refuse", "keep", "drop"]
@@ -33,7 +37,7 @@ _LARGEST_FILE = 64 << 20
 _ORDER: dict[str, tuple[str, ...]] = {
     "": (
         *("schema", "version", "generator", "clip", "polytope", "colours", "quality"),
-        *("edits", "versions", "history", "extra"),
+        *("edits", "mattes", "versions", "history", "extra"),
     ),
     "/clip": ("name", "source", "frames", "rate", "size", "encoding", "conversion"),
     "/clip/conversion": ("input_space", "config", "error", "steps"),
@@ -46,10 +50,11 @@ _ORDER: dict[str, tuple[str, ...]] = {
     "/polytope/transitions/*": ("tracks", "faces"),
     "/quality": ("stages", "options", "versions"),
     "/quality/stages/*": ("stage",),
-    "/edits": ("ramp", "vertices", "stops", "picks", "locks", "solution"),
+    "/edits": ("ramp", "vertices", "stops", "picks", "locks"),
     "/edits/vertices/*": ("vertex", "rgb", "ramp"),
     "/edits/stops/*": ("id", "edge", "frame", "rgb", "ramp"),
-    "/edits/solution": ("vertices", "keys", "bumps", "holds"),
+    "/mattes": ("display", "grids"),
+    "/mattes/display": ("from", "to", "values"),
     "/versions/*": ("name", "edits"),
     "/history": ("done", "undone"),
 }
@@ -78,11 +83,8 @@ _SPREAD = {
     "/edits/vertices",
     "/edits/stops",
     "/edits/picks",
-    "/edits/solution",
-    "/edits/solution/vertices",
-    "/edits/solution/keys",
-    "/edits/solution/bumps",
-    "/edits/solution/holds",
+    "/mattes",
+    "/mattes/grids",
     "/colours",
     "/versions",
     "/history",
@@ -130,7 +132,7 @@ def new_document(
     quality = quality or {}
     document: Fields = {
         "schema": SCHEMA,
-        "version": _core.SIDECAR_VERSION,
+        "version": 1,
         "generator": f"palette4d {_core.__version__}",
         "clip": clip,
         "polytope": polytope,
@@ -212,11 +214,22 @@ def load(path: str | os.PathLike[str]) -> Fields:
 def fields_of(data: bytes) -> Fields:
     """Return the members of a text that the core accepts; 24.0 becomes 24 where it is whole."""
     document: Fields = json.loads(data)
+    if document["version"] < _core.SIDECAR_VERSION:
+        _upgrade(document)
     clip = document["clip"]
     frames = clip["frames"]
     for holder, names in ((frames, ("first", "last", "step", "skipped")), (clip, ("rate", "size"))):
         holder.update({name: _whole(holder[name]) for name in names})
     return document
+
+
+def _upgrade(document: Fields) -> None:
+    """Bring the members of version 1 up to date: picks no longer move palette colours."""
+    for part in (document["edits"], *(v["edits"] for v in document.get("versions", ()))):
+        part.pop("solution", None)
+        for pick in part.get("picks", ()):
+            for name in edits.FORMER:
+                pick.pop(name, None)
 
 
 def _whole(value: Any) -> Any:
@@ -237,11 +250,44 @@ def state_of(document: Mapping[str, Any]) -> dict[edits.Key, Any]:
 
 
 def with_state(document: Fields, state: edits.State, vertex_ids: Iterable[str]) -> Fields:
-    """Return a document with the `edits` (without a solution) and `versions` of a state."""
+    """Return a document with the `edits` and `versions` of a state."""
     found = {**document, "edits": edits.to_fields(state, vertex_ids)}
     names = sorted(name for kind, name in state if kind == "version")
     found["versions"] = [{"name": name, "edits": state["version", name]} for name in names]
     return found if names else {n: v for n, v in found.items() if n != "versions"}
+
+
+def with_mattes(
+    document: Fields, texts: Mapping[str, str], curve: Callable[[], "Display | None"]
+) -> Fields:
+    """Return a document with the mattes of its picks, those of versions and steps too.
+
+    Without picks the file has the first version of the format, so that older programs read it.
+    """
+    picks = list(_picks_in(document))
+    document = {name: value for name, value in document.items() if name != "mattes"}
+    document["version"] = 2 if picks else 1
+    used = sorted({pick["matte"] for pick in picks if "matte" in pick} & texts.keys())
+    mattes: Fields = {}
+    if picks and (display := curve()) is not None:
+        start, end, values = display
+        mattes["display"] = {"from": start, "to": end, "values": values}
+    if used or mattes:
+        document["mattes"] = {**mattes, "grids": {id_: texts[id_] for id_ in used}}
+    return document
+
+
+def _picks_in(document: Fields) -> Iterator[Fields]:
+    """Yield all picks of a document: of its edits, its versions and its steps."""
+    for part in (document["edits"], *(v["edits"] for v in document.get("versions", ()))):
+        yield from part.get("picks", ())
+    for step in itertools.chain(*document.get("history", {}).values()):
+        for kind, _, *values in step["changes"]:
+            for value in filter(None, values):
+                if kind == "pick":
+                    yield value
+                elif kind == "version":
+                    yield from value.get("picks", ())
 
 
 def history_of(document: Mapping[str, Any], name: str) -> tuple[list[edits.Edit], list[edits.Edit]]:
@@ -383,7 +429,7 @@ def write(
 
 def _canonical(value: Any, where: str) -> Any:
     """Return plain JSON values, with the file's member order and number formats."""
-    if where == "/history" or type(value) is str:
+    if where in ("/history", "/mattes") or type(value) is str:
         return value  # steps are plain values in their order already, and many
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
@@ -476,7 +522,8 @@ def _with_edits_of(old: Fields, new: Fields, target: Path) -> Fields:
             'the new one, so they cannot be kept. Discard them with on_edits="drop", or choose '
             "another output"
         )
-    users = {name: old[name] for name in ("edits", "versions", "history") if name in old}
+    names = ("edits", "mattes", "versions", "history")
+    users = {name: old[name] for name in names if name in old}
     kept: Fields = _canonical({**new, **users, "extra": new.get("extra") or old["extra"]}, "")
     return kept
 

@@ -57,11 +57,16 @@ _FAR = 100_000
 
 SIDECAR = File("sidecar", "Sidecar")
 OUTPUT = Choice(
-    "output", "Output", ("Recoloured", "Weight of a handle", "Palette", "Outside"), "Recoloured"
+    "output",
+    "Output",
+    ("Recoloured", "Weight of a handle", "Palette", "Outside", "Matte of a pick"),
+    "Recoloured",
 )
 WEIGHT_OF = Number("weightOf", "Handle", 1, 1, HANDLES)
+PICK = Number("pick", "Pick", 1, 1, 32)
 STRENGTH = Number("strength", "Strength", 1, 0, 1, decimals=3, animates=True)
 KEEP_LIGHTNESS = Number("keepLightness", "Keep lightness", 0, 0, 1, decimals=3, animates=True)
+CLEAN_UP = Number("cleanUp", "Clean up", 1, 0, 1, decimals=3, animates=True)
 MIX = Number("mix", "Mix", 1, 0, 1, decimals=3, animates=True)
 EDITS_FROM = Choice("editsFrom", "Edits from", ("Sidecar", "Host", "Both"), "Both")
 IN_POINT = Number("inPoint", "In-point", 0, -_FAR, _FAR, decimals=2)
@@ -93,6 +98,7 @@ ALL: tuple[Parameter, ...] = (
     SIDECAR,
     OUTPUT,
     WEIGHT_OF,
+    PICK,
     Choice("matteIn", "Matte in", ("Picture", "Alpha"), "Picture"),
     Number("outsideReach", "Outside at", 0.05, 0.001, 1, decimals=4),
     STRENGTH,
@@ -103,6 +109,7 @@ ALL: tuple[Parameter, ...] = (
         ("Auto", "Rec.709", "Rec.2020", "P3", "ACES AP1", "Rec.601"),
         "Auto",
     ),
+    CLEAN_UP,
     MIX,
     Choice(
         "pictureIn",
@@ -121,9 +128,11 @@ MAIN: tuple[Parameter, ...] = (
     SIDECAR,
     OUTPUT,
     WEIGHT_OF,
+    PICK,
     EDITS_FROM,
     STRENGTH,
     KEEP_LIGHTNESS,
+    CLEAN_UP,
     MIX,
     IN_POINT,
 )

@@ -62,9 +62,9 @@ def plot(
 
     from palette4d.common.errors import Palette4dError
     from palette4d.common.files import refuse_existing, replacing
+    from palette4d.grade.clip_colours import ClipColours
     from palette4d.grade.document import Document
     from palette4d.grade.shares import track_shares
-    from palette4d.grade.solve import ClipAtTimes
     from palette4d.media.source_clip import frame_colours
     from palette4d.plotting import page, style
     from palette4d.plotting.frames import default_frames
@@ -80,7 +80,8 @@ def plot(
     if not isinstance(document, Document):
         document = Document.load(document)
     graded = document.version(version)
-    sidecar, stored = graded.core, ClipAtTimes(graded.fields())
+    sidecar = graded.core
+    stored = ClipColours(sidecar.polytope, graded.fields())
     shares = track_shares(stored, graded.tracks)
     against = None if before is None else document.version(before).core.edits
     names = ("before", "after") if before is None else (before or "active", version or "active")

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from palette4d.grade.solve import ClipAtTimes
+from palette4d.grade.clip_colours import ClipColours
 from palette4d.plotting.rows import PlottedPalette
 
 F64 = NDArray[np.float64]
@@ -18,7 +18,7 @@ TRIED = 64
 STEP = np.array([1 / 255] * 3 + [0])
 
 
-def default_frames(palette: PlottedPalette, clip: ClipAtTimes) -> list[float]:
+def default_frames(palette: PlottedPalette, clip: ClipColours) -> list[float]:
     """Choose the frames to show: the clip's ends, frames that stand for the others, and edits.
 
     Frames whose colours others show, too, are left out. Frames of edits come on top: the frame of
@@ -41,7 +41,7 @@ def default_frames(palette: PlottedPalette, clip: ClipAtTimes) -> list[float]:
     return sorted(chosen)
 
 
-def _representing(clip: ClipAtTimes, times: Sequence[float], *, alike: bool) -> list[float]:
+def _representing(clip: ClipColours, times: Sequence[float], *, alike: bool) -> list[float]:
     """Leave out one frame after the other, so that all are near in colour to one of the others."""
     colours = [clip.colours_at(time) for time in times]
     own = [_mean_distance(rgbw, rgbw) for rgbw in colours]

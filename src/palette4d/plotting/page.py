@@ -102,8 +102,8 @@ def column(
         if edits is None or edits.empty:
             return small
         colours = _core.edited_colours(sidecar.polytope, edits, palette)
-        bumps = edits.bumps_at(palette.frame)
-        recolourer = _core.Recolourer(palette.rgb, colours, palette.faces, bumps=bumps)
+        picks = edits.picks_at(palette.frame)
+        recolourer = _core.Recolourer(palette.rgb, colours, palette.faces, picks=picks)
         return recolourer.apply(small, threads=0)
 
     if sidecar.edits.empty and against is None:

@@ -43,7 +43,7 @@ class PlottedPalette:
     frames, rgb, edited : (n,), (n, 3), (n, 3) float64
         Times of the vertices, and their colours before and after the edit.
     changed : (n,) bool array
-        The vertex has an edited colour, or picks move it.
+        The vertex has an edited colour.
     edges : list of (int, int)
         Vertex indices, the earlier end first.
     stops : list of (str, int, float, (3,) float64)
@@ -113,7 +113,7 @@ class PlottedPalette:
     def sampled(self, frames: F64) -> tuple[F64, F64]:
         """Return the colours of all edges at (k,) times, before and after, (m, k, 3).
 
-        The core computes them, so that ramps and picks count. An edge is NaN where it is not; at an
+        The core computes them, so that ramps count. An edge is NaN where it is not; at an
         end it has the vertex's colour.
         """
         polytope, edits = self.sidecar.polytope, self.sidecar.edits
@@ -147,14 +147,16 @@ class PlottedPalette:
 
     @property
     def edited_times(self) -> list[float]:
-        """The frames of edited vertices and of stops."""
-        return [*map(float, self.frames[self.changed]), *(stop[2] for stop in self.stops)]
+        """The frames of edited vertices, of stops and of picks."""
+        own = [*map(float, self.frames[self.changed]), *(stop[2] for stop in self.stops)]
+        return own + self.sidecar.edits.pick_times
 
     def change(self, frames: F64) -> F64:
-        """Return by how much the colours change at (k,) times: the largest of a channel, (k,)."""
+        """Return by how much colours change at (k,) times: the largest of a channel, (k,)."""
         before, after = self.sampled(frames)
         found: F64 = np.nanmax(np.abs(after - before), axis=(0, 2))
-        return found
+        picked = [self.sidecar.edits.picks_at(frame).largest for frame in frames.tolist()]
+        return np.maximum(found, picked)
 
 
 def track_ids(polytope: _core.Polytope) -> dict[str, str]:

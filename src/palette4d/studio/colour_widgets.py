@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import (
     QColor,
     QImage,
@@ -31,6 +31,8 @@ Shown = Callable[[F64], U8]
 
 #: The chroma at the wheel's rim, for displays; more than sRGB's strongest colours have.
 RIM = 0.33
+#: Arrows of some keyboards come with it.
+KEYPAD = Qt.KeyboardModifier.KeypadModifier
 #: The wheel is computed at this size and scaled up.
 GRAIN = 96
 
@@ -76,11 +78,27 @@ class Swatch(QWidget):
         painter.end()
 
 
-class Wheel(QWidget):
+class Keyed(QWidget):
+    """A part whose value the arrows change: they do nothing else while it has the keyboard."""
+
+    KEYS: tuple[Qt.Key, ...] = (Qt.Key.Key_Left, Qt.Key.Key_Right)
+
+    def event(self, event: QEvent) -> bool:
+        """Keep the arrows from the menus."""
+        if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent):
+            plain = event.modifiers() in (Qt.KeyboardModifier.NoModifier, KEYPAD)
+            if plain and event.key() in self.KEYS:
+                event.accept()
+                return True
+        return super().event(event)
+
+
+class Wheel(Keyed):
     """Hue around, chroma outwards, at one lightness; what cannot be displayed is dimmed."""
 
     moved = Signal(object)  #: (chroma, hue)
     let_go = Signal()
+    KEYS = (*Keyed.KEYS, Qt.Key.Key_Up, Qt.Key.Key_Down)
 
     def __init__(self) -> None:
         """Begin grey."""
@@ -229,7 +247,7 @@ class Wheel(QWidget):
         self.let_go.emit()
 
 
-class Bar(QWidget):
+class Bar(Keyed):
     """A value on a gradient of the colours that it leads to."""
 
     moved = Signal(float)
@@ -313,3 +331,84 @@ class Bar(QWidget):
             return
         self.moved.emit(self.value + steps[key])
         self.let_go.emit()
+
+
+class Span(Bar):
+    """A lowest and a highest value on one bar; what is outside of them is dimmed."""
+
+    moved = Signal(object)  #: (lowest, highest)
+
+    KEYS = (*Keyed.KEYS, Qt.Key.Key_Up, Qt.Key.Key_Down)
+    #: The least distance between both values.
+    APART = 0.01
+
+    def __init__(self, name: str, step: float) -> None:
+        """Begin with all of the bar."""
+        super().__init__(name, step)
+        self.span = (0.0, 1.0)
+        self._upper = False  # the end that was touched last
+
+    def show_span(self, span: tuple[float, float], colours: U8) -> None:
+        """Show both values, and the colours of the bar from 0 to 1."""
+        self.span, self.colours = span, colours
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Draw the gradient and both marks."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
+        box = QRectF(5, 5, self.width() - 10, self.height() - 10)
+        painter.setPen(paint.pen(style.BRIGHT if self.hasFocus() else style.RIM, 1.0))
+        width = box.width() / max(len(self.colours), 1)
+        painter.setBrush(paint.texture(self.colours, box.left(), width))
+        painter.drawRoundedRect(box, 2, 2)
+        low, high = map(self._x, self.span)
+        inner = box.adjusted(0, 0.5, 0, -0.5)
+        for left, right in ((inner.left(), low), (high, inner.right())):
+            rest = QRectF(left, inner.top(), right - left, inner.height())
+            painter.fillRect(rest, QColor(theme.PANEL))
+            painter.setPen(paint.pen(theme.LINE, 1.0))
+            painter.drawLine(QPointF(left, box.center().y()), QPointF(right, box.center().y()))
+        painter.setPen(paint.pen(style.INK, 1.2))
+        painter.setBrush(QColor(style.BRIGHT))
+        for at in (low, high):
+            painter.drawRoundedRect(QRectF(at - 2.5, 1.5, 5, self.height() - 3), 2, 2)
+        painter.end()
+
+    def _move(self, value: float) -> None:
+        """Move the end that was touched last."""
+        low, high = self.span
+        if self._upper:
+            high = min(max(value, low + self.APART), 1.0)
+        else:
+            low = max(min(value, high - self.APART), 0.0)
+        self.moved.emit((round(low, 3), round(high, 3)))
+
+    def _value(self, x: float) -> float:
+        return min(max((x - 5) / max(self.width() - 10, 1), 0.0), 1.0)
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Take the nearer end."""
+        if event.button() == Qt.MouseButton.LeftButton:
+            x = event.position().x()
+            low, high = map(self._x, self.span)
+            self._upper = abs(x - high) < abs(x - low)
+            self._move(self._value(x))
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Move it."""
+        if event.buttons() & Qt.MouseButton.LeftButton:
+            self._move(self._value(event.position().x()))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Left and right move an end by a step; up and down choose which."""
+        steps = {Qt.Key.Key_Left: -self.step, Qt.Key.Key_Right: self.step}
+        key = Qt.Key(event.key())
+        if key in (Qt.Key.Key_Up, Qt.Key.Key_Down):
+            self._upper = key == Qt.Key.Key_Up
+        elif key in steps:
+            self._move(self.span[self._upper] + steps[key])
+            self.let_go.emit()
+        else:
+            super().keyPressEvent(event)

@@ -3,15 +3,17 @@
 It knows no toolkit. The verbs are those of `palette4d edit`; tests compare both.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 from palette4d.grade.document import Document
 from palette4d.grade.edits import Ramp
 from palette4d.grade.follow import Progress
-from palette4d.grade.picks import Pick
+from palette4d.grade.picks import Area, Pick
 from palette4d.plotting import style
 from palette4d.studio import texts
 from palette4d.studio.session import Session
+from palette4d.studio.states import Place
 
 
 def handles_of(document: Document, ids: tuple[str, ...]) -> list[str]:
@@ -22,21 +24,22 @@ def handles_of(document: Document, ids: tuple[str, ...]) -> list[str]:
 
 def reset(session: Session) -> None:
     """Reset the selected vertices, and remove the selected stops and picks (`reset`, `unpick`)."""
-    document = session.newest
+    document, clip = session.document, source_of(session)
     if document is None:
         return
-    picks = [pick.id for pick in document.picks if pick.id in session.selection]
+    picks = [pick for pick in document.picks if pick.id in session.selection]
     ids = [id_ for id_ in session.selection if id_ in document.settings]
     said = texts.REMOVED if picks and not ids else texts.WAS_RESET
 
     def change(document: Document) -> None:
         if picks:
-            document.unpick(*picks)
+            document.unpick(*(pick.id for pick in picks), clip=clip)
         for id_ in ids:
             document.reset(id_)
 
     alone = not ids or (not picks and len(ids) == 1)
-    _as_one(session, "reset", [*picks, *ids], change, said, alone=alone)
+    both = [*(pick.id for pick in picks), *ids]
+    _as_one(session, "reset", both, change, said, alone=alone, learns=_holds(picks))
 
 
 def reset_all(session: Session) -> None:
@@ -46,25 +49,27 @@ def reset_all(session: Session) -> None:
 
 def remove(session: Session, ids: list[str]) -> None:
     """Remove picks and holds, and unlock handles (`unpick`, `unlock`)."""
-    document = session.newest
+    document, clip = session.document, source_of(session)
     if document is None:
         return
     locks = [id_ for id_ in ids if id_ in document.locks]
-    picks = [pick.id for pick in document.picks if pick.id in ids]
+    picks = [pick for pick in document.picks if pick.id in ids]
+    names = [pick.id for pick in picks]
 
     def change(document: Document) -> None:
         if locks:
             document.unlock(*locks)
         if picks:
-            document.unpick(*picks)
+            document.unpick(*names, clip=clip)
 
-    both = bool(locks and picks)
-    _as_one(session, "remove", [*locks, *picks], change, texts.REMOVED, alone=not both)
+    alone = not (locks and picks)
+    both = [*locks, *names]
+    _as_one(session, "remove", both, change, texts.REMOVED, alone=alone, learns=_holds(picks))
 
 
 def lock(session: Session) -> None:
     """Lock the selected handles, or unlock them if all are locked (`lock`, `unlock`)."""
-    document = session.newest
+    document = session.document
     ids = [] if document is None else handles_of(document, session.selection)
     if document is None or not ids:
         session.say(texts.SELECT_A_HANDLE, "warning")
@@ -77,7 +82,7 @@ def lock(session: Session) -> None:
 
 def set_ramp(session: Session, ramp: Ramp) -> None:
     """Set the ramp of the selected handles; without a selection, the clip's (`ramp`)."""
-    document = session.newest
+    document = session.document
     if document is None:
         return
     ids = handles_of(document, session.selection)
@@ -97,22 +102,56 @@ def set_ramp(session: Session, ramp: Ramp) -> None:
 
 def enable(session: Session, id_: str, on: bool) -> None:
     """Switch a pick or hold on or off (`enable`, `disable`)."""
+    document, clip = session.document, source_of(session)
 
     def change(document: Document) -> None:
-        with document.one_step(f"{'enable' if on else 'disable'} {id_}"):
-            document.change_pick(id_, enabled=on)
+        document.change_pick(id_, enabled=on, clip=clip)
 
-    session.edit(change, (texts.ENABLED if on else texts.DISABLED).format(id=id_))
+    picks = [] if document is None else [pick for pick in document.picks if pick.id == id_]
+    said, verb = (texts.ENABLED, "enable") if on else (texts.DISABLED, "disable")
+    _as_one(session, verb, [id_], change, said, alone=False, learns=_holds(picks))
 
 
 def change_pick(session: Session, id_: str, text: str, **changes: Any) -> None:
-    """Change how and when a pick or hold acts; its colour is followed again (`change`)."""
-    clip = None if session.clip is None else session.clip.source
+    """Change how and when a pick or hold acts, where that reads the clip again (`change`)."""
+    clip = source_of(session)
 
     def change(document: Document, progress: Progress) -> None:
         document.change_pick(id_, clip=clip, progress=progress, **changes)
 
     session.edit_later(change, text.format(id=id_))
+
+
+def shape_pick(session: Session, id_: str, dragging: bool, **changes: Any) -> None:
+    """Change a pick's reach, softness or lightness, which reads nothing (`change`)."""
+    do = session.drag if dragging else session.edit
+    do(lambda document: document.change_pick(id_, **changes), texts.PICK_SHAPED.format(id=id_))
+
+
+def hold(session: Session, place: Place) -> None:
+    """Hold the colour of a pixel or a box (`hold`); a pick that is selected stays so."""
+    clip = source_of(session)
+    chosen = session.picked is not None and session.picked.kind == "pick"
+
+    def make(document: Document, progress: Progress) -> str:
+        if clip is None:
+            return document.hold(place.frame, colour=place.colour, any_value=True).id
+        pixel = (place.x, place.y)
+        return document.hold(
+            place.frame, pixel=pixel, box=place.box, clip=clip, progress=progress
+        ).id
+
+    session.edit_later(make, texts.HELD, lambda id_: None if chosen else session.select(id_))
+
+
+def add_area(session: Session, id_: str, area: Area) -> None:
+    """Add a box or a stroke to a pick or hold (`area`)."""
+    clip = source_of(session)
+
+    def add(document: Document, _: Progress) -> None:
+        document.add_area(id_, area, clip=clip)
+
+    session.edit_later(add, texts.AREA_ADDED.format(id=id_))
 
 
 def set_fade(session: Session, id_: str, fade: float) -> None:
@@ -145,7 +184,7 @@ def move_stop(session: Session, id_: str, frame: float, *, dragging: bool = Fals
 
 def keep_version(session: Session) -> None:
     """Keep the edits as the next version: A, B, C…, then A2, B2… (`version save`)."""
-    document = session.newest
+    document = session.document
     if document is None:
         return
     rounds = ("", *map(str, range(2, len(document.versions) + 3)))
@@ -161,8 +200,25 @@ def use_version(session: Session, name: str) -> None:
     session.edit(lambda document: document.use_version(name), text)
 
 
+def source_of(session: Session) -> str | None:
+    """Return the clip that edits read."""
+    return None if session.clip is None else session.clip.source
+
+
+def _holds(picks: list[Pick]) -> bool:
+    """Return whether holds are among these, so that the others are learned again."""
+    return any(pick.kind == "hold" for pick in picks)
+
+
 def _as_one(
-    session: Session, verb: str, ids: list[str], change: Any, text: str, *, alone: bool
+    session: Session,
+    verb: str,
+    ids: list[str],
+    change: Callable[[Document], object],
+    text: str,
+    *,
+    alone: bool,
+    learns: bool = False,
 ) -> None:
     """Do a change of several as one step; alone it is one step by itself."""
 
@@ -173,5 +229,7 @@ def _as_one(
         with document.one_step(f"{verb} {' '.join(ids)}"):
             change(document)
 
-    if ids:
+    if ids and learns:
+        session.edit_later(lambda document, _: whole(document), text.format(ids=", ".join(ids)))
+    elif ids:
         session.edit(whole, text.format(ids=", ".join(ids)))

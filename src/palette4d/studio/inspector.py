@@ -32,11 +32,13 @@ from palette4d.common.errors import Palette4dError
 from palette4d.grade.document import Document
 from palette4d.grade.edits import RAMPS, as_colour
 from palette4d.grade.follow import Progress
+from palette4d.grade.picks import Area
 from palette4d.plotting import style
 from palette4d.studio import grade_steps, texts, theme
 from palette4d.studio.choice import Choice
 from palette4d.studio.colour_widgets import Bar, Swatch, Wheel
 from palette4d.studio.pick_list import PickList, Versions
+from palette4d.studio.pick_panel import PickPanel
 from palette4d.studio.screen_colours import on_screen
 from palette4d.studio.session import Session
 from palette4d.studio.states import Place
@@ -68,6 +70,7 @@ class Inspector(QWidget):
         self._make()
         for event in ("document", "selection", "frame", "view", "clip"):
             session.on(event, self.refresh, panel=True)
+        session.on("draft", self._try_again)
         self.refresh()
 
     # ------------------------------------------------------------------------------------- layout
@@ -78,10 +81,12 @@ class Inspector(QWidget):
         column.setContentsMargins(10, 8, 10, 10)
         column.setSpacing(8)
         column.addLayout(self._make_head())
-        column.addLayout(self._make_scope())
+        column.addWidget(self._make_scope())
         column.addLayout(self._make_colour())
         column.addLayout(self._make_hex())
         column.addLayout(self._make_buttons())
+        self.panel = PickPanel(self.session)
+        column.addWidget(self.panel)
         self.picks = PickList(self.session)
         column.addWidget(self.picks, 1)
         self.versions = Versions(self.session)
@@ -116,8 +121,10 @@ class Inspector(QWidget):
         row.addLayout(words, 1)
         return row
 
-    def _make_scope(self) -> QHBoxLayout:
-        row = QHBoxLayout()
+    def _make_scope(self) -> QWidget:
+        self.scope_row = QWidget()
+        row = QHBoxLayout(self.scope_row)
+        row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(0)
         group = QButtonGroup(self)
         self.scopes: dict[Scope, QToolButton] = {}
@@ -150,7 +157,7 @@ class Inspector(QWidget):
             self.ramp.addItem(texts.RAMPS[ramp], ramp)
         self.ramp.activated.connect(self._ramp_chosen)
         row.addWidget(self.ramp)
-        return row
+        return self.scope_row
 
     def _make_colour(self) -> QHBoxLayout:
         row = QHBoxLayout()
@@ -251,7 +258,7 @@ class Inspector(QWidget):
                 targets = [self._target_at(document, session.place)]
         self.target = targets[0] if targets else None
         if not session.dragging:
-            self._settled = self.target
+            self._settled, self._tried = self.target, ()
         self._silent = True
         try:
             self._show_words(len(session.selection))
@@ -268,7 +275,8 @@ class Inspector(QWidget):
             part.setEnabled(on)
         document = self.session.document
         for part in self.scopes.values():
-            part.setEnabled(target is not None and not target.picked)
+            part.setEnabled(target is not None)
+        self.scope_row.setVisible(target is None or not target.picked)
         self.reset.setEnabled(
             document is not None and any(id_ in document.settings for id_ in self.session.selection)
         )
@@ -396,7 +404,7 @@ class Inspector(QWidget):
             return None
         new = tuple(rgb.tolist())
         if target.picked:
-            return PickTo(target, new)
+            return PickTo(target, new, self.session.draft)
         if self.scope == "handle":
             return Recolour(target, self.session.selection, float(self.session.frame), new)
         return RecolourMany(target, self.scope == "track", new, change)
@@ -427,10 +435,10 @@ class Inspector(QWidget):
             return
         if self.target is None or not self.session.dragging:
             return
-        place, clip, to = target.place, self.session.clip, self._tried
+        place, source, to = target.place, grade_steps.source_of(self.session), self._tried
 
         def pick(document: Document, progress: Progress) -> str:
-            if clip is None:
+            if source is None:
                 made = document.pick(place.frame, colour=place.colour, to=to, any_value=True)
             else:
                 made = document.pick(
@@ -438,7 +446,7 @@ class Inspector(QWidget):
                     pixel=(place.x, place.y),
                     box=place.box,
                     to=to,
-                    clip=clip.source,
+                    clip=source,
                     any_value=True,
                     progress=progress,
                 )
@@ -459,21 +467,24 @@ class Inspector(QWidget):
 
     def hold(self, place: Place) -> None:
         """Hold the colour of a pixel."""
-        clip = self.session.clip
+        self.session.take("")
+        grade_steps.hold(self.session, place)
 
-        def hold(document: Document, progress: Progress) -> str:
-            if clip is None:
-                return document.hold(place.frame, colour=place.colour, any_value=True).id
-            pixel = (place.x, place.y)
-            return document.hold(
-                place.frame, pixel=pixel, box=place.box, clip=clip.source, progress=progress
-            ).id
+    def add_area(self, area: Area) -> None:
+        """Add a box or a stroke to the selected pick."""
+        if self.session.picked is not None:
+            grade_steps.add_area(self.session, self.session.picked.id, area)
 
-        self.session.edit_later(hold, texts.HELD, self.session.select)
+    def _try_again(self) -> None:
+        """Show the colour that was tried before the pixel's pick was learned."""
+        if self._tried and self.session.dragging:
+            self.try_colour(np.asarray(self._tried))
 
     def _target_at(self, document: Document, place: Place) -> Target:
         """Return the target of a pixel, with the colour that the edits give it."""
         before = np.asarray(place.colour, dtype=np.float64)
+        if self._tried and self.session.dragging:
+            return Target("", "place", place.frame, before, np.asarray(self._tried), place)
         pixel = before.astype(np.float32).reshape(1, 1, 3)
         after = document.recolour(pixel, place.frame, space="palette")[0, 0].astype(np.float64)
         return Target("", "place", place.frame, before, after, place)

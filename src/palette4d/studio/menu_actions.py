@@ -42,6 +42,8 @@ class MenuActions:
         """Forget a drag; else select nothing."""
         if self.session.dragging:
             self.session.cancel()
+        elif self.session.tool:
+            self.session.take("")
         elif self.window.isFullScreen():
             self.window.showNormal()
         else:
@@ -72,9 +74,7 @@ class MenuActions:
         self._set_range(until=float(self.session.frame))
 
     def _set_range(self, start: float | None = None, until: float | None = None) -> None:
-        document, chosen = self.session.document, self.session.selection
-        picks = () if document is None else document.picks
-        pick = next((pick for pick in picks if pick.id in chosen), None)
+        pick = self.session.picked
         if pick is None:
             self.session.say(texts.SELECT_A_PICK, "warning")
             return
@@ -129,7 +129,7 @@ class MenuActions:
 
     def compare_version(self) -> None:
         """Compare with the next version that differs; after the last with the source."""
-        document = self.session.newest
+        document = self.session.document
         same = () if document is None else document.same_edits()
         names = ["", *(name for name in self.session.versions if name not in same)]
         now = self.session.view.version
@@ -185,6 +185,10 @@ class MenuActions:
     def outside(self) -> None:
         """Mark colours outside of the palette."""
         self.session.look(outside=not self.session.view.outside)
+
+    def matte(self) -> None:
+        """Show the matte of the selected pick, or no more."""
+        self.session.look(matte=not self.session.view.matte)
 
     def brighter(self) -> None:
         """Raise the exposure."""

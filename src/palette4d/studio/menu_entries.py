@@ -91,6 +91,7 @@ ACTIONS = (
     Action("zoom_in", VIEW, ("Ctrl++", "Ctrl+="), group=1),
     Action("zoom_out", VIEW, ("Ctrl+-",), group=1),
     Action("outside", VIEW, ("X",), True, 2),
+    Action("matte", VIEW, ("M",), True, 2),
     Action("brighter", VIEW, ("E",), group=3),
     Action("darker", VIEW, ("Shift+E",), group=3),
     Action("plain_look", VIEW, ("Ctrl+0",), group=3),

@@ -1,7 +1,7 @@
-"""Lists below the inspected colour: picks, holds and locks with what they reach, and versions."""
+"""Lists below the inspected colour: picks, holds and locks with when they act, and versions."""
 
 import numpy as np
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt, QTimer
+from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QIcon, QKeyEvent, QPainter, QPixmap
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -25,8 +25,6 @@ from palette4d.studio.session import Session
 #: The size of the colours before a pick's name.
 ICON = QSize(34, 14)
 ID = Qt.ItemDataRole.UserRole
-#: Notes on picks are worked out when nothing has changed for so many milliseconds.
-REST = 300
 
 
 class PickList(QWidget):
@@ -41,7 +39,7 @@ class PickList(QWidget):
         self.title.setStyleSheet(f"color: {theme.FAINT}")
         self.list = QTreeWidget()
         self.list.setAccessibleName(texts.PICK_LIST)
-        self.list.setColumnCount(3)
+        self.list.setColumnCount(2)
         self.list.setHeaderLabels(texts.PICK_COLUMNS)
         self.list.setRootIsDecorated(False)
         self.list.setUniformRowHeights(True)
@@ -51,8 +49,7 @@ class PickList(QWidget):
         header = self.list.header()
         header.setStretchLastSection(False)
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
-        for column in (1, 2):
-            header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
+        header.setSectionResizeMode(1, QHeaderView.ResizeMode.ResizeToContents)
         self.remove = QPushButton(texts.REMOVE)
         self.remove.clicked.connect(self.remove_selected)
         row = QHBoxLayout()
@@ -61,19 +58,11 @@ class PickList(QWidget):
         column_ = QVBoxLayout(self)
         column_.setContentsMargins(0, 0, 0, 0)
         column_.setSpacing(4)
-        self.notes = QLabel()
-        self.notes.setTextFormat(Qt.TextFormat.PlainText)
-        self.notes.setWordWrap(True)
-        self.notes.setStyleSheet(f"color: {theme.FAINT}")
-        self.notes.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self.notes.hide()
-        self._resting = QTimer(self)
-        self._resting.setSingleShot(True)
-        self._resting.timeout.connect(self._note)
         column_.addLayout(row)
         column_.addWidget(self.list, 1)
-        column_.addWidget(self.notes)
-        session.on("document", lambda: self._resting.start(REST), panel=True)
+        self.list.setMouseTracking(True)
+        self.list.itemEntered.connect(lambda item: session.hover_over(item.data(0, ID)))
+        self.list.viewport().installEventFilter(self)
         self.list.itemSelectionChanged.connect(self._selected)
         self.list.itemChanged.connect(self._toggled)
         for event in ("document", "selection", "view"):
@@ -98,7 +87,7 @@ class PickList(QWidget):
             self.list.addTopLevelItem(item)
             item.setSelected(pick.id in self.session.selection)
         for id_ in locks:
-            item = QTreeWidgetItem([texts.LOCKED.format(id=id_), "", ""])
+            item = QTreeWidgetItem([texts.LOCKED.format(id=id_), ""])
             item.setData(0, ID, id_)
             self.list.addTopLevelItem(item)
             item.setSelected(id_ in self.session.selection)
@@ -106,24 +95,19 @@ class PickList(QWidget):
         self.setVisible(bool(picks or locks))
         self._silent = False
 
-    def _note(self) -> None:
-        """Say what speaks against the picks, as the command line does."""
-        document = self.session.document
-        if self.session.dragging or self.session.solving:
-            return  # when it is done, the session tells of the document again
-        notes = [] if document is None else document.pick_notes()
-        self.notes.setText("\n".join(f"{line[0].upper()}{line[1:]}." for line in notes))
-        self.notes.setVisible(bool(notes))
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Hide the matte when the pointer leaves the list."""
+        if event.type() == QEvent.Type.Leave:
+            self.session.hover_over(None)
+        return super().eventFilter(watched, event)
 
-    @staticmethod
-    def _words(pick: Pick) -> list[str]:
+    def _words(self, pick: Pick) -> list[str]:
         kind = texts.HOLD if pick.kind == "hold" else texts.PICK
-        name = f"{pick.id} {kind} · {style.number(pick.frame)}"
-        if not pick.enabled or pick.residual is None:
-            return [name, "–", "–"]
-        met = texts.MET if pick.residual <= pick.tolerance else texts.NOT_MET
-        share = "–" if pick.share is None else f"{pick.share:.0%}"
-        return [name, f"{met} {pick.residual:.3f}", share]
+        start, until = grade_steps.range_of(self.session, pick)
+        when = texts.ALL_FRAMES
+        if pick.start is not None or pick.until is not None:
+            when = f"{style.number(start)} – {style.number(until)}"
+        return [f"{pick.id} {kind} · {style.number(pick.frame)}", when if pick.enabled else "–"]
 
     def _tip(self, pick: Pick) -> str:
         start, until = grade_steps.range_of(self.session, pick)
@@ -164,6 +148,7 @@ class PickList(QWidget):
 
     def remove_selected(self) -> None:
         """Remove the selected picks and holds, and unlock the selected handles."""
+        self.session.hover_over(None)
         grade_steps.remove(self.session, [item.data(0, ID) for item in self.list.selectedItems()])
 
     def keyPressEvent(self, event: QKeyEvent) -> None:

@@ -6,12 +6,19 @@ It knows no toolkit.
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from palette4d import _core
 from palette4d.studio import texts
 from palette4d.studio.preview import Grade, Preview
 from palette4d.studio.session import Session
 from palette4d.studio.states import Place, Probe
+
+F32 = NDArray[np.float32]
+
+#: The side of a cell of the clean-up, and how far from a pixel it sees
+#: (core/output/clean_up.cpp).
+CELL, REACH = 4, 32
 
 
 def place_between(session: Session, first: tuple[int, int], last: tuple[int, int]) -> Place | None:
@@ -52,7 +59,8 @@ def probe_at(session: Session, x: int, y: int) -> Probe | None:
     if session.document is None:
         return Probe(x, y, source, source)
     grade = Grade.of(session.document, session.frame)
-    result = Preview.exact(pixel, grade, session.clip.premultiplied)
+    around, row, column = _around(pixels, x, y)
+    result = Preview.exact(around, grade, session.clip.premultiplied)[row, column]
     colour: Any = _core.straight_colours(pixel, premultiplied=session.clip.premultiplied)[0]
     if grade.conversion is not None:
         colour = grade.conversion.to_palette(colour)
@@ -60,4 +68,16 @@ def probe_at(session: Session, x: int, y: int) -> Probe | None:
     shares: dict[str, float] = {}
     for id_, share in zip(grade.palette.ids, weights[0], strict=True):
         shares[id_] = shares.get(id_, 0.0) + float(share)
-    return Probe(x, y, source, tuple(float(v) for v in result[0, 0]), shares)
+    return Probe(x, y, source, tuple(float(v) for v in result), shares)
+
+
+def _around(pixels: F32, x: int, y: int) -> tuple[F32, int, int]:
+    """Return the part of a frame that decides a pixel's result, and its row and column there.
+
+    The cells of the clean-up are counted from the lower left corner.
+    """
+    height = len(pixels)
+    left, below = max(0, x - REACH) // CELL * CELL, max(0, height - 1 - y - REACH) // CELL * CELL
+    top = max(0, y - REACH)
+    part = pixels[top : height - below, left : x + REACH + 1]
+    return np.ascontiguousarray(part), y - top, x - left

@@ -38,6 +38,8 @@ STRIP = 300_000
 OUTSIDE_POINTS = 60_000
 #: The grey of a matte's other pixels, and how much of the picture shows through.
 MATTE_GREY, MATTE_SHOWS = 58, 0.12
+#: Pixels that a pick leaves alone, beside its matte: this share of their lightness, and a grey.
+REST_LIGHT, REST_LIFT = 0.32, 12
 
 
 @dataclass(frozen=True)
@@ -45,17 +47,13 @@ class Grade:
     """A palette at a time with its edits: what recolouring needs."""
 
     palette: Palette
-    conversion: Any
-    bumps: Any = None
+    conversion: _core.ColourConversion | None
+    picks: _core.FramePicks | None = None
 
     @classmethod
     def of(cls, document: Document, frame: float) -> "Grade":
         """Return a document's grade at a time."""
-        core = document.core
-        own = core.conversion
-        steps = None if own is None else own.steps
-        bumps = core.bumps_at(frame)
-        return cls(document.palette(frame), steps, bumps if len(bumps) else None)
+        return cls._with(document, document.palette(frame), document.core.edits)
 
     @classmethod
     def of_version(cls, document: Document, name: str, frame: float) -> "Grade | None":
@@ -65,15 +63,20 @@ class Grade:
         if edits is None:
             return None
         edited = _core.edited_colours(core.polytope, edits, _core.slice_at(core.polytope, frame))
-        bumps = edits.bumps_at(frame)
-        own = core.conversion
-        palette = dataclasses.replace(document.palette(frame), edited=edited)
-        return cls(palette, None if own is None else own.steps, bumps if len(bumps) else None)
+        return cls._with(
+            document, dataclasses.replace(document.palette(frame), edited=edited), edits
+        )
+
+    @classmethod
+    def _with(cls, document: Document, palette: Palette, edits: _core.Edits) -> "Grade":
+        own = document.core.conversion
+        picks = edits.picks_at(palette.frame)
+        return cls(palette, None if own is None else own.steps, picks)
 
     def recolourer(self) -> _core.Recolourer:
         """Return the exact recolouring."""
         palette = self.palette
-        return _core.Recolourer(palette.rgb, palette.edited, palette.faces, bumps=self.bumps)
+        return _core.Recolourer(palette.rgb, palette.edited, palette.faces, picks=self.picks)
 
 
 @dataclass(frozen=True)
@@ -103,7 +106,9 @@ class Request:
     settled : bool
         Nothing moves: make the exact picture.
     matte : str or None
-        A palette colour or handle whose weight is shown.
+        A palette colour or handle whose weight is shown, or a pick whose matte is.
+    pick_matte : FramePicks or None
+        The matte of that pick.
     outside : bool
         Mark colours outside of the palette.
     scaled : bool
@@ -124,6 +129,7 @@ class Request:
     sides: frozenset[str] = frozenset({"after"})
     settled: bool = True
     matte: str | None = None
+    pick_matte: _core.FramePicks | None = None
     outside: bool = False
     scaled: bool = False
 
@@ -303,9 +309,11 @@ class Preview:
             after = _painted(painter, colours, request.premultiplied, exact, check)
         matte = None
         if request.matte is not None and request.grade is not None and after is not None:
-            matte = matte_of(self._source(request, exact), request.grade, request.matte)
+            source = self._source(request, exact)
+            matte = matte_of(source, request.grade, request.matte, request.pick_matte)
             if matte is not None:
-                after = _highlighted(after, matte)
+                shown = _highlighted if request.pick_matte is None else _singled_out
+                after = shown(after, matte)
         outside, share = None, 0.0
         if request.outside and request.grade is not None:
             outside, share = outside_of(self._source(request, exact), request.grade)
@@ -324,8 +332,22 @@ class Preview:
     def exact(
         pixels: F32, grade: Grade, premultiplied: bool, check: Callable[[], None] = lambda: None
     ) -> F32:
-        """Return (h, w, c) pixels recoloured as `palette4d render` does, to the bit."""
+        """Return (h, w, c) pixels recoloured as `palette4d render` does, to the bit.
+
+        What picks do is cleaned up along the picture's edges, so the pixels must be all of it.
+        """
         recolourer = grade.recolourer()
+        premultiplied = premultiplied and pixels.shape[2] == 4
+        if grade.picks is not None and grade.picks.count:
+            check()
+            return _core.draw(
+                np.ascontiguousarray(pixels),
+                "recoloured",
+                recolourer,
+                premultiplied=premultiplied,
+                threads=0,
+                conversion=grade.conversion,
+            )
         result = np.empty(pixels.shape, np.float32)
         rows = max(1, STRIP // pixels.shape[1])
         for top in range(0, len(pixels), rows):
@@ -333,7 +355,7 @@ class Preview:
             strip = np.ascontiguousarray(pixels[top : top + rows])
             result[top : top + rows] = recolourer.apply(
                 strip,
-                premultiplied=premultiplied and pixels.shape[2] == 4,
+                premultiplied=premultiplied,
                 precision="single",
                 threads=0,
                 conversion=grade.conversion,
@@ -416,23 +438,29 @@ def shares_of(palette: Palette, id_: str) -> NDArray[np.float64]:
     return shares
 
 
-def matte_of(colours: F32, grade: Grade, id_: str) -> F32 | None:
-    """Return the (h, w) weight of a handle or palette colour; None if it has none here."""
+def matte_of(
+    colours: F32, grade: Grade, id_: str, picks: _core.FramePicks | None = None
+) -> F32 | None:
+    """Return the (h, w) weight of a handle or palette colour; None if it has none here.
+
+    With `picks`, the matte of a pick (`_core.Sidecar.pick_matte_at`).
+    """
     palette = grade.palette
-    shares = shares_of(palette, id_)
-    if not shares.any():
-        return None
-    # Recolouring adds weights times displacements: displaced by its shares in red, a grey picture
-    # of the weights comes out.
     moved = np.array(palette.rgb)
-    moved[:, 0] += shares
+    if picks is None:
+        shares = shares_of(palette, id_)
+        if not shares.any():
+            return None
+        # Recolouring adds weights times displacements: displaced by its shares in red, a grey
+        # picture of the weights comes out. A pick's matte is added in the same way.
+        moved[:, 0] += shares
     own = np.ascontiguousarray(colours[..., :3])
     if grade.conversion is not None:
         own = grade.conversion.to_palette(own).astype(np.float32)
-    recolourer = _core.Recolourer(palette.rgb, moved, palette.faces)
+    recolourer = _core.Recolourer(palette.rgb, moved, palette.faces, picks=picks)
     done = recolourer.apply(own, precision="single", threads=0)
     matte: F32 = np.clip(np.nan_to_num(done[..., 0] - own[..., 0]), 0, 1)
-    return matte
+    return matte if picks is None or matte.any() else None
 
 
 def _highlighted(picture: U8, matte: F32) -> U8:
@@ -440,6 +468,18 @@ def _highlighted(picture: U8, matte: F32) -> U8:
     weight = (matte * (1 - MATTE_SHOWS) + MATTE_SHOWS)[..., None]
     result = picture.copy()
     result[..., :3] = picture[..., :3] * weight + MATTE_GREY * (1 - weight)
+    return result
+
+
+def _singled_out(picture: U8, matte: F32) -> U8:
+    """Return the picture where a pick acts, and dark and grey elsewhere."""
+    weight = (matte * np.float32(256)).astype(np.uint16)
+    colours = picture[..., :3].astype(np.uint16)
+    grey = colours @ np.array([54, 183, 19], np.uint16) >> 8  # Rec.709's luminance weights
+    rest = ((grey * np.uint16(256 * REST_LIGHT) >> 8) + np.uint16(REST_LIFT)) * (256 - weight)
+    result = picture.copy()
+    for channel in range(3):
+        result[..., channel] = (colours[..., channel] * weight + rest) >> 8
     return result
 
 

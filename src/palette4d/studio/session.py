@@ -6,7 +6,6 @@ While something is dragged, the edit is tried on a copy; only its last form reac
 """
 
 import contextlib
-import copy
 import dataclasses
 import hashlib
 import itertools
@@ -19,13 +18,14 @@ from typing import TypeVar
 
 from palette4d.common.errors import Palette4dError, in_words
 from palette4d.grade.document import Document
+from palette4d.grade.edits import Key
 from palette4d.grade.follow import Progress
 from palette4d.media.clip import Clip, open_clip
 from palette4d.media.source_clip import find_clip
 from palette4d.studio import texts
 from palette4d.studio.display import Display
+from palette4d.studio.drafts import Drafts
 from palette4d.studio.player import Player
-from palette4d.studio.session_view import SessionView
 
 Edit = Callable[[Document], object]
 T = TypeVar("T")
@@ -36,16 +36,13 @@ SAVE_AFTER, SAVE_AT_MOST = 0.4, 1.5
 TRY_AGAIN = 5.0
 
 
-class Session(SessionView):
+class Session(Drafts):
     """The state that all views share.
 
     Attributes
     ----------
     document : Document or None
-        The document as the views show it: while something is dragged, a copy with the drag's edit;
-        while picks are being solved, the document before the edit.
-    newest : Document or None
-        The document with all edits; its picks may not be solved yet.
+        The document as the views show it: while something is dragged, a copy with the drag's edit.
     player : Player or None
         Reads the clip's frames.
     display : Display or None
@@ -63,7 +60,6 @@ class Session(SessionView):
         self._trial: Document | None = None
         self._dragged: tuple[Edit, str] | None = None
         self._copy: Path | None = None  # has the edits that could not be saved
-        self._drags = 0  # how many were begun
         self._stamp: tuple[int, int, int] | None = None
         self._edited_at: float | None = None  # the first edit that is not on disk
         self._last_edit = self._next_try = 0.0
@@ -78,16 +74,6 @@ class Session(SessionView):
     def document(self) -> Document | None:
         """The document as the views show it."""
         return self._trial or self._document
-
-    @property
-    def newest(self) -> Document | None:
-        """The document with all edits; its picks may not be solved yet."""
-        return self._document
-
-    @property
-    def solving(self) -> bool:
-        """Whether the views show an older document until the picks of an edit are solved."""
-        return self._trial is not None and self._dragged is None
 
     @property
     def versions(self) -> tuple[str, ...]:
@@ -213,31 +199,23 @@ class Session(SessionView):
         self._copy = None
         self.clip = self.player = self._stamp = self.probe = self.hover = self.place = None
         self.selection, self.playing, self.marks = (), 0, None
+        self.tool, self.answer = "", None
         self._edited_at, self.view = None, dataclasses.replace(self.view, version="")
 
     # -------------------------------------------------------------------------------------- edits
 
-    def edit(
-        self, operation: Callable[[Document], T], text: str = "", solved: Document | None = None
-    ) -> T | None:
-        """Do an edit, as a verb does it; an error becomes the status, and None is returned.
-
-        The views hear of it when its picks are solved. `solved` is a copy of the document that may
-        have the same edits, with its picks solved.
-        """
+    def edit(self, operation: Callable[[Document], T], text: str = "") -> T | None:
+        """Do an edit, as a verb does it; an error becomes the status, and None is returned."""
         document = self._document
         if document is None:
             return None
-        self._trial = self._trial or copy.copy(document)
-        dragged, self._dragged = self._dragged, None
+        dragged, self._trial, self._dragged = self.dragging, None, None
         before = len(document.history)
         try:
             result = operation(document)
         except (Palette4dError, OSError) as error:
-            if dragged is not None:
-                self._settle()
-            elif document.solved or self.beside is None:
-                self._trial = None
+            if dragged:
+                self._changed()
             self.report(error)
             return None
         self._note_edit()
@@ -248,27 +226,8 @@ class Session(SessionView):
             self.say(f"{text}; {locked}" if text else locked, "warning")
         elif text:
             self.say(text)
-        self._settle(solved or self._trial)
+        self._changed()
         return result
-
-    def _settle(self, solved: Document | None = None) -> None:
-        """Tell the views of the document, when its picks are solved, which takes a while."""
-        document = self._document
-        assert document is not None
-        if solved is not None:
-            document.take_solution(solved)
-        if document.solved or self.beside is None:
-            self._trial = None
-            self._changed()
-            return
-        trial = document.trial()
-
-        def finish() -> None:
-            # A drag that has begun meanwhile is shown instead.
-            if self._document is document and self._dragged is None:
-                self._settle(trial)
-
-        self.beside(lambda: self._solve(trial, finish))
 
     def edit_later(
         self,
@@ -278,9 +237,10 @@ class Session(SessionView):
     ) -> None:
         """Do an edit that reads the clip: in a thread on a copy, and then here.
 
-        What is being dragged stays visible until then. `then` gets the operation's result.
+        What is being dragged stays visible until then. `then` gets the operation's result. If the
+        user has changed the same thing meanwhile, the edit is done again after that.
         """
-        document = self._document
+        document, dragged = self._document, self._dragged
         if document is None:
             return
         trial = document.trial()
@@ -291,8 +251,14 @@ class Session(SessionView):
 
         def finish(result: T) -> None:
             self.following -= 1
-            if self._document is document:
-                self.edit(repeat, text, trial)
+            if self._document is document and not _applies(trial, document):
+                self.edit_later(operation, text, then)
+            elif self._document is document:
+                meanwhile = self._dragged if dragged is None else None
+                self.take_mattes(trial)
+                self.edit(repeat, text)
+                if meanwhile is not None:
+                    self.drag(*meanwhile)
                 then(result)
             self.emit("followed")
 
@@ -302,7 +268,8 @@ class Session(SessionView):
 
         def fail(error: Exception) -> None:
             self.following -= 1
-            self.cancel()
+            if dragged is not None:
+                self.cancel()
             self._changed()  # a view may show what was wanted
             self.report(error)
             self.emit("followed")
@@ -310,7 +277,6 @@ class Session(SessionView):
         def work() -> None:
             try:
                 result = operation(trial, say)
-                trial.core  # noqa: B018  its picks are solved when it is read
             except Exception as error:  # whatever fails, the window stays
                 failed = error
                 self.post(lambda: fail(failed))
@@ -318,13 +284,16 @@ class Session(SessionView):
                 self.post(lambda: finish(result))
 
         self.following += 1
+        self.say(texts.LEARNING)
         threading.Thread(target=work, name="palette4d edit", daemon=True).start()
 
-    def drag(self, operation: Edit, text: str = "") -> None:
-        """Show an edit without doing it; each call replaces the last.
+    def take_mattes(self, trial: Document) -> None:
+        """Have the mattes that were learned for a copy of the document."""
+        if self._document is not None:
+            self._document._mattes.update(trial._mattes)
 
-        Picks are solved beside the views' thread: the views hear of it when that is done.
-        """
+    def drag(self, operation: Edit, text: str = "") -> None:
+        """Show an edit without doing it; each call replaces the last."""
         if self._document is None:
             return
         trial = self._document.trial()
@@ -333,29 +302,8 @@ class Session(SessionView):
         except (Palette4dError, OSError) as error:
             self.report(error)
             return
-        if self._dragged is None:
-            self._drags += 1
-        self._dragged = operation, text
-        number = self._drags
-        if trial.solved or self.beside is None:
-            self._show_trial(trial, number)
-        else:
-            self.beside(lambda: self._solve(trial, lambda: self._show_trial(trial, number)))
-
-    def _solve(self, trial: Document, then: Callable[[], object]) -> None:
-        """Solve the picks of a copy; runs in a thread."""
-        try:
-            trial.core  # noqa: B018  it is computed when it is read
-        except Exception as error:  # whatever fails, the window stays
-            failed = error
-            self.post(lambda: self.report(failed))
-        else:
-            self.post(then)
-
-    def _show_trial(self, trial: Document, number: int) -> None:
-        if self._dragged is not None and number == self._drags:
-            self._trial = trial
-            self._changed()
+        self._trial, self._dragged = trial, (operation, text)
+        self._changed()
 
     def drop(self) -> None:
         """Do the edit that was dragged last."""
@@ -365,8 +313,8 @@ class Session(SessionView):
     def cancel(self) -> None:
         """Forget the edit that is being dragged."""
         if self._dragged is not None:
-            self._dragged = None
-            self._settle()
+            self._trial = self._dragged = None
+            self._changed()
 
     @property
     def dragging(self) -> bool:
@@ -527,3 +475,12 @@ def _stamp(path: Path) -> tuple[int, int, int] | None:
     except OSError:
         return None
     return found.st_mtime_ns, found.st_size, found.st_ino
+
+
+def _applies(trial: Document, document: Document) -> bool:
+    """Return whether what the steps of a copy change is in the document as they found it."""
+    found: dict[Key, object] = {}
+    for change in (change for step in trial.history for change in step.changes):
+        found.setdefault(change.key, change.before)
+    state = document.state
+    return all(state.get(key) == before for key, before in found.items())

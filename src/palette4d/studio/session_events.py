@@ -21,6 +21,9 @@ Event = Literal[
     "range",
     "status",
     "followed",  # an edit has read the clip, or failed
+    "draft",  # what a pick of the clicked pixel takes is learned
+    "answer",  # what the selected pick takes is known, or is not any more
+    "tool",  # what a click in the picture does
 ]
 
 
@@ -33,9 +36,6 @@ class Events:
         What the last action did.
     post : callable
         Runs a function on the views' thread; the window sets it.
-    beside : callable or None
-        Runs a function beside the views' thread; of functions that wait only the newest. The window
-        sets it. None: picks are solved when they are read.
     later : callable
         Runs a panel's function soon, when the picture is shown; the window sets it.
     """
@@ -45,7 +45,6 @@ class Events:
         self._callbacks: dict[str, list[tuple[Callable[[], object], bool]]] = {}
         self.status = Status()
         self.post: Callable[[Callable[[], object]], object] = lambda call: call()
-        self.beside: Callable[[Callable[[], object]], object] | None = None
         self.later: Callable[[Callable[[], object]], object] = lambda call: call()
 
     @property

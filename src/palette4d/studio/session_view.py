@@ -2,12 +2,15 @@
 
 import dataclasses
 from abc import ABC, abstractmethod
-from typing import Any
+from typing import Any, Literal
 
+from palette4d.grade.answer import Answer
 from palette4d.media.clip import Clip
 from palette4d.studio.display import Look
 from palette4d.studio.session_events import Events
 from palette4d.studio.states import Place, Probe, View
+
+Tool = Literal["", "add", "hold"]
 
 
 class SessionView(Events, ABC):
@@ -20,13 +23,17 @@ class SessionView(Events, ABC):
     frame : int
         The playhead.
     selection : tuple of str
-        The ids of the selected vertices, stops and edges.
+        The ids of the selected vertices, stops, edges, picks and holds.
     hover : str or None
-        The handle or palette colour under the pointer.
+        The handle, palette colour or pick under the pointer.
     probe : Probe or None
         The pixel under the pointer.
     place : Place or None
         The pixel or box that was clicked, and is not picked yet.
+    tool : str
+        What a drag in the picture does: "" picks, "add" adds to the selected pick, "hold" holds.
+    answer : Answer or None
+        What the selected pick takes of its frame; None until that is known.
     view : View
         How the picture is shown.
     playing : int
@@ -46,6 +53,8 @@ class SessionView(Events, ABC):
         self.hover: str | None = None
         self.probe: Probe | None = None
         self.place: Place | None = None
+        self.tool: Tool = ""
+        self.answer: Answer | None = None
         self.view = View()
         self.playing = 0
         self.marks: tuple[int, int] | None = None
@@ -89,16 +98,29 @@ class SessionView(Events, ABC):
     def select(self, *ids: str) -> None:
         """Select handles or palette colours; a pixel that was clicked is forgotten."""
         if ids != self.selection or self.place is not None:
-            self.selection, self.place = ids, None
+            self.selection, self.place, self.answer = ids, None, None
+            self.take("")
             self.emit("selection")
 
     def begin_pick(self, place: Place) -> None:
         """Inspect a pixel that was clicked; nothing else is selected."""
-        self.selection, self.place = (), place
+        self.selection, self.place, self.answer = (), place, None
+        self.take("")
         self.emit("selection")
 
+    def take(self, tool: Tool) -> None:
+        """Choose what a drag in the picture does."""
+        if tool != self.tool:
+            self.tool = tool
+            self.emit("tool")
+
+    def show_answer(self, answer: Answer | None) -> None:
+        """Tell what the selected pick takes."""
+        self.answer = answer
+        self.emit("answer")
+
     def hover_over(self, id: str | None) -> None:
-        """Tell which handle or palette colour is under the pointer."""
+        """Tell which handle, palette colour or pick is under the pointer."""
         if id != self.hover:
             self.hover = id
             self.emit("hover")

@@ -28,6 +28,8 @@ class View:
         Stops, and the power of the display, for looking only.
     outside : bool
         Mark the pixels outside of the palette.
+    matte : bool
+        Show the matte of the selected pick.
     version : str
         The version that "before" shows instead of the source; "" is the source.
     """
@@ -39,6 +41,7 @@ class View:
     exposure: float = 0.0
     gamma: float = 1.0
     outside: bool = False
+    matte: bool = False
     version: str = ""
 
 

@@ -5,7 +5,7 @@ picked yet. Each edit is that of a verb: `edit set`, `track`, `palette`, `pick` 
 """
 
 import contextlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from palette4d.colour.oklch import Adjustment
 from palette4d.grade.document import Document
+from palette4d.grade.edits import Change, Edit, as_colour, new_id
+from palette4d.grade.picks import Pick
 from palette4d.studio.states import Place
 
 F64 = NDArray[np.float64]
@@ -142,19 +144,23 @@ class PickTo:
         A pick, or a pixel.
     rgb : tuple of float
         Its new colour.
+    draft : Pick or None
+        The pick of the pixel, with its matte; None while that is being learned.
     """
 
     target: Target
     rgb: tuple[float, ...]
+    draft: Pick | None = None
 
     def __call__(self, document: Document) -> None:
-        """Do it; a new pick is not followed yet."""
-        target = self.target
+        """Do it; a new pick is not followed yet, and nothing is learned."""
+        target, draft = self.target, self.draft
         if target.kind == "pick":
             document.change_pick(target.id, to=self.rgb, any_value=True)
-        elif target.kind == "place":
-            rgb, colour = self.rgb, target.before.tolist()
-            document.pick(target.frame, colour=colour, to=rgb, follow=False, any_value=True)
+        elif target.kind == "place" and draft is not None:
+            id_ = new_id("p", (pick.id for pick in document.picks))
+            fields = replace(draft, id=id_, to=as_colour(self.rgb)).to_fields()
+            document.apply(Edit((Change("pick", id_, None, fields),), ""))
 
 
 @dataclass(frozen=True)

@@ -49,8 +49,11 @@ READING = "reading…"
 BEFORE = "before"
 AFTER = "after"
 NEW_PICK = "choose its new colour"
+ALSO, PROPOSED_HOLD, PROPOSED_BOX = "also", "hold?", "add?"
 NO_MATTE = "{id} has no weight in this frame"
 MATTE, MATTE_ENDS = "weight of {id}", ("0 %", "100 %")
+PICK_MATTE, DRAFT_MATTE = "matte of {id}", "what a pick here takes"
+NO_PICK_MATTE = "{id} does nothing in this frame"
 PROBE_IN = "in"
 PROBE_OUT = "out"
 NO_COLOUR = "there is no colour: the pixels are transparent or not finite"
@@ -149,6 +152,7 @@ ACTIONS = {
         "zoom_in": "Zoom in",
         "zoom_out": "Zoom out",
         "outside": "Mark colours outside of the palette",
+        "matte": "Matte of the selected pick",
         "brighter": "Exposure up",
         "darker": "Exposure down",
         "plain_look": "Reset exposure and gamma",
@@ -199,13 +203,20 @@ GESTURES = (
         "Alt-click or Ctrl-click",
         "hold: the colour stays; with a drag, the mean of a box",
     ),
+    (
+        "picture",
+        "Shift-drag, with a pick selected",
+        "paint what belongs to it too; a click adds a box",
+    ),
+    ("picture", "Shift-wheel, with a pick selected", "the brush's size"),
     ("picture", "move the pointer", "see the pixel's values, and its weights on the rows"),
     ("picture", "wheel", "zoom at the pointer"),
-    ("picture", "middle button, Shift-drag", "pan"),
+    ("picture", "middle button; Shift-drag without a pick", "pan"),
     ("picture", "drag the wipe's line", "move the wipe"),
     ("timeline", "click a disc or a row", "select it; Shift or Ctrl adds"),
     ("timeline", "drag over the ground", "select the discs in the box"),
     ("timeline", "move over a disc or a row", "see its weight as a matte over the picture"),
+    ("timeline", "move over a pick's bar", "see what it takes; so in the list of picks"),
     ("timeline", "double-click a row", "add a stop there"),
     ("timeline", "double-click a disc", "go to its frame"),
     ("timeline", "drag a stop", "move it to another frame; with Alt between frames"),
@@ -323,7 +334,7 @@ FIRST_STEPS = "First steps"
 FIRST_STEPS_TEXT = (
     "1. Drop a clip on the window. Its palette is found in some seconds.\n"
     "2. Click a colour in the picture and choose what it becomes.\n"
-    "3. Alt-click or Ctrl-click what must stay as it is.\n"
+    "3. Shift-drag over what belongs to it too. Alt- or Ctrl-click what must stay as it is.\n"
     "4. W shows before and after. Ctrl+Z undoes. Everything is saved by itself."
 )
 MANUAL = "Gestures and keys"
@@ -343,13 +354,10 @@ ADD_STOP_AT = "Add a stop at frame {frame}"
 REMOVE_STOP = "Remove the stop"
 LOCK, UNLOCK = "Lock", "Unlock"
 ACTS = "Acts"
-PALETTE_ONLY = "By the palette alone, no local remainder"
 SAME_COLOUR = "The same new colour in all frames"
 FADE = "Fades, before and after the range"
 FADE_OF, NO_FADE = "{frames} frames", "none"
 FADE_SET = "{id} fades over {frames} frames before and after its range"
-BY_PALETTE = "{id} acts by the palette alone"
-WITH_REMAINDER = "{id} acts by the palette, and by a local remainder"
 SAME_EVERYWHERE = "{id} becomes the same colour in all frames"
 SAME_SHIFT = "{id} changes by the same way in all frames"
 RESET = "Reset the selected handles"
@@ -413,17 +421,45 @@ PLACE_HINT = "choose what it becomes"
 PICK, HOLD = "pick", "hold"
 PICKED, PICK_SET = "the colour is picked", "{id} has a new colour"
 HELD = "the colour is held"
+LEARNING = "learning the colour…"
 STILL_FOLLOWING = "a colour is still being followed through the clip; try again when that is done"
 CLOSES_SOON = "the window closes when the colour is followed; close it again to lose that edit"
 FOLLOWING = "following the colour: {done} of {total} frames"
 PICK_LIST = "Picks, holds and locks"
-PICK_COLUMNS = ("id, kind, frame", "off by", "palette")
-MET, NOT_MET = "✓", "⚠"
+PICK_COLUMNS = ("id, kind, frame", "acts")
+ALL_FRAMES = "all frames"
 LOCKED = "{id} is locked"
 LOCKED_MOVED = "locked against picks, changed by hand: {ids}"
 RANGE_SET = "{id} acts from frame {start} to {until}"
-PICK_TIP = "from frame {} to {}, fades of {} frames; “palette” is its share of the change"
-ENABLED, DISABLED = "{id} acts again", "{id} does not act"
+PICK_TIP = "from frame {} to {}, fades of {} frames; the picture shows what it takes"
+PICK_SHAPED = "the matte of {id} is changed"
+REACH, SOFTNESS, LIGHTNESS_RANGE = "Reach", "Softness", "Lightness"
+REACH_TIP = "Above 0 it takes more colours, below 0 fewer"
+SOFTNESS_TIP = "How soft the edge of its matte is"
+LIGHTNESS_TIP = "It changes only what is this light. Up and down choose the end that keys move"
+WHOLE_HUE = "All of its hue"
+WHOLE_HUE_TIP = "It takes all colours of its hue, as a qualifier does; nothing is learned"
+ITS_HUE, ITS_COLOURS = "{id} takes all of its hue", "{id} takes the colours of its place"
+ADD_TO_IT = "Add to it"
+ADD_TO_IT_TIP = (
+    "Then paint in the picture what belongs to it too; a click is a box. Shift-drag does the same"
+)
+HOLD_TOOL = "Hold…"
+HOLD_TOOL_TIP = "Then click in the picture what must stay. Alt-click does the same"
+MATTE_BUTTON = "Matte"
+MATTE_TIP = "Show what it takes; the rest is dark and grey (M)"
+AREA_ADDED = "{id} has learned what was added"
+LOOKING = "looking what it takes…"
+TAKES, KEEPS = "Takes {share} of frame {frame}.", "Keeps {share} of frame {frame}."
+ALSO_TAKES = "Also takes {share} elsewhere, most of it at {x}, {y}."
+LEAVES_OUT = "Leaves out {share} beside it, at {x}, {y}."
+ADD_HOLD, ADD_HOLD_TIP = "Add this hold", "Then it takes {share} elsewhere"
+ADD_BOX, ADD_BOX_TIP = "Add this box", "Then it takes {share}"
+FLOODS = (
+    "This may be more than one thing. Look at its matte. A hold on what must stay takes less, "
+    "and so does a lower reach."
+)
+ENABLED, DISABLED = "{ids} acts again", "{ids} does not act"
 REMOVE = "Remove"
 REMOVED = "removed {ids}"
 KEEP = "Keep"

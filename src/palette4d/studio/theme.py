@@ -46,8 +46,8 @@ QToolButton {{ padding: 3px 6px; }}
 QToolButton[flat="true"] {{ background: transparent; border-color: transparent; }}
 QPushButton:hover, QToolButton:hover {{ background: #3a3a3a; color: {BRIGHT}; }}
 QPushButton:focus, QToolButton:focus {{ border-color: {FAINT}; }}
-QPushButton:pressed, QToolButton:pressed, QToolButton:checked {{ background: #4a4a4a;
-  color: {BRIGHT}; }}
+QPushButton:pressed, QPushButton:checked, QToolButton:pressed, QToolButton:checked {{
+  background: #4a4a4a; color: {BRIGHT}; }}
 QPushButton:default {{ border-color: {FAINT}; color: {BRIGHT}; }}
 QPushButton:disabled, QToolButton:disabled {{ color: #5e5e5e; }}
 QLineEdit, QAbstractSpinBox, QComboBox, QPlainTextEdit, QTextEdit {{ background: {PIT};

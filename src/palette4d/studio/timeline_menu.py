@@ -88,9 +88,9 @@ def _add_pick(menu: QMenu, session: Session, pick: Pick) -> None:
     switch = not pick.enabled
     entry(menu, texts.ACTS, pick.enabled, lambda: grade_steps.enable(session, pick.id, switch))
     if pick.kind == "pick":
-        said = texts.WITH_REMAINDER if pick.global_only else texts.BY_PALETTE
-        only = changed(said, global_only=not pick.global_only)
-        entry(menu, texts.PALETTE_ONLY, pick.global_only, only)
+        said = texts.ITS_COLOURS if pick.whole_hue else texts.ITS_HUE
+        hue = changed(said, whole_hue=not pick.whole_hue)
+        entry(menu, texts.WHOLE_HUE, pick.whole_hue, hue)
         same = pick.toward == "colour"
         said = texts.SAME_SHIFT if same else texts.SAME_EVERYWHERE
         toward = changed(said, toward="shift" if same else "colour")

@@ -313,7 +313,7 @@ class TimelineView(QWidget):
 
     def _hover(self, at: QPointF) -> None:
         hit = self.places.hit(at)
-        self.session.hover_over(hit.id or None if hit.what != "pick" else None)
+        self.session.hover_over(hit.id or None)
         shape = Qt.CursorShape.ArrowCursor
         if hit.stop or hit.grip:
             shape = Qt.CursorShape.SizeHorCursor

@@ -17,6 +17,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QWidget
 
+from palette4d.grade.picks import Area
 from palette4d.studio import texts
 from palette4d.studio.pixels import place_between, probe_at
 from palette4d.studio.player import Region
@@ -30,6 +31,8 @@ NEAR_WIPE, CLICK = 6, 4
 ZOOM_STEP, LEAST_ZOOM, MOST_ZOOM = 1.25, 0.02, 64.0
 #: A click with one of these holds; many desktops keep Alt for themselves.
 HOLD_KEYS = Qt.KeyboardModifier.AltModifier | Qt.KeyboardModifier.ControlModifier
+#: Half of the brush's width, its limits in pixels of the widget, and the step of the wheel.
+BRUSH, LEAST_BRUSH, MOST_BRUSH, BRUSH_STEP = 10.0, 2.0, 200.0, 1.2
 #: The probe stands within so many pixels of the lower rim.
 PROBE_HEIGHT = 200
 #: Frames that are read around the playhead, when it has rested for so many milliseconds.
@@ -65,11 +68,15 @@ class Viewer(QWidget):
         self.doing = ""
         self._pan_from = QPointF()
         self.pointer: QPointF | None = None
+        self.shows_brush = False  #: the pointer is a brush
         self._resting = QTimer(self)
         self._resting.setSingleShot(True)
         self._resting.timeout.connect(self._read_around)
         self.on_pick: Any = None  #: called with a Place for a click or a box
         self.on_hold: Any = None  #: the same with Alt
+        self.on_area: Any = None  #: called with an Area for a stroke
+        self.brush = BRUSH  #: half of its width, in pixels of the widget
+        self.stroke: list[tuple[int, int]] = []  #: the frame's pixels that a stroke is drawn along
         session.on("clip", self._clip_changed)
         session.on("document", self.refresh)
         session.on("document", self._probe_again)
@@ -78,7 +85,9 @@ class Viewer(QWidget):
         session.on("pixels", self._pixels_arrived)
         session.on("view", self.refresh)
         session.on("hover", self.refresh)
-        for event in ("wipe", "selection"):
+        session.on("selection", self.refresh)
+        session.on("draft", self.refresh)
+        for event in ("wipe", "answer", "tool"):
             session.on(event, self.update)
 
     # ---------------------------------------------------------------------------- what is shown
@@ -162,7 +171,8 @@ class Viewer(QWidget):
             region,
             pixels,
             settled=not moving,
-            matte=session.hover,
+            matte=session.shown_matte,
+            pick_matte=session.pick_matte(session.shown_matte),
             outside=session.view.outside,
         )
 
@@ -360,9 +370,12 @@ class Viewer(QWidget):
         elif event.button() == Qt.MouseButton.LeftButton:
             if self._over_wipe(point):
                 self.doing = "wipe"
+            elif (at := self.pixel_at(point)) is not None and self.brushing(event.modifiers()):
+                self.doing, self.stroke = "stroke", [at]
+                self.update()
             elif event.modifiers() & Qt.KeyboardModifier.ShiftModifier:
                 self.doing, self._pan_from = "pan", QPointF(self._middle())
-            elif self.pixel_at(point) is not None:
+            elif at is not None:
                 self.doing = "pick"
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
@@ -379,12 +392,17 @@ class Viewer(QWidget):
             left = self.origin(self.panes()[0][1]).x()
             at = (point.x() - left) / (clip.width * self.scale())
             self.session.look(wipe=min(max(at, 0.0), 1.0))
+        elif self.doing == "stroke":
+            self._draw_to(point)
         elif self.doing in ("pick", "box") and self.press is not None:
             moved = point - self.press
             if max(abs(moved.x()), abs(moved.y())) > CLICK:
                 self.doing = "box"
             self.update()
         else:
+            before, self.shows_brush = self.shows_brush, self.brushing(event.modifiers())
+            if before or self.shows_brush:
+                self.update()
             over = self._over_wipe(point)
             shape = Qt.CursorShape.SplitHCursor if over else Qt.CursorShape.CrossCursor
             self.setCursor(shape if self.pixel_at(point) or over else Qt.CursorShape.ArrowCursor)
@@ -395,10 +413,15 @@ class Viewer(QWidget):
         doing, press, self.doing, self.press = self.doing, self.press, "", None
         if doing == "pan":
             self.refresh()
+        if doing == "stroke":
+            points, self.stroke = self.stroke, []
+            drawn = tuple((float(x), float(y)) for x, y in points)
+            if self.on_area is not None:
+                self.on_area(Area(self.session.frame, drawn, self.stroke_radius))
         if doing in ("pick", "box") and press is not None:
             place = self.place(press, event.position() if doing == "box" else press)
             if place is not None:
-                hold = event.modifiers() & HOLD_KEYS
+                hold = event.modifiers() & HOLD_KEYS or self.session.tool == "hold"
                 act = self.on_hold if hold else self.on_pick
                 if act is not None:
                     act(place)
@@ -410,14 +433,20 @@ class Viewer(QWidget):
 
     def leaveEvent(self, event: QEvent) -> None:
         """Stop probing."""
-        self.pointer = None
+        self.pointer, self.shows_brush = None, False
         self.session.show_probe(None)
         self.update()
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        """Zoom at the pointer."""
-        turns = event.angleDelta().y() / 120
-        if turns:
+        """Zoom at the pointer; with Shift, change the brush's size."""
+        turn = event.angleDelta()
+        turns = (turn.y() or turn.x()) / 120  # some systems turn the wheel sideways with Shift
+        shift = event.modifiers() & Qt.KeyboardModifier.ShiftModifier
+        if turns and shift and self.brushing(event.modifiers()):
+            self.brush = min(max(self.brush * BRUSH_STEP**turns, LEAST_BRUSH), MOST_BRUSH)
+            self.shows_brush = True
+            self.update()
+        elif turns:
             self.zoom_by(ZOOM_STEP**turns, event.position())
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -427,6 +456,27 @@ class Viewer(QWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Ask for a picture of the new size."""
         self.refresh()
+
+    # ------------------------------------------------------------------------------------- strokes
+
+    def brushing(self, keys: Qt.KeyboardModifier) -> bool:
+        """Return whether a drag adds to the selected pick."""
+        shift = bool(keys & Qt.KeyboardModifier.ShiftModifier)
+        return self.session.picked is not None and (shift or self.session.tool == "add")
+
+    @property
+    def stroke_radius(self) -> float:
+        """Half of the brush's width in pixels of the frame, so that its width is whole."""
+        return max(1, round(2 * self.brush / self.scale())) / 2
+
+    def _draw_to(self, point: QPointF) -> None:
+        """Draw the stroke on; points nearer than a third of the brush are left out."""
+        at = self.pixel_at(point)
+        if at is not None:
+            away = math.hypot(at[0] - self.stroke[-1][0], at[1] - self.stroke[-1][1])
+            if away >= max(1.0, self.stroke_radius / 3):
+                self.stroke.append(at)
+        self.update()
 
     def hold_to_compare(self, down: bool) -> None:
         """Show the picture before while a key is down."""

@@ -1,15 +1,28 @@
 """How the viewer is drawn: the picture, the wipe, captions, picks and holds, and the probe."""
 
 import functools
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt
-from PySide6.QtGui import QBrush, QColor, QFontMetricsF, QImage, QLinearGradient, QPainter, QPen
+from PySide6.QtGui import (
+    QBrush,
+    QColor,
+    QFontMetricsF,
+    QImage,
+    QLinearGradient,
+    QPainter,
+    QPainterPath,
+    QPainterPathStroker,
+    QPen,
+)
 
+from palette4d.grade.picks import Pick
 from palette4d.studio import texts, theme
-from palette4d.studio.preview import MATTE_GREY
+from palette4d.studio.drafts import DRAFT
+from palette4d.studio.preview import MATTE_GREY, REST_LIFT, REST_LIGHT
 from palette4d.studio.screen_colours import on_screen
 
 if TYPE_CHECKING:
@@ -53,6 +66,7 @@ class ViewerPainter:
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         self._draw_captions(painter)
         self._draw_marks(painter)
+        self._draw_brush(painter)
         if (
             self.viewer.doing == "box"
             and self.viewer.press is not None
@@ -139,17 +153,79 @@ class ViewerPainter:
             both = np.array([pick.rgb, pick.rgb if pick.to is None else pick.to])
             chosen = pick.id in session.selection
             _flag(painter, box, pick.id, on_screen(session, both), bright=chosen)
+        if session.picked is not None:
+            self._draw_areas(painter, session.picked)
+
+    def _draw_areas(self, painter: QPainter, pick: Pick) -> None:
+        """Draw what was added to the selected pick, and what its answer proposes."""
+        session, found = self.session, self.session.answer
+        for area in pick.areas:
+            if area.frame == session.frame:
+                self._stroke(painter, area.points, area.radius, 70)
+        if found is None or found.frame != session.frame:
+            return
+        for place, text in (
+            (found.other if found.hold is None else None, texts.ALSO),
+            (found.hold, texts.PROPOSED_HOLD),
+            (found.part, texts.PROPOSED_BOX),
+        ):
+            if place is not None:
+                box = self._mark(painter, *place.pixel, place.box, hold=True, dashed=True)
+                shown = on_screen(session, np.array([place.rgb]))
+                _flag(painter, box, text, shown, bright=False)
+
+    def _draw_brush(self, painter: QPainter) -> None:
+        """Draw the stroke, and the brush at the pointer."""
+        viewer, at = self.viewer, self.viewer.pointer
+        if viewer.stroke:
+            self._stroke(painter, viewer.stroke, viewer.stroke_radius, 110)
+        if at is not None and (viewer.shows_brush or viewer.stroke):
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            radius = viewer.stroke_radius * viewer.scale()
+            _ring(painter, lambda: painter.drawEllipse(at, radius, radius), thin=True)
+
+    def _stroke(
+        self, painter: QPainter, points: Sequence[tuple[float, float]], radius: float, alpha: int
+    ) -> None:
+        """Draw a box (one point) or a stroke of the frame."""
+        scale = self.viewer.scale()
+        line = [self.viewer.point_of(x + 0.5, y + 0.5) for x, y in points]
+        shape = QPainterPath()
+        if len(line) == 1:
+            half = radius * scale
+            shape.addRect(line[0].x() - half, line[0].y() - half, 2 * half, 2 * half)
+        else:
+            middle = QPainterPath(line[0])
+            for point in line[1:]:
+                middle.lineTo(point)
+            stroker = QPainterPathStroker()
+            stroker.setWidth(2 * radius * scale)
+            stroker.setCapStyle(Qt.PenCapStyle.RoundCap)
+            stroker.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
+            shape = stroker.createStroke(middle).simplified()
+        painter.fillPath(shape, QColor(255, 255, 255, alpha))
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        _ring(painter, lambda: painter.drawPath(shape), thin=True)
 
     def _mark(
-        self, painter: QPainter, x: float, y: float, side: int, *, hold: bool, cross: bool = False
+        self,
+        painter: QPainter,
+        x: float,
+        y: float,
+        side: int,
+        *,
+        hold: bool,
+        cross: bool = False,
+        dashed: bool = False,
     ) -> QRectF:
         """Draw a ring or a square around pixels; return its box."""
         point = self.viewer.point_of(x + 0.5, y + 0.5)
         half = max(7.0, side * self.viewer.scale() / 2)
         box = QRectF(point.x() - half, point.y() - half, 2 * half, 2 * half)
         painter.setBrush(Qt.BrushStyle.NoBrush)
-        _ring(painter, lambda: painter.drawRect(box) if hold else painter.drawEllipse(box))
-        if hold:
+        draw = painter.drawRect if hold else painter.drawEllipse
+        _ring(painter, lambda: draw(box), dashed=dashed)
+        if hold and not dashed:
             _ring(painter, lambda: painter.drawPoint(point))
         if cross:
             for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):
@@ -207,12 +283,18 @@ class ViewerPainter:
 
     def _draw_legend(self, painter: QPainter) -> None:
         """Say what the matte shows, with its scale from grey to the picture."""
-        picture, hover = self.viewer.picture, self.session.hover
-        if picture is None or hover is None or picture.request.matte != hover:
+        picture, shown = self.viewer.picture, self.session.shown_matte
+        if picture is None or shown is None or picture.request.matte != shown:
             return
+        pick = picture.request.pick_matte is not None
         painter.setFont(theme.numbers_font(9))
         measure = painter.fontMetrics()
-        words = (texts.MATTE if picture.matte else texts.NO_MATTE).format(id=hover)
+        has, lacks = texts.MATTE, texts.NO_MATTE
+        if pick:
+            has, lacks = texts.PICK_MATTE, texts.NO_PICK_MATTE
+        if shown == DRAFT:
+            has = lacks = texts.DRAFT_MATTE
+        words = (has if picture.matte else lacks).format(id=shown)
         ends = texts.MATTE_ENDS
         wide = 90.0
         widths = [measure.horizontalAdvance(text) for text in (words, *ends)]
@@ -224,19 +306,30 @@ class ViewerPainter:
         painter.drawRoundedRect(box, 4, 4)
         base = box.top() + 4 + measure.ascent()
         x = box.left() + 8
-        shown = (words, ends[0]) if picture.matte else (words,)
-        for text, width in zip(shown, widths, strict=False):
+        told = (words, ends[0]) if picture.matte else (words,)
+        for text, width in zip(told, widths, strict=False):
             painter.setPen(QColor(theme.BRIGHT))
             painter.drawText(QPointF(x, base), text)
             x += width + 8
         if not picture.matte:
             return
-        colour = self._palette_colours().get(hover, QColor(theme.BRIGHT))
+        colour, grey = self._palette_colours().get(shown, QColor(theme.BRIGHT)), MATTE_GREY
+        if pick:
+            colour, grey = self._pick_colour(shown), round(128 * REST_LIGHT + REST_LIFT)
         scale = QLinearGradient(x, 0, x + wide, 0)
-        scale.setColorAt(0, QColor(MATTE_GREY, MATTE_GREY, MATTE_GREY))
+        scale.setColorAt(0, QColor(grey, grey, grey))
         scale.setColorAt(1, colour)
         painter.fillRect(QRectF(x, box.top() + 7, wide, tall - 14), QBrush(scale))
         painter.drawText(QPointF(x + wide + 6, base), ends[1])
+
+    def _pick_colour(self, id_: str) -> QColor:
+        """Return the new colour of a pick, or that of the clicked pixel, as displayed."""
+        document, place = self.session.document, self.session.place
+        picks = () if document is None else document.picks
+        rgb = next((pick.to or pick.rgb for pick in picks if pick.id == id_), None)
+        if rgb is None:
+            rgb = (1.0, 1.0, 1.0) if place is None else place.colour
+        return QColor(*on_screen(self.session, np.array(rgb)).tolist())
 
     def _palette_colours(self) -> dict[str, QColor]:
         """Return the frame's palette colours as displayed, by id."""
@@ -280,24 +373,30 @@ def _figure(value: float) -> str:
     return f"{value:7.4f}" if abs(value) < 100 else f"{value:7.1f}"
 
 
-def _ring(painter: QPainter, draw: Any) -> None:
+def _ring(painter: QPainter, draw: Any, *, thin: bool = False, dashed: bool = False) -> None:
     """Draw a line that is seen on any picture: dark below bright."""
+    slim = 0.55 if thin or dashed else 1.0
     for width, colour in ((4.2, QColor(0, 0, 0, 190)), (1.8, QColor(255, 255, 255, 255))):
-        painter.setPen(QPen(colour, width))
+        pen = QPen(colour, width * slim)
+        if dashed and width < 2:
+            pen.setDashPattern([4, 3])
+        painter.setPen(pen)
         draw()
 
 
 def _flag(
     painter: QPainter, box: QRectF, text: str, colours: NDArray[np.uint8], *, bright: bool
 ) -> None:
-    """Write a name on a plate beside a mark, with the colour before and after."""
+    """Write a name on a plate beside a mark, with its colours."""
     font = painter.font()
     font.setPointSizeF(8.5)
     font.setBold(bright)
     painter.setFont(font)
     measure = QFontMetricsF(font)
     tall = measure.height() + 4
-    plate = QRectF(box.right() + 5, box.top() - 2, measure.horizontalAdvance(text) + 36, tall)
+    left = 9 + 11 * len(colours)
+    wide = left + measure.horizontalAdvance(text) + 5
+    plate = QRectF(box.right() + 5, box.top() - 2, wide, tall)
     painter.setPen(QPen(QColor(255, 255, 255, 230) if bright else QColor(0, 0, 0, 0), 1))
     painter.setBrush(QColor(18, 18, 18, 215))
     painter.drawRoundedRect(plate, 3, 3)
@@ -305,7 +404,7 @@ def _flag(
         square = QRectF(plate.left() + 5 + 11 * k, plate.top() + 3, 11, tall - 6)
         painter.fillRect(square, QColor(*rgb))
     painter.setPen(QColor(255, 255, 255))
-    painter.drawText(QPointF(plate.left() + 31, plate.top() + 2 + measure.ascent()), text)
+    painter.drawText(QPointF(plate.left() + left, plate.top() + 2 + measure.ascent()), text)
 
 
 def _label(painter: QPainter, text: str, box: QRectF, side: Qt.AlignmentFlag) -> None:

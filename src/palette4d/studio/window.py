@@ -47,7 +47,6 @@ from palette4d.studio.inspector import Inspector
 from palette4d.studio.instance import Listener
 from palette4d.studio.menu_actions import MenuActions
 from palette4d.studio.menu_entries import ACTIONS, Action
-from palette4d.studio.newest import Newest
 from palette4d.studio.paths import sequence_of
 from palette4d.studio.session import Session
 from palette4d.studio.shot_list import Shots
@@ -162,7 +161,6 @@ class Window(QMainWindow):
         self.session = session
         self.settings = settings if settings is not None else QSettings("palette4d", "studio")
         session.post = _Post(self).post
-        session.beside = Newest("palette4d solver").ask
         self.setWindowTitle(f"{texts.TITLE}[*]")
         self.setAcceptDrops(True)
         self.setDockNestingEnabled(True)
@@ -175,6 +173,7 @@ class Window(QMainWindow):
         self.solid = SolidView(session)
         self.inspector = Inspector(session)
         self.viewer.on_pick, self.viewer.on_hold = self.inspector.pick, self.inspector.hold
+        self.viewer.on_area = self.inspector.add_area
         self.history = History(session)
         self.files = FileMenu(self)
         self.shots = Shots(session, self.files.open_shot)
@@ -413,6 +412,7 @@ class Window(QMainWindow):
         checks = {
             **{f"show_{each}": view.compare == each for each in texts.COMPARE},
             "outside": view.outside,
+            "matte": view.matte,
             "loop": session.loop,
             "full_screen": self.isFullScreen(),
         }
@@ -516,8 +516,9 @@ class Window(QMainWindow):
             self.viewer.current
             and picture is not None
             and picture.exact
-            and not session.solving
+            and not session.learning
             and session.player.idle
+            and self.inspector.panel.settled
             and self.turns.settled
             and (self.timeline.settled or not self.timeline.isVisible())
         )

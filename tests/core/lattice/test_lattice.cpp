@@ -10,6 +10,7 @@
 
 #include "check.hpp"
 #include "images.hpp"
+#include "picks.hpp"
 #include "shapes.hpp"
 
 using namespace palette4d;
@@ -431,16 +432,19 @@ TEST(what_is_wrong_is_said) {
     CHECK_EQUAL(lattice.apply(empty.in(), empty.out(), {}).exact(), 0LL);
 }
 
-TEST(bumps_and_holds_are_evaluated_at_each_colour) {
+TEST(picks_and_holds_are_evaluated_at_each_colour) {
     Random random(60);
-    const std::vector<Bump> bumps = {{{0.5, 0.4, 0.3}, 0.3, {0.3, -0.35, 0.2}},
-                                     {{0.6, 0.6, 0.6}, 0.02, {-0.55, 0.5, -0.5}},
-                                     {{0.2, 0.7, 0.5}, 0.6, {0.1, -0.6, 0.1}},
-                                     {{0.4, 0.5, 0.4}, 0.4, {}, 1},
-                                     {{0.6, 0.3, 0.5}, 0.2, {}, 0.5}};
+    Edits edits;
+    edits.picks = {picks::pick("a", {0.6, 0.3, 0.25}, {0.3, 0.65, 0.4}),
+                   picks::pick("b", {0.6, 0.6, 0.58}, {0.1, 0.9, 0.2}),
+                   picks::pick("c", {0.2, 0.7, 0.5}, {0.3, 0.1, 0.6}),
+                   picks::hold("h", {0.4, 0.5, 0.4}), picks::hold("i", {0.6, 0.3, 0.5})};
+    edits.picks[2].from = 2;
+    edits.picks[2].fade = 4;
+    const FramePicks found_picks = picks_at(edits, 0);
     for (const Edited& palette : {edited(random_convex(random, 9), 3), edited(concave_cube(), 4)}) {
         const auto recolourer = std::make_shared<Recolourer>(palette.mesh.rgb, palette.colours,
-                                                             palette.mesh.faces, bumps);
+                                                             palette.mesh.faces, found_picks);
         for (const bool premultiplied : {false, true}) {
             const Lattice lattice(recolourer);
             Image image = picture(400, 120, 4, 77);
@@ -478,10 +482,11 @@ TEST(bumps_and_holds_are_evaluated_at_each_colour) {
     }
 }
 
-TEST(bumps_alone_need_no_lattice) {
+TEST(picks_alone_need_no_lattice) {
+    Edits edits;
+    edits.picks = {picks::pick("a", {0.5, 0.5, 0.4}, {0.6, 0.3, 0.7})};
     const auto recolourer =
-        std::make_shared<Recolourer>(cube().rgb, cube().rgb, cube().faces,
-                                     std::vector<Bump>{{{0.5, 0.5, 0.5}, 0.5, {0.1, -0.2, 0.3}}});
+        std::make_shared<Recolourer>(cube().rgb, cube().rgb, cube().faces, picks_at(edits, 0));
     const Lattice lattice(recolourer);
     const Image image = picture(96, 20, 4, 14);
     Image expected(96, 20, 4), found(96, 20, 4);

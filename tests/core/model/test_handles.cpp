@@ -1,6 +1,7 @@
 #include "model/handles.hpp"
 
 #include <limits>
+#include <memory>
 #include <stdexcept>
 
 #include "check.hpp"
@@ -79,7 +80,7 @@ TEST(handles_that_do_not_exist_and_colours_that_are_none_are_refused) {
     CHECK_THROWS(std::invalid_argument, with_colours(polytope, edits, true, {{0, {0, nan, 0}}}));
 }
 
-TEST(colours_of_the_host_keep_ramps_and_the_solution) {
+TEST(colours_of_the_host_keep_ramps_and_picks) {
     const Polytope polytope = split_parts().build();
     Edits edits;
     edits.vertex_rgb.resize(polytope.vertices().size());
@@ -87,16 +88,15 @@ TEST(colours_of_the_host_keep_ramps_and_the_solution) {
     edits.vertex_ramp[1] = Ramp::kHold;
     edits.default_ramp = Ramp::kSmooth;
     edits.stops = {{"s1", 0, 5, {0, 1, 0}, Ramp::kLinear}};
-    edits.solution.vertex_by.resize(polytope.vertices().size());
-    edits.solution.keys = {{0, 10, {0.25, 0, 0}}};
-    edits.solution.bumps = {{0.5, {{2, {0, 0, 0}, {0, 2, 0}}}}};
+    edits.picks.resize(2);
+    edits.display = std::make_shared<const DisplayCurve>(DisplayCurve{0, 1, {0, 1}});
     const int stop = static_cast<int>(polytope.vertices().size());
     const Edits kept = with_colours(polytope, edits, true, {{1, {1, 1, 1}}, {stop, {0, 0, 1}}});
     CHECK(kept.default_ramp == Ramp::kSmooth && kept.vertex_ramp == edits.vertex_ramp);
     CHECK(kept.stops[0].ramp == Ramp::kLinear && kept.stops[0].rgb == (Vec3{0, 0, 1}));
-    CHECK(kept.solution.keys.size() == 1 && kept.solution.bumps.size() == 1);
+    CHECK(kept.picks.size() == 2 && kept.display == edits.display);
     // Alone, they are all there is.
     const Edits alone = with_colours(polytope, edits, false, {{1, {1, 1, 1}}});
-    CHECK(alone.solution.vertex_by.empty() && alone.solution.bumps.empty());
+    CHECK(alone.picks.empty());
     CHECK(alone.default_ramp == Ramp::kLinear && alone.stops.empty());
 }

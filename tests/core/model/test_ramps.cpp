@@ -110,12 +110,9 @@ TEST(edits_of_another_polytope_are_refused) {
 
 TEST(edits_of_the_wrong_size_are_refused) {
     const Polytope polytope = split_parts().build();
-    Edits ramps = no_edits(polytope), solution = no_edits(polytope);
-    ramps.vertex_ramp.resize(3);
-    solution.solution.vertex_by.resize(3);
-    for (const Edits& edits : {ramps, solution}) {
-        CHECK_THROWS(std::invalid_argument, edited_colours(polytope, edits, slice_at(polytope, 1)));
-    }
+    Edits edits = no_edits(polytope);
+    edits.vertex_ramp.resize(3);
+    CHECK_THROWS(std::invalid_argument, edited_colours(polytope, edits, slice_at(polytope, 1)));
 }
 
 TEST(a_held_edit_stays_and_a_smooth_one_does_not_overshoot) {
@@ -151,64 +148,4 @@ TEST(a_held_edit_stays_and_a_smooth_one_does_not_overshoot) {
     edits.vertex_ramp.resize(polytope.vertices().size());
     edits.vertex_ramp[0] = Ramp::kHold;
     CHECK(same_bits(moved(4.9), {0, 0, 0}) && !same_bits(moved(6), moved(5)));
-}
-
-TEST(the_solution_is_added_to_the_edited_colours) {
-    const Polytope polytope = split_parts().build();
-    Edits edits = no_edits(polytope);
-    edits.solution.vertex_by.resize(polytope.vertices().size());
-    edits.solution.vertex_by[1] = {0, 0, 0.5};
-    edits.solution.keys = {{0, 5, {0, 0.5, 0}}, {0, 10, {0.25, 0, 0}}};
-    const auto by = [&](double t) {
-        const Slice slice = slice_at(polytope, t);
-        Edits plain = edits;
-        plain.solution = {};
-        const Vec3 with = edited_colours(polytope, edits, slice)[0],
-                   without = edited_colours(polytope, plain, slice)[0];
-        return Vec3{with[0] - without[0], with[1] - without[1], with[2] - without[2]};
-    };
-    for (const Ramp ramp : {Ramp::kLinear, Ramp::kSmooth}) {
-        edits.default_ramp = ramp;
-        CHECK(same_bits(by(0), {0, 0, 0}));
-        CHECK(apart(by(2.5), {0, 0.25, 0}) < 1e-15);
-        CHECK(apart(by(7.5), {0.125, 0.25, 0}) < 1e-15);
-        CHECK(apart(by(10), {0.25, 0, 0}) < 1e-15);
-        CHECK(apart(by(15), {0.125, 0, 0.25}) < 1e-15);
-        CHECK(apart(by(20), {0, 0, 0.5}) < 1e-15);
-        edits.stops = {{"s1", 0, 4, {0.2, 0.9, 0.4}}};
-    }
-    // Other edges keep their bits.
-    const Slice slice = slice_at(polytope, 7);
-    const auto colours = edited_colours(polytope, edits, slice);
-    for (std::size_t i = 1; i < colours.size(); ++i) CHECK(same_bits(colours[i], slice.rgb[i]));
-}
-
-TEST(bumps_follow_their_keys_and_are_left_out_while_they_do_nothing) {
-    Edits edits;
-    CHECK(bumps_at(edits, 3).empty());
-    edits.solution.bumps = {
-        {0.5, {{2, {0, 0, 0}, {0, 0, 0}}, {4, {1, 0, 0}, {0, 2, 0}}, {6, {1, 1, 0}, {0, 0, 0}}}},
-        {0.25, {{3, {0.5, 0.5, 0.5}, {0.125, 0, 0}}}}};
-    for (const double t : {-1e9, 0.0, 2.0, 6.0, 7.0, 1e9}) {
-        const std::vector<Bump> bumps = bumps_at(edits, t);
-        CHECK_EQUAL(bumps.size(), 1u);
-        CHECK_EQUAL(bumps[0].radius, 0.25);
-        CHECK(same_bits(bumps[0].by, {0.125, 0, 0}));
-    }
-    const std::vector<Bump> bumps = bumps_at(edits, 3);
-    CHECK_EQUAL(bumps.size(), 2u);
-    CHECK(same_bits(bumps[0].centre, {0.5, 0, 0}) && same_bits(bumps[0].by, {0, 1, 0}));
-    CHECK(same_bits(bumps_at(edits, 4)[0].centre, {1, 0, 0}));
-    CHECK(same_bits(bumps_at(edits, 5)[0].centre, {1, 0.5, 0}));
-}
-
-TEST(holds_come_after_bumps_and_are_left_out_while_they_keep_nothing) {
-    Edits edits;
-    edits.solution.holds = {{{{2, {0, 0, 0}, 0.5, 0}, {4, {1, 0, 0}, 0.25, 1}}}};
-    CHECK(bumps_at(edits, 2).empty());
-    edits.solution.bumps = {{0.25, {{3, {0.5, 0.5, 0.5}, {0.125, 0, 0}}}}};
-    const Bump hold = bumps_at(edits, 3)[1];
-    CHECK(same_bits(hold.centre, {0.5, 0, 0}) && same_bits(hold.by, {0, 0, 0}));
-    CHECK(hold.radius == 0.375 && hold.keep == 0.5);
-    CHECK_EQUAL(bumps_at(edits, 9)[1].keep, 1.0);
 }

@@ -187,22 +187,9 @@ TEST(broken_documents_are_refused_where_they_are_broken) {
         {"\"enabled\": false", "\"on\": false", "/edits/picks/1/on"},
         {"\"pixel\": [10, 7]", "\"pixel\": [10, -7]", "/edits/picks/0/pixel/1"},
         {"\"there\": 0.5", "\"there\": 1.5", "/edits/picks/0/path/0/there"},
-        {"[[0.06, 0.05, 0.04]", "[[0.06, 0.05]", "/edits/picks/0/spread/0"},
-        {"\"worst\": 0.004", "\"worst\": -1", "/edits/picks/0/worst"},
         {"{\"frame\": 12, \"rgb\": [0.3, 0.35, 0.3]}]", "{\"frame\": 0, \"rgb\": [0, 0, 0]}]",
          "/edits/picks/0/path/1/frame"},
         {"[\"v8\", \"s1\"]", "[\"v8\", 1]", "/edits/locks/1"},
-        {"{\"vertex\": \"v8\"", "{\"vertex\": \"v2\"", "/edits/solution/vertices/1/vertex"},
-        {"{\"vertex\": \"v8\"", "{\"vertex\": \"v99\"", "/edits/solution/vertices/1/vertex"},
-        {"\"frame\": 2.5, \"by\"", "\"frame\": 6, \"by\"", "/edits/solution/keys/1/frame"},
-        {"\"frame\": 2.5, \"by\"", "\"frame\": 9, \"by\"", "/edits/solution/keys/1/frame"},
-        {"{\"radius\": 0.3,", "{\"radius\": 0,", "/edits/solution/bumps/1/radius"},
-        {"{\"radius\": 0.3,", "{\"radius\": 0.3, \"x\": 1,", "/edits/solution/bumps/1/x"},
-        {"{\"radius\": 0.3, \"keys\": [{\"frame\": 5, \"rgb\": [0.5, 0.35, 0.2], \"by\": "
-         "[-0.03, 0.08, 0.04]}]}",
-         "{\"radius\": 0.3, \"keys\": []}", "/edits/solution/bumps/1/keys"},
-        {"{\"frame\": 14, \"rgb\"", "{\"frame\": 12, \"rgb\"",
-         "/edits/solution/bumps/0/keys/3/frame"},
         {"[0.4, 0.3, 0.25, 0.5]", "[0.4, 0.3, 0.25, 1.5]", "/colours/0/rgbw/0/3"},
         {"{\"frame\": 20, \"rgbw\"", "{\"frame\": 0, \"rgbw\"", "/colours/1/frame"},
         {"\"name\": \"none\"", "\"name\": \"warm Gr\u00fcn\"", "/versions/1/name"},
@@ -224,13 +211,16 @@ TEST(picks_ramps_and_versions_arrive) {
     CHECK(edits.default_ramp == Ramp::kSmooth);
     CHECK(edits.vertex_ramp[3] == Ramp::kHold && !edits.vertex_ramp[4]);
     CHECK(!edits.stops[0].ramp && edits.stops[1].ramp == Ramp::kLinear);
-    CHECK(edits.solution.vertex_by[7] == (Vec3{-0.04, 0.015, 0.03}));
-    CHECK(edits.solution.vertex_by[0] == (Vec3{0, 0, 0}));
-    CHECK_EQUAL(edits.solution.keys.size(), 3u);
-    CHECK_EQUAL(edits.solution.keys[1].frame, 6.0);  // by edge and frame; the file has it first
-    CHECK_EQUAL(edits.solution.bumps.size(), 2u);
-    CHECK_EQUAL(edits.solution.bumps[0].keys.size(), 4u);
-    CHECK(edits.solution.bumps[0].keys[2].by == (Vec3{0.06, -0.04, 0.02}));
+    CHECK_EQUAL(edits.picks.size(), 2u);
+    const Pick &pick = edits.picks[0], &hold = edits.picks[1];
+    CHECK(pick.id == "p1" && !pick.hold && pick.enabled && pick.toward_colour);
+    CHECK(pick.frame == 3 && pick.from == 2.0 && pick.until == 12.0 && pick.fade == 2);
+    CHECK(pick.rgb == (Vec3{0.4, 0.3, 0.25}) && pick.to == (Vec3{0.5, 0.25, 0.2}));
+    CHECK(pick.path.size() >= 2 && pick.path[0].there == 0.5);
+    CHECK(hold.hold && !hold.enabled && hold.to == hold.rgb);
+    // Version 1 knows no mattes: all of the hue.
+    CHECK(!pick.matte && pick.taken().odds == hue_matte(pick.rgb).odds);
+    CHECK(pick.reach == 0 && pick.softness == 0.5 && pick.darkest == 0 && pick.lightest == 1);
     CHECK_EQUAL(sidecar.versions.size(), 2u);
     CHECK_EQUAL(sidecar.versions[0].name, std::string("warm Gr\u00fcn"));
     CHECK(sidecar.versions[0].edits.default_ramp == Ramp::kHold);
@@ -244,6 +234,187 @@ TEST(picks_ramps_and_versions_arrive) {
     };
     CHECK_EQUAL(parse_sidecar(named(name), "name").versions[1].name, name);
     CHECK_EQUAL(refused(named(name + "x")).pointer(), std::string("/versions/1/name"));
+}
+
+namespace {
+
+/// Mattes as Python writes them: zlib streams of differences, as base64. All nodes of these have
+/// log odds 126; then 127, one node less, and 100 at the first node, 3 at all others.
+const std::string kSure =
+    "eNrtwSEBAAAAAiCXu90bBqABAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA"
+    "AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA"
+    "AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAF4M0LMAfw==";
+const std::string kTooSure =
+    "eNrtwSEBAAAAAiCfe90bBqABAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA"
+    "AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA"
+    "AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAF4MEOAAgA==";
+const std::string kShort =
+    "eNrtwTEBAAAAwqD1T20ND6AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA"
+    "AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA"
+    "AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAgBMDQB0AAQ==";
+const std::string kWrapped =
+    "eNrtwTEBAAAMAqCFtdeqWsMDyB8AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA"
+    "AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA"
+    "AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAMKIhqAEE";
+
+/// A file of version 2 with one pick that has a learned matte, and one that has none.
+std::string version_2() {
+    std::string text = golden("tetrahedron");
+    text = replaced(text, "\"version\": 1", "\"version\": 2");
+    text = replaced(
+        text, "\"extra\": {",
+        "\"mattes\": {\"display\": {\"from\": -0.5, \"to\": 1.5, \"values\": [0, 0.25, 1]},"
+        "\"grids\": {\"m1\": \"" +
+            kSure + "\", \"m2\": \"" + kWrapped + "\"}}, \"extra\": {");
+    return replaced(
+        text, "\"stops\": []",
+        "\"stops\": [], \"picks\": ["
+        "{\"id\": \"p1\", \"kind\": \"pick\", \"frame\": 3, \"rgb\": [0.4, 0.3, 0.25],"
+        " \"to\": [0.5, 0.2, 0.2], \"pixel\": [10, 7], \"box\": 3, \"matte\": \"m2\","
+        " \"areas\": [{\"frame\": 3, \"points\": [[1, 2], [3, 4.5]], \"radius\": 2}],"
+        " \"whole_hue\": false, \"reach\": -1.5, \"softness\": 0.25, \"lightness\": [0.125, 0.75]},"
+        "{\"id\": \"p2\", \"kind\": \"hold\", \"frame\": 0, \"rgb\": [0.4, 0.3, 0.25]}]");
+}
+
+}  // namespace
+
+TEST(version_2_has_mattes) {
+    const Sidecar sidecar = parse_sidecar(version_2(), "two");
+    const Edits& edits = sidecar.edits;
+    CHECK(edits.display && edits.display->from == -0.5 && edits.display->to == 1.5);
+    CHECK(edits.display->values == (std::vector<double>{0, 0.25, 1}));
+    const Pick &pick = edits.picks[0], &hold = edits.picks[1];
+    CHECK_EQUAL(pick.taken().odds.size(), MatteGrid::kSize);
+    CHECK(pick.taken().odds[0] == 100 && pick.taken().odds[1] == 3 &&
+          pick.taken().odds.back() == 3);
+    CHECK(pick.reach == -1.5 && pick.softness == 0.25);
+    CHECK(pick.darkest == 0.125 && pick.lightest == 0.75);
+    CHECK(!hold.matte &&
+          hold.taken().odds == hue_matte(displayed(hold.rgb, edits.display.get())).odds);
+    const std::string other = replaced(version_2(), "\"matte\": \"m2\"", "\"matte\": \"m1\"");
+    const Matte sure = parse_sidecar(other, "other").edits.picks[0].taken();
+    CHECK(sure.odds == std::vector<std::uint8_t>(MatteGrid::kSize, 126));
+}
+
+TEST(versions_share_mattes) {
+    const std::string text = version_2();
+    const std::size_t at = text.find("\"edits\": ") + 9;
+    // The text of the edits, up to the member behind it.
+    int depth = 0;
+    std::size_t end = at;
+    do {
+        depth += (text[end] == '{') - (text[end] == '}');
+        ++end;
+    } while (depth > 0 || text[end - 1] != '}');
+    const std::string edits = text.substr(at, end - at);
+    const Sidecar sidecar = parse_sidecar(
+        replaced(text, "\"extra\": {",
+                 "\"versions\": [{\"name\": \"a\", \"edits\": " + edits + "}], \"extra\": {"),
+        "versions");
+    CHECK(sidecar.versions[0].edits.picks[0].matte == sidecar.edits.picks[0].matte);
+    CHECK(sidecar.versions[0].edits.display == sidecar.edits.display);
+}
+
+TEST(broken_mattes_and_picks_are_refused_where_they_are_broken) {
+    struct Case {
+        std::string from, to, pointer;
+    };
+    const std::string sure = kSure;
+    std::string damaged = sure;
+    std::swap(damaged[20], damaged[21]);
+    const std::vector<Case> cases = {
+        {sure, kTooSure, "/mattes/grids/m1"},
+        {sure, kShort, "/mattes/grids/m1"},
+        {sure, damaged.substr(1), "/mattes/grids/m1"},
+        {sure, "!" + sure.substr(1), "/mattes/grids/m1"},
+        {sure, sure.substr(0, sure.size() - 4), "/mattes/grids/m1"},
+        {sure, sure + "AAAA", "/mattes/grids/m1"},
+        {sure, "", "/mattes/grids/m1"},
+        {sure, std::string((1 << 17) + 4, 'A'), "/mattes/grids/m1"},
+        {'"' + sure + '"', "7", "/mattes/grids/m1"},
+        {"\"m1\":", "\"m 1\":", "/mattes/grids"},
+        {"\"m1\":", "\"m1\\u0000\":", "/mattes/grids"},
+        {"\"m1\":", "\"\":", "/mattes/grids"},
+        {"\"m1\":", "\"m2\":", "/mattes/grids/m2"},
+        {"\"from\": -0.5", "\"from\": 1.5", "/mattes/display/to"},
+        {"\"from\": -0.5", "\"from\": 1e9", "/mattes/display/from"},
+        {"\"values\": [0, 0.25, 1]", "\"values\": [0]", "/mattes/display/values"},
+        {"\"values\": [0, 0.25, 1]", "\"values\": [0, null]", "/mattes/display/values/1"},
+        {"\"values\": [0, 0.25, 1]", "\"values\": 3", "/mattes/display/values"},
+        {"\"display\":", "\"shown\":", "/mattes/shown"},
+        {"\"matte\": \"m2\"", "\"matte\": \"m3\"", "/edits/picks/0/matte"},
+        {"\"matte\": \"m2\"", "\"matte\": 2", "/edits/picks/0/matte"},
+        {"\"whole_hue\": false", "\"whole_hue\": 0", "/edits/picks/0/whole_hue"},
+        {"\"reach\": -1.5", "\"reach\": 21", "/edits/picks/0/reach"},
+        {"\"softness\": 0.25", "\"softness\": 1.25", "/edits/picks/0/softness"},
+        {"[0.125, 0.75]", "[0.75, 0.75]", "/edits/picks/0/lightness"},
+        {"[0.125, 0.75]", "[0.125, 1.75]", "/edits/picks/0/lightness/1"},
+        {"[0.125, 0.75]", "[0.125]", "/edits/picks/0/lightness"},
+        {"\"points\": [[1, 2], [3, 4.5]]", "\"points\": []", "/edits/picks/0/areas/0/points"},
+        {"[3, 4.5]", "[3, -4.5]", "/edits/picks/0/areas/0/points/1/1"},
+        {"[3, 4.5]", "[3]", "/edits/picks/0/areas/0/points/1"},
+        {"\"radius\": 2", "\"radius\": -2", "/edits/picks/0/areas/0/radius"},
+        {"\"areas\": [{\"frame\": 3, ", "\"areas\": [{", "/edits/picks/0/areas/0/frame"},
+        {"\"box\": 3", "\"box\": 0", "/edits/picks/0/box"},
+        {"\"box\": 3", "\"spread\": []", "/edits/picks/0/spread"},  // of version 1
+        {"\"picks\": [", "\"solution\": {}, \"picks\": [", "/edits/solution"},
+    };
+    for (const Case& broken : cases) {
+        const SidecarError problem = refused(replaced(version_2(), broken.from, broken.to));
+        CHECK_EQUAL(problem.pointer(), broken.pointer);
+    }
+}
+
+TEST(version_1_ignores_what_picks_were_solved_to) {
+    const std::string text = golden("picks");
+    const Sidecar as_it_was = parse_sidecar(text, "one");
+    const std::string other =
+        replaced(replaced(text, "\"radius\": 0.125, \"path\"", "\"radius\": null, \"path\""),
+                 "\"vertices\": [\n        {\"vertex\": \"v2\", \"by\"",
+                 "\"vertices\": [\n        {\"vertex\": \"nobody\", \"by\"");
+    const Sidecar changed = parse_sidecar(other, "one");
+    CHECK_EQUAL(changed.edits.picks.size(), as_it_was.edits.picks.size());
+    CHECK_EQUAL(
+        refused(replaced(text, "\"radius\": 0.125, \"path\"", "\"reach\": 1, \"path\"")).pointer(),
+        std::string("/edits/picks/0/reach"));
+    CHECK_EQUAL(refused(replaced(text, "\"version\": 1", "\"version\": 2")).pointer(),
+                std::string("/edits/solution"));
+}
+
+TEST(picks_and_mattes_are_bounded) {
+    const auto listed = [](int count, const auto& one) {
+        std::string list;
+        for (int i = 0; i < count; ++i) list += (i ? "," : "") + one(std::to_string(i));
+        return list;
+    };
+    const std::string text = golden("tetrahedron");
+    const auto with_picks = [&](int count) {
+        return replaced(text, "\"stops\": []",
+                        "\"stops\": [], \"picks\": [" + listed(count, [](const std::string& i) {
+                            return "{\"id\":\"p" + i +
+                                   "\",\"kind\":\"hold\",\"frame\":0,\"rgb\":[0,0," + i + "]}";
+                        }) + "]");
+    };
+    CHECK_EQUAL(parse_sidecar(with_picks(1000), "many").edits.picks.size(), 1000u);
+    CHECK_EQUAL(refused(with_picks(1001)).pointer(), std::string("/edits/picks"));
+    const auto with_grids = [&](int count) {
+        return replaced(replaced(text, "\"version\": 1", "\"version\": 2"), "\"extra\": {",
+                        "\"mattes\": {\"grids\": {" + listed(count, [](const std::string& i) {
+                            return "\"m" + i + "\": \"" + kSure + '"';
+                        }) + "}}, \"extra\": {");
+    };
+    CHECK(parse_sidecar(with_grids(100), "many").edits.picks.empty());
+    CHECK_EQUAL(refused(with_grids(1001)).pointer(), std::string("/mattes/grids"));
+    const std::string points =
+        listed(60'000, [](const std::string&) { return std::string("[1,2]"); });
+    CHECK_EQUAL(
+        parse_sidecar(replaced(version_2(), "[[1, 2], [3, 4.5]]", '[' + points + ']'), "many")
+            .edits.picks.size(),
+        2u);
+    CHECK_EQUAL(
+        refused(replaced(version_2(), "[[1, 2], [3, 4.5]]", '[' + points + ',' + points + ']'))
+            .pointer(),
+        std::string("/edits/picks/0/areas/0/points"));
 }
 
 TEST(a_newer_version_asks_for_an_update) {
@@ -309,8 +480,8 @@ TEST(every_truncation_is_refused) {
 TEST(random_damage_never_does_more_than_throw) {
     static const char kBytes[] = "\"{}[],:0123456789.-+eEvsntfu\\ \n\x00\x7f\x80\xc3\xff";
     Numbers numbers(20211);
-    for (const char* name : {"edited", "edge_through_boundary", "step_two", "flat"}) {
-        const std::string text = golden(name);
+    for (const char* name : {"edited", "edge_through_boundary", "step_two", "flat", ""}) {
+        const std::string text = *name ? golden(name) : version_2();
         for (int round = 0; round < 1500; ++round) {
             std::string damaged = text;
             for (std::size_t hits = 1 + numbers.below(3); hits > 0; --hits) {

@@ -1,0 +1,82 @@
+#include "model/picks.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace palette4d {
+namespace {
+
+/// The keys around a frame, and the weight of the later one.
+struct Around {
+    const PathKey *before, *after;
+    double weight;
+};
+Around around(const std::vector<PathKey>& path, double frame) {
+    const auto after =
+        std::upper_bound(path.begin(), path.end(), frame,
+                         [](double time, const PathKey& key) { return time < key.frame; });
+    if (after == path.begin()) return {&path.front(), &path.front(), 0};
+    if (after == path.end()) return {&path.back(), &path.back(), 0};
+    const PathKey& before = *(after - 1);
+    return {&before, &*after, (frame - before.frame) / (after->frame - before.frame)};
+}
+
+}  // namespace
+
+const Matte& HueMatte::get() const {
+    std::call_once(once_, [this] { matte_ = hue_matte(display_); });
+    return matte_;
+}
+
+const Matte& Pick::taken() const {
+    if (matte) return *matte;
+    if (!hue) throw std::invalid_argument("picks: found a pick without a matte");
+    return hue->get();
+}
+
+Vec3 Pick::colour_at(double at) const {
+    if (path.empty()) return rgb;
+    const auto [before, after, weight] = around(path, at);
+    return before->rgb + weight * (after->rgb - before->rgb);
+}
+
+Vec3 Pick::change_at(double at) const {
+    const Vec3 colour = colour_at(at);
+    if (hold) return {0, 0, 0};
+    if (toward_colour) return to - colour;
+    const Vec3 change = to - rgb;
+    const auto largest = [](const Vec3& c) { return std::max(c[0], std::max(c[1], c[2])); };
+    // The change that makes a wall blue by day would make its night black a bright blue.
+    const double now = largest(colour), picked = largest(rgb);
+    double part = now < picked ? std::max(0.0, now) / std::max(picked, 1e-9) : 1.0;
+    double most = std::max(largest(to), largest(rgb));
+    for (const PathKey& key : path) most = std::max(most, largest(key.rgb));
+    for (std::size_t c = 0; c < 3; ++c) {
+        // A shift leads to no colour below or above all that are known, and not out of 0..1.
+        double low = std::min(0.0, std::min(to[c], rgb[c]));
+        for (const PathKey& key : path) low = std::min(low, key.rgb[c]);
+        const double high = most <= 1 ? 1.0 : std::numeric_limits<double>::infinity();
+        const double size = std::abs(change[c]);
+        if (size > 1e-9) {
+            part = std::min(part, (change[c] < 0 ? colour[c] - low : high - colour[c]) / size);
+        }
+    }
+    return std::max(0.0, part) * change;
+}
+
+double Pick::strength_at(double at, double step) const {
+    const double ramp = std::max(fade, step);
+    double strength = 1;
+    if (from) strength = std::min(strength, 1 - (*from - at) / ramp);
+    if (until) strength = std::min(strength, 1 - (at - *until) / ramp);
+    if (!path.empty()) {
+        const auto [before, after, weight] = around(path, at);
+        strength = std::max(0.0, std::min(strength, 1.0)) *
+                   (before->there + weight * (after->there - before->there));
+    }
+    return std::max(0.0, std::min(strength, 1.0));
+}
+
+}  // namespace palette4d

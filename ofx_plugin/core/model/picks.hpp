@@ -1,0 +1,62 @@
+// Picks and holds: colours of the clip that change or stay, as the user asked.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "model/matte.hpp"
+#include "model/vec3.hpp"
+
+namespace palette4d {
+
+/// Where a picked colour is at a frame.
+struct PathKey {
+    double frame;
+    Vec3 rgb;
+    double there = 1;  ///< how much of the change is asked for, 0..1: 0 where the colour is gone
+};
+
+/// The hue_matte() of a display colour, computed at its first use: a file's versions may have many
+/// picks that are never used. Thread-safe.
+class HueMatte {
+public:
+    explicit HueMatte(const Vec3& display) : display_(display) {}
+    const Matte& get() const;
+
+private:
+    Vec3 display_;
+    mutable std::once_flag once_;
+    mutable Matte matte_;
+};
+
+struct Pick {
+    std::string id;
+    bool hold = false;  ///< the colour stays; else it becomes `to`
+    bool enabled = true;
+    double frame = 0;            ///< where it was picked
+    Vec3 rgb{}, to{};            ///< in the palette's code values, before edits
+    bool toward_colour = false;  ///< at other frames: the same new colour, not the same change
+    std::optional<double> from, until;  ///< first and last frame with the full change
+    double fade = 0;                    ///< frames of the ramps before and after
+    std::vector<PathKey> path;  ///< the colour at other frames, linear between; empty: always rgb
+    std::shared_ptr<const Matte> matte;   ///< a learned one; null: that of the colour's hue
+    std::shared_ptr<const HueMatte> hue;  ///< never null where `matte` is
+    double reach = 0;                     ///< log odds added to the matte
+    double softness = 0.5;                ///< 0 a hard matte, 1 a soft one
+    double darkest = 0, lightest = 1;     ///< the display lightness that the pick takes
+
+    /// The learned matte, else that of the hue. Throws std::invalid_argument without either.
+    const Matte& taken() const;
+    /// Where the colour is at a frame.
+    Vec3 colour_at(double frame) const;
+    /// The whole change that is asked for at a frame, without ramps.
+    Vec3 change_at(double frame) const;
+    /// How much of it is asked for, 0..1. `step`: frame numbers from one of the clip's frames to
+    /// the next; a range without fades takes one of them.
+    double strength_at(double frame, double step) const;
+};
+
+}  // namespace palette4d

@@ -1,0 +1,94 @@
+// Clean up: the displacement that picks make, filtered with the picture as its guide, so that codec
+// blocks, 4:2:0 edges and rims go. A fast guided filter (He, Sun: "Fast Guided Filter", 2015).
+//
+// Cells of pixels, counted from the picture's lower left corner, are averaged. In 5 x 5 cells the
+// displacement is fitted by a linear function of the colour. The functions of 5 x 5 cells are
+// averaged, interpolated between the cells' centres, and applied to the pixels' colours. Colours
+// beyond 0..1 guide as nearer ones, within -1..2. All sums have a fixed order: tiles, threads and
+// render windows do not change the result.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "convert/colour_conversion.hpp"
+#include "recolour/pick_kernels.hpp"
+#include "recolour/recolour.hpp"
+
+namespace palette4d {
+
+struct CleanUpKernels;
+
+/// A part of the plane of pixels; y counts upwards, and x2 and y2 are outside.
+struct Area {
+    int x1, y1, x2, y2;
+};
+
+/// The side of a cell in pixels, in a picture drawn at `scale` (1: full size).
+int clean_up_cell(double scale);
+/// Pixels that the filter sees on each side of a pixel, at most.
+int clean_up_support(int cell);
+
+/// One frame's filter. Const after prepare(), so that threads share it.
+class CleanUp {
+public:
+    struct Place {
+        Area picture;  ///< the whole picture
+        Area source;   ///< the part of it that can be read
+        Area drawn;    ///< the part that will be drawn
+        int cell_width, cell_height;
+    };
+    struct Format {
+        int channels;  ///< 3 or 4
+        bool premultiplied;
+    };
+    /// Returns the float pixels x1 to x2 of row y: in `space`, or where they are.
+    using Read = std::function<const float*(int y, int x1, int x2, float* space)>;
+    /// Calls work(i) for each i below `count`, in any threads.
+    using Share = std::function<void(int count, const std::function<void(int)>& work)>;
+
+    /// `map` has picks, in the palette's code values; `conversion` leads there, null: none.
+    CleanUp(std::shared_ptr<const Recolourer> map,
+            std::shared_ptr<const ColourConversion> conversion, double amount, Format format,
+            const Place& place);
+    ~CleanUp();
+
+    /// Reads the picture. `threads` is how many share() uses.
+    void prepare(const Read& read, int threads, const Share& share);
+
+    const Recolourer& map() const { return *map_; }
+    double amount() const { return amount_; }
+    /// Sets `change`, (count, 3), to what must be added, at strength 1 and in the palette's code
+    /// values, to a row of pixels from (x, y) on: amount * filtered + own * unfiltered. False when
+    /// that is 0 for all of them.
+    bool change(const float* pixels, int x, int y, int count, double own, float* change) const;
+
+private:
+    class Strip;
+    struct Block;
+    /// The linear functions of one row of cells.
+    struct Row {
+        std::unique_ptr<float[]> terms;  ///< null where all are 0
+        std::vector<char> some;          ///< for each block of cells, whether some are not 0
+    };
+
+    /// Reads pixels of a row into slots; `x` is the first slot's, counted from the picture's left.
+    bool load(const float* row, int row_x, int row_end, int x, Block& block) const;
+
+    const std::shared_ptr<const Recolourer> map_;
+    const std::shared_ptr<const ColourConversion> conversion_;
+    const double amount_;
+    const Format format_;
+    const CleanUpKernels& kernels_;
+    const PickPlan<float> picks_;
+    decltype(PickKernels::set) const set_picks_;
+    Place place_;
+    const int cells_;                                      ///< in a block
+    int column1_ = 0, column2_ = 0, row1_ = 0, row2_ = 0;  ///< cells that are summed
+    int first_ = 0, last_ = 0;                             ///< rows of cells that are drawn from
+    std::vector<Row> rows_;
+    std::vector<float> parts_;
+};
+
+}  // namespace palette4d

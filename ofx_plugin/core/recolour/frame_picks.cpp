@@ -1,0 +1,360 @@
+#include "recolour/frame_picks.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace palette4d {
+namespace {
+
+/// The membership at which a matte without softness has its step, and by how much it begins before
+/// and is whole after it at softness 1. It never begins below kLeast.
+constexpr double kFirm = 0.4, kSoft = 1 - kFirm, kLeast = 0.02;
+/// Width of the soft ends of a pick's range of lightness.
+constexpr double kLightnessEnd = 0.1;
+
+struct Held {
+    Vec3 point;
+    double strength;
+};
+
+/// Sets the nodes around a point.
+void set_around(FrameMatte& matte, const Vec3& point, float value) {
+    const MatteGrid::Place p = MatteGrid::place(point);
+    for (int corner = 0; corner < 8; ++corner) {
+        matte[MatteGrid::index(p.u + (corner >> 2), p.v + (corner >> 1 & 1), p.l + (corner & 1))] =
+            value;
+    }
+}
+
+/// A pick's matte at a frame, without holds.
+FrameMatte baked(const Pick& pick, const Vec3& from, const Vec3& to) {
+    float values[2 * Matte::kMiddle + 1];
+    const double half = std::max(kSoft * pick.softness, 1e-3);
+    const double low = std::max(kFirm - half, kLeast), high = kFirm + half;
+    for (int i = 0; i <= 2 * Matte::kMiddle; ++i) {
+        const double odds = Matte::log_odds(static_cast<std::uint8_t>(i)) + pick.reach;
+        const double membership = i == 0 ? 0.0 : 1 / (1 + std::exp(-odds));
+        values[i] = static_cast<float>(smooth_step(membership, low, high));
+    }
+    FrameMatte still(MatteGrid::kSize);
+    const std::vector<std::uint8_t>& odds = pick.taken().odds;
+    for (std::size_t i = 0; i < still.size(); ++i) still[i] = values[odds[i]];
+    const Vec3 away = to - from;
+    if (pick_distance2(to, from) > 1e-10) {
+        FrameMatte moved(MatteGrid::kSize);
+        std::size_t at = 0;
+        for (int u = 0; u < MatteGrid::kSaturations; ++u) {
+            for (int v = 0; v < MatteGrid::kSaturations; ++v) {
+                for (int l = 0; l < MatteGrid::kLightnesses; ++l, ++at) {
+                    const Vec3 node = MatteGrid::point(u, v, l);
+                    const double along = nearness(node, to);
+                    moved[at] =
+                        along == 0
+                            ? still[at]
+                            : static_cast<float>(MatteGrid::at(still.data(), node - along * away));
+                }
+            }
+        }
+        still.swap(moved);
+    }
+    // The picked colour itself is the thing's.
+    set_around(still, to, 1);
+    if (pick.darkest > 0 || pick.lightest < 1) {
+        for (int l = 0; l < MatteGrid::kLightnesses; ++l) {
+            const double at = l / MatteGrid::kPerLightness;
+            double in = 1;
+            if (pick.darkest > 0) {
+                in = smooth_step(at, pick.darkest - kLightnessEnd, pick.darkest);
+            }
+            if (pick.lightest < 1) {
+                in *= 1 - smooth_step(at, pick.lightest, pick.lightest + kLightnessEnd);
+            }
+            const auto share = static_cast<float>(in);
+            for (std::size_t i = static_cast<std::size_t>(l); i < still.size();
+                 i += MatteGrid::kLightnesses) {
+                still[i] *= share;
+            }
+        }
+    }
+    return still;
+}
+
+void hold_back(FrameMatte& matte, const Vec3& pick, const std::vector<Held>& holds) {
+    if (holds.empty()) return;
+    std::size_t at = 0;
+    for (int u = 0; u < MatteGrid::kSaturations; ++u) {
+        for (int v = 0; v < MatteGrid::kSaturations; ++v) {
+            for (int l = 0; l < MatteGrid::kLightnesses; ++l, ++at) {
+                if (matte[at] == 0) continue;
+                const Vec3 node = MatteGrid::point(u, v, l);
+                double left = 1;
+                for (const Held& hold : holds) {
+                    left *= 1 - hold.strength * (1 - spared(node, hold.point, pick));
+                }
+                matte[at] *= static_cast<float>(left);
+            }
+        }
+    }
+}
+
+struct Moment {
+    const Pick* pick;
+    Vec3 colour, point;  ///< at the frame
+    Vec3 first;          ///< the point where it was picked
+    double strength;
+};
+
+std::vector<Moment> moments(const Edits& edits, double frame, bool hold) {
+    std::vector<Moment> result;
+    for (const Pick& pick : edits.picks) {
+        if (!pick.enabled || pick.hold != hold) continue;
+        const double strength = pick.strength_at(frame, edits.frame_step);
+        if (!(strength > 0)) continue;
+        const Vec3 colour = pick.colour_at(frame);
+        const DisplayCurve* const curve = edits.display.get();
+        result.push_back({&pick, colour, pick_point(displayed(colour, curve)),
+                          pick_point(displayed(pick.rgb, curve)), strength});
+    }
+    return result;
+}
+
+FramePick frame_pick(const Moment& moment, const std::vector<Held>& holds, double frame) {
+    FrameMatte matte = baked(*moment.pick, moment.first, moment.point);
+    hold_back(matte, moment.point, holds);
+    return {moment.colour, moment.pick->change_at(frame), moment.strength,
+            std::make_shared<const FrameMatte>(std::move(matte))};
+}
+
+std::vector<Held> held_at(const std::vector<Moment>& holds) {
+    std::vector<Held> held;
+    for (const Moment& hold : holds) held.push_back({hold.point, hold.strength});
+    return held;
+}
+
+}  // namespace
+
+FramePicks picks_at(const Edits& edits, double frame) {
+    FramePicks result;
+    result.display = edits.display;
+    const std::vector<Moment> holds = moments(edits, frame, true);
+    if (!holds.empty()) {
+        FrameMatte left(MatteGrid::kSize, 1.0f);
+        for (const Moment& hold : holds) {
+            FrameMatte matte = baked(*hold.pick, hold.first, hold.point);
+            const auto strength = static_cast<float>(hold.strength);
+            for (std::size_t i = 0; i < left.size(); ++i) left[i] *= 1 - strength * matte[i];
+        }
+        result.left = std::make_shared<const FrameMatte>(std::move(left));
+    }
+    const std::vector<Held> held = held_at(holds);
+    for (const Moment& pick : moments(edits, frame, false)) {
+        result.picks.push_back(frame_pick(pick, held, frame));
+    }
+    return result;
+}
+
+FramePicks matte_at(const Edits& edits, const std::string& id, double frame) {
+    FramePicks result;
+    result.display = edits.display;
+    for (const bool hold : {false, true}) {
+        for (const Moment& moment : moments(edits, frame, hold)) {
+            if (moment.pick->id != id) continue;
+            const std::vector<Held> held =
+                hold ? std::vector<Held>() : held_at(moments(edits, frame, true));
+            result.picks.push_back(frame_pick(moment, held, frame));
+            result.picks.back().change = {1, 1, 1};
+        }
+    }
+    return result;
+}
+
+namespace {
+
+/// The first and last nodes, by axis, whose values are not `idle`; in no order without such.
+struct Extent {
+    int first[3] = {MatteGrid::kSaturations, MatteGrid::kSaturations, MatteGrid::kLightnesses};
+    int last[3] = {-1, -1, -1};
+
+    Extent(const FrameMatte& matte, float idle) {
+        const auto add = [&](int axis, int node) {
+            first[axis] = std::min(first[axis], node);
+            last[axis] = std::max(last[axis], node);
+        };
+        const float* line = matte.data();
+        for (int u = 0; u < MatteGrid::kSaturations; ++u) {
+            for (int v = 0; v < MatteGrid::kSaturations; ++v, line += MatteGrid::kLightnesses) {
+                bool some = false;
+                for (int l = 0; l < MatteGrid::kLightnesses; ++l) some |= line[l] != idle;
+                if (!some) continue;
+                add(0, u);
+                add(1, v);
+                for (int l = 0; l < MatteGrid::kLightnesses; ++l) {
+                    if (line[l] != idle) add(2, l);
+                }
+            }
+        }
+    }
+    bool empty() const { return last[0] < 0; }
+};
+
+constexpr int kNodes[3] = {MatteGrid::kSaturations, MatteGrid::kSaturations,
+                           MatteGrid::kLightnesses};
+
+/// A node's value reaches to its neighbours, and beyond the grid without end.
+template <class T>
+void set_bounds(const Extent& extent, typename PickPlan<T>::Grid& grid) {
+    constexpr double kEndless = std::numeric_limits<double>::infinity();
+    for (int c = 0; c < 3; ++c) {
+        // A hundredth of a cell is for rounding.
+        const double per = c == 2 ? MatteGrid::kPerLightness : MatteGrid::kPerSaturation;
+        const double start = c == 2 ? 0 : -MatteGrid::kMost;
+        const int first = extent.first[c], last = extent.last[c];
+        grid.low[c] = static_cast<T>(first == 0 ? -kEndless : start + (first - 1.01) / per);
+        grid.high[c] =
+            static_cast<T>(last == kNodes[c] - 1 ? kEndless : start + (last + 1.01) / per);
+    }
+}
+
+/// A grid's values as the kernels of single precision read them: those around all points within
+/// the bounds.
+std::shared_ptr<const FrameMatte> arranged(const std::shared_ptr<const FrameMatte>& matte,
+                                           const Extent& extent, PickPlan<float>::Grid& grid) {
+    if (extent.empty()) return matte;  // never read
+    int first[3], count[3];
+    for (int c = 0; c < 3; ++c) {
+        // Within the hundredth of a cell the next cell counts.
+        first[c] = std::max(extent.first[c] - 2, 0);
+        count[c] = std::min(extent.last[c] + 2, kNodes[c] - 1) - first[c] + 1;
+    }
+    const int line = 2 * count[2], plane = count[1] * line;
+    FrameMatte pairs(static_cast<std::size_t>(count[0] * plane), 0.0f);
+    float* to = pairs.data();
+    for (int u = 0; u < count[0]; ++u) {
+        for (int v = 0; v < count[1]; ++v) {
+            const float* const from =
+                &(*matte)[MatteGrid::index(first[0] + u, first[1] + v, first[2])];
+            const float* const next = from + (v + 1 < count[1] ? MatteGrid::kLightnesses : 0);
+            for (int l = 0; l < count[2]; ++l) {
+                *to++ = from[l];
+                *to++ = next[l];
+            }
+        }
+    }
+    grid.plane = plane;
+    grid.step[0] = static_cast<float>(plane);
+    grid.step[1] = static_cast<float>(line);
+    grid.step[2] = 2;
+    grid.base = static_cast<float>(first[0] * plane + first[1] * line + first[2] * 2);
+    return std::make_shared<const FrameMatte>(std::move(pairs));
+}
+
+/// As double precision reads them.
+std::shared_ptr<const FrameMatte> arranged(const std::shared_ptr<const FrameMatte>& matte,
+                                           const Extent&, PickPlan<double>::Grid& grid) {
+    constexpr int kLine = MatteGrid::kLightnesses, kPlane = MatteGrid::kSaturations * kLine;
+    grid.plane = kPlane;
+    grid.step[0] = kPlane;
+    grid.step[1] = kLine;
+    grid.step[2] = 1;
+    grid.base = 0;
+    return matte;
+}
+
+}  // namespace
+
+template <class T>
+typename PickPlan<T>::Grid PickMemory<T>::grid(const std::shared_ptr<const FrameMatte>& matte,
+                                               float idle) {
+    typename PickPlan<T>::Grid grid{};
+    const Extent extent(*matte, idle);
+    set_bounds<T>(extent, grid);
+    mattes_.push_back(arranged(matte, extent, grid));
+    grid.values = mattes_.back()->data();
+    return grid;
+}
+
+template <class T>
+PickMemory<T>::PickMemory(const FramePicks& picks, const std::vector<Vec3>& done) {
+    for (std::size_t i = 0; i < picks.picks.size(); ++i) {
+        const FramePick& pick = picks.picks[i];
+        const Vec3 shown = displayed(pick.colour, picks.display.get()), point = pick_point(shown);
+        const PickedColour picked(shown);
+        const double own = picked.amount(shown);
+        typename PickPlan<T>::One one;
+        one.matte = grid(pick.matte, 0);
+        for (std::size_t c = 0; c < 3; ++c) {
+            one.at[c] = static_cast<T>(point[c]);
+            one.change[c] = static_cast<T>(
+                pick.strength * (pick.change[c] - (i < done.size() ? done[i][c] : 0.0)) / own);
+        }
+        for (std::size_t c = 0; c < 2; ++c) one.along[c] = static_cast<T>(picked.along[c]);
+        one.plain = static_cast<T>(picked.plain);
+        one.dark = static_cast<T>(picked.dark);
+        one.bright = static_cast<T>(picked.bright);
+        one.strength = static_cast<T>(pick.strength);
+        picks_.push_back(one);
+    }
+    if (picks.left) left_ = grid(picks.left, 1);
+    if (picks.display) {
+        const DisplayCurve& curve = *picks.display;
+        for (const double value : curve.values) display_.push_back(static_cast<T>(value));
+        display_from_ = static_cast<T>(curve.from);
+        display_scale_ =
+            static_cast<T>(static_cast<double>(display_.size() - 1) / (curve.to - curve.from));
+    }
+}
+
+template <class T>
+PickPlan<T> PickMemory<T>::plan() const {
+    return {picks_.data(),
+            static_cast<int>(picks_.size()),
+            left_,
+            display_.empty() ? nullptr : display_.data(),
+            static_cast<int>(display_.size()),
+            display_from_,
+            display_scale_};
+}
+
+template class PickMemory<float>;
+template class PickMemory<double>;
+
+double left_at(const FramePicks& picks, const Vec3& colour) {
+    if (!picks.left) return 1;
+    return MatteGrid::at(picks.left->data(), pick_point(displayed(colour, picks.display.get())));
+}
+
+Vec3 with_picks(const FramePicks& picks, const PickPlan<double>& plan, const Vec3& colour,
+                const Vec3& moved) {
+    const Vec3 shown = displayed(colour, picks.display.get()), point = pick_point(shown);
+    const auto reaches = [&](const PickPlan<double>::Grid& grid) {
+        bool inside = true;
+        for (std::size_t c = 0; c < 3; ++c) {
+            inside &= point[c] >= grid.low[c] && point[c] <= grid.high[c];
+        }
+        return inside;
+    };
+    Vec3 sum{};
+    double shares = 0;
+    for (int k = 0; k < plan.count; ++k) {
+        const PickPlan<double>::One& pick = plan.picks[k];
+        if (!reaches(pick.matte)) continue;
+        const double matte = MatteGrid::at(pick.matte.values, point);
+        const PickedColour picked({pick.along[0], pick.along[1]}, pick.plain, pick.dark,
+                                  pick.bright);
+        double share = matte * picked.amount(shown);
+        if (plan.count > 1) {
+            const double weight =
+                matte * pick.strength / (pick_distance2(point, vec3(pick.at)) + kNearestPick);
+            shares += weight;
+            share *= weight;
+        }
+        for (std::size_t c = 0; c < 3; ++c) sum[c] += share * pick.change[c];
+    }
+    if (plan.count > 1) sum = (1 / std::max(shares, 1e-30)) * sum;
+    const bool held = plan.left.values && moved != Vec3{0, 0, 0} && reaches(plan.left);
+    return held ? MatteGrid::at(plan.left.values, point) * moved + sum : moved + sum;
+}
+
+}  // namespace palette4d

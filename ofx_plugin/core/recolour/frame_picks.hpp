@@ -1,0 +1,71 @@
+// The picks and holds of one frame, ready to recolour: D(c) = sum of m(c) a(c) change.
+//
+// m is the matte over colours at this frame: the learned grid with the pick's sliders, moved along
+// with the picked colour, and what holds leave of it. a is the amount of the picked colour in c: 1
+// at it, s in a shade of it s times as dark, alpha in its mixture of alpha with grey, 0 in grey. So
+// shadows, highlights, soft edges and noise change as much as they should.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "model/edits.hpp"
+#include "model/matte.hpp"
+#include "recolour/pick_kernels.hpp"
+
+namespace palette4d {
+
+/// The values of a MatteGrid at one frame, 0..1.
+using FrameMatte = std::vector<float>;
+
+/// What one pick does at a frame.
+struct FramePick {
+    Vec3 colour;      ///< the picked colour there, in the palette's code values
+    Vec3 change;      ///< the whole change of that colour from the unedited one
+    double strength;  ///< how much of the change is asked for, above 0
+    std::shared_ptr<const FrameMatte> matte;
+};
+
+struct FramePicks {
+    std::vector<FramePick> picks;
+    /// What holds leave of the changes that the palette makes; null: all.
+    std::shared_ptr<const FrameMatte> left;
+    std::shared_ptr<const DisplayCurve> display;
+};
+
+/// The enabled picks and holds that ask for something at a frame.
+FramePicks picks_at(const Edits& edits, double frame);
+/// One pick's share of its change, 0..1, as a change of all channels; for its matte. Without a pick
+/// of this id, or where it asks for nothing, no colour changes.
+FramePicks matte_at(const Edits& edits, const std::string& id, double frame);
+
+/// The memory that a PickPlan points to. `done` has what the palette does to each picked colour.
+template <class T>
+class PickMemory {
+public:
+    PickMemory(const FramePicks& picks, const std::vector<Vec3>& done);
+    /// Valid while this is.
+    PickPlan<T> plan() const;
+
+private:
+    /// In the form that the kernels read; `idle` are the values that do nothing.
+    typename PickPlan<T>::Grid grid(const std::shared_ptr<const FrameMatte>& matte, float idle);
+
+    std::vector<typename PickPlan<T>::One> picks_;
+    typename PickPlan<T>::Grid left_{};
+    std::vector<std::shared_ptr<const FrameMatte>> mattes_;
+    std::vector<T> display_;
+    T display_from_ = 0, display_scale_ = 1;
+};
+
+extern template class PickMemory<float>;
+extern template class PickMemory<double>;
+
+/// What holds leave of the palette's change of a colour, 0..1.
+double left_at(const FramePicks& picks, const Vec3& colour);
+/// The displacement of one colour, of which the palette does `moved`, in double. `plan` is that of
+/// the picks.
+Vec3 with_picks(const FramePicks& picks, const PickPlan<double>& plan, const Vec3& colour,
+                const Vec3& moved);
+
+}  // namespace palette4d

@@ -1,0 +1,319 @@
+"""What a pick takes of its frame, what else it takes, and which gesture would help.
+
+Input: a document with a pick, and its clip. Output: an `Answer`. Proposed holds and boxes have been
+tried on a copy of the document.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palette4d import _core
+from palette4d.common.errors import Palette4dError
+from palette4d.common.text import hex_of, percent
+from palette4d.grade.edits import Colour, as_colour
+from palette4d.grade.mattes import Display, display_curve
+from palette4d.grade.picks import Area, Pick
+from palette4d.media.source_clip import nearest_frame
+
+if TYPE_CHECKING:
+    from palette4d.grade.clip_of_picks import ClipOfPicks
+    from palette4d.grade.document import Document
+    from palette4d.grade.pick_edits import PickEdits
+
+F32 = NDArray[np.float32]
+B = NDArray[np.bool_]
+
+#: The frame is reduced to about this width, in pixels.
+WIDTH = 480
+#: A pixel that gets this share of the change is taken.
+TAKEN = 0.25
+#: Shares of the frame that are worth a word: other things that are taken, and parts that are not.
+OTHERS, PART = 0.005, 0.01
+#: A hold helps if it halves what else is taken, and costs the picked thing less than this share.
+COST = 0.1
+#: A pick may be more than what was clicked on if most of its colours are farther than FAR from the
+#: picked one (in saturation, and 0.4 of lightness); if it is as large as LARGE, or covers three
+#: borders, from SOME of them on.
+FAR, MOST, SOME, LARGE = 0.2, 0.6, 0.1, 0.4
+
+
+@dataclass(frozen=True)
+class Place:
+    """A place in the frame that a gesture may name.
+
+    Attributes
+    ----------
+    pixel : (int, int)
+    box : int
+    rgb : 3 floats
+        Its colour, in the palette's code values.
+    share : float
+        Share of the frame's pixels that it stands for.
+    left : float
+        With the gesture: for a hold, what is still taken elsewhere; for a box, what the pick takes.
+    """
+
+    pixel: tuple[int, int]
+    box: int
+    rgb: Colour
+    share: float
+    left: float = 0.0
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a pick or hold does in the frame that it was picked in.
+
+    Attributes
+    ----------
+    frame : int
+    share : float
+        Share of the frame's pixels that get at least a quarter of the change.
+    others : float
+        The same for pixels that are not connected with what was clicked on.
+    other : Place or None
+        The largest of these.
+    hold : Place or None
+        A hold that helps.
+    part : Place or None
+        A neighbouring part of the same hue that is not taken; a box there would add it.
+    floods : bool
+        The pick takes so much that it may be more than one thing.
+    """
+
+    frame: int
+    share: float
+    others: float = 0.0
+    other: Place | None = None
+    hold: Place | None = None
+    part: Place | None = None
+    floods: bool = False
+
+    def lines(self, id: str) -> list[str]:
+        """Return the answer for people, and the gestures that help as arguments of `edit`."""
+        found = [f"takes {percent(self.share)} of frame {self.frame}"]
+        if self.other is not None:
+            x, y = self.other.pixel
+            found.append(
+                f"also takes {percent(self.others)} elsewhere, most of it {hex_of(self.other.rgb)} "
+                f"at {x},{y}"
+            )
+        if self.hold is not None:
+            x, y = self.hold.pixel
+            found.append(
+                f"  to keep it: hold --frame {self.frame} --pixel {x},{y} --box {self.hold.box} "
+                f"(leaves {percent(self.hold.left)})"
+            )
+        if self.part is not None:
+            x, y = self.part.pixel
+            found.append(
+                f"does not take {hex_of(self.part.rgb)} at {x},{y}, "
+                f"{percent(self.part.share)} of the frame"
+            )
+            found.append(
+                f"  if it belongs to it: area {id} --frame {self.frame} --pixel {x},{y} "
+                f"--box {self.part.box} (then takes {percent(self.part.left)})"
+            )
+        if self.floods:
+            found.append(
+                "  warning: this may be more than one thing. Look at its matte (render --output "
+                f"pick:{id}); a hold on what must stay, or a lower --reach, takes less"
+            )
+        return found
+
+
+def of(document: PickEdits, pick: Pick, of_clip: ClipOfPicks) -> Answer | None:
+    """Return the answer for a pick; None where the clip is not there."""
+    clip = of_clip.open()
+    if clip is None:
+        return None
+    frame = nearest_frame(clip, pick.frame)
+    view = _View.of(document, of_clip, frame)
+    taken = view.taken(document, pick)
+    share = float(taken.mean())
+    if pick.kind == "hold":
+        return Answer(frame, share)
+    seeds = view.seeds(pick, frame)
+    own = _connected(taken, seeds)
+    others = taken & ~own if seeds.any() else np.zeros_like(taken)
+    beside = float(others.mean())
+    far, large = view.far(pick, own), share > LARGE or _borders(own) >= 3
+    floods = far > (SOME if large else MOST)
+    found = Answer(frame, share, beside, floods=floods)
+    if beside > OTHERS:
+        found = replace(found, other=view.place(others))
+        found = replace(found, hold=_hold(document, pick, of_clip, view, own, others))
+    part = view.beside(pick, own, taken)
+    if part.mean() > max(PART, 0.1 * share) and not pick.whole_hue:
+        found = replace(found, part=_part(document, pick, of_clip, view, part, beside))
+    return found
+
+
+def _hold(
+    document: PickEdits, pick: Pick, of_clip: ClipOfPicks, view: _View, own: B, others: B
+) -> Place | None:
+    """Return a hold on the largest other thing, if it helps and spares the picked thing."""
+    place = view.place(others)
+    trial = _trial(document, of_clip)
+    try:
+        trial.hold(view.frame, pixel=place.pixel, box=place.box, follow=False)
+    except Palette4dError:
+        return None
+    taken = view.taken(trial, next(p for p in trial.picks if p.id == pick.id))
+    left = float((taken & others).mean())
+    if left > 0.5 * others.mean() or (taken & own).sum() < (1 - COST) * own.sum():
+        return None
+    return replace(place, left=left)
+
+
+def _part(
+    document: PickEdits, pick: Pick, of_clip: ClipOfPicks, view: _View, part: B, beside: float
+) -> Place | None:
+    """Return a second box, if it adds the part and little else."""
+    place = view.place(part)
+    trial = _trial(document, of_clip)
+    area = Area(view.frame, (place.pixel,), place.box / 2)
+    try:
+        trial.add_area(pick.id, area)
+    except Palette4dError:
+        return None
+    grown = next(p for p in trial.picks if p.id == pick.id)
+    taken = view.taken(trial, grown)
+    others = taken & ~_connected(taken, view.seeds(grown, view.frame))
+    if (taken & part).sum() < 0.5 * part.sum() or others.mean() > beside + OTHERS:
+        return None
+    return replace(place, left=float(taken.mean()))
+
+
+def _trial(document: PickEdits, of_clip: ClipOfPicks) -> Document:
+    """Return a copy whose picks are learned from the frames that were read already."""
+    trial: Document = document.trial()  # type: ignore[attr-defined]
+    trial._clip_of_picks = lambda clip: of_clip  # type: ignore[method-assign]
+    return trial
+
+
+@dataclass(frozen=True)
+class _View:
+    """A frame, reduced: every n-th pixel of every n-th row, n = `every`."""
+
+    frame: int
+    every: int
+    rgb: F32
+    real: B
+    display: Display | None
+
+    @classmethod
+    def of(cls, document: PickEdits, of_clip: ClipOfPicks, frame: int) -> _View:
+        pixels = of_clip.read(frame)
+        every = max(1, round(pixels.shape[1] / WIDTH))
+        rgb = np.ascontiguousarray(pixels[every // 2 :: every, every // 2 :: every])
+        real = np.asarray(np.isfinite(rgb).all(axis=2))
+        shown = np.where(real[..., None], rgb, 0).astype(np.float32)
+        return cls(frame, every, shown, real, display_curve(document.encoding))
+
+    def taken(self, document: PickEdits, pick: Pick) -> B:
+        """Return which pixels get at least a quarter of a pick's change."""
+        picks = document.core.pick_matte_at(pick.id, self.frame)
+        return self._drawn(picks) & self.real
+
+    def _drawn(self, picks: _core.FramePicks) -> B:
+        # Any palette will do: none of its colours moves.
+        corner = np.zeros((1, 3))
+        faces = np.zeros((0, 3), np.int32)
+        drawn = _core.Recolourer(corner, corner, faces, picks=picks).apply(
+            self.rgb, precision="single"
+        )
+        return np.asarray((drawn - self.rgb)[..., 0] > TAKEN)
+
+    def far(self, pick: Pick, own: B) -> float:
+        """Return the share of a region whose colours are far from the picked one."""
+        if not own.any():
+            return 0.0
+        points = _core.pick_points(self.rgb[own], self.display)
+        away = points - _core.pick_points([pick.rgb], self.display)
+        return float((np.linalg.norm(away * (1, 1, 0.4), axis=1) > FAR).mean())
+
+    def beside(self, pick: Pick, own: B, taken: B) -> B:
+        """Return the largest part of the pick's hue that is connected with it and not taken."""
+        from scipy import ndimage
+
+        shown = _shown(pick.rgb, self.display)
+        odds = _core.hue_matte(shown).astype(np.float32)
+        cone = np.where(odds == 0, 0, 1 / (1 + np.exp((63 - odds) * (6 / 63))))
+        given = [(pick.rgb, (1.0, 1.0, 1.0), 1.0, cone.astype(np.float32))]
+        picks = _core.FramePicks(given, display=self.display)
+        left = self._drawn(picks) & self.real & ~taken
+        left = ndimage.binary_opening(left, iterations=2)
+        labels, count = ndimage.label(left)
+        if not count or not own.any():
+            return np.zeros_like(own)
+        touching = np.unique(labels[ndimage.binary_dilation(own, iterations=4)])
+        sizes = np.bincount(labels.ravel())
+        sizes[0] = 0
+        kept = [n for n in touching.tolist() if n]
+        if not kept:
+            return np.zeros_like(own)
+        return np.asarray(labels == max(kept, key=lambda n: int(sizes[n])))
+
+    def seeds(self, pick: Pick, frame: int) -> B:
+        """Return the pixels that the user marked in a frame."""
+        found = np.zeros(self.real.shape, bool)
+        areas = [area for area in pick.areas if area.frame == frame]
+        if pick.pixel is not None and round(pick.frame) == frame:
+            areas.append(Area(frame, (pick.pixel,), (pick.box or 1) / 2))
+        for area in areas:
+            for x, y in area.points:
+                half = max(area.radius / self.every, 0.5)
+                row, column = y / self.every, x / self.every
+                found[
+                    max(0, int(row - half)) : int(row + half) + 1,
+                    max(0, int(column - half)) : int(column + half) + 1,
+                ] = True
+        return found
+
+    def place(self, mask: B) -> Place:
+        """Return the middle of a mask's largest part, and a box that lies in it."""
+        from scipy import ndimage
+
+        labels, _ = ndimage.label(mask)
+        sizes = np.bincount(labels.ravel())
+        sizes[0] = 0
+        largest = labels == sizes.argmax()
+        depth = ndimage.distance_transform_cdt(np.pad(largest, 1))[1:-1, 1:-1]
+        row, column = np.unravel_index(int(depth.argmax()), depth.shape)
+        box = int(min(2 * depth.max() - 1, 15)) * self.every
+        pixel = (
+            int(column) * self.every + self.every // 2,
+            int(row) * self.every + self.every // 2,
+        )
+        rgb = as_colour(np.median(self.rgb[largest], axis=0).tolist())
+        return Place(pixel, max(box, 1), rgb, float(largest.mean()))
+
+
+def _shown(rgb: Colour, display: Display | None) -> Colour:
+    """Return the display code values of a colour."""
+    if display is None:
+        return rgb
+    start, end, values = display
+    codes = np.linspace(start, end, len(values))
+    return as_colour(np.interp(rgb, codes, values).tolist())
+
+
+def _connected(mask: B, seeds: B) -> B:
+    """Return the parts of a mask that are connected with seeds, across gaps of a pixel or two."""
+    from scipy import ndimage
+
+    labels, _ = ndimage.label(ndimage.binary_dilation(mask))
+    kept = np.unique(labels[seeds])
+    return np.asarray(np.isin(labels, kept[kept > 0]) & mask)
+
+
+def _borders(mask: B) -> int:
+    """Return how many of the frame's borders a mask covers for a third or more."""
+    sides = (mask[0], mask[-1], mask[:, 0], mask[:, -1])
+    return sum(bool(side.mean() >= 1 / 3) for side in sides)

@@ -1,0 +1,162 @@
+"""Mattes of picks: learned from frames of the clip, and kept in the sidecar.
+
+Input: a pick or a hold, and its clip. Output: a matte over colours, as the sidecar's member
+``mattes`` holds it. The core learns (`core/fit/matte_learning.hpp`); this module chooses frames.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import zlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palette4d import _core
+from palette4d.common.errors import Palette4dError
+from palette4d.grade.picks import Pick
+
+F32 = NDArray[np.float32]
+Bytes = NDArray[np.uint8]
+#: (from, to, values): display code values of a palette's code values, evenly spaced.
+Display = tuple[float, float, list[float]]
+ReadFrame = Callable[[int], F32]
+"""The straight colours of a frame, (h, w, 3) in the palette's code values; NaN: no colour."""
+
+#: A matte is also learned from this many frames along the pick's path, so that colours which come
+#: later are known. More cost a read of a frame each, and change little.
+FURTHER_FRAMES = 3
+#: Samples of a display curve: straight lines between them are within 1/255 of it.
+SAMPLES = 1024
+#: The brightest scene-linear code value that a curve tells from others.
+BRIGHTEST = 2.0
+
+
+@dataclass(frozen=True)
+class Learned:
+    """A matte that was learned.
+
+    Attributes
+    ----------
+    id : str
+        A hash of the matte: equal mattes have one id.
+    text : str
+        The matte as the sidecar has it.
+    found : bool
+        Whether the frame has pixels of the colour.
+    share : float
+        Share of the frame's pixels, 0..1, that are connected with what was clicked on.
+    """
+
+    id: str
+    text: str
+    found: bool
+    share: float
+
+
+def learn(
+    pick: Pick,
+    holds: Sequence[Pick],
+    frames: Sequence[int],
+    read: ReadFrame,
+    display: Display | None,
+) -> Learned:
+    """Learn the matte of a pick or hold.
+
+    Parameters
+    ----------
+    pick : Pick
+        With its path, if its colour is followed.
+    holds : sequence of Pick
+        Holds that are background for this pick.
+    frames : sequence of int
+        The clip's frames.
+    read : callable
+        Reads a frame.
+    display : tuple or None
+        `display_curve` of the palette's encoding.
+    """
+    chosen = [_nearest(frames, pick.frame)]
+    chosen += [_nearest(frames, area.frame) for area in pick.areas]
+    seeded = list(dict.fromkeys(chosen))
+    others = [frame for frame in _along(pick, frames) if frame not in seeded]
+    given = []
+    for frame in [*seeded, *others]:
+        background = [
+            _box(hold)
+            for hold in holds
+            if hold.pixel is not None and _nearest(frames, hold.frame) == frame
+        ]
+        own = [] if pick.pixel is None or frame != seeded[0] else [_box(pick)]
+        own += [
+            (list(area.points), float(area.radius))
+            for area in pick.areas
+            if _nearest(frames, area.frame) == frame
+        ]
+        colour = tuple(pick.colour_at(frame).tolist())
+        given.append((read(frame), colour, own, background, frame in seeded))
+    found = _core.learn_matte(
+        given,
+        pick.rgb,
+        holds=[tuple(hold.colour_at(pick.frame).tolist()) for hold in holds],
+        display=display,
+    )
+    odds: Bytes = found["odds"]
+    return Learned(id_of(odds), text_of(odds), found["found"], found["share"])
+
+
+def _box(pick: Pick) -> tuple[list[tuple[float, float]], float]:
+    assert pick.pixel is not None
+    return [pick.pixel], (pick.box or 1) / 2
+
+
+def _nearest(frames: Sequence[int], frame: float) -> int:
+    return min(frames, key=lambda number: (abs(number - frame), number))
+
+
+def _along(pick: Pick, frames: Sequence[int]) -> list[int]:
+    """Return frames spread over those at which all of the pick is asked for."""
+    first = frames[0] if pick.start is None else pick.start
+    last = frames[-1] if pick.until is None else pick.until
+    inside = [n for n in frames if first <= n <= last and pick.strength_at(n, 1.0) > 0.5]
+    count = min(FURTHER_FRAMES, len(inside))
+    return [inside[(2 * k + 1) * len(inside) // (2 * count)] for k in range(count)]
+
+
+def id_of(odds: Bytes) -> str:
+    """Return the id of a matte: m and 16 digits of a hash of its log odds."""
+    return "m" + hashlib.sha256(odds.tobytes()).hexdigest()[:16]
+
+
+def text_of(odds: Bytes) -> str:
+    """Return a matte's text: base64 of a zlib stream of the differences of its log odds."""
+    flat = odds.reshape(-1)
+    steps = np.diff(flat, prepend=np.zeros(1, np.uint8))  # modulo 256
+    return base64.b64encode(zlib.compress(steps.tobytes(), 9)).decode()
+
+
+@lru_cache(maxsize=16)
+def display_curve(encoding: str) -> Display | None:
+    """Return the curve from a palette's code values to a display's; None where they are the same.
+
+    Saturation is measured in display code values. Each channel has the curve of greys: primaries
+    stay those of the palette.
+    """
+    from palette4d.colour.difference import viewing_of
+
+    viewing = viewing_of(encoding)
+    if viewing.to_srgb is None or viewing.encoding in ("", "sdr-video"):
+        return None
+    top = BRIGHTEST if viewing.encoding == "scene-linear" else 1.0
+    codes = np.linspace(0.0, top, SAMPLES)
+    shown = np.asarray(viewing.to_srgb(np.repeat(codes[:, None], 3, axis=1)), np.float64)[:, 1]
+    if not np.isfinite(shown).all():
+        raise Palette4dError(
+            f"found no finite display values for the encoding {encoding!r}; picks cannot be made"
+        )
+    rising = np.maximum.accumulate(np.clip(shown, 0.0, None))
+    return 0.0, top, np.round(rising, 5).tolist()

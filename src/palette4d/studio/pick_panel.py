@@ -1,0 +1,342 @@
+"""The panel of the selected pick or hold: its matte, and what it takes of its frame."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QRectF, QSize, Qt, QTimer
+from PySide6.QtGui import QPainter, QPixmap
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QDoubleSpinBox,
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from palette4d.common.errors import in_words
+from palette4d.common.text import percent
+from palette4d.grade.answer import Answer
+from palette4d.grade.picks import MOST_REACH, Area, Pick
+from palette4d.plotting import style
+from palette4d.studio import grade_steps, paint, texts, theme
+from palette4d.studio.colour_widgets import Bar, Span
+from palette4d.studio.newest import Newest
+from palette4d.studio.screen_colours import on_screen
+from palette4d.studio.session import Session
+from palette4d.studio.states import Place
+
+U8 = NDArray[np.uint8]
+
+#: What a pick takes is worked out when nothing has changed for so many milliseconds.
+REST = 300
+#: A reach this near 0 becomes 0.
+SNAP = 0.12
+#: Colours of a bar.
+SAMPLES = 24
+#: The width of the numbers beside the bars.
+NUMBERS = 72
+#: The size of a colour before a line.
+SWATCH = QSize(14, 14)
+
+
+class Line(QWidget):
+    """A line of the answer: a colour, words, and what would help."""
+
+    def __init__(self, button: str = "") -> None:
+        """Begin hidden."""
+        super().__init__()
+        self.swatch, self.words = QLabel(), QLabel()
+        self.swatch.setFixedSize(SWATCH)
+        self.words.setTextFormat(Qt.TextFormat.PlainText)
+        self.words.setWordWrap(True)
+        self.words.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(6)
+        row.addWidget(self.swatch)
+        row.addWidget(self.words, 1)
+        self.button = QPushButton(button)
+        self.button.setVisible(bool(button))
+        row.addWidget(self.button)
+        self.hide()
+
+    def say(self, words: str, colour: U8 | None = None) -> None:
+        """Show words with a displayed colour; without words, hide."""
+        self.words.setText(words)
+        self.swatch.setVisible(colour is not None)
+        if colour is not None:
+            self.swatch.setPixmap(_patch(self, colour))
+        self.setVisible(bool(words))
+
+
+class PickPanel(QWidget):
+    """Reach, softness and lightness of the selected pick, its tools, and its answer."""
+
+    def __init__(self, session: Session) -> None:
+        """Listen to the session."""
+        super().__init__()
+        self.session = session
+        self._silent = False
+        self._newest = Newest("palette4d answer")
+        self._waits: object = None  # what an answer was asked for
+        self._known: object = None  # what the answer that is shown is for
+        self._warned: tuple[str, ...] = ()
+        self._resting = QTimer(self)
+        self._resting.setSingleShot(True)
+        self._resting.timeout.connect(self._ask)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(6)
+        column.addLayout(self._make_tools())
+        column.addWidget(self._make_shape())
+        self.takes, self.warning = Line(), Line()
+        self.other = Line(texts.ADD_HOLD)
+        self.part = Line(texts.ADD_BOX)
+        self.other.button.clicked.connect(self._add_hold)
+        self.part.button.clicked.connect(self._add_box)
+        self.warning.words.setStyleSheet(f"color: {theme.WARNING}")
+        for line in (self.takes, self.other, self.part, self.warning):
+            column.addWidget(line)
+        for event in ("document", "selection", "clip"):
+            session.on(event, self.refresh, panel=True)
+            session.on(event, lambda: self._resting.start(REST))
+        session.on("answer", self._show_answer)
+        session.on("view", self.refresh)
+        session.on("tool", self._show_tool)
+        self.refresh()
+
+    def _make_tools(self) -> QHBoxLayout:
+        row = QHBoxLayout()
+        row.setSpacing(6)
+        self.add, self.hold, self.matte = QPushButton(), QPushButton(), QPushButton()
+        for button, text, tip in (
+            (self.add, texts.ADD_TO_IT, texts.ADD_TO_IT_TIP),
+            (self.hold, texts.HOLD_TOOL, texts.HOLD_TOOL_TIP),
+            (self.matte, texts.MATTE_BUTTON, texts.MATTE_TIP),
+        ):
+            button.setText(text)
+            button.setToolTip(tip)
+            button.setCheckable(True)
+            row.addWidget(button)
+        session = self.session
+        self.add.clicked.connect(lambda on: session.take("add" if on else ""))
+        self.hold.clicked.connect(lambda on: session.take("hold" if on else ""))
+        self.matte.clicked.connect(lambda on: session.look(matte=on))
+        row.addStretch(1)
+        self.whole_hue = QCheckBox(texts.WHOLE_HUE)
+        self.whole_hue.setToolTip(texts.WHOLE_HUE_TIP)
+        self.whole_hue.clicked.connect(self._toggled)
+        row.addWidget(self.whole_hue)
+        return row
+
+    def _make_shape(self) -> QWidget:
+        self.shape = QWidget()
+        grid = QGridLayout(self.shape)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setHorizontalSpacing(6)
+        grid.setVerticalSpacing(2)
+        self.bars: dict[str, Bar] = {}
+        self.boxes: dict[str, QDoubleSpinBox] = {}
+        for line, (name, text, tip, low, high, step) in enumerate(
+            (
+                ("reach", texts.REACH, texts.REACH_TIP, -MOST_REACH, MOST_REACH, 0.25),
+                ("softness", texts.SOFTNESS, texts.SOFTNESS_TIP, 0.0, 1.0, 0.05),
+            )
+        ):
+            label, bar, box = QLabel(text), Bar(text, step), QDoubleSpinBox()
+            box.setAccessibleName(text)
+            box.setDecimals(2)
+            box.setRange(low, high)
+            box.setSingleStep(step)
+            box.setKeyboardTracking(False)
+            box.setFixedWidth(NUMBERS)
+            box.valueChanged.connect(lambda value, name=name: self._typed(name, value))
+            bar.moved.connect(lambda value, name=name: self._moved(name, value))
+            bar.let_go.connect(self.session.drop)
+            label.setBuddy(box)
+            _add_row(grid, line, tip, label, bar, box)
+            self.bars[name], self.boxes[name] = bar, box
+        self.lightness, self.lightness_words = Span(texts.LIGHTNESS_RANGE, 0.05), QLabel()
+        label = QLabel(texts.LIGHTNESS_RANGE)
+        self.lightness_words.setFixedWidth(NUMBERS)
+        self.lightness.moved.connect(lambda span: self._moved("lightness", span))
+        self.lightness.let_go.connect(self.session.drop)
+        _add_row(grid, 2, texts.LIGHTNESS_TIP, label, self.lightness, self.lightness_words)
+        grid.setColumnStretch(1, 1)
+        return self.shape
+
+    # ------------------------------------------------------------------------------ what it shows
+
+    def refresh(self) -> None:
+        """Show the selected pick or hold."""
+        pick = self.session.picked
+        self.setVisible(pick is not None)
+        if pick is None:
+            return
+        self.shape.setVisible(pick.kind == "pick")
+        self.whole_hue.setVisible(pick.kind == "pick")
+        self._silent = True
+        try:
+            self._show_shape(pick)
+        finally:
+            self._silent = False
+        self._show_tool()
+
+    def _show_shape(self, pick: Pick) -> None:
+        own = on_screen(self.session, pick.rgb).astype(np.float64)
+        ramp = np.linspace(0, 1, SAMPLES)[:, None]
+        dark = np.full(3, 40.0)
+        colours = (dark + (own - dark) * ramp).astype(np.uint8)
+        greys = np.repeat(np.rint(ramp * 255), 3, axis=1).astype(np.uint8)
+        self.bars["reach"].show_value(pick.reach, 0.0, -MOST_REACH, MOST_REACH, colours)
+        self.bars["softness"].show_value(pick.softness, 0.5, 0.0, 1.0, colours)
+        self.lightness.show_span(pick.lightness, greys)
+        self.lightness_words.setText("{:.2f} – {:.2f}".format(*pick.lightness))
+        for name, box in self.boxes.items():
+            if not box.lineEdit().hasFocus() or not box.lineEdit().isModified():
+                box.setValue(getattr(pick, name))
+        self.whole_hue.setChecked(pick.whole_hue)
+
+    def _show_tool(self) -> None:
+        self.add.setChecked(self.session.tool == "add")
+        self.hold.setChecked(self.session.tool == "hold")
+        self.matte.setChecked(self.session.view.matte)
+
+    # --------------------------------------------------------------------------------- what it does
+
+    def _moved(self, name: str, value: float | tuple[float, float]) -> None:
+        pick = self.session.picked
+        if pick is None:
+            return
+        if isinstance(value, float):
+            value = 0.0 if name == "reach" and abs(value) < SNAP else round(value, 2)
+        grade_steps.shape_pick(self.session, pick.id, True, **{name: value})
+
+    def _typed(self, name: str, value: float) -> None:
+        pick = self.session.picked
+        if not self._silent and pick is not None:
+            grade_steps.shape_pick(self.session, pick.id, False, **{name: round(value, 2)})
+
+    def _toggled(self, on: bool) -> None:
+        pick = self.session.picked
+        if pick is not None:
+            said = texts.ITS_HUE if on else texts.ITS_COLOURS
+            grade_steps.change_pick(self.session, pick.id, said, whole_hue=on)
+
+    def _add_hold(self) -> None:
+        """Hold what the answer proposes."""
+        found = self.session.answer
+        if found is not None and found.hold is not None:
+            (x, y), hold = found.hold.pixel, found.hold
+            grade_steps.hold(self.session, Place(found.frame, x, y, hold.box, hold.rgb))
+
+    def _add_box(self) -> None:
+        """Add the part that the answer proposes."""
+        found, pick = self.session.answer, self.session.picked
+        if found is not None and found.part is not None and pick is not None:
+            area = Area(found.frame, (found.part.pixel,), found.part.box / 2)
+            grade_steps.add_area(self.session, pick.id, area)
+
+    # ---------------------------------------------------------------------------------- the answer
+
+    @property
+    def settled(self) -> bool:
+        """Whether the answer of now is shown."""
+        return not self._resting.isActive() and self._waits is None
+
+    def _ask(self) -> None:
+        """Ask what the selected pick takes, and what speaks against it."""
+        session, pick = self.session, self.session.picked
+        document, source = session.document, grade_steps.source_of(session)
+        if document is None or pick is None or source is None:
+            self._waits = self._known = None
+            self._clear()
+            return
+        if session.dragging or session.following:
+            return  # the session tells of the document again when that is done
+        # What it takes depends on itself and on holds; its new colour changes nothing.
+        own = [replace(p, to=None) for p in document.picks if p.kind == "hold" or p.id == pick.id]
+        asked, trial = (document, source, own), document.trial()
+        known = session.answer if asked == self._known else None
+        self._waits = asked
+        if known is None:
+            self.other.button.setEnabled(False)
+            self.part.button.setEnabled(False)
+        if session.answer is None:
+            self._clear(texts.LOOKING)
+
+        def work() -> None:
+            found = known
+            try:
+                warned = trial.pick_warnings(pick.id, source)
+                if found is None and pick.enabled:
+                    found = trial.answer(pick.id, source)
+            except Exception as error:  # whatever fails, the window stays
+                warned = (in_words(error),)
+            session.post(lambda: self._answered(asked, found, warned))
+
+        self._newest.ask(work)
+
+    def _answered(self, asked: object, found: Answer | None, warned: tuple[str, ...]) -> None:
+        if asked is not self._waits:
+            return
+        self._waits, self._known, self._warned = None, asked, warned
+        self.session.show_answer(found)
+
+    def _clear(self, words: str = "") -> None:
+        """Show no answer, but words instead of it."""
+        for line in (self.other, self.part, self.warning):
+            line.say("")
+        self.takes.say(words)
+
+    def _show_answer(self) -> None:
+        found, pick = self.session.answer, self.session.picked
+        self._clear()
+        told = [f"{line[0].upper()}{line[1:]}." for line in self._warned]
+        if found is not None and pick is not None:
+            says = texts.TAKES if pick.kind == "pick" else texts.KEEPS
+            self.takes.say(says.format(share=percent(found.share), frame=found.frame))
+            if found.other is not None:
+                (x, y), share = found.other.pixel, percent(found.others)
+                words = texts.ALSO_TAKES.format(share=share, x=x, y=y)
+                self.other.say(words, on_screen(self.session, found.other.rgb))
+            if found.part is not None:
+                (x, y), share = found.part.pixel, percent(found.part.share)
+                words = texts.LEAVES_OUT.format(share=share, x=x, y=y)
+                self.part.say(words, on_screen(self.session, found.part.rgb))
+            for line, place, tip in (
+                (self.other, found.hold, texts.ADD_HOLD_TIP),
+                (self.part, found.part, texts.ADD_BOX_TIP),
+            ):
+                line.button.setEnabled(True)
+                line.button.setVisible(place is not None)
+                left = "" if place is None else percent(place.left)
+                line.button.setToolTip(tip.format(share=left))
+            if found.floods:
+                told.insert(0, texts.FLOODS)
+        self.warning.say("\n".join(told))
+
+
+def _add_row(grid: QGridLayout, line: int, tip: str, *parts: QWidget) -> None:
+    for place, part in enumerate(parts):
+        part.setToolTip(tip)
+        grid.addWidget(part, line, place)
+
+
+def _patch(widget: QWidget, colour: U8) -> QPixmap:
+    """Return a displayed colour with a rim."""
+    ratio = widget.devicePixelRatioF()
+    picture = QPixmap(SWATCH * ratio)
+    picture.setDevicePixelRatio(ratio)
+    picture.fill(Qt.GlobalColor.transparent)
+    painter = QPainter(picture)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    painter.setPen(paint.pen(style.RIM, 1.0))
+    painter.setBrush(paint.colour_of(colour))
+    painter.drawRoundedRect(QRectF(0.5, 0.5, SWATCH.width() - 1, SWATCH.height() - 1), 2.5, 2.5)
+    painter.end()
+    return picture

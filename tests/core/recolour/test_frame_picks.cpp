@@ -1,0 +1,458 @@
+#include "recolour/frame_picks.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+
+#include "check.hpp"
+#include "images.hpp"
+#include "lattice/lattice.hpp"
+#include "picks.hpp"
+#include "recolour/recolour.hpp"
+#include "shapes.hpp"
+#include "simd/kernel_choice.hpp"
+
+using namespace palette4d;
+using namespace images;
+using namespace shapes;
+using picks::ball;
+using picks::hold;
+using picks::pick;
+
+namespace {
+
+const Vec3 kRed{0.6, 0.25, 0.2}, kGreen{0.25, 0.55, 0.3}, kBlue{0.2, 0.3, 0.65};
+
+Edits edits_of(std::vector<Pick> all) {
+    Edits edits;
+    edits.picks = std::move(all);
+    return edits;
+}
+
+/// The palette as it is, or with some colours moved.
+Recolourer with(const FramePicks& all, bool handles = false) {
+    std::vector<Vec3> edited = cube().rgb;
+    if (handles) {
+        edited[7] = {1.2, 0.7, 0.9};
+        edited[1] = {0.8, 0.1, -0.1};
+    }
+    return {cube().rgb, edited, cube().faces, all};
+}
+
+double gap(const Vec3& a, const Vec3& b) {
+    return std::max({std::abs(a[0] - b[0]), std::abs(a[1] - b[1]), std::abs(a[2] - b[2])});
+}
+
+/// Colours everywhere: near the picks, greys, black and white, far outside, and what is none.
+Image everything(int width, int height, int channels, std::uint64_t seed) {
+    Image image(width, height, channels);
+    Random random(seed);
+    for (int i = 0; i < width * height; ++i) {
+        const Vec3 centres[] = {kRed, kGreen, kBlue, {0, 0, 0}, {1, 1, 1}, {0.5, 0.5, 0.5}};
+        const double reach = i % 3 == 0 ? 1.0 : 0.1;
+        const Vec3 colour = centres[i % 6] + random.colour(-reach, reach);
+        float* const pixel = &image.data[static_cast<std::size_t>(i * channels)];
+        for (std::size_t c = 0; c < 3; ++c) pixel[c] = static_cast<float>(colour[c]);
+        if (channels == 4) pixel[3] = static_cast<float>(random.uniform(0.2, 1.2));
+    }
+    const float odd[] = {kNan, kInf, -kInf, -0.0f, 0.0f, 1e-42f, 3e38f, -3e38f, 1e30f, -1e6f};
+    for (std::size_t i = 0; i < std::size(odd); ++i) image.data[i * 7 * channels + i % 3] = odd[i];
+    for (std::size_t c = 0; c < 3; ++c) {
+        image.data[90 * channels + c] = c == 1 ? -3e38f : 3e38f;
+        image.data[91 * channels + c] = -3e38f;
+        image.data[92 * channels + c] = -0.0f;
+    }
+    return image;
+}
+
+/// Picks of every kind: several, one, with holds, pale ones, with a curve.
+std::vector<FramePicks> many() {
+    std::vector<FramePicks> all;
+    all.push_back(picks_at(edits_of({pick("a", kRed, {0.3, 0.3, 0.6})}), 0));
+    all.push_back(
+        picks_at(edits_of({pick("a", kRed, {0.3, 0.3, 0.6}), pick("b", kGreen, {0.6, 0.5, 0.2}),
+                           pick("w", {0.95, 0.94, 0.96}, {0.9, 0.8, 0.7})}),
+                 0));
+    all.push_back(picks_at(
+        edits_of({pick("a", kRed, {0.3, 0.3, 0.6}), hold("h", kGreen), hold("g", {0.1, 0.1, 0.1}),
+                  pick("k", {0.02, 0.02, 0.02}, {0.1, 0.05, 0})}),
+        0));
+    all.push_back(picks_at(edits_of({hold("h", kGreen)}), 0));
+    all.push_back({{ball(kBlue, {0.1, -0.2, 0.05}, 0.15)}, nullptr, nullptr});
+    Edits log = edits_of({pick("a", kRed, {0.3, 0.3, 0.6}), hold("h", kGreen)});
+    std::vector<double> values;
+    for (int i = 0; i <= 64; ++i) values.push_back(std::pow(i / 64.0, 0.6));
+    log.display = std::make_shared<const DisplayCurve>(DisplayCurve{0, 1.1, values});
+    all.push_back(picks_at(log, 0));
+    return all;
+}
+
+}  // namespace
+
+TEST(a_picked_colour_becomes_its_target_exactly) {
+    const Vec3 pale{0.52, 0.5, 0.49}, black{0, 0, 0}, white{1, 1, 1}, dark{0.02, 0.03, 0.02};
+    for (const Vec3& colour : {kRed, kGreen, kBlue, pale, black, white, dark}) {
+        const Vec3 to{0.4, 0.3, 0.5};
+        for (const double softness : {0.0, 0.5, 1.0}) {
+            Pick one = pick("p", colour, to);
+            one.softness = softness;
+            one.reach = softness - 0.5;
+            for (const bool handles : {false, true}) {
+                const Recolourer recolourer = with(picks_at(edits_of({one}), 3), handles);
+                CHECK(gap(recolourer.displaced(colour, 1), to) < 1e-12);
+                // Half of the strength, half of the way.
+                CHECK(gap(recolourer.displaced(colour, 0.5), 0.5 * (colour + to)) < 1e-12);
+            }
+        }
+    }
+}
+
+TEST(colours_below_black_and_above_white_can_be_picked) {
+    for (const double level : {-0.5, -0.02, -0.01, 1.01, 1.02, 4.0}) {
+        const Vec3 colour{level, level, level}, to{0.5, 0.4, 0.3};
+        const Recolourer recolourer = with(picks_at(edits_of({pick("p", colour, to)}), 0), true);
+        Pick exact = pick("p", colour, to);
+        exact.toward_colour = true;
+        const Recolourer toward = with(picks_at(edits_of({exact}), 0), true);
+        CHECK(gap(toward.displaced(colour, 1), to) < 1e-9);
+        for (const double other : {-9.0, -0.02, 0.0, 0.5, 1.0, 1.02, 9.0}) {
+            CHECK(finite(recolourer.displaced({other, other, other}, 1)));
+        }
+    }
+}
+
+TEST(targets_are_met_with_a_display_curve) {
+    Edits edits = edits_of({pick("p", kRed, {0.3, 0.3, 0.6})});
+    edits.display =
+        std::make_shared<const DisplayCurve>(DisplayCurve{-0.1, 0.9, {0.05, 0.3, 0.7, 1.0}});
+    const Vec3 to{0.3, 0.3, 0.6};
+    edits.picks[0].matte =
+        std::make_shared<const Matte>(hue_matte(displayed(kRed, edits.display.get())));
+    const Recolourer recolourer = with(picks_at(edits, 0), true);
+    CHECK(gap(recolourer.displaced(kRed, 1), to) < 1e-12);
+}
+
+TEST(several_targets_are_met_together) {
+    const Vec3 near_red{0.62, 0.28, 0.2};
+    const Edits edits =
+        edits_of({pick("a", kRed, {0.3, 0.3, 0.6}), pick("b", kGreen, {0.7, 0.6, 0}),
+                  pick("c", kBlue, kBlue), pick("d", near_red, {0.7, 0.3, 0.2})});
+    for (const bool handles : {false, true}) {
+        const Recolourer recolourer = with(picks_at(edits, 0), handles);
+        for (const Pick& one : edits.picks) {
+            CHECK(gap(recolourer.displaced(one.rgb, 1), one.to) < 1e-3);
+        }
+    }
+}
+
+TEST(a_ramp_goes_from_what_the_palette_does_to_the_target) {
+    Pick one = pick("p", kRed, {0.3, 0.3, 0.6});
+    one.from = 10;
+    one.fade = 4;
+    const Vec3 by_handles = with({}, true).displaced(kRed, 1);
+    for (const double frame : {6.0, 7.0, 9.0, 10.0, 30.0}) {
+        const FramePicks found = picks_at(edits_of({one}), frame);
+        const double strength = one.strength_at(frame, 1);
+        CHECK_EQUAL(found.picks.empty(), strength == 0);
+        const Vec3 expected = (1 - strength) * by_handles + strength * one.to;
+        CHECK(gap(with(found, true).displaced(kRed, 1), expected) < 1e-12);
+    }
+}
+
+TEST(a_pick_follows_its_colour) {
+    Pick one = pick("p", kRed, {0.3, 0.3, 0.6});
+    one.path = {{0, kRed}, {10, {0.5, 0.3, 0.15}}};
+    for (const double frame : {0.0, 4.0, 10.0}) {
+        const FramePicks found = picks_at(edits_of({one}), frame);
+        const Vec3 colour = one.colour_at(frame);
+        CHECK(gap(found.picks[0].colour, colour) == 0);
+        const Vec3 end = with(found).displaced(colour, 1);
+        CHECK(gap(end, colour + one.change_at(frame)) < 1e-12);
+    }
+    // A narrow matte moves along: what was beside the colour is beside it still.
+    Matte narrow;
+    narrow.odds.assign(MatteGrid::kSize, 0);
+    const FramePick some = ball(kRed, {}, 0.06);
+    for (std::size_t i = 0; i < MatteGrid::kSize; ++i) {
+        if ((*some.matte)[i] > 0) narrow.odds[i] = 126;
+    }
+    one.matte = std::make_shared<const Matte>(narrow);
+    const Vec3 shade = 0.95 * one.colour_at(10);
+    CHECK(left_at({{}, picks_at(edits_of({one}), 10).picks[0].matte, nullptr}, shade) > 0.9);
+    CHECK(left_at({{}, picks_at(edits_of({one}), 0).picks[0].matte, nullptr}, shade) < 0.1);
+}
+
+TEST(shades_change_as_much_as_they_are_of_the_colour) {
+    const Vec3 to{0.3, 0.3, 0.6};
+    const Recolourer recolourer = with(picks_at(edits_of({pick("p", kRed, to)}), 0));
+    for (const double shade : {0.9, 0.7, 0.5}) {
+        const Vec3 moved = recolourer.displaced(shade * kRed, 1) - shade * kRed;
+        CHECK(gap(moved, shade * (to - kRed)) < 0.05 * shade);
+    }
+}
+
+TEST(a_hold_keeps_its_colour) {
+    const Vec3 kept{0.55, 0.35, 0.15};
+    Pick a = pick("a", kRed, {0.3, 0.3, 0.6}), h = hold("h", kept);
+    // Without picks: to the bit, whatever the palette does.
+    const Recolourer alone = with(picks_at(edits_of({h}), 0), true);
+    CHECK(gap(alone.displaced(kept, 1), kept) < 1e-15);
+    CHECK(gap(alone.displaced(kBlue, 1), with({}, true).displaced(kBlue, 1)) < 1e-15);
+    CHECK(!with(picks_at(edits_of({h}), 0)).moves());
+    // Next to a pick: within the grid's cells.
+    const Recolourer both = with(picks_at(edits_of({a, h}), 0), true);
+    const Recolourer only = with(picks_at(edits_of({a}), 0), true);
+    CHECK(gap(only.displaced(kept, 1), kept) > 0.1);
+    CHECK(gap(both.displaced(kept, 1), kept) < 0.01);
+    CHECK(gap(both.displaced(kRed, 1), a.to) < 1e-12);
+    // A hold that has faded by half keeps half.
+    h.from = 10;
+    h.fade = 4;
+    const Vec3 full = with({}, true).displaced(kept, 1),
+               half = with(picks_at(edits_of({h}), 8), true).displaced(kept, 1);
+    CHECK(gap(half, 0.5 * (full + kept)) < 1e-6);
+}
+
+TEST(picks_that_ask_for_nothing_are_left_out) {
+    Pick off = pick("a", kRed, {0.3, 0.3, 0.6}), late = pick("b", kGreen, {0, 0, 0});
+    off.enabled = false;
+    late.from = 100;
+    Pick gone = pick("c", kBlue, {0, 0, 0});
+    gone.path = {{0, kBlue, 0}};
+    Pick off_hold = hold("h", kRed);
+    off_hold.enabled = false;
+    const FramePicks none = picks_at(edits_of({off, late, gone, off_hold}), 0);
+    CHECK(none.picks.empty() && !none.left);
+    CHECK_EQUAL(picks_at(edits_of({off, late, gone}), 100).picks.size(), 1u);
+}
+
+TEST(sliders_widen_and_narrow_a_matte) {
+    const Vec3 beside{0.5, 0.35, 0.2};
+    const auto share = [&](const Pick& one) {
+        const FramePicks found = picks_at(edits_of({one}), 0);
+        return MatteGrid::at(found.picks[0].matte->data(), pick_point(beside));
+    };
+    Pick one = pick("p", kRed, {0.3, 0.3, 0.6});
+    const double usual = share(one);
+    CHECK(usual > 0 && usual < 1);
+    one.reach = 3;
+    CHECK(share(one) > usual);
+    one.reach = -3;
+    CHECK(share(one) < usual);
+    one.reach = 20;
+    CHECK_EQUAL(share(one), 1.0);
+    one.reach = 0;
+    one.softness = 0;
+    const Vec3 own = pick_point(beside);
+    int between = 0;
+    for (const double step : {-0.1, -0.05, 0.0, 0.05, 0.1}) {
+        const FramePicks hard = picks_at(edits_of({one}), 0);
+        const double found =
+            MatteGrid::at(hard.picks[0].matte->data(), {own[0], own[1] + step, own[2]});
+        between += found > 0 && found < 1;
+    }
+    CHECK(between <= 1);  // a hard edge, one cell wide
+    // A range of lightness, with soft ends of a tenth.
+    one.softness = 0.5;
+    const double lightness = lightness_of(beside);
+    one.darkest = lightness + 0.25;
+    CHECK_EQUAL(share(one), 0.0);
+    one.darkest = 0;
+    one.lightest = lightness - 0.25;
+    CHECK_EQUAL(share(one), 0.0);
+    one.darkest = lightness - 0.2;
+    one.lightest = lightness + 0.2;
+    CHECK_NEAR(share(one), usual, 1e-12);
+    // It leaves out even the picked colour.
+    one.darkest = 0;
+    one.lightest = lightness_of(kRed) - 0.25;
+    const FramePicks found = picks_at(edits_of({one}), 0);
+    CHECK_EQUAL(MatteGrid::at(found.picks[0].matte->data(), pick_point(kRed)), 0.0);
+}
+
+TEST(a_matte_shows_one_pick_alone) {
+    const Edits edits = edits_of(
+        {pick("a", kRed, {0.3, 0.3, 0.6}), pick("b", kGreen, {0, 0, 0}), hold("h", kBlue)});
+    for (const char* id : {"a", "b", "h"}) {
+        const FramePicks shown = matte_at(edits, id, 0);
+        CHECK_EQUAL(shown.picks.size(), 1u);
+        const Recolourer recolourer = with(shown);
+        for (const Pick& one : edits.picks) {
+            const Vec3 moved = recolourer.displaced(one.rgb, 1) - one.rgb;
+            const double expected = one.id == id ? 1 : 0;
+            CHECK(gap(moved, {expected, expected, expected}) < 0.02);
+        }
+    }
+    CHECK(matte_at(edits, "nobody", 0).picks.empty());
+}
+
+TEST(where_a_matte_is_0_every_bit_stays) {
+    for (const FramePicks& all : many()) {
+        const auto recolourer =
+            std::make_shared<const Recolourer>(cube().rgb, cube().rgb, cube().faces, all);
+        for (const int channels : {3, 4}) {
+            const Image image = everything(61, 20, channels, 11);
+            for (const Precision precision : {Precision::kSingle, Precision::kDouble}) {
+                Image found(61, 20, channels);
+                RecolourOptions way{1.0, channels == 4, 1};
+                way.precision = precision;
+                recolourer->apply(image.in(), found.out(), way);
+                int still = 0, moved = 0;
+                for (std::size_t i = 0; i < image.data.size(); i += channels) {
+                    const float* const from = &image.data[i];
+                    const double alpha = channels == 4 ? from[3] : 1.0;
+                    const Vec3 colour{from[0] / alpha, from[1] / alpha, from[2] / alpha};
+                    bool zero = true;
+                    if (finite(colour)) {
+                        const Vec3 point = pick_point(displayed(colour, all.display.get()));
+                        for (const FramePick& one : all.picks) {
+                            zero &= MatteGrid::at(one.matte->data(), point) < 1e-12;
+                        }
+                    }
+                    const bool same = std::memcmp(from, &found.data[i], 4 * channels) == 0;
+                    if (zero) CHECK(same);
+                    still += same;
+                    moved += !same;
+                }
+                CHECK(still > 50 && (all.picks.empty() || moved > 50));
+            }
+        }
+    }
+}
+
+TEST(pictures_are_the_same_by_every_way) {
+    for (const FramePicks& all : many()) {
+        for (const bool handles : {false, true}) {
+            const Recolourer recolourer = with(all, handles);
+            if (!recolourer.moves()) continue;
+            for (const int channels : {3, 4}) {
+                const Image image = everything(203, 7, channels, 5);
+                const RecolourOptions way{0.75, channels == 4, 1};
+                Image expected(203, 7, channels), exact(203, 7, channels);
+                recolourer.apply(image.in(), expected.out(), way);
+                RecolourOptions twofold = way;
+                twofold.precision = Precision::kDouble;
+                recolourer.apply(image.in(), exact.out(), twofold);
+                for (std::size_t i = 0; i < image.data.size(); ++i) {
+                    const double alpha =
+                        channels == 4 ? std::max(std::abs(image.data[i / 4 * 4 + 3]), 1.0f) : 1;
+                    const bool close = std::abs(expected.data[i] - exact.data[i]) <=
+                                       alpha * kSingleTolerance + 1e-6 * std::abs(exact.data[i]);
+                    CHECK(close || same_bits({expected.data[i]}, {exact.data[i]}) ||
+                          (std::isnan(expected.data[i]) && std::isnan(exact.data[i])));
+                }
+                // Threads, instruction sets, places in a row, and the same memory do not show.
+                for (const InstructionSet set : instruction_sets()) {
+                    Image found = image;
+                    RecolourOptions other = way;
+                    other.threads = 3;
+                    other.instructions = set;
+                    recolourer.apply(found.in(), found.out(), other);
+                    CHECK(same_bits(found.data, expected.data));
+                    other.precision = Precision::kDouble;
+                    recolourer.apply(image.in(), found.out(), other);
+                    CHECK(same_bits(found.data, exact.data));
+                }
+                for (const int x : {0, 1, 17, 130, 202}) {
+                    const std::size_t at = (4 * 203 + static_cast<std::size_t>(x)) *
+                                           static_cast<std::size_t>(channels);
+                    float pixel[4];
+                    recolourer.apply({&image.data[at], 1, 1, channels, 16},
+                                     {pixel, 1, 1, channels, 16}, way);
+                    CHECK(std::memcmp(pixel, &expected.data[at], sizeof(float) * channels) == 0);
+                }
+            }
+        }
+    }
+}
+
+TEST(one_colour_and_a_picture_agree) {
+    for (const FramePicks& all : many()) {
+        const Recolourer recolourer = with(all, true);
+        const Image image = everything(100, 3, 3, 8);
+        Image found(100, 3, 3);
+        RecolourOptions way;
+        way.precision = Precision::kDouble;
+        recolourer.apply(image.in(), found.out(), way);
+        for (std::size_t i = 0; i < image.data.size(); i += 3) {
+            const Vec3 colour{image.data[i], image.data[i + 1], image.data[i + 2]};
+            const Vec3 expected = recolourer.displaced(colour, 1);
+            for (std::size_t c = 0; c < 3; ++c) {
+                const float rounded = static_cast<float>(expected[c]);
+                CHECK(same_bits({found.data[i + c]}, {rounded}) || std::isnan(rounded));
+            }
+        }
+    }
+}
+
+TEST(kernels_of_all_sets_agree_where_stages_need_them) {
+    // The twofold kernels run on few pixels of a picture only.
+    Random random(9);
+    for (const FramePicks& all : many()) {
+        const PickMemory<double> twofold(all, {});
+        const PickMemory<float> single(all, {});
+        alignas(64) double colour[3][64], expected[3][64], found[3][64];
+        alignas(64) float colour_f[3][64], expected_f[4][64], found_f[4][64];
+        for (int i = 0; i < 64; ++i) {
+            const Vec3 p = random.colour(-0.3, 1.3);
+            for (std::size_t c = 0; c < 3; ++c) {
+                colour_f[c][i] = static_cast<float>(p[c]);
+                colour[c][i] = static_cast<double>(colour_f[c][i]);
+            }
+        }
+        for (const int count : {1, 3, 17, 64}) {
+            std::fill_n(&expected[0][0], 192, 0.25);
+            PickKernels::baseline().add_twofold(twofold.plan(), colour, expected, count);
+            for (int i = 0; i < count; ++i) {
+                const Vec3 p{colour[0][i], colour[1][i], colour[2][i]};
+                const Vec3 exact = with_picks(all, twofold.plan(), p, {0.25, 0.25, 0.25});
+                for (std::size_t c = 0; c < 3; ++c) CHECK_NEAR(expected[c][i], exact[c], 1e-12);
+            }
+            std::fill_n(&expected_f[0][0], 256, 1.0f);
+            const bool some =
+                PickKernels::baseline().set(single.plan(), colour_f, expected_f, count);
+            for (const InstructionSet set : instruction_sets()) {
+                const PickKernels& kernels = kernels_of<PickKernels>(set);
+                std::fill_n(&found[0][0], 192, 0.25);
+                kernels.add_twofold(twofold.plan(), colour, found, count);
+                std::fill_n(&found_f[0][0], 256, 1.0f);
+                CHECK(kernels.set(single.plan(), colour_f, found_f, count) == some);
+                for (std::size_t c = 0; c < 4; ++c) {
+                    const std::size_t size = static_cast<std::size_t>(count);
+                    if (c < 3) CHECK(std::memcmp(found[c], expected[c], size * 8) == 0);
+                    if (some || c == 3) {
+                        CHECK(std::memcmp(found_f[c], expected_f[c], size * 4) == 0);
+                    }
+                }
+            }
+        }
+    }
+}
+
+TEST(picks_that_are_no_picks_are_refused) {
+    const FramePick good = ball(kRed, {0.1, 0, 0}, 0.1);
+    const auto refused = [&](const FramePicks& all) {
+        CHECK_THROWS(std::invalid_argument, with(all));
+    };
+    FramePick bad = good;
+    bad.colour[1] = std::nan("");
+    refused({{bad}, nullptr, nullptr});
+    bad = good;
+    bad.change[2] = std::numeric_limits<double>::infinity();
+    refused({{bad}, nullptr, nullptr});
+    for (const double strength : {0.0, -1.0, 1.5, std::nan("")}) {
+        bad = good;
+        bad.strength = strength;
+        refused({{bad}, nullptr, nullptr});
+    }
+    bad = good;
+    bad.matte = nullptr;
+    refused({{bad}, nullptr, nullptr});
+    bad.matte = std::make_shared<const FrameMatte>(7, 0.5f);
+    refused({{bad}, nullptr, nullptr});
+    refused({{good}, bad.matte, nullptr});
+    CHECK(with({{good}, nullptr, nullptr}).moves());
+}

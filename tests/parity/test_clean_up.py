@@ -1,0 +1,143 @@
+"""The clean-up of picks against a plain filter, written anew from its description."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from palette4d import _core
+
+F64 = NDArray[np.float64]
+
+CELL, AROUND, NOISE = 4, 2, 4e-4
+TETRAHEDRON = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+FACES = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
+
+
+def picks(change: tuple[float, float, float] = (-0.4, 0.3, 0.1)) -> _core.FramePicks:
+    """Return one pick of all reds."""
+    red = (0.8, 0.25, 0.2)
+    odds = _core.hue_matte(red).astype(np.float64) - 63
+    matte = 1 / (1 + np.exp(-odds * 6 / 63))
+    return _core.FramePicks([(red, change, 1.0, np.where(odds > -63, matte, 0).astype(np.float32))])
+
+
+def recolourer(found: _core.FramePicks | None = None, *, moves: bool = False) -> _core.Recolourer:
+    """Return the picks on a palette that moves one colour, or none."""
+    edited = [*TETRAHEDRON[:3], (0.1, 0.2, 0.9)] if moves else TETRAHEDRON
+    return _core.Recolourer(TETRAHEDRON, edited, FACES, picks=found or picks())
+
+
+def picture(height: int, width: int, seed: int = 3) -> NDArray[np.float32]:
+    """Return smooth colours with edges and noise; a third of them are red."""
+    rng = np.random.default_rng(seed)
+    y, x = np.mgrid[:height, :width] / 23.0
+    image = 0.5 + 0.3 * np.stack([np.sin(x + y), np.cos(2 * y - x), np.sin(3 * x)], -1)
+    image[(np.floor(x) + np.floor(y)) % 3 == 0] = (0.75, 0.3, 0.2)
+    return (image + rng.normal(0, 0.02, image.shape)).astype(np.float32)
+
+
+def around(cells: F64) -> F64:
+    """Return sums over the cells around each cell, those that there are."""
+    padded = np.pad(cells, ((AROUND, AROUND), (AROUND, AROUND), (0, 0)))
+    windows = np.lib.stride_tricks.sliding_window_view(
+        padded, (2 * AROUND + 1, 2 * AROUND + 1), axis=(0, 1)
+    )
+    result: F64 = windows.sum((-2, -1))
+    return result
+
+
+def cells_of(pixels: F64, cell: int) -> F64:
+    """Return sums over cells that are counted from the lower left."""
+    height, width = pixels.shape[:2]
+    padded = np.pad(pixels, ((-height % cell, 0), (0, -width % cell), (0, 0)))
+    rows, columns = padded.shape[0] // cell, padded.shape[1] // cell
+    result: F64 = padded.reshape(rows, cell, columns, cell, -1).sum((1, 3))
+    return result
+
+
+def between(cells: F64, height: int, width: int, cell: int) -> F64:
+    """Return the cells' values at all pixels, linear between the cells' centres."""
+
+    def axis(values: F64, size: int) -> F64:
+        at = np.clip((np.arange(size) + 0.5) / cell - 0.5, 0, len(values) - 1)
+        low = np.floor(at).astype(int)
+        part = (at - low)[:, None, None]
+        high = np.minimum(low + 1, len(values) - 1)
+        result: F64 = (1 - part) * values[low] + part * values[high]
+        return result
+
+    down = axis(cells[::-1], height)[::-1]
+    return axis(down.transpose(1, 0, 2), width).transpose(1, 0, 2)
+
+
+def limited(colours: F64) -> F64:
+    """Return the guide: colours beyond 0..1 are brought nearer to it."""
+    with np.errstate(all="ignore"):
+        low = np.where(colours < 0, colours / (1 - colours), colours)
+        return np.where(colours > 1, 2 - 1 / colours, low)
+
+
+def filtered(guide: F64, displacement: F64, good: NDArray[np.bool_], cell: int = CELL) -> F64:
+    """Return the displacement, filtered with the picture as its guide, (h, w, 3)."""
+    height, width = good.shape
+    guide = limited(np.where(good[..., None], guide, 0))
+    displacement = np.where(good[..., None], displacement, 0)
+    products = (guide[..., :, None] * guide[..., None, :]).reshape(height, width, 9)
+    mixed = (guide[..., :, None] * displacement[..., None, :]).reshape(height, width, 9)
+    cells = cells_of(
+        np.concatenate([good[..., None], guide, displacement, products, mixed], -1), cell
+    )
+    sums = around(cells)
+    means = sums[..., 1:] / np.maximum(sums[..., :1], 1)
+    shape = (*means.shape[:2], 3, 3)
+    mean_guide, mean_moved = means[..., :3], means[..., 3:6]
+    column = mean_guide[..., :, None]
+    covariance = means[..., 6:15].reshape(shape) - column * mean_guide[..., None, :]
+    mixed = means[..., 15:].reshape(shape) - column * mean_moved[..., None, :]
+    slopes = np.linalg.solve(covariance + NOISE * np.eye(3), mixed)
+    constant = mean_moved - np.einsum("...c,...cd->...d", mean_guide, slopes)
+    terms = np.concatenate([slopes.reshape(*shape[:2], 9), constant], -1)
+    weight = (cells[..., :1] > 0).astype(np.float64)
+    terms = around(terms * weight) / np.maximum(around(weight), 1)
+    terms = between(terms, height, width, cell)
+    slopes, constant = terms[..., :9].reshape(height, width, 3, 3), terms[..., 9:]
+    return np.einsum("hwc,hwcd->hwd", guide, slopes) + constant
+
+
+@pytest.mark.parametrize("size", [(64, 96), (37, 51), (3, 5), (1, 1), (9, 130)])
+@pytest.mark.parametrize("amount", [1.0, 0.3])
+@pytest.mark.parametrize("moves", [False, True])
+def test_the_core_filters_what_picks_do(size: tuple[int, int], amount: float, moves: bool) -> None:
+    image = picture(*size)
+    edit = recolourer(moves=moves)
+    palette = recolourer(_core.FramePicks([]), moves=moves)
+    guide = image.astype(np.float64)
+    displacement = edit.apply(image).astype(np.float64) - palette.apply(image)
+    change = filtered(guide, displacement, np.ones(size, bool)) - displacement
+    expected = _core.draw(image, "recoloured", edit, clean_up=0) + amount * change
+    drawn = _core.draw(image, "recoloured", edit, clean_up=amount)
+    np.testing.assert_allclose(drawn, expected, atol=3e-6)
+
+
+def test_highlights_and_negative_colours_guide_as_nearer_ones() -> None:
+    image = picture(60, 80)
+    image[20:23, 30:50] *= 40
+    image[40:44, 30:50] -= 3
+    guide = image.astype(np.float64)
+    displacement = _core.draw(image, "recoloured", recolourer(), clean_up=0) - guide
+    expected = guide + filtered(guide, displacement, np.ones((60, 80), bool))
+    drawn = _core.draw(image, "recoloured", recolourer())
+    np.testing.assert_allclose(drawn, expected, atol=3e-6, rtol=3e-7)
+
+
+def test_colours_that_are_none_take_no_part() -> None:
+    image = picture(40, 60)
+    image[10:20, 5:30] = np.nan
+    image[30, 30, 1] = np.inf
+    good = np.isfinite(image).all(-1)
+    guide = np.where(good[..., None], image, 0).astype(np.float64)
+    displacement = recolourer().apply(guide.astype(np.float32)).astype(np.float64) - guide
+    expected = guide + filtered(guide, displacement, good)
+    drawn = _core.draw(image, "recoloured", recolourer())
+    np.testing.assert_array_equal(drawn[~good], image[~good])
+    np.testing.assert_allclose(drawn[good], expected[good], atol=3e-6)
