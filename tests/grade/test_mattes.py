@@ -83,6 +83,26 @@ def test_a_hold_keeps_a_thing_while_the_palette_loses_its_colour(
     assert np.median(change[25:75, 115:145]) > 0.1
 
 
+def test_a_hold_of_a_box_keeps_what_is_connected_with_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A face beside a shirt of nearly its hue, from light to dark: held at its light side."""
+    rng = np.random.default_rng(1)
+    frame = np.tile(WALL, (H, W, 1))
+    frame[60:, 20:140] = COAT
+    light = np.linspace(1.25, 0.7, 40)[None, :, None]
+    frame[10:60, 60:100] = np.array([0.68, 0.36, 0.28]) * light
+    images = np.clip(frame + rng.normal(size=(2, H, W, 3)) * 0.01, 0, 1).astype(np.float32)
+    clip: Clip = ArrayClip(images)
+    monkeypatch.setattr("palette4d.grade.clip_of_picks.find_clip", lambda *_: clip)
+    found: Document = palette4d.analyze(images, vertices=12)
+    found.pick(0, pixel=(40.0, 75.0), box=9, to="#2040b0")
+    found.hold(0, pixel=(66.0, 30.0), box=7)
+    change = moved(found, images[0])
+    assert np.quantile(change[15:52, 62:98], 0.95) < 0.08
+    assert np.median(change[65:, 25:135]) > 0.4
+
+
 def test_an_area_adds_a_part(document: Document, pictures: F32) -> None:
     document.pick(0, pixel=CLICK, box=9, to="#2040b0")
     image = pictures[0]

@@ -143,6 +143,41 @@ void seed_by_colour(View& view, const Vec3& point) {
     for (const auto& [unused, i] : away) view.seed[i] = 1;
 }
 
+/// Adds to a marked part of the background what is connected with it, has its hue, and is nearer
+/// its colour than the pick's.
+void grow_other(const View& view, Mask& marked, const Vec3& pick) {
+    Vec3 shown{};
+    double count = 0;
+    std::vector<std::size_t> open;
+    for (std::size_t i = 0; i < view.size(); ++i) {
+        if (!marked[i] || !view.real[i]) continue;
+        for (std::size_t c = 0; c < 3; ++c) shown[c] += static_cast<double>(view.shown[c][i]);
+        count += 1;
+        open.push_back(i);
+    }
+    if (count == 0) return;
+    shown = (1 / count) * shown;
+    const Vec3 own = pick_point(shown);
+    const Grid hue = hue_grid(shown);
+    const auto width = static_cast<std::size_t>(view.width);
+    const auto visit = [&](std::size_t i) {
+        if (marked[i] || !view.real[i] || view.seed[i]) return;
+        const Vec3& point = view.point[i];
+        if (pick_distance2(point, own) >= pick_distance2(point, pick)) return;
+        if (MatteGrid::at(hue.data(), point) < 0.5) return;
+        marked[i] = 1;
+        open.push_back(i);
+    };
+    while (!open.empty()) {
+        const std::size_t i = open.back();
+        open.pop_back();
+        if (i % width > 0) visit(i - 1);
+        if (i % width + 1 < width) visit(i + 1);
+        if (i >= width) visit(i - width);
+        if (i + width < view.size()) visit(i + width);
+    }
+}
+
 View reduced(const LearningFrame& frame, const Vec3& picked, const DisplayCurve* display) {
     if (frame.width < 1 || frame.height < 1) {
         throw std::invalid_argument("learn_matte: found a frame without pixels");
@@ -197,7 +232,12 @@ View reduced(const LearningFrame& frame, const Vec3& picked, const DisplayCurve*
     }
     const double scale = 1.0 / by;
     mark(view.seed, view, frame.object, scale);
-    mark(view.other, view, frame.others, scale);
+    for (const Brush& area : frame.others) {
+        Mask marked(size, 0);
+        mark(marked, view, {area}, scale);
+        grow_other(view, marked, start);
+        for (std::size_t i = 0; i < size; ++i) view.other[i] |= marked[i];
+    }
     view.seeded = frame.seeded;
     if (frame.seeded && frame.object.empty()) seed_by_colour(view, start);
     for (std::size_t i = 0; i < size; ++i) view.seed[i] &= view.real[i];

@@ -159,7 +159,7 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
         "--reach",
         type=number(-8, 8),
         metavar="R",
-        help="log odds: above 0 it takes more colours, below 0 fewer (default 0)",
+        help="1: a bit more colours, -1: a bit fewer; log odds, -8 to 8 (default 0)",
     )
     add("--softness", type=number(0, 1), metavar="S", help="of the matte's edge (default 0.5)")
     add(
@@ -358,6 +358,13 @@ def _print_pick(document: Document, id_: str, clip: str | None, followed: bool =
     answer = document.answer(id_, clip) if found.enabled else None
     for line in () if answer is None else answer.lines(id_):
         print(f"  {line}")
+    if found.kind == "pick":
+        return
+    for pick in document.picks:  # what the hold leaves of them
+        if pick.kind == "pick" and pick.enabled:
+            left = document.answer(pick.id, clip, tries=False)
+            for line in () if left is None else left.lines(pick.id):
+                print(f"  {pick.id} now {line.strip()}")
 
 
 def _told(document: Document, pick: Pick, followed: bool = False) -> str:
@@ -393,6 +400,7 @@ def _told(document: Document, pick: Pick, followed: bool = False) -> str:
         f"softness {pick.softness:g}" * (pick.softness != 0.5),
         "lightness {:g} to {:g}".format(*pick.lightness) * (pick.lightness != (0, 1)),
         "all of its hue" * pick.whole_hue,
+        "the same new colour at all frames" * (pick.toward == "colour"),
         counted(len(pick.areas), "more area") * bool(pick.areas),
     ]
     if any(shown_as):
@@ -419,7 +427,8 @@ def _path(pick: Pick) -> list[str]:
         lines.append(
             f"  note: at frame {far:g} it is {away.max():.2f} away from the picked colour. If that "
             f"is another thing: pick --frame {far:g} --pixel X,Y --with {pick.id}, or change "
-            f"{pick.id} {' '.join(limits)}"
+            f"{pick.id} {' '.join(limits)}. If the thing itself changes: change {pick.id} "
+            "--toward colour gives it the same new colour"
         )
     return lines
 

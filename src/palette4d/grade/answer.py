@@ -84,6 +84,8 @@ class Answer:
         A neighbouring part of the same hue that is not taken; a box there would add it.
     floods : bool
         The pick takes so much that it may be more than one thing.
+    tried : bool
+        Holds and boxes were tried.
     """
 
     frame: int
@@ -93,6 +95,7 @@ class Answer:
     hold: Place | None = None
     part: Place | None = None
     floods: bool = False
+    tried: bool = True
 
     def lines(self, id: str) -> list[str]:
         """Return the answer for people, and the gestures that help as arguments of `edit`."""
@@ -102,6 +105,11 @@ class Answer:
             found.append(
                 f"also takes {percent(self.others)} elsewhere, most of it {hex_of(self.other.rgb)} "
                 f"at {x},{y}"
+            )
+        if self.other is not None and self.hold is None and self.tried:
+            found.append(
+                "  no hold there keeps it and spares the rest: hold another part of it, or change "
+                f"{id} --reach -1"
             )
         if self.hold is not None:
             x, y = self.hold.pixel
@@ -127,8 +135,13 @@ class Answer:
         return found
 
 
-def of(document: PickEdits, pick: Pick, of_clip: ClipOfPicks) -> Answer | None:
-    """Return the answer for a pick; None where the clip is not there."""
+def of(
+    document: PickEdits, pick: Pick, of_clip: ClipOfPicks, *, tries: bool = True
+) -> Answer | None:
+    """Return the answer for a pick; None where the clip is not there.
+
+    Without `tries` no hold and no box are proposed, which takes most of the time.
+    """
     clip = of_clip.open()
     if clip is None:
         return None
@@ -144,12 +157,13 @@ def of(document: PickEdits, pick: Pick, of_clip: ClipOfPicks) -> Answer | None:
     beside = float(others.mean())
     far, large = view.far(pick, own), share > LARGE or _borders(own) >= 3
     floods = far > (SOME if large else MOST)
-    found = Answer(frame, share, beside, floods=floods)
+    found = Answer(frame, share, beside, floods=floods, tried=tries)
     if beside > OTHERS:
         found = replace(found, other=view.place(others))
-        found = replace(found, hold=_hold(document, pick, of_clip, view, own, others))
+        if tries:
+            found = replace(found, hold=_hold(document, pick, of_clip, view, own, others))
     part = view.beside(pick, own, taken)
-    if part.mean() > max(PART, 0.1 * share) and not pick.whole_hue:
+    if tries and part.mean() > max(PART, 0.1 * share) and not pick.whole_hue:
         found = replace(found, part=_part(document, pick, of_clip, view, part, beside))
     return found
 

@@ -272,14 +272,14 @@ class PickEdits(Recolouring):
         """The ids of the handles that stay when tracks or the palette move."""
         return tuple(edits.to_fields(self._state, ()).get("locks", ()))
 
-    def answer(self, id: str, clip: Path | None = None) -> "Answer | None":
+    def answer(self, id: str, clip: Path | None = None, *, tries: bool = True) -> "Answer | None":
         """Return what a pick takes of its frame, what else it takes, and what would help.
 
-        None where the clip is not there.
+        None where the clip is not there. Without `tries` nothing is proposed; it is quicker.
         """
         from palette4d.grade import answer
 
-        return answer.of(self, self._pick(id), self._clip_of_picks(clip))
+        return answer.of(self, self._pick(id), self._clip_of_picks(clip), tries=tries)
 
     def pick_warnings(self, id: str, clip: Path | None = None) -> tuple[str, ...]:
         """Return what speaks against the clip of a pick or hold, and its colour."""
