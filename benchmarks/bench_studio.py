@@ -313,7 +313,7 @@ def small_clip(
     show("jump, shown before, small clip", bench.jumps(times, cached=True, shown=True), 50, 33)
     show("jump, decoded, small clip", bench.jumps(times, cached=True), 50, 33)
     show("weights under the pointer, small clip", bench.probes(times), 50, 33)
-    show("a pick solved, small clip", bench.picks(times), 100, 50)
+    show("a pick made, small clip", bench.picks(times), 100, 50)
     bench.close()
 
 

