@@ -131,3 +131,21 @@ def test_what_enters_later_changes_nothing_before() -> None:
     there = np.interp(range(20), [key.frame for key in path], [key.there for key in path])
     assert not there[:7].any()
     assert (there[13:] == 1).all()
+
+
+@pytest.mark.parametrize("changed", ["light", "thing"])
+def test_a_path_ends_on_a_thing_of_another_size(changed: str) -> None:
+    """What gets darker is followed; what goes over into a larger thing of another colour is not."""
+    rng = np.random.default_rng(5)
+    start, end = np.array([0.8, 0.2, 0.15]), np.array([0.25, 0.06, 0.05])
+    frames = np.empty((30, 60, 100, 3), np.float32)
+    for i in range(30):
+        frames[i] = [0.35, 0.5, 0.6]
+        colour = start + (end - start) * i / 29
+        size = 10 if changed == "light" else 10 + 12 * i // 29
+        frames[i, 20 : 20 + size, 30 : 30 + size] = colour
+    frames += 0.01 * rng.normal(size=frames.shape).astype(np.float32)
+    path = follow.paths(ArrayClip(frames), [(0, (0.8, 0.2, 0.15))], (0, 29))
+    there = np.interp(range(30), [key.frame for key in path], [key.there for key in path])
+    assert there[0] == 1
+    assert there[29] == (1 if changed == "light" else 0)

@@ -113,6 +113,36 @@ def test_an_area_adds_a_part(document: Document, pictures: F32) -> None:
         document.add_area("p1", Area(0, ((1e6, 0.0),), 4.0))
 
 
+@pytest.mark.parametrize("has_coat", [True, False])
+def test_a_copy_learns_again_in_the_other_clip(
+    document: Document, pictures: F32, monkeypatch: pytest.MonkeyPatch, has_coat: bool
+) -> None:
+    document.pick(0, pixel=CLICK, box=9, to=(0.1, 0.25, 0.8))
+    mirrored = np.ascontiguousarray(pictures[:, :, ::-1])
+    # A rose wall, near the coat's hue: the first clip's matte has not learned that it stays.
+    mirrored[np.abs(mirrored - WALL).max(axis=3) < 0.06] += np.float32([0.1, -0.05, -0.05])
+    coat = (mirrored[..., 0] > 2.5 * mirrored[..., 1]) & (mirrored[..., 0] > 0.25)
+    if not has_coat:
+        mirrored[coat] = np.float32(WALL) + np.float32([0.1, -0.05, -0.05])
+    other: Document = palette4d.analyze(mirrored, vertices=12)
+    clip: Clip = ArrayClip(mirrored)
+    monkeypatch.setattr("palette4d.grade.clip_of_picks.find_clip", lambda *_: clip)
+    fit = other.copy_from(document)
+    if not has_coat:
+        assert not other.picks
+        assert "p1" in str(fit)  # said, not dropped in silence
+        assert np.abs(other.recolour(mirrored[0], 0) - mirrored[0]).max() < 0.02
+        return
+    (pick,) = other.picks
+    assert pick.matte != document.picks[0].matte
+    assert pick.pixel is not None
+    assert coat[0][pick.pixel[1], pick.pixel[0]]
+    change = moved(other, mirrored[0])
+    assert change[coat[0]].mean() > 0.3
+    assert change[5:15].max() < 0.04  # the wall
+    assert change[25:75, 15:45].mean() < 0.04  # the door
+
+
 def test_equal_picks_learn_equal_mattes(document: Document) -> None:
     first = document.pick(0, pixel=CLICK, box=9, to="#2040b0").matte
     second = document.pick(0, pixel=CLICK, box=9, to="#20b040").matte
