@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -109,15 +110,20 @@ def test_frame_picks_keep_what_they_are_given() -> None:
     ],
 )
 def test_bad_frame_picks_are_refused_in_words(
-    change: dict[str, object], error: type[Exception], message: str
+    change: dict[str, Any], error: type[Exception], message: str
 ) -> None:
-    good = {"colour": RED, "matte": np.zeros(GRID, np.float32), "left": None, "display": None}
+    good: dict[str, Any] = {
+        "colour": RED,
+        "matte": np.zeros(GRID, np.float32),
+        "left": None,
+        "display": None,
+    }
     given = {**good, **change}
     with pytest.raises(error, match=message):
         _core.FramePicks(
-            [(given["colour"], (0.0, 0.0, 0.0), 1.0, given["matte"])],  # type: ignore[list-item]
-            left=given["left"],  # type: ignore[arg-type]
-            display=given["display"],  # type: ignore[arg-type]
+            [(given["colour"], (0.0, 0.0, 0.0), 1.0, given["matte"])],
+            left=given["left"],
+            display=given["display"],
         )
 
 

@@ -239,7 +239,7 @@ def test_a_log_clip_is_told_apart_as_its_picture_is(pictures: F32) -> None:
         box = image[41:50, 56:65].reshape(-1, 3).mean(axis=0, dtype=np.float64)
         r, g, b = box.tolist()
         pick = Pick("p1", "pick", 0, (r, g, b), (0.1, 0.2, 0.7), pixel=CLICK, box=9)
-        learned = mattes.learn(pick, (), [0], lambda _, image=image: image, display)  # type: ignore[misc]
+        learned = mattes.learn(pick, (), [0], {0: image}.__getitem__, display)
         assert learned.found
         taken.append(learned.share)
     assert taken[0] == pytest.approx(taken[1], rel=0.05)

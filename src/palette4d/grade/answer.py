@@ -22,7 +22,6 @@ from palette4d.media.source_clip import nearest_frame
 
 if TYPE_CHECKING:
     from palette4d.grade.clip_of_picks import ClipOfPicks
-    from palette4d.grade.document import Document
     from palette4d.grade.pick_edits import PickEdits
 
 F32 = NDArray[np.float32]
@@ -173,7 +172,7 @@ def _hold(
 ) -> Place | None:
     """Return a hold on the largest other thing, if it helps and spares the picked thing."""
     place = view.place(others)
-    trial = _trial(document, of_clip)
+    trial = document.trial_of_picks(of_clip)
     try:
         trial.hold(view.frame, pixel=place.pixel, box=place.box, follow=False)
     except Palette4dError:
@@ -190,7 +189,7 @@ def _part(
 ) -> Place | None:
     """Return a second box, if it adds the part and little else."""
     place = view.place(part)
-    trial = _trial(document, of_clip)
+    trial = document.trial_of_picks(of_clip)
     area = Area(view.frame, (place.pixel,), place.box / 2)
     try:
         trial.add_area(pick.id, area)
@@ -202,13 +201,6 @@ def _part(
     if (taken & part).sum() < 0.5 * part.sum() or others.mean() > beside + OTHERS:
         return None
     return replace(place, left=float(taken.mean()))
-
-
-def _trial(document: PickEdits, of_clip: ClipOfPicks) -> Document:
-    """Return a copy whose picks are learned from the frames that were read already."""
-    trial: Document = document.trial()  # type: ignore[attr-defined]
-    trial._clip_of_picks = lambda clip: of_clip  # type: ignore[method-assign]
-    return trial
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,7 @@ class Document(HandleEdits, PickEdits):
         data = sidecar.encoded(fields)
         self.path: Path | None = None
         self._start(data, _core.parse_sidecar(data, self._name))
-        self._disk: bytes | None = None
+        self._disk = None
         self.notes = tuple(notes)
         self.report = dict(report or {})
 
@@ -95,14 +95,6 @@ class Document(HandleEdits, PickEdits):
             f"{counted(len(self._handles.vertices), 'vertex', 'vertices')}, "
             f"{counted(sum(kind in ACTIVE for kind, _ in self._state), 'edit')}>"
         )
-
-    def trial(self) -> "Document":
-        """Return a copy to try edits on, without the history and without a file."""
-        new = copy.copy(self)
-        new._done, new._undone = [], []
-        new.path, new._disk = None, None
-        new._mark_saved()
-        return new
 
     # ----------------------------------------------------------------------------------- versions
 

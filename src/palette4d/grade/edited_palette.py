@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
@@ -48,6 +48,7 @@ class EditedPalette(Steps):
     """
 
     path: Path | None
+    _disk: bytes | None  # the sidecar's bytes, as they were read or saved last
 
     def _become(self, state: State) -> None:
         super()._become(state)
@@ -68,6 +69,14 @@ class EditedPalette(Steps):
 
     def _mark_saved(self) -> None:
         self._saved = (self._state, self._done, self._undone)
+
+    def trial(self) -> Self:
+        """Return a copy to try edits on, without the history and without a file."""
+        new = copy.copy(self)
+        new._done, new._undone = [], []
+        new.path, new._disk = None, None
+        new._mark_saved()
+        return new
 
     # ------------------------------------------------------------------------------ what it holds
 

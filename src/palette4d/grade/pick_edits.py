@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -28,6 +28,14 @@ Progress = Callable[[int, int], object]
 
 class PickEdits(Recolouring):
     """The picks and locks of a palette. `mattes` learns what colours they take."""
+
+    _reading: "ClipOfPicks | None" = None  # the clip of a trial, open already
+
+    def trial_of_picks(self, of_clip: "ClipOfPicks") -> Self:
+        """Return a trial whose picks are learned from frames of a clip that were read already."""
+        new = self.trial()
+        new._reading = of_clip
+        return new
 
     @property
     def picks(self) -> tuple[Pick, ...]:
@@ -327,6 +335,8 @@ class PickEdits(Recolouring):
     def _clip_of_picks(self, clip: Path | None) -> "ClipOfPicks":
         from palette4d.grade.clip_of_picks import ClipOfPicks
 
+        if self._reading is not None:
+            return self._reading
         conversion = self._conversion("input")
         return ClipOfPicks(self._fields["clip"], conversion, self.path, clip)
 

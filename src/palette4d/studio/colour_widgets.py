@@ -279,9 +279,8 @@ class Bar(Keyed):
         share = (value - self.low) / max(self.high - self.low, 1e-9)
         return 5 + min(max(share, 0.0), 1.0) * (self.width() - 10)
 
-    def paintEvent(self, event: QPaintEvent) -> None:
-        """Draw the gradient and the marks."""
-        painter = QPainter(self)
+    def _draw_gradient(self, painter: QPainter) -> QRectF:
+        """Draw the bar without marks; return its place."""
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
         box = QRectF(5, 5, self.width() - 10, self.height() - 10)
@@ -292,30 +291,39 @@ class Bar(Keyed):
         else:
             painter.setBrush(QColor(theme.PAGE))
         painter.drawRoundedRect(box, 2, 2)
+        return box
+
+    def _draw_mark(self, painter: QPainter, x: float) -> None:
+        painter.setPen(paint.pen(style.INK, 1.2))
+        painter.setBrush(QColor(style.BRIGHT))
+        painter.drawRoundedRect(QRectF(x - 2.5, 1.5, 5, self.height() - 3), 2, 2)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Draw the gradient and the marks."""
+        painter = QPainter(self)
+        box = self._draw_gradient(painter)
         if self.isEnabled():
             start, now = self._x(self.origin), self._x(self.value)
             painter.setPen(paint.pen(style.INK, 3.0))
             painter.drawLine(QPointF(start, box.top()), QPointF(start, box.bottom()))
             painter.setPen(paint.pen(style.RING, 1.0))
             painter.drawLine(QPointF(start, box.top()), QPointF(start, box.bottom()))
-            painter.setPen(paint.pen(style.INK, 1.2))
-            painter.setBrush(QColor(style.BRIGHT))
-            painter.drawRoundedRect(QRectF(now - 2.5, 1.5, 5, self.height() - 3), 2, 2)
+            self._draw_mark(painter, now)
         painter.end()
 
-    def _emit(self, x: float) -> None:
+    def _value_at(self, x: float) -> float:
         share = (x - 5) / max(self.width() - 10, 1)
-        self.moved.emit(self.low + min(max(share, 0.0), 1.0) * (self.high - self.low))
+        return self.low + min(max(share, 0.0), 1.0) * (self.high - self.low)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Choose a value."""
         if event.button() == Qt.MouseButton.LeftButton:
-            self._emit(event.position().x())
+            self.moved.emit(self._value_at(event.position().x()))
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         """Change the value."""
         if event.buttons() & Qt.MouseButton.LeftButton:
-            self._emit(event.position().x())
+            self.moved.emit(self._value_at(event.position().x()))
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         """End the drag."""
@@ -356,13 +364,7 @@ class Span(Bar):
     def paintEvent(self, event: QPaintEvent) -> None:
         """Draw the gradient and both marks."""
         painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
-        box = QRectF(5, 5, self.width() - 10, self.height() - 10)
-        painter.setPen(paint.pen(style.BRIGHT if self.hasFocus() else style.RIM, 1.0))
-        width = box.width() / max(len(self.colours), 1)
-        painter.setBrush(paint.texture(self.colours, box.left(), width))
-        painter.drawRoundedRect(box, 2, 2)
+        box = self._draw_gradient(painter)
         low, high = map(self._x, self.span)
         inner = box.adjusted(0, 0.5, 0, -0.5)
         for left, right in ((inner.left(), low), (high, inner.right())):
@@ -370,10 +372,8 @@ class Span(Bar):
             painter.fillRect(rest, QColor(theme.PANEL))
             painter.setPen(paint.pen(theme.LINE, 1.0))
             painter.drawLine(QPointF(left, box.center().y()), QPointF(right, box.center().y()))
-        painter.setPen(paint.pen(style.INK, 1.2))
-        painter.setBrush(QColor(style.BRIGHT))
         for at in (low, high):
-            painter.drawRoundedRect(QRectF(at - 2.5, 1.5, 5, self.height() - 3), 2, 2)
+            self._draw_mark(painter, at)
         painter.end()
 
     def _move(self, value: float) -> None:
@@ -385,21 +385,18 @@ class Span(Bar):
             low = max(min(value, high - self.APART), 0.0)
         self.moved.emit((round(low, 3), round(high, 3)))
 
-    def _value(self, x: float) -> float:
-        return min(max((x - 5) / max(self.width() - 10, 1), 0.0), 1.0)
-
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Take the nearer end."""
         if event.button() == Qt.MouseButton.LeftButton:
             x = event.position().x()
             low, high = map(self._x, self.span)
             self._upper = abs(x - high) < abs(x - low)
-            self._move(self._value(x))
+            self._move(self._value_at(x))
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         """Move it."""
         if event.buttons() & Qt.MouseButton.LeftButton:
-            self._move(self._value(event.position().x()))
+            self._move(self._value_at(event.position().x()))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Left and right move an end by a step; up and down choose which."""
