@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 FRAMES = (1, 11, 22, 30, 38, 48)
 """Shown in before_after.png: a summer day, its end, autumn, late autumn, dusk and night."""
 GOLD = 28
-"""The frame at which the gold is edited: a vertex of the palette lies there."""
+"""The frame at which the gold of leaves and meadow is picked."""
 AUTUMN = 30
 """The frame whose edit is baked: late autumn."""
 
@@ -97,8 +97,10 @@ def before_after(clip: Path, graded: Path, out: Path) -> None:
 
 
 def fade(sidecar: Path) -> str:
-    """Say over which frames the newest colour stop acts: between its edge's two vertices."""
+    """Say over which frames the edit of the palette acts: between its edge's two vertices."""
     document = json.loads(sidecar.read_text(encoding="utf-8"))
+    if not document["edits"]["stops"]:
+        return "it is a vertex: its colour comes and goes with the vertices around it"
     stop = document["edits"]["stops"][-1]
     (edge,) = (e for e in document["polytope"]["edges"] if e["id"] == stop["edge"])
     when = {v["id"]: v["frame"] for v in document["polytope"]["vertices"]}
@@ -129,15 +131,12 @@ def demo(out: Path) -> None:
     run("The palette as a picture", "plot", str(sidecar), "--clip", frames, "-o", str(palette))
     # fmt: off
     run("Edit: the gold of late autumn, in leaves and meadow, becomes rose",
-        "edit", str(sidecar), "set", "--near", "0.86,0.58,0.07", "--frame", str(GOLD),
-        "--rgb", "0.9", "0.42", "0.62")
+        "edit", str(sidecar), "pick", "--frame", str(GOLD), "--pixel", "275,68", "--box", "5",
+        "--to", "#e66b9e", "--from", "27", "--fade", "6", "--clip", frames)
     run("Edit: a colour stop turns the day's blue, in the sky and the haze, to lavender",
         "edit", str(sidecar), "set", "--near", "0.2,0.47,0.85", "--frame", "11",
         "--rgb", "0.52", "0.45", "0.85")
     say(f"   {fade(sidecar)}")
-    run("Edit: until the same frame the green that turns to gold stays as it was",
-        "edit", str(sidecar), "set", "--near", "0.49,0.67,0.14", "--frame", "11",
-        "--rgb", "0.49", "0.67", "0.14")
     # fmt: on
     run("The palette with its edits", "plot", str(sidecar), "--clip", frames, "-o", str(edited))
     run("Render", "render", str(sidecar), frames, "-o", str(graded / "sample.####.exr"))
