@@ -18,7 +18,8 @@ ROOMS: dict[str, set[str]] = {
     "core/lattice": {"simd", "model", "convert", "recolour"},
     "core/output": {"simd", "threads", "model", "convert", "recolour"},
     "core/fit": {"simd", "threads", "model"},
-    "node": {"model", "convert", "sidecar", "recolour", "lattice", "output"},
+    "gpu": {"gpu/kernel", "simd", "model", "recolour", "output"},
+    "node": {"model", "convert", "sidecar", "recolour", "lattice", "output", "gpu"},
 }
 INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"', re.MULTILINE)
 

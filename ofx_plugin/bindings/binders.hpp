@@ -14,6 +14,7 @@ void bind_slice(py::module_& module);       ///< Slice, slice_at, edited_colours
 void bind_mvc(py::module_& module);         ///< mean value coordinates and palette weights
 void bind_recolour(py::module_& module);    ///< Recolourer
 void bind_output(py::module_& module);      ///< draw, luminance_weights
+void bind_gpu(py::module_& module);         ///< the kernel's text and tables
 void bind_bins(py::module_& module);        ///< ColourBinner
 void bind_analysis(py::module_& module);    ///< the hot loops of palette4d.analysis
 void bind_rgbt(py::module_& module);        ///< progressive hulls in RGB and time

@@ -15,6 +15,7 @@ PYBIND11_MODULE(_core, module) {
     bind_mvc(module);
     bind_recolour(module);
     bind_output(module);
+    bind_gpu(module);
     bind_analysis(module);
     bind_bins(module);
     bind_rgbt(module);

@@ -323,6 +323,23 @@ def surface_reader(slice: Slice) -> F64:
 def luminance_weights(encoding: str) -> list[float]:
     """Return the weights of red, green and blue by an encoding's name; Rec.709's if unknown."""
 
+def kernel_text(part: str) -> str:
+    """Return the GPU kernel's text: 'layout', 'face', 'frame', 'opencl' or 'cuda'."""
+
+def kernel_table(
+    map: Recolourer,
+    *,
+    output: str = "recoloured",
+    strength: float = 1.0,
+    keep_lightness: float = 0.0,
+    lightness: Sequence[float] = (0, 0, 0),
+    mix: float = 1.0,
+    matte_in_alpha: bool = False,
+    outside_at: float = 0.05,
+    premultiplied: bool = False,
+) -> tuple[F32, F32]:
+    """Return what the kernel reads for a frame: the table and the grids, both flat."""
+
 LATTICE_TOLERANCE: float
 """What `Lattice.largest_error` is held against."""
 

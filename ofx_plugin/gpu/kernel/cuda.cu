@@ -1,0 +1,38 @@
+/* Prelude for CUDA. */
+#define P4D_FN static __device__ __forceinline__
+#define P4D_STRUCT(name, body) struct name { body };
+#define P4D_INT(x) ((int)(x))
+#define P4D_TABLE const float *__restrict__ t_, const float *__restrict__ g_,
+#define P4D_PASS t_, g_,
+#define P4D_T(i) t_[i]
+#define P4D_G(i) __ldg(g_ + (i))
+#define P4D_SQRT sqrtf
+#define P4D_ATAN2 atan2f
+#define P4D_ABS fabsf
+#define P4D_MIN fminf
+#define P4D_MAX fmaxf
+@P4D_FRAME@
+/* As in opencl.cl. The table is copied to memory that the threads of a block share. */
+extern "C" __global__ void p4d_draw(const float *in, float *out, const float *table,
+                                    const float *grids, int table_size, long long in_row,
+                                    long long out_row, int width, int height, int x1, int y1,
+                                    int x2, int y2) {
+    extern __shared__ float shared[];
+    for (int i = threadIdx.x; i < table_size; i += blockDim.x) shared[i] = table[i];
+    __syncthreads();
+    int x = blockIdx.x * blockDim.x + threadIdx.x, y = blockIdx.y;
+    if (x >= width) return;
+    for (; y < height; y += gridDim.y) {
+        float *to = out + y * out_row + 4 * x;
+        p4d_rgba c;
+        c.r = c.g = c.b = c.a = 0.0f;
+        if (x >= x1 && x < x2 && y >= y1 && y < y2) {
+            const float *from = in + y * in_row + 4 * x;
+            c = p4d_pixel(shared, grids, from[0], from[1], from[2], from[3]);
+        }
+        to[0] = c.r;
+        to[1] = c.g;
+        to[2] = c.b;
+        to[3] = c.a;
+    }
+}

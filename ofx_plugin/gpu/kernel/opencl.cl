@@ -1,0 +1,30 @@
+/* Prelude for OpenCL C 1.1. */
+#pragma OPENCL FP_CONTRACT ON
+#define P4D_FN static
+#define P4D_STRUCT(name, body) typedef struct { body } name;
+#define P4D_INT(x) ((int)(x))
+#define P4D_TABLE __constant const float *t_, __global const float *g_,
+#define P4D_PASS t_, g_,
+#define P4D_T(i) t_[i]
+#define P4D_G(i) g_[i]
+#define P4D_SQRT sqrt
+#define P4D_ATAN2 atan2
+#define P4D_ABS fabs
+#define P4D_MIN fmin
+#define P4D_MAX fmax
+@P4D_FRAME@
+/* Draws a window of RGBA pixels. Pixel (x, y) of the window is at `*_start` + y * `*_row` + 4 x, in
+   floats; the source covers [x1, x2) x [y1, y2) of it, and the rest becomes transparent black. */
+__kernel void p4d_draw(__global const float *in, __global float *out, __constant const float *table,
+                       __global const float *grids, int in_start, int in_row, int out_start,
+                       int out_row, int width, int height, int x1, int y1, int x2, int y2) {
+    int x = (int)get_global_id(0), y = (int)get_global_id(1);
+    if (x >= width || y >= height) return;
+    float4 to = (float4)(0.0f, 0.0f, 0.0f, 0.0f);
+    if (x >= x1 && x < x2 && y >= y1 && y < y2) {
+        float4 from = vload4(0, in + in_start + y * in_row + 4 * x);
+        p4d_rgba c = p4d_pixel(table, grids, from.x, from.y, from.z, from.w);
+        to = (float4)(c.r, c.g, c.b, c.a);
+    }
+    vstore4(to, 0, out + out_start + y * out_row + 4 * x);
+}

@@ -1,0 +1,157 @@
+"""The GPU kernel's text beside the reference and the exact core."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from parity.cases import (
+    BODIES,
+    DOCUMENTS,
+    EDITED,
+    FAST_TOLERANCE,
+    UNEDITED,
+    Body,
+    picture,
+    random_hull,
+    same_bits,
+    times_of,
+)
+from parity.implementations import CORE, REFERENCE, Core
+from parity.kernel import KERNEL, draw
+
+from palette4d import _core
+
+F64 = NDArray[np.float64]
+
+#: Of the exact path, in the palette's code values; the promise is 1e-4.
+GOAL = 4e-5
+
+
+@pytest.mark.parametrize(("channels", "premultiplied"), [(3, False), (4, False), (4, True)])
+@pytest.mark.parametrize("name", EDITED)
+def test_the_kernel_recolours_as_the_reference(
+    name: str, channels: int, premultiplied: bool
+) -> None:
+    image = picture(channels)
+    for frame, strength in zip(times_of(name)[1:4], (1.0, 0.4, 1.0), strict=True):
+        arguments = image, DOCUMENTS[name], frame, strength, premultiplied
+        expected, found = REFERENCE.recolour(*arguments), KERNEL.recolour(*arguments)
+        np.testing.assert_allclose(found, expected, **FAST_TOLERANCE)
+
+
+@pytest.mark.parametrize("name", UNEDITED)
+def test_without_an_edit_the_picture_is_untouched(name: str) -> None:
+    for channels in (3, 4):
+        image = picture(channels)
+        for frame in times_of(name):
+            result = KERNEL.recolour(image, DOCUMENTS[name], frame, 1.0, channels == 4)
+            assert same_bits(result, image).all()
+
+
+def test_pixels_that_no_edit_reaches_keep_their_bits() -> None:
+    name = "still-pick"
+    image = picture(4)
+    exact = CORE.recolour(image, DOCUMENTS[name], 7.0)
+    found = KERNEL.recolour(image, DOCUMENTS[name], 7.0)
+    untouched = same_bits(exact, image)
+    assert 10 < untouched.sum() < untouched.size
+    assert same_bits(found, image)[untouched].all()
+
+
+def near(rgb: F64, faces: list[list[int]], seed: int) -> NDArray[np.float32]:
+    """Colours at 1e-8 to 1e-2 from faces, edges, vertices and planes, and anywhere."""
+    rng = np.random.default_rng(seed)
+    points = [rng.uniform(-0.2, 1.2, (4000, 3))]
+    if faces:
+        corners = rgb[np.array(faces)]
+        away = np.repeat(10.0 ** np.arange(-8, -1), 6)
+        for alpha in ((1, 1, 1), (1, 1, 0), (1, 0, 0)):
+            shares = rng.dirichlet([1, 1, 1], (len(faces), len(away))) * np.array(alpha)
+            shares /= shares.sum(axis=2, keepdims=True)
+            at = np.einsum("fnk,fkc->fnc", shares, corners)
+            points.append((at + away[:, None] * rng.normal(size=at.shape)).reshape(-1, 3))
+        # In the planes, beside the faces.
+        wide = rng.normal(size=(len(faces), len(away), 3)) * 2
+        wide[..., 2] = 1 - wide[..., 0] - wide[..., 1]
+        at = np.einsum("fnk,fkc->fnc", wide, corners)
+        at = at + away[:, None] * rng.normal(size=at.shape)
+        points.append(at[(np.abs(at - 0.5) < 0.7).all(axis=2)])
+    return np.concatenate(points).astype(np.float32)
+
+
+def largest_error(rgb: F64, faces: list[list[int]], seed: int) -> float:
+    """Of the kernel from double precision, where all vertices move by up to 0.3."""
+    rng = np.random.default_rng(seed)
+    moved = rng.uniform(-0.3, 0.3, rgb.shape)
+    # Where a colour splits, its parts begin with one change.
+    same = np.argmax((rgb[:, None] == rgb[None]).all(axis=2), axis=1)
+    edited = rgb + moved[same]
+    recolourer = _core.Recolourer(rgb, edited, faces)
+    image = near(rgb, faces, seed)[None]
+    exact = recolourer.apply(image, precision="double")
+    return float(np.abs(draw(image, recolourer).astype(float) - exact).max())
+
+
+@pytest.mark.parametrize("body", BODIES, ids=lambda body: body.name)
+def test_every_kind_of_palette_is_within_the_goal(body: Body) -> None:
+    assert largest_error(body.rgb, body.faces, 3) < GOAL
+
+
+@pytest.mark.parametrize("points", [8, 12, 16])
+@pytest.mark.parametrize("squeeze", [1.0, 0.02])
+def test_random_hulls_are_within_the_goal(points: int, squeeze: float) -> None:
+    for seed in range(3):
+        rgb, faces = random_hull(seed, points)
+        rgb = 0.5 + (rgb - 0.5) * np.array([1, squeeze, 1])
+        assert largest_error(rgb, faces, seed) < GOAL
+
+
+def reader(name: str, frame: float, output: str) -> _core.Recolourer:
+    """What draws a matte of a document."""
+    sidecar = Core.sidecar(DOCUMENTS[name])
+    cut = _core.slice_at(sidecar.polytope, frame)
+    if output == "outside":
+        return _core.Recolourer(cut.rgb, _core.surface_reader(cut), cut.faces)
+    if output == "pick":
+        return _core.Recolourer(
+            cut.rgb, cut.rgb, cut.faces, picks=sidecar.pick_matte_at("red", frame)
+        )
+    read = _core.weight_reader(sidecar.polytope, sidecar.edits, cut, "v2")
+    return _core.Recolourer(cut.rgb, read, cut.faces)
+
+
+@pytest.mark.parametrize("in_alpha", [False, True])
+@pytest.mark.parametrize("premultiplied", [False, True])
+@pytest.mark.parametrize("output", ["weight", "outside", "pick"])
+def test_mattes_are_those_of_the_core(output: str, premultiplied: bool, in_alpha: bool) -> None:
+    recolourer = reader("still-learned", 7.0, output)
+    image = picture(4)
+    options = {
+        "output": output,
+        "mix": 0.7,
+        "matte_in_alpha": in_alpha,
+        "outside_at": 0.1,
+        "premultiplied": premultiplied,
+    }
+    expected = _core.draw(image, map=recolourer, clean_up=0.0, **options)
+    found = draw(image, recolourer, **options)
+    np.testing.assert_allclose(found, expected, rtol=2e-7, atol=GOAL * 10)
+    assert np.ptp(expected[1:5, :, :]) > 0.1
+
+
+@pytest.mark.parametrize("premultiplied", [False, True])
+def test_lightness_is_kept_and_the_source_mixed_in_as_in_the_core(premultiplied: bool) -> None:
+    recolourer = Core("single").recolourer(DOCUMENTS["still-learned"], 7.0)
+    image = picture(4)
+    options = {
+        "strength": 0.8,
+        "keep_lightness": 0.6,
+        "lightness": [0.2126, 0.7152, 0.0722],
+        "mix": 0.5,
+        "premultiplied": premultiplied,
+    }
+    expected = _core.draw(image, "recoloured", recolourer, clean_up=0.0, **options)
+    found = draw(image, recolourer, **options)
+    np.testing.assert_allclose(found, expected, **FAST_TOLERANCE)
+    assert (found[1:] != image[1:]).any()
