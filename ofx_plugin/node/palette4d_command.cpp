@@ -7,13 +7,16 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <nlohmann/json.hpp>
 #include <sstream>
 #include <utility>
 #include <vector>
 
 #include "child_process.hpp"
+#include "model/sidecar_error.hpp"
 #include "paths.hpp"
 #include "program_file.hpp"
+#include "sidecar/json_tree.hpp"
 #include "windows.hpp"
 
 #if !defined(_WIN32)
@@ -122,24 +125,45 @@ fs::path temporary_folder() {
 #endif
 }
 
-/// The last whole line that `palette4d analyze --progress` has written.
-std::string last_line(const fs::path& file) {
+using Json = nlohmann::json;
+
+/// The last whole line that `palette4d analyze --progress` has written; null where there is none.
+Json last_event(const fs::path& file) {
+    constexpr std::streamoff kMost = 1 << 16;
     std::ifstream lines(file, std::ios::binary | std::ios::ate);
     const std::streamoff size = lines ? static_cast<std::streamoff>(lines.tellg()) : 0;
-    std::string text(static_cast<std::size_t>(size < 8192 ? size : 8192), '\0');
+    std::string text(static_cast<std::size_t>(std::min(size, kMost)), '\0');
     lines.seekg(size - static_cast<std::streamoff>(text.size()));
     lines.read(&text[0], static_cast<std::streamsize>(text.size()));
-    const std::size_t end = text.rfind('\n');
-    if (end == std::string::npos) return "";
-    const std::size_t before = end == 0 ? std::string::npos : text.rfind('\n', end - 1);
-    return text.substr(before + 1, end - before - 1);
+    text.resize(text.rfind('\n') + 1);
+    if (text.empty()) return nullptr;
+    text.pop_back();
+    try {
+        return json_tree(text.substr(text.rfind('\n') + 1), "progress");
+    } catch (const SidecarError&) {
+        return nullptr;
+    }
+}
+
+std::string text_of(const Json& event, const char* name) {
+    const Json part = event.is_object() ? event.value(name, Json()) : Json();
+    std::string text = part.is_string() ? part.get<std::string>() : "";
+    std::replace(text.begin(), text.end(), '\n', ' ');
+    return text;
+}
+
+/// How far an analysis is; "" where it has not said.
+std::string progress(const Json& event) {
+    const std::string stage = text_of(event, "stage");
+    if (stage.empty()) return "";
+    const Json done = event.value("done", Json()), total = event.value("total", Json());
+    return ": " + stage + (total.is_number() ? ": " + done.dump() + " of " + total.dump() : "");
 }
 
 /// Why a program has ended: the error that it wrote, without the program's name.
 std::string reason(const std::string& line) {
-    for (const std::string start : {"palette4d: error: ", "error: "}) {
-        if (line.rfind(start, 0) == 0) return line.substr(start.size());
-    }
+    const std::string start = "palette4d: error: ";
+    if (line.rfind(start, 0) == 0) return line.substr(start.size());
     return line.empty() ? "it ended without a word; free some memory, or run 'palette4d "
                           "install-plugin' again in a terminal"
                         : line;
@@ -148,13 +172,19 @@ std::string reason(const std::string& line) {
 /// Takes note of an analysis that has ended; false where it has succeeded.
 bool keep(Analysis& one) {
     if (!one.child || one.child->running()) return true;
-    std::string line = last_line(one.folder / "progress");
-    if (line.rfind("error: ", 0) != 0 && line != "done") line = one.child->last_words();
+    const Json event = last_event(one.folder / "progress");
+    std::string said = text_of(event, "error");
+    if (said.empty()) {
+        said = reason(one.child->last_words());
+    } else if (event.value("fields", Json()) == true) {
+        if (said.back() == '.') said.pop_back();
+        said += ". Push Open in Studio for these, and choose File > Analyse\xe2\x80\xa6";
+    }
     one.child.reset();
     std::error_code error;
     fs::remove_all(one.folder, error);
-    if (line == "done") return false;
-    one.failure = "the analysis of " + one.clip + " failed: " + reason(line);
+    if (event.is_object() && event.contains("finished")) return false;
+    one.failure = "the analysis of " + one.clip + " failed: " + said;
     return true;
 }
 
@@ -245,8 +275,7 @@ AnalysisState analysis_state(const std::string& sidecar) {
         return {};
     }
     if (!one.child) return {false, one.failure};
-    const std::string line = last_line(one.folder / "progress");
-    return {true, "analysing " + one.clip + (line.empty() ? "" : ": " + line) +
+    return {true, "analysing " + one.clip + progress(last_event(one.folder / "progress")) +
                       "; push Analyse to cancel it"};
 }
 

@@ -1,5 +1,5 @@
-// palette4d itself, started from a host: its window, and analyses in the background. Depends
-// neither on OpenFX nor on the core.
+// palette4d itself, started from a host: its window, and analyses in the background. Does not
+// depend on OpenFX.
 #pragma once
 
 #include <optional>

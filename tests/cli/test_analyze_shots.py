@@ -93,7 +93,8 @@ class TestMovies:
     ) -> None:
         out, log = tmp_path / "shots", tmp_path / "progress.txt"
         assert analyze(cut_movie, out, "--detect-shots", "--progress", str(log)) == 0
-        assert log.read_text().splitlines()[-2:] == ["frames: 10 of 10", "done"]
+        *_, last, end = map(json.loads, log.read_text().splitlines())
+        assert (last["done"], last["total"], end) == (10, 10, {"finished": True})
         printed = capsys.readouterr()
         assert "2 shots of 2: 2 analysed" in printed.out
         assert printed.err == ""

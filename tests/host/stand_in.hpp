@@ -29,6 +29,9 @@ bool soon(Done done) {
     return false;
 }
 
+inline const char* const kFinished = R"({"finished": true})"
+                                     "\n";
+
 /// The bundle with that program, as `palette4d install-plugin` installs it.
 inline std::string installed(const std::filesystem::path& program) {
     const std::filesystem::path copy = folder() / "OFX" / "Palette4D.ofx.bundle";
@@ -41,8 +44,8 @@ inline std::string installed(const std::filesystem::path& program) {
 }
 
 /// A bundle whose program notes its arguments in the file `started`. As `palette4d analyze` it then
-/// waits for the file `go`, which says how it ends: with `done`, after copying box.json to the
-/// sidecar, or with an error. Where there is a file `fails`, it fails with that on standard error.
+/// waits for the file `go`, which is its last event: `kFinished`, after copying box.json to the
+/// sidecar, or an error. Where there is a file `fails`, it fails with that on standard error.
 inline std::string installed() {
     const std::filesystem::path copy = folder() / ("python" + own_file().extension().u8string());
     std::filesystem::copy_file(own_file(), copy);

@@ -73,7 +73,7 @@ TEST(the_frames_of_the_host_are_analysed) {
     effect.push();
     CHECK(effect.node->text("status").find("cancelled") == 0);
     // Again, over the frames of the first time.
-    write("go", "done\n");
+    write("go", kFinished);
     effect.push();
     CHECK(soon([&] {
         return effect.status().find("choose it in the node Palette4D") != std::string::npos;
@@ -97,7 +97,8 @@ TEST(studio_opens_the_sidecar_or_the_frames) {
     };
     CHECK(open().find("shot.p4d.json is not there yet; push Analyse first") != std::string::npos);
     CHECK(!effect.started());
-    write("go", "error: it has cuts\n");
+    write("go", R"({"error": "it has cuts"})"
+                "\n");
     effect.push();
     CHECK(soon([&] { return effect.status().find("failed: it has cuts") != std::string::npos; }));
     const std::string frames = (folder() / "shot.frames" / "shot.######.exr").u8string();

@@ -281,7 +281,7 @@ TEST(an_analysis_runs_beside_the_host) {
     CHECK(other->changed("sidecar") == kOfxStatOK && third->changed("reload") == kOfxStatOK);
     CHECK(other->text("status").find("analysing " + clip) == 0);
     CHECK(third->text("status") == "No sidecar chosen");
-    write("go", "done\n");
+    write("go", kFinished);
     CHECK(soon([&] { return window.status().find("box: frames 10-20") == 0; }));
     CHECK(window.node->render(4, &source, output, layout.bounds) == kOfxStatOK);
     CHECK(output.pixels(layout.bounds) != source.pixels(layout.bounds));
@@ -301,7 +301,7 @@ TEST(a_second_push_stops_the_analysis) {
     EXPECT(window.node->text("status").find("cancelled the analysis") == 0,
            window.node->text("status"));
     CHECK(soon(no_children));
-    write("go", "done\n");
+    write("go", kFinished);
     CHECK(!window.says("analysing"));
     CHECK(!fs::exists(target));
 }
@@ -311,9 +311,11 @@ TEST(an_analysis_that_fails_says_why) {
     const std::string kept = sidecar("mine.p4d.json");
     window.node->set("clipFile", (folder() / "shot.mov").u8string());
     window.node->set("sidecar", kept);
-    write("go", "error: it has edits; keep them with --keep-edits\n");
+    write("go", R"({"error": "it has edits; keep them with\n'Edits'", "fields": true})"
+                "\n");
     window.push("analyse");
-    CHECK(soon([&] { return window.says("failed: it has edits; keep them with --keep-edits"); }));
+    CHECK(soon(
+        [&] { return window.says("failed: it has edits; keep them with 'Edits'. Push Open"); }));
     // The sidecar that is there still serves.
     window.expect("3 edits");
     CHECK(text_of(fs::u8path(kept)) == sidecar_text());
@@ -338,7 +340,7 @@ TEST(analyse_needs_to_know_the_clip) {
     window.node->effect().properties.put("OfxImageEffectPropSrcFilePath",
                                          (folder() / "shot.[1001-1003].exr").u8string());
     write("box.json", sidecar_text());
-    write("go", "done\n");
+    write("go", kFinished);
     window.push("analyse");
     CHECK(soon([&] { return window.says("time 0 is frame 10"); }));
     CHECK(window.node->text("sidecar").empty());

@@ -8,15 +8,15 @@ import shlex
 import time
 from fractions import Fraction
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from palette4d import analyze, load
 from palette4d.analysis.options import LIKE, METHODS, OPTIONS, check_methods, parse_setting
 from palette4d.cli import analysis_report, analyze_shots
-from palette4d.cli.messages import as_fields, as_options, tell
+from palette4d.cli.messages import as_options, tell
 from palette4d.cli.progress import progress_bar
 from palette4d.common.arguments import checked, frame_range, whole
-from palette4d.common.errors import Palette4dError, in_words
+from palette4d.common.errors import Palette4dError
 from palette4d.common.text import counted
 
 USAGE = "palette4d analyze CLIP -o OUT [options]"
@@ -181,12 +181,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("--json", action="store_true", help="print the report as JSON")
     parser.add_argument("--quiet", action="store_true", help="no progress, no report")
-    parser.add_argument(
-        "--progress",
-        metavar="FILE",
-        type=Path,
-        help="write progress into FILE for a host, line by line; the last is 'done' or 'error: …'",
-    )
     analyze_shots.add_options(parser)
     parser.add_argument("-h", "--help", action="help", help="show this help")
     parser.add_argument("--help-all", dest="all", nargs=0, action=_HelpAll, help="all options")
@@ -210,28 +204,16 @@ def _rate(text: str) -> Fraction:
 
 def run(args: argparse.Namespace) -> int:
     """Run `palette4d analyze`."""
-    with _ProgressFile(args.progress) as progress:
-        return _run(args, progress)
-
-
-def _run(args: argparse.Namespace, progress: _ProgressFile) -> int:
     settings = _settings(args)
     if analyze_shots.is_show(args):
-        return analyze_shots.run(args, settings, progress)
+        return analyze_shots.run(args, settings)
     from palette4d.grade import sidecar
 
     on_edits = settings.pop("on_edits")
     sidecar.check_target(args.output, on_edits=on_edits)
     bars = _Bars(hidden=args.quiet or args.json)
     try:
-
-        def tell_both(stage: str, done: int, total: int) -> None:
-            bars(stage, done, total)
-            progress(stage, done, total)
-
-        document = analyze(
-            args.clip, frames=args.frames, like=args.like, progress=tell_both, **settings
-        )
+        document = analyze(args.clip, frames=args.frames, like=args.like, progress=bars, **settings)
     finally:
         bars.close()
     document.save(args.output, on_edits=on_edits)
@@ -266,47 +248,6 @@ def _settings(args: argparse.Namespace) -> dict[str, Any]:
     spaces = ("input_space", "palette_space", "ocio_config")
     names = ("rate", "skip_bad_frames", "allow_cuts", "method", "on_edits", *spaces)
     return {name: vars(args)[name] for name in names} | given
-
-
-class _ProgressFile:
-    """Lines for a program that waits: `STAGE: DONE of TOTAL`, then `done` or `error: MESSAGE`."""
-
-    def __init__(self, path: Path | None) -> None:
-        self.path = path
-        self.file: IO[str] | None = None
-        self.last = 0.0
-
-    def __enter__(self) -> _ProgressFile:
-        if self.path is not None:
-            try:
-                self.file = self.path.open("w", encoding="utf-8", errors="backslashreplace")
-            except OSError as error:
-                raise Palette4dError(
-                    f"{self.path}: cannot be written: {error.strerror}; choose another file"
-                ) from error
-        return self
-
-    def __call__(self, stage: str, done: int, total: int) -> None:
-        # Not too often: some stages have thousands of short steps.
-        if self.file is not None and (done == total or time.monotonic() - self.last > 0.2):
-            self.last = time.monotonic()
-            self._write(f"{stage.replace('_', ' ')}: {done} of {total}")
-
-    def _write(self, line: str) -> None:
-        if self.file is not None:
-            print(line, file=self.file, flush=True)
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: object
-    ) -> None:
-        if self.file is None:
-            return
-        if isinstance(error, Exception):
-            words = as_fields(in_words(error) or type(error).__name__)
-            self._write(f"error: {' '.join(words.split())}")
-        elif error is None:
-            self._write("done")
-        self.file.close()
 
 
 class _Bars:

@@ -15,8 +15,6 @@ from palette4d.common.text import counted
 from palette4d.shows.timeline_files import is_timeline
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from palette4d.shows.batch import Show
 
 DESCRIPTION = """\
@@ -104,19 +102,12 @@ def _refuse(args: argparse.Namespace, given: dict[str, bool], needs: str) -> Non
             args.usage_error(f"{option} {needs}")
 
 
-def run(
-    args: argparse.Namespace, settings: dict[str, Any], progress: Callable[[str, int, int], None]
-) -> int:
+def run(args: argparse.Namespace, settings: dict[str, Any]) -> int:
     """Analyse many shots; print the written files, and raise an error for failed shots."""
     from palette4d.shows.analysis import analyze_shots
 
     failed: UnfinishedError | None = None
     with frames_bar("shots", hidden=args.quiet or args.json) as show:
-
-        def tell_both(words: str, done: int, total: int) -> None:
-            show(done, total, words)
-            progress("frames", done, total)
-
         try:
             done: Any = analyze_shots(
                 args.clip,
@@ -128,7 +119,7 @@ def run(
                 jobs=args.jobs,
                 cluster=args.cluster,
                 force=args.force,
-                progress=tell_both,
+                progress=lambda words, done, total: show(done, total, words),
                 **settings,
             )
         except UnfinishedError as error:

@@ -5,12 +5,15 @@ takes the parsed arguments and returns the exit status.
 """
 
 import argparse
+import contextlib
 import importlib
 import os
+import signal
 import sys
 from collections.abc import Callable, Sequence
 
 from palette4d._core import __version__
+from palette4d.cli import job
 from palette4d.cli.messages import tell
 from palette4d.cli.terminal import printable_output
 from palette4d.common.arguments import Parser, accept_negative_values
@@ -41,6 +44,7 @@ example:
   palette4d render clip.p4d.json clip/ -o graded/frame.####.exr
 
 `palette4d VERB --help` explains a verb and shows an example.
+`palette4d VERB --progress FILE` is for programs that wait: progress as JSON lines (docs/files.md).
 """
 
 
@@ -58,6 +62,8 @@ def build_parser(verb: str = "") -> argparse.ArgumentParser:
     asked = f"palette4d.cli.{verb.replace('-', '_')}"
     for name in (asked,) if asked in VERB_MODULES else VERB_MODULES:
         importlib.import_module(name).add_parser(subparsers)
+    for each in subparsers.choices.values():
+        each.add_argument("--progress", metavar="FILE", help=argparse.SUPPRESS)
     accept_negative_values(subparsers)
     return parser
 
@@ -74,16 +80,21 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     # All loops run in threads of palette4d's own. Those of OpenBLAS would only spin beside them.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    if sys.platform == "win32":  # what Studio sends in the place of Ctrl-C
+        signal.signal(signal.SIGBREAK, signal.default_int_handler)
     given = sys.argv[1:] if argv is None else argv
-    with printable_output():
-        return _run(build_parser(*given[:1]).parse_args(given))
+    with printable_output(), contextlib.ExitStack() as stack:
+        return _run(build_parser(*given[:1]).parse_args(given), stack)
 
 
-def _run(args: argparse.Namespace) -> int:
+def _run(args: argparse.Namespace, stack: contextlib.ExitStack) -> int:
     run: Callable[[argparse.Namespace], int] = args.run
     try:
+        stack.enter_context(job.events_to(args.progress))
         status = run(args)
         sys.stdout.flush()
+        if status == 0:
+            job.event(finished=True)
     except BrokenPipeError:
         # The reader of our output has ended (`palette4d info … | head`). This is no error, but
         # Python would report one when it flushes stdout at exit.
@@ -94,6 +105,9 @@ def _run(args: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         print("palette4d: interrupted", file=sys.stderr)
         return 130
+    except Exception as error:
+        job.event(error=str(error) or type(error).__name__)
+        raise
     return status
 
 

@@ -1,7 +1,7 @@
 """What the command line prints on standard error.
 
 Errors and notes of the API name its arguments: ``force=True``, ``frames=…``. Here, and only here,
-they become options: ``--force``, ``--frames``. Hosts have none: they get the names of the fields of
+they become options: ``--force``, ``--frames``. Programs that wait get the names of the fields of
 Studio's dialog.
 """
 
@@ -9,6 +9,7 @@ import re
 import sys
 
 from palette4d.analysis.options import OPTIONS
+from palette4d.cli import job
 from palette4d.studio import texts
 
 _ARGUMENT = re.compile(r'\b([a-z][a-z0-9_]*)=(True|…|"[^"\n]*"|-?[0-9][0-9.e+-]*[0-9]|[0-9])')
@@ -59,11 +60,10 @@ _FIELDS = {
 
 
 def as_fields(text: str) -> str:
-    """Return a message of an analysis in the words of a host's user, who has Studio.
+    """Return a message of an analysis in the words of Studio's dialog, which hosts open too.
 
     >>> as_fields("choose frames=…, or leave such frames out with skip_bad_frames=True.")
-    "choose 'Frames', or leave such frames out with 'Skip bad frames'. Push Open in Studio for \
-these, and choose File > Analyse…"
+    "choose 'Frames', or leave such frames out with 'Skip bad frames'."
     """
 
     def field(found: re.Match[str]) -> str:
@@ -76,14 +76,13 @@ these, and choose File > Analyse…"
     for argument, label in _FIELDS.items():
         if not argument.isidentifier():
             words = words.replace(argument, f"'{label}'")
-    words = _ARGUMENT.sub(field, words)
-    if words == text:
-        return text
-    menu, entry = texts.MENUS["file"].replace("&", ""), texts.ACTIONS["window"]["analyze"]
-    return f"{words.rstrip('.')}. Push Open in Studio for these, and choose {menu} > {entry}"
+    return _ARGUMENT.sub(field, words)
 
 
 def tell(kind: str, text: str) -> None:
     """Print a message: `kind` is "error", "warning" or "note"."""
-    words = as_options(text).encode("utf-8", "backslashreplace").decode("utf-8")
-    print(f"palette4d: {kind}: {words}", file=sys.stderr)
+    fields = as_fields(text)
+    job.event(**{kind: fields, "fields": fields != text})
+    if not job.on_stderr():
+        words = as_options(text).encode("utf-8", "backslashreplace").decode("utf-8")
+        print(f"palette4d: {kind}: {words}", file=sys.stderr)

@@ -1,21 +1,43 @@
-"""The progress bars of commands."""
+"""The progress of commands: bars on a terminal, events for a program that waits."""
 
 from __future__ import annotations
 
 import contextlib
+import io
+import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
+from palette4d.cli import job
 from palette4d.cli.terminal import unfiltered_stderr
 from palette4d.common.text import printable
 
+#: Least seconds between two events of a stage: some have thousands of short steps.
+BETWEEN = 0.1
+
 
 def progress_bar(what: str, *, total: int | None, unit: str, hidden: bool) -> Any:
-    """Return a tqdm bar on standard error, if that is a terminal and it is not hidden."""
+    """Return a tqdm bar on standard error, if that is a terminal and it is not hidden.
+
+    For a program that waits, it writes events in the place of the bar.
+    """
     from tqdm import tqdm
 
-    file = unfiltered_stderr()
-    return tqdm(total=total, desc=what, unit=unit, disable=hidden or None, file=file)
+    if not job.waits():
+        file = unfiltered_stderr()
+        return tqdm(total=total, desc=what, unit=unit, disable=hidden or None, file=file)
+
+    class Events(tqdm):  # type: ignore[misc]
+        told = 0.0
+
+        def display(self, msg: str | None = None, pos: int | None = None) -> None:
+            now = time.monotonic()
+            if msg != "" and (self.n == self.total or now - self.told > BETWEEN):
+                self.told = now
+                stage = self.desc.rstrip(": ").replace("_", " ")
+                job.event(stage=stage, done=self.n, total=self.total)
+
+    return Events(total=total, desc=what, file=io.StringIO())
 
 
 @contextlib.contextmanager

@@ -24,8 +24,8 @@ from PySide6.QtWidgets import (
 
 from palette4d.studio import texts, theme
 from palette4d.studio.choice import Choice
+from palette4d.studio.job import Job, command_line
 from palette4d.studio.paths import sequence_of
-from palette4d.studio.verb_process import VerbProcess, command_line
 
 FieldKind = Literal["text", "words", "save", "open", "folder", "choice", "check"]
 
@@ -93,7 +93,7 @@ class VerbDialog(QDialog):
         self.setMinimumWidth(760)
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self.verb, self.fields = verb, tuple(fields)
-        self.job: VerbProcess | None = None
+        self.job: Job | None = None
         self._post, self._done = post, done
         self.inputs: list[QLineEdit | QComboBox | QCheckBox] = []
         column = QVBoxLayout(self)
@@ -228,16 +228,16 @@ class VerbDialog(QDialog):
         self.stop.setText(texts.STOP_JOB)
         for entry in self.inputs:
             entry.setEnabled(False)
-        self.job = VerbProcess(self.words(), lambda job: self._post(lambda: self._changed(job)))
+        self.job = Job(self.words(), lambda job: self._post(lambda: self._changed(job)))
 
-    def _changed(self, job: VerbProcess) -> None:
+    def _changed(self, job: Job) -> None:
         if job is not self.job:
             return
         try:
             if job.fraction is not None and not job.cancelled:
                 self.bar.setRange(0, 1000)
                 self.bar.setValue(round(job.fraction * 1000))
-                self.stage.setText(f"{job.what.replace('_', ' ')} {job.fraction:.0%}")
+                self.stage.setText(f"{job.what} {job.fraction:.0%}")
             self.log.setPlainText((job.messages + job.output).strip())
             if job.status is None:
                 return
