@@ -26,6 +26,7 @@ PUBLIC = {
     "bake",
     "config",
     "export",
+    "export_dctl",
     "install_plugin",
     "load",
     "open_clip",

@@ -3,11 +3,10 @@
 
 namespace palette4d::gpu {
 
-/// The parts, without a dialect's prelude.
-const char* layout_text();
-const char* face_text();
-/// layout, face, palette, picks and pixel: all that a frame's table needs.
+/// What draws a frame by its table, without a dialect's prelude.
 const char* frame_text();
+/// What draws any frame of a clip's palette and edits, likewise.
+const char* clip_text();
 
 const char* opencl_text();
 const char* cuda_text();

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from palette4d.grade.rendering import render
     from palette4d.hosts.install import install_plugin
     from palette4d.lut_export.bake import bake
+    from palette4d.lut_export.dctl import export_dctl
     from palette4d.media.clip import Clip, open_clip
     from palette4d.plotting import plot
     from palette4d.shows.analysis import analyze_shots
@@ -45,6 +46,7 @@ __all__ = [
     "bake",
     "config",
     "export",
+    "export_dctl",
     "install_plugin",
     "load",
     "open_clip",
@@ -61,6 +63,7 @@ _HOMES = {
     "bake": "palette4d.lut_export.bake",
     "config": "palette4d.shows.exports",
     "export": "palette4d.shows.exports",
+    "export_dctl": "palette4d.lut_export.dctl",
     "install_plugin": "palette4d.hosts.install",
     "open_clip": "palette4d.media.clip",
     "plot": "palette4d.plotting",

@@ -175,3 +175,35 @@ class TestConfig:
     def test_one_clip_for_two_sidecars(self, tmp_path: Path) -> None:
         assert config(EDITED, SPLIT, "-o", tmp_path / "show", "--clip", "x.####.png") == 1
         assert not (tmp_path / "show").exists()
+
+
+def dctl(*words: object) -> int:
+    return main(["export", str(EDITED), *map(str, words)])
+
+
+def test_a_dctl_is_one_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = tmp_path / "shot.dctl"
+    assert dctl("--dctl", output) == 0
+    assert "frames 0 to 20 from " in capsys.readouterr().out
+    assert "p4d_at_frame" in output.read_text(encoding="ascii")
+    assert dctl("--dctl", output, "--frames", "2-5", "--json") == 1
+    assert dctl("--dctl", output, "--frames", "2-5", "--json", "--force") == 0
+    assert json.loads(capsys.readouterr().out)["last"] == 5
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("--dctl", "a.dctl", "--every", "1"), "--dctl"),
+        (("--dctl", "a.dctl", "--size", "9"), "--dctl"),
+        (("--every", "1"), "--output"),
+        (("-o", "luts"), "--stops"),
+    ],
+)
+def test_one_kind_of_export_is_chosen(
+    words: tuple[str, ...], expected: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as error:
+        dctl(*words)
+    assert error.value.code == 2
+    assert expected in capsys.readouterr().err

@@ -25,11 +25,13 @@ again bakes only files that are missing or changed. Ctrl-C leaves whole files on
 --stops are the times of the colour stops, of the edited palette colours and of their neighbours.
 With a manifest each shot's files go to a folder of its name; --otio writes a copy of the edit whose
 clips name the shot's sidecar and files in their metadata ("palette4d").
+--dctl writes the palette and its edits through time as one file for DaVinci Resolve, without LUTs.
 
 examples:
   palette4d export shot010.p4d.json --every 1 -o luts
   palette4d export shot010.p4d.json --frames 1001-1100x10 -o luts --format clf --max-error 0.02
   palette4d export shots/edit.shots.json --stops -o luts --otio edit_luts.otio
+  palette4d export shot010.p4d.json --dctl shot010.dctl
 """
 
 
@@ -40,14 +42,17 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="bake many frames: a dated series of LUT files",
         description="Bake the edit at many frames, a file each, in parallel, with an index.",
         epilog=EPILOG,
-        usage="%(prog)s SIDECAR (--every N | --stops | --frames RANGE) -o DIR [options]",
+        usage="%(prog)s SIDECAR (--every N | --stops | --frames RANGE) -o DIR [options]\n"
+        "       %(prog)s SIDECAR --dctl OUT.dctl [--frames RANGE] [--force]",
         formatter_class=wide_help,
     )
     add = parser.add_argument
     sidecar = "the sidecar (.p4d.json), or the manifest of a show (.shots.json)"
     add("sidecar", metavar="SIDECAR", type=Path, help=sidecar)
-    add_frame_choice(parser, required=True)
-    add("-o", "--output", metavar="DIR", type=Path, required=True, help="the folder for the files")
+    add_frame_choice(parser, required=False)
+    add("-o", "--output", metavar="DIR", type=Path, help="the folder for the files")
+    dctl = "write one DCTL file instead"
+    add("--dctl", metavar="OUT.dctl", type=Path, help=dctl)
     add("--name", metavar="NAME", help="the files' name (default: the clip's)")
     padding = "digits of the frame number in the names (default 4)"
     add("--padding", metavar="N", type=whole(0, 12), default=4, help=padding)
@@ -83,6 +88,12 @@ def export_settings(args: argparse.Namespace) -> dict[str, Any]:
 
 def run(args: argparse.Namespace) -> int:
     """Export; print the written files."""
+    if args.dctl is not None:
+        return _dctl(args)
+    if args.output is None:
+        args.usage_error("the following arguments are required: -o/--output")
+    if args.every is None and not args.stops and args.frames is None:
+        args.usage_error("one of the arguments --every --stops --frames is required")
     from palette4d.shows.exports import export
 
     failed: UnfinishedError | None = None
@@ -112,6 +123,26 @@ def run(args: argparse.Namespace) -> int:
     warn(done.series)
     if failed:
         raise failed
+    return 0
+
+
+def _dctl(args: argparse.Namespace) -> int:
+    """Write a DCTL file; print its size."""
+    from dataclasses import asdict
+
+    from palette4d.lut_export.dctl import MOST_BYTES, export_dctl
+
+    others = ("output", "every", "otio", "name", "clip", "size")
+    if args.stops or any(getattr(args, name) is not None for name in others):
+        args.usage_error("--dctl: only with --frames, --force, --json and --quiet")
+    done = export_dctl(args.sidecar, args.dctl, frames=args.frames, force=args.force)
+    if args.json:
+        print(json.dumps(asdict(done), indent=2))
+    elif not args.quiet:
+        print(
+            f"{done.output}: frames {done.first} to {done.last} from {counted(done.keys, 'key')}, "
+            f"{done.constant_bytes / 1024:.1f} KB of {MOST_BYTES // 1024} KB"
+        )
     return 0
 
 

@@ -1,0 +1,191 @@
+"""DCTL files: the whole edit of a clip in one, compiled as C++ and as OpenCL."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from opencl import run
+from palette4d.lut_export import dctl
+from palette4d.lut_export.frame_edit import frame_edit
+from parity.cases import DOCUMENTS, Document, edited, pick, picked, split_merge_document
+from parity.kernel import compiler
+
+import palette4d
+from palette4d import Palette4dError, _core
+
+F32 = NDArray[np.float32]
+
+NAMES = ["changes-smooth", "changes-stops", "changes-hold", "flat-edited", "grey-edited",
+         "colour-edited", "still-edited"]  # fmt: skip
+#: Of `render`, in code values.
+PROMISE = 1e-4
+
+#: What Resolve puts before a DCTL for OpenCL, and the flags that it builds with.
+OPENCL_HOST = """
+#define __DEVICE__ static
+#define __CONSTANT__ __constant
+#define make_float3(x, y, z) (float3)(x, y, z)
+#define _fabs fabs
+#define _sqrtf sqrt
+#define _atan2f atan2
+#define _fminf fmin
+#define _fmaxf fmax
+#define DEFINE_UI_PARAMS(name, label, kind, ...)
+#define p4d_strength 1.0f
+#define p4d_offset 0
+"""
+OPENCL_MAIN = """
+__kernel void draw(__global const float *in, __global float *out) {
+    int i = 3 * (int)get_global_id(0);
+    float3 to = transform(1, 1, 0, 0, in[i], in[i + 1], in[i + 2]);
+    out[i] = to.x; out[i + 1] = to.y; out[i + 2] = to.z;
+}
+"""
+OPENCL_FLAGS = "-cl-fast-relaxed-math -cl-mad-enable -cl-denorms-are-zero"
+
+
+@pytest.fixture
+def colours() -> F32:
+    """(n, 3) colours within and around the palettes."""
+    return np.random.default_rng(8).uniform(-0.2, 1.2, (3000, 3)).astype(np.float32)
+
+
+def exported(document: Document, folder: Path, **options: str) -> tuple[Path, dctl.DctlExport]:
+    """The DCTL of a document."""
+    source, output = folder / "shot.p4d.json", folder / "shot.dctl"
+    source.write_text(json.dumps(document), encoding="utf-8")
+    return output, palette4d.export_dctl(source, output, force=True, **options)
+
+
+def exact(document: Document, frame: float, colours: F32) -> NDArray[np.float64]:
+    """What `render` draws, in double."""
+    sidecar = _core.parse_sidecar(json.dumps(document), "case")
+    return frame_edit(sidecar, frame).exact(colours)
+
+
+class Compiled:
+    """A DCTL file as C++."""
+
+    def __init__(self, path: Path, *flags: str) -> None:
+        library = path.with_suffix(".so")
+        source = Path(__file__).with_name("dctl_host.cpp")
+        command = [compiler(), "-std=c++17", "-O1", *flags, "-Wall", "-Wno-unused-parameter"]
+        command += ["-Werror", "-shared", "-fPIC", f'-DPALETTE4D_DCTL="{path}"', str(source)]
+        subprocess.run([*command, "-o", str(library)], check=True, timeout=120)
+        self.library = ctypes.CDLL(str(library))
+
+    def draw(self, frame: int, colours: F32, strength: float = 1.0, offset: int = 0) -> F32:
+        """The colours at a frame of the timeline."""
+        result = np.empty_like(colours)
+        self.library.draw(
+            ctypes.c_int(frame),
+            ctypes.c_float(strength),
+            ctypes.c_int(offset),
+            ctypes.c_void_p(colours.ctypes.data),
+            ctypes.c_void_p(result.ctypes.data),
+            ctypes.c_long(len(colours)),
+        )
+        return result
+
+
+def frames_of(document: Document) -> tuple[int, int]:
+    blocks = document["polytope"]["blocks"]
+    return blocks[0]["first"], blocks[-1]["last"]
+
+
+@pytest.mark.parametrize("flags", [(), ("-ffast-math",)], ids=["exact", "fast-math"])
+@pytest.mark.parametrize("name", NAMES)
+def test_every_frame_is_as_rendered(
+    name: str, flags: tuple[str, ...], colours: F32, tmp_path: Path
+) -> None:
+    document = DOCUMENTS[name]
+    path, done = exported(document, tmp_path)
+    compiled = Compiled(path, *flags)
+    first, last = frames_of(document)
+    assert (done.first, done.last) == (first, last)
+    changed = 0.0
+    for frame in range(first, last + 1):
+        # The timeline begins with 1 where the clip has its first frame.
+        found = compiled.draw(frame - first + 1, colours)
+        expected = exact(document, frame, colours)
+        assert np.abs(found - expected).max() < PROMISE
+        changed = max(changed, float(np.abs(found - colours).max()))
+    assert changed > 0.05
+
+
+@pytest.mark.parametrize("name", ["changes-smooth", "flat-edited"])
+def test_it_runs_as_opencl_with_the_flags_of_resolve(
+    name: str, colours: F32, tmp_path: Path
+) -> None:
+    document = DOCUMENTS[name]
+    path, _ = exported(document, tmp_path)
+    first, last = frames_of(document)
+    for frame in (first, (first + last) // 2, last):
+        now = f"#define TIMELINE_FRAME_INDEX {frame - first + 1}\n"
+        offset = OPENCL_HOST.replace("p4d_offset 0", f"p4d_offset {first - 1}")
+        source = now + offset + path.read_text(encoding="ascii") + OPENCL_MAIN
+        found = run(source, "draw", OPENCL_FLAGS, colours)
+        assert np.abs(found - exact(document, frame, colours)).max() < PROMISE
+
+
+def test_sliders_and_frames_beyond_the_clip(colours: F32, tmp_path: Path) -> None:
+    document = DOCUMENTS["changes-stops"]
+    compiled = Compiled(exported(document, tmp_path)[0])
+    full = exact(document, 12, colours)
+    np.testing.assert_allclose(
+        compiled.draw(3, colours, strength=0.25, offset=10),
+        colours + 0.25 * (full - colours),
+        atol=PROMISE,
+    )
+    assert (compiled.draw(13, colours, strength=0.0) == colours).all()
+    assert (compiled.draw(-50, colours) == compiled.draw(1, colours)).all()
+    assert (compiled.draw(5000, colours) == compiled.draw(31, colours)).all()
+
+
+def test_unedited_colours_keep_their_bits(colours: F32, tmp_path: Path) -> None:
+    document = DOCUMENTS["changes"]
+    compiled = Compiled(exported(document, tmp_path)[0])
+    for frame in (1, 12, 31):
+        assert (compiled.draw(frame, colours).view(np.uint32) == colours.view(np.uint32)).all()
+
+
+def test_smooth_ramps_need_few_keys(tmp_path: Path) -> None:
+    base = split_merge_document()
+    straight, smooth = (
+        exported(edited(base, {"a1": (0.3, 0.5, 0.2)}, [("ea", 11, (0.4, 0, 0.1))], ramp=ramp),
+                 tmp_path)[1]
+        for ramp in ("linear", "smooth")
+    )  # fmt: skip
+    assert smooth.keys <= straight.keys + 2 < 20
+
+
+def test_a_range_of_frames_is_smaller(colours: F32, tmp_path: Path) -> None:
+    document = DOCUMENTS["changes-smooth"]
+    whole = exported(document, tmp_path)[1]
+    path, part = exported(document, tmp_path, frames="12-18")
+    assert part.constant_bytes < whole.constant_bytes
+    assert (part.first, part.last) == (12, 18)
+    found = Compiled(path).draw(4, colours)
+    assert np.abs(found - exact(document, 15, colours)).max() < PROMISE
+
+
+def test_what_a_dctl_cannot_hold_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    document = DOCUMENTS["changes-smooth"]
+    with pytest.raises(Palette4dError, match=r"has no room for their mattes"):
+        exported(picked(document, [pick("red", (0.6, 0.3, 0.2), (0.4, 0.3, 0.6))]), tmp_path)
+    with pytest.raises(Palette4dError, match=r"outside the clip"):
+        exported(document, tmp_path, frames="12-400")
+    monkeypatch.setattr(dctl, "MOST_BYTES", 1000)
+    with pytest.raises(Palette4dError, match=r"room for 0 KB.*frames="):
+        exported(document, tmp_path)
+    with pytest.raises(Palette4dError, match=r"\.dctl"):
+        palette4d.export_dctl(tmp_path / "shot.p4d.json", tmp_path / "shot.cube")
+    assert not list(tmp_path.glob("*.dctl"))
