@@ -102,8 +102,6 @@ py::dict learn(const std::vector<GivenFrame>& given, const Vec3& picked,
     result["odds"] = grid_array(matte.odds);
     result["found"] = learned.found;
     result["share"] = learned.share;
-    result["borders"] = learned.borders;
-    result["far"] = learned.far;
     return result;
 }
 

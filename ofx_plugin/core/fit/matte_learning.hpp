@@ -37,8 +37,6 @@ struct LearningFrame {
 struct LearnedMatte {
     std::vector<float> membership;  ///< a MatteGrid, 0..1
     double share = 0;               ///< of the first frame's pixels: the region
-    int borders = 0;                ///< of the frame that the region touches for a third or more
-    double far = 0;                 ///< share of the region whose colours are far from the pick
     bool found = false;             ///< whether the first frame has any such region
 };
 

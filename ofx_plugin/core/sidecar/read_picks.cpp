@@ -18,7 +18,7 @@ constexpr std::size_t kMaxPicks = 1000, kMaxPathKeys = 20'000;
 constexpr std::size_t kMaxPoints = 100'000;
 /// Learned mattes take some 15 KB each.
 constexpr std::size_t kMaxMatteText = 1 << 17;
-constexpr double kMaxReach = 20;
+constexpr double kMaxReach = 8;
 
 void check_point(const Cursor& point) {
     if (point.list("2 numbers, x and y") != 2) point.wrong("a list of 2 numbers, x and y");

@@ -236,9 +236,16 @@ def run_area(args: argparse.Namespace) -> int:
     document = load(args.sidecar)
     points = (args.pixel,) if args.stroke is None else tuple(args.stroke)
     size = (args.box if args.stroke is None else args.width) or 9
-    document.add_area(args.id, Area(args.frame, points, size / 2), clip=args.clip)
+    before = document.answer(args.id, args.clip, tries=False)
+    found = document.add_area(args.id, Area(args.frame, points, size / 2), clip=args.clip)
     document.save()
     _print_pick(document, args.id, args.clip)
+    after = document.answer(args.id, args.clip, tries=False)
+    if found.kind == "pick" and before and after and abs(after.share - before.share) < 0.002:
+        print(
+            f"  takes as much as before: what you marked was taken, or looks like what is around "
+            f"it. Where it has another colour, pick it too; else change {args.id} --reach 1"
+        )
     return 0
 
 

@@ -24,6 +24,8 @@ F32 = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
 #: (from, to, values): display code values of a palette's code values, evenly spaced.
 Display = tuple[float, float, list[float]]
+#: The points of a box (one) or a stroke, and its half width, in pixels of the clip.
+Brush = tuple[list[tuple[float, float]], float]
 ReadFrame = Callable[[int], F32]
 """The straight colours of a frame, (h, w, 3) in the palette's code values; NaN: no colour."""
 
@@ -86,17 +88,8 @@ def learn(
     others = [frame for frame in _along(pick, frames) if frame not in seeded]
     given = []
     for frame in [*seeded, *others]:
-        background = [
-            _box(hold)
-            for hold in holds
-            if hold.pixel is not None and _nearest(frames, hold.frame) == frame
-        ]
-        own = [] if pick.pixel is None or frame != seeded[0] else [_box(pick)]
-        own += [
-            (list(area.points), float(area.radius))
-            for area in pick.areas
-            if _nearest(frames, area.frame) == frame
-        ]
+        own = _brushes(pick, frame, frames)
+        background = [brush for hold in holds for brush in _brushes(hold, frame, frames)]
         colour = tuple(pick.colour_at(frame).tolist())
         given.append((read(frame), colour, own, background, frame in seeded))
     found = _core.learn_matte(
@@ -109,9 +102,15 @@ def learn(
     return Learned(id_of(odds), text_of(odds), found["found"], found["share"])
 
 
-def _box(pick: Pick) -> tuple[list[tuple[float, float]], float]:
-    assert pick.pixel is not None
-    return [pick.pixel], (pick.box or 1) / 2
+def _brushes(pick: Pick, frame: int, frames: Sequence[int]) -> list[Brush]:
+    """Return the places of a frame that a pick or hold names: points and a radius each."""
+    found: list[Brush] = []
+    if pick.pixel is not None and _nearest(frames, pick.frame) == frame:
+        found.append(([pick.pixel], (pick.box or 1) / 2))
+    for area in pick.areas:
+        if _nearest(frames, area.frame) == frame:
+            found.append((list(area.points), float(area.radius)))
+    return found
 
 
 def _nearest(frames: Sequence[int], frame: float) -> int:

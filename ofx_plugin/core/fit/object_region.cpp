@@ -1,0 +1,435 @@
+#include "fit/object_region.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+namespace palette4d {
+namespace {
+
+/// Width, in pixels, that frames are reduced to at most: codec noise averages out, hair stays.
+constexpr int kWidth = 480;
+/// Half width, in reduced pixels, of the band around the object that is matted. Wider: soft edges
+/// and motion blur are matted. Narrower: less background is left out.
+constexpr int kBand = 8;
+/// Amount of the picked colour from which on a region grows.
+constexpr double kGrows = 0.25;
+/// A colour with the pick's saturation is a shade of it, one with half of it is a mixture or
+/// another thing: limits of the region's growth.
+constexpr double kPale = 0.35, kPure = 0.65;
+/// At the other frames the object is found where colours are this certainly the object's.
+constexpr double kSure = 0.9;
+
+/// 1 where a colour has the pick's saturation or more.
+double purity(const Vec3& shown, const Vec3& picked) {
+    const auto [red, green] = chroma_of(picked);
+    const double length = std::sqrt(red * red + green * green);
+    const double certain = hue_certainty(picked);
+    const auto [own_red, own_green] = chroma_of(shown);
+    const double along = std::max(own_red * red + own_green * green, 0.0) / std::max(length, 1e-9);
+    const double saturation = (along + kChromaNoise) / (lightness_of(shown) + kChromaNoise);
+    const double relative =
+        saturation * (lightness_of(picked) + kChromaNoise) / (length + kChromaNoise);
+    return 1 - certain + certain * smooth_step(relative, kPale, kPure);
+}
+
+/// Marks the pixels of areas. `scale`: reduced pixels for each of the frame's.
+void mark(Mask& mask, const View& view, const std::vector<Brush>& areas, double scale) {
+    for (const Brush& area : areas) {
+        const double radius = std::max(area.radius * scale, 0.5);
+        const auto square = [&](double x, double y) {
+            const double x1 = std::max(0.0, std::ceil(x - radius)),
+                         x2 = std::min(view.width - 1.0, std::floor(x + radius));
+            const double y1 = std::max(0.0, std::ceil(y - radius)),
+                         y2 = std::min(view.height - 1.0, std::floor(y + radius));
+            if (!(x1 <= x2 && y1 <= y2)) return;
+            for (int row = static_cast<int>(y1); row <= static_cast<int>(y2); ++row) {
+                for (int column = static_cast<int>(x1); column <= static_cast<int>(x2); ++column) {
+                    mask[view.at(column, row)] = 1;
+                }
+            }
+        };
+        for (std::size_t i = 0; i < area.points.size(); ++i) {
+            // Pixel centres: reduced pixel n has the pixels from n / scale on.
+            const double x = (area.points[i][0] + 0.5) * scale - 0.5,
+                         y = (area.points[i][1] + 0.5) * scale - 0.5;
+            const double from_x = i ? (area.points[i - 1][0] + 0.5) * scale - 0.5 : x,
+                         from_y = i ? (area.points[i - 1][1] + 0.5) * scale - 0.5 : y;
+            const double length = std::max(std::abs(x - from_x), std::abs(y - from_y));
+            const double steps = std::ceil(length / radius) + 1;
+            // Only those steps whose squares are within the frame: a line may be very long.
+            double first = 1, last = steps;
+            const auto clip = [&](double from, double to, int size) {
+                if (from == to) return;
+                const double a = (-radius - 1 - from) / (to - from) * steps,
+                             b = (size + radius - from) / (to - from) * steps;
+                first = std::max(first, std::floor(std::min(a, b)));
+                last = std::min(last, std::ceil(std::max(a, b)));
+            };
+            clip(from_x, x, view.width);
+            clip(from_y, y, view.height);
+            for (double step = first; step <= last; step += 1) {
+                const double part = step / steps;
+                square(from_x + part * (x - from_x), from_y + part * (y - from_y));
+            }
+        }
+    }
+}
+
+/// Areas that casts to pixels and loops over steps can take.
+void check_areas(const std::vector<Brush>& areas) {
+    constexpr double kMostPixels = 1e9;
+    const auto fits = [](double x) { return std::abs(x) <= kMostPixels; };  // not NaN
+    for (const Brush& area : areas) {
+        bool good = fits(area.radius);
+        for (const auto& [x, y] : area.points) good = good && fits(x) && fits(y);
+        if (!good) {
+            throw std::invalid_argument(
+                "learn_matte: found an area with NaN or beyond 1e9 pixels; expected pixels of the "
+                "frame");
+        }
+    }
+}
+
+/// The pixels nearest the picked colour: a thousandth of all, but none that is another colour.
+void seed_by_colour(View& view, const Vec3& point) {
+    std::vector<std::pair<float, std::size_t>> away;
+    for (std::size_t i = 0; i < view.size(); ++i) {
+        if (!view.real[i]) continue;
+        const auto square = static_cast<float>(pick_distance2(view.point[i], point));
+        if (square < kNear * kNear) away.emplace_back(square, i);
+    }
+    std::sort(away.begin(), away.end());
+    away.resize(std::min(away.size(), std::max(view.size() / 1000, std::size_t{9})));
+    for (const auto& [unused, i] : away) view.seed[i] = 1;
+}
+
+/// Spreads from the pixels in `open` to neighbours that join(pixel) takes.
+template <class Join>
+void spread(const View& view, std::vector<std::size_t> open, Join join) {
+    const auto width = static_cast<std::size_t>(view.width);
+    const auto visit = [&](std::size_t i) {
+        if (join(i)) open.push_back(i);
+    };
+    while (!open.empty()) {
+        const std::size_t i = open.back();
+        open.pop_back();
+        if (i % width > 0) visit(i - 1);
+        if (i % width + 1 < width) visit(i + 1);
+        if (i >= width) visit(i - width);
+        if (i + width < view.size()) visit(i + width);
+    }
+}
+
+/// Adds to a marked part of the background what is connected with it, has its hue, and is nearer
+/// its colour than the pick's.
+void grow_other(const View& view, Mask& marked, const Vec3& pick) {
+    Vec3 shown{};
+    std::vector<std::size_t> open;
+    for (std::size_t i = 0; i < view.size(); ++i) {
+        if (!marked[i] || !view.real[i]) continue;
+        for (std::size_t c = 0; c < 3; ++c) shown[c] += static_cast<double>(view.shown[c][i]);
+        open.push_back(i);
+    }
+    if (open.empty()) return;
+    shown = (1 / static_cast<double>(open.size())) * shown;
+    const Vec3 own = pick_point(shown);
+    const Grid hue = hue_grid(shown);
+    spread(view, std::move(open), [&](std::size_t i) {
+        if (marked[i] || !view.real[i] || view.seed[i]) return false;
+        const Vec3& point = view.point[i];
+        if (pick_distance2(point, own) >= pick_distance2(point, pick)) return false;
+        if (MatteGrid::at(hue.data(), point) < 0.5) return false;
+        marked[i] = 1;
+        return true;
+    });
+}
+
+/// Means over squares of half width `radius`, of the pixels in a mask. From sums over all pixels
+/// above and to the left, so that a mean takes the same time for any radius.
+class LocalMean {
+public:
+    LocalMean(const View& view, const Mask& mask, int radius)
+        : view_(view), mask_(mask), radius_(radius), counts_(sums(nullptr)) {}
+
+    /// The means at the `wanted` pixels; 0 at others.
+    Image of(const Image& image, const Mask& wanted) const {
+        const std::vector<double> values = sums(&image);
+        Image means(view_.size(), 0);
+        for (int y = 0; y < view_.height; ++y) {
+            for (int x = 0; x < view_.width; ++x) {
+                if (!wanted[view_.at(x, y)]) continue;
+                const double count = window(counts_, x, y);
+                means[view_.at(x, y)] =
+                    static_cast<float>(count > 0 ? window(values, x, y) / count : 0.0);
+            }
+        }
+        return means;
+    }
+    bool any(int x, int y) const { return window(counts_, x, y) > 0; }
+
+private:
+    std::vector<double> sums(const Image* image) const {
+        const auto stride = static_cast<std::size_t>(view_.width) + 1;
+        std::vector<double> table(stride * (static_cast<std::size_t>(view_.height) + 1), 0.0);
+        for (int y = 0; y < view_.height; ++y) {
+            double row = 0;
+            for (int x = 0; x < view_.width; ++x) {
+                const std::size_t i = view_.at(x, y);
+                if (mask_[i]) row += image ? static_cast<double>((*image)[i]) : 1.0;
+                const std::size_t at =
+                    (static_cast<std::size_t>(y) + 1) * stride + static_cast<std::size_t>(x) + 1;
+                table[at] = table[at - stride] + row;
+            }
+        }
+        return table;
+    }
+    double window(const std::vector<double>& table, int x, int y) const {
+        const auto stride = static_cast<std::size_t>(view_.width) + 1;
+        const auto x1 = static_cast<std::size_t>(std::max(0, x - radius_)),
+                   x2 = static_cast<std::size_t>(std::min(view_.width, x + radius_ + 1));
+        const auto y1 = static_cast<std::size_t>(std::max(0, y - radius_)),
+                   y2 = static_cast<std::size_t>(std::min(view_.height, y + radius_ + 1));
+        return table[y2 * stride + x2] - table[y1 * stride + x2] - table[y2 * stride + x1] +
+               table[y1 * stride + x1];
+    }
+
+    const View& view_;
+    const Mask& mask_;
+    const int radius_;
+    const std::vector<double> counts_;
+};
+
+/// City-block distances to the nearest pixel whose mask is `value`; beyond the frame there is none.
+std::vector<int> distances(const View& view, const Mask& mask, std::uint8_t value) {
+    const int far = view.width + view.height;
+    std::vector<int> away(view.size());
+    for (std::size_t i = 0; i < away.size(); ++i) away[i] = mask[i] == value ? 0 : far;
+    for (int y = 0; y < view.height; ++y) {
+        for (int x = 0; x < view.width; ++x) {
+            int& own = away[view.at(x, y)];
+            if (x > 0) own = std::min(own, away[view.at(x - 1, y)] + 1);
+            if (y > 0) own = std::min(own, away[view.at(x, y - 1)] + 1);
+        }
+    }
+    for (int y = view.height - 1; y >= 0; --y) {
+        for (int x = view.width - 1; x >= 0; --x) {
+            int& own = away[view.at(x, y)];
+            if (x + 1 < view.width) own = std::min(own, away[view.at(x + 1, y)] + 1);
+            if (y + 1 < view.height) own = std::min(own, away[view.at(x, y + 1)] + 1);
+        }
+    }
+    return away;
+}
+
+/// A little smoother, so that single noisy pixels neither join nor part regions.
+Image smoothed(const View& view, const Image& image) {
+    constexpr double kSigma = 1.5;
+    constexpr int kRadius = 5;
+    float kernel[2 * kRadius + 1];
+    double sum = 0;
+    for (int i = -kRadius; i <= kRadius; ++i) sum += std::exp(-0.5 * i * i / (kSigma * kSigma));
+    for (int i = -kRadius; i <= kRadius; ++i) {
+        kernel[i + kRadius] = static_cast<float>(std::exp(-0.5 * i * i / (kSigma * kSigma)) / sum);
+    }
+    Image rows(view.size()), found(view.size());
+    for (int y = 0; y < view.height; ++y) {
+        for (int x = 0; x < view.width; ++x) {
+            float value = 0;
+            for (int i = -kRadius; i <= kRadius; ++i) {
+                value +=
+                    kernel[i + kRadius] * image[view.at(std::clamp(x + i, 0, view.width - 1), y)];
+            }
+            rows[view.at(x, y)] = value;
+        }
+    }
+    for (int y = 0; y < view.height; ++y) {
+        for (int x = 0; x < view.width; ++x) {
+            float value = 0;
+            for (int i = -kRadius; i <= kRadius; ++i) {
+                value +=
+                    kernel[i + kRadius] * rows[view.at(x, std::clamp(y + i, 0, view.height - 1))];
+            }
+            found[view.at(x, y)] = value;
+        }
+    }
+    return found;
+}
+
+/// The pixels of a region that are connected with seeds, across gaps of one or two pixels.
+Mask connected(const View& view, const Mask& region, const Mask& seeds) {
+    const std::vector<int> away = distances(view, region, 1);
+    Mask reached(view.size(), 0);
+    std::vector<std::size_t> open;
+    for (std::size_t i = 0; i < view.size(); ++i) {
+        if (seeds[i] && away[i] <= 1) {
+            reached[i] = 1;
+            open.push_back(i);
+        }
+    }
+    spread(view, std::move(open), [&](std::size_t i) {
+        if (reached[i] || away[i] > 1) return false;
+        reached[i] = 1;
+        return true;
+    });
+    for (std::size_t i = 0; i < view.size(); ++i) reached[i] &= region[i];
+    return reached;
+}
+
+Parts parts_of(const View& view, Mask region) {
+    Parts parts;
+    const std::size_t size = view.size();
+    const std::vector<int> outside = distances(view, region, 1),
+                           inside = distances(view, region, 0);
+    Mask far(size), core(size), between(size);
+    for (std::size_t i = 0; i < size; ++i) {
+        far[i] = outside[i] > kBand && view.real[i];
+        core[i] = inside[i] > 2;
+        between[i] = !far[i] && !core[i] && view.real[i];
+    }
+    const LocalMean of_object(view, core, kBand * 3 / 2), of_others(view, far, kBand * 3 / 2);
+    std::array<Image, 3> front, back;
+    for (std::size_t c = 0; c < 3; ++c) {
+        front[c] = of_object.of(view.shown[c], between);
+        back[c] = of_others.of(view.shown[c], between);
+    }
+    parts.object.assign(size, 0);
+    parts.background.assign(size, 0);
+    parts.band.assign(size, 0);
+    Image alphas(size, 0);
+    for (int y = 0; y < view.height; ++y) {
+        for (int x = 0; x < view.width; ++x) {
+            const std::size_t i = view.at(x, y);
+            if (!view.real[i]) continue;
+            bool mixed = false;
+            double alpha = 0;
+            if (between[i] && of_object.any(x, y) && of_others.any(x, y)) {
+                Vec3 line, own;
+                for (std::size_t c = 0; c < 3; ++c) {
+                    line[c] = static_cast<double>(front[c][i]) - back[c][i];
+                    own[c] = static_cast<double>(view.shown[c][i]) - back[c][i];
+                }
+                const double length2 = dot(line, line);
+                if (length2 > 0.01) {
+                    alpha = std::clamp(dot(own, line) / length2, 0.0, 1.0);
+                    const Vec3 off = own - alpha * line;
+                    mixed = dot(off, off) < length2 / 16;
+                }
+            }
+            const bool object =
+                (inside[i] > 1 && !mixed) || (mixed && alpha > 0.9 && region[i]) || view.seed[i];
+            const bool others = !object && ((outside[i] > 1 && !mixed) || (mixed && alpha < 0.05));
+            parts.object[i] = object && !view.other[i];
+            parts.background[i] = others || view.other[i];
+            parts.band[i] = mixed && !object && !others && !view.other[i];
+            alphas[i] = static_cast<float>(alpha);
+        }
+    }
+    // A mixture has its part of the object's amount of the picked colour, not of the pick's.
+    const Image means = LocalMean(view, parts.object, kBand).of(view.amount, parts.band);
+    parts.wanted.assign(size, 0);
+    for (std::size_t i = 0; i < size; ++i) {
+        if (!parts.band[i]) continue;
+        const double own = std::max(static_cast<double>(view.amount[i]), 0.05);
+        parts.wanted[i] = static_cast<float>(
+            std::clamp(static_cast<double>(alphas[i]) * means[i] / own, 0.0, 1.0));
+    }
+    parts.region = std::move(region);
+    return parts;
+}
+
+}  // namespace
+
+View reduced(const LearningFrame& frame, const Vec3& picked, const DisplayCurve* display) {
+    if (frame.width < 1 || frame.height < 1) {
+        throw std::invalid_argument("learn_matte: found a frame without pixels");
+    }
+    check_areas(frame.object);
+    check_areas(frame.others);
+    View view;
+    const int by = std::max(1, (frame.width + kWidth - 1) / kWidth);
+    view.width = (frame.width + by - 1) / by;
+    view.height = (frame.height + by - 1) / by;
+    const std::size_t size = view.size();
+    for (Image& channel : view.shown) channel.assign(size, 0);
+    view.point.resize(size);
+    view.real.assign(size, 0);
+    view.amount.resize(size);
+    view.grows.resize(size);
+    view.node.resize(size);
+    view.seed.assign(size, 0);
+    view.other.assign(size, 0);
+    const Vec3 now = displayed(frame.colour, display), first = displayed(picked, display);
+    const Vec3 here = pick_point(now), start = pick_point(first);
+    const PickedColour own(now);
+    for (int y = 0; y < view.height; ++y) {
+        for (int x = 0; x < view.width; ++x) {
+            const std::size_t i = view.at(x, y);
+            Vec3 sum{};
+            int count = 0;
+            for (int row = y * by; row < std::min((y + 1) * by, frame.height); ++row) {
+                const auto* const pixels = reinterpret_cast<const float*>(
+                    reinterpret_cast<const char*>(frame.pixels) + frame.row_bytes * row);
+                for (int column = x * by; column < std::min((x + 1) * by, frame.width); ++column) {
+                    const float* const rgb = pixels + 3 * static_cast<std::ptrdiff_t>(column);
+                    const Vec3 colour{rgb[0], rgb[1], rgb[2]};
+                    if (!finite(colour)) continue;
+                    add(sum, 1, colour);
+                    ++count;
+                }
+            }
+            if (count == 0) continue;
+            view.real[i] = 1;
+            const Vec3 shown = displayed((1.0 / count) * sum, display);
+            for (std::size_t c = 0; c < 3; ++c) view.shown[c][i] = static_cast<float>(shown[c]);
+            const Vec3 point = pick_point(shown);
+            view.point[i] = point - nearness(point, here) * (here - start);
+            const MatteGrid::Place p = MatteGrid::place(view.point[i]);
+            view.node[i] = static_cast<std::uint32_t>(MatteGrid::index(
+                p.u + (p.part_u >= 0.5), p.v + (p.part_v >= 0.5), p.l + (p.part_l >= 0.5)));
+            const double amount = own.amount(shown);
+            view.amount[i] = static_cast<float>(amount);
+            view.grows[i] = static_cast<float>(amount > kGrows ? purity(shown, now) : 0);
+        }
+    }
+    const double scale = 1.0 / by;
+    mark(view.seed, view, frame.object, scale);
+    for (const Brush& area : frame.others) {
+        Mask marked(size, 0);
+        mark(marked, view, {area}, scale);
+        grow_other(view, marked, start);
+        for (std::size_t i = 0; i < size; ++i) view.other[i] |= marked[i];
+    }
+    view.seeded = frame.seeded;
+    if (frame.seeded && frame.object.empty()) seed_by_colour(view, start);
+    for (std::size_t i = 0; i < size; ++i) view.seed[i] &= view.real[i];
+    return view;
+}
+
+Parts find_object(const View& view, const Grid& membership, const Grid& sure) {
+    Image inside(view.size());
+    Mask seeds = view.seed;
+    for (std::size_t i = 0; i < view.size(); ++i) {
+        if (!view.real[i]) continue;
+        if (view.seeded && view.grows[i] == 0) continue;
+        const double m = MatteGrid::at(membership.data(), view.point[i]);
+        inside[i] = static_cast<float>(m * static_cast<double>(view.grows[i]));
+        if (!view.seeded) {
+            seeds[i] = m > kSure && MatteGrid::at(sure.data(), view.point[i]) > kSure;
+        }
+    }
+    if (!view.seeded) {
+        // Single pixels are noise.
+        const std::vector<int> within = distances(view, seeds, 0);
+        for (std::size_t i = 0; i < view.size(); ++i) seeds[i] = within[i] > 1;
+    }
+    const Image smooth = smoothed(view, inside);
+    Mask region(view.size());
+    for (std::size_t i = 0; i < view.size(); ++i) {
+        region[i] = view.real[i] && !view.other[i] && (smooth[i] > 0.5f || view.seed[i]);
+    }
+    return parts_of(view, connected(view, region, seeds));
+}
+
+}  // namespace palette4d
