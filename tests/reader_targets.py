@@ -99,7 +99,7 @@ def edit(path: Path, folder: Path) -> str:
     """Read a timeline and its shots; return a fault as its traceback."""
     try:
         with mock.patch.object(timeline_shots.Child, "call", unopened):
-            numbered(timeline_shots.shots_of(timeline_clips.clips_of(path)))
+            numbered(timeline_shots.shots_of(timeline_clips.clips_of(path))[0])
     except Palette4dError:
         return "refused"
     except Exception:

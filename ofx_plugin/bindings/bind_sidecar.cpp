@@ -12,6 +12,7 @@
 #include "arrays.hpp"
 #include "binders.hpp"
 #include "recolour/frame_picks.hpp"
+#include "sidecar/clip_name.hpp"
 #include "sidecar/sidecar.hpp"
 
 using palette4d::Edits;
@@ -240,4 +241,6 @@ void bind_sidecar(py::module_& module) {
         },
         py::arg("text"), py::arg("name") = "<text>",
         "The same for text (str or bytes) in memory; `name` replaces the file name in errors.");
+    module.def("clip_name", &palette4d::clip_name, py::arg("file_name"),
+               "A media file's name without extension and frame number: that of its sidecar.");
 }

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <vector>
 
+#include "sidecar/clip_name.hpp"
 #include "windows.hpp"
 
 namespace palette4d::node {
@@ -125,31 +126,8 @@ std::vector<fs::path> search_folders(const std::string& folder) {
     return folders;
 }
 
-constexpr const char* kEnding = ".p4d.json";
-
-bool is_still(const fs::path& media) {
-    std::string ending = media.extension().u8string();
-    for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    for (const char* known : {".exr", ".dpx", ".tif", ".tiff", ".png", ".jpg", ".jpeg", ".cin",
-                              ".tga", ".sgi", ".ari", ".dng", ".jp2", ".j2k", ".j2c", ".bmp"}) {
-        if (ending == known) return true;
-    }
-    return false;
-}
-
-/// The length of a name without a frame number, or its placeholder, at the end.
-std::size_t without_number(const std::string& stem) {
-    const std::size_t end = stem.find_last_not_of("0123456789#@%d[]-");
-    if (end == std::string::npos || end + 1 == stem.size()) return stem.size();
-    const std::size_t name = stem.find_last_not_of("._- ", end);
-    return name == std::string::npos ? stem.size() : name + 1;
-}
-
-/// A clip's name without extension and, for a sequence, without frame number.
-std::string clip_name(const std::string& path) {
-    const fs::path file = native(path);
-    const std::string stem = file.stem().u8string();
-    return is_still(file) ? stem.substr(0, without_number(stem)) : stem;
+std::string name_of(const std::string& media) {
+    return clip_name(native(media).filename().u8string());
 }
 
 }  // namespace
@@ -221,8 +199,8 @@ std::optional<std::string> find_beside(const std::string& media, const std::stri
     std::vector<fs::path> folders = search_folders(meant(folder));
     folders.insert(folders.begin(), file.parent_path());
     for (const fs::path& base : folders) {
-        for (const std::string& name : {file.stem().u8string(), clip_name(media)}) {
-            const fs::path path = base / native(name + kEnding);
+        for (const std::string& name : {file.stem().u8string(), name_of(media)}) {
+            const fs::path path = base / native(name + kSidecarEnding);
             if (is_file(path)) return path.u8string();
         }
     }
@@ -230,12 +208,12 @@ std::optional<std::string> find_beside(const std::string& media, const std::stri
 }
 
 std::string sidecar_beside(const std::string& clip) {
-    return (native(clip).parent_path() / native(clip_name(clip) + kEnding)).u8string();
+    return (native(clip).parent_path() / native(name_of(clip) + kSidecarEnding)).u8string();
 }
 
 std::string clip_spec(const std::string& media) {
     const fs::path file = native(media);
-    if (!is_still(file)) return media;
+    if (!is_still(file.filename().u8string())) return media;
     std::string stem = file.stem().u8string();
     std::size_t begin = stem.find_first_of("0123456789", without_number(stem));
     if (begin == std::string::npos) return media;
@@ -257,7 +235,7 @@ std::string clip_spec(const std::string& media) {
 
 std::optional<double> first_number(const std::string& media) {
     const fs::path file = native(media);
-    if (!is_still(file)) return std::nullopt;
+    if (!is_still(file.filename().u8string())) return std::nullopt;
     const std::string stem = file.stem().u8string();
     const std::string rest = stem.substr(without_number(stem));
     const std::size_t digit = rest.find_first_of("0123456789");
@@ -267,7 +245,7 @@ std::optional<double> first_number(const std::string& media) {
 }
 
 bool same_clip(const std::string& media, const std::string& source) {
-    return clip_name(media) == clip_name(source);
+    return name_of(media) == name_of(source);
 }
 
 std::string meant(const std::string& path) { return unpasted(without_project(path)); }

@@ -1,4 +1,4 @@
-// Finds sidecar files. Depends neither on OpenFX nor on the core.
+// Finds sidecar files. Depends on the core's rule for their names only, not on OpenFX.
 #pragma once
 
 #include <cstddef>

@@ -135,6 +135,9 @@ class Slice:
 
 def read_sidecar(path: str | os.PathLike[str]) -> Sidecar: ...
 def parse_sidecar(text: str | bytes, name: str = ...) -> Sidecar: ...
+def clip_name(file_name: str) -> str:
+    """A media file's name without extension and frame number: that of its sidecar."""
+
 def slice_at(polytope: Polytope, frame: float) -> Slice: ...
 def edited_colours(polytope: Polytope, edits: Edits, slice: Slice) -> F64:
     """(n, 3) float64 edited colours of the slice's vertices."""

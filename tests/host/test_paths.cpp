@@ -228,6 +228,8 @@ TEST(a_still_stands_for_its_sequence) {
     }
     CHECK(preferred(sidecar_beside("/a/shot.####.exr")) == preferred("/a/shot.p4d.json"));
     CHECK(preferred(sidecar_beside("/a/take3.mov")) == preferred("/a/take3.p4d.json"));
+    CHECK(preferred(sidecar_beside("/a/A001C001.mov")) == preferred("/a/A001C001.p4d.json"));
+    CHECK(preferred(sidecar_beside("/a/plate_v2.png")) == preferred("/a/plate_v2.p4d.json"));
 }
 
 TEST(a_missing_file_is_said_with_where_it_was_looked_for) {

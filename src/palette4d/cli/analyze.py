@@ -191,13 +191,15 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def _rate(text: str) -> Fraction:
+    from palette4d.media.clip_base import as_rate
+
     try:
-        rate = Fraction(text)
+        rate = Fraction(text) if "/" in text else as_rate(float(text))
     except (ValueError, ZeroDivisionError):
-        rate = Fraction(0)
-    if rate <= 0:
+        rate = None
+    if rate is None or rate <= 0:
         raise argparse.ArgumentTypeError(
-            f"found {text!r}, expected frames a second such as 24 or 24000/1001"
+            f"found {text!r}, expected frames a second such as 24, 23.976 or 24000/1001"
         )
     return rate
 

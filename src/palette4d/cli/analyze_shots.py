@@ -139,6 +139,7 @@ def run(args: argparse.Namespace, settings: dict[str, Any]) -> int:
 def report(done: Show) -> list[str]:
     """Return the report on the written files."""
     from palette4d.shows.manifest import DONE
+    from palette4d.shows.shots import words_of_speed
 
     entries = [entry for entry in done.manifest.entries if entry.status == DONE]
     lines = [
@@ -150,6 +151,8 @@ def report(done: Show) -> list[str]:
         assert entry.frames is not None
         where = f"   {entry.shot.place.record}" if entry.shot.place else ""
         first, last = entry.frames
+        if speed := words_of_speed(entry.shot.speed):
+            where += f"   {speed}"
         lines.append(f"  {entry.shot.name:<{width}}  frames {first} to {last}{where}")
     if len(entries) > MOST_LISTED:
         lines.append(f"  and {len(entries) - MOST_LISTED} more")

@@ -111,6 +111,7 @@ def info_of(document: "Document") -> dict[str, Any]:
         "edited_vertices": len(edited),
         "ramp": document.ramp,
         "picks": len(fields["edits"].get("picks", [])),
+        "edit": fields["extra"].get("edit"),
         "locks": fields["edits"].get("locks", []),
         "versions": list(document.versions),
         "steps": len(document.history),
@@ -176,6 +177,21 @@ def _share(share: "Share | None") -> dict[str, Any]:
     return {"share": share.mean, **most}
 
 
+def _edit_line(edit: Any) -> str:
+    """Return how the edit plays the shot, with the values of the node's parameters.
+
+    Other programs may have written anything there.
+    """
+    try:
+        speed, trimmed, reverse = float(edit["speed"]), float(edit["inPoint"]), edit["reverse"]
+    except (KeyError, TypeError, ValueError):
+        return ""
+    if speed == 0:
+        return "in edit   a freeze frame"
+    backwards = ", Reverse on" if reverse is True else ""
+    return f"in edit   Speed {speed:.9g}{backwards}, In-point {trimmed:g}"
+
+
 def _print_tracks(info: dict[str, Any]) -> None:
     """Print a line for each palette colour through time, before and after."""
     wide = max([5, *(len(track["name"]) for track in info["tracks"])])
@@ -216,6 +232,8 @@ def _print_head(info: dict[str, Any]) -> None:
     skipped = f", {len(info['skipped'])} skipped" if info["skipped"] else ""
     print(f"clip      {info['name']}  ({info['source']})")
     print(f"frames    {first} to {last}{step}{skipped}, {numerator / denominator:g} per second")
+    if line := _edit_line(info["edit"]):
+        print(line)
     found_in = f", palette in {info['encoding']}" if info["input_space"] else ""
     colours = info["input_space"] or info["encoding"]
     if colours == "unknown":

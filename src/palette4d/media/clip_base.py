@@ -264,10 +264,16 @@ def named(frames: Sequence[int]) -> str:
 
 
 def as_rate(value: float) -> Fraction | None:
-    """Usual rate nearest to a floating-point rate: 23.976 -> 24000/1001; None if it is no rate."""
+    """Usual rate nearest to a floating-point rate; None if it is no rate.
+
+    >>> as_rate(23.976), as_rate(23.98), as_rate(59.94), as_rate(24.0)
+    (Fraction(24000, 1001), Fraction(24000, 1001), Fraction(60000, 1001), Fraction(24, 1))
+    """
     if not math.isfinite(value) or value <= 0:
         return None
     for whole in range(1, 241):
-        if abs(value - whole * 1000 / 1001) < 2e-4 * whole / 24:
+        ntsc = whole * 1000 / 1001
+        # People round to two decimals, which are too few to tell 5 from 5000/1001.
+        if abs(value - ntsc) < 2e-4 * whole / 24 or (whole >= 12 and value == round(ntsc, 2)):
             return Fraction(whole * 1000, 1001)
     return Fraction(value).limit_denominator(1001) or None

@@ -1,4 +1,4 @@
-"""The start timecode that a camera writes into a clip's files.
+"""Timecodes, and the one that a camera writes into a clip's files.
 
 Movies state it for the file, for the video stream or in a separate stream. DPX and OpenEXR state it
 in each frame (SMPTE ST 268, `smpte:TimeCode`).
@@ -7,11 +7,46 @@ in each frame (SMPTE ST 268, `smpte:TimeCode`).
 from __future__ import annotations
 
 import re
+from fractions import Fraction
 
 from palette4d.common.errors import Palette4dError
 from palette4d.media.clip_base import Clip
 
 _TIMECODE = re.compile(r"([0-9]{2}:[0-9]{2}:[0-9]{2}[:;.][0-9]{2,3})")
+_PARTS = re.compile(r"([0-9]{1,2})[:;.,]([0-9]{2})[:;.,]([0-9]{2})([:;.,])([0-9]{2,3})")
+
+
+def nominal(rate: Fraction) -> int:
+    """Return the whole frames that a second of timecode has: 30 for 29.97."""
+    return max(1, round(rate))
+
+
+def frames_of(timecode: str, rate: Fraction, drop: bool = False) -> int | None:
+    """Return the number of frames from 00:00:00:00 to a timecode; None if there is no such one.
+
+    Any separator but a colon before the frames means that the timecode drops numbers, and so does
+    `drop`. It does so at multiples of 29.97 and 30 alone (SMPTE ST 12-1).
+
+    >>> frames_of("01:00:00:00", Fraction(30000, 1001)), frames_of("01:00:00;00", Fraction(30))
+    (108000, 107892)
+    >>> frames_of("00:01:00;00", Fraction(30)), frames_of("00:00:00:24", Fraction(24))
+    (None, None)
+    """
+    found = _PARTS.fullmatch(timecode.strip())
+    if found is None:
+        return None
+    hours, minutes, seconds, frames = (int(found[i]) for i in (1, 2, 3, 5))
+    base = nominal(rate)
+    if minutes > 59 or seconds > 59 or frames >= base:
+        return None
+    count = ((hours * 60 + minutes) * 60 + seconds) * base + frames
+    if base % 30 or not (drop or found[4] != ":"):
+        return count
+    skipped = base // 15  # of each minute but the tenth, twentieth, …
+    if minutes % 10 and not seconds and frames < skipped:
+        return None
+    whole = hours * 60 + minutes
+    return count - skipped * (whole - whole // 10)
 
 
 def start_timecode(clip: Clip) -> str | None:

@@ -134,9 +134,10 @@ def _of_edit(
     """Return an edit, its shots, and notes."""
     edit = timeline_clips.read(path, rate)
     folder = None if media is None else find_media.Folder(Path(media))
-    found, renamed = shots.numbered(timeline_shots.shots_of(edit, folder, handles))
-    notes = [f"not analysed: {note}" for note in edit.notes]
-    if path.suffix.lower() == ".edl" and rate is None:
+    listed, counting = timeline_shots.shots_of(edit, folder, handles)
+    found, renamed = shots.numbered(listed)
+    notes = [f"not analysed: {note}" for note in edit.notes] + counting
+    if timeline_files.is_edl(path) and rate is None:
         notes.append("an EDL does not state its rate: 24 frames per second are assumed (rate=…)")
     if renamed:
         some = ", ".join(renamed[:8]) + (", …" if len(renamed) > 8 else "")

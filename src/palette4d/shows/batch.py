@@ -8,6 +8,7 @@ that are missing or failed.
 from __future__ import annotations
 
 import dataclasses
+import json
 import os
 from collections.abc import Callable
 from fractions import Fraction
@@ -172,6 +173,7 @@ class Show:
         elif not self.options.force and (frames := self.there(own, before)) is not None:
             entry = Entry(own, DONE, frames)
             self.kept.append(shot.name)
+            _tell_edit(self.folder / entry.sidecar, own, frames)
         elif chosen:
             try:
                 self.check_target(entry, before)
@@ -240,9 +242,11 @@ class Show:
                 raise Palette4dError(outcome.text)
             document = outcome.document
             document["clip"]["source"] = entry.shot.clip
+            frames = document["clip"]["frames"]
+            if edit := _edit_of(entry.shot, (frames["first"], frames["last"])):
+                document["extra"]["edit"] = edit
             target = self.folder / entry.sidecar
             _, notes = reanalysis.save(document, target, on_edits=self.options.on_edits)
-            frames = document["clip"]["frames"]
             self.entries[name] = Entry(entry.shot, DONE, (frames["first"], frames["last"]))
             self.analysed.append(name)
             self.notes[name] = (*outcome.notes, *notes)
@@ -261,6 +265,33 @@ class Show:
         total = sum(counts[name] for name in [*self.kept, *self.tasks])
         ready = sum(entry.status == DONE for entry in self.entries.values())
         return total - left, total, f"{ready} of {counted(len(self.entries), 'shot')}"
+
+
+def _edit_of(shot: Shot, frames: tuple[int, int]) -> dict[str, Any]:
+    """Return how an edit plays a shot, by the names of the node's parameters, and its CDL.
+
+    `frames` are the sidecar's first and last. Nothing at the media's own speed and without a CDL.
+    """
+    edit: dict[str, Any] = {}
+    if shot.speed != 1:
+        trimmed = frames[1] - shot.used[1] if shot.speed < 0 else shot.used[0] - frames[0]
+        edit = {"speed": abs(shot.speed), "reverse": shot.speed < 0, "inPoint": trimmed}
+    if shot.cdl is not None:
+        edit["cdl"] = dataclasses.asdict(shot.cdl)
+    return edit
+
+
+def _tell_edit(target: Path, shot: Shot, frames: tuple[int, int]) -> None:
+    """Let a sidecar that is kept say how the edit plays its shot now."""
+    read = sidecar.read_bytes(target)
+    document = sidecar.fields_of(read)
+    edit = json.loads(json.dumps(_edit_of(shot, frames)))
+    if document["extra"].get("edit", {}) == edit or shot.place is None:
+        return
+    document["extra"] = {**document["extra"], "edit": edit}
+    if not edit:
+        del document["extra"]["edit"]
+    sidecar.save(document, target, on_edits="drop", replaces=read)
 
 
 def analyse_shot(task: ShotTask, threads: int) -> Analysed:

@@ -19,6 +19,9 @@ from palette4d.media import clip_sequence
 # name.####.exr, name.%04d.exr, name.@@@@.exr, name.[1001-1100].exr, name.1001.exr
 _NUMBERS = re.compile(r"(%0?[0-9]*d|#+|@+|\[[0-9]+-[0-9]+\]|(?<![0-9])[0-9]+)(?=\.[A-Za-z0-9]+$)")
 
+#: Extensions of camera originals, whose proxies are analysed.
+CAMERA = frozenset({"mxf", "r3d", "braw", "ari", "arx", "dng"})
+
 
 def local_path(url: str) -> Path:
     """Return the path for a media reference's URL or path."""
@@ -92,7 +95,7 @@ def _plain(name: str) -> str:
     suffix = path.suffix.lower().lstrip(".")
     known = clip_sequence.MOVIE_EXTENSIONS | clip_sequence.IMAGE_EXTENSIONS
     # The text after the last dot of a clip's name need not be an extension.
-    stem = path.stem if suffix in known | {"mxf", "r3d", "braw", "ari", "arx"} else name
+    stem = path.stem if suffix in known | CAMERA else name
     if suffix in clip_sequence.IMAGE_EXTENSIONS:
         stem = re.sub(r"[._ -]?(%0?[0-9]*d|#+|@+|\[[0-9]+-[0-9]+\])$", "", stem)
         if numbered := clip_sequence.frame_number(stem):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 import re
 from fractions import Fraction
 from pathlib import Path
@@ -17,6 +18,7 @@ from palette4d import _core
 from palette4d.common.errors import Palette4dError, in_words
 from palette4d.common.files import replacing
 from palette4d.common.json_files import UnusableFile, read_json
+from palette4d.shows.edl_cdl import Cdl
 from palette4d.shows.shots import Place, Shot
 
 SCHEMA, VERSION = "palette4d.shots", 1
@@ -120,6 +122,10 @@ def _row(entry: Entry) -> dict[str, Any]:
     }
     if place is not None:
         row["edit"] = {"track": place.track, "record": place.record, "path": list(place.path)}
+    if shot.speed != 1:
+        row["speed"] = shot.speed
+    if shot.cdl is not None:
+        row["cdl"] = dataclasses.asdict(shot.cdl)
     if entry.error:
         row["error"] = entry.error
     return row
@@ -178,7 +184,17 @@ def _entry(row: dict[str, Any]) -> Entry:
     name = _text(row["name"])
     if row["sidecar"] != f"{name}.p4d.json" or not _NAME.fullmatch(name):
         raise ValueError(f"sidecar {row['sidecar']!r} of the shot {name!r}")
-    shot = Shot(name, _text(row["clip"]), first, last, (used_first, used_last), step, place)
+    shot = Shot(
+        name,
+        _text(row["clip"]),
+        first,
+        last,
+        (used_first, used_last),
+        step,
+        place,
+        speed=_number(row.get("speed", 1)),
+        cdl=_cdl(row["cdl"]) if "cdl" in row else None,
+    )
     return Entry(
         shot=shot,
         status=row["status"],
@@ -197,6 +213,20 @@ def _whole(value: Any) -> int:
     if type(value) is not int or abs(value) > LARGEST_NUMBER:
         raise TypeError(f"{value!r:.40} instead of a whole number up to {LARGEST_NUMBER}")
     return value
+
+
+def _number(value: Any) -> float:
+    if type(value) not in (int, float) or not math.isfinite(value):
+        raise TypeError(f"{value!r:.40} instead of a number")
+    return float(value)
+
+
+def _cdl(row: dict[str, Any]) -> Cdl:
+    three = {}
+    for name in ("slope", "offset", "power"):
+        r, g, b = map(_number, row[name])
+        three[name] = (r, g, b)
+    return Cdl(**three, saturation=_number(row["saturation"]))
 
 
 def _rate(numerator: Any, denominator: Any) -> Fraction:

@@ -1,6 +1,8 @@
-"""The range of a clip's media that an edit shows, with transitions, speed and compounds.
+"""The media that a clip of an edit shows, with transitions, speed and compounds.
 
-Input: a clip of an OpenTimelineIO timeline. Output: ranges of time, in the edit and in the media.
+Input: a clip of an OpenTimelineIO timeline. Output: times of the edit and of the media, in seconds.
+OpenTimelineIO's times are doubles at any rate. Here they are fractions, so that no sum of times at
+several rates is off by a frame.
 """
 
 from __future__ import annotations
@@ -13,10 +15,12 @@ from fractions import Fraction
 from typing import Any
 
 from palette4d.common.errors import Palette4dError
+from palette4d.media.clip_base import as_rate
+from palette4d.media.timecode import nominal
 from palette4d.shows.timeline_files import library
 
-#: Fraction of a frame within which two times are the same: OpenTimelineIO's are doubles.
-ROUNDING = 1e-3
+#: Part of a frame within which two times are the same: files hold times as rounded decimals.
+ROUNDING = Fraction(1, 1000)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -26,33 +30,79 @@ class Level:
     Attributes
     ----------
     item : OpenTimelineIO's object.
-    place : its start in its parent; None for 0, a text if it cannot be known.
+    place : its start in its parent, in seconds; a text if it cannot be known.
     """
 
     item: Any
-    place: Any
+    place: Fraction | str
 
     @property
-    def moves(self) -> tuple[Any, Any]:
-        """The start of the item's own time, and its start in its parent; None for 0."""
+    def moves(self) -> tuple[Fraction, Fraction]:
+        """The start of the item's own time, and its start in its parent, in seconds."""
         if isinstance(self.place, str):
             raise Palette4dError(self.place)
         if isinstance(self.item, library().schema.Clip):
-            return self.item.trimmed_range().start_time, self.place
+            return seconds(self.item.trimmed_range().start_time), self.place
         own = self.item.source_range
-        return None if own is None else own.start_time, self.place
+        return Fraction(0) if own is None else seconds(own.start_time), self.place
 
 
-def shown(levels: Sequence[Level]) -> tuple[Any, Any] | None:
-    """Return a clip's start in the edit, and the range of its media that the edit shows.
+@dataclasses.dataclass(frozen=True)
+class Shown:
+    """What an edit shows of a clip's media.
 
-    `levels` begins with the clip and ends with the track. None if the edit shows nothing of the
-    clip. The start is in the time of the timeline's stack, the range in the media's time.
+    Attributes
+    ----------
+    record : the clip's start in the time of the timeline's stack, in seconds.
+    start, end : the media's time in seconds. At the media's own speed `end` is behind the last
+        frame, else it is a time in the last frame.
+    speed : how often the media's own speed; negative if it plays backwards, 0 if it stands still.
+    """
+
+    record: Fraction
+    start: Fraction
+    end: Fraction
+    speed: float = 1.0
+
+    def frames(self, rate: Fraction) -> tuple[int, int]:
+        """Return the first and last frame, counted in the media's time at a rate."""
+        start, end = self.start * rate, self.end * rate
+        first = math.floor(start + ROUNDING)
+        if self.speed == 1:
+            return first, max(first, math.ceil(end - ROUNDING) - 1)
+        return first, max(first, math.floor(end + ROUNDING))
+
+
+def rate_of(rate: float) -> Fraction:
+    """Return a rate of OpenTimelineIO's; `Palette4dError` if it is none."""
+    found = as_rate(rate)
+    if found is None:
+        raise Palette4dError(
+            f"found the rate {rate:g}, expected frames per second above 0; mend it in the edit"
+        )
+    return found
+
+
+def own_rate(range_: Any) -> Fraction:
+    """Return the rate at which a time range counts; a start of 0 may have any."""
+    start = range_.start_time
+    return rate_of(start.rate if start.value else range_.duration.rate)
+
+
+def seconds(time: Any) -> Fraction:
+    """Return a time of OpenTimelineIO's in seconds."""
+    return Fraction(time.value).limit_denominator(10**6) / rate_of(time.rate)
+
+
+def shown(levels: Sequence[Level], rate: Fraction) -> Shown | None:
+    """Return what an edit shows of a clip; None if it shows nothing of it.
+
+    `levels` begins with the clip and ends with the track. `rate` is that of the edit.
     """
     schema = library().schema
     clip = levels[0].item
-    whole = window = clip.visible_range()  # with the media that neighbouring transitions show
-    for level, parent in itertools.pairwise([*levels, Level(levels[-1].item.parent(), None)]):
+    whole = window = _visible(clip)
+    for level, parent in itertools.pairwise([*levels, Level(levels[-1].item.parent(), "")]):
         item = level.item
         if item is not clip and any(
             isinstance(effect, schema.TimeEffect) for effect in item.effects
@@ -62,45 +112,51 @@ def shown(levels: Sequence[Level]) -> tuple[Any, Any] | None:
                 "another speed, which is not followed; change the speed of the clip itself"
             )
         own, place = level.moves
-        window = _moved(window, own, place)
+        window = _moved(window, place - own)
         if parent.item.source_range is not None:
-            window = _common(window, parent.item.source_range)
-            if window is None:
+            cut = _common(window, _bounds(parent.item.source_range))
+            if cut is None:
                 return None
+            window = cut
     back = window
     for level in levels:
         own, place = level.moves
-        back = _moved(back, place, own)
+        back = _moved(back, own - place)
     left = _common(back, whole)
-    return None if left is None else (window.start_time, _with_speed(clip, left))
+    return None if left is None else _with_speed(clip, window[0], left, rate)
 
 
-def frames(shown: Any, rate: Fraction) -> tuple[int, int]:
-    """Return the first and last frame of a range of media, counted in its time at a rate."""
-    start, length = _at(shown.start_time, rate), _at(shown.duration, rate)
-    rounding = Fraction(ROUNDING).limit_denominator(1000)
-    first = math.floor(start + rounding)
-    return first, max(first, math.ceil(start + length - rounding) - 1)
+_Range = tuple[Fraction, Fraction]
 
 
-def _at(time: Any, rate: Fraction) -> Fraction:
-    value = Fraction(time.value).limit_denominator(10**6)
-    return value * (rate / Fraction(time.rate).limit_denominator(1001))
+def _bounds(range_: Any) -> _Range:
+    start = seconds(range_.start_time)
+    return start, start + seconds(range_.duration)
 
 
-def _moved(window: Any, back: Any, on: Any) -> Any:
-    """Return a time range moved back by one time and on by another; None is 0."""
-    start = window.start_time
-    if back is not None:
-        start = start - back
-    if on is not None:
-        start = start + on
-    return library().opentime.TimeRange(start, window.duration)
+def _visible(clip: Any) -> _Range:
+    """Return a clip's range with the media that neighbouring transitions show."""
+    start, end = _bounds(clip.trimmed_range())
+    head, tail = clip.parent().handles_of_child(clip) if _in_track(clip) else (None, None)
+    return start - (seconds(head) if head else 0), end + (seconds(tail) if tail else 0)
 
 
-def _with_speed(clip: Any, shown: Any) -> Any:
-    """Return the media that a clip plays in a range of its own time."""
-    schema, opentime = library().schema, library().opentime
+def _in_track(clip: Any) -> bool:
+    return isinstance(clip.parent(), library().schema.Track)
+
+
+def _moved(window: _Range, by: Fraction) -> _Range:
+    return window[0] + by, window[1] + by
+
+
+def _common(one: _Range, other: _Range) -> _Range | None:
+    start, end = max(one[0], other[0]), min(one[1], other[1])
+    return None if end <= start else (start, end)
+
+
+def speed_of(clip: Any) -> float:
+    """Return a clip's constant speed, 1 for the media's own; `Palette4dError` if it has none."""
+    schema = library().schema
     speed = 1.0
     for effect in clip.effects:
         if isinstance(effect, schema.LinearTimeWarp):  # a freeze frame, too
@@ -108,31 +164,33 @@ def _with_speed(clip: Any, shown: Any) -> Any:
         elif isinstance(effect, schema.TimeEffect):
             raise Palette4dError(
                 f"the clip {clip.name!r} has the time effect {effect.effect_name!r}, which is "
-                "not followed; expected a constant speed or a freeze frame"
+                f"not followed; {effect.name or 'expected a constant speed or a freeze frame'}"
             )
-    if speed == 1:
-        return shown
-    if speed < 0 or not math.isfinite(speed):
+    if not math.isfinite(speed):
         raise Palette4dError(
-            f"the clip {clip.name!r} plays at {speed:g} times its speed, which is not followed; "
-            "expected 0 (a freeze frame) or more. Render it, or analyse its media on its own"
+            f"the clip {clip.name!r} plays at {speed:g} times its speed, expected a finite number; "
+            "mend it in the edit"
         )
-    # The in-point stays the same; time counts from there, in whole frames.
-    origin = clip.trimmed_range().start_time
-    rate = shown.duration.rate
-    begin = origin.value_rescaled_to(rate)
-    start = begin + speed * (shown.start_time.value_rescaled_to(rate) - begin)
-    last = start + speed * (shown.duration.value - 1)
-    first, end = math.floor(start + ROUNDING), math.floor(last + ROUNDING) + 1
-    return opentime.TimeRange(
-        opentime.RationalTime(first, rate), opentime.RationalTime(max(1, end - first), rate)
-    )
+    return speed
 
 
-def _common(one: Any, other: Any) -> Any:
-    """Return the intersection of two time ranges; None if it is empty."""
-    start = max(one.start_time, other.start_time)
-    end = min(one.end_time_exclusive(), other.end_time_exclusive())
-    if end <= start:
-        return None
-    return library().opentime.range_from_start_end_time(start, end)
+def _with_speed(clip: Any, record: Fraction, left: _Range, rate: Fraction) -> Shown:
+    """Return the media that a clip plays in a range of its own time.
+
+    At another speed the in-point stays, and the media of the clip's length times the speed follows
+    it. Backwards, its last frame is played first.
+    """
+    speed = speed_of(clip)
+    if speed == 1:
+        return Shown(record, *left)
+    own = clip.trimmed_range()
+    begin, end = _bounds(own)
+    counted = own_rate(own)
+    # The edit shows no frame after its own last one.
+    finest = counted if nominal(counted) == nominal(rate) else max(counted, rate)
+    step = 1 / finest
+    first, last = left[0] - begin, max(left[0], left[1] - step) - begin
+    if speed < 0:
+        first, last = end - begin - step - last, end - begin - step - first
+    times = Fraction(abs(speed)).limit_denominator(10**6)
+    return Shown(record, begin + times * first, begin + times * last, speed)

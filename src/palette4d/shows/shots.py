@@ -15,6 +15,7 @@ from palette4d.common.errors import Palette4dError
 from palette4d.common.text import file_safe
 from palette4d.media import cuts
 from palette4d.media.clip_base import Clip, even_step, hidden
+from palette4d.shows.edl_cdl import Cdl
 
 #: Largest number of colours per frame in the search for cuts.
 BINS = 4096
@@ -50,6 +51,8 @@ class Shot:
     step : the distance between frames.
     place : the place in the edit.
     problem : the reason why it cannot be analysed, or "".
+    speed : how often the media's own speed the edit plays it; negative backwards, 0 a freeze frame.
+    cdl : the CDL that the edit states for it.
     """
 
     name: str
@@ -60,6 +63,8 @@ class Shot:
     step: int = 1
     place: Place | None = None
     problem: str = ""
+    speed: float = 1.0
+    cdl: Cdl | None = None
 
     @property
     def frames(self) -> str:
@@ -70,6 +75,18 @@ class Shot:
     def count(self) -> int:
         """The number of analysed frames."""
         return (self.last - self.first) // self.step + 1
+
+
+def words_of_speed(speed: float) -> str:
+    """Return how an edit plays a shot.
+
+    >>> words_of_speed(-1), words_of_speed(1.5), words_of_speed(-2), words_of_speed(0)
+    ('backwards', '1.5 x', '2 x backwards', 'freeze frame')
+    """
+    if speed == 0:
+        return "freeze frame"
+    words = [f"{abs(speed):.4g} x"] if abs(speed) != 1 else []
+    return " ".join(words + ["backwards"] * (speed < 0))
 
 
 def numbered(shots: Iterable[Shot]) -> tuple[list[Shot], list[str]]:

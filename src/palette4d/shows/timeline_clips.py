@@ -16,11 +16,13 @@ from typing import Any
 from palette4d.common.errors import Palette4dError, in_words
 from palette4d.common.text import counted
 from palette4d.shows import media_range, timeline_files
-from palette4d.shows.media_range import Level
+from palette4d.shows.edl_cdl import Cdl
+from palette4d.shows.media_range import Level, Shown, own_rate, rate_of, seconds
 from palette4d.shows.shots import Place
 
 #: The most compounds inside of each other.
 DEEPEST = 64
+NOTHING = Shown(Fraction(0), Fraction(0), Fraction(0))
 #: The most digits of a frame number in a file's name.
 MOST_DIGITS = 20
 
@@ -36,9 +38,13 @@ class EditClip:
     url : the file, or the folder of `pattern`, as the edit names it; "" if it names none.
     pattern : the name of the image sequence that it refers to, with one # a digit, or "".
     reel : its reel's name, or "".
-    first, last : the frames that the edit shows, counted in the media's time at `rate`.
-    rate : the media's frames per second.
-    begins : the first frame of the media, counted likewise; None if the edit does not say it.
+    shown : the times of the media that the edit shows, and the speed.
+    rate : the media's frames per second, as the edit counts them.
+    begins, length : the start of the media in seconds, and its frames; None if the edit does not
+        say them.
+    by_frames : whether the edit's times are frames of the media, whatever its files' rate, as
+        in an EDL.
+    cdl : its CDL.
     start_frame : the number of the image sequence's first file.
     problem : the reason why its times or names cannot be used, or "".
     """
@@ -48,10 +54,12 @@ class EditClip:
     url: str = ""
     pattern: str = ""
     reel: str = ""
-    first: int = 0
-    last: int = 0
+    shown: Shown = NOTHING
     rate: Fraction = Fraction(24)
-    begins: int | None = None
+    begins: Fraction | None = None
+    length: int | None = None
+    by_frames: bool = False
+    cdl: Cdl | None = None
     start_frame: int = 0
     problem: str = ""
 
@@ -89,7 +97,7 @@ class _Walk:
         self.others: dict[tuple[str, str], int] = {}
         start = timeline.global_start_time
         try:
-            self.rate = _rate(start.rate if start else _first_rate(timeline))
+            self.rate = rate_of(start.rate) if start else _first_rate(timeline)
         except Palette4dError as error:
             raise Palette4dError(f"{path}: {error}") from None
 
@@ -97,7 +105,7 @@ class _Walk:
         """Return all clips; `Palette4dError` if there are none."""
         schema = self.otio.schema
         for index, track in enumerate(self.timeline.tracks):
-            level = Level(track, None)
+            level = Level(track, Fraction(0))
             if not isinstance(track, schema.Track):
                 self.walk((level,), (index,), f"layer {index + 1}")
             elif track.kind != schema.TrackKind.Video:
@@ -128,7 +136,7 @@ class _Walk:
             )
         schema, parent = self.otio.schema, levels[0].item
         # Summed here: OpenTimelineIO would add all items before each clip anew.
-        place: Any = None
+        place: Fraction | str = Fraction(0)
         for index, item in enumerate(parent):
             here = (*path, index)
             if isinstance(item, schema.Transition):
@@ -153,12 +161,12 @@ class _Walk:
             return
         place = Place(track, "", path)
         try:
-            shown = media_range.shown(levels)
+            shown = media_range.shown(levels, self.rate)
             if shown is None:
                 self.passed_over("clip is cut away", "clips are cut away")
                 return
-            place = Place(track, self.record_of(shown[0]), path)
-            self.clips.append(self.described(clip, place, shown[1]))
+            place = Place(track, self.record_of(shown.record), path)
+            self.clips.append(self.described(clip, place, shown))
         except MemoryError:
             raise
         except Exception as error:  # anything may come of a hostile file
@@ -167,14 +175,15 @@ class _Walk:
                 problem = f"its times or names cannot be used ({problem}); mend it in the edit"
             self.clips.append(EditClip(clip.name, place, problem=problem))
 
-    def described(self, clip: Any, place: Place, used: Any) -> EditClip:
+    def described(self, clip: Any, place: Place, shown: Shown) -> EditClip:
         """Return a clip that shows a range of its media's time."""
         schema, reference = self.otio.schema, clip.media_reference
         numbered = isinstance(reference, schema.ImageSequenceReference)
         known = getattr(reference, "available_range", None)
-        start = known.start_time if known is not None else used.start_time
-        rate = _rate(reference.rate if numbered and reference.rate > 0 else start.rate)
-        first, last = media_range.frames(used, rate)
+        # The times of what stands beside the clip are none of its media's.
+        rate = own_rate(clip.trimmed_range() if known is None else known)
+        if numbered and reference.rate > 0:
+            rate = rate_of(reference.rate)
         url = pattern = ""
         if isinstance(reference, schema.ExternalReference):
             url = reference.target_url or ""
@@ -193,37 +202,36 @@ class _Walk:
             url=url,
             pattern=pattern,
             reel=_reel(clip),
-            first=first,
-            last=last,
+            shown=shown,
             rate=rate,
-            begins=None if known is None else round(start.rescaled_to(float(rate)).value),
+            begins=None if known is None else seconds(known.start_time),
+            length=None if known is None else round(seconds(known.duration) * rate),
+            by_frames=timeline_files.is_edl(self.path),
+            cdl=Cdl.of_metadata(clip.metadata.get("cdl")),
             start_frame=reference.start_frame if numbered else 0,
         )
 
-    def record_of(self, time: Any) -> str:
+    def record_of(self, time: Fraction) -> str:
         """Return a time of the timeline as a timecode, else as a frame number."""
-        opentime = self.otio.opentime
-        start = self.timeline.global_start_time
+        opentime, start = self.otio.opentime, self.timeline.global_start_time
         rate = float(self.rate)
-        at = time.rescaled_to(rate)
-        if start is not None:
-            at += start.rescaled_to(rate)
+        at = (time + (seconds(start) if start else 0)) * self.rate
+        frame = math.floor(at + media_range.ROUNDING)
         try:
-            return str(opentime.to_timecode(at, rate))
+            return str(opentime.to_timecode(opentime.RationalTime(frame, rate), rate))
         except ValueError:  # a rate that timecodes do not have, or before 0
-            return f"{at.value:g}"
+            return f"{float(at):g}"
 
 
-def _end(place: Any, item: Any) -> Any:
+def _end(place: Fraction | str, item: Any) -> Fraction | str:
     """Return the end of a track's item that begins at a place; a text if there is no such time."""
     if isinstance(place, str):
         return place
     try:
-        duration = item.duration()
+        return place + seconds(item.duration())
     except Exception:  # an item without any range, or times that cannot be: each type has its own
         kind = type(item).__name__.lower()
         return f"a {kind} before it has no length, expected one; set its source_range"
-    return duration if place is None else place + duration
 
 
 def _reel(clip: Any) -> str:
@@ -234,22 +242,11 @@ def _reel(clip: Any) -> str:
     return reel if isinstance(reel, str) else ""
 
 
-def _rate(rate: float) -> Fraction:
-    found = Fraction(rate).limit_denominator(1001) if math.isfinite(rate) else Fraction(0)
-    if found <= 0:
-        raise Palette4dError(
-            f"found the rate {rate:g}, expected frames per second above 0; mend it in the edit"
-        )
-    return found
-
-
-def _first_rate(timeline: Any) -> float:
+def _first_rate(timeline: Any) -> Fraction:
     """Return the rate of a timeline without a start time: the rate of its first clip."""
     for clip in timeline.find_clips():
         try:
-            rate = float(clip.trimmed_range().duration.rate)
-            _rate(rate)
+            return rate_of(clip.trimmed_range().duration.rate)
         except Exception:  # a clip without any range
             continue
-        return rate
-    return 24.0
+    return Fraction(24)

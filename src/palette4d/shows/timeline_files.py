@@ -16,6 +16,7 @@ from palette4d.common.child import Child, ChildError
 from palette4d.common.errors import Palette4dError, in_words
 from palette4d.common.json_files import read_regular
 from palette4d.common.text import counted
+from palette4d.shows import edl_timeline
 
 Result = TypeVar("Result")
 
@@ -41,6 +42,11 @@ def library() -> Any:
 def is_timeline(spec: str) -> bool:
     """Whether a file is an edit, by its extension."""
     return Path(spec).suffix.lower().lstrip(".") in EXTENSIONS
+
+
+def is_edl(path: Path) -> bool:
+    """Whether a file is an EDL, by its extension."""
+    return path.suffix.lower() == ".edl"
 
 
 def in_child(path: Path, call: Callable[..., Result], *arguments: object) -> Result:
@@ -88,9 +94,9 @@ def faults_of(path: Path) -> Iterator[None]:
 def load(path: Path, rate: Fraction | None = None) -> Any:
     """Return the only timeline of a file; call it in a child process."""
     otio = library()
-    edl = path.suffix.lower() == ".edl"
-    arguments = {"rate": float(rate)} if rate is not None and edl else {}
-    found = otio.adapters.read_from_file(str(path), **arguments)
+    if is_edl(path):
+        return edl_timeline.timeline_of(path, read_regular(path, LARGEST_FILE), rate, otio)
+    found = otio.adapters.read_from_file(str(path))
     if isinstance(found, otio.schema.SerializableCollection):
         timelines = [one for one in found if isinstance(one, otio.schema.Timeline)]
         if len(timelines) != 1:
@@ -104,15 +110,13 @@ def load(path: Path, rate: Fraction | None = None) -> Any:
             f"{path}: found a {type(found).__name__}, expected a timeline; write the edit to a "
             "file as a whole"
         )
-    if edl:
-        _rebase(found)
     return found
 
 
-def as_json(path: Path) -> str:
-    """Return the timeline of a file as OpenTimelineIO's JSON."""
+def as_json(path: Path, rate: Fraction) -> str:
+    """Return the timeline of a file as OpenTimelineIO's JSON; `rate` is that of an EDL."""
     with faults_of(path):
-        return str(library().adapters.write_to_string(load(path), "otio_json"))
+        return str(library().adapters.write_to_string(load(path, rate), "otio_json"))
 
 
 def check_json(path: Path, text: str) -> None:
@@ -123,26 +127,6 @@ def check_json(path: Path, text: str) -> None:
 
 def _first_line(error: Exception) -> str:
     return str(error).strip().partition("\n")[0] or type(error).__name__
-
-
-def _rebase(timeline: Any) -> None:
-    """Let all tracks of an EDL begin with the first track; later tracks get a leading gap.
-
-    The EDL adapter stores a track's first record timecode as a negative start. OpenTimelineIO would
-    take it as a range and show nothing of the track.
-    """
-    otio = library()
-    starts = [t.source_range.start_time for t in timeline.tracks if t.source_range is not None]
-    if not starts:
-        return
-    first = max(starts)  # the least record timecode: the starts are its negative
-    for track in timeline.tracks:
-        if track.source_range is not None:
-            late = first - track.source_range.start_time
-            track.source_range = None
-            if late.value > 0:
-                track.insert(0, otio.schema.Gap(duration=late))
-    timeline.global_start_time = otio.opentime.RationalTime(-first.value, first.rate)
 
 
 def sha256(path: Path) -> str:

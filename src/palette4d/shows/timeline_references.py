@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +63,7 @@ def write(
     `source` comes from `check`, `exported` has the series of each shot by its name. File names are
     relative to the folder of `target`.
     """
-    document = _document(source)
+    document = _document(source, manifest.rate)
     timeline = _timeline(document, source)
     folder = target.absolute().parent
     count = 0
@@ -87,9 +88,9 @@ def write(
     return count
 
 
-def _document(source: Path) -> Any:
+def _document(source: Path, rate: Fraction) -> Any:
     """Return a timeline's JSON: from an .otio file, else converted by OpenTimelineIO."""
-    text: str | bytes = timeline_files.in_child(source, timeline_files.as_json, source)
+    text: str | bytes = timeline_files.in_child(source, timeline_files.as_json, source, rate)
     if source.suffix.lower() == ".otio":
         text = read_regular(source, timeline_files.LARGEST_FILE)
     try:

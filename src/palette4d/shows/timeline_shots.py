@@ -11,16 +11,17 @@ import functools
 from fractions import Fraction
 from pathlib import Path
 
+from palette4d import _core
 from palette4d.common.child import Child, ChildError
 from palette4d.common.errors import Palette4dError, in_words
 from palette4d.common.text import file_safe
+from palette4d.media import clip_sequence
 from palette4d.media.clip import Clip, open_clip
 from palette4d.media.clip_base import describe
-from palette4d.media.timecode import start_timecode
+from palette4d.media.timecode import frames_of, nominal, start_timecode
 from palette4d.shows import find_media
 from palette4d.shows.shots import Shot
 from palette4d.shows.timeline_clips import EditClip, EditList
-from palette4d.shows.timeline_files import library
 
 #: Limits for opening one clip: a long movie's time stamps are read through a slow network.
 SECONDS, MEGABYTES = 300.0, 8192
@@ -30,7 +31,8 @@ SECONDS, MEGABYTES = 300.0, 8192
 class Media:
     """A clip's first and last frame, all of them in words, and whether it is a movie, or a still.
 
-    An opened clip may hold a million numbers, and an edit thousands of clips.
+    `rate` is that of a movie: images rarely state theirs. An opened clip may hold a million
+    numbers, and an edit thousands of clips.
     """
 
     first: int
@@ -38,19 +40,28 @@ class Media:
     frames: str
     is_movie: bool
     is_still: bool
+    rate: Fraction
+
+    @property
+    def count(self) -> int:
+        """How many frames there are from the first to the last."""
+        return self.last - self.first + 1
 
 
 def shots_of(
     edit: EditList, folder: find_media.Folder | None = None, handles: int = 0
-) -> list[Shot]:
-    """Return the shots of an edit; `Shot.problem` says if its media is missing or unusable.
+) -> tuple[list[Shot], list[str]]:
+    """Return the shots of an edit, and notes on how they were counted.
+
+    `Shot.problem` says if the media is missing or unusable.
 
     Media is looked for in `folder`, then beside the timeline. `handles` is the number of head and
     of tail frames; there are fewer where the media ends.
     """
     with Child(SECONDS, MEGABYTES) as child:
         finder = _Finder(edit.path, folder, handles, child)
-        return [finder.shot(clip) for clip in edit.clips]
+        shots = [finder.shot(clip) for clip in edit.clips]
+        return shots, list(dict.fromkeys(finder.notes))
 
 
 class _Finder:
@@ -62,6 +73,7 @@ class _Finder:
         self.path, self.folder, self.handles, self.child = path, folder, handles, child
         self.media: dict[str, Media | str] = {}
         self.timecodes: dict[str, str | None] = {}
+        self.notes: list[str] = []
 
     def shot(self, clip: EditClip) -> Shot:
         """Return the shot for a clip."""
@@ -71,7 +83,7 @@ class _Finder:
                 return self.found_shot(clip)
             except (Palette4dError, OSError, ValueError) as error:  # names that cannot be
                 problem = in_words(error)
-        name = file_safe(clip.name or "shot")
+        name = _name(clip.name or "shot")
         return Shot(name, "", 0, 0, (0, 0), place=clip.place, problem=problem)
 
     def found_shot(self, clip: EditClip) -> Shot:
@@ -85,12 +97,14 @@ class _Finder:
                 "bring the whole media, or the right take"
             )
         return Shot(
-            name=file_safe(clip.name or Path(spec).stem),
+            name=_name(clip.name or Path(spec).name),
             clip=spec,
             first=max(media.first, first - self.handles),
             last=min(media.last, last + self.handles),
             used=(first, last),
             place=clip.place,
+            speed=clip.shown.speed,
+            cdl=clip.cdl,
         )
 
     def opened(self, spec: str) -> Media:
@@ -134,16 +148,38 @@ class _Finder:
         """Return the first and last frame of the media that the edit shows, as the files count."""
         if media.is_still:
             return media.first, media.first
-        offset = self.offset(clip, spec, media)
-        return clip.first + offset, clip.last + offset
+        rate = self.counted(clip, spec, media)
+        first, last = clip.shown.frames(rate)
+        offset = self.offset(clip, spec, media, rate, (first, last))
+        return first + offset, last + offset
 
-    def offset(self, clip: EditClip, spec: str, media: Media) -> int:
+    def counted(self, clip: EditClip, spec: str, media: Media) -> Fraction:
+        """Return the rate that counts a clip's frames: the edit's, or that of the movie's file.
+
+        23.976 and 24 count alike. An edit that has another rate for all of the movie's frames plays
+        them frame for frame; else its times are seconds.
+        """
+        if not media.is_movie or nominal(clip.rate) == nominal(media.rate):
+            return clip.rate
+        if not clip.by_frames:
+            return clip.rate if clip.length == media.count else media.rate
+        self.notes.append(
+            f"{spec} plays {float(media.rate):.6g} frames per second, the EDL's timecodes count "
+            f"{float(clip.rate):.6g}: they are taken as frames of the media. Check the shot"
+        )
+        return clip.rate
+
+    def offset(
+        self, clip: EditClip, spec: str, media: Media, rate: Fraction, shown: tuple[int, int]
+    ) -> int:
         """Return the offset from a frame of the media's time to the file's frame number."""
+        begins = None if clip.begins is None else round(clip.begins * rate)
         if clip.pattern:
-            return clip.start_frame - (clip.begins or 0)
-        if not media.is_movie and media.first <= clip.first <= clip.last <= media.last:
+            return clip.start_frame - (begins or 0)
+        if not media.is_movie and media.first <= shown[0] <= shown[1] <= media.last:
             return 0  # a sequence's numbers are the media's time
-        begins = self.stated(spec, clip.rate) if clip.begins is None else clip.begins
+        if begins is None:
+            begins = self.stated(spec, rate)
         return 0 if begins is None else media.first - begins
 
     def stated(self, spec: str, rate: Fraction) -> int | None:
@@ -151,19 +187,23 @@ class _Finder:
         if spec not in self.timecodes:
             self.timecodes[spec] = self.child.call(_timecode, spec)
         text = self.timecodes[spec]
-        if text is None:
-            return None
-        try:
-            return int(library().opentime.from_timecode(text, float(rate)).to_frames())
-        except ValueError:  # a rate that timecodes do not have
-            return None
+        return None if text is None else frames_of(text, rate)
+
+
+def _name(clip: str) -> str:
+    """Return the name of a clip's shot, which the node finds by its media: without an extension.
+
+    The text after the last dot of a clip's name need not be an extension.
+    """
+    known = clip_sequence.MOVIE_EXTENSIONS | clip_sequence.IMAGE_EXTENSIONS | find_media.CAMERA
+    return file_safe(_core.clip_name(clip) if clip_sequence.extension(clip) in known else clip)
 
 
 def _media(spec: str) -> Media:
     clip = _opened(spec)
     first, last = clip.frames[0], clip.frames[-1]
     still = len(clip.frames) == 1 and not clip.is_movie
-    return Media(first, last, describe(clip.frames), clip.is_movie, still)
+    return Media(first, last, describe(clip.frames), clip.is_movie, still, clip.rate)
 
 
 def _timecode(spec: str) -> str | None:

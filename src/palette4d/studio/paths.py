@@ -3,6 +3,7 @@
 import contextlib
 from pathlib import Path
 
+from palette4d import _core
 from palette4d.media import clip_sequence
 from palette4d.media.clip import ClipError
 from palette4d.media.clip_sequence import ImageSequence
@@ -31,7 +32,7 @@ def sequence_of(path: str) -> str:
 def sidecar_of(path: str) -> Path | None:
     """Return the sidecar beside a clip, if it was analysed before."""
     found = Path(path)
-    names = [found.name.split("#")[0].split("%")[0].rstrip("._-"), found.stem, found.name]
+    names = [_core.clip_name(found.name), found.stem, found.name]
     if "#" in found.name:
         with contextlib.suppress(ClipError):
             names.append(clip_sequence.of_pattern(path)[0].name)

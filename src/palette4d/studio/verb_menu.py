@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtWidgets import QCheckBox, QFileDialog, QLineEdit
 
+from palette4d import _core
 from palette4d.analysis.options import METHODS
 from palette4d.shows.manifest import ENDING
 from palette4d.studio import texts
@@ -54,8 +55,7 @@ class VerbMenu:
         if source:
             path = Path(source)
             # The name by which the node finds it, see docs/node.md.
-            stem = path.name.split("#")[0].rstrip("._-") or path.absolute().parent.name
-            stem = Path(stem).stem if "#" not in source else stem
+            stem = _core.clip_name(path.name) or path.absolute().parent.name
             out = str(path.with_name(f"{stem}.p4d.json"))
         return self._analyze(texts.ANALYZE, source, out)
 

@@ -1,0 +1,23 @@
+// The one rule for the names of sidecars: which sidecar belongs to a media file.
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+namespace palette4d {
+
+/// What follows a clip's name in the name of its sidecar.
+inline constexpr const char* kSidecarEnding = ".p4d.json";
+
+/// Whether a file's name, in UTF-8 and without folders, has the extension of an image.
+bool is_still(const std::string& file_name);
+
+/// The length of a name without extension and without the frame number, or its placeholder, at its
+/// end. The 2 of "plate_v2" is a version, not a frame.
+std::size_t without_number(const std::string& stem);
+
+/// A media file's name without its extension and, for an image, without its frame number:
+/// `shot.mov`, `shot.1001.exr` and `shot.####.exr` are all of `shot`.
+std::string clip_name(const std::string& file_name);
+
+}  // namespace palette4d
