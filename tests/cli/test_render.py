@@ -283,7 +283,7 @@ def test_bad_frames_stop_or_are_left_out(tmp_path, capsys):
     folder = grey_levels(tmp_path / "in", range(4))
     (folder / "clip.0002.png").write_bytes(b"no picture")
     with pytest.raises(Palette4dError, match="frame 2"):
-        run(PLAIN, folder, "-o", tmp_path / "a" / "o.#.png")
+        run(PLAIN, folder, "-o", tmp_path / "a" / "o.#.png", "--missing", "error")
     assert run(PLAIN, folder, "-o", tmp_path / "b" / "o.#.png", "--skip-bad-frames") == 0
     assert sorted(p.name for p in (tmp_path / "b").iterdir()) == ["o.0.png", "o.1.png", "o.3.png"]
     assert "skipped bad frame 2" in capsys.readouterr().err

@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import json
 import re
+from typing import TYPE_CHECKING, Any
 
 from palette4d.cli.messages import tell
-from palette4d.common.arguments import frame_range, number, whole
+from palette4d.common.arguments import checked, frame_range, number, whole
+from palette4d.common.errors import UnfinishedError
 from palette4d.common.text import counted
+from palette4d.jobs.dask_farm import check_address
+
+if TYPE_CHECKING:
+    from palette4d.grade.rendering import Rendered
 
 DESCRIPTION = """\
 Recolour the frames of a clip with the edits of a sidecar, by the same code as the OpenFX node.
@@ -160,12 +167,30 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--threads", type=whole(0), default=0, metavar="N", help="0: one per processor (default)"
     )
+    parser.add_argument(
+        "--cluster",
+        metavar="ADDRESS",
+        type=checked(str, check_address),
+        help="render the frames on a Dask farm: its scheduler's address (tls://farm:8786)",
+    )
     parser.add_argument("--force", action="store_true", help="replace files that exist already")
     parser.add_argument(
-        "--skip-bad-frames", action="store_true", help="skip missing or unreadable frames"
+        "--skip-existing", action="store_true", help="keep frames that exist, render the others"
     )
+    parser.add_argument(
+        "--missing",
+        choices=("hold", "black", "error"),
+        help="what a missing or unreadable frame shows: the frame before (default), black, or "
+        "an error",
+    )
+    parser.add_argument(
+        "--skip-bad-frames",
+        action="store_true",
+        help="write no file for such a frame; movies follow --missing",
+    )
+    parser.add_argument("--json", action="store_true", help="print what was written as JSON")
     parser.add_argument("--quiet", action="store_true", help="no progress bar, no report")
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, usage_error=parser.error)
 
 
 def _show(text: str) -> str:
@@ -182,30 +207,66 @@ def run(args: argparse.Namespace) -> int:
     """Render; returns the exit status."""
     from palette4d.cli.progress import frames_bar
     from palette4d.grade.document import Document
-    from palette4d.grade.rendering import render
     from palette4d.media.clip_base import named
+    from palette4d.shows.frames import render
 
-    with frames_bar("render", hidden=args.quiet) as progress:
-        done = render(
-            Document.load(args.sidecar, version=args.version),
-            args.clip,
-            args.output,
-            frames=args.frames,
-            compare=args.compare,
-            space=args.space,
-            half=args.half,
-            bits=args.bits,
-            threads=args.threads,
-            skip_bad_frames=args.skip_bad_frames,
-            force=args.force,
-            progress=progress,
-            tell=tell,
-            **{name: vars(args)[name] for name in DRAWN},
+    if args.force and args.skip_existing:
+        args.usage_error("--skip-existing keeps files that exist, --force replaces them; use one")
+    if args.skip_bad_frames and args.missing == "error":
+        args.usage_error(
+            "--skip-bad-frames passes over such frames, --missing error stops; use one"
         )
-    if done.skipped:
-        tell("note", f"skipped bad {named(done.skipped)}")
-    if not args.quiet:
-        first, last = done.files[0], done.files[-1].name
-        to = "" if len(done.files) == 1 else f" to {last}"
-        print(f"rendered {first}{to}, {counted(len(done.frames), 'frame')}")
+    failed: UnfinishedError | None = None
+    with frames_bar("render", hidden=args.quiet or args.json) as progress:
+        try:
+            done: Any = render(
+                Document.load(args.sidecar, version=args.version),
+                args.clip,
+                args.output,
+                frames=args.frames,
+                compare=args.compare,
+                space=args.space,
+                half=args.half,
+                bits=args.bits,
+                threads=args.threads,
+                missing=args.missing or "hold",
+                skip_bad_frames=args.skip_bad_frames,
+                skip_existing=args.skip_existing,
+                cluster=args.cluster,
+                force=args.force,
+                progress=progress,
+                tell=tell,
+                **{name: vars(args)[name] for name in DRAWN},
+            )
+        except UnfinishedError as error:
+            done, failed = error.done, error
+    left_out = sorted(set(done.skipped) - set(done.filled))
+    if done.filled:
+        shows = "black" if args.missing == "black" else "the frame before"
+        tell("note", f"missing or unreadable {named(done.filled)}: {shows} is shown")
+    if left_out:
+        tell("note", f"skipped bad {named(left_out)}")
+    if args.json:
+        print(json.dumps(_report(done), ensure_ascii=True))
+    elif not args.quiet:
+        if done.frames:
+            first, last = done.files[0], done.files[-1].name
+            to = "" if len(done.files) == 1 else f" to {last}"
+            print(f"rendered {first}{to}, {counted(len(done.frames), 'frame')}")
+        if done.kept:
+            print(f"kept {counted(len(done.kept), 'existing frame')}")
+    if failed:
+        raise failed
     return 0
+
+
+def _report(done: Rendered) -> dict[str, object]:
+    """Return the output of --json."""
+    return {
+        "files": [str(path) for path in done.files],
+        "frames": done.frames,
+        "kept": done.kept,
+        "skipped": sorted(set(done.skipped) - set(done.filled)),
+        "filled": done.filled,
+        "notes": done.notes,
+    }

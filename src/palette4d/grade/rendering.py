@@ -6,7 +6,7 @@ import contextlib
 import os
 from collections.abc import Callable, Generator
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Literal
@@ -17,7 +17,7 @@ from palette4d.common.files import make_folder
 from palette4d.grade.document import Document
 from palette4d.grade.output import Output
 from palette4d.media.clip import Clip, Image, open_clip
-from palette4d.media.clip_base import F32, describe
+from palette4d.media.clip_base import F32, ClipError, FrameError, describe, named
 from palette4d.media.frame_writer import (
     FramePattern,
     OutputError,
@@ -28,6 +28,9 @@ from palette4d.media.frame_writer import (
 from palette4d.media.movie_writer import is_movie, movie_writer
 
 Compare = Literal["wipe", "side"]
+Missing = Literal["hold", "black", "error"]
+#: Metadata of a frame that are not those of a frame that it stands for.
+_OF_ONE_FRAME = ("smpte:TimeCode", "smpte:KeyCode")
 _LINE = np.float32(1.0)  # the line of a wipe, in code values: white
 
 
@@ -40,7 +43,11 @@ class Rendered:
     files : list of Path
         The frames, or the movie.
     frames, skipped : list of int
-        The frame numbers that were rendered, and those of bad frames that were left out.
+        The frame numbers that were rendered, and those of bad frames.
+    kept : list of int
+        Those whose files were there and were kept (``skip_existing``).
+    filled : list of int
+        Those of bad frames that show the frame before, or black.
     notes : list of str
         Notes for the user; the first say where clip and sidecar differ.
     """
@@ -49,6 +56,8 @@ class Rendered:
     frames: list[int]
     skipped: list[int]
     notes: list[str]
+    kept: list[int] = field(default_factory=list)
+    filled: list[int] = field(default_factory=list)
 
 
 def compared(source: F32, edited: F32, how: Compare) -> F32:
@@ -119,6 +128,79 @@ def movie_notes(clip: Clip, width: int, alpha: bool) -> list[str]:
     return found
 
 
+@dataclass
+class Painter:
+    """Draws a clip's frames, and something in the place of a bad frame.
+
+    Attributes
+    ----------
+    document, clip : the palette with its edits, and the clip.
+    drawn : what to draw.
+    compare, space, threads : as for `render`.
+    missing : what a bad frame shows; "leave out": nothing.
+    filled : the bad frames that show something, so far.
+    """
+
+    document: Document
+    clip: Clip
+    drawn: Output
+    compare: Compare | None = None
+    space: Literal["input", "palette"] = "input"
+    threads: int = 0
+    missing: Missing | Literal["leave out"] = "error"
+    filled: list[int] = field(default_factory=list)
+    _last: tuple[Image, F32] | None = field(default=None, init=False)
+
+    def paint(self, frame: int) -> tuple[Image, F32] | None:
+        """Return a frame and its picture; None if it is bad and left out."""
+        painted = self._painted(frame)
+        if painted is not None or self.missing == "leave out":
+            return painted
+        before = self._nearest(frame)
+        self.filled.append(frame)
+        image, pixels = before
+        if self.missing == "black":
+            pixels = np.zeros_like(pixels)
+        metadata = tuple(one for one in image.metadata if one[0] not in _OF_ONE_FRAME)
+        return replace(image, frame=frame, metadata=metadata), pixels
+
+    def _painted(self, frame: int) -> tuple[Image, F32] | None:
+        """Return a good frame and its picture; None if it is bad."""
+        if frame in self.clip.skipped:
+            return None
+        try:
+            image = self.clip.load(frame)
+        except FrameError:
+            if self.missing == "error":
+                raise
+            self.clip.skip(frame)
+            return None
+        source = with_alpha(image.pixels) if self.drawn.in_alpha else image.pixels
+        pixels = self.document.recolour(
+            source,
+            frame,
+            **asdict(self.drawn),
+            premultiplied=self.clip.premultiplied,
+            space=self.space,
+            threads=self.threads,
+        )
+        if self.compare is not None:
+            pixels = compared(source, pixels, self.compare)
+        self._last = image, pixels
+        return self._last
+
+    def _nearest(self, frame: int) -> tuple[Image, F32]:
+        """Return the nearest good frame before another one; the first good one if there is none."""
+        frames = self.clip.frames
+        at = frames.index(frame)
+        for other in (*reversed(frames[:at]), *frames[at + 1 :]):
+            if self._last is not None and self._last[0].frame == other:
+                return self._last
+            if (found := self._painted(other)) is not None:
+                return found
+        raise self.clip.none_readable()
+
+
 def render(
     document: str | os.PathLike[str] | Document,
     clip: str | os.PathLike[str] | Clip,
@@ -130,7 +212,9 @@ def render(
     half: bool = False,
     bits: int | None = None,
     threads: int = 0,
+    missing: Missing = "hold",
     skip_bad_frames: bool = False,
+    skip_existing: bool = False,
     force: bool = False,
     progress: Callable[[int, int], object] | None = None,
     tell: Callable[[str, str], object] | None = None,
@@ -159,8 +243,14 @@ def render(
         Bits a sample: 8 or 16 for PNG, 8, 16 or 32 for TIFF.
     threads : int
         0: one per processor.
+    missing : {"hold", "black", "error"}
+        What a missing or unreadable frame shows: the frame before (of the first ones, the first
+        good one), black, or an error.
     skip_bad_frames : bool
-        Skip missing and unreadable frames.
+        Write no files for such frames. A movie has no frame numbers, so that it follows
+        ``missing``.
+    skip_existing : bool
+        Keep files that exist, and render only the others: a render that was interrupted goes on.
     force : bool
         Replace files that exist. A clip's own files are never replaced.
     progress : callable, optional
@@ -185,27 +275,28 @@ def render(
     if not isinstance(document, Document):
         document = Document.load(document)
     drawn = Output(**picture)
-    whole = frames is None
-    if not isinstance(clip, Clip):
-        clip = open_clip(os.fspath(clip), frames=frames, skip_bad_frames=skip_bad_frames)
-    output = os.fspath(output)
-    width = clip.width * (2 if compare == "side" else 1)
+    whole, output = frames is None, os.fspath(output)
     movie = is_movie(Path(output))
+    clip, fill = opened_for_render(clip, frames, missing, skip_bad_frames, movie=movie)
+    width = clip.width * (2 if compare == "side" else 1)
     inputs = {clip.file(frame) for frame in clip.frames}
+    todo = clip.frames
     if movie:
         if half or bits is not None:
             raise OutputError(
                 f"output {output}: half=True and bits=… are for frames, not for movies"
             )
+        if skip_existing and Path(output).exists():
+            return Rendered([Path(output)], [], [], [], kept=list(clip.frames))
         check_targets([Path(output)], inputs, force)
         make_folder(Path(output).parent)
         opened = _movie(clip, document, Path(output), width)
     else:
         pattern = FramePattern.parse(output, ", or a movie OUT.mp4 or OUT.mov")
         samples = sample_type(pattern.extension, clip.depth, half=half, bits=bits)
-        check_targets(pattern.paths(clip.frames), inputs, force)
+        todo = frames_to_render(clip, pattern, inputs, skip_existing=skip_existing, force=force)
         make_folder(pattern.folder)
-        opened = _frames(clip, pattern, samples)
+        opened = frame_files(clip, pattern, samples)
     warnings = mismatches(document, clip, whole)
     alpha = clip.has_alpha or drawn.in_alpha
     notes = [*clip.notes, *(movie_notes(clip, width, alpha) if movie else ())]
@@ -213,6 +304,7 @@ def render(
         for kind, texts in (("warning", warnings), ("note", notes)):
             for text in texts:
                 tell(kind, text)
+    painter = Painter(document, clip, drawn, compare, space, threads, fill)
     written: list[Path] = []
     rendered: list[int] = []
     pending: Future[Path] | None = None
@@ -221,36 +313,74 @@ def render(
         if pending is not None:
             written.append(pending.result())
             if progress is not None:
-                progress(len(written), len(clip.frames))
+                progress(len(written), len(todo))
 
     # One frame is written while the next is read and recoloured.
     with opened as write, ThreadPoolExecutor(1) as writer:
-        for image in clip.iter_images():
-            source = with_alpha(image.pixels) if drawn.in_alpha else image.pixels
-            pixels = document.recolour(
-                source,
-                image.frame,
-                **asdict(drawn),
-                premultiplied=clip.premultiplied,
-                space=space,
-                threads=threads,
-            )
-            if compare is not None:
-                pixels = compared(source, pixels, compare)
+        for frame in todo:
+            if (painted := painter.paint(frame)) is None:
+                continue
             finish()
-            rendered.append(image.frame)
-            pending = writer.submit(write, image, pixels)
+            rendered.append(frame)
+            pending = writer.submit(write, *painted)
         finish()
+        if todo and not rendered:
+            raise clip.none_readable()
     return Rendered(
-        written[:1] if movie else written, rendered, list(clip.skipped), [*warnings, *notes]
+        written[:1] if movie else written,
+        rendered,
+        list(clip.skipped),
+        [*warnings, *notes],
+        sorted(set(clip.frames) - set(todo)),
+        painter.filled,
     )
+
+
+def opened_for_render(
+    clip: str | os.PathLike[str] | Clip,
+    frames: str | None,
+    missing: Missing,
+    skip_bad_frames: bool,
+    *,
+    movie: bool,
+) -> tuple[Clip, Missing | Literal["leave out"]]:
+    """Open the clip of a render; return it with what a bad frame shows.
+
+    Frames before its first or behind its last file are an error: they are no gap.
+    """
+    if isinstance(clip, Clip):
+        skip_bad_frames = skip_bad_frames or clip.skip_bad_frames
+    else:
+        tolerant = skip_bad_frames or missing != "error"
+        clip = open_clip(os.fspath(clip), frames=frames, skip_bad_frames=tolerant)
+        if not skip_bad_frames and (outside := clip.outside):
+            raise ClipError(
+                f"{clip.source}: found no {named(outside)}, before its first or behind its last "
+                "frame; choose a range inside, or leave such frames out with skip_bad_frames=True"
+            )
+    return clip, "leave out" if skip_bad_frames and not movie else missing
+
+
+def frames_to_render(
+    clip: Clip, pattern: FramePattern, inputs: set[Path], *, skip_existing: bool, force: bool
+) -> list[int]:
+    """Return the frames to write, after a check of their files."""
+    targets = dict(zip(clip.frames, pattern.paths(clip.frames), strict=True))
+    if skip_existing:  # files are written under another name first: those that exist are whole
+        targets = {
+            frame: path
+            for frame, path in targets.items()
+            if not path.is_file() or not path.stat().st_size
+        }
+    check_targets(list(targets.values()), inputs, force or skip_existing)
+    return list(targets)
 
 
 _Write = Callable[[Image, F32], Path]
 
 
 @contextlib.contextmanager
-def _frames(clip: Clip, pattern: FramePattern, samples: str) -> Generator[_Write]:
+def frame_files(clip: Clip, pattern: FramePattern, samples: str) -> Generator[_Write]:
     """Yield a function that writes a frame to its file, with the source frame's metadata."""
     import OpenImageIO as oiio
 

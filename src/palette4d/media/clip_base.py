@@ -124,6 +124,11 @@ class Clip(abc.ABC):
         """Distance between neighbouring frame numbers (1 for a single frame); 0 when it varies."""
         return even_step(self.frames)
 
+    @property
+    def outside(self) -> list[int]:
+        """The frames before the first and behind the last file, which `skip_bad_frames` allows."""
+        return []
+
     @abc.abstractmethod
     def load(self, frame: int) -> Image:
         """Read one frame with its metadata; FrameError when it is missing or unreadable."""

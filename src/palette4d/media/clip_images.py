@@ -78,6 +78,12 @@ class ImageClip(Clip):
         """The file of a frame, whether it exists or not."""
         return self.sequence.path(frame)
 
+    @property
+    def outside(self) -> list[int]:
+        """The frames before the first and behind the last file."""
+        first, last = min(self.sequence.files), max(self.sequence.files)
+        return [frame for frame in self.frames if not first <= frame <= last]
+
     def load(self, frame: int) -> Image:
         """Read one frame; FrameError when it is missing, unreadable, or of another size."""
         header, stored, orientation = self._read(frame)

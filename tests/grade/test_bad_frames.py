@@ -1,0 +1,174 @@
+"""What a render shows for missing and unreadable frames; ffprobe-like counts by PyAV."""
+
+from __future__ import annotations
+
+import json
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from clip_files import write_image, write_movie
+
+from palette4d.cli import main
+from palette4d.common.errors import Palette4dError
+from palette4d.grade.rendering import render
+from palette4d.media.clip import open_clip
+
+PLAIN = Path(__file__).resolve().parents[1] / "golden" / "sidecars" / "v1_edited.p4d.json"
+
+
+def grey(level: int) -> np.ndarray:
+    return np.full((16, 24, 3), level, np.uint8)
+
+
+def sequence(folder: Path, frames, broken=()) -> str:
+    """Grey frames, lighter by 10 each; the broken ones hold no picture."""
+    for frame in frames:
+        write_image(folder / f"g.{frame:04d}.png", grey(10 * frame))
+    for frame in broken:
+        (folder / f"g.{frame:04d}.png").write_bytes(b"no picture")
+    return str(folder / "g.####.png")
+
+
+def levels(path: str | Path) -> dict[int, int]:
+    """The grey of each frame of a clip, in 8 bits."""
+    clip = open_clip(str(path))
+    return {frame: round(float(pixels.mean()) * 255) for frame, pixels in clip}
+
+
+def count(path: Path) -> int:
+    with av.open(str(path)) as movie:
+        return sum(1 for _ in movie.decode(video=0))
+
+
+NONE = {"strength": 0.0}
+
+
+class TestFrames:
+    """Sequences keep their numbers."""
+
+    def test_the_frame_before_is_held(self, tmp_path: Path) -> None:
+        clip = sequence(tmp_path / "in", [1, 2, 4, 5], broken=[3, 6])
+        done = render(PLAIN, clip, tmp_path / "o.####.png", **NONE)
+        assert levels(tmp_path / "o.####.png") == {1: 10, 2: 20, 3: 20, 4: 40, 5: 50, 6: 50}
+        assert (done.filled, done.skipped) == ([3, 6], [3, 6])
+
+    def test_several_in_a_row_and_the_first(self, tmp_path: Path) -> None:
+        clip = sequence(tmp_path / "in", [3, 6], broken=[1])
+        render(PLAIN, clip, tmp_path / "o.####.png", frames="1-6", **NONE)
+        assert levels(tmp_path / "o.####.png") == {1: 30, 2: 30, 3: 30, 4: 30, 5: 30, 6: 60}
+
+    def test_black(self, tmp_path: Path) -> None:
+        clip = sequence(tmp_path / "in", [1, 2, 4])
+        render(PLAIN, clip, tmp_path / "o.####.png", missing="black", frames="1-4", **NONE)
+        assert levels(tmp_path / "o.####.png") == {1: 10, 2: 20, 3: 0, 4: 40}
+
+    def test_an_error(self, tmp_path: Path) -> None:
+        clip = sequence(tmp_path / "in", [1, 2, 4])
+        with pytest.raises(Palette4dError, match="frame 3 missing"):
+            render(PLAIN, clip, tmp_path / "o.####.png", missing="error", frames="1-4")
+
+    def test_a_range_beyond_the_clip_is_no_gap(self, tmp_path: Path) -> None:
+        clip = sequence(tmp_path / "in", [1, 2])
+        with pytest.raises(Palette4dError, match="found no frames 3-4, before its first or behind"):
+            render(PLAIN, clip, tmp_path / "o.####.png", frames="1-4")
+
+    def test_only_bad_frames(self, tmp_path: Path) -> None:
+        clip = sequence(tmp_path / "in", [1, 2], broken=[1, 2])
+        with pytest.raises(Palette4dError, match="none readable"):
+            render(PLAIN, clip, tmp_path / "o.####.png")
+
+    def test_a_timecode_is_not_held(self, tmp_path: Path) -> None:
+        from clip_files import TimeCode
+
+        for frame in (1, 2):
+            image = grey(frame * 10).astype(np.uint16) * 257
+            write_image(tmp_path / f"g.{frame}.dpx", image, smpte__TimeCode=TimeCode(frame))
+        (tmp_path / "g.2.dpx").write_bytes(b"")
+        render(PLAIN, str(tmp_path / "g.#.dpx"), tmp_path / "o.#.exr", **NONE)
+        names = [
+            {name for name, _, _ in open_clip(str(tmp_path / f"o.{i}.exr")).load(i).metadata}
+            for i in (1, 2)
+        ]
+        assert "smpte:TimeCode" in names[0] - names[1]
+
+
+class TestMovies:
+    """A movie has as many frames as the clip, so that nothing behind a gap comes early."""
+
+    @pytest.mark.parametrize("words", [(), ("--skip-bad-frames",), ("--missing", "black")])
+    def test_of_a_sequence(self, tmp_path: Path, words, capsys: pytest.CaptureFixture) -> None:
+        clip = sequence(tmp_path / "in", [1, 2, 4, 5])
+        out = tmp_path / "o.mov"
+        assert (
+            main.main(["render", str(PLAIN), clip, "-o", str(out), "--strength", "0", *words]) == 0
+        )
+        assert count(out) == 5
+        found = levels(out)
+        assert found[3] == pytest.approx(40, abs=1)
+        assert found[2] == pytest.approx(0 if "black" in words else 20, abs=1)
+        assert "unreadable frame 3" in capsys.readouterr().err
+
+    def test_of_a_movie(self, tmp_path: Path) -> None:
+        """A picture that cannot be decoded, in the middle of ProRes."""
+        path = tmp_path / "in.mov"
+        write_movie(
+            path,
+            "prores_ks",
+            "yuv422p10le",
+            [grey(40 * i) for i in range(1, 6)],
+            "rgb24",
+            rate=Fraction(24),
+        )
+        with av.open(str(path)) as movie:
+            packets = [packet for packet in movie.demux(video=0) if packet.size]
+            place, size = packets[2].pos, packets[2].size
+        data = bytearray(path.read_bytes())
+        data[place + 4 : place + size] = bytes(size - 4)
+        path.write_bytes(data)
+        done = render(PLAIN, path, tmp_path / "o.mov", **NONE)
+        assert done.filled == [2]
+        assert count(tmp_path / "o.mov") == 5
+        found = levels(tmp_path / "o.mov")
+        assert found[2] == found[1]
+        assert found[3] > found[1] + 50
+
+
+class TestAgain:
+    """--skip-existing and --json."""
+
+    def run(self, *words: object) -> int:
+        return main.main(["render", *map(str, words), "--strength", "0"])
+
+    def test_what_exists_stays(self, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+        clip = sequence(tmp_path / "in", [1, 2, 4])
+        out = tmp_path / "o.####.png"
+        assert self.run(PLAIN, clip, "-o", out, "--frames", "1-2", "--quiet") == 0
+        (tmp_path / "o.0001.png").write_bytes(b"mine")
+        (tmp_path / "o.0004.png").touch()  # a program that was killed left it
+        capsys.readouterr()
+        words = [PLAIN, clip, "-o", out, "--skip-existing", "--json", "--frames", "1-4"]
+        assert self.run(*words) == 0
+        found = json.loads(capsys.readouterr().out)
+        assert (found["frames"], found["kept"], found["filled"]) == ([3, 4], [1, 2], [3])
+        assert [Path(file).name for file in found["files"]] == ["o.0003.png", "o.0004.png"]
+        assert (tmp_path / "o.0001.png").read_bytes() == b"mine"
+        assert levels(tmp_path / "o.0003.png") == {3: 20}
+        assert self.run(*words) == 0
+        assert json.loads(capsys.readouterr().out)["frames"] == []
+
+    def test_a_movie_that_exists_stays(self, tmp_path: Path) -> None:
+        (tmp_path / "o.mov").write_bytes(b"mine")
+        clip = sequence(tmp_path / "in", [1, 2])
+        assert self.run(PLAIN, clip, "-o", tmp_path / "o.mov", "--skip-existing") == 0
+        assert (tmp_path / "o.mov").read_bytes() == b"mine"
+
+    @pytest.mark.parametrize(
+        "words", [("--force", "--skip-existing"), ("--skip-bad-frames", "--missing", "error")]
+    )
+    def test_options_that_contradict(self, tmp_path: Path, words) -> None:
+        with pytest.raises(SystemExit) as ended:
+            self.run(PLAIN, tmp_path, "-o", tmp_path / "o.mov", *words)
+        assert ended.value.code == 2
