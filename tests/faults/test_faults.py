@@ -33,7 +33,7 @@ REFUSALS = (errno.ENOSPC, errno.EIO, errno.EACCES, errno.EROFS, errno.EINTR)
 LASTING = (errno.ENOSPC, errno.EROFS)
 DATE = re.compile(rb"(?<=capDate\0string\0\x13\0\0\0).{19}")
 TEMPORARY = r"(.*/)?\..*\.[0-9a-f]{16}\.p4d-tmp(\.[^.]*|/.*)?"
-LOCK = r"(.*/)?\..*\.lock(\.[0-9a-f]{16})?"
+LOCK = r"(.*/)?\..*\.lock(\.removing)?"
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux" or not shutil.which("cc"), reason="needs Linux and a C compiler"

@@ -478,17 +478,11 @@ def test_editors_at_the_same_time_lose_nothing(edited: Path) -> None:
 
 
 def test_a_lock_that_stays_is_reported(edited: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    fcntl = pytest.importorskip("fcntl")
     monkeypatch.setattr(locking, "LOCK_SECONDS", 0.2)
     document = Document.load(edited)
     document.set("v1", rgb=WHITE)
-    handle = os.open(edited.parent, os.O_RDONLY)
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX)
-        with pytest.raises(Palette4dError):
-            document.save()
-    finally:
-        os.close(handle)
+    with locking.locked(edited), pytest.raises(Palette4dError):
+        document.save()
     document.save()
 
 

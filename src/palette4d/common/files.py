@@ -261,6 +261,13 @@ def _is_left_over(entry: os.DirEntry[str]) -> bool:
     handle = os.open(entry.path, access | getattr(os, "O_NOFOLLOW", 0))
     try:
         locked = _lock(handle)
+        if locked:
+            # Some file systems grant every lock.
+            again = os.open(entry.path, access | getattr(os, "O_NOFOLLOW", 0))
+            try:
+                locked = None if _lock(again) else True
+            finally:
+                os.close(again)
         if locked is None:
             return time.time() - os.fstat(handle).st_mtime > _LEFT_OVER_AFTER
         return locked

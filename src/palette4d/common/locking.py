@@ -1,12 +1,11 @@
 """Locks between programs that replace one file.
 
-Where the file system has locks, the folder of the file is locked: this creates no file and ends
-with the process. Elsewhere (some network file systems, Windows) a lock file beside the file says
-who holds it. If its owner died on this computer, the next program removes it.
+A lock file beside the file says who holds it: created exclusively, it excludes on every file
+system, also where locks of the system are refused, or exclude nobody. If its owner died on this
+computer, the next program removes it.
 """
 
 import contextlib
-import errno
 import os
 import platform
 import random
@@ -20,16 +19,13 @@ from pathlib import Path
 from palette4d.common.errors import Palette4dError
 from palette4d.common.json_files import UnusableFile, read_regular
 
-if sys.platform != "win32":
-    import fcntl
-
 #: Seconds to wait while another program holds the lock.
 LOCK_SECONDS = 10.0
 
 #: Seconds after which a half-written lock file is that of a program that was killed.
 UNFINISHED_SECONDS = 2.0
 
-_LOCK = re.compile(r"\..*\.lock(\.[0-9a-f]{16})?", re.DOTALL)
+_LOCK = re.compile(r"\..*\.lock", re.DOTALL)
 _LONGEST = 4096
 _OWNER = re.compile(r"\S+ [0-9]+ [0-9a-f]{16}")
 
@@ -37,47 +33,10 @@ _OWNER = re.compile(r"\S+ [0-9]+ [0-9a-f]{16}")
 @contextlib.contextmanager
 def locked(target: Path) -> Iterator[Callable[[], None]]:
     """Hold the lock of a file; yield a check that raises if the lock was lost."""
+    if not target.parent.is_dir():
+        yield lambda: None  # the write reports the error
+        return
     deadline = time.monotonic() + LOCK_SECONDS
-    with contextlib.ExitStack() as stack:
-        if sys.platform != "win32":
-            try:
-                folder = os.open(target.parent, os.O_RDONLY)
-            except (FileNotFoundError, NotADirectoryError):
-                yield _nothing  # the write reports the error
-                return
-            except OSError:  # a folder that may be written but not listed, for example
-                yield stack.enter_context(_lock_file(target, deadline))
-                return
-            stack.callback(os.close, folder)  # releases the lock
-            if _flocked(folder, target, deadline):
-                yield _nothing
-                return
-        yield stack.enter_context(_lock_file(target, deadline))
-
-
-def _nothing() -> None: ...
-
-
-def _flocked(folder: int, target: Path, deadline: float) -> bool:
-    """Lock a folder; return whether its file system has locks."""
-    while True:
-        try:
-            fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            if error.errno not in (errno.EWOULDBLOCK, errno.EAGAIN):
-                return False
-        else:
-            return True
-        if time.monotonic() > deadline:
-            raise Palette4dError(
-                f"{target}: another program has kept the folder {target.parent} locked for "
-                f"{LOCK_SECONDS:g} seconds; wait for it to finish, or end it"
-            )
-        time.sleep(0.05)
-
-
-@contextlib.contextmanager
-def _lock_file(target: Path, deadline: float) -> Iterator[Callable[[], None]]:
     path = target.with_name(f".{target.name[:200]}.lock")
     mine = f"{_computer()} {os.getpid()} {secrets.token_hex(8)}"
     while not _created(path, mine):
@@ -183,11 +142,19 @@ def _is_unfinished(path: Path, owner: str) -> bool:
 
 
 def _remove(path: Path, owner: str) -> None:
-    """Remove the lock file of an owner that died, and no other."""
-    aside = path.with_name(f"{path.name}.{secrets.token_hex(8)}")
+    """Remove the lock file of an owner that died, and no other.
+
+    One program at a time may: between the look and the removal another one could remove it too, and
+    a third take the lock.
+    """
+    turn = path.with_name(f"{path.name}.removing")
     with contextlib.suppress(OSError):
-        path.rename(aside)
-        if _content(aside) != owner:  # another program was faster, and holds a lock of its own
-            os.link(aside, path)
+        if time.time() - turn.lstat().st_mtime > LOCK_SECONDS:  # of a program that was killed
+            turn.unlink()
     with contextlib.suppress(OSError):
-        aside.unlink(missing_ok=True)
+        os.close(os.open(turn, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+        try:
+            if _content(path) == owner:
+                path.unlink()
+        finally:
+            turn.unlink(missing_ok=True)
