@@ -23,6 +23,10 @@ constexpr const char* kMissing =
     "found no such file, so no palette4d is known to this node; install "
     "palette4d and run 'palette4d install-plugin' in a terminal (Linux only so far)";
 
+#if !defined(_WIN32)
+bool ours(uid_t owner) { return owner == 0 || owner == ::geteuid(); }
+#endif
+
 bool absolute(const std::string& path) {
 #if defined(_WIN32)
     const bool of_a_drive = std::isalpha(static_cast<unsigned char>(path[0])) != 0 &&
@@ -57,7 +61,7 @@ std::string text_of(const fs::path& file, std::string& problem) {
     struct stat about{};
     if (::fstat(handle, &about) != 0 || !S_ISREG(about.st_mode)) {
         problem = "it is not a file";
-    } else if (about.st_uid != 0 && about.st_uid != ::geteuid()) {
+    } else if (!ours(about.st_uid)) {
         problem = "found a file of another user, expected one of yours or of root";
     } else if ((about.st_mode & S_IWOTH) != 0) {
         problem = "found a file that every user may change, expected one that only its owner may";
@@ -73,6 +77,37 @@ std::string text_of(const fs::path& file, std::string& problem) {
     return text;
 #endif
 }
+
+#if !defined(_WIN32)
+/// What is wrong with a file or folder that other users could change; empty: they cannot.
+std::string changeable(const fs::path& path) {
+    struct stat about{};
+    if (::lstat(path.c_str(), &about) != 0) return "";
+    if (!ours(about.st_uid)) return path.u8string() + " belongs to another user";
+    const bool is_link = S_ISLNK(about.st_mode);  // its mode says nothing
+    const bool sticky = S_ISDIR(about.st_mode) && (about.st_mode & S_ISVTX) != 0;
+    if (is_link || sticky) return "";
+    // A user's own group, as some systems give to each, is the user.
+    const bool own_group =
+        about.st_gid == 0 || (about.st_uid == ::geteuid() && about.st_gid == ::getegid());
+    if ((about.st_mode & S_IWOTH) != 0 || ((about.st_mode & S_IWGRP) != 0 && !own_group)) {
+        return path.u8string() + " may be changed by other users";
+    }
+    return "";
+}
+
+/// The same for a program, where its links lead, and all folders on the way.
+std::string changeable_program(const fs::path& program) {
+    std::error_code error;
+    for (fs::path path : {program, fs::canonical(program, error)}) {
+        for (; path.has_relative_path(); path = path.parent_path()) {
+            const std::string problem = changeable(path);
+            if (!problem.empty()) return problem;
+        }
+    }
+    return "";
+}
+#endif
 
 bool executable(const std::string& path) {
     std::error_code error;
@@ -111,6 +146,15 @@ ProgramPath read_program(const fs::path& file) {
     if (found.problem.empty() && !executable(found.path)) {
         found.problem = "it names " + found.path + ", which is not a program";
     }
+#if !defined(_WIN32)
+    if (found.problem.empty()) {
+        const std::string problem = changeable_program(found.path);
+        if (!problem.empty()) {
+            found.problem = "it names " + found.path + ", and " + problem +
+                            "; expected a palette4d that you or root alone may change";
+        }
+    }
+#endif
     if (found.problem.empty()) return found;
     const bool missing = found.problem == kMissing;
     return {"", file.u8string() + ": " + found.problem + (missing ? "" : kRemedy)};

@@ -20,7 +20,8 @@ struct ProgramPath {
 ProgramPath parse_program(const std::string& text);
 
 /// Reads the file. It must be a regular file of the user or of root, not writable for all, of at
-/// most kMaxProgramBytes; its path must be an executable file. Never waits, whatever the file is.
+/// most kMaxProgramBytes; its path must be an executable file. Only the user and root may change
+/// the program and the folders on the way to it. Never waits, whatever the file is.
 ProgramPath read_program(const std::filesystem::path& file);
 
 }  // namespace palette4d::node

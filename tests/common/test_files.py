@@ -5,6 +5,7 @@ import fcntl
 import os
 import secrets
 import stat
+import struct
 import subprocess
 import sys
 from collections.abc import Callable
@@ -140,6 +141,79 @@ def test_permissions_are_kept(old: Path, mode: int) -> None:
     with replacing(old, force=True) as temporary:
         temporary.write_bytes(b"new")
     assert stat.S_IMODE(old.stat().st_mode) == mode
+
+
+def access_list(*entries: tuple[int, int, int]) -> bytes:
+    """An access list as Linux stores it, of (tag, rights, id)."""
+    return struct.pack("<I", 2) + b"".join(struct.pack("<HHI", *entry) for entry in entries)
+
+
+NOBODY = 0xFFFFFFFF
+# Owner rw, user 12345 r, group none, mask r, others none.
+FOR_ONE = access_list(
+    (1, 6, NOBODY), (2, 4, 12345), (4, 0, NOBODY), (16, 4, NOBODY), (32, 0, NOBODY)
+)
+ACL = "system.posix_acl_access"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs Linux's extended attributes")
+def test_attributes_and_access_lists_are_kept(old: Path) -> None:
+    os.setxattr(old, "user.reviewed", b"yes")
+    os.setxattr(old, ACL, FOR_ONE)
+    replace(old, lambda: None)
+    assert old.read_bytes() == b"new"
+    assert os.getxattr(old, "user.reviewed") == b"yes"
+    assert os.getxattr(old, ACL) == FOR_ONE
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs Linux's extended attributes")
+def test_what_the_folder_gives_to_new_files_does_not_widen_an_old_ones_rights(old: Path) -> None:
+    old.chmod(0o600)
+    os.setxattr(old.parent, "system.posix_acl_default", FOR_ONE)
+    replace(old, lambda: None)
+    assert stat.S_IMODE(old.stat().st_mode) == 0o600
+    assert ACL not in os.listxattr(old)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs Linux's extended attributes")
+def test_an_access_list_that_cannot_be_copied_gives_its_rights_to_nobody(
+    old: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    os.setxattr(old, ACL, FOR_ONE)
+    monkeypatch.setattr(os, "setxattr", failing(OSError(errno.ENOTSUP, "none here")))
+    replace(old, lambda: None)
+    assert stat.S_IMODE(old.stat().st_mode) == 0o600
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="needs root")
+@pytest.mark.parametrize(("may", "mode"), [(True, 0o664), (False, 0o644)])
+def test_owner_and_group_are_kept_or_their_rights_go(
+    old: Path, may: bool, mode: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    os.chown(old, 12345, 12346)
+    old.chmod(0o664)
+    if not may:
+        monkeypatch.setattr(os, "fchown", failing(PermissionError(errno.EPERM, "not you")))
+    replace(old, lambda: None)
+    about = old.stat()
+    assert (about.st_uid, about.st_gid) == ((12345, 12346) if may else (0, 0))
+    assert stat.S_IMODE(about.st_mode) == mode
+
+
+def test_while_it_is_written_nobody_reads_what_will_be_closed(old: Path) -> None:
+    old.chmod(0o640)
+    with replacing(old, force=True) as temporary:
+        assert stat.S_IMODE(temporary.stat().st_mode) == 0o600
+        temporary.write_bytes(b"new")
+
+
+def test_a_file_with_two_names_is_not_parted_from_the_other(old: Path) -> None:
+    other = old.with_name("other.cube")
+    other.hardlink_to(old)
+    with pytest.raises(Palette4dError, match="of 2 names"):
+        replace(old, lambda: None)
+    assert old.samefile(other)
+    assert old.read_bytes() == b"old"
 
 
 def test_a_new_file_has_the_usual_permissions(tmp_path: Path) -> None:

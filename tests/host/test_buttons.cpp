@@ -106,6 +106,28 @@ TEST(the_programs_file_is_believed_only_if_it_is_ours) {
         refused("of another user");
         CHECK(::chown(file.c_str(), 0, 0) == 0);
     }
+    const fs::path place = folder() / "place";
+    fs::create_directory(place);
+    fs::copy_file(fs::canonical("/bin/sh"), place / "sh");
+    fs::create_symlink(place / "sh", folder() / "link");
+    for (const fs::path& named : {place / "sh", folder() / "link"}) {
+        write("program", named.u8string());
+        CHECK(read_program(file).path == named.u8string());
+        for (const fs::path& open : {place / "sh", place}) {
+            fs::permissions(open, fs::perms::others_write, fs::perm_options::add);
+            refused("may be changed by other users");
+            fs::permissions(open, fs::perms::others_write, fs::perm_options::remove);
+        }
+        if (::geteuid() == 0) {
+            for (const fs::path& theirs : {place / "sh", place}) {
+                CHECK(::chown(theirs.c_str(), 12345, 12345) == 0);
+                refused("belongs to another user");
+                CHECK(::chown(theirs.c_str(), 0, 0) == 0);
+            }
+        }
+    }
+    fs::remove_all(place);
+    fs::remove(folder() / "link");
     write("program", "/bin");
     refused("/bin, which is not a program");
     write("program", file.u8string());

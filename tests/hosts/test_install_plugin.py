@@ -75,6 +75,43 @@ def test_the_bundle_knows_which_python_has_palette4d(
     assert stat.S_IMODE((target / PROGRAM).stat().st_mode) == 0o644
 
 
+def test_a_closed_umask_makes_no_closed_plugin(bundle: Path, tmp_path: Path) -> None:
+    for path in (bundle, *bundle.rglob("*")):  # pip had the same umask
+        path.chmod(0o700 if path.is_dir() else 0o600)
+    old = os.umask(0o077)
+    try:
+        target = install_bundle(bundle, tmp_path / "new" / "OFX")
+    finally:
+        os.umask(old)
+    modes = {path.name: stat.S_IMODE(path.stat().st_mode) for path in target.rglob("*")}
+    assert modes.pop("program") == 0o644
+    assert set(modes.values()) == {0o755}
+    if os.geteuid() == 0:
+        folders = (target, target.parent, target.parent.parent)
+        assert {stat.S_IMODE(path.stat().st_mode) for path in folders} == {0o755}
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="needs root")
+@pytest.mark.parametrize("how", ["theirs", "open"])
+@pytest.mark.parametrize("what", ["package", "library", "link"])
+def test_root_installs_nothing_that_another_user_could_change(
+    bundle: Path, tmp_path: Path, what: str, how: str
+) -> None:
+    """Else each user's node would run what that one puts there."""
+    changed = {"package": bundle.parent, "library": bundle, "link": bundle}[what]
+    given = bundle
+    if what == "link":
+        given = tmp_path / "link"
+        given.symlink_to(bundle)
+    if how == "theirs":
+        os.chown(changed, 12345, 12345)
+    else:
+        changed.chmod(0o777)
+    with pytest.raises(Palette4dError, match="root"):
+        install_bundle(given, tmp_path / "OFX")
+    assert not (tmp_path / "OFX").exists()
+
+
 def test_replaces_an_earlier_version(bundle: Path, tmp_path: Path) -> None:
     destination = tmp_path / "OFX"
     old = make_bundle(destination, b"old code")

@@ -11,9 +11,11 @@ from palette4d.hosts.install import install_plugin
 
 _EPILOG = """\
 examples:
-  sudo palette4d install-plugin                   for every user, where all hosts look
-                                                  (on Windows: as an administrator, without sudo)
   palette4d install-plugin --dest ~/OFX           for yourself; then export OFX_PLUGIN_PATH=~/OFX
+  sudo /opt/palette4d/bin/palette4d install-plugin
+                                                  for every user, where all hosts look, from an
+                                                  environment that root alone may change
+                                                  (on Windows: as an administrator, without sudo)
   palette4d install-plugin --dest ~/OFX --link    follows this installation when it is upgraded
   palette4d install-plugin --dest ~/OFX --kdenlive --shotcut
                                                   the node, and files for these two programs

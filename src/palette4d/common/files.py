@@ -24,6 +24,7 @@ _TEMPORARY = re.compile(r"\..*\.[0-9a-f]{16}\.p4d-tmp(\.[^.]*)?", re.DOTALL)
 #: Seconds after which a temporary file counts as left over where files cannot be locked.
 _LEFT_OVER_AFTER = 86400.0
 _swept: set[Path] = set()
+_ACCESS_LIST = "system.posix_acl_access"
 #: As many links on the way to a file as Linux follows.
 _MOST_LINKS = 40
 
@@ -41,6 +42,11 @@ def refuse_existing(path: Path, force: bool) -> None:
         raise Palette4dError(f"{path}: there is no folder {path.parent}; create it first")
     if path.exists() and not force:
         raise Palette4dError(f"{path}: {EXISTS}")
+    if path.exists() and path.stat().st_nlink > 1:
+        raise Palette4dError(
+            f"{path}: found a file of {path.stat().st_nlink} names (hard links), which would part "
+            "from the others; expected a file of its own. Write to another name, or make it a copy"
+        )
     if not os.access(path.parent, os.W_OK):
         raise _closed(path)
 
@@ -94,8 +100,10 @@ def replacing(
 
     The temporary file is new (O_EXCL) and has an unpredictable name. It has the suffix of `path`,
     because libraries choose the format by it. File and folder are synced. A replaced file keeps its
-    permissions. An error or Ctrl-C in the body removes the temporary file and leaves `path`
-    unchanged. The next process that writes in the folder removes what a killed process left there.
+    owner, group, permissions, access list and extended attributes as far as the user may set them;
+    nobody gets more rights. An error or Ctrl-C in the body removes the temporary file and leaves
+    `path` unchanged. The next process that writes in the folder removes what a killed process left
+    there.
 
     Parameters
     ----------
@@ -200,8 +208,9 @@ def _new_temporary(path: Path) -> tuple[Path, int | None]:
     """
     while True:
         temporary = _temporary_name(path)
-        # 0o666 less the umask, as for any new file.
-        handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+        # 0o666 less the umask, as for any new file; what will have an old one's rights is closed.
+        mode = 0o600 if path.exists() else 0o666
+        handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
         ours = _is_locked(handle)
         if ours and sys.platform != "win32":
             return temporary, handle
@@ -224,10 +233,37 @@ def _rename(temporary: Path, path: Path) -> None:
 
 
 def _copy_permissions(path: Path, handle: int) -> None:
-    """Give an open file the permissions of another file, which is no link."""
-    mode = path.lstat().st_mode
-    if stat.S_ISREG(mode) and hasattr(os, "fchmod"):
-        os.fchmod(handle, mode & 0o777)
+    """Give an open file the owner and rights of another one, which is no link, and never more."""
+    old = path.lstat()
+    if not stat.S_ISREG(old.st_mode) or sys.platform == "win32":
+        return
+    for owner, group in ((old.st_uid, -1), (-1, old.st_gid)):
+        with contextlib.suppress(OSError):
+            os.fchown(handle, owner, group)
+    mode = old.st_mode & 0o777
+    # With an access list the group's bits are those of the list.
+    if os.fstat(handle).st_gid != old.st_gid or not _copy_attributes(path, handle):
+        mode &= ~0o070 | (mode & 0o007) << 3
+    os.fchmod(handle, mode)
+
+
+def _copy_attributes(path: Path, handle: int) -> bool:
+    """Copy extended attributes; return whether an access list, if there is one, was copied."""
+    if not hasattr(os, "listxattr"):
+        return True
+    names: list[str] = []
+    with contextlib.suppress(OSError):
+        names = os.listxattr(path, follow_symlinks=False)
+    if _ACCESS_LIST not in names:
+        with contextlib.suppress(OSError):  # what the folder gives to new files
+            os.removexattr(handle, _ACCESS_LIST)
+    copied = True
+    for name in names:
+        try:
+            os.setxattr(handle, name, os.getxattr(path, name, follow_symlinks=False))
+        except OSError:
+            copied = copied and name != _ACCESS_LIST
+    return copied
 
 
 def _is_locked(handle: int) -> bool:

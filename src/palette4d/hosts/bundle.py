@@ -17,6 +17,7 @@ from pathlib import Path
 from palette4d import _core
 from palette4d.common.errors import Palette4dError, WriteError
 from palette4d.common.files import replacing, temporary_folder
+from palette4d.hosts.ownership import changeable, runs_as_root
 
 BUNDLE = "Palette4D.ofx.bundle"
 _PLUGINS = "OFX/Plugins"
@@ -86,8 +87,10 @@ def install_bundle(
     """
     bundle = bundle.resolve()
     target = destination / BUNDLE
+    if runs_as_root():
+        _refuse_others_program(bundle)
     try:
-        destination.mkdir(parents=True, exist_ok=True)
+        _make_open_folder(destination)
         if target.exists() and target.resolve() == bundle and link:
             return target
         if os.path.lexists(target) and not force and not _is_ours(target):
@@ -106,6 +109,7 @@ def install_bundle(
             else:
                 shutil.copytree(bundle, fresh)
                 _write_program(fresh)
+                _open_for_all(fresh)
             _replace(fresh, target, temporary / "old")
     except PermissionError as error:
         who = (
@@ -134,6 +138,33 @@ def _reason(error: OSError) -> str:
     if isinstance(error, shutil.Error) and error.args[0]:
         return str(error.args[0][0][2])
     return error.strerror or str(error)
+
+
+def _refuse_others_program(bundle: Path) -> None:
+    """Check that root alone may change what all users' nodes will run."""
+    for path in (Path(sys.executable), Path(sys.prefix), bundle):
+        problem = changeable(path)
+        if problem is not None:
+            raise Palette4dError(
+                f"{path}: {problem}. Every user's node would run what that one puts there. Install "
+                "palette4d where root alone may write (sudo python3 -m venv /opt/palette4d; sudo "
+                "/opt/palette4d/bin/pip install …), and run its install-plugin"
+            )
+
+
+def _make_open_folder(folder: Path) -> None:
+    """Make a folder and its parents; root's are readable for all whatever the umask is."""
+    if not folder.exists():
+        _make_open_folder(folder.parent)
+        folder.mkdir(exist_ok=True)
+        if runs_as_root():
+            folder.chmod(0o755)
+
+
+def _open_for_all(bundle: Path) -> None:
+    """Let all users read a bundle that was copied from an environment which may be closed."""
+    for path in (bundle, *bundle.rglob("*")):
+        path.chmod(0o755 if path.is_dir() or path.suffix == ".ofx" else 0o644)
 
 
 def _write_program(bundle: Path) -> None:
