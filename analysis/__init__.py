@@ -1,4 +1,4 @@
 """Analysis of a clip (section 5 of Du et al. 2021). Each stage is one module.
 
-`pipeline` knows the stages and their order. No stage imports another stage.
+Only `pipeline` knows the order of the stages. No stage imports another one.
 """

@@ -19,9 +19,9 @@ from palette4d.analysis.losses import palette_loss, refine_palette
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import FramePalette
 
-# Evaluations per frame are few: refinement starts from the neighbour's refined palette.
+# Most evaluations of the loss per frame; few, since the neighbour's refined palette is the start.
 EVALUATIONS = 30
-# A frame keeps its neighbour's palette if their losses differ by less than this share.
+# Relative tolerance of losses: below it a frame keeps its neighbour's palette without refinement.
 SAME = 1e-3
 
 
@@ -103,8 +103,8 @@ class Merge:
         self.losses: list[float] = []
         n = len(frames)
         self.before = keep.weighted_loss(n, options) + adopt.weighted_loss(n, options)
-        both = len(keep.palettes) + len(adopt.palettes)
-        self.theta = _theta(both, len(keep.palettes[0].rgb), n, options)
+        count = len(keep.palettes) + len(adopt.palettes)
+        self.theta = _theta(count, len(keep.palettes[0].rgb), n, options)
         self.kept = sum(keep.losses)
         self.change = self.theta * self.kept - self.before
 
@@ -115,11 +115,11 @@ class Merge:
 
     def advance(self) -> None:
         """Refine the palette of the next frame, away from `keep`."""
-        first, count, at = self.adopt.first, len(self.adopt.palettes), len(self.palettes)
-        colours = self.frames[first + (at if self.forwards else count - 1 - at)].coarse
+        first, count, index = self.adopt.first, len(self.adopt.palettes), len(self.palettes)
+        colours = self.frames[first + (index if self.forwards else count - 1 - index)].coarse
         end = -1 if self.forwards else 0
-        previous = self.palettes[-1] if at else self.keep.palettes[end]
-        fitted = self.losses[-1] if at else self.keep.losses[end]
+        previous = self.palettes[-1] if index else self.keep.palettes[end]
+        fitted = self.losses[-1] if index else self.keep.losses[end]
         loss = palette_loss(colours, previous.rgb, self.options)
         if abs(loss - fitted) > SAME * fitted:
             rgb = refine_palette(colours, previous, self.gamut, self.options, EVALUATIONS)
@@ -182,33 +182,35 @@ def merge_sequence(
 
 def placed(
     blocks: Sequence[Block],
-    few: Sequence[FrameStatistics],
+    sampled: Sequence[FrameStatistics],
     frames: Sequence[FrameStatistics],
     options: AnalysisOptions,
 ) -> tuple[list[Block], list[FrameStatistics]]:
-    """Return blocks of `few` frames with their ends at neighbours of all `frames`; their frames.
+    """Extend the blocks of `sampled` frames in `frames`; return them, and the frames they cover.
 
-    Between the last frame of a block and the first of the next, both keep their palettes up to the
-    boundary of the least loss.
+    In the gap between two blocks, frames before the boundary keep the earlier block's last palette
+    and frames after it the later block's first. The boundary is where the sum of losses is least.
     """
     index = {frame.frame: i for i, frame in enumerate(frames)}
-    out, kept = [blocks[0]], [few[i] for i in range(len(blocks[0].palettes))]
+    out, kept = [blocks[0]], [sampled[i] for i in range(len(blocks[0].palettes))]
     for block in blocks[1:]:
-        start, before, own = block.first, out[-1], list(few[block.first :][: len(block.palettes)])
-        gap = frames[index[few[start - 1].frame] + 1 : index[few[start].frame]]
+        start, before = block.first, out[-1]
+        own = list(sampled[start:][: len(block.palettes)])
+        gap = frames[index[sampled[start - 1].frame] + 1 : index[sampled[start].frame]]
         if gap:
             early, late = before.palettes[-1], block.palettes[0]
             first = [palette_loss(f.coarse, early.rgb, options) for f in gap]
             second = [palette_loss(f.coarse, late.rgb, options) for f in gap]
-            at = int(np.argmin([sum(first[:n]) + sum(second[n:]) for n in range(len(gap) + 1)]))
-            if at > 0:
-                kept.append(gap[at - 1])
+            sums = [sum(first[:n]) + sum(second[n:]) for n in range(len(gap) + 1)]
+            boundary = int(np.argmin(sums))
+            if boundary > 0:
+                kept.append(gap[boundary - 1])
                 out[-1] = Block(
-                    before.first, (*before.palettes, early), (*before.losses, first[at - 1])
+                    before.first, (*before.palettes, early), (*before.losses, first[boundary - 1])
                 )
-            if at < len(gap):
-                own.insert(0, gap[at])
-                block = Block(start, (late, *block.palettes), (second[at], *block.losses))
+            if boundary < len(gap):
+                own.insert(0, gap[boundary])
+                block = Block(start, (late, *block.palettes), (second[boundary], *block.losses))
         out.append(dataclasses.replace(block, first=len(kept)))
         kept += own
     return out, kept

@@ -1,8 +1,8 @@
 """Clip colours: a few weighted colours of the clip, for the solver of picks.
 
 Input: the statistics of the frames. Output: the sidecar's member "colours". Each entry stands for
-the frames around it, so that a colour of a short time counts too. Colours far from all others are
-kept however rare they are. The clip is not read again.
+the frames around it, so that a brief colour counts too. Colours far from all others are kept
+however rare they are. The clip is not read again.
 """
 
 from __future__ import annotations
@@ -18,11 +18,12 @@ F64 = NDArray[np.float64]
 
 # Entries and colours per entry: with four digits each, about 25 KB as JSON.
 MOST_ENTRIES, MOST_COLOURS = 12, 64
-# Colours of one cell count as one. Cells per unit of the gamut's longest side.
+# Colours of one cell are averaged. Cells per unit of the gamut's longest side.
 CELLS = 32
-# A colour's share of the pixels counts in its fourth root when colours are chosen, and at least
-# this share: a lamp of a few pixels is chosen for its distance.
+# Weight of a candidate colour: its share of the pixels, at least LEAST_SHARE, to the power ROOT.
+# With a low power, a lamp of a few pixels is chosen for its distance.
 LEAST_SHARE, ROOT = 1e-4, 0.25
+# Decimal places of the JSON: a tenth of an 8-bit step.
 DIGITS = 4
 
 
@@ -34,39 +35,41 @@ def clip_colours(frames: Sequence[FrameStatistics]) -> list[dict[str, Any]]:
     """
     gamut = Gamut.of(frames)
     count = min(MOST_ENTRIES, len(frames))
-    at = np.unique(np.linspace(0, len(frames) - 1, count).round().astype(int))
-    nearest = np.abs(np.arange(len(frames))[:, None] - at).argmin(axis=1)
+    centres = np.unique(np.linspace(0, len(frames) - 1, count).round().astype(int))
+    nearest = np.abs(np.arange(len(frames))[:, None] - centres).argmin(axis=1)
     return [
         {
             "frame": frames[centre].frame,
             "rgbw": _reduced(
-                [one for one, p in zip(frames, nearest, strict=True) if p == part], gamut
+                [frame for frame, place in zip(frames, nearest, strict=True) if place == entry],
+                gamut,
             ),
         }
-        for part, centre in enumerate(at.tolist())
+        for entry, centre in enumerate(centres.tolist())
     ]
 
 
 def _reduced(frames: Sequence[FrameStatistics], gamut: Gamut) -> list[list[float]]:
-    rgb = np.concatenate([one.coarse.rgb for one in frames])
-    shares = np.concatenate([one.coarse.counts / one.coarse.total for one in frames]) / len(frames)
+    rgb = np.concatenate([frame.coarse.rgb for frame in frames])
+    shares = np.concatenate([frame.coarse.counts / frame.coarse.total for frame in frames])
+    shares /= len(frames)
     cells = np.floor((rgb - gamut.low) * (CELLS / gamut.scale)).astype(np.int64)
     keys = cells @ np.array([(CELLS + 1) ** 2, CELLS + 1, 1], np.int64)
     rgb, shares = _grouped(rgb, shares, keys)
     worth = np.maximum(shares, LEAST_SHARE) ** ROOT
     channels = np.ascontiguousarray(rgb.T)  # much quicker than row by row
 
-    def distances(one: int) -> F64:
-        red, green, blue = (channels - channels[:, one : one + 1]) ** 2
+    def distances(chosen: int) -> F64:
+        red, green, blue = (channels - channels[:, chosen : chosen + 1]) ** 2
         away: F64 = np.sqrt(red + green + blue)
         return away
 
     distance = distances(int(shares.argmax()))
     nearest = np.zeros(len(rgb), np.int64)
-    for one in range(1, min(MOST_COLOURS, len(rgb))):
-        there = distances(int((distance * worth).argmax()))
-        nearest[there < distance] = one
-        distance = np.minimum(distance, there)
+    for entry in range(1, min(MOST_COLOURS, len(rgb))):
+        to_chosen = distances(int((distance * worth).argmax()))
+        nearest[to_chosen < distance] = entry
+        distance = np.minimum(distance, to_chosen)
     rgb, shares = _grouped(rgb, shares, nearest)
     rows: list[list[float]] = np.column_stack([rgb, shares]).round(DIGITS).tolist()
     return sorted(rows, key=lambda row: (-row[3], row))

@@ -32,25 +32,25 @@ from palette4d.media.clip_base import Fill, FrameError, named
 if TYPE_CHECKING:
     from palette4d.media.clip import Clip
 
-# Pixels after which freed memory is returned to the system: glibc would keep the gaps that frames
-# of different sizes leave.
+# Pixels between two calls that return freed memory to the system. glibc would keep the gaps that
+# frames of different sizes leave.
 TRIM_EVERY = 50_000_000
 # Colours kept for all frames together, about 100 MB. Four times as many gave no better palettes.
 MOST_COLOURS = 2_000_000
-# Shorter clips keep more coarse colours per frame, at most this many times as many.
+# Clips below SHORT frames keep more coarse colours per frame, at most RICHER times as many.
 SHORT, RICHER = 48, 2
 # In a longer clip only every n-th frame is analysed: a palette is linear in time anyway.
 MOST_FRAMES = 3000
 # Least colours and coarse colours per frame, for any number of frames.
 FEWEST_COLOURS, FEWEST_COARSE = 1024, 512
-# Limits of the frames that are read at the same time: bytes, and frames.
+# Caps on the frames that are read at the same time: bytes, and frames.
 MEMORY, MOST_WORKERS = 400 << 20, 8
 # Most bytes of a binner's table.
 TABLE = 64 << 20
-# A colour outside 0..1 counts from this many pixels of a small frame, this share of a tiny frame.
+# Least number of pixels that extend a border outside 0..1, and its cap as a share of the frame.
 FEWEST_OUTSIDE, MOST_OUTSIDE_SHARE = 5, 0.01
-# Outliers are farther outside than this share of the extent of the clip's other colours. Nearer
-# colours hardly change a hull and may be the end of a true highlight.
+# Least distance of an outlier, as a share of the extent of the clip's other colours. Nearer colours
+# hardly change a hull and may belong to a true highlight.
 OUTLYING = 0.1
 
 Progress = Callable[[int, int], object]
@@ -92,10 +92,12 @@ def gather_clip(
     chosen = chosen_frames(clip.frames)
     colours, coarse = budget(len(chosen), options)
     pixels = clip.width * clip.height
-    found: dict[int, FrameStatistics | None] = {}
+    statistics: dict[int, FrameStatistics | None] = {}
     hidden: set[int] = set()
 
-    def taken(number: int, fill: Fill, binner: _core.ColourBinner) -> FrameStatistics | None:
+    def statistics_of(
+        number: int, fill: Fill, binner: _core.ColourBinner
+    ) -> FrameStatistics | None:
         try:
             if fill(binner):
                 hidden.add(number)
@@ -106,10 +108,10 @@ def gather_clip(
     most = min(MOST_WORKERS, MEMORY // (TABLE + 12 * pixels), len(chosen))
     workers = max(1, min(thread_count(options), most))
     # Close the generator to end its threads: the traceback of an error would keep them alive.
-    with contextlib.closing(_in_order(clip.fills(chosen), taken, workers)) as results:
+    with contextlib.closing(_in_order(clip.fills(chosen), statistics_of, workers)) as results:
         for done, (number, result) in enumerate(results, start=1):
             try:
-                found[number] = result()
+                statistics[number] = result()
             except FrameError:
                 if not clip.skip_bad_frames:
                     raise
@@ -118,7 +120,7 @@ def gather_clip(
                 _core.return_memory()
             if progress:
                 progress(done, len(chosen))
-    if not found:
+    if not statistics:
         raise clip.none_readable()
     notes = []
     if len(chosen) < len(clip.frames):
@@ -127,13 +129,13 @@ def gather_clip(
             f"{clip.frames.index(chosen[1])} and the last are analysed, {len(chosen)} in all; "
             "colours change linearly between them"
         )
-    if any(found[number] is not None for number in found.keys() - hidden):
-        found |= dict.fromkeys(hidden)  # alpha is used, and these frames are fully transparent
+    if any(statistics[number] is not None for number in statistics.keys() - hidden):
+        statistics |= dict.fromkeys(hidden)  # alpha is used, and these frames are fully transparent
     elif hidden:
         notes.append(_unused_alpha(clip.premultiplied))
-    usable = {number: one for number, one in found.items() if one is not None}
+    usable = {number: frame for number, frame in statistics.items() if frame is not None}
     kept, outliers = without_outliers(usable, options, colours, coarse)
-    return ClipStatistics({**found, **kept}, (*notes, *outliers))
+    return ClipStatistics({**statistics, **kept}, (*notes, *outliers))
 
 
 def chosen_frames(frames: Sequence[int]) -> list[int]:
@@ -161,26 +163,26 @@ def without_outliers(
     """Return frames whose outliers are clipped to the border of the other colours, and a note.
 
     Each channel has a lower and an upper border, never inside 0..1. A border is the farthest value
-    that enough pixels of one frame reach: `LOST_SHARE` of a frame, at most `options.k`. So many
-    pixels are worth a handle. Pixels are counted per frame, because a hot pixel is in all frames.
+    that enough pixels of one frame reach: `LOST_SHARE` of a frame, at most `options.k`. That many
+    pixels justify a handle. Pixels are counted per frame, because a hot pixel is in all frames.
     The borders hold for the whole clip, so that a highlight may begin small. Frames without
     outliers are returned unchanged.
     """
     if not frames:
         return {}, ()
-    reached = np.array([_reached(one, options) for one in frames.values()])  # (n, 2, 3)
+    reached = np.array([_reached(frame, options) for frame in frames.values()])  # (n, 2, 3)
     low, high = reached[:, 0].min(axis=0), reached[:, 1].max(axis=0)
     margin = OUTLYING * (high - low)
-    least = np.min([one.low for one in frames.values()], axis=0)
-    most = np.max([one.high for one in frames.values()], axis=0)
+    least = np.min([frame.low for frame in frames.values()], axis=0)
+    most = np.max([frame.high for frame in frames.values()], axis=0)
     low = np.where(least < low - margin, low, -np.inf)
     high = np.where(most > high + margin, high, np.inf)
     kept: dict[int, FrameStatistics] = {}
     pixels, farthest = 0.0, 0.0
-    for number, one in frames.items():
-        if np.all(one.low >= low) and np.all(one.high <= high):
+    for number, frame in frames.items():
+        if np.all(frame.low >= low) and np.all(frame.high <= high):
             continue
-        rgb, counts = one.colours.rgb, one.colours.counts
+        rgb, counts = frame.colours.rgb, frame.colours.counts
         clipped = np.clip(rgb, low, high)
         distance = np.abs(rgb - clipped).max(axis=1)
         pixels += counts[distance > 0].sum()
@@ -189,8 +191,10 @@ def without_outliers(
         binner.add_colours(clipped, counts)
         taken = binner.take(colours, coarse)
         assert taken is not None  # frames without pixels have no tree
-        fine, few, lowest, highest = taken
-        kept[number] = dataclasses.replace(one, colours=fine, coarse=few, low=lowest, high=highest)
+        fine, coarser, lowest, highest = taken
+        kept[number] = dataclasses.replace(
+            frame, colours=fine, coarse=coarser, low=lowest, high=highest
+        )
     if not kept:
         return dict(frames), ()
     note = (
@@ -221,9 +225,9 @@ def _reached(frame: FrameStatistics, options: AnalysisOptions) -> NDArray[np.flo
             outside = np.flatnonzero(values > border)
             outside = outside[np.argsort(-values[outside], kind="stable")]
             # Rounding may leave the mean of counts just below a whole number.
-            there = np.flatnonzero(np.cumsum(frame.colours.counts[outside]) >= enough - 1e-6)
-            if len(there):
-                out[side, channel] = sign * values[outside[there[0]]]
+            reaching = np.flatnonzero(np.cumsum(frame.colours.counts[outside]) >= enough - 1e-6)
+            if len(reaching):
+                out[side, channel] = sign * values[outside[reaching[0]]]
     return out
 
 
@@ -238,11 +242,11 @@ def _taken(
     taken = binner.take(max(colours, least), coarse, scale)
     if taken is None:
         return None
-    fine, few, low, high = taken
+    fine, coarser, low, high = taken
     histogram = colour_histogram.histogram(fine.rgb, fine.counts)
     if colours < least:  # of a very long clip
         fine = pooled([fine], colours)
-    return FrameStatistics(frame, fine, few, histogram, low, high, count, ignored)
+    return FrameStatistics(frame, fine, coarser, histogram, low, high, count, ignored)
 
 
 def _in_order(

@@ -85,9 +85,9 @@ def mesh_volume(rgb: F64, faces: I32) -> float:
 def deepest_concavity(polytope: SkewPolytope, frames: Iterable[FrameStatistics]) -> float:
     """Return the largest share of its hull that a slice lacks; `narrow` frames are skipped."""
     slices = {
-        (at, rgb.tobytes()): (rgb, block.faces)  # a static palette has one
+        (index, rgb.tobytes()): (rgb, block.faces)  # a static palette has one
         for frame in frames
-        for at, block in enumerate(polytope.blocks)
+        for index, block in enumerate(polytope.blocks)
         if block.first <= frame.frame <= block.last and not narrow(frame)
         for rgb in (polytope.colours_at(block, frame.frame),)
     }

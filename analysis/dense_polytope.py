@@ -33,7 +33,7 @@ class DensePolytope:
     ----------
     node : `node[i][s]` is the vertex of colour s in frame i.
     position : (n, 3) colours of each frame, of ghosts too.
-    at : (frame index, colour) of each vertex.
+    place : (frame index, colour) of each vertex.
     chain : for each edge (v, w) the ghosts between v and w, in order of time.
     """
 
@@ -51,16 +51,16 @@ class DensePolytope:
         self.block_frames: list[range] = []
         self.node: list[list[int]] = []
         self.position: list[F64] = []
-        self.at: list[tuple[int, int]] = []
+        self.place: list[tuple[int, int]] = []
         for block in blocks:
             begin = len(self.node)
             self.block_frames.append(range(begin, begin + len(block)))
             for i, palette in enumerate(block, begin):
-                self.node.append(list(range(len(self.at), len(self.at) + len(palette.rgb))))
-                self.at += [(i, s) for s in range(len(palette.rgb))]
+                self.node.append(list(range(len(self.place), len(self.place) + len(palette.rgb))))
+                self.place += [(i, s) for s in range(len(palette.rgb))]
                 self.position.append(palette.rgb.copy())
-        self.before: list[list[int]] = [[] for _ in self.at]
-        self.after: list[list[int]] = [[] for _ in self.at]
+        self.before: list[list[int]] = [[] for _ in self.place]
+        self.after: list[list[int]] = [[] for _ in self.place]
         self.chain: dict[tuple[int, int], list[int]] = {}
         for b, inside in enumerate(self.block_frames):
             for i in inside[:-1]:
@@ -70,7 +70,7 @@ class DensePolytope:
                 last, first = self.node[inside[-1]], self.node[inside[-1] + 1]
                 for i, j in self.links[b]:
                     self._join(last[i], first[j])
-        self.alive = [True] * len(self.at)
+        self.alive = [True] * len(self.place)
 
     def _join(self, u: int, v: int) -> None:
         self.after[u].append(v)
@@ -79,7 +79,7 @@ class DensePolytope:
 
     def colour(self, vertex: int) -> F64:
         """Return the (3,) colour of a vertex; a ghost has the colour of its edge at that time."""
-        i, s = self.at[vertex]
+        i, s = self.place[vertex]
         rgb: F64 = self.position[i][s]
         return rgb
 
@@ -95,11 +95,11 @@ class DensePolytope:
         """Return (frame index, colour, (3,) position) of each colour that the removal of `vertex`
         would move."""
         v, w = self.before[vertex][0], self.after[vertex][0]
-        start, end = self.frames[self.at[v][0]], self.frames[self.at[w][0]]
+        start, end = self.frames[self.place[v][0]], self.frames[self.place[w][0]]
         a, b = self.colour(v), self.colour(w)
         out = []
         for ghost in (*self.chain[v, vertex], vertex, *self.chain[vertex, w]):
-            i, s = self.at[ghost]
+            i, s = self.place[ghost]
             weight = (self.frames[i] - start) / (end - start)
             out.append((i, s, a + weight * (b - a)))
         return out
@@ -120,7 +120,7 @@ class DensePolytope:
         keep = [v for v, alive in enumerate(self.alive) if alive]
         index = {v: n for n, v in enumerate(keep)}
         edge_of = {ghost: edge for edge, chain in self.chain.items() for ghost in chain}
-        vertices = np.array([[*self.colour(v), self.frames[self.at[v][0]]] for v in keep])
+        vertices = np.array([[*self.colour(v), self.frames[self.place[v][0]]] for v in keep])
 
         def through(nodes: Sequence[int]) -> tuple[int, ...]:
             """Return the track through the given vertices and ghosts."""

@@ -1,8 +1,8 @@
 """The palette of an earlier version of a clip, which moves to the colours of the new one.
 
-A new search may end at other handles although only the grain of the clip has changed: palettes of
-nearly the same price change places. A moved palette keeps its colours and stops. Input: a sidecar
-document. Output: its `SkewPolytope`, at the times of the new version.
+A new search may find other handles although only the grain of the clip has changed: palettes of
+nearly the same price change places in the ranking. A moved palette keeps its colours and stops.
+Input: a sidecar document. Output: its `SkewPolytope`, at the times of the new version.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from palette4d.analysis.polytope import Section, SkewPolytope
 from palette4d.common.errors import Palette4dError
 from palette4d.media.clip_base import Clip, describe
 
-# A palette fits worse if L' is so many times that of its own clip.
+# Factor of L', against its value on the palette's own clip, above which a note reports a worse fit.
 WORSE = 1.25
 
 
@@ -47,18 +47,25 @@ def read(document: Mapping[str, Any], clip: Clip) -> SkewPolytope:
 
 def _polytope(fields: Mapping[str, Any]) -> SkewPolytope:
     """Return the polytope of a sidecar's "polytope"; the inverse of `fields_of`."""
-    place = {vertex["id"]: at for at, vertex in enumerate(fields["vertices"])}
+    place = {vertex["id"]: index for index, vertex in enumerate(fields["vertices"])}
 
-    def section(of: Mapping[str, Any], first: float, last: float) -> Section:
-        tracks = tuple(tuple(place[one] for one in track) for track in of["tracks"])
-        return Section(first, last, tracks, np.array(of["faces"], np.int32).reshape(-1, 3))
+    def section(fields_of_section: Mapping[str, Any], first: float, last: float) -> Section:
+        tracks = tuple(
+            tuple(place[vertex] for vertex in track) for track in fields_of_section["tracks"]
+        )
+        return Section(
+            first, last, tracks, np.array(fields_of_section["faces"], np.int32).reshape(-1, 3)
+        )
 
     blocks = tuple(section(b, float(b["first"]), float(b["last"])) for b in fields["blocks"])
     between = zip(fields["transitions"], blocks, blocks[1:], strict=False)
     return SkewPolytope(
         np.array([[*v["rgb"], v["frame"]] for v in fields["vertices"]], float),
         blocks,
-        tuple(section(of, before.last, after.first) for of, before, after in between),
+        tuple(
+            section(fields_of_section, before.last, after.first)
+            for fields_of_section, before, after in between
+        ),
     )
 
 

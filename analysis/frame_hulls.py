@@ -21,7 +21,7 @@ from palette4d import _core
 
 F64 = NDArray[np.float64]
 
-# A hull is simplified to so many corners at most: more hinder the merging of frames.
+# Most corners of a simplified hull: with more, neighbouring frames rarely merge.
 MOST_CORNERS = 8
 
 
@@ -35,7 +35,7 @@ def frame_palette(
 def simple_hull(
     colours: _core.ColourTree, options: AnalysisOptions, most: int = MOST_CORNERS
 ) -> F64 | FramePalette:
-    """Return at most so many (n, 3) corners whose hull holds all colours, or the palette of flat
+    """Return at most `most` (n, 3) corners whose hull holds all colours, or the palette of flat
     colours."""
     rgb = colours.rgb
     most = min(most, options.palette_size)
@@ -59,13 +59,13 @@ def refined(
     """Return the refined palette of a `simple_hull`."""
     if isinstance(simple, FramePalette):
         return simple
-    close = options.merge_distance * gamut.scale
-    best = hull_mesh(merge_close(gamut.clip(simple), close))
+    least_distance = options.merge_distance * gamut.scale
+    best = hull_mesh(merge_close(gamut.clip(simple), least_distance))
     best_loss = palette_loss(colours, best.rgb, options)
     # Refining may push a vertex inside the hull, so the second round starts from the new hull.
     for _ in range(2):
         moved = refine_palette(colours, best, gamut, options)
-        palette = hull_mesh(merge_close(moved, close))
+        palette = hull_mesh(merge_close(moved, least_distance))
         loss = palette_loss(colours, palette.rgb, options)
         if loss >= best_loss and len(palette.rgb) >= len(best.rgb):
             break

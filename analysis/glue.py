@@ -28,9 +28,10 @@ I32 = NDArray[np.int32]
 Bool = NDArray[np.bool_]
 Links = tuple[tuple[int, int], ...]
 
-# After this many nodes the search returns its best solution; real clips need far fewer.
+# Cap on the nodes of the branch and bound; at the cap it returns its best solution. Real clips need
+# far fewer.
 MOST_NODES = 200_000
-# The cost of a broken rule: more than any colour distance that it could save.
+# Cost of a broken rule, in RGB distance: more than breaking it can save.
 BROKEN = 10.0
 
 
@@ -61,19 +62,19 @@ def glue(first: FramePalette, second: FramePalette) -> Glue:
         links = _nearest_links(distance)
         return Glue(links, 0, n == m and _same_topology(first, second, links))
     hull = hull_pairs(first.rgb, second.rgb)
-    everything = np.ones_like(hull)
-    found, complete = _search(first, second, distance, hull, strict=True)
-    bound = np.inf if found is None else sum(float(distance[i, j]) for i, j in found[0])
-    shorter, seen = _search(first, second, distance, everything, strict=True, bound=bound)
-    found, complete = shorter or found, complete and seen
-    if found is not None:
-        same = n == m and _same_topology(first, second, found[0])
-        return Glue(found[0], 0, same, complete)
-    found, seen = _search(first, second, distance, everything, strict=False)
-    if found is None:
+    all_pairs = np.ones_like(hull)
+    solution, complete = _search(first, second, distance, hull, strict=True)
+    bound = np.inf if solution is None else sum(float(distance[i, j]) for i, j in solution[0])
+    shorter, also_complete = _search(first, second, distance, all_pairs, strict=True, bound=bound)
+    solution, complete = shorter or solution, complete and also_complete
+    if solution is not None:
+        same = n == m and _same_topology(first, second, solution[0])
+        return Glue(solution[0], 0, same, complete)
+    solution, also_complete = _search(first, second, distance, all_pairs, strict=False)
+    if solution is None:
         links = _nearest_links(distance)
-        found = links, _broken_edges(first, second, links)
-    return Glue(found[0], found[1], False, complete and seen)
+        solution = links, _broken_edges(first, second, links)
+    return Glue(solution[0], solution[1], False, complete and also_complete)
 
 
 def hull_pairs(first: F64, second: F64) -> Bool:
@@ -150,11 +151,12 @@ def _same_topology(first: FramePalette, second: FramePalette, links: Links) -> b
 def _broken_edges(first: FramePalette, second: FramePalette, links: Links) -> int:
     near, far = first.adjacency(), second.adjacency()
     broken = 0
-    for one, other, pairs in ((near, far, links), (far, near, tuple((j, i) for i, j in links))):
-        images = [[j for i, j in pairs if i == v] for v in range(len(one))]
+    for source, target, pairs in ((near, far, links), (far, near, tuple((j, i) for i, j in links))):
+        images = [[j for i, j in pairs if i == v] for v in range(len(source))]
         broken += sum(
-            bool(one[v, w]) and not any(a == b or other[a, b] for a in images[v] for b in images[w])
-            for v, w in itertools.combinations(range(len(one)), 2)
+            bool(source[v, w])
+            and not any(a == b or target[a, b] for a in images[v] for b in images[w])
+            for v, w in itertools.combinations(range(len(source)), 2)
         )
     return broken
 
@@ -174,12 +176,12 @@ def transition_faces(first: FramePalette, second: FramePalette, links: Links) ->
     late = [j for _, j in links]
     early = [i for i, _ in links]
     if len(set(late)) == len(links):
-        place = {j: at for at, j in enumerate(late)}
+        place = {j: index for index, j in enumerate(late)}
         return _relabel(second.faces, place)
     if len(set(early)) == len(links):
-        place = {i: at for at, i in enumerate(early)}
+        place = {i: index for index, i in enumerate(early)}
         return _relabel(first.faces, place)
-    tracks = {j: [at for at, (_, b) in enumerate(links) if b == j] for j in set(late)}
+    tracks = {j: [index for index, (_, b) in enumerate(links) if b == j] for j in set(late)}
     mesh = [tuple(tracks[int(v)][0] for v in face) for face in second.faces]
     wanted = {_triangle(*map(int, face)) for face in first.faces}
     for j in sorted(tracks):
@@ -202,8 +204,8 @@ def _split_vertex(
     star = {}  # neighbour -> next neighbour, anticlockwise round `old`
     for face in mesh:
         if old in face:
-            at = face.index(old)
-            star[face[(at + 1) % 3]] = face[(at + 2) % 3]
+            index = face.index(old)
+            star[face[(index + 1) % 3]] = face[(index + 2) % 3]
     ring = [min(star)]
     while len(ring) < len(star):
         ring.append(star[ring[-1]])

@@ -28,12 +28,12 @@ STOPPED = (
     nlopt.runtime_error,
     nlopt.invalid_argument,
 )
-# A pixel farther outside than this is lost: edits of the palette do not reach it. A smaller share
-# of a frame counts as hot pixels or glints.
+# RGB distance outside the palette beyond which a pixel is lost: edits of the palette do not reach
+# it. Lost pixels below LOST_SHARE of a frame are ignored, as hot pixels or glints.
 LOST, LOST_SHARE = 0.25, 1e-4
-# `descend`: the longest step, in colour or in parts of the clip; how many steps grow up to it; how
-# much of the mean and of the mean square of the gradient a step keeps; a square of the gradient
-# that counts as zero.
+# `descend`: the longest step, in RGB or in clip lengths; the number of steps that grow up to it;
+# Adam's beta 1 and 2, the decay of the gradient's mean and mean square; the square that avoids a
+# division by zero.
 STEP, WARM_UP, MEAN, SQUARE, TINY = 0.012, 3, 0.65, 0.9, 1e-18
 NO_FACES: I32 = np.zeros((0, 3), np.int32)
 
@@ -196,9 +196,9 @@ def descend(
     steps: int,
     longest: float = STEP,
 ) -> F64:
-    """Minimise a function inside a box by so many gradient steps; return the last point.
+    """Minimise a function inside a box by a number of gradient steps; return the last point.
 
-    `slope(x, k)` is the gradient for step k. It may be of another part of the function each time.
+    `slope(x, k)` is the gradient at step k, possibly of another part of the function each time.
     Steps follow Adam (Kingma and Ba 2015); they grow at first, then shrink to nothing. No line
     search can fail at a kink, where `minimise` ends early: with many colours there are kinks
     everywhere.

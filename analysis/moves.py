@@ -1,9 +1,9 @@
-"""Moves of the structure search that take a whole colour away.
+"""Moves of the structure search that remove a whole colour, and the insertion of stops.
 
 A chain is a colour from its beginning to its end: the vertices between the clip's ends, or between
-a split and a merge, with one neighbour on either side in time. `without` of a polytope takes one
-vertex away; `without_chain` all of a chain. Every section keeps a closed mesh: the chain's track is
-drawn into a neighbouring one.
+a split and a merge, each with at most one neighbour on either side in time. `without` of a polytope
+removes one vertex, `without_chain` a whole chain. Every section keeps a closed mesh: the chain's
+track is contracted into a neighbouring one.
 """
 
 from __future__ import annotations
@@ -17,22 +17,22 @@ from palette4d.analysis.polytope import Section, SkewPolytope
 
 I32 = NDArray[np.int32]
 
-# A solid has at least this many colours.
+# Least number of colours that enclose a volume.
 LEAST_COLOURS = 4
-# An edge of at most so many frames gets no stop.
+# Longest edge without a stop, in frames: a stop needs `LEAST_GAP` on either side.
 LONG_EDGE = 2
-# Times of a section at which the meshes after a move are compared.
+# Number of times in a section at which candidate meshes are compared.
 COMPARED = 5
 
 
 def chains(polytope: SkewPolytope) -> list[tuple[int, ...]]:
-    """Return the chains that may go: every section keeps enough colours."""
+    """Return the removable chains: without one, every section keeps enough colours."""
     before, after = polytope.neighbours()
 
     def inner(v: int) -> bool:
         return len(before[v]) <= 1 and len(after[v]) <= 1
 
-    found = []
+    candidates = []
     for v in range(len(polytope.vertices)):
         # A chain begins with the clip or behind a splitting vertex.
         if not inner(v) or any(inner(u) for u in before[v]):
@@ -44,15 +44,15 @@ def chains(polytope: SkewPolytope) -> list[tuple[int, ...]]:
             chain.append(after[chain[-1]][0])
         end = after[chain[-1]]
         if not end or len(before[end[0]]) > 1:
-            found.append(tuple(chain))
-    few = {
+            candidates.append(tuple(chain))
+    needed = {
         v
         for section in (*polytope.blocks, *polytope.transitions)
         if len(section.tracks) <= LEAST_COLOURS
         for track in section.tracks
         for v in track
     }
-    return [chain for chain in found if few.isdisjoint(chain)]
+    return [chain for chain in candidates if needed.isdisjoint(chain)]
 
 
 def without_chain(
@@ -60,21 +60,21 @@ def without_chain(
 ) -> SkewPolytope:
     """Return the polytope without a chain of `chains`.
 
-    With `any_mesh` sections get the first mesh found, for losses that do not depend on it.
+    With `any_mesh`, sections get the first valid mesh, for losses that do not depend on it.
     """
     gone = set(chain)
     place = np.cumsum([v not in gone for v in range(len(polytope.vertices))]) - 1
 
     def rest(section: Section) -> Section:
         faces, tracks = section.faces, list(section.tracks)
-        at = next((i for i, track in enumerate(tracks) if not gone.isdisjoint(track)), None)
-        if at is not None:
-            del tracks[at]
+        index = next((i for i, track in enumerate(tracks) if not gone.isdisjoint(track)), None)
+        if index is not None:
+            del tracks[index]
             if len(faces) and any_mesh:
-                faces = next(_drawn_in(faces, at))
+                faces = next(_contracted(faces, index))
             elif len(faces):
                 faces = _least_concave(polytope, Section(section.first, section.last, tuple(tracks),
-                                                         faces), at)  # fmt: skip
+                                                         faces), index)  # fmt: skip
         renamed = tuple(tuple(int(place[v]) for v in track) for track in tracks)
         return Section(section.first, section.last, renamed, faces)
 
@@ -97,16 +97,16 @@ def enriched(polytope: SkewPolytope) -> SkewPolytope:
 
 
 def _least_concave(polytope: SkewPolytope, section: Section, gone: int) -> I32:
-    """Return the mesh of a section's remaining tracks that lacks least of its hull."""
+    """Return the least concave mesh of a section's remaining tracks."""
     times = np.linspace(section.first, section.last, COMPARED)
     colours = [polytope.colours_at(section, t) for t in times]
     solid = [(rgb, volume) for rgb in colours if (volume := hull_volume(rgb)) > 0]
-    meshes = list(_drawn_in(section.faces, gone))
+    meshes = list(_contracted(section.faces, gone))
     return max(meshes, key=lambda mesh: sum(mesh_volume(rgb, mesh) / v for rgb, v in solid))
 
 
-def _drawn_in(faces: I32, gone: int) -> Iterator[I32]:
-    """Yield the meshes without the corner `gone`, each drawn into one of its neighbours."""
+def _contracted(faces: I32, gone: int) -> Iterator[I32]:
+    """Yield the meshes without the corner `gone`, contracted into each of its neighbours."""
     touches: dict[int, set[int]] = {}
     for face in faces.tolist():
         for v in face:

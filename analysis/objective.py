@@ -31,12 +31,12 @@ from palette4d import _core
 
 F64 = NDArray[np.float64]
 
-# Least distance in frames between two vertices of a track: a steeper change would be a cut.
+# Least gap between two vertices of a track, in frames: a steeper change would be a cut.
 LEAST_GAP = 0.5
-# Weight in eq. 11 of the edges to and from a colour that exists for a short time only.
+# Weight in eq. 11 of the edges of a brief colour (see `Objective`).
 BRIEF = 0.25
-# A joint step looks at one part of the frames. There are at most so many parts, each of at least so
-# many frames.
+# A joint step evaluates every n-th frame only: n is at most MOST_PARTS, and smaller where a step
+# would have fewer than FEWEST_OF_A_PART frames.
 MOST_PARTS, FEWEST_OF_A_PART = 3, 3
 
 
@@ -89,8 +89,8 @@ def losses_of(
     polytope: SkewPolytope, frames: Sequence[FrameStatistics], options: AnalysisOptions
 ) -> Losses:
     """Measure a polytope on all colours of all frames, by the paper's losses alone."""
-    everything = range(len(frames))
-    rows = frame_losses(polytope, frames, everything, loss_weights(options), options, coarse=False)
+    all_frames = range(len(frames))
+    rows = frame_losses(polytope, frames, all_frames, loss_weights(options), options, coarse=False)
     k, _ = smoothness(polytope.vertices, polytope.edges(), polytope.length())
     return summarise(rows, k, options)
 
@@ -107,8 +107,8 @@ def refine_jointly(
 ) -> tuple[SkewPolytope, float]:
     """Move all vertices together in their boxes; return the polytope and the value of `Objective`.
 
-    Each step looks at every n-th frame, another choice each time. The value is never above the
-    value of the given polytope, clipped to the gamut. Vertices in `brief` (see `Objective`) keep
+    Each step evaluates every n-th frame, from another first one each time. The value never exceeds
+    that of the given polytope, clipped to the gamut. Vertices in `brief` (see `Objective`) keep
     their times: the mean over all frames would shorten such a colour.
     """
     evaluate = Objective(polytope, frames, options, gamut, coarse, brief)
@@ -119,19 +119,19 @@ def refine_jointly(
     parts = max(1, min(MOST_PARTS, len(frames) // FEWEST_OF_A_PART))
 
     def slope(x: F64, step: int) -> F64:
-        some = evaluate.everything[step % parts :: parts]
-        _, gradient = evaluate(x * evaluate.scale, some, for_all=True)
+        part = evaluate.all_frames[step % parts :: parts]
+        _, gradient = evaluate(x * evaluate.scale, part, for_all=True)
         scaled: F64 = gradient * evaluate.scale
         return scaled
 
     low, high = (bound / evaluate.scale for bound in box)
     moved = descend(slope, start / evaluate.scale, low, high, steps, longest) * evaluate.scale
     vertices = evaluate.with_fixed_times(np.clip(moved, *box), start)
-    value, _ = evaluate(vertices, evaluate.everything, False)
-    if steps and value >= evaluate(start, evaluate.everything, False)[0]:
-        # The best place is so near, maybe at a kink, that steps lead away from it.
+    value, _ = evaluate(vertices, evaluate.all_frames, False)
+    if steps and value >= evaluate(start, evaluate.all_frames, False)[0]:
+        # The optimum is near, or at a kink, and the steps overshoot it.
         vertices = move_all(evaluate, start, max(1, steps // parts))
-        value, _ = evaluate(vertices, evaluate.everything, False)
+        value, _ = evaluate(vertices, evaluate.all_frames, False)
     return polytope.with_vertices(vertices), value
 
 
@@ -140,7 +140,7 @@ def move_all(evaluate: Objective, vertices: F64, most_evaluations: int) -> F64:
     moving = np.arange(len(vertices))
     # Each neighbour in time gets half the gap between them, so that both may move at once.
     box = evaluate.box(vertices, moving, share=0.5)
-    return move(evaluate, vertices, moving, evaluate.everything, box, most_evaluations)
+    return move(evaluate, vertices, moving, evaluate.all_frames, box, most_evaluations)
 
 
 def move(
@@ -151,9 +151,9 @@ def move(
     box: tuple[F64, F64],
     most_evaluations: int,
 ) -> F64:
-    """Return the vertices with those in `moving` at their best place in the box.
+    """Return the vertices, those in `moving` at their optimum in the box.
 
-    NLopt minimises until little changes: the paper's refinement.
+    NLopt minimises to a relative tolerance: the paper's refinement.
     """
 
     def objective(x: F64) -> tuple[float, F64]:
@@ -174,8 +174,8 @@ def move(
 class Objective:
     """Eq. 12 over a choice of frames, plus the terms for convexity, separation and reach.
 
-    Vertices in `brief` belong to a colour that exists for a short time only. It may appear and
-    vanish quickly: in eq. 11 the edges that end at these vertices have the weight `BRIEF`.
+    Vertices in `brief` belong to a colour that exists for a short time. It may appear and vanish
+    quickly: the edges of these vertices have the weight `BRIEF` in eq. 11.
     """
 
     def __init__(
@@ -191,7 +191,7 @@ class Objective:
         self.weights = shaped_weights(options, gamut.scale)
         self.loss = loss_of(polytope, frames, coarse)
         self.threads = thread_count(options)
-        self.everything = list(range(len(frames)))
+        self.all_frames = list(range(len(frames)))
         self.times = np.array([frame.frame for frame in frames], float)
         self.edges = polytope.edges()
         self.quick = np.where(np.isin(self.edges, list(brief)).any(axis=1), BRIEF, 1.0)
@@ -208,19 +208,19 @@ class Objective:
     def __call__(
         self, vertices: F64, which: list[int], with_gradient: bool = True, for_all: bool = False
     ) -> tuple[float, F64]:
-        """Return sum over `which` of L / N + gamma K (+ shape), and the gradient if wanted.
+        """Return the sum over `which` of L / N + gamma K (+ shape), and its gradient on request.
 
-        N is the number of all frames, or with `for_all` of those in `which`, which stand for them.
+        N counts all frames; with `for_all` the frames in `which`, as a sample of all frames.
         """
         o = self.options
         rows, gradient = self.loss.evaluate(
             vertices, which, self.weights, self.threads, with_gradient
         )
         sums = rows.sum(axis=0)
-        count = len(which if for_all else self.everything)
+        count = len(which if for_all else self.all_frames)
         value = (o.lambda_ * sums[0] + sums[1] + sums[2]) / count
         gradient = gradient / count if with_gradient else np.zeros_like(vertices)
-        if o.gamma and len(self.everything) > 1:
+        if o.gamma and len(self.all_frames) > 1:
             k, slope = smoothness(vertices, self.edges, self.length, self.quick)
             value += o.gamma * k
             gradient += o.gamma * slope

@@ -61,7 +61,7 @@ Progress = Callable[[str, int, int], object]
 
 @dataclasses.dataclass(frozen=True)
 class StageResult:
-    """The vertices, blocks and losses after a stage."""
+    """Vertices, blocks and losses after a stage."""
 
     stage: str
     vertices: int
@@ -75,7 +75,7 @@ class StageResult:
 
 
 @dataclasses.dataclass(frozen=True)
-class Found:
+class PaletteResult:
     """The result of all stages.
 
     Attributes
@@ -91,7 +91,7 @@ class Found:
 
 
 @dataclasses.dataclass(frozen=True)
-class Analysis(Found):
+class Analysis(PaletteResult):
     """The result of an analysis.
 
     Attributes
@@ -167,8 +167,8 @@ def analyze(
         if not allow_cuts:
             raise Palette4dError(f"{clip.source}: {cuts.refusal(clip.frames, starts)}")
         missing.append(cuts.note(starts))
-    found = find_polytope(usable, options, tell, earlier)
-    polytope = found.polytope
+    result = find_polytope(usable, options, tell, earlier)
+    polytope = result.polytope
     fields = polytope.fields() if like is None else earlier_palette.fields_of(polytope, like)
     document = sidecar.new_document(
         {
@@ -186,7 +186,7 @@ def analyze(
         },
         fields,
         {
-            "stages": [stage.row() for stage in found.stages],
+            "stages": [stage.row() for stage in result.stages],
             "options": options.recorded(),
             "versions": _versions(),
         },
@@ -197,7 +197,7 @@ def analyze(
     warnings = advice.warnings(
         report,
         options,
-        {stage.stage: stage.losses.max_distance for stage in found.stages},
+        {stage.stage: stage.losses.max_distance for stage in result.stages},
         brightest=float(finished.vertices[:, :3].max()),
     )
     notes = [*clip.notes]
@@ -210,11 +210,11 @@ def analyze(
     for vertex, name in zip(vertices, names, strict=True):
         vertex["name"] = name
     if like is not None:
-        notes += earlier_palette.fit(like, found.stages[-1].losses.L_prime)
-    notes += [*gathered.notes, *missing, *found.notes, *warnings]
+        notes += earlier_palette.fit(like, result.stages[-1].losses.L_prime)
+    notes += [*gathered.notes, *missing, *result.notes, *warnings]
     return Analysis(
-        found.polytope,
-        found.stages,
+        result.polytope,
+        result.stages,
         tuple(notes),
         document=document,
         report=report,
@@ -260,14 +260,14 @@ def find_polytope(
     options: AnalysisOptions,
     progress: Progress | None = None,
     earlier: SkewPolytope | None = None,
-) -> Found:
+) -> PaletteResult:
     """Run the stages after `colour_statistics` on at least one frame, in order of time.
 
     `earlier` is the palette that the method `LIKE` moves.
     """
-    # Times from 0 on: how frames are numbered must not show, not even by rounding.
+    # Times start at 0, so that the result does not depend on frame numbers, not even by rounding.
     first = frames[0].frame
-    frames = [dataclasses.replace(one, frame=one.frame - first) for one in frames]
+    frames = [dataclasses.replace(frame, frame=frame.frame - first) for frame in frames]
     run = _Run(frames, options, progress)
     if options.method == LIKE:
         if earlier is None:
@@ -277,7 +277,7 @@ def find_polytope(
         methods = {"skew": _skew, "paper": _paper, "static": _static, "rgbt": _rgbt}
         polytope = methods[options.method](run)
     polytope = polytope.later(first)
-    return Found(polytope, tuple(run.stages), tuple(run.notes))
+    return PaletteResult(polytope, tuple(run.stages), tuple(run.notes))
 
 
 class _Run:
@@ -345,7 +345,7 @@ def _skew(run: _Run) -> SkewPolytope:
 
 
 def _moved(run: _Run, earlier: SkewPolytope) -> SkewPolytope:
-    """The palette of an earlier version, before and after it is moved."""
+    """Move the palette of an earlier version to the colours of this clip."""
     frames, gamut, options = run.frames, run.gamut, run.options
     run.record("earlier_palette", earlier)
     near, _ = refine_jointly(earlier, frames, gamut, options, MOVING_STEPS, coarse=True)
@@ -356,7 +356,7 @@ def _moved(run: _Run, earlier: SkewPolytope) -> SkewPolytope:
 
 
 def _price(polytope: SkewPolytope, run: _Run, cost: float, free: int = 0) -> float:
-    """Return L' and the cost of the handles but for those that are `free`."""
+    """Return L' and the cost of all handles except `free` of them."""
     return run.losses(polytope).L_prime + cost * (len(polytope.vertices) - free)
 
 
@@ -368,65 +368,68 @@ def _searched(
     The search starts from `static`, which does not depend on `handle_cost`.
     """
     frames, gamut = run.frames, run.gamut
-    few = structure_search.key_frames(static, frames, options, structure_search.KEY_FRAMES)
-    blocks, first = _consistent_blocks(run, few)
-    sequence = block_merging.merge_sequence(blocks, few, gamut, options)
+    sampled = structure_search.key_frames(static, frames, options, structure_search.KEY_FRAMES)
+    blocks, first = _consistent_blocks(run, sampled)
+    sequence = block_merging.merge_sequence(blocks, sampled, gamut, options)
     configurations = [merged for _, merged in run.counted("block_merging", sequence, len(blocks))]
     few_blocks = [c for c in reversed(configurations) if len(c) <= options.blocks]
     starts, notes = [], []
 
-    def next_starts() -> Iterator[SkewPolytope]:  # the search may need the first few only
+    def next_starts() -> Iterator[SkewPolytope]:  # lazily: the search may stop early
         for configuration in few_blocks:
-            apart, these = block_merging.placed(configuration, few, frames, options)
-            dense, note = _glued(these, apart)
+            apart, its_frames = block_merging.placed(configuration, sampled, frames, options)
+            dense, note = _glued(its_frames, apart)
             notes.append(note)
-            vertex_removal.thin_out(dense, these, options)
+            vertex_removal.thin_out(dense, its_frames, options)
             starts.append(dense.polytope())
             yield starts[-1]
 
     rungs = [rung.polytope for rung in run.ladder]
     begun = run.counted("vertex_removal", next_starts(), len(few_blocks))
-    at, found = structure_search.search(begun, static, rungs, few, frames, gamut, options)
-    with_stops = stop_insertion.insert_stops(found, frames, gamut, options)
+    chosen, polytope = structure_search.search(
+        begun, static, rungs, sampled, frames, gamut, options
+    )
+    with_stops = stop_insertion.insert_stops(polytope, frames, gamut, options)
     run.stages += [
         first,
-        run.result("block_merging", static if at is None else starts[at]),
+        run.result("block_merging", static if chosen is None else starts[chosen]),
         run.result("vertex_removal", with_stops[-1].polytope),
     ]
-    if at is not None and len(found.blocks) > 1:
-        run.notes += notes[at]
+    if chosen is not None and len(polytope.blocks) > 1:
+        run.notes += notes[chosen]
     cost = options.handle_cost
-    for polytope, free in _with_useful_stops(run, with_stops):
-        if _price(polytope, run, cost, free) <= _price(simple, run, cost):
-            return polytope
+    for candidate, free in _with_useful_stops(run, with_stops):
+        if _price(candidate, run, cost, free) <= _price(simple, run, cost):
+            return candidate
     return simple
 
 
 def _with_useful_stops(
     run: _Run, tried: Sequence[stop_insertion.WithStops]
 ) -> Iterator[tuple[SkewPolytope, int]]:
-    """Yield the refined polytope with all stops, if they are of use, and without stops.
+    """Yield the refined polytope with all stops, if they are useful, and the one without stops.
 
-    Stops are of use if they lower the price, or if fewer pixels are lost: `LOST_SHARE` of a frame
-    for each handle. Then they need not be worth their cost: the second item is how many are free.
+    Stops are useful if they lower the price, or if each recovers lost pixels: `LOST_SHARE` of a
+    frame. Useful stops cost nothing; the second item is their number.
     """
 
-    def priced(one: SkewPolytope) -> float:
-        rare = structure_search.rare_cost(one, run.frames)
-        return _price(one, run, run.options.handle_cost) + rare
+    def priced(candidate: SkewPolytope) -> float:
+        rare = structure_search.rare_cost(candidate, run.frames)
+        return _price(candidate, run, run.options.handle_cost) + rare
 
     refined = [
-        vertex_refinement.refine(one.polytope, run.frames, run.gamut, run.options, one.brief)
-        for one in dict.fromkeys((tried[0], tried[-1]))
+        vertex_refinement.refine(stops.polytope, run.frames, run.gamut, run.options, stops.brief)
+        for stops in dict.fromkeys((tried[0], tried[-1]))
     ]
     if len(refined) > 1:
         plain, rich = refined
         before, after = (
-            stop_insertion.lost_share(one, run.frames, run.gamut, run.options) for one in refined
+            stop_insertion.lost_share(candidate, run.frames, run.gamut, run.options)
+            for candidate in refined
         )
-        stops = len(rich.vertices) - len(plain.vertices)
-        if before - after >= LOST_SHARE * stops or priced(rich) <= priced(plain):
-            yield rich, stops
+        count = len(rich.vertices) - len(plain.vertices)
+        if before - after >= LOST_SHARE * count or priced(rich) <= priced(plain):
+            yield rich, count
     yield refined[0], 0
 
 

@@ -70,13 +70,13 @@ class SkewPolytope:
 
     def edges(self) -> I32:
         """Return the inter-frame edges E, (m, 2) vertex indices, earlier end first, each once."""
-        found = {
+        pairs = {
             pair
             for section in (*self.blocks, *self.transitions)
             for track in section.tracks
             for pair in itertools.pairwise(track)
         }
-        return np.array(sorted(found), np.int32).reshape(-1, 2)
+        return np.array(sorted(pairs), np.int32).reshape(-1, 2)
 
     def length(self) -> float:
         """Return the clip's length in frames; 1 for a single frame, so that it can divide."""
@@ -110,9 +110,9 @@ class SkewPolytope:
         time = min(max(time, block.first), block.last)
         ends, weights = [], []
         for track in block.tracks:
-            at = np.interp(time, self.vertices[list(track), 3], range(len(track)))
-            ends.append((track[int(at)], track[math.ceil(at)]))
-            weights.append(at % 1)
+            position = np.interp(time, self.vertices[list(track), 3], range(len(track)))
+            ends.append((track[int(position)], track[math.ceil(position)]))
+            weights.append(position % 1)
         rgb = self.colours_at(block, time)
         return Slice(rgb, block.faces, np.array(ends, np.int32), np.array(weights))
 
@@ -142,10 +142,10 @@ class SkewPolytope:
         return dataclasses.replace(self, vertices=vertices, blocks=tuple(blocks))
 
     def later(self, by: float) -> SkewPolytope:
-        """Return the polytope so many frames later."""
+        """Return the polytope, `by` frames later."""
 
-        def moved(one: Section) -> Section:
-            return dataclasses.replace(one, first=one.first + by, last=one.last + by)
+        def moved(section: Section) -> Section:
+            return dataclasses.replace(section, first=section.first + by, last=section.last + by)
 
         return SkewPolytope(
             self.vertices + np.array([0, 0, 0, by]),
@@ -164,9 +164,9 @@ class SkewPolytope:
         def parted(old: Section) -> Section:
             tracks = []
             for track in old.tracks:
-                for at, pair in enumerate(itertools.pairwise(track), 1):
+                for index, pair in enumerate(itertools.pairwise(track), 1):
                     if pair == edge:
-                        track = _covering(old, [*track[:at], new, *track[at:]], vertices)
+                        track = _covering(old, [*track[:index], new, *track[index:]], vertices)
                         break
                 tracks.append(track)
             return dataclasses.replace(old, tracks=tuple(tracks))
@@ -223,9 +223,9 @@ class SkewPolytope:
         order = list(range(len(self.vertices)))
         if not ids:
             order.sort(key=lambda i: (self.vertices[i, 3], *self.vertices[i, :3], i))
-            ids = [f"v{at}" for at in range(1, len(order) + 1)]
+            ids = [f"v{number}" for number in range(1, len(order) + 1)]
         name = dict(zip(order, ids, strict=True))
-        place = {index: at for at, index in enumerate(order)}
+        place = {index: number for number, index in enumerate(order)}
         edges = sorted((place[int(u)], place[int(v)]) for u, v in self.edges())
         return {
             "vertices": [
@@ -237,8 +237,8 @@ class SkewPolytope:
                 for i in order
             ],
             "edges": [
-                {"id": f"e{at}", "from": name[order[u]], "to": name[order[v]]}
-                for at, (u, v) in enumerate(edges, 1)
+                {"id": f"e{number}", "from": name[order[u]], "to": name[order[v]]}
+                for number, (u, v) in enumerate(edges, 1)
             ],
             "blocks": [
                 {

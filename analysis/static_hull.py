@@ -24,10 +24,11 @@ from palette4d.analysis.polytope import FramePalette, Section, SkewPolytope
 
 F64 = NDArray[np.float64]
 
+# Gradient steps on each rung.
 STEPS = 40
-# The colours of these evenly spaced frames decide.
+# Number of evenly spaced frames on which rungs are refined and compared.
 EVEN_FRAMES = 24
-# They start from so many times the coarse colours of one frame.
+# Colours of the first rung's hull, as a multiple of the coarse colours of one frame.
 POOLED = 2
 
 
@@ -36,28 +37,28 @@ def ladder(
 ) -> list[Priced]:
     """Return static palettes from `palette_size` colours down to four, with their values.
 
-    Each lacks one colour of the one before. Of two such ladders, without `convexity` and with it,
-    the better palette of each number of colours is returned. Colours that do not get to a corner of
-    the palette go too. Colours without volume have one palette.
+    Each rung has one colour fewer than the rung before. Two ladders are built, without `convexity`
+    and with it; for each number of colours the better rung is returned. Colours inside the hull are
+    removed too. Colours without volume have one palette.
     """
-    some = [*frames[: -1 : -(-len(frames) // EVEN_FRAMES)], frames[-1]]
+    sampled = [*frames[: -1 : -(-len(frames) // EVEN_FRAMES)], frames[-1]]
     colours = pooled([f.coarse for f in frames], POOLED * options.coarse_colours)
     roomy = dataclasses.replace(options, refinement_box=2 * options.refinement_box)
     weights = shaped_weights(options, gamut.scale, faces=False)
 
     def bare(rgb: F64) -> SkewPolytope:
-        return _still(FramePalette(rgb, NO_FACES), some)
+        return _still(FramePalette(rgb, NO_FACES), sampled)
 
     def loss(rgb: F64, every: int = 1) -> float:
         rows = frame_losses(
-            bare(rgb), some, range(0, len(some), every), weights, options, coarse=True
+            bare(rgb), sampled, range(0, len(sampled), every), weights, options, coarse=True
         )
         return float((options.lambda_ * rows[:, 0] + rows[:, 1] + rows[:, 2]).mean())
 
     def rungs(rgb: F64, start: Callable[[F64], SkewPolytope]) -> Iterator[FramePalette]:
         while True:
-            found, _ = refine_jointly(start(rgb), some, gamut, roomy, STEPS, coarse=True)
-            palette = hull_mesh(found.vertices[:, :3])
+            moved, _ = refine_jointly(start(rgb), sampled, gamut, roomy, STEPS, coarse=True)
+            palette = hull_mesh(moved.vertices[:, :3])
             yield palette
             count = len(palette.rgb)
             if count <= LEAST_COLOURS:
@@ -70,8 +71,8 @@ def ladder(
         return [Priced(_lasting(simple, frames), loss(simple.rgb))]
     first = refined(colours, simple, gamut, dataclasses.replace(options, merge_distance=0.0)).rgb
     best: dict[int, tuple[float, FramePalette]] = {}
-    # With faces, `convexity` keeps colours from falling into the solid, where they are lost.
-    for start in (bare, lambda rgb: _still(hull_mesh(rgb), some)):
+    # With faces, `convexity` keeps colours at corners of the hull; inside it they are removed.
+    for start in (bare, lambda rgb: _still(hull_mesh(rgb), sampled)):
         for palette in rungs(first, start):
             count, value = len(palette.rgb), loss(palette.rgb)
             if count not in best or value < best[count][0]:

@@ -7,7 +7,7 @@ that only a few frames have. Frames with lost pixels (`LOST`) get stops.
 The lost colours of such a frame get a stop on a track, with or without stops before and after that
 keep the rest of the track where it is. In the clip's first and last frame the vertex of the track
 itself takes the colour. A stop stays if it brings most of the lost pixels back. It need not be
-worth its `handle_cost`, which judges the mean: the value of `Objective` may even rise by `WORTH`.
+worth its `handle_cost`, which judges the mean. The value of `Objective` may rise by `WORTH`.
 Its edges count little in eq. 11, which would otherwise rather lose the colour than let it change
 quickly.
 """
@@ -32,10 +32,15 @@ from palette4d import _core
 F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
 
+# Most frames that get stops.
 MOST_ROUNDS = 10
-REMOVED = 0.5  # the least share of the lost pixels that a stop must bring back
-WORTH = 0.04  # the most that lost pixels may raise the value of `Objective`
-FARTHEST = 1000  # lost colours that are looked at
+# Least share of the lost pixels that a stop must bring back.
+REMOVED = 0.5
+# Most that a stop may raise the value of `Objective`.
+WORTH = 0.04
+# Cap on the lost colours of a frame that are clustered, farthest first: the time is quadratic.
+FARTHEST = 1000
+# Most evaluations of the objective for each candidate (NLopt).
 EVALUATIONS = 30
 
 
@@ -74,7 +79,9 @@ def insert_stops(
             if change > WORTH:
                 continue
             rest = _Misfit.of(moved.polytope, [frames[i] for i in trial.span], gamut, options)
-            removed = [misfit.removed(i, rest, at, trial.share) for at, i in enumerate(trial.span)]
+            removed = [
+                misfit.removed(i, rest, index, trial.share) for index, i in enumerate(trial.span)
+            ]
             left = removed.count(False)
             if removed[trial.span.index(worst)] and (best is None or (left, price) < best[:2]):
                 best = left, price, moved
@@ -129,10 +136,10 @@ class _Misfit:
         bad = np.flatnonzero(self.lost >= LOST_SHARE).tolist()
         return max((i for i in bad if i not in hopeless), key=lambda i: self.far[i], default=None)
 
-    def removed(self, frame: int, rest: _Misfit, at: int, share: float) -> bool:
+    def removed(self, frame: int, rest: _Misfit, index: int, share: float) -> bool:
         """Return whether most of the pixels of a lost colour are back in frame `at` of `rest`."""
-        less = self.lost[frame] - rest.lost[at] >= REMOVED * min(share, self.lost[frame])
-        return bool(less and rest.far[at] <= self.far[frame])
+        less = self.lost[frame] - rest.lost[index] >= REMOVED * min(share, self.lost[frame])
+        return bool(less and rest.far[index] <= self.far[frame])
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -184,8 +191,8 @@ def _trials(
         if lasting[0] < lasting[1]:
             shapes += [(lasting, beside, False), (lasting, beside, True)]
         for track, (peaks, pins, held) in itertools.product(range(len(rgb)), shapes):
-            stops = [(*target.tolist(), at) for at in peaks]
-            stops += [(*polytope.colours_at(block, at)[track], at) for at in pins]
+            stops = [(*target.tolist(), when) for when in peaks]
+            stops += [(*polytope.colours_at(block, when)[track], when) for when in pins]
             changed, new = _with_stops(polytope, place, track, stops, len(peaks))
             if new:
                 yield _Trial(changed, new, len(peaks), share, span, held)
@@ -198,9 +205,9 @@ def _outside(rgb: F64, faces: I32, frame: FrameStatistics) -> F64:
 
 
 def _lost_colour(distance: F64, frame: FrameStatistics, scale: float) -> tuple[F64, float]:
-    """Return the mean of the lost colours that are near one of them, and their share of the pixels.
+    """Return the mean of a cluster of lost colours, and its share of the frame's pixels.
 
-    Of the one where pixels times distance outside add up to most.
+    The cluster with the largest sum of pixels times distance outside is returned.
     """
     colours, counts = frame.coarse.rgb, frame.coarse.counts
     far = np.argsort(-distance, kind="stable")[:FARTHEST]
@@ -217,9 +224,9 @@ def _with_stops(
 ) -> tuple[SkewPolytope, list[int]]:
     """Return the polytope with stops (r, g, b, frame) on a block's track, and their vertices.
 
-    Stops too near to others in time are left out. If one of the first `peaks` is, none is added. In
+    Stops too near others in time are skipped; if a peak is skipped, no stop is added. In
     the clip's first and last frame the track's own vertex takes the colour of a peak, if another
-    stop keeps the rest of the track.
+    stop holds the rest of the track.
     """
     block = polytope.blocks[place]
     chain = list(block.tracks[track])
@@ -239,10 +246,10 @@ def _with_stops(
             if i < peaks:
                 return polytope, []
             continue
-        at = int(np.searchsorted(times, stop[3]))
+        index = int(np.searchsorted(times, stop[3]))
         new = len(changed.vertices)
-        changed = changed.with_stop((chain[at - 1], chain[at]), stop)
-        chain.insert(at, new)
+        changed = changed.with_stop((chain[index - 1], chain[index]), stop)
+        chain.insert(index, new)
         added.append(new)
     if len(added) <= peaks and min(added) < len(polytope.vertices):  # the whole track would change
         return polytope, []
@@ -256,7 +263,7 @@ def _settled(
     gamut: Gamut,
     options: AnalysisOptions,
 ) -> tuple[WithStops, float]:
-    """Move the new vertices to their best places; return the polytope and the change in value."""
+    """Optimise the new vertices; return the polytope and the change in value."""
     brief = (*now.brief, *trial.new[: trial.peaks])
     evaluate = Objective(trial.polytope, frames, options, gamut, True, brief)
     vertices = trial.polytope.vertices.copy()

@@ -1,20 +1,22 @@
 """Structure search: the handles that are worth their cost.
 
 Input: polytopes to start from (the configurations of block merging, thinned out), and static hulls.
-Output: the polytope of the least price, refined on coarse colours. The price is what is minimised,
-eq. 12 with the terms for shape, plus `handle_cost` a vertex, plus `RARE_COST` a rare one.
+Output: the polytope of the least price, refined on coarse colours. The price is the value of
+`Objective` (eq. 12 with the terms for shape), plus `handle_cost` for each vertex, plus `RARE_COST`
+for each rare one.
 
-Static hulls are refined. From each other start a walk goes down from rich to poor. Each step takes
-away the vertex whose loss costs least, and all others move jointly to take over. Then the walk goes
-back to its best palette, takes a whole colour away (`moves`), and goes down again, until no poorer
-palette can be the best. Stops are put into the best palette of each start, and single vertices
-removed again.
-`handle_cost`, `vertices` and `blocks` choose among the palettes found. A dearer handle and fewer
-vertices also lengthen the walks. So a dearer handle hardly ever means more handles, and more of
-what is allowed hardly ever anything worse (docs/lab/search.md).
+Static hulls are only refined. From every other start a walk removes vertices. Each step removes the
+vertices whose removal raises the loss least, and refines the others jointly. When the price has
+risen too far, the walk returns to its best palette, removes a whole colour (`moves`), and removes
+single vertices again. At last, stops are inserted into each walk's best palette, and single
+vertices are removed once more.
 
-The paper's rule, a multiple of the loss before removal (section 5.4.2), does not measure the use of
-a vertex.
+`handle_cost`, `vertices` and `blocks` select from the palettes of all walks. A higher cost and
+fewer vertices only make the walks longer. So a higher `handle_cost` rarely gives more handles, and
+relaxing a limit rarely gives a worse palette (docs/lab/search.md).
+
+The paper stops at a multiple of the loss before removal (section 5.4.2), which does not measure the
+use of a vertex.
 """
 
 from __future__ import annotations
@@ -34,30 +36,34 @@ from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import SkewPolytope
 
 F64 = NDArray[np.float64]
+Candidate = tuple[Priced, int | None]
+"""A palette, and the index of its start; None for a static hull."""
 
 # Gradient steps of joint moves: at the start of a walk, and after each removal.
 FIRST_STEPS, STEPS = 20, 15
-# The palettes of a walk are compared at this cost, whatever `handle_cost` is.
+# Walks compare palettes at the default cost of a handle, whatever `handle_cost` is.
 USUAL = AnalysisOptions()
 USUAL_COST = USUAL.handle_cost
-# Prices this share above the least are hopeless: walks end, and no more blocks are tried.
+# Relative tolerance of prices on a walk: it ends, and no more blocks are tried, when the price
+# exceeds the least by more. Larger values find better palettes and take longer.
 PATIENCE = 0.08
-# With a dearer handle or fewer vertices walks end only at so many times the cost.
+# Factor of `handle_cost` in the stopping test, for higher costs and for fewer vertices.
 DEARER = 4
-# At the end palettes are refined in rounds, on more frames than before and on all frames in the
-# last one: the steps of a round, and how far above the least price a palette may be to take part.
-# So many with the same numbers of handles and colours do.
-ROUNDS, OF_A_KIND = ((0, 0.5), (5, 0.05), (30, 0.02)), 2
-# Prices that differ by this share count as the same: the last refinement changes them by as much.
+# Final selection, in rounds: the gradient steps, and the relative tolerance of the price within
+# which candidates take part. The last round measures all frames.
+ROUNDS = ((0, 0.5), (5, 0.05), (30, 0.02))
+# Most candidates with the same numbers of handles and colours in a round.
+OF_A_KIND = 2
+# Relative tolerance of equal prices: the last refinement changes them by as much.
 ALIKE = 0.005
-# Stops are put into the best palette again if the last ones lowered its price by this share.
+# Least relative gain in price that justifies another insertion of stops.
 WORTHWHILE = 0.01
-# A rare handle costs so much more, whatever `handle_cost` is.
+# Extra cost of a rare handle, whatever `handle_cost` is.
 RARE_COST = USUAL_COST
-# So many evenly spaced frames are looked at, by merging and by walks, and so many others with the
-# largest losses.
+# Evenly spaced frames for block merging and the first rounds, and for walks; and the number of
+# frames with the largest losses that are added.
 KEY_FRAMES, EVEN_FRAMES, WORST_FRAMES = 48, 16, 8
-# Frames in which palettes without one of their colours are compared.
+# Evenly spaced frames on which the removal of a whole colour is measured.
 CHAIN_FRAMES = 8
 
 
@@ -65,101 +71,103 @@ def search(
     starts: Iterable[SkewPolytope],
     static: SkewPolytope,
     rungs: Sequence[SkewPolytope],
-    few: Sequence[FrameStatistics],
+    key: Sequence[FrameStatistics],
     frames: Sequence[FrameStatistics],
     gamut: Gamut,
     options: AnalysisOptions,
 ) -> tuple[int | None, SkewPolytope]:
-    """Return which start the best polytope comes from (None: a static hull), and the polytope.
+    """Return the index of the best polytope's start (None: a static hull), and the polytope.
 
-    The starts come in the order of their blocks. Those with more blocks than one that is far worse
-    than the best are not searched. `rungs` are static hulls; `static` is the best of them.
+    `starts` are in order of their number of blocks. The search ends at a start whose price exceeds
+    the least by more than `PATIENCE`. `rungs` are static hulls, and `static` is the best of them.
+    `key` are the `key_frames` of the clip's `frames`.
     """
-    usual = few if len(few) <= EVEN_FRAMES else key_frames(static, few, options, EVEN_FRAMES)
-    found = [
+    usual = key if len(key) <= EVEN_FRAMES else key_frames(static, key, options, EVEN_FRAMES)
+    refined_rungs = [
         Priced(*refine_jointly(rung, usual, gamut, options, FIRST_STEPS, True)) for rung in rungs
     ]
-    ways: list[tuple[int | None, Sequence[FrameStatistics], list[Priced]]] = [(None, usual, found)]
+    # The start, the frames and the palettes of each walk.
+    walks: list[tuple[int | None, Sequence[FrameStatistics], list[Priced]]]
+    walks = [(None, usual, refined_rungs)]
 
     def known() -> list[Priced]:
-        return [one for *_, way in ways for one in way]
+        return [palette for *_, palettes in walks for palette in palettes]
 
     least = math.inf
-    for at, start in enumerate(starts):
-        ends = {time for b in start.blocks for time in (b.first, b.last)}
-        ends |= {frame.frame for frame in usual}
-        some = [frame for frame in frames if frame.frame in ends]
-        steps = walk(start, some, gamut, options, known())
-        ways.append((at, some, steps))
-        price = min(map(_usual_price, steps))
+    for index, start in enumerate(starts):
+        times = {time for b in start.blocks for time in (b.first, b.last)}
+        times |= {frame.frame for frame in usual}
+        measured = [frame for frame in frames if frame.frame in times]
+        palettes = walk(start, measured, gamut, options, known())
+        walks.append((index, measured, palettes))
+        price = min(map(_usual_price, palettes))
         if price > (1 + PATIENCE) * least:
             break
         least = min(least, price)
-    for _, seen, way in ways:
-        way += up_and_down(min(way, key=_usual_price), seen, gamut, options, known())
-    everything = [(one, at) for at, _, way in ways for one in way]
-    return best_of(everything, few, frames, gamut, options)
+    for _, sample, palettes in walks:
+        best = min(palettes, key=_usual_price)
+        palettes += up_and_down(best, sample, gamut, options, known())
+    candidates = [(palette, index) for index, _, palettes in walks for palette in palettes]
+    return best_of(candidates, key, frames, gamut, options)
 
 
-def _usual_price(one: Priced) -> float:
-    return one.price(USUAL_COST)
+def _usual_price(palette: Priced) -> float:
+    return palette.price(USUAL_COST)
 
 
 def best_of(
-    found: Sequence[tuple[Priced, int | None]],
-    few: Sequence[FrameStatistics],
+    candidates: Sequence[Candidate],
+    key: Sequence[FrameStatistics],
     frames: Sequence[FrameStatistics],
     gamut: Gamut,
     options: AnalysisOptions,
 ) -> tuple[int | None, SkewPolytope]:
-    """Return the best of all that was found, measured on all frames, and its start.
+    """Return the start and the polytope of the best candidate, measured on all frames.
 
-    The first rounds look at a `few` frames, more than the walks. Of palettes of nearly the same
-    price it is one with the fewest handles, and of these the one whose terms for shape are least.
+    The first rounds measure the `key` frames, more than the walks. Of candidates with equal prices
+    (`ALIKE`) the one with the fewest handles wins, then the one with the least terms for shape.
     """
-    everything = [one for one, _ in found]
+    palettes = [palette for palette, _ in candidates]
     cost = options.handle_cost
-    close = [(p, at) for p, at in found if allowed(p, everything, options)]
-    for (steps, share), seen in zip(ROUNDS, (few, few, frames), strict=True):
+    close = [candidate for candidate in candidates if allowed(candidate[0], palettes, options)]
+    for (steps, tolerance), measured in zip(ROUNDS, (key, key, frames), strict=True):
         close = [
-            (Priced(*refine_jointly(p.polytope, seen, gamut, options, steps, True)), at)
-            for p, at in _close(close, cost, share)
+            (Priced(*refine_jointly(p.polytope, measured, gamut, options, steps, True)), start)
+            for p, start in _close(close, cost, tolerance)
         ]
-    close.sort(key=lambda found: found[0].price(cost))
-    # Rare handles are counted only where they decide: counting is slow.
-    whole = functools.cache(lambda one: one.price(cost) + rare_cost(one.polytope, frames))
+    close.sort(key=lambda candidate: candidate[0].price(cost))
+    # Rare handles are counted for few candidates only: counting is slow.
+    full_price = functools.cache(lambda p: p.price(cost) + rare_cost(p.polytope, frames))
     least = math.inf
-    for one, _ in close:
-        if one.price(cost) < least:
-            least = min(least, whole(one))
+    for palette, _ in close:
+        if palette.price(cost) < least:
+            least = min(least, full_price(palette))
 
-    def plainness(one: Priced) -> tuple[int, float]:
+    def plainness(palette: Priced) -> tuple[int, float]:
         weights = shaped_weights(options, gamut.scale)
-        everywhere = range(len(frames))
-        rows = frame_losses(one.polytope, frames, everywhere, weights, options, coarse=True)
-        return one.handles, float(rows[:, 2].mean())
+        all_frames = range(len(frames))
+        rows = frame_losses(palette.polytope, frames, all_frames, weights, options, coarse=True)
+        return palette.handles, float(rows[:, 2].mean())
 
-    alike = [found for found in close if found[0].price(cost) <= (1 + ALIKE) * least]
-    alike.sort(key=lambda found: plainness(found[0]))
-    chosen, at = next(found for found in alike if whole(found[0]) <= (1 + ALIKE) * least)
-    return at, chosen.polytope
+    alike = [candidate for candidate in close if candidate[0].price(cost) <= (1 + ALIKE) * least]
+    alike.sort(key=lambda candidate: plainness(candidate[0]))
+    best, start = next(c for c in alike if full_price(c[0]) <= (1 + ALIKE) * least)
+    return start, best.polytope
 
 
-def _close(
-    found: Sequence[tuple[Priced, int | None]], cost: float, share: float
-) -> list[tuple[Priced, int | None]]:
-    """Return the palettes near the least price, few of each number of handles and colours."""
-    bound = (1 + share) * min(one.price(cost) for one, _ in found)
-    best: dict[tuple[int, ...], list[tuple[Priced, int | None]]] = {}
-    for one, at in sorted(found, key=lambda found: found[0].price(cost)):
-        kind = (one.handles, *(len(block.tracks) for block in one.polytope.blocks))
-        if one.price(cost) <= bound:
-            best.setdefault(kind, []).append((one, at))
-    return [found for kind in best.values() for found in kind[:OF_A_KIND]]
+def _close(candidates: Sequence[Candidate], cost: float, tolerance: float) -> list[Candidate]:
+    """Return the candidates near the least price, `OF_A_KIND` for each (handles, colours)."""
+    bound = (1 + tolerance) * min(palette.price(cost) for palette, _ in candidates)
+    kinds: dict[tuple[int, ...], list[Candidate]] = {}
+    for palette, start in sorted(candidates, key=lambda candidate: candidate[0].price(cost)):
+        kind = (palette.handles, *(len(block.tracks) for block in palette.polytope.blocks))
+        if palette.price(cost) <= bound:
+            kinds.setdefault(kind, []).append((palette, start))
+    return [candidate for kind in kinds.values() for candidate in kind[:OF_A_KIND]]
 
 
 def rare_cost(polytope: SkewPolytope, frames: Sequence[FrameStatistics]) -> float:
-    """Return what the rare handles of a palette cost more than others."""
+    """Return the extra cost of a palette's rare handles."""
     return RARE_COST * rare_handles(polytope, frames)
 
 
@@ -169,20 +177,20 @@ def key_frames(
     options: AnalysisOptions,
     even: int,
 ) -> list[FrameStatistics]:
-    """Return frames that stand for all: evenly spaced, and those that one palette fits worst.
+    """Return a sample of the frames: `even` evenly spaced ones, and those `static` fits worst.
 
-    The frames before and after these count too: otherwise a palette that fits a flash might change
-    long before it.
+    The neighbours of a badly fitting frame are included: otherwise a palette that fits a flash
+    might change long before it.
     """
     chosen = {*range(0, len(frames), -(-len(frames) // even)), len(frames) - 1}
     most = len(chosen) + WORST_FRAMES
-    everything = range(len(frames))
-    rows = frame_losses(static, frames, everything, loss_weights(options), options, coarse=True)
+    all_frames = range(len(frames))
+    rows = frame_losses(static, frames, all_frames, loss_weights(options), options, coarse=True)
     loss = options.lambda_ * rows[:, 0] + rows[:, 1]
     for worst in np.argsort(-loss, kind="stable").tolist():
         if len(chosen) >= most:
             break
-        chosen |= {worst - 1, worst, worst + 1} & set(everything)
+        chosen |= {worst - 1, worst, worst + 1} & set(all_frames)
     return [frames[i] for i in sorted(chosen)]
 
 
@@ -193,24 +201,24 @@ def walk(
     options: AnalysisOptions,
     known: Sequence[Priced],
 ) -> list[Priced]:
-    """Return the palettes on the way down from a polytope, all its colours first.
+    """Return the palettes of a walk from a polytope, most colours first.
 
-    Ends when no colour can go, or when poorer palettes cannot be the best of these and of those
-    `known`. `frames` may be a choice of the clip's frames.
+    The walk ends when no colour can be removed, or when further palettes can beat neither these nor
+    the `known` ones. `frames` may be a sample of the clip's frames.
     """
-    found: list[Priced] = []
+    palettes: list[Priced] = []
     first = Priced(*refine_jointly(polytope, frames, gamut, options, FIRST_STEPS, True))
     while True:
-        steps = remove_singly(first, frames, gamut, options, [*known, *found])
-        found += steps
-        best = min(steps, key=lambda one: one.price(USUAL_COST))
-        chain = _dispensable(best.polytope, frames, gamut, options)
+        steps = remove_singly(first, frames, gamut, options, [*known, *palettes])
+        palettes += steps
+        best = min(steps, key=_usual_price)
+        chain = _cheapest_chain(best.polytope, frames, gamut, options)
         if chain is None:
-            return found
+            return palettes
         poorer = moves.without_chain(best.polytope, chain)
         first = Priced(*refine_jointly(poorer, frames, gamut, options, STEPS, True))
-        if hopeless(first, found, [*known, *found], options):
-            return [*found, first]
+        if hopeless(first, palettes, [*known, *palettes], options):
+            return [*palettes, first]
 
 
 def up_and_down(
@@ -220,20 +228,20 @@ def up_and_down(
     options: AnalysisOptions,
     known: Sequence[Priced],
 ) -> list[Priced]:
-    """Return what is found when stops are put into a palette and single vertices removed again.
+    """Insert stops into a palette, remove single vertices again, and return all palettes.
 
-    Stops are put into the middle of each edge. Goes on with the best of what is found as long as
-    that is worthwhile.
+    Stops are inserted in the middle of each edge. This is repeated with the best palette so far,
+    while the relative gain in price is at least `WORTHWHILE`.
     """
-    found: list[Priced] = []
+    palettes: list[Priced] = []
     while True:
         rich = moves.enriched(best.polytope)
         first = Priced(*refine_jointly(rich, frames, gamut, options, FIRST_STEPS, True))
-        steps = remove_singly(first, frames, gamut, options, [*known, *found])
-        found += steps
+        steps = remove_singly(first, frames, gamut, options, [*known, *palettes])
+        palettes += steps
         before, best = best, min(best, *steps, key=_usual_price)
         if _usual_price(best) > (1 - WORTHWHILE) * _usual_price(before):
-            return found
+            return palettes
 
 
 def remove_singly(
@@ -243,90 +251,97 @@ def remove_singly(
     options: AnalysisOptions,
     known: Sequence[Priced] = (),
 ) -> list[Priced]:
-    """Return a palette with fewer and fewer vertices, most vertices first.
+    """Return palettes with fewer and fewer vertices, most vertices first.
 
-    Ends when no vertex can go, or when poorer palettes cannot be the best.
+    Ends when no vertex can be removed, or when further palettes cannot be the best.
     """
-    found = [first]
-    while not hopeless(found[-1], found, [*known, *found], options):
-        last = found[-1]
-        cheapest = _cheapest(last.polytope, frames, gamut, options)
+    palettes = [first]
+    while not hopeless(palettes[-1], palettes, [*known, *palettes], options):
+        last = palettes[-1]
+        cheapest = _cheapest_vertices(last.polytope, frames, gamut, options)
         if not cheapest:
             break
         rest = last.polytope
         for vertex in sorted(cheapest[: max(1, len(cheapest) // 3)], reverse=True):
             rest = rest.without(vertex)
-        found.append(Priced(*refine_jointly(rest, frames, gamut, options, STEPS, True)))
-    return found
+        palettes.append(Priced(*refine_jointly(rest, frames, gamut, options, STEPS, True)))
+    return palettes
 
 
 def hopeless(
-    one: Priced, found: Iterable[Priced], known: Iterable[Priced], options: AnalysisOptions
+    last: Priced,
+    own: Iterable[Priced],
+    known: Iterable[Priced],
+    options: AnalysisOptions,
 ) -> bool:
-    """Return whether palettes with fewer vertices are unlikely to be the best.
+    """Return whether palettes with fewer vertices than `last` are unlikely to be the best.
 
-    They are when prices have risen far since the best one `found` on this walk, or when the value
-    alone, which rises as vertices go, is too much beside what is `known`: at the usual cost of a
-    handle and, for other options, at theirs too, so that these look no less far. For dearer handles
-    and fewer vertices it counts `DEARER` times, so that a walk gets over a few bad palettes.
+    Either the price exceeds the least of the walk's `own` palettes by more than `PATIENCE`. Or the
+    value, which rises with each removal, plus the cost of the fewest handles exceeds the least
+    price of the `known` palettes.
+
+    Both tests use the usual cost of a handle, and also that of the options if these differ: then a
+    walk is never shorter than with the defaults. With a higher cost or fewer vertices they use
+    `DEARER` times the cost too, so that the walk passes a few bad palettes.
     """
-    fewest = min(2 * min(len(block.tracks) for block in one.polytope.blocks), one.handles)
+    fewest = min(2 * min(len(block.tracks) for block in last.polytope.blocks), last.handles)
 
-    def at(cost: float, most: AnalysisOptions) -> bool:
-        def least(of: Iterable[Priced]) -> float:
-            return min((x.price(cost) for x in of if allowed(x, (), most)), default=math.inf)
+    def ends(cost: float, limits: AnalysisOptions) -> bool:
+        def least(palettes: Iterable[Priced]) -> float:
+            prices = (p.price(cost) for p in palettes if allowed(p, (), limits))
+            return min(prices, default=math.inf)
 
-        risen = one.price(cost) > (1 + PATIENCE) * least(found)
-        return risen or one.value + cost * fewest > least(known)
+        risen = last.price(cost) > (1 + PATIENCE) * least(own)
+        return risen or last.value + cost * fewest > least(known)
 
     cost = options.handle_cost
     dear = DEARER * cost if cost > USUAL_COST or options.vertices else cost
-    return at(USUAL_COST, USUAL) and at(cost, options) and at(dear, USUAL)
+    return ends(USUAL_COST, USUAL) and ends(cost, options) and ends(dear, USUAL)
 
 
-def allowed(one: Priced, found: Sequence[Priced], options: AnalysisOptions) -> bool:
-    """Return whether a palette has at most `vertices`, or is the smallest there is."""
+def allowed(palette: Priced, others: Sequence[Priced], options: AnalysisOptions) -> bool:
+    """Return whether a palette has at most `vertices`, or no more than any of the others."""
     most = options.vertices or math.inf
-    return one.handles <= max(most, min((x.handles for x in found), default=0))
+    return palette.handles <= max(most, min((p.handles for p in others), default=0))
 
 
-def _dispensable(
+def _cheapest_chain(
     polytope: SkewPolytope,
     frames: Sequence[FrameStatistics],
     gamut: Gamut,
     options: AnalysisOptions,
 ) -> tuple[int, ...] | None:
-    """Return the chain whose loss costs least before the others take over, if any may go."""
+    """Return the chain with the least loss without it, before others are refined, or None."""
     weights = shaped_weights(options, gamut.scale, faces=False)
-    few = range(0, len(frames), -(-len(frames) // CHAIN_FRAMES))
+    measured = range(0, len(frames), -(-len(frames) // CHAIN_FRAMES))
 
     def loss(chain: tuple[int, ...]) -> float:
         rest = moves.without_chain(polytope, chain, any_mesh=True)
-        rows = frame_losses(rest, frames, few, weights, options, coarse=True)
+        rows = frame_losses(rest, frames, measured, weights, options, coarse=True)
         return float((options.lambda_ * rows[:, 0] + rows[:, 1] + rows[:, 2]).sum())
 
     return min(moves.chains(polytope), key=loss, default=None)
 
 
-def _cheapest(
+def _cheapest_vertices(
     polytope: SkewPolytope,
     frames: Sequence[FrameStatistics],
     gamut: Gamut,
     options: AnalysisOptions,
 ) -> list[int]:
-    """Return removable vertices, the least needed first, no two of them neighbours in time."""
+    """Return removable vertices, cheapest first, no two of them neighbours in time."""
     times = np.array([frame.frame for frame in frames], float)
     vertices, edges, length = polytope.vertices, polytope.edges(), polytope.length()
     before, after = polytope.neighbours()
     loss = loss_of(polytope, frames, coarse=True)
     weights = shaped_weights(options, gamut.scale)
 
-    def losses(of: F64, which: Sequence[int]) -> F64:
-        rows, _ = loss.evaluate(of, which, weights, thread_count(options), False)
+    def losses(trial: F64, which: Sequence[int]) -> F64:
+        rows, _ = loss.evaluate(trial, which, weights, thread_count(options), False)
         total: F64 = options.lambda_ * rows[:, 0] + rows[:, 1] + rows[:, 2]
         return total
 
-    now = losses(vertices, range(len(frames)))
+    current = losses(vertices, range(len(frames)))
     order = []
     for vertex in polytope.removable():
         (early,), (late,) = before[vertex], after[vertex]
@@ -334,7 +349,7 @@ def _cheapest(
         rest = vertices.copy()  # with the vertex on the edge between its neighbours
         rest[vertex] = start + (rest[vertex, 3] - start[3]) / (end[3] - start[3]) * (end - start)
         which = np.flatnonzero((times > start[3]) & (times < end[3])).tolist()
-        rise = float((losses(rest, which) - now[which]).sum()) / len(frames) if which else 0.0
+        rise = float((losses(rest, which) - current[which]).sum()) / len(frames) if which else 0.0
         others = edges[(edges != vertex).all(axis=1)]
         k, _ = smoothness(rest, np.vstack([others, np.array([[early, late]], np.int32)]), length)
         order.append((rise + options.gamma * k, vertex))

@@ -18,10 +18,11 @@ from palette4d.analysis.objective import refine_jointly
 from palette4d.analysis.options import AnalysisOptions
 from palette4d.analysis.polytope import SkewPolytope
 
+# Gradient steps on all colours of all frames.
 STEPS = 25
-# The longest step of a palette that is nearly right.
+# The longest step, as `STEP` in `losses`; short, because the start is nearly optimal.
 GENTLE = 0.005
-# The factor of `convexity` for slices that are not convex.
+# Factor of `convexity` in the second refinement of slices that are not convex.
 STIFFER = 3.0
 
 
@@ -32,14 +33,14 @@ def refine(
     options: AnalysisOptions,
     brief: tuple[int, ...] = (),
 ) -> SkewPolytope:
-    """Return the refined polytope; if it is not convex, refined again with more `convexity`.
+    """Return the refined polytope. If it is not convex, refine it again with more `convexity`.
 
-    The second result is taken if its deepest concavity is less. `brief` as in `Objective`.
+    The second result is kept if its deepest concavity is less. `brief` as in `Objective`.
     """
-    found, _ = refine_jointly(polytope, frames, gamut, options, STEPS, False, brief, GENTLE)
-    deepest = deepest_concavity(found, frames)
+    refined, _ = refine_jointly(polytope, frames, gamut, options, STEPS, False, brief, GENTLE)
+    deepest = deepest_concavity(refined, frames)
     if not options.convexity or deepest <= CONCAVE:
-        return found
+        return refined
     stiffer = dataclasses.replace(options, convexity=STIFFER * options.convexity)
-    again, _ = refine_jointly(found, frames, gamut, stiffer, STEPS, False, brief, GENTLE)
-    return again if deepest_concavity(again, frames) < deepest else found
+    stiffened, _ = refine_jointly(refined, frames, gamut, stiffer, STEPS, False, brief, GENTLE)
+    return stiffened if deepest_concavity(stiffened, frames) < deepest else refined

@@ -19,12 +19,12 @@ from palette4d.analysis.options import AnalysisOptions
 
 F64 = NDArray[np.float64]
 
-# An invisible loss a frame: 1/200 of an 8-bit step at lambda 50. Without it, rounding would keep
+# Tolerance of L in a frame: 1/200 of an 8-bit step at lambda 50. Without it, rounding would keep
 # the vertices of clips whose loss is zero.
 NEGLIGIBLE = 1e-3
-# `thin_out` stops at this multiple of the first loss, well before vertices matter.
+# Threshold of `thin_out`, as a multiple of the first loss; the structure search goes on from there.
 THINNED = 1.6
-# A path of a colour within this distance of the line between two vertices is straight.
+# RGB tolerance for straight paths: a colour's distance from the line between two vertices.
 STRAIGHT = 0.08
 
 
@@ -46,9 +46,9 @@ class RemovalTrials:
         """Return the losses of the frames that the removal of `vertex` affects, by frame index."""
         moved = self.dense.ghosts(vertex)
         state = tuple(self._version[i] for i, _, _ in moved)
-        known = self._tried.get(vertex)
-        if known is not None and known[0] == state:
-            return known[1]
+        cached = self._tried.get(vertex)
+        if cached is not None and cached[0] == state:
+            return cached[1]
         new = {}
         for i, s, rgb in moved:
             palette = self.dense.position[i].copy()
@@ -58,7 +58,7 @@ class RemovalTrials:
         return new
 
     def change(self, vertex: int) -> float:
-        """Return by how much the removal of `vertex` raises the sum of the losses."""
+        """Return the rise of the sum of the losses when `vertex` is removed."""
         return sum(new - float(self.losses[i]) for i, new in self._without(vertex).items())
 
     def remove(self, vertex: int) -> None:
@@ -81,7 +81,7 @@ def thin_out(
     threshold = THINNED * float(first.sum()) + NEGLIGIBLE * len(first)
     _straighten(dense)
     trials = RemovalTrials(dense, frames, options)
-    pool = [v for v in range(len(dense.at)) if dense.removable(v)]
+    pool = [v for v in range(len(dense.place)) if dense.removable(v)]
     while pool:
         total = float(trials.losses.sum())
         room = max(1, len(pool) // 4)
@@ -114,16 +114,16 @@ def _straighten(dense: DensePolytope) -> None:
             float(np.linalg.norm(rgb - original[i][s])) for i, s, rgb in dense.ghosts(vertex)
         )
 
-    queue = [(bend(v), v) for v in range(len(dense.at)) if dense.removable(v)]
+    queue = [(bend(v), v) for v in range(len(dense.place)) if dense.removable(v)]
     heapq.heapify(queue)
     while queue:
-        known, vertex = heapq.heappop(queue)
-        if known > STRAIGHT:
+        cached, vertex = heapq.heappop(queue)
+        if cached > STRAIGHT:
             break
         if not dense.removable(vertex):
             continue
         now = bend(vertex)  # it grows as neighbours go
-        if now > known:
+        if now > cached:
             heapq.heappush(queue, (now, vertex))
             continue
         dense.remove(vertex)

@@ -50,22 +50,22 @@ def remove_vertices(
     options: AnalysisOptions,
     progress: Counter | None = None,
 ) -> None:
-    """Remove vertices, in place. The candidates are nearest to their ghosts; the cheapest goes."""
+    """Remove vertices, in place: of the vertices nearest to their ghosts, the cheapest first."""
     trials = RemovalTrials(dense, frames, options)
     threshold = options.eta2 * float(trials.losses.sum()) + NEGLIGIBLE * len(frames)
-    pool = [v for v in range(len(dense.at)) if dense.removable(v)]
+    pool = [v for v in range(len(dense.place)) if dense.removable(v)]
     start, removed = len(pool), 0
     distance: dict[int, tuple[tuple[int, int], float]] = {}
 
     def ghost_distance(vertex: int) -> float:
         """Return the distance between the vertex and its ghost at the same time."""
         ends = dense.before[vertex][0], dense.after[vertex][0]
-        known = distance.get(vertex)
-        if known is None or known[0] != ends:
-            place = next(rgb for i, _, rgb in dense.ghosts(vertex) if i == dense.at[vertex][0])
+        cached = distance.get(vertex)
+        if cached is None or cached[0] != ends:
+            place = next(rgb for i, _, rgb in dense.ghosts(vertex) if i == dense.place[vertex][0])
             gap = float(np.linalg.norm(place - dense.colour(vertex)))
-            distance[vertex] = known = ends, gap
-        return known[1]
+            distance[vertex] = cached = ends, gap
+        return cached[1]
 
     while pool := [v for v in pool if dense.removable(v)]:
         nearest = sorted(pool, key=lambda v: (ghost_distance(v), v))[: options.removal_candidates]
@@ -101,6 +101,6 @@ def refine_vertices(
         vertices = move_all(evaluate, vertices, JOINT_EVALUATIONS)
         if progress:
             progress(cycle + 1, options.refinement_cycles)
-    if fine(vertices, fine.everything)[0] > fine(start, fine.everything)[0]:
+    if fine(vertices, fine.all_frames)[0] > fine(start, fine.all_frames)[0]:
         vertices = start
     return polytope.with_vertices(vertices)

@@ -222,14 +222,14 @@ def _hull(points: F64) -> _Hull:
             continue
         used = np.unique(hull.simplices)
         _, facets = np.unique(hull.equations, axis=0, return_inverse=True)
-        found = _Hull(
+        result = _Hull(
             points[used],
             used.astype(np.int64),
             np.searchsorted(used, hull.simplices).astype(np.int64),
             facets.ravel().astype(np.int64),
         )
-        if found.closed():
-            return found
+        if result.closed():
+            return result
     raise _IllFormedError
 
 
@@ -512,8 +512,8 @@ def _join(before: _Run, after: _Run, ends: list[int], starts: list[int]) -> bool
 
 
 def _rotated(face: Sequence[int]) -> tuple[int, ...]:
-    at = list(face).index(min(face))
-    return (*face[at:], *face[:at])
+    start = list(face).index(min(face))
+    return (*face[start:], *face[:start])
 
 
 def _assembled(lattice: _Lattice, sequence: list[_Run], frames: F64) -> SkewPolytope:
@@ -527,16 +527,16 @@ def _assembled(lattice: _Lattice, sequence: list[_Run], frames: F64) -> SkewPoly
         covered = frames[(frames > first) & (frames < last)]
         begins = [first] if run.opens else covered[:1].tolist()
         ends = [last] if run.closes else covered[-1:].tolist()
-        whole = sorted([*begins, *ends])
-        if not whole:
+        own_frames = sorted([*begins, *ends])
+        if not own_frames:
             pending = run  # without frames of its own the run is only a transition
             continue
         if blocks:
             inner = run if not run.opens else pending
             assert inner is not None
-            transitions.append(_between(lattice, inner, blocks[-1].last, whole[0]))
-        tracks = tuple(_part(lattice, track, whole[0], whole[-1]) for track in run.tracks)
-        blocks.append(Section(whole[0], whole[-1], tracks, run.faces))
+            transitions.append(_between(lattice, inner, blocks[-1].last, own_frames[0]))
+        tracks = tuple(_part(lattice, track, own_frames[0], own_frames[-1]) for track in run.tracks)
+        blocks.append(Section(own_frames[0], own_frames[-1], tracks, run.faces))
         pending = run
     return SkewPolytope(lattice.vertices, tuple(blocks), tuple(transitions))
 

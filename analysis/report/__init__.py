@@ -1,1 +1,1 @@
-"""How good a palette is, and what its user should know about it."""
+"""The quality of a palette, and warnings about it."""

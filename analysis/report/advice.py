@@ -1,4 +1,4 @@
-"""What the figures of a report mean for the user: warnings, each with a remedy.
+"""Warnings about a finished palette, each with a remedy.
 
 Input: the `Report` of a finished palette, the options it was found with, and the farthest pixel at
 each stage. Output: sentences. A remedy names only options that affect the method in use.
@@ -16,15 +16,15 @@ from palette4d.analysis.report.quality import Report
 
 from palette4d.common.text import counted
 
-# A frame fits badly above this multiple of the median frame's L, and above `BAD_L`.
+# Thresholds of L for a badly fitting frame: a multiple of the median frame's L, and an L.
 BAD_FRAME, BAD_L = 4.0, 0.3
-# Two handles at a smaller RGB distance look alike.
+# RGB distance below which two handles are hard to tell apart.
 LOOKALIKE = 0.06
-# A handle is unused whose mean weight is smaller in every frame.
+# A handle is unused if its mean weight is below this threshold in every frame.
 UNUSED = 0.001
-# Pixels count as lost if a simpler palette leaves them so much nearer.
+# Lost pixels are reported if they are farther outside than with a simpler palette, by this factor.
 FARTHER = 1.4
-# Settings with which colours may change at once.
+# Settings that let colours change from one frame to the next.
 AT_ONCE = {"gamma": 0.0003, "handle_cost": 0.001, "blocks": 9}
 # No display-referred picture and no log encoding has larger code values.
 BRIGHT = 2.0
@@ -42,15 +42,15 @@ def warnings(
     *,
     brightest: float,
 ) -> tuple[str, ...]:
-    """Return what does not fit, and what helps.
+    """Return the warnings about a palette.
 
     Parameters
     ----------
     report : of the finished palette.
     options : the options that it was found with.
     farthest : the distance of the farthest pixel outside, by stage.
-    brightest : the largest code value of the palette. In scene-linear light distances mean little:
-        that is then the only warning.
+    brightest : the largest code value of the palette. Above `BRIGHT` the clip may be scene-linear,
+        where distances mean little: that is then the only warning.
     """
     if brightest > BRIGHT:
         return (
@@ -58,14 +58,14 @@ def warnings(
             "mean little; give its colour space with input_space=… (such as ACEScg), and leave out "
             "palette_space=…: the palette is then found in a log encoding",
         )
-    found = (
+    texts = (
         _fit(report, options),
         _lost(report, options, farthest),
         _lookalikes(report, options),
         _concave(report),
         _unused(report, options),
     )
-    return tuple(text for text in found if text)
+    return tuple(text for text in texts if text)
 
 
 def _another(options: AnalysisOptions) -> str:
@@ -132,7 +132,7 @@ def _lost(x: Report, options: AnalysisOptions, farthest: Mapping[str, float]) ->
 def _lookalikes(x: Report, options: AnalysisOptions) -> str:
     if x.closest is None or x.closest[0] >= LOOKALIKE:
         return ""
-    distance, frame, one, other = x.closest
+    distance, frame, first, second = x.closest
     ways = _another(options)
     if options.method == "skew":
         ways = (
@@ -140,7 +140,7 @@ def _lookalikes(x: Report, options: AnalysisOptions) -> str:
             'moves, take method="static"'
         )
     return (
-        f"near frame {frame} the handles {one} and {other} are hard to tell apart "
+        f"near frame {frame} the handles {first} and {second} are hard to tell apart "
         f"({distance:.2f} apart): {ways}"
     )
 

@@ -1,4 +1,4 @@
-"""How good a palette is: the fit of each frame, and figures about its use that no loss contains.
+"""Quality of a palette: the fit of each frame, and figures that no loss contains.
 
 Input: the polytope as the sidecar holds it, and the frames' statistics. Output: a `Report`, whose
 figures the sidecar records. `advice` turns them into warnings.
@@ -21,7 +21,7 @@ from palette4d import _core
 
 F64 = NDArray[np.float64]
 
-# A pixel farther outside than one 8-bit step counts as outside in the report.
+# Tolerance for pixels outside in the report: one 8-bit step.
 VISIBLE = 1 / 255
 
 
@@ -110,9 +110,9 @@ class Report:
             "merges": self.merges,
         }
         if self.closest:
-            distance, frame, one, other = self.closest
+            distance, frame, first, second = self.closest
             out |= {"closest_handles": distance, "closest_handles_frame": frame}
-            out |= {"closest_handle_ids": f"{one} {other}"}
+            out |= {"closest_handle_ids": f"{first} {second}"}
         return out
 
 
@@ -121,26 +121,26 @@ def report(
 ) -> Report:
     """Measure a polytope on the clip's frames."""
     slices = [_core.slice_at(polytope, float(f.frame)) for f in frames]
-    both = list(zip(slices, frames, strict=True))
-    concavities = [(0.0 if narrow(f) else concavity(s.rgb, s.faces), f.frame) for s, f in both]
+    pairs = list(zip(slices, frames, strict=True))
+    concavities = [(0.0 if narrow(f) else concavity(s.rgb, s.faces), f.frame) for s, f in pairs]
     sources, targets = np.unique(polytope.edges[:, 0]), np.unique(polytope.edges[:, 1])
     out_degree = np.bincount(polytope.edges[:, 0], minlength=len(polytope.vertices))
     in_degree = np.bincount(polytope.edges[:, 1], minlength=len(polytope.vertices))
     return Report(
-        fits=tuple(_fit(s, f, options) for s, f in both),
+        fits=tuple(_fit(s, f, options) for s, f in pairs),
         closest=_closest(polytope, slices, frames),
         least_used=_least_used(polytope, slices, frames),
-        concavity=max(concavities, key=lambda found: found[0]),
+        concavity=max(concavities, key=lambda depth_and_frame: depth_and_frame[0]),
         splits=int((out_degree[sources] > 1).sum()),
         merges=int((in_degree[targets] > 1).sum()),
         colours=float(np.mean([len(s.rgb) for s in slices])),
     )
 
 
-def _fit(here: _core.Slice, frame: FrameStatistics, options: AnalysisOptions) -> FrameFit:
+def _fit(cut: _core.Slice, frame: FrameStatistics, options: AnalysisOptions) -> FrameFit:
     def measured(**slight: float) -> tuple[float, float, float, float, float, F64]:
         weights = _core.LossWeights(options.lambda_, options.k, **slight)
-        return _core.palette_loss(frame.colours, here.rgb, NO_FACES, weights, False)
+        return _core.palette_loss(frame.colours, cut.rgb, NO_FACES, weights, False)
 
     r, c, _, outside, farthest, _ = measured()
     visible, lost = (
@@ -154,16 +154,16 @@ def _closest(
 ) -> tuple[float, int, str, str] | None:
     best: tuple[float, int, str, str] | None = None
     ids = polytope.vertex_ids
-    for here, frame in zip(slices, frames, strict=True):
+    for cut, frame in zip(slices, frames, strict=True):
         if narrow(frame):
             continue
-        gaps = np.linalg.norm(here.rgb[:, None] - here.rgb[None], axis=2)
+        gaps = np.linalg.norm(cut.rgb[:, None] - cut.rgb[None], axis=2)
         # Colours with a common vertex are close by design.
-        related = (here.ends[:, None] == here.ends[None]).any(axis=2)
+        related = (cut.ends[:, None] == cut.ends[None]).any(axis=2)
         gaps[related] = np.inf
         i, j = np.unravel_index(int(np.argmin(gaps)), gaps.shape)
         if np.isfinite(gaps[i, j]) and (best is None or gaps[i, j] < best[0]):
-            near = [ids[here.ends[k, int(here.weights[k] > 0.5)]] for k in (int(i), int(j))]
+            near = [ids[cut.ends[k, int(cut.weights[k] > 0.5)]] for k in (int(i), int(j))]
             best = float(gaps[i, j]), frame.frame, near[0], near[1]
     return best
 
