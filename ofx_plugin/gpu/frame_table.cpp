@@ -15,6 +15,9 @@
 namespace palette4d::gpu {
 namespace {
 
+/// Colours are pulled in to this, times the palette's largest number above 1.
+constexpr float kReach = 1e4f;
+
 class Writer {
 public:
     explicit Writer(std::vector<float>& to) : to_(to) {}
@@ -235,6 +238,7 @@ FrameTable frame_table(const Drawing& drawing, bool premultiplied) {
     for (std::size_t c = 0; c < 3; ++c) {
         table[P4D_KEEP + 1 + c] = static_cast<float>(options.lightness[c]);
     }
+    table[P4D_REACH] = kReach;
     table[P4D_MIX] = static_cast<float>(options.mix);
     table[P4D_MATTE] = options.in_alpha ? 1.0f : 0.0f;
     table[P4D_MATTE + 1] = static_cast<float>(1 / options.reach);
@@ -256,6 +260,10 @@ FrameTable frame_table(const Drawing& drawing, bool premultiplied) {
                 std::minmax_element(body.rgb().begin(), body.rgb().end(), smaller);
             table[P4D_LOW + c] = static_cast<float>((*low)[c]);
             table[P4D_HIGH + c] = static_cast<float>((*high)[c]);
+            for (const double end : {(*low)[c], (*high)[c]}) {
+                table[P4D_REACH] =
+                    std::max(table[P4D_REACH], kReach * static_cast<float>(std::abs(end)));
+            }
         }
     }
     add_picks(*map, result);

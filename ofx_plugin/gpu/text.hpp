@@ -9,6 +9,7 @@ const char* frame_text();
 const char* clip_text();
 
 const char* opencl_text();
-const char* cuda_text();
+/// Compiled from cuda.cu by tools/make_ptx.py.
+const char* cuda_ptx();
 
 }  // namespace palette4d::gpu

@@ -1,6 +1,7 @@
 #include "describe.hpp"
 
 #include "colour_management.hpp"
+#include "gpu_render.hpp"
 #include "output_params.hpp"
 #include "params.hpp"
 #include "sidecar_choice.hpp"
@@ -67,6 +68,7 @@ OfxStatus describe(const Suites& suites, OfxImageEffectHandle effect) {
     // A pixel's result depends on that pixel only, so a host may bake the node into a LUT, but for
     // the clean-up of picks: a render for a LUT leaves it out.
     node->set_string(kOfxImageEffectPropNoSpatialAwareness, "true");
+    describe_gpu(*node);
     describe_colour(*node);
     return kOfxStatOK;
 }

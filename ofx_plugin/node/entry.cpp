@@ -7,6 +7,7 @@
 #include "analyse_effect.hpp"
 #include "colour_management.hpp"
 #include "describe.hpp"
+#include "gpu/queue.hpp"
 #include "host.hpp"
 #include "instance.hpp"
 #include "render.hpp"
@@ -60,6 +61,7 @@ OfxStatus dispatch(const char* action, OfxImageEffectHandle effect, OfxPropertyS
     if (is(kOfxActionLoad)) return load_suites() ? kOfxStatOK : kOfxStatErrMissingHostFeature;
     if (is(kOfxActionUnload) || is(kOfxActionPurgeCaches)) {
         purge_sidecars();
+        gpu::purge();
         return kOfxStatOK;
     }
     const std::shared_ptr<const Suites> host = suites();
@@ -86,7 +88,7 @@ void remember_host(OfxHost* host) { set_host(host); }
 
 // Raise a version when its parameters change: hosts cache the description under it.
 OfxPlugin g_plugins[] = {
-    {kOfxImageEffectPluginApi, kOfxImageEffectPluginApiVersion, "org.palette4d.Palette4D", 1, 5,
+    {kOfxImageEffectPluginApi, kOfxImageEffectPluginApiVersion, "org.palette4d.Palette4D", 1, 6,
      &remember_host, &main_entry<&grade_action>},
     {kOfxImageEffectPluginApi, kOfxImageEffectPluginApiVersion, "org.palette4d.Analyse", 1, 0,
      &remember_host, &main_entry<&analyse_action>}};

@@ -93,8 +93,9 @@ ShownFrame shown_frame(const Params& params, const Chosen& chosen, const HostCli
 }
 
 /// `pushed`: what a button did; `copy`: what became of the project's copy of the sidecar.
+/// `gpu`: what drew the last picture.
 void write_status(Params& params, Chosen chosen, const std::string& pushed, const std::string& copy,
-                  const std::string& shown) {
+                  const std::string& shown, const std::string& gpu) {
     std::string expects;
     if (const Sidecar* sidecar = chosen.sidecar()) {
         const bool in_palette_space = params.int_now(kParamPictureIn).value_or(0) == 1;
@@ -107,7 +108,7 @@ void write_status(Params& params, Chosen chosen, const std::string& pushed, cons
     // The file that an analysis will write is not missing.
     if (analysis.running && !chosen.result.loaded) chosen.result.problem.clear();
     const std::string text = status_of(chosen, {pushed, studio, analysis.words},
-                                       handles_in_use(params), {expects, copy, shown});
+                                       handles_in_use(params), {expects, copy, shown, gpu});
     if (params.string_now(kParamStatus) != text) params.note_string(kParamStatus, text);
 }
 
@@ -159,11 +160,13 @@ void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const P
     ShownHandles handles;
     std::optional<double> source_less_time;
     bool rendered = false;
+    std::string gpu;
     if (instance) {
         const std::lock_guard<std::mutex> lock(instance->mutex);
         handles = instance->shown;
         rendered = instance->rendered;
         source_less_time = instance->source_less_time;
+        gpu = instance->gpu;
     }
     notice_undone(params, handles);
     handle_changed(params, chosen, param, handles);
@@ -182,7 +185,7 @@ void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const P
         shown = shown_frame(params, chosen, host_clip(suites, effect, source_frame), *time);
     }
     if (param == kParamOpenInStudio) pushed = push_open_in_studio(params, chosen, shown.frame);
-    write_status(params, std::move(chosen), pushed, copy, shown.words);
+    write_status(params, std::move(chosen), pushed, copy, shown.words, gpu);
 }
 
 void note_source_frame(OfxImageEffectHandle effect, OfxTime time,
@@ -193,6 +196,13 @@ void note_source_frame(OfxImageEffectHandle effect, OfxTime time,
     instance->rendered = true;
     instance->source_less_time.reset();
     if (source_frame) instance->source_less_time = *source_frame - time;
+}
+
+void note_gpu(OfxImageEffectHandle effect, const std::string& words) {
+    const std::shared_ptr<Instance> instance = find(effect);
+    if (!instance) return;
+    const std::lock_guard<std::mutex> lock(instance->mutex);
+    instance->gpu = words;
 }
 
 void report(const Suites& suites, OfxImageEffectHandle effect, const std::string& problem) {

@@ -17,6 +17,7 @@ struct Instance {
     ShownHandles shown;
     bool rendered = false;
     std::optional<double> source_less_time;  ///< media frame minus time, at the last render
+    std::string gpu;  ///< what drew the last render of a host that renders on a GPU; else empty
 };
 
 /// The actions of an instance's life. They never fail: an instance renders even without its record.
@@ -31,6 +32,9 @@ void instance_changed(const Suites& suites, OfxImageEffectHandle effect, const P
 /// Stores the media frame of a render for the status, since changes come without it.
 void note_source_frame(OfxImageEffectHandle effect, OfxTime time,
                        std::optional<double> source_frame);
+
+/// Stores what drew a render on a GPU, for the status.
+void note_gpu(OfxImageEffectHandle effect, const std::string& words);
 
 /// Shows a problem as the instance's persistent message, or clears the message when `problem` is
 /// empty. Allowed while rendering. Each render shows the problem again, because hosts clear

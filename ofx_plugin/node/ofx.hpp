@@ -17,6 +17,22 @@
 #define kOfxImageEffectPropNoSpatialAwareness "OfxImageEffectPropNoSpatialAwareness"
 #endif
 
+// From OFX 1.5 (in ofxGPURender.h): images in a GPU's memory. OpenCL's are buffers.
+#ifndef kOfxImageEffectPropOpenCLRenderSupported
+#define kOfxImageEffectPropOpenCLRenderSupported "OfxImageEffectPropOpenCLRenderSupported"
+#define kOfxImageEffectPropOpenCLEnabled "OfxImageEffectPropOpenCLEnabled"
+#define kOfxImageEffectPropOpenCLCommandQueue "OfxImageEffectPropOpenCLCommandQueue"
+#endif
+#ifndef kOfxImageEffectPropCudaRenderSupported
+#define kOfxImageEffectPropCudaRenderSupported "OfxImageEffectPropCudaRenderSupported"
+#define kOfxImageEffectPropCudaStreamSupported "OfxImageEffectPropCudaStreamSupported"
+#define kOfxImageEffectPropCudaEnabled "OfxImageEffectPropCudaEnabled"
+#define kOfxImageEffectPropCudaStream "OfxImageEffectPropCudaStream"
+#endif
+#ifndef kOfxStatGPURenderFailed
+#define kOfxStatGPURenderFailed ((int)1002)
+#endif
+
 // Nuke's extension, which Natron supports too: keeps the next parameter on the same row.
 #define kOfxParamPropLayoutHint "OfxParamPropLayoutHint"
 #define kOfxParamPropLayoutHintNoNewLine 2

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "gpu_render.hpp"
 #include "handle_params.hpp"
 #include "host_time.hpp"
 #include "output_params.hpp"
@@ -30,6 +31,7 @@ void define_params(const Suites& suites, OfxParamSetHandle params) {
                    "How much of the edit applies: 0 is the original picture, 1 the full edit."},
                   {1, 0, 1, 0, 1}, 0.01, 3, true);
     define_mode_param(define);
+    if (renders_on_gpus(suites)) define_gpu_param(define);
     define_output_params(define);
     define_handle_params(define);
     define_time_params(define);

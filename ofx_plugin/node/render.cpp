@@ -16,6 +16,7 @@
 #include "clip_image.hpp"
 #include "describe.hpp"
 #include "frame_setup.hpp"
+#include "gpu_render.hpp"
 #include "instance.hpp"
 #include "output_params.hpp"
 #include "pixels.hpp"
@@ -184,6 +185,126 @@ OfxStatus regions_of_interest(const Suites& suites, OfxImageEffectHandle effect,
     return kOfxStatOK;
 }
 
+namespace {
+
+/// The pictures of a render. Their data may be in a GPU's memory.
+struct Pictures {
+    Image out;
+    std::optional<Image> in;  ///< empty: no source, or one that cannot be read
+    bool absent = false;      ///< the host has no source here
+    bool paint = false;       ///< the brush is the mask
+    std::optional<Image> brush{};
+    bool brush_absent = false;
+};
+
+enum class Action { kDraw, kCopy, kClear };
+
+/// What becomes of the window. Made without a look at pixels.
+struct Plan {
+    Action action = Action::kDraw;
+    OfxStatus status = kOfxStatOK;
+    FrameSetup setup{};
+    std::exception_ptr error = nullptr;  ///< to be thrown again once the window is whole
+
+    Plan& with(Action other, OfxStatus answer = kOfxStatOK) {
+        action = other;
+        status = answer;
+        return *this;
+    }
+};
+
+Plan plan_of(const Suites& suites, OfxImageEffectHandle effect, const Properties& in_args,
+             OfxTime time, const Pictures& pictures) {
+    Plan plan;
+    if (!pictures.in || !same_format(*pictures.in, pictures.out)) {
+        // Never show the host's uninitialised memory.
+        return plan.with(Action::kClear, pictures.absent ? kOfxStatOK : kOfxStatFailed);
+    }
+    const OfxRectI& whole = pictures.out.definition;
+    std::optional<double> source_frame;
+    if (const auto index = in_args.get_int(kResolvePropSrcFrame)) source_frame = *index;
+    note_source_frame(effect, time, source_frame);
+    FrameSetup& setup = plan.setup;
+    try {
+        const Mode mode = mode_at(Params(suites, effect), time);
+        setup = frame_setup_at(suites, effect, time, interpolation_of(suites, mode, in_args, whole),
+                               source_frame);
+    } catch (...) {
+        plan.error = std::current_exception();
+        return plan.with(Action::kCopy);
+    }
+    report(suites, effect, setup.problem.empty() ? setup.note : setup.problem);
+    // Alpha-only pictures pass through too.
+    if (setup.passes || pictures.in->channels < 3) return plan.with(Action::kCopy);
+    setup.drawing.picture = area_of(whole);
+    // A host that bakes a LUT wants colours only, so no mattes and no strip.
+    if (in_args.get_string(kOfxImageEffectPropNoSpatialAwareness) == "true") {
+        setup.drawing.options.clean_up = 0;
+        if (setup.drawing.options.output == Output::kPalette) {
+            setup.drawing.options.output = Output::kRecoloured;
+            if (!setup.drawing.edit) return plan.with(Action::kCopy);
+        }
+    }
+    if (pictures.paint && !pictures.brush) {
+        return plan.with(Action::kCopy, pictures.brush_absent ? kOfxStatOK : kOfxStatFailed);
+    }
+    return plan;
+}
+
+/// Draws in the host's memory.
+OfxStatus draw_here(const Suites& suites, OfxImageEffectHandle effect, const Pictures& pictures,
+                    const OfxRectI& window, const Scale& scale, Plan& plan) {
+    if (plan.action == Action::kClear) {
+        clear(pictures.out, window);
+    } else if (plan.action == Action::kCopy) {
+        copy(*pictures.in, pictures.out, window);
+    } else {
+        if (pictures.brush) plan.setup.drawing.mask = &*pictures.brush;
+        return draw_window(suites, effect, *pictures.in, pictures.out, window, scale, plan.setup);
+    }
+    if (plan.error) std::rethrow_exception(plan.error);
+    return plan.status;
+}
+
+/// Draws in a GPU's memory: with the kernel, or in copies where that lacks something.
+OfxStatus draw_there(const Suites& suites, OfxImageEffectHandle effect, const Pictures& pictures,
+                     const OfxRectI& window, const Scale& scale, Plan& plan, gpu::Queue& queue,
+                     bool by_kernel) {
+    std::string problem = by_kernel ? "" : "GPU is Off";
+    if (by_kernel) {
+        static const NodeDrawing kAsItIs;
+        const bool draws = plan.action == Action::kDraw;
+        const NodeDrawing& drawing = draws ? plan.setup.drawing : kAsItIs;
+        const Image* const in = plan.action == Action::kClear ? nullptr : &*pictures.in;
+        problem = draws && pictures.brush
+                      ? "the kernel lacks the brush"
+                      : draw_by_kernel(queue, in, pictures.out, window, drawing);
+        if (problem.empty()) {
+            note_gpu(effect, "GPU: " + queue.device());
+            if (plan.error) std::rethrow_exception(plan.error);
+            return plan.status;
+        }
+    }
+    Pictures copies = pictures;
+    const HostCopy in(queue, pictures.in), brush(queue, pictures.brush);
+    HostWindow out(queue, pictures.out, window);
+    if (!in.whole() || !brush.whole()) return kOfxStatGPURenderFailed;
+    copies.in = in.image();
+    copies.brush = brush.image();
+    copies.out = out.image();
+    note_gpu(effect, "GPU: " + queue.device() + ", drawn on the processor and copied: " + problem);
+    OfxStatus status = kOfxStatFailed;
+    try {
+        status = draw_here(suites, effect, copies, window, scale, plan);
+    } catch (...) {
+        out.upload();
+        throw;
+    }
+    return out.upload() ? status : kOfxStatGPURenderFailed;
+}
+
+}  // namespace
+
 OfxStatus render(const Suites& suites, OfxImageEffectHandle effect, const Properties& in_args) {
     const std::optional<double> time = in_args.get_double(kOfxPropTime);
     if (!time) return kOfxStatFailed;
@@ -195,55 +316,21 @@ OfxStatus render(const Suites& suites, OfxImageEffectHandle effect, const Proper
     if (is_empty(window)) return kOfxStatOK;
 
     const ClipImage source(suites, effect, kOfxImageEffectSimpleSourceClipName, *time);
-    if (!source.pixels() || !same_format(*source.pixels(), out)) {
-        // Never show the host's uninitialised memory.
-        clear(out, window);
-        return source.absent() ? kOfxStatOK : kOfxStatFailed;
-    }
-    const Image& in = *source.pixels();
-
-    std::optional<double> source_frame;
-    if (const auto index = in_args.get_int(kResolvePropSrcFrame)) source_frame = *index;
-    note_source_frame(effect, *time, source_frame);
-    FrameSetup setup;
-    try {
-        const Mode mode = mode_at(Params(suites, effect), *time);
-        setup =
-            frame_setup_at(suites, effect, *time,
-                           interpolation_of(suites, mode, in_args, out.definition), source_frame);
-    } catch (...) {
-        copy(in, out, window);
-        throw;
-    }
-    report(suites, effect, setup.problem.empty() ? setup.note : setup.problem);
-    // Alpha-only pictures pass through too.
-    if (setup.passes || in.channels < 3) {
-        copy(in, out, window);
-        return kOfxStatOK;
-    }
-    const OfxRectI& whole = out.definition;
-    setup.drawing.picture = {whole.x1, whole.y1, whole.x2, whole.y2};
-    // A host that bakes a LUT wants colours only, so no mattes and no strip.
-    if (in_args.get_string(kOfxImageEffectPropNoSpatialAwareness) == "true") {
-        setup.drawing.options.clean_up = 0;
-        if (setup.drawing.options.output == Output::kPalette) {
-            setup.drawing.options.output = Output::kRecoloured;
-            if (!setup.drawing.edit) {
-                copy(in, out, window);
-                return kOfxStatOK;
-            }
-        }
-    }
+    Pictures pictures{out, source.pixels(), source.absent(), is_paint(suites, effect)};
     std::optional<ClipImage> brush;
-    if (is_paint(suites, effect)) {
+    if (pictures.paint) {
         brush.emplace(suites, effect, kBrushClipName, *time);
-        if (!brush->pixels()) {
-            copy(in, out, window);
-            return brush->absent() ? kOfxStatOK : kOfxStatFailed;
-        }
-        setup.drawing.mask = &*brush->pixels();
+        pictures.brush = brush->pixels();
+        pictures.brush_absent = brush->absent();
     }
-    return draw_window(suites, effect, in, out, window, scale_of(in_args), setup);
+    Plan plan = plan_of(suites, effect, in_args, *time, pictures);
+    const Scale scale = scale_of(in_args);
+    const GpuRender gpu(in_args);
+    if (!gpu.enabled) return draw_here(suites, effect, pictures, window, scale, plan);
+    // Without its system, what the host hands over cannot even be read.
+    if (!gpu.queue) return kOfxStatGPURenderFailed;
+    return draw_there(suites, effect, pictures, window, scale, plan, *gpu.queue,
+                      gpu_wanted(Params(suites, effect), *time));
 }
 
 }  // namespace palette4d::node

@@ -327,7 +327,7 @@ def luminance_weights(encoding: str) -> list[float]:
     """Return the weights of red, green and blue by an encoding's name; Rec.709's if unknown."""
 
 def kernel_text(part: str) -> str:
-    """Return the GPU kernel's text: 'frame', 'clip', 'opencl' or 'cuda'."""
+    """Return the GPU kernel's text: 'frame', 'clip' or 'opencl'."""
 
 def kernel_table(
     map: Recolourer,

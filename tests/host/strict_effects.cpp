@@ -109,8 +109,10 @@ OfxStatus get_image(OfxImageClipHandle clip, OfxTime time, const OfxRectD*,
     const Layout& layout = picture->layout();
     auto set = std::make_unique<OfxPropertySetStruct>(kImage);
     set->put(kOfxPropType, std::string(kOfxTypeImage));
-    set->put(kOfxImagePropData, static_cast<void*>(const_cast<unsigned char*>(
-                                    picture->at(layout.bounds.x1, layout.bounds.y1))));
+    set->put(kOfxImagePropData, now.devices
+                                    ? now.devices->at(picture)
+                                    : static_cast<void*>(const_cast<unsigned char*>(
+                                          picture->at(layout.bounds.x1, layout.bounds.y1))));
     put_rect(*set, kOfxImagePropBounds, layout.bounds);
     put_rect(*set, kOfxImagePropRegionOfDefinition, layout.definition.value_or(layout.bounds));
     set->put(kOfxImagePropRowBytes, static_cast<int>(picture->row_bytes()));

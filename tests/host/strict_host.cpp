@@ -54,6 +54,10 @@ void Host::configure(Config config) {
     properties_.put(kOfxImageEffectPropSupportsTiles, int{config_.tiles});
     properties_.put("NatronOfxHostIsNatron", int{config_.natron});
     properties_.put(kOfxImageEffectPropSupportsMultiResolution, int{config_.multi_resolution});
+    for (const char* system : {"OpenCL", "Cuda"}) {
+        properties_.put("OfxImageEffectProp" + std::string(system) + "RenderSupported",
+                        std::string(config_.gpus ? "true" : "false"));
+    }
 }
 
 void Host::fault(const std::string& what) {

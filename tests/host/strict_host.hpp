@@ -160,6 +160,13 @@ public:
     const unsigned char* at(int x, int y) const;
     float* floats(int x, int y) { return reinterpret_cast<float*>(at(x, y)); }
     const float* floats(int x, int y) const { return reinterpret_cast<const float*>(at(x, y)); }
+    /// From the first pixel of the first row to the end, guards included; only where rows count
+    /// upwards.
+    unsigned char* rest() { return at(layout_.bounds.x1, layout_.bounds.y1); }
+    std::size_t rest_size() const {
+        const auto* const first = at(layout_.bounds.x1, layout_.bounds.y1);
+        return static_cast<std::size_t>(storage_.data() + storage_.size() - first);
+    }
     /// Everything, guards and padding included.
     const std::vector<unsigned char>& storage() const { return storage_; }
     /// The pixels of an area, row after row without gaps.
@@ -189,6 +196,7 @@ struct Config {
     std::vector<double> frame_range{};   ///< of the source, as instances report it; empty: not
     double frame_rate = 0;               ///< likewise; 0: not
     OfxStatus edit_answer = kOfxStatOK;  ///< of paramEditBegin and its End
+    bool gpus = false;                   ///< that it renders with OpenCL and CUDA
     int cancel_after = -1;               ///< updates of the progress until the user cancels
     /// What Natron's source does: paramEditEnd asks for clip preferences under a lock that every
     /// action takes, a message's arguments are lost, each render begins with no message shown, and
@@ -252,6 +260,8 @@ struct Activity {
     double time = 0;        ///< of the action
     /// Where the plugin may fetch images beside a render: the source's.
     const std::function<const Picture*(double time)>* frames = nullptr;
+    /// Where pictures are in a device's memory; null: in the host's.
+    const std::map<const Picture*, void*>* devices = nullptr;
 };
 Activity& activity();
 
@@ -296,6 +306,7 @@ std::set<std::string> slave_params(const OfxImageEffectStruct& descriptor);
 /// it and its effect were described with temporal access.
 inline constexpr const char* kTemporal = " temporal";
 
+class Gpu;
 class Instance;
 
 /// The program's arguments in UTF-8; on Windows main() gets them in the code page.
@@ -386,6 +397,8 @@ public:
     std::map<std::string, Value> extra_arguments;
     /// Of the Paint context.
     const Picture* brush = nullptr;
+    /// Renders get their pictures in its memory; null: in the host's.
+    Gpu* gpu = nullptr;
     /// Every render is done twice, and a difference is a fault.
     bool twice = false;
     /// The source's pictures for a plugin that fetches them after a user's edit; empty: it may not.
@@ -412,6 +425,8 @@ private:
     static void check_released(const std::set<OfxPropertySetHandle>& images, const char* action);
     OfxStatus render_once(double time, const Picture* source, Picture& output,
                           const OfxRectI& window);
+    /// The render action itself, on the Gpu.
+    OfxStatus render_there(OfxPropertySetStruct& arguments, const Picture* source, Picture& output);
 };
 
 }  // namespace strict

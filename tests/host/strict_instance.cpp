@@ -3,6 +3,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "strict_gpu.hpp"
 #include "strict_host.hpp"
 
 namespace strict {
@@ -351,6 +352,34 @@ void Instance::check_released(const std::set<OfxPropertySetHandle>& images, cons
     for (OfxPropertySetHandle image : images) delete image;
 }
 
+OfxStatus Instance::render_there(OfxPropertySetStruct& arguments, const Picture* source,
+                                 Picture& output) {
+    std::map<const Picture*, void*> devices;
+    for (const Picture* picture : {source, static_cast<const Picture*>(&output), brush}) {
+        if (!picture || devices.count(picture)) continue;
+        auto& all = const_cast<Picture&>(*picture);
+        devices[picture] = gpu->allocate(all.rest(), all.rest_size());
+    }
+    gpu->describe(arguments);
+    activity().devices = &devices;
+    const OfxStatus status =
+        plugin_.call(kOfxImageEffectActionRender, &effect_, &arguments, nullptr);
+    for (const auto& [picture, memory] : devices) {
+        auto& all = const_cast<Picture&>(*picture);
+        if (picture == &output) {
+            gpu->download(memory, all.rest(), all.rest_size());
+        } else {
+            std::vector<unsigned char> after(all.rest_size());
+            gpu->download(memory, after.data(), after.size());
+            if (!std::equal(after.begin(), after.end(), all.rest())) {
+                Host::get().fault("render: a source on the device was written");
+            }
+        }
+        gpu->release(memory);
+    }
+    return status;
+}
+
 OfxStatus Instance::render_once(double time, const Picture* source, Picture& output,
                                 const OfxRectI& window) {
     Host& host = Host::get();
@@ -367,7 +396,9 @@ OfxStatus Instance::render_once(double time, const Picture* source, Picture& out
     OfxPropertySetStruct in = render_arguments(time, window);
     in.put_all(kOfxImageEffectPropRenderScale, {output.layout().scale, output.layout().scale});
     for (const auto& [name, value] : extra_arguments) in.put(name, value);
-    const OfxStatus status = plugin_.call(kOfxImageEffectActionRender, &effect_, &in, nullptr);
+    const OfxStatus status =
+        gpu ? render_there(in, source, output)
+            : plugin_.call(kOfxImageEffectActionRender, &effect_, &in, nullptr);
     activity() = before;
 
     check_released(images, "render");

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import importlib.metadata
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -155,3 +160,25 @@ def test_lightness_is_kept_and_the_source_mixed_in_as_in_the_core(premultiplied:
     found = draw(image, recolourer, **options)
     np.testing.assert_allclose(found, expected, **FAST_TOLERANCE)
     assert (found[1:] != image[1:]).any()
+
+
+@pytest.fixture
+def make_ptx(repo_root: Path) -> ModuleType:
+    """tools/make_ptx.py."""
+    spec = importlib.util.spec_from_file_location("make_ptx", repo_root / "tools" / "make_ptx.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_ptx_is_that_of_the_kernel(make_ptx: ModuleType) -> None:
+    """Mended by: python tools/make_ptx.py."""
+    text = make_ptx.PTX.read_text(encoding="utf-8")
+    assert text.startswith(make_ptx.stamp())
+    try:
+        importlib.metadata.version("nvidia-cuda-nvrtc-cu11")
+    except importlib.metadata.PackageNotFoundError:
+        return  # the stamp alone
+    assert text == make_ptx.compiled()

@@ -1,0 +1,291 @@
+// The node in a host that hands over pictures in a GPU's memory: OpenCL, on this machine's
+// processor where pocl is installed, and CUDA where there is a GPU. Without either these tests do
+// nothing, and say so.
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <iostream>
+#include <thread>
+
+#include "harness.hpp"
+#include "strict_gpu.hpp"
+
+using namespace strict;
+using namespace test;
+
+namespace {
+
+/// Of *Exact*, in code values.
+constexpr double kPromise = 1e-4;
+
+/// The devices of this machine, each in a context of its own.
+std::vector<std::unique_ptr<Gpu>> gpus() {
+    Config config;
+    config.gpus = true;
+    Host::get().configure(config);
+    std::vector<std::unique_ptr<Gpu>> all;
+    if (auto gpu = opencl_gpu()) all.push_back(std::move(gpu));
+    for (const bool stream : {true, false}) {
+        if (auto gpu = cuda_gpu(stream)) all.push_back(std::move(gpu));
+    }
+    const char* const required = std::getenv("PALETTE4D_REQUIRE_GPU");
+    EXPECT(!all.empty() || !required || std::strcmp(required, "1") != 0,
+           "no GPU and no pocl, which PALETTE4D_REQUIRE_GPU=1 asks for");
+    static bool told = false;
+    if (all.empty() && !told) figure("no OpenCL (Debian: pocl-opencl-icd) and no CUDA: not tested");
+    told = true;
+    return all;
+}
+
+/// What a host with GPUs can have: rows count upwards.
+std::vector<Layout> gpu_layouts() {
+    std::vector<Layout> all;
+    for (Layout layout : layouts()) {
+        layout.upside_down = false;
+        all.push_back(layout);
+    }
+    return all;
+}
+
+std::string text_with_picks() {
+    std::string text = sidecar_text();
+    const std::string picks =
+        R"("picks": [{"id": "p1", "kind": "pick", "frame": 12, "rgb": [0.75, 0.25, 0.25],
+        "to": [0.25, 0.5, 0.75]},
+        {"id": "p3", "kind": "hold", "frame": 12, "rgb": [0.25, 0.75, 0.25]},
+        {"id": "p4", "kind": "pick", "frame": 12, "rgb": [0.25, 0.25, 0.75],
+        "to": [0.75, 0.75, 0.25]}], )";
+    text.insert(text.find("\"edits\": {") + 10, picks);
+    return text;
+}
+
+/// A node that draws a picture here and on a GPU.
+struct Both : Ready {
+    Gpu& gpu;
+    explicit Both(Gpu& on, const std::string& of = test::sidecar()) : Ready(of), gpu(on) {
+        set("mode", 1);
+    }
+    std::vector<unsigned char> draw(const Picture* source, const Layout& layout,
+                                    const OfxRectI& window, Gpu* on, double time = 3) {
+        Picture output(layout);
+        instance->gpu = on;
+        CHECK(instance->render(time, source, output, window) == kOfxStatOK);
+        instance->gpu = nullptr;
+        return output.pixels(window);
+    }
+    std::string status() {
+        CHECK(instance->changed("", "", kOfxChangeTime) == kOfxStatOK);
+        return instance->text("status");
+    }
+    bool by_kernel() {
+        const std::string text = status();
+        return text.find("GPU: " + gpu.device()) != std::string::npos &&
+               text.find("copied") == std::string::npos;
+    }
+    /// Both ways: near each other where the kernel draws, else equal.
+    void compare(const Picture& source, const OfxRectI& window, bool kernel) {
+        const Layout& layout = source.layout();
+        const auto here = draw(&source, layout, window, nullptr);
+        const auto there = draw(&source, layout, window, &gpu);
+        EXPECT(by_kernel() == kernel, status());
+        if (!kernel) {
+            CHECK(here == there);
+            return;
+        }
+        const auto a = floats(layout, here), b = floats(layout, there);
+        const auto from = floats(layout, source.pixels(window));
+        double worst = 0;
+        for (std::size_t i = 0; i < a.size(); ++i) {
+            if (std::memcmp(&a[i], &b[i], sizeof(float)) == 0) continue;
+            // Beyond that the closest colour is a matter of rounding here, too.
+            const float* const pixel = &from[i - i % 4];
+            if (std::any_of(pixel, pixel + 3, [](float c) { return std::abs(c) > 1e4f; })) {
+                CHECK(std::isfinite(b[i]));
+                continue;
+            }
+            EXPECT(std::memcmp(&a[i], &from[i], sizeof(float)) != 0, "an untouched number changed");
+            const double size = std::max(1.0, std::abs(static_cast<double>(a[i])));
+            const double error = std::abs(static_cast<double>(a[i]) - b[i]) / size;
+            worst = std::max(worst, std::isfinite(error) ? error : 1);
+        }
+        EXPECT(worst < kPromise, std::to_string(worst));
+    }
+};
+
+bool is_rgba_float(const Layout& layout) {
+    return layout.channels == 4 && layout.depth == Depth::kFloat;
+}
+
+}  // namespace
+
+TEST(gpu_pictures_are_the_exact_ones) {
+    for (const auto& gpu : gpus()) {
+        Both node(*gpu);
+        for (const Layout& layout : gpu_layouts()) {
+            const Picture source = source_of(layout);
+            node.compare(source, layout.bounds, is_rgba_float(layout));
+            const OfxRectI& b = layout.bounds;
+            node.compare(source, rect(b.x1 + 3, b.y1 + 5, b.x2 - 7, b.y2 - 2),
+                         is_rgba_float(layout));
+        }
+    }
+}
+
+TEST(gpu_draws_a_window_beyond_the_source) {
+    for (const auto& gpu : gpus()) {
+        Both node(*gpu);
+        Layout part;
+        part.bounds = rect(4, 3, 11, 13);
+        part.padding = 32;
+        const Picture source = source_of(part);
+        Layout whole;
+        const auto here = node.draw(&source, whole, whole.bounds, nullptr);
+        const auto there = node.draw(&source, whole, whole.bounds, gpu.get());
+        CHECK(node.by_kernel());
+        const auto a = floats(whole, here), b = floats(whole, there);
+        for (std::size_t i = 0; i < a.size(); ++i) CHECK(!(std::abs(a[i] - b[i]) > kPromise));
+        // And without a source: transparent black.
+        const auto nothing = node.draw(nullptr, whole, whole.bounds, gpu.get());
+        CHECK(std::all_of(nothing.begin(), nothing.end(), [](auto byte) { return byte == 0; }));
+        CHECK(node.by_kernel());
+    }
+}
+
+TEST(gpu_pictures_without_an_edit_keep_their_bits) {
+    for (const auto& gpu : gpus()) {
+        Both node(*gpu, sidecar("plain.p4d.json", false));
+        for (const Layout& layout : gpu_layouts()) {
+            const Picture source = source_of(layout);
+            CHECK(node.draw(&source, layout, layout.bounds, gpu.get()) ==
+                  source.pixels(layout.bounds));
+            CHECK(node.by_kernel() == is_rgba_float(layout));
+        }
+        node.set("sidecar", std::string("nowhere.p4d.json"));
+        const Picture source = source_of({});
+        CHECK(node.draw(&source, {}, Layout{}.bounds, gpu.get()) == source.pixels(Layout{}.bounds));
+    }
+}
+
+TEST(gpu_mattes_lightness_and_mix) {
+    for (const auto& gpu : gpus()) {
+        Both node(*gpu, write("picks.p4d.json", text_with_picks()));
+        node.set("cleanUp", 0.0);
+        for (const char* alpha : {kOfxImageUnPreMultiplied, kOfxImagePreMultiplied}) {
+            Layout layout;
+            layout.premultiplication = alpha;
+            const Picture source = source_of(layout);
+            node.set("mix", 0.75);
+            node.set("keepLightness", 0.5);
+            node.set("strength", 0.8);
+            for (const int output : {0, 1, 3, 4}) {
+                for (const int in_alpha : {0, 1}) {
+                    node.set("output", output);
+                    node.set("matteIn", in_alpha);
+                    node.compare(source, layout.bounds, true);
+                }
+            }
+            node.set("output", 0);
+        }
+    }
+}
+
+TEST(gpu_what_the_kernel_lacks_is_drawn_on_the_processor) {
+    for (const auto& gpu : gpus()) {
+        Both node(*gpu, write("picks.p4d.json", text_with_picks()));
+        Layout layout;
+        layout.bounds = rect(-3, 2, 40, 37);
+        layout.padding = 16;
+        const Picture source = source_of(layout);
+        const OfxRectI window = rect(0, 4, 33, 35);
+        node.compare(source, window, false);  // the clean-up of picks
+        node.set("cleanUp", 0.0);
+        node.compare(source, window, true);
+        node.set("output", 2);  // the palette in the picture
+        node.compare(source, window, false);
+        node.set("output", 0);
+        node.set("gpu", 1);
+        node.compare(source, window, false);
+        node.set("gpu", 0);
+        node.compare(source, window, true);
+    }
+}
+
+TEST(gpu_pictures_with_a_brush) {
+    for (const auto& gpu : gpus()) {
+        Both node(*gpu);
+        node.instance = node.plugin.create(kOfxImageEffectContextPaint);
+        node.set("sidecar", node.path);
+        Layout strokes;
+        strokes.channels = 1;
+        Picture brush(strokes);
+        fill(brush, 5, false);
+        const Picture source = source_of({});
+        for (const Picture* with : {static_cast<const Picture*>(&brush), {}}) {
+            node.instance->brush = with;
+            const auto here = node.draw(&source, {}, Layout{}.bounds, nullptr);
+            CHECK(node.draw(&source, {}, Layout{}.bounds, gpu.get()) == here);
+        }
+    }
+}
+
+TEST(gpu_two_contexts_and_sixteen_instances_in_threads) {
+    for (const auto& gpu : gpus()) {
+        const bool cuda = gpu->device().find("CUDA") != std::string::npos;
+        const auto other = cuda ? cuda_gpu() : opencl_gpu();
+        Plugin plugin{bundle()};
+        const std::string path = sidecar();
+        Layout layout;
+        layout.bounds = rect(0, 0, 64, 40);
+        Picture source(layout);
+        fill(source, 3, false);
+        std::vector<std::unique_ptr<Instance>> instances;
+        for (int i = 0; i < 16; ++i) {
+            instances.push_back(plugin.create());
+            instances.back()->set("sidecar", path);
+        }
+        Picture expected(layout);
+        instances[0]->gpu = gpu.get();
+        CHECK(instances[0]->render(3, &source, expected, layout.bounds) == kOfxStatOK);
+        std::atomic<int> wrong{0};
+        std::vector<std::thread> threads;
+        for (std::size_t t = 0; t < 4; ++t) {
+            threads.emplace_back([&, t] {
+                const auto own = cuda ? cuda_gpu() : opencl_gpu();
+                for (std::size_t round = 0; round < 40; ++round) {
+                    Instance& instance = *instances[t * 4 + round % 4];
+                    instance.gpu = round % 3 == 0 ? own.get() : (t % 2 ? gpu : other).get();
+                    Picture output(layout);
+                    wrong += instance.render(3, &source, output, layout.bounds) != kOfxStatOK;
+                    wrong += output.pixels(layout.bounds) != expected.pixels(layout.bounds);
+                }
+            });
+        }
+        for (std::thread& thread : threads) thread.join();
+        CHECK(wrong == 0);
+    }
+}
+
+TEST(gpu_a_queue_that_is_none_is_an_error_of_the_gpu) {
+    for (const auto& gpu : gpus()) {
+        Both node(*gpu);
+        const Picture source = source_of({});
+        Picture output({});
+        node.instance->extra_arguments["OfxImageEffectPropOpenCLEnabled"] = 1;
+        CHECK(node.instance->render(3, &source, output, Layout{}.bounds) == 1002);
+        node.instance->extra_arguments.clear();
+        CHECK(node.instance->render(3, &source, output, Layout{}.bounds) == kOfxStatOK);
+    }
+}
+
+TEST(a_host_without_gpus_has_no_parameter_for_them) {
+    Plugin plain{bundle()};
+    CHECK(plain.create()->effect().params.params.count("gpu") == 0);
+    Config config;
+    config.gpus = true;
+    Host::get().configure(config);
+    Plugin plugin{bundle()};
+    CHECK(plugin.create()->effect().params.params.count("gpu") == 1);
+    CHECK(plugin.describe(kOfxImageEffectContextFilter)
+              ->properties.text("OfxImageEffectPropOpenCLRenderSupported") == "true");
+}
