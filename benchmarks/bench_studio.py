@@ -52,7 +52,7 @@ def make_movie(clip: str, out: Path, count: int) -> None:
     frames = [*opened.frames, *opened.frames[-2:0:-1]]
     y = np.arange(HD[1])[:, None] * opened.height // HD[1]
     x = np.arange(HD[0])[None, :] * opened.width // HD[0]
-    with movie_writer(out, HD, opened.rate, opened.encoding) as append:
+    with movie_writer(out, HD, opened.rate) as append:
         for k in range(count):
             pixels = opened.read(frames[k * len(frames) // count % len(frames)])[..., :3]
             append(np.ascontiguousarray(np.roll(pixels[y, x], k, axis=1)), False)

@@ -22,10 +22,12 @@ Colours that no edit touches keep their exact code values. --output writes matte
 
 Frames keep their numbers: frame 1017 of the clip gets the palette at frame 1017 and is written as
 frame 1017. Movies count from 0. EXR is 32-bit float (half with --half). PNG has 8 bits for an 8-bit
-source and 16 for others. TIFF is like PNG, but 32-bit float for a float source.
+source and 16 for others. TIFF is like PNG, but 32-bit float for a float source. DPX has 10 bits,
+JPEG 8.
 
-OUT.mp4 is H.264 (4:2:0, 8 bits), OUT.mov ProRes 422 HQ (10 bits), at the clip's rate and without
-sound. An odd width (in .mp4 also an odd height) grows by one pixel, a copy of the last."""
+OUT.mov is ProRes 422 HQ, OUT.mp4 H.264, or HEVC in 10 bits for PQ and HLG; --codec chooses others.
+Movies keep the clip's rate, colour tags, fields, timecode, pixel aspect, reel and sound. A note
+says what cannot be kept."""
 
 EPILOG = """\
 examples:
@@ -49,6 +51,8 @@ DRAWN = (
     "outside_at",
     "clean_up",
 )
+# Of movies, by the names of `media.codecs`.
+CODECS = ("prores422hq", "prores4444", "dnxhr-hqx", "dnxhr-444", "h264", "hevc")
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -71,7 +75,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         dest="output",
         required=True,
         metavar="OUT",
-        help="frames as OUT.####.exr, .png or .tif, one # a digit (a plain name for one frame), "
+        help="frames as OUT.####.exr, .png, .tif, .dpx or .jpg, one # a digit (a plain name for "
+        "one frame), "
         "or a movie as OUT.mp4 or OUT.mov",
     )
     parser.add_argument(
@@ -162,8 +167,21 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("--half", action="store_true", help="EXR with 16-bit float")
     parser.add_argument(
-        "--bits", type=int, choices=(8, 16, 32), help="bits a sample of PNG (8, 16) or TIFF"
+        "--bits",
+        type=int,
+        choices=(8, 10, 16, 32),
+        help="bits a sample of PNG (8, 16), TIFF (8, 16, 32) or DPX (10, 16)",
     )
+    parser.add_argument(
+        "--codec",
+        choices=CODECS,
+        help="of a movie: prores422hq (default of .mov), prores4444 (keeps alpha), dnxhr-hqx, "
+        "dnxhr-444, h264 (default of .mp4), hevc (10 bits; of .mp4 for PQ and HLG)",
+    )
+    parser.add_argument(
+        "--crf", type=whole(0, 51), metavar="N", help="quality of h264 and hevc: 0 lossless, 14"
+    )
+    parser.add_argument("--no-sound", action="store_true", help="do not copy a movie's sound")
     parser.add_argument(
         "--threads", type=whole(0), default=0, metavar="N", help="0: one per processor (default)"
     )
@@ -228,6 +246,9 @@ def run(args: argparse.Namespace) -> int:
                 space=args.space,
                 half=args.half,
                 bits=args.bits,
+                codec=args.codec,
+                crf=args.crf,
+                sound=not args.no_sound,
                 threads=args.threads,
                 missing=args.missing or "hold",
                 skip_bad_frames=args.skip_bad_frames,

@@ -7,7 +7,6 @@ import os
 from collections.abc import Callable, Generator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field, replace
-from fractions import Fraction
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,9 +14,12 @@ import numpy as np
 
 from palette4d.common.files import make_folder
 from palette4d.grade.document import Document
+from palette4d.grade.movie_rendering import MoviePlan
 from palette4d.grade.output import Output
 from palette4d.media.clip import Clip, Image, open_clip
 from palette4d.media.clip_base import F32, ClipError, FrameError, describe, named
+from palette4d.media.codecs import is_movie
+from palette4d.media.frame_tags import frame_notes, of_colours, of_movie
 from palette4d.media.frame_writer import (
     FramePattern,
     OutputError,
@@ -25,7 +27,6 @@ from palette4d.media.frame_writer import (
     sample_type,
     write_frame,
 )
-from palette4d.media.movie_writer import is_movie, movie_writer
 
 Compare = Literal["wipe", "side"]
 Missing = Literal["hold", "black", "error"]
@@ -106,24 +107,6 @@ def mismatches(document: Document, clip: Clip, whole: bool) -> list[str]:
         found.append(
             f"{spans}, this clip has {describe(clip.frames)}; each frame takes the palette of its "
             "own number. Check that this is the clip you mean"
-        )
-    return found
-
-
-def movie_notes(clip: Clip, width: int, alpha: bool) -> list[str]:
-    """Return notes on the limits of a movie of this clip: size, alpha, encoding."""
-    found = []
-    if width % 2 or clip.height % 2:
-        found.append(
-            f"the picture is {width}x{clip.height} pixels; where the movie's encoder needs an "
-            "even size, the last column or row is repeated"
-        )
-    if alpha:
-        found.append("the movie has no alpha, the picture is laid over black; frames keep it")
-    if "linear" in clip.encoding:
-        found.append(
-            f"the clip's code values are {clip.encoding} and stay so: the movie looks dark in most "
-            "players. Render frames, and convert those to a display space"
         )
     return found
 
@@ -211,6 +194,9 @@ def render(
     space: Literal["input", "palette"] = "input",
     half: bool = False,
     bits: int | None = None,
+    codec: str | None = None,
+    crf: int | None = None,
+    sound: bool = True,
     threads: int = 0,
     missing: Missing = "hold",
     skip_bad_frames: bool = False,
@@ -229,8 +215,8 @@ def render(
     clip : str, path or Clip
         A name for `open_clip`, or an opened clip; ``frames`` and ``skip_bad_frames`` are for names.
     output : str or path
-        ``OUT.####.exr`` (``.png``, ``.tif``) for frames, which keep their numbers, or ``OUT.mp4``,
-        ``OUT.mov`` for a movie at the clip's rate.
+        ``OUT.####.exr`` (``.png``, ``.tif``, ``.dpx``, ``.jpg``) for frames, which keep their
+        numbers, or ``OUT.mp4``, ``OUT.mov`` for a movie at the clip's rate.
     frames : str, optional
         Only these frames: "1001-1100x2".
     compare : {"wipe", "side"}, optional
@@ -240,7 +226,14 @@ def render(
     half : bool
         EXR in 16-bit float.
     bits : int, optional
-        Bits a sample: 8 or 16 for PNG, 8, 16 or 32 for TIFF.
+        Bits a sample: 8 or 16 for PNG, 8, 16 or 32 for TIFF, 10 or 16 for DPX.
+    codec : str, optional
+        Of a movie, one of `CODECS`. By default ProRes 422 HQ for ``.mov``. ``.mp4`` gets H.264, and
+        HEVC in 10 bits for PQ and HLG.
+    crf : int, optional
+        Quality of H.264 and HEVC, 0 (lossless) to 51.
+    sound : bool
+        Copy the sound of a movie to the movie that is rendered.
     threads : int
         0: one per processor.
     missing : {"hold", "black", "error"}
@@ -288,18 +281,29 @@ def render(
             )
         if skip_existing and Path(output).exists():
             return Rendered([Path(output)], [], [], [], kept=list(clip.frames))
+        plan = MoviePlan.of(
+            clip,
+            document,
+            Path(output),
+            (width, clip.height),
+            alpha=clip.has_alpha or drawn.in_alpha,
+            codec=codec,
+            crf=crf,
+            sound=sound,
+        )
         check_targets([Path(output)], inputs, force)
         make_folder(Path(output).parent)
-        opened = _movie(clip, document, Path(output), width)
+        notes, opened = plan.notes, plan.opened()
     else:
+        refuse_codec(output, codec, crf)
         pattern = FramePattern.parse(output, ", or a movie OUT.mp4 or OUT.mov")
         samples = sample_type(pattern.extension, clip.depth, half=half, bits=bits)
         todo = frames_to_render(clip, pattern, inputs, skip_existing=skip_existing, force=force)
         make_folder(pattern.folder)
+        notes = frame_notes(clip, pattern.extension)
         opened = frame_files(clip, pattern, samples)
     warnings = mismatches(document, clip, whole)
-    alpha = clip.has_alpha or drawn.in_alpha
-    notes = [*clip.notes, *(movie_notes(clip, width, alpha) if movie else ())]
+    notes = [*clip.notes, *notes]
     if tell is not None:
         for kind, texts in (("warning", warnings), ("note", notes)):
             for text in texts:
@@ -334,6 +338,12 @@ def render(
         sorted(set(clip.frames) - set(todo)),
         painter.filled,
     )
+
+
+def refuse_codec(output: str, codec: str | None, crf: int | None) -> None:
+    """Raise an error if frames are asked for with the options of a movie."""
+    if codec is not None or crf is not None:
+        raise OutputError(f"output {output}: codec=… and crf=… are for movies, not for frames")
 
 
 def opened_for_render(
@@ -382,30 +392,17 @@ _Write = Callable[[Image, F32], Path]
 @contextlib.contextmanager
 def frame_files(clip: Clip, pattern: FramePattern, samples: str) -> Generator[_Write]:
     """Yield a function that writes a frame to its file, with the source frame's metadata."""
-    import OpenImageIO as oiio
 
     def write(image: Image, pixels: F32) -> Path:
         metadata = image.metadata
         if clip.is_movie:
-            rate = (clip.rate.numerator, clip.rate.denominator)
-            metadata = (*metadata, ("FramesPerSecond", oiio.TypeDesc("rational"), rate))
+            metadata = (*metadata, *of_movie(clip, image.frame))
+        else:
+            kept = {name for name, _, _ in metadata}
+            metadata += tuple(one for one in of_colours(clip) if one[0] not in kept)
         path = pattern.path(image.frame)
         premultiplied = clip.premultiplied
         write_frame(path, pixels, samples, premultiplied=premultiplied, metadata=metadata)
         return path
 
     yield write
-
-
-@contextlib.contextmanager
-def _movie(clip: Clip, document: Document, path: Path, width: int) -> Generator[_Write]:
-    """Yield a function that appends a frame to a movie."""
-    # Image files rarely state a rate, so the sidecar's rate is used.
-    rate = clip.rate if clip.is_movie else Fraction(*document.core.clip["rate"])
-    with movie_writer(path, (width, clip.height), rate, clip.encoding) as append:
-
-        def write(image: Image, pixels: F32) -> Path:
-            append(pixels, clip.premultiplied)
-            return path
-
-        yield write

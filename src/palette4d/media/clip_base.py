@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
+from palette4d.media.stated import Stated
 
 F32 = NDArray[np.float32]
 
@@ -55,7 +56,8 @@ class Image:
     """One frame with its stored code values, upright.
 
     pixels is (h, w, 3 or 4) float32. Integer formats are divided by their largest value; float
-    formats are unchanged, also negatives, values above 1, NaNs and infinities. metadata holds
+    formats are unchanged, also negatives, values above 1, NaNs and infinities. Y'CbCr has values
+    below 0 and above 1, too: sub-blacks, super-whites and colours outside R'G'B'. metadata holds
     (name, OpenImageIO type, value) for a recoloured copy of the file.
     """
 
@@ -95,6 +97,8 @@ class Clip(abc.ABC):
         Notes for the user, such as a variable frame rate.
     skipped : list of int
         Frames skipped so far, in rising order.
+    stated : Stated
+        What the files state beside pixels: colour tags, timecode, pixel aspect and so on.
     """
 
     name: str
@@ -111,6 +115,7 @@ class Clip(abc.ABC):
     is_movie: bool = False
     notes: list[str] = field(default_factory=list)
     skipped: list[int] = field(default_factory=list)
+    stated: Stated = field(default_factory=Stated)
 
     def __repr__(self) -> str:
         """Return one line: the name, the frames, the size, and the encoding."""

@@ -32,6 +32,15 @@ from palette4d.media.clip_base import (
     progression_step,
 )
 from palette4d.media.clip_sequence import ImageSequence
+from palette4d.media.colour_tags import (
+    UNKNOWN,
+    ColourTags,
+    encoding_of,
+    name_of,
+    primaries_of,
+    tags_of,
+)
+from palette4d.media.stated import Stated
 
 #: Metadata that a recoloured copy of the frame keeps.
 CARRIED = (
@@ -42,6 +51,7 @@ CARRIED = (
     "chromaticities",
     "colorInteropID",
     "PixelAspectRatio",
+    "CICP",
     "ICCProfile",
     "whiteLuminance",
     "reelName",
@@ -54,18 +64,6 @@ CARRIED = (
 )
 _RATE_NAMES = ("FramesPerSecond", "dpx:FrameRate", "dpx:TemporalFrameRate")
 _DEPTHS = {"uint": "uint32", "int": "int32"}
-# Common names for OpenImageIO's colour space names; other names stay the same.
-_ENCODINGS = {
-    "srgb_rec709_scene": "sRGB",
-    "srgb_rec709_display": "sRGB",
-    "srgb": "sRGB",
-    "lin_rec709_scene": "linear Rec.709",
-    "lin_rec709": "linear Rec.709",
-    "scene_linear": "linear",
-    "linear": "linear",
-    "rec709": "Rec.709",
-    "ocio:lin_rec709_scene": "linear Rec.709",
-}
 
 
 @dataclass(repr=False)
@@ -164,6 +162,7 @@ class Header:
     rate: Fraction | None
     metadata: tuple[tuple[str, Any, Any], ...]
     note: str
+    tags: ColourTags
 
 
 def open_images(
@@ -209,7 +208,19 @@ def open_images(
         skip_bad_frames=skip_bad_frames,
         notes=[f"{source}: {header.note}"] if header.note else [],
         skipped=missing,
+        stated=_stated(header),
         sequence=sequence,
+    )
+
+
+def _stated(header: Header) -> Stated:
+    """Return what the first frame states, for a movie that is made of the sequence."""
+    found = {name: value for name, _, value in header.metadata}
+    aspect = float(found.get("PixelAspectRatio", 1.0))
+    return Stated(
+        tags=header.tags,
+        pixel_aspect=Fraction(aspect).limit_denominator(1000) if aspect > 0 else Fraction(1),
+        reel=str(found.get("reelName", "")),
     )
 
 
@@ -396,7 +407,7 @@ def _header(spec: Any, chosen: list[int]) -> Header:
     has_alpha = len(chosen) == 4
     straight = bool(spec.get_int_attribute("oiio:UnassociatedAlpha", 0))
     bits = _bits(spec)
-    space = oiio_text.readable(spec.get_string_attribute("oiio:ColorSpace"))
+    encoding, tags = _colours(spec)
     return Header(
         width=width,
         height=height,
@@ -404,7 +415,7 @@ def _header(spec: Any, chosen: list[int]) -> Header:
         premultiplied=has_alpha and not straight,
         bits=bits,
         depth=f"uint{bits}" if bits else _DEPTHS.get(str(spec.format), str(spec.format)),
-        encoding=_ENCODINGS.get(space.lower(), space) or _dpx_encoding(spec) or "unknown",
+        encoding=encoding,
         rate=_rate(spec),
         metadata=tuple(
             (param.name, param.type, oiio_text.readable(param.value))
@@ -412,7 +423,25 @@ def _header(spec: Any, chosen: list[int]) -> Header:
             if param.name in CARRIED
         ),
         note=_note(spec, chosen),
+        tags=tags,
     )
+
+
+def _colours(spec: Any) -> tuple[str, ColourTags]:
+    """Return the encoding that a file states, and the tags that mean the same."""
+    space = oiio_text.readable(spec.get_string_attribute("oiio:ColorSpace"))
+    stated = spec.getattribute("CICP")
+    if stated is not None and UNKNOWN not in (cicp := ColourTags(*stated[:2])).pair:
+        # OpenImageIO takes pairs that it has no name for as sRGB.
+        known = tags_of(space).pair == cicp.pair
+        return (name_of(space) if known else encoding_of(cicp)), cicp
+    dpx = _dpx_encoding(spec)
+    encoding = name_of(space) or dpx or "unknown"
+    tags = tags_of(dpx) if tags_of(dpx).known else tags_of(encoding)
+    xy = spec.getattribute("chromaticities")
+    if not tags.known and xy is not None and len(xy) == 8:
+        tags = ColourTags(primaries_of(xy))
+    return encoding, tags
 
 
 def _note(spec: Any, chosen: list[int]) -> str:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import bisect
 import functools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,6 @@ import av
 import numpy as np
 from av.codec.codec import Capabilities
 from av.error import FFmpegError
-from numpy.typing import NDArray
 
 from palette4d import _core
 from palette4d.common.arguments import MAX_FRAMES, parse_frames
@@ -34,41 +33,19 @@ from palette4d.media.clip_base import (
     Fill,
     FrameError,
     Image,
-    all_hidden,
     describe,
     named,
 )
-
-# H.273 code points; libswscale and PyAV use the same numbers.
-_TRANSFERS = {
-    1: "Rec.709",
-    4: "gamma 2.2",
-    5: "gamma 2.8",
-    6: "Rec.601",
-    7: "SMPTE 240M",
-    8: "linear",
-    13: "sRGB",
-    14: "Rec.2020",
-    15: "Rec.2020",
-    16: "Rec.2100 PQ",
-    18: "Rec.2100 HLG",
-}
-_UNSPECIFIED = 2
-# Weights of red and blue in luma, by matrix coefficients.
-LUMA_WEIGHTS = {
-    1: (0.2126, 0.0722),
-    4: (0.30, 0.11),
-    5: (0.299, 0.114),
-    6: (0.299, 0.114),
-    7: (0.212, 0.087),
-    9: (0.2627, 0.0593),
-    10: (0.2627, 0.0593),
-}
-_LIMITED_RANGE, _FULL_RANGE = 1, 2
-_GREYS = ("gray", "gray10le", "gray12le", "gray16le")
-_PLANAR_DEPTHS = (8, 9, 10, 12, 14, 16)
-#: Prefixes of the names of Y'CbCr layouts.
-_LUMA_CHROMA = ("yuv", "nv", "p0", "p2", "p4", "yuyv", "uyvy", "yvyu", "y2", "xv", "v")
+from palette4d.media.colour_tags import LUMA_WEIGHTS, MATRICES, UNKNOWN, UNREADABLE, encoding_of
+from palette4d.media.movie_pixels import (
+    bin_picture,
+    is_luma_chroma,
+    picture_pixels,
+    shape_of,
+    turn,
+    upright,
+)
+from palette4d.media.movie_stated import stated_by
 
 #: FFmpeg's names of the formats of `MOVIE_EXTENSIONS`. It recognises formats by content, and
 #: playlists such as ffconcat or HLS would lead it to other files.
@@ -80,8 +57,6 @@ _FORMATS = (
 ONLY_FILES = {"format_whitelist": ",".join(_FORMATS), "protocol_whitelist": "file"}
 
 
-#: Pixels of a strip that is converted at once: it stays in the processor's cache.
-_STRIP = 30_000
 #: Pictures whose decoding takes longer than opening the file again for a seek.
 WORTH_SEEKING = 4
 
@@ -96,6 +71,11 @@ class MovieClip(Clip):
     stamps: list[int] | None = field(kw_only=True, default=None)
     #: The numbers of the key frames, in order; empty if they are not known.
     key_frames: list[int] = field(kw_only=True, default_factory=list)
+    time_base: Fraction = field(kw_only=True, default=Fraction(1))
+    #: Whether the time between frames varies.
+    varies: bool = field(kw_only=True, default=False)
+    #: The matrix of pictures that state none.
+    matrix: int = field(kw_only=True, default=1)
     _decoder: Iterator[tuple[int, av.VideoFrame]] | None = field(default=None, init=False)
     _next: int = field(default=0, init=False)
     _held: tuple[int, av.VideoFrame] | None = field(default=None, init=False)
@@ -105,10 +85,14 @@ class MovieClip(Clip):
         """Return the movie file, which holds every frame."""
         return self.path
 
+    def time(self, frame: int) -> Fraction:
+        """Return the time at which a frame is shown, in seconds of the file."""
+        return Fraction(self.stamps[frame] * self.time_base) if self.stamps else frame / self.rate
+
     def load(self, frame: int) -> Image:
         """Decode one picture; FrameError if it is damaged, missing or of another size."""
         picture = self._picture(frame)
-        return Image(frame, _upright(picture_pixels(picture), picture))
+        return Image(frame, upright(picture_pixels(picture), picture))
 
     def load_small(self, frame: int, width: int, height: int) -> F32:
         """Decode one picture for a preview, scaled before it is converted where that is quicker.
@@ -118,10 +102,9 @@ class MovieClip(Clip):
         (height, width, 3 or 4) float32, or the whole picture as `load` where the layout needs it.
         """
         picture = self._picture(frame)
-        if picture.rotation or not _is_luma_chroma(picture):
-            return _upright(picture_pixels(picture), picture)
-        matrix, full = _matrix(picture), int(picture.color_range) == _FULL_RANGE
-        spread = 2 if full else 1
+        if any(turn(picture)) or not is_luma_chroma(picture):
+            return upright(picture_pixels(picture), picture)
+        matrix, spread = picture.colorspace, 2 if self.stated.tags.full_range else 1
         small = picture.reformat(
             width=width,
             height=height,
@@ -138,20 +121,22 @@ class MovieClip(Clip):
         """Decode the frames in order; one frame may be binned while the next is decoded."""
         for frame in frames:
             try:
-                fill: Fill = functools.partial(_bin_picture, self._picture(frame), self.row_step)
+                fill: Fill = functools.partial(bin_picture, self._picture(frame), self.row_step)
             except FrameError as error:
                 fill = functools.partial(_fail, error)
             yield frame, fill
 
     def _picture(self, frame: int) -> av.VideoFrame:
         picture = self._find(frame)
+        if picture is not None and int(picture.colorspace) == UNKNOWN:
+            picture.colorspace = self.matrix
         if picture is None:
             why = f" ({self._problem})" if self._problem else ""
             raise FrameError(
                 f"{self.path}: frame {frame} cannot be decoded{why}; expected {self.count} whole "
                 f"frames. {LEAVE_OUT}"
             )
-        shape = _shape(picture)
+        shape = shape_of(picture)
         if shape != (self.height, self.width, 4 if self.has_alpha else 3):
             height, width, channels = shape
             raise FrameError(
@@ -202,7 +187,7 @@ class MovieClip(Clip):
         """(number, picture) from the key frame before `start`, or a little later."""
         numbers = {stamp: index for index, stamp in enumerate(self.stamps or ())}
         counted = 0
-        with _open(self.path) as container:
+        with opened_movie(self.path) as container:
             stream = _video_stream(container, self.path)
             # Report a damaged picture instead of concealing the damage.
             stream.codec_context.options = {"err_detect": "crccheck+explode"}
@@ -240,12 +225,18 @@ class MovieClip(Clip):
 
 
 def open_movie(
-    path: Path, frames: str | None, rate: Fraction | None, skip_bad_frames: bool
+    path: Path,
+    frames: str | None,
+    rate: Fraction | None,
+    skip_bad_frames: bool,
+    matrix: str | None = None,
 ) -> MovieClip:
     """Open a movie file over the given range; raises ClipError or FrameError as `open_clip`."""
-    with _open(path) as container:
+    with opened_movie(path) as container:
         stream = _video_stream(container, path)
         first, promised, stamps, packets, keys = _index(container, stream, path)
+        untagged, notes = _resolve_matrix(first, path, matrix)
+        stated = stated_by(container, stream, first)
         own_rate = stream.average_rate or stream.guessed_rate or stream.base_rate
         base = stream.time_base
     count = max(promised, packets)
@@ -262,13 +253,13 @@ def open_movie(
             f"{path}: frame {packets} is missing: the file ends after {packets} of {count} frames. "
             f"{LEAVE_OUT}"
         )
-    height, width, channels = _shape(first)
+    height, width, channels = shape_of(first)
     if height * width * channels > MOST_SAMPLES:
         raise ClipError(
             f"{path}: found {width}x{height} pixels, expected at most 13000x13000; scale it down"
         )
-    notes = []
-    if stamps is not None and base is not None and _varies(stamps, base, own_rate):
+    varies = stamps is not None and base is not None and _varies(stamps, base, own_rate)
+    if varies:
         notes.append(f"{path}: the frame rate varies; frames are counted, their times are not used")
     bits = max((component.bits for component in first.format.components), default=8)
     return MovieClip(
@@ -278,7 +269,8 @@ def open_movie(
         rate=rate or (Fraction(own_rate) if own_rate else DEFAULT_RATE),
         width=width,
         height=height,
-        encoding=_encoding(first),
+        encoding=encoding_of(stated.tags if not untagged else replace(stated.tags, matrix=UNKNOWN)),
+        stated=stated,
         has_alpha=channels == 4,
         premultiplied=False,
         depth="float" if bits == 32 else f"uint{max(bits, 8)}",
@@ -289,10 +281,38 @@ def open_movie(
         count=count,
         stamps=stamps,
         key_frames=keys,
+        time_base=base or Fraction(1),
+        varies=varies,
+        matrix=untagged or int(first.colorspace),
     )
 
 
-def _open(path: Path) -> Any:
+def _resolve_matrix(picture: av.VideoFrame, path: Path, asked: str | None) -> tuple[int, list[str]]:
+    """Give a Y'CbCr picture without a matrix one; returns that (0 for others), and notes.
+
+    Unless the user asks for another, HD is Rec.709 and SD is Rec.601.
+    """
+    stated = int(picture.colorspace)
+    if stated in UNREADABLE and not picture.format.is_rgb:
+        raise ClipError(
+            f"{path}: found the Y'CbCr matrix {UNREADABLE[stated]}, expected one of Rec.709, "
+            "Rec.601, Rec.2020 (non-constant luminance) or SMPTE 240M; convert the movie, as with "
+            "FFmpeg's zscale=matrix=709"
+        )
+    if stated == UNKNOWN and not picture.format.is_rgb:
+        hd = picture.width >= 1280 or picture.height > 576
+        picture.colorspace = MATRICES[asked] if asked else 1 if hd else 5
+        return int(picture.colorspace), []
+    notes = []
+    if stated == 10:
+        notes.append(f"{path}: Rec.2020 with constant luminance is read as if it were not constant")
+    if asked and stated in LUMA_WEIGHTS:
+        notes.append(f"{path}: the movie states its matrix itself; matrix={asked} is not used")
+    return 0, notes
+
+
+def opened_movie(path: Path) -> Any:
+    """Open a movie file to read; ClipError if FFmpeg cannot."""
     try:
         # Without the protocol FFmpeg would read a name such as "cam:01.mov" as an address.
         return av.open(f"file:{path}", mode="r", options=ONLY_FILES)
@@ -378,195 +398,6 @@ def _varies(stamps: list[int], base: Fraction, rate: Fraction | None) -> bool:
     return bool(np.ptp(gaps) > max(2, float(Fraction(1, 4) / (rate * base))))
 
 
-def _encoding(picture: av.VideoFrame) -> str:
-    if named := _TRANSFERS.get(int(picture.color_trc)):
-        return named
-    if int(picture.color_primaries) == 1 or int(picture.colorspace) == 1:
-        return "Rec.709"
-    return "unknown"
-
-
-def _upright(pixels: F32, picture: av.VideoFrame) -> F32:
-    """Apply the display matrix' rotation (anticlockwise degrees) where it is a quarter turn."""
-    turns = round(picture.rotation / 90)
-    return np.ascontiguousarray(np.rot90(pixels, turns)) if turns else pixels
-
-
 def _fail(error: FrameError, binner: _core.ColourBinner) -> bool:
     """Return a function that raises a bad frame's error instead of filling."""
     raise error
-
-
-def _shape(picture: av.VideoFrame) -> tuple[int, int, int]:
-    """(h, w, 3 or 4) of its pixels, upright."""
-    turned = round(picture.rotation / 90) % 2
-    size = (picture.width, picture.height) if turned else (picture.height, picture.width)
-    return (*size, 4 if _has_alpha(picture) else 3)
-
-
-def _has_alpha(picture: av.VideoFrame) -> bool:
-    layout = picture.format
-    return layout.has_palette or any(component.is_alpha for component in layout.components)
-
-
-def _bits(picture: av.VideoFrame) -> int:
-    return max(component.bits for component in picture.format.components)
-
-
-def _bin_picture(picture: av.VideoFrame, row_step: int, binner: _core.ColourBinner) -> bool:
-    """Bin every `row_step`-th row of a picture; return whether all are invisible (`Fill`)."""
-    if _is_luma_chroma(picture) and not _has_alpha(picture):
-        bits, matrix = _bits(picture), _matrix(picture)
-        red_weight, blue_weight = LUMA_WEIGHTS[matrix]
-        binner.add_luma_chroma(
-            *_thinned(picture, row_step),
-            red_weight=red_weight,
-            blue_weight=blue_weight,
-            bits=bits,
-            full_range=int(picture.color_range) == _FULL_RANGE,
-        )
-        return False
-    packed = _packed(picture)
-    pixels = (picture_pixels(picture) if packed is None else packed)[row_step // 2 :: row_step]
-    binner.add(pixels)
-    if not all_hidden(binner):
-        return False
-    # No pixel is visible: see `Clip.straight_colours`.
-    binner.clear()
-    binner.add(pixels[..., :3])
-    return True
-
-
-def _thinned(picture: av.VideoFrame, step: int) -> list[NDArray[Any]]:
-    """Every `step`-th row of Y', Cb and Cr, each as wide as the picture.
-
-    In a large picture chroma comes from the nearest sample, because filtering would cost more than
-    decoding.
-    """
-    samples = np.uint8 if _bits(picture) == 8 else np.uint16
-    if step == 1 or len(picture.planes) != 3:
-        return [_plane(plane, samples)[step // 2 :: step] for plane in _full_chroma(picture).planes]
-    rows = np.arange(step // 2, picture.height, step)
-    planes = []
-    for plane in picture.planes:
-        lines = _plane(plane, samples)[rows * plane.height // picture.height]
-        wide = np.repeat(lines, -(-picture.width // plane.width), axis=1)
-        planes.append(wide[:, : picture.width])
-    return planes
-
-
-def picture_pixels(picture: av.VideoFrame) -> F32:
-    """(h, w, 3 or 4) float32 R'G'B'(A) in 0..1 of a decoded picture, alpha straight.
-
-    Y'CbCr is converted here in floating point with the stream's own matrix and range. Defaults are
-    Rec.709 above 576 lines, else Rec.601, and limited range. libswscale only scales chroma to full
-    size, because its conversion rounds.
-    """
-    packed = _packed(picture)
-    if packed is not None:
-        return packed.astype(np.float32) / np.float32(255)
-    bits = _bits(picture)
-    kind = np.uint8 if bits == 8 else np.uint16
-    if picture.format.name in _GREYS and int(picture.color_range) != _LIMITED_RANGE:
-        grey = _plane(picture.planes[0], kind).astype(np.float32) / np.float32((1 << bits) - 1)
-        return np.repeat(grey[..., None], 3, axis=2)
-    if picture.format.is_rgb and bits in _PLANAR_DEPTHS:
-        alpha = "a" if _has_alpha(picture) else ""
-        planar = _to(picture, f"gbr{alpha}p{bits}le")
-        green, blue, red, *rest = [_plane(plane, kind) for plane in planar.planes]
-        samples = np.stack([red, green, blue, *rest], axis=-1)
-        return samples.astype(np.float32) / np.float32((1 << bits) - 1)
-    if _is_luma_chroma(picture):
-        return _from_luma_chroma(picture)
-    wide = _to(picture, "rgba64le" if _has_alpha(picture) else "rgb48le").to_ndarray()
-    return wide.astype(np.float32) / np.float32(65535)
-
-
-def _packed(picture: av.VideoFrame) -> NDArray[np.uint8] | None:
-    """(h, w, 3 or 4) samples of R'G'B' of up to 8 bits; None for everything else."""
-    layout = picture.format
-    if not (layout.is_rgb or layout.has_palette) or _bits(picture) > 8:
-        return None
-    packed = _to(picture, "rgba" if _has_alpha(picture) else "rgb24").to_ndarray()
-    return np.asarray(packed, np.uint8)
-
-
-def _to(picture: av.VideoFrame, layout: str) -> av.VideoFrame:
-    """Another sample layout of the same depth, with neither matrix nor range changed."""
-    if picture.format.name == layout:
-        return picture
-    matrix = int(picture.colorspace) if int(picture.colorspace) in (1, 4, 5, 7, 9) else 5
-    # Without a stated range libswscale assumes limited range for Y'CbCr, full range for R'G'B'.
-    full = int(picture.color_range) == _FULL_RANGE or picture.format.is_rgb
-    return picture.reformat(
-        format=layout,
-        src_colorspace=matrix,
-        dst_colorspace=matrix,
-        src_color_range=2 if full else 1,
-        dst_color_range=2 if full or layout.startswith(("rgb", "gbr")) else 1,
-        interpolation="BICUBIC",
-    )
-
-
-def _plane(plane: Any, samples: type) -> NDArray[Any]:
-    """(h, w) samples of a plane; its lines in memory may be longer."""
-    kind = np.dtype(samples).newbyteorder("<")
-    lines = np.frombuffer(plane, dtype=kind)[: plane.height * plane.line_size // kind.itemsize]
-    return lines.reshape(plane.height, -1)[:, : plane.width]
-
-
-def _is_luma_chroma(picture: av.VideoFrame) -> bool:
-    """Whether a picture is Y'CbCr of a known matrix and depth."""
-    return (
-        picture.format.name.startswith(_LUMA_CHROMA)
-        and not picture.format.is_rgb
-        and _matrix(picture) in LUMA_WEIGHTS
-        and _bits(picture) in _PLANAR_DEPTHS
-        and not (_has_alpha(picture) and _bits(picture) == 14)
-    )
-
-
-def _full_chroma(picture: av.VideoFrame) -> av.VideoFrame:
-    """Planar Y'CbCr(A) with as many chroma samples as luma samples."""
-    bits = _bits(picture)
-    depth = "" if bits == 8 else f"{bits}le"
-    return _to(picture, f"yuv{'a' if _has_alpha(picture) else ''}444p{depth}")
-
-
-def _matrix(picture: av.VideoFrame) -> int:
-    """Matrix coefficients; if the file states none, by the number of lines."""
-    stated = int(picture.colorspace)
-    return (1 if picture.height > 576 else 5) if stated == _UNSPECIFIED else stated
-
-
-def _from_luma_chroma(picture: av.VideoFrame) -> F32:
-    """Y'CbCr -> R'G'B' in floating point (ITU-T H.273, section 8.3), clamped to 0..1."""
-    bits, unit = _bits(picture), float(1 << (_bits(picture) - 8))
-    kind = np.uint8 if bits == 8 else np.uint16
-    planes = [_plane(plane, kind) for plane in _full_chroma(picture).planes]
-    largest = float((1 << bits) - 1)
-    full = int(picture.color_range) == _FULL_RANGE
-    black, white = (0.0, largest) if full else (16 * unit, 219 * unit)
-    span = largest if full else 224 * unit
-    red_weight, blue_weight = LUMA_WEIGHTS[_matrix(picture)]
-    green_weight = 1 - red_weight - blue_weight
-    height, width = planes[0].shape
-    out = np.empty((height, width, len(planes)), np.float32)
-    rows = max(1, _STRIP // width)
-    for top in range(0, height, rows):
-        luma, blue, red, *rest = [plane[top : top + rows].astype(np.float32) for plane in planes]
-        luma -= np.float32(black)
-        luma /= np.float32(white)
-        for chroma, weight in ((blue, blue_weight), (red, red_weight)):
-            chroma -= np.float32(128 * unit)
-            chroma /= np.float32(span)
-            chroma *= np.float32(2 * (1 - weight))
-            chroma += luma
-        luma -= np.float32(red_weight) * red
-        luma -= np.float32(blue_weight) * blue
-        luma /= np.float32(green_weight)
-        for alpha in rest:
-            alpha /= np.float32(largest)
-        for channel, values in enumerate((red, luma, blue, *rest)):
-            np.clip(values, 0, 1, out=out[top : top + rows, :, channel])
-    return out

@@ -183,6 +183,8 @@ class ConvertedClip(Clip):
 
     def _bin(self, pixels: F32, binner: _core.ColourBinner) -> bool:
         rows = pixels[self.row_step // 2 :: self.row_step]
+        if self.stated.headroom:  # as without a conversion
+            rows = np.clip(rows, 0, 1)
         binner.add(np.ascontiguousarray(self.straight_colours(rows)))
         return hidden(rows)
 

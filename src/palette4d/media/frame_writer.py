@@ -1,7 +1,8 @@
-"""Writing frames: EXR, PNG and TIFF through OpenImageIO, to a temporary name and then renamed.
+"""Writing frames: EXR, PNG, TIFF, DPX and JPEG through OpenImageIO, then renamed to their names.
 
 Code values are written without conversion. Alpha follows each format's convention: premultiplied in
-EXR, straight in PNG. TIFF keeps the frame's kind of alpha and states it.
+EXR and DPX, straight in PNG. TIFF keeps the frame's kind of alpha and states it. JPEG has none: the
+picture is laid over black.
 """
 
 from __future__ import annotations
@@ -20,10 +21,16 @@ from palette4d.common.errors import Palette4dError, WriteError
 from palette4d.common.files import EXISTS, replacing
 from palette4d.media import oiio_text
 
-FORMATS = ("exr", "png", "tif", "tiff")
+FORMATS = ("exr", "png", "tif", "tiff", "dpx", "jpg", "jpeg")
+_EXPECTED = ".exr, .png, .tif, .dpx or .jpg"
 # What each format can hold of the metadata that `palette4d.media.clip_images.CARRIED` names.
 _TEXT = ("oiio:ColorSpace", "ICCProfile", "DateTime", "Copyright", "Artist", "ImageDescription")
-_METADATA: dict[str, tuple[str, ...]] = {"png": _TEXT, "tif": (*_TEXT, "Make", "Model")}
+_PLAIN = (*_TEXT, "PixelAspectRatio")
+_METADATA: dict[str, tuple[str, ...]] = {
+    "png": (*_PLAIN, "CICP"),
+    "tif": (*_PLAIN, "Make", "Model"),
+    "jpg": (*_PLAIN, "Make", "Model"),
+}
 _HALF_MAX = float(np.finfo(np.float16).max)
 
 
@@ -53,7 +60,7 @@ class FramePattern:
         path = Path(text)
         if path.suffix.lower().lstrip(".") not in FORMATS:
             raise OutputError(
-                f'output {text}: found the extension "{path.suffix}", expected .exr, .png or .tif; '
+                f'output {text}: found the extension "{path.suffix}", expected {_EXPECTED}; '
                 f"name the frames as in OUT.####.exr{also}"
             )
         if not any(mark in path.name for mark in "#@%$"):
@@ -78,8 +85,8 @@ class FramePattern:
 
     @property
     def extension(self) -> str:
-        """Lower case, without the dot, `tif` for both spellings."""
-        return self.suffix.lower().lstrip(".").replace("tiff", "tif")
+        """Lower case, without the dot, `tif` and `jpg` for both spellings."""
+        return _format(self.suffix)
 
     def path(self, frame: int) -> Path:
         """File of a frame; the sign of a negative number counts as a digit, as in C's printf."""
@@ -94,6 +101,10 @@ class FramePattern:
                 f"pattern such as {self.prefix}.####{self.suffix}, or one frame (frames=…)"
             )
         return [self.path(frame) for frame in frames]
+
+
+def _format(suffix: str) -> str:
+    return suffix.lower().lstrip(".").replace("tiff", "tif").replace("jpeg", "jpg")
 
 
 def check_targets(
@@ -124,15 +135,15 @@ def _identity(path: Path) -> tuple[int, int] | str:
 
 
 def sample_type(extension: str, depth: str, *, half: bool = False, bits: int | None = None) -> str:
-    """Sample type of an output file: "half", "float", "uint8" or "uint16".
+    """Sample type of an output file: "half", "float", "uint8", "uint10" or "uint16".
 
     Parameters
     ----------
-    extension : "exr", "png" or "tif".
+    extension : "exr", "png", "tif", "dpx" or "jpg".
     depth : `Clip.depth` of the source.
     half : 16-bit float, EXR only.
-    bits : 8 or 16 for PNG, 8, 16 or 32 for TIFF. By default 8 for an 8-bit source, else 16; 32
-        (float) for a TIFF of a float source.
+    bits : 8 or 16 for PNG, 8, 16 or 32 for TIFF, 10 or 16 for DPX. By default 8 for an 8-bit
+        source, else 16; 32 (float) for a TIFF of a float source; 10 for DPX.
     """
     if extension == "exr":
         if bits not in (None, 16, 32) or (bits == 32 and half):
@@ -143,29 +154,37 @@ def sample_type(extension: str, depth: str, *, half: bool = False, bits: int | N
     if half:
         raise OutputError(f"found half=True for {extension.upper()}, expected it for EXR alone")
     if bits is None:
+        if extension in ("dpx", "jpg"):
+            return "uint10" if extension == "dpx" else "uint8"
         if extension == "tif" and depth in ("float", "half", "double"):
             return "float"
         return "uint8" if depth == "uint8" else "uint16"
-    if bits not in ((8, 16, 32) if extension == "tif" else (8, 16)):
+    fitting = {"tif": (8, 16, 32), "dpx": (10, 16), "jpg": (8,)}.get(extension, (8, 16))
+    if bits not in fitting:
         raise OutputError(
-            f"found {bits} bits for {extension.upper()}, expected 8 or 16"
-            + (" or 32" if extension == "tif" else "")
+            f"found {bits} bits for {extension.upper()}, expected "
+            + " or ".join(str(one) for one in fitting)
         )
     return "float" if bits == 32 else f"uint{bits}"
 
 
 def quantised(pixels: NDArray[np.float32], samples: str) -> NDArray[Any]:
-    """Float32 pixels as they are stored: clamped to 0..1 and rounded for integers (NaN is 0)."""
+    """Float32 pixels as they are stored: clamped to 0..1 and rounded for integers (NaN is 0).
+
+    10 bits are the upper bits of 16, and again the lower ones, as OpenImageIO reads them.
+    """
     if samples == "float":
         return pixels.astype(np.float32, copy=False)
     if samples == "half":
         # Finite values stay finite; NaN and infinities are unchanged.
         finite = np.clip(pixels, -_HALF_MAX, _HALF_MAX)
         return np.where(np.isinf(pixels), pixels, finite).astype(np.float16)
-    kind = np.dtype(samples)
-    largest = np.float32(np.iinfo(kind).max)
+    ten = samples == "uint10"
+    kind = np.dtype("uint16" if ten else samples)
+    largest = np.float32(1023 if ten else np.iinfo(kind).max)
     clamped = np.clip(np.nan_to_num(pixels, nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0)
-    return np.asarray(np.rint(clamped * largest).astype(kind))
+    codes = np.asarray(np.rint(clamped * largest).astype(kind))
+    return codes << 6 | codes >> 4 if ten else codes
 
 
 def with_alpha_of(
@@ -175,7 +194,10 @@ def with_alpha_of(
 
     Premultiplied pixels without a straight colour (`_core.straight_colours`) keep their values.
     """
-    if pixels.shape[2] != 4 or extension == "tif" or premultiplied == (extension == "exr"):
+    if pixels.shape[2] == 4 and extension == "jpg":
+        return pixels[..., :3] * (np.float32(1) if premultiplied else pixels[..., 3:]), True
+    fits = extension == "tif" or premultiplied == (extension in ("exr", "dpx"))
+    if pixels.shape[2] != 4 or fits:
         return pixels, premultiplied
     out = pixels.copy()
     if premultiplied:
@@ -198,7 +220,7 @@ def write_frame(
 
     Parameters
     ----------
-    path : `.exr`, `.png`, `.tif` or `.tiff`; a file that is there is replaced.
+    path : with an extension of `FORMATS`; a file that is there is replaced.
     pixels : (h, w, 3 or 4) float32; RGB or RGBA.
     samples : as `sample_type` gives it.
     premultiplied : whether the colours of RGBA pixels are multiplied by alpha.
@@ -212,16 +234,21 @@ def write_frame(
     """
     import OpenImageIO as oiio
 
-    extension = path.suffix.lower().lstrip(".").replace("tiff", "tif")
+    extension = _format(path.suffix)
     pixels, premultiplied = with_alpha_of(extension, pixels, premultiplied)
     stored = np.ascontiguousarray(quantised(pixels, samples))
     height, width, channels = stored.shape
-    spec = oiio.ImageSpec(width, height, channels, samples)
+    kind = "uint16" if samples == "uint10" else samples
+    spec = oiio.ImageSpec(width, height, channels, kind)
     allowed = _METADATA.get(extension)
     for name, kind, value in metadata:
         if allowed is None or name in allowed:
             spec.attribute(name, kind, value)
-    spec.attribute("compression", "zip")
+    spec.attribute("compression", "jpeg:95" if extension == "jpg" else "zip")
+    if samples == "uint10":
+        spec.attribute("oiio:BitsPerSample", 10)
+    if extension == "jpg":
+        spec.attribute("jpeg:subsampling", "4:4:4")
     if extension == "png":
         # A fast level: level 9 takes many times longer and saves a few per cent.
         spec.attribute("png:compressionLevel", 4)
@@ -232,7 +259,7 @@ def write_frame(
     with replacing(path, force=True) as temporary:
         target = oiio.ImageOutput.create(oiio_text.file_name(temporary))
         if target is None:
-            raise OutputError(f"{path}: {oiio_text.problem_of(oiio)}; expected .exr, .png or .tif")
+            raise OutputError(f"{path}: {oiio_text.problem_of(oiio)}; expected {_EXPECTED}")
         if not target.open(str(temporary), spec):
             raise _cannot_write(path, oiio_text.problem_of(target))
         written = target.write_image(stored)
@@ -267,8 +294,11 @@ def _is_whole(path: Path, stored: NDArray[Any]) -> bool:
     source.close()
     if path.suffix.lower() == ".exr" and not _has_table(path.read_bytes(), height):
         return False
-    whole = stored[first:].tobytes()  # NaNs are equal, too
-    return rows is not None and not problem and rows.tobytes() == whole
+    if rows is None or problem:
+        return False
+    if _format(path.suffix) == "jpg":
+        return True  # lossy: its decoder reports a file that ends early
+    return bool(rows.tobytes() == stored[first:].tobytes())  # NaNs are equal, too
 
 
 def _has_table(exr: bytes, height: int) -> bool:

@@ -1,63 +1,138 @@
-"""Writing movies: H.264 in .mp4 and ProRes 422 HQ in .mov, through PyAV (FFmpeg's libraries).
+"""Writing movies through PyAV (FFmpeg's libraries), with what the source states beside pixels.
 
-R'G'B' becomes Y'CbCr without any transfer curve. Movies of these formats have no alpha: the picture
-is composited over black. Sound is not copied.
+R'G'B' becomes Y'CbCr without any transfer curve. A codec without alpha gets the picture over black.
 """
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Generator
+import dataclasses
+import functools
+import itertools
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import av
 import numpy as np
 from av.error import FFmpegError
+from av.filter import Graph
 from numpy.typing import NDArray
 
 from palette4d.common.files import replacing
 from palette4d.media.clip_base import F32
-from palette4d.media.clip_movie import LUMA_WEIGHTS
-from palette4d.media.frame_writer import OutputError
+from palette4d.media.codecs import Codec, codec_for
+from palette4d.media.colour_tags import LUMA_WEIGHTS, UNKNOWN
+from palette4d.media.frame_writer import OutputError, with_alpha_of
+from palette4d.media.sound import Sound
+from palette4d.media.stated import Stated
+
+#: FFmpeg's numbers: interlaced, top or bottom field first, in which order the lines are stored.
+_FIELD_ORDERS = {"tff": (2, 4), "bff": (3, 5)}
 
 
-class _Format(NamedTuple):
-    encoder: str
-    layout: str
-    bits: int
-    rows: int  # rows of the picture per chroma sample; the columns are always two
-    options: dict[str, str]
+@dataclass(frozen=True)
+class Delivery:
+    """How a movie is written.
 
+    Attributes
+    ----------
+    codec : one of `CODECS`.
+    stated : what the movie states; its tags have a matrix and a range that the codec can hold.
+    alpha : whether the movie keeps alpha.
+    crf : quality of H.264 and HEVC, 0 (lossless) to 51; None for the default.
+    notes : for the user, what the movie cannot keep.
+    """
 
-_FORMATS = {
-    "mp4": _Format("libx264", "yuv420p", 8, 2, {"crf": "14"}),
-    "mov": _Format("prores_ks", "yuv422p10le", 10, 1, {"profile": "hq", "vendor": "apl0"}),
-}
+    codec: Codec
+    stated: Stated
+    alpha: bool = False
+    crf: int | None = None
+    notes: tuple[str, ...] = ()
 
-#: Primaries, transfer and matrix (ITU-T H.273) for a clip's encoding (`Clip.encoding`).
-_TAGS = {
-    "sRGB": (1, 13, 1),
-    "gamma 2.2": (1, 4, 1),
-    "linear": (1, 8, 1),
-    "linear Rec.709": (1, 8, 1),
-    "Rec.2020": (9, 14, 9),
-    "Rec.2100 PQ": (9, 16, 9),
-    "Rec.2100 HLG": (9, 18, 9),
-}
-_REC709 = (1, 1, 1)
-_LIMITED = 1
+    @classmethod
+    def plan(
+        cls,
+        path: Path,
+        stated: Stated,
+        *,
+        alpha: bool = False,
+        codec: str | None = None,
+        crf: int | None = None,
+    ) -> Delivery:
+        """Choose the codec, and check that it can hold what the source states.
 
+        Raises
+        ------
+        OutputError
+            The codec is unknown, does not fit the file's name, or cannot hold fields.
+        """
+        chosen = codec_for(path, codec, stated.tags.transfer)
+        if crf is not None and "crf" not in chosen.options:
+            raise OutputError(
+                f"output {path}: found crf={crf} for {chosen.name}, expected it for h264 and hevc "
+                "alone; choose codec=…"
+            )
+        if stated.fields and not chosen.interlaced:
+            raise OutputError(
+                f"output {path}: found an interlaced clip for {chosen.name}, which holds "
+                "progressive pictures alone; choose codec=prores422hq or h264, or deinterlace "
+                "the clip first"
+            )
+        tags = stated.tags.for_luma_chroma()
+        notes = []
+        if tags.full_range and not chosen.full_range:
+            tags = dataclasses.replace(tags, full_range=False)
+            notes.append(f"the clip has full range, {chosen.name} holds limited range; both match")
+        if chosen.encoder == "dnxhd":
+            # FFmpeg's DNxHR says Rec.709 in the stream, and .mov states both of these or nothing.
+            tags = dataclasses.replace(tags, matrix=1)
+            if not tags.known and tags.pair != (UNKNOWN, UNKNOWN):
+                notes.append(
+                    f"{chosen.name} states primaries and transfer together or not at all: the "
+                    "clip states one, the movie none"
+                )
+        if alpha and not chosen.alpha_layout:
+            notes.append(
+                "the movie has no alpha, the picture is laid over black; frames and "
+                "codec=prores4444 keep it"
+            )
+        return cls(
+            chosen,
+            dataclasses.replace(stated, tags=tags),
+            alpha and bool(chosen.alpha_layout),
+            crf,
+            tuple(notes),
+        )
 
-def is_movie(path: Path) -> bool:
-    """Return whether a name has the extension of a movie that can be written."""
-    return path.suffix.lower().lstrip(".") in _FORMATS
+    @property
+    def rows(self) -> int:
+        """The height is a multiple of this."""
+        return self.codec.down * (2 if self.stated.fields and self.codec.down > 1 else 1)
+
+    def size(self, width: int, height: int) -> tuple[int, int]:
+        """The size of the movie, in which chroma samples are whole."""
+        return width + -width % self.codec.across, height + -height % self.rows
+
+    def check_size(self, path: Path, width: int, height: int) -> None:
+        """Refuse a picture that is too small for the codec."""
+        least = self.codec.least
+        if width < least[0] or height < least[1]:
+            raise OutputError(
+                f"output {path}: found {width}x{height} pixels for {self.codec.name}, expected at "
+                f"least {least[0]}x{least[1]}; choose another codec=…"
+            )
 
 
 @contextlib.contextmanager
 def movie_writer(
-    path: Path, size: tuple[int, int], rate: Fraction, encoding: str = "unknown"
+    path: Path,
+    size: tuple[int, int],
+    rate: Fraction,
+    delivery: Delivery | None = None,
+    sound: Sound | None = None,
 ) -> Generator[Callable[[F32, bool], None]]:
     """Yield a function that appends a frame; the file appears when the body succeeds.
 
@@ -66,40 +141,48 @@ def movie_writer(
     Parameters
     ----------
     path : `.mp4` or `.mov`; a file that is there is replaced.
-    size : (int, int); width and height in pixels. Two columns (in .mp4 also two rows) share a
-        chroma sample, so an odd size grows by one: the last column or row is repeated.
+    size : (int, int); width and height in pixels. Where pixels share a chroma sample, an odd size
+        grows by one: the last column or row is repeated.
     rate : frames per second.
-    encoding : `Clip.encoding`, for the movie's colour tags; Rec.709 if it is unknown.
+    delivery : codec, tags and so on; by default what the name says, with unknown colours.
+    sound : the streams to copy.
 
     Yields
     ------
     callable
-        ((h, w, 3 or 4) float32 R'G'B'(A), whether colours are premultiplied). Values are clamped
-        to 0..1; NaN is 0.
+        ((h, w, 3 or 4) float32 R'G'B'(A), whether colours are premultiplied). NaN is 0. Values
+        are clamped to 0..1, or, if the source has `Stated.headroom`, to the codec's code values.
     """
-    form = _FORMATS[path.suffix.lower().lstrip(".")]
-    primaries, transfer, matrix = _TAGS.get(encoding, _REC709)
+    how = delivery or Delivery.plan(path, Stated())
+    how.check_size(path, *size)
     with replacing(path, force=True) as temporary:
         try:
-            with av.open(f"file:{temporary}", "w", options={"movflags": "+faststart"}) as movie:
-                stream: Any = movie.add_stream(form.encoder, rate=rate, options=form.options)
-                stream.width, stream.height = size[0] + size[0] % 2, size[1] + size[1] % form.rows
-                stream.pix_fmt = form.layout
-                stream.color_primaries, stream.color_trc = primaries, transfer
-                stream.colorspace, stream.color_range = matrix, _LIMITED
-                stream.thread_type = "AUTO"
+            with (
+                av.open(f"file:{temporary}", "w", options={"movflags": "+faststart"}) as movie,
+                contextlib.ExitStack() as opened,
+            ):
+                stream = _stream(movie, size, rate, how)
+                copier = opened.enter_context(sound.into(movie)) if sound else None
+                field_flags = _FieldFlags(how.stated.fields)
+                count, written = 0, itertools.count(-2)
 
                 def append(pixels: F32, premultiplied: bool) -> None:
-                    if pixels.shape[2] == 4:
-                        alpha = np.float32(1) if premultiplied else pixels[..., 3:]
-                        pixels = pixels[..., :3] * alpha
-                    picture = _picture(pixels, form, matrix)
+                    nonlocal count
+                    picture = _picture(_with_alpha(pixels, premultiplied, how), how)
+                    picture.pts, picture.time_base = count, 1 / rate
+                    picture = field_flags.set(picture)
                     # ProRes reads its tags from the picture, H.264 from the stream.
-                    picture.color_primaries, picture.color_trc = primaries, transfer
-                    movie.mux(stream.encode(picture))
+                    tags = how.stated.tags
+                    picture.color_primaries, picture.color_trc = tags.primaries, tags.transfer
+                    movie.mux(_timed(stream.encode(picture), how.codec, written))
+                    count += 1
+                    if copier is not None:
+                        movie.mux(copier.until(count / rate))
 
                 yield append
-                movie.mux(stream.encode(None))
+                movie.mux(_timed(stream.encode(None), how.codec, written))
+                if copier is not None:
+                    movie.mux(copier.until())
         except FFmpegError as error:
             raise OutputError(
                 f"{path}: the movie cannot be written ({error.strerror}); expected room on the "
@@ -108,32 +191,138 @@ def movie_writer(
             ) from error
 
 
-def _picture(pixels: F32, form: _Format, matrix: int) -> av.VideoFrame:
-    """R'G'B' (h, w, 3) as limited-range Y'CbCr (ITU-T H.273, section 8.3), rounded once.
+def _stream(movie: Any, size: tuple[int, int], rate: Fraction, how: Delivery) -> Any:
+    """Add the video stream with all that it states."""
+    stated, tags = how.stated, how.stated.tags
+    options = dict(how.codec.options)
+    if how.crf is not None:
+        options["crf"] = str(how.crf)
+    if stated.fields:
+        options["flags"] = "+ildct+ilme"
+    stream = movie.add_stream(how.codec.encoder, rate=rate, options=options)
+    stream.width, stream.height = how.size(*size)
+    stream.pix_fmt = how.codec.alpha_layout if how.alpha else how.codec.layout
+    stream.color_primaries, stream.color_trc = tags.primaries, tags.transfer
+    stream.colorspace, stream.color_range = tags.matrix, 2 if tags.full_range else 1
+    context = stream.codec_context
+    if stated.pixel_aspect != 1:
+        context.sample_aspect_ratio = stated.pixel_aspect
+    if stated.fields:
+        orders = _FIELD_ORDERS[stated.fields]
+        context.field_order = stated.field_order if stated.field_order in orders else orders[0]
+    if how.codec.encoder == "libx265":
+        context.codec_tag = "hvc1"  # which QuickTime needs
+    for name, text in (("timecode", stated.timecode), ("reel_name", stated.reel)):
+        if text:
+            stream.metadata[name] = text
+    stream.thread_type = "AUTO"
+    return stream
+
+
+def _timed(packets: Any, codec: Codec, written: Iterator[int]) -> Any:
+    """Return encoded packets with times of decoding.
+
+    x265 leaves these undefined if a movie is shorter than its delay, which is two frames.
+    """
+    if codec.encoder == "libx265":
+        for packet in packets:
+            packet.dts = next(written)
+    return packets
+
+
+class _FieldFlags:
+    """Marks pictures as interlaced with FFmpeg's filter, because PyAV cannot."""
+
+    def __init__(self, fields: str) -> None:
+        self._fields = fields
+        self._graph: Any = None
+
+    def set(self, picture: av.VideoFrame) -> av.VideoFrame:
+        """Return the picture, marked."""
+        if not self._fields:
+            return picture
+        self._graph = self._graph or self._made(picture)
+        self._graph.push(picture)
+        marked: av.VideoFrame = self._graph.pull()
+        return marked
+
+    def _made(self, picture: av.VideoFrame) -> Any:
+        graph = Graph()
+        chain = (
+            graph.add_buffer(
+                width=picture.width,
+                height=picture.height,
+                format=picture.format,
+                time_base=picture.time_base,
+            ),
+            graph.add("setfield", f"mode={self._fields}"),
+            graph.add("buffersink"),
+        )
+        chain[0].link_to(chain[1])
+        chain[1].link_to(chain[2])
+        graph.configure()
+        return graph
+
+
+def _with_alpha(pixels: F32, premultiplied: bool, how: Delivery) -> F32:
+    """Return the pixels in the movie's kind of alpha: straight, or over black without alpha."""
+    if pixels.shape[2] == 3:
+        if not how.alpha:
+            return pixels
+        return np.concatenate([pixels, np.ones_like(pixels[..., :1])], axis=2)
+    if how.alpha:
+        return with_alpha_of("png", pixels, premultiplied)[0]
+    return pixels[..., :3] * (np.float32(1) if premultiplied else pixels[..., 3:])
+
+
+def _picture(pixels: F32, how: Delivery) -> av.VideoFrame:
+    """R'G'B'(A) (h, w, 3 or 4) as Y'CbCr(A) (ITU-T H.273, section 8.3), rounded once.
 
     libswscale has errors of up to one 8-bit step, and is on average half a step too bright.
     """
+    codec, tags = how.codec, how.stated.tags
     height, width = pixels.shape[:2]
-    pixels = np.pad(pixels, ((0, height % form.rows), (0, width % 2), (0, 0)), "edge")
-    pixels = np.clip(np.nan_to_num(pixels, nan=0.0, posinf=1.0, neginf=0.0), 0, 1)
-    red, blue = LUMA_WEIGHTS[matrix]
-    luma = pixels @ np.array([red, 1 - red - blue, blue], np.float32)
-    picture = av.VideoFrame(pixels.shape[1], pixels.shape[0], form.layout)
-    picture.colorspace, picture.color_range = matrix, _LIMITED
-    unit = 1 << (form.bits - 8)
-    _fill(picture.planes[0], (16 + 219 * luma) * unit)
+    pad = ((0, -height % how.rows), (0, -width % codec.across), (0, 0))
+    pixels = np.nan_to_num(np.pad(pixels, pad, "edge"), nan=0.0, posinf=1.0, neginf=0.0)
+    # Far beyond what Y'CbCr holds, so that only its own limits clamp the colours.
+    room = 1 if how.stated.headroom else 0
+    pixels = np.clip(pixels, -room, 1 + room)
+    red, blue = LUMA_WEIGHTS[tags.matrix]
+    luma = pixels[..., :3] @ np.array([red, 1 - red - blue, blue], np.float32)
+    layout = codec.alpha_layout if how.alpha else codec.layout
+    picture = av.VideoFrame(pixels.shape[1], pixels.shape[0], layout)
+    picture.colorspace, picture.color_range = tags.matrix, 2 if tags.full_range else 1
+    unit, top = 1 << (codec.bits - 8), (1 << codec.bits) - 1
+    black, white, span = (0, top, top) if tags.full_range else (16 * unit, 219 * unit, 224 * unit)
+    limits = (0, top) if tags.full_range else (unit, 255 * unit - 1)
+    fill = functools.partial(_fill, limits=limits)
+    fill(picture.planes[0], black + white * luma)
     for plane, channel, weight in ((1, 2, blue), (2, 0, red)):
-        chroma = (pixels[..., channel] - luma) * np.float32(224 / (2 * (1 - weight)))
-        # Chroma lies on the even columns and, if rows are halved, between two rows.
-        before = np.concatenate([chroma[:, :1], chroma[:, 1:-1:2]], axis=1)
-        chroma = (before + 2 * chroma[:, ::2] + chroma[:, 1::2]) / 4
-        chroma = chroma.reshape(-1, form.rows, chroma.shape[1]).mean(axis=1)
-        _fill(picture.planes[plane], (128 + chroma) * unit)
+        chroma = (pixels[..., channel] - luma) * np.float32(span / (2 * (1 - weight)))
+        fill(picture.planes[plane], 128 * unit + _shared(chroma, how))
+    if how.alpha:
+        _fill(picture.planes[3], np.clip(pixels[..., 3], 0, 1) * top, (0, top))
     return picture
 
 
-def _fill(plane: Any, samples: NDArray[np.floating[Any]]) -> None:
+def _shared(chroma: F32, how: Delivery) -> F32:
+    """Return chroma (h, w) at the places of its samples: even columns, and between rows."""
+    if how.codec.across == 2:
+        before = np.concatenate([chroma[:, :1], chroma[:, 1:-1:2]], axis=1)
+        chroma = (before + 2 * chroma[:, ::2] + chroma[:, 1::2]) / np.float32(4)
+    if how.codec.down == 1:
+        return chroma
+    if not how.stated.fields:
+        return np.asarray(chroma.reshape(-1, 2, chroma.shape[1]).mean(axis=1))
+    # A quarter of the way from the field's upper row to its lower one, or three (H.264, 6.2).
+    rows = chroma.reshape(-1, 4, chroma.shape[1])
+    upper = 0.75 * rows[:, 0] + 0.25 * rows[:, 2]
+    lower = 0.25 * rows[:, 1] + 0.75 * rows[:, 3]
+    return np.stack([upper, lower], axis=1).reshape(-1, chroma.shape[1]).astype(np.float32)
+
+
+def _fill(plane: Any, samples: NDArray[np.floating[Any]], limits: tuple[int, int]) -> None:
     kind = np.dtype("<u2" if plane.line_size >= 2 * plane.width else "u1")
     lines = np.zeros((plane.height, plane.line_size // kind.itemsize), kind)
-    lines[:, : plane.width] = np.rint(samples)
+    lines[:, : plane.width] = np.clip(np.rint(samples), *limits)
     plane.update(lines.tobytes())

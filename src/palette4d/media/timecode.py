@@ -12,7 +12,6 @@ from fractions import Fraction
 from palette4d.common.errors import Palette4dError
 from palette4d.media.clip_base import Clip
 
-_TIMECODE = re.compile(r"([0-9]{2}:[0-9]{2}:[0-9]{2}[:;.][0-9]{2,3})")
 _PARTS = re.compile(r"([0-9]{1,2})[:;.,]([0-9]{2})[:;.,]([0-9]{2})([:;.,])([0-9]{2,3})")
 
 
@@ -50,25 +49,16 @@ def frames_of(timecode: str, rate: Fraction, drop: bool = False) -> int | None:
 
 
 def start_timecode(clip: Clip) -> str | None:
-    """Return the timecode of a clip's first frame, `HH:MM:SS:FF`; None if the files have none."""
+    """Return the timecode of a movie's frame 0, or of a sequence's first frame, `HH:MM:SS:FF`.
+
+    None if the files have none.
+    """
+    if clip.is_movie:
+        return clip.stated.timecode or None
     try:
-        return _of_movie(clip) if clip.is_movie else _of_image(clip)
+        return _of_image(clip)
     except (Palette4dError, OSError):
         return None
-
-
-def _of_movie(clip: Clip) -> str | None:
-    import av
-
-    from palette4d.media.clip_movie import ONLY_FILES
-
-    with av.open(f"file:{clip.file(0)}", options=ONLY_FILES) as container:
-        stated = [container.metadata, *(stream.metadata for stream in container.streams)]
-        for metadata in stated:
-            found = _TIMECODE.search(metadata.get("timecode", ""))
-            if found:
-                return found[0]
-    return None
 
 
 def _of_image(clip: Clip) -> str | None:
@@ -91,3 +81,40 @@ def _decoded(word: int) -> str:
         return f"{(byte >> 4) & tens}{byte & 15}"
 
     return f"{digits(hours, 3)}:{digits(minutes, 7)}:{digits(seconds, 7)}{drop}{digits(frames, 3)}"
+
+
+def encoded(timecode: str) -> int | None:
+    """Return the 32 bits of a timecode; None above 39 frames, for which there are no digits.
+
+    >>> hex(encoded("10:21:52;03")), encoded("00:00:00:59")
+    ('0x10215243', None)
+    """
+    numbers = [int(part) for part in timecode.replace(";", ":").replace(".", ":").split(":")]
+    if numbers[3] > 39:
+        return None
+    word = 0
+    for number in numbers:
+        word = word << 8 | number // 10 << 4 | number % 10
+    return word | (0x40 if timecode[8] in ";." else 0)
+
+
+def moved(timecode: str, frames: int, rate: Fraction) -> str:
+    """Return the timecode so many frames later; "" if the rate has no such timecode.
+
+    >>> moved("00:00:59;29", 1, Fraction(30000, 1001)), moved("23:59:59:23", 1, Fraction(24))
+    ('00:01:00;02', '00:00:00:00')
+    """
+    before = frames_of(timecode, rate)
+    if before is None:
+        return ""
+    base, separator, digits = nominal(rate), timecode[8], len(timecode) - 9
+    drop = base // 15 if separator != ":" and base % 30 == 0 else 0
+    of_ten, of_one = 600 * base - 9 * drop, 60 * base - drop
+    tens, count = divmod((before + frames) % (144 * of_ten), of_ten)
+    if count >= 60 * base:  # the first minute of ten drops none
+        count += drop * (1 + (count - 60 * base) // of_one)
+    seconds, frame = divmod(tens * 600 * base + count, base)
+    return (
+        f"{seconds // 3600:02d}:{seconds // 60 % 60:02d}:{seconds % 60:02d}"
+        f"{separator}{frame:0{digits}d}"
+    )

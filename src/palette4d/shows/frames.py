@@ -23,8 +23,9 @@ from palette4d.grade.output import Output
 from palette4d.grade.rendering import Missing, Painter, Rendered
 from palette4d.jobs.workers import Failed, Workers
 from palette4d.media.clip import Clip, open_clip
+from palette4d.media.codecs import is_movie
+from palette4d.media.frame_tags import frame_notes
 from palette4d.media.frame_writer import FramePattern, sample_type
-from palette4d.media.movie_writer import is_movie
 
 #: Frames of a task: a worker decodes a movie from a key frame, and returns the files of a task
 #: together.
@@ -110,6 +111,9 @@ def _on_farm(
     space: Literal["input", "palette"] = "input",
     half: bool = False,
     bits: int | None = None,
+    codec: str | None = None,
+    crf: int | None = None,
+    sound: bool = True,
     threads: int = 0,
     missing: Missing = "hold",
     skip_bad_frames: bool = False,
@@ -124,6 +128,7 @@ def _on_farm(
             f"output {output}: a movie is encoded frame after frame, on one machine; expected "
             "OUT.####.exr, .png or .tif with cluster=…, or leave cluster=… out"
         )
+    rendering.refuse_codec(str(output), codec, crf)
     clip, fill = rendering.opened_for_render(spec, frames, missing, skip_bad_frames, movie=False)
     pattern = FramePattern.parse(str(output))
     samples = sample_type(pattern.extension, clip.depth, half=half, bits=bits)
@@ -133,11 +138,11 @@ def _on_farm(
     )
     make_folder(pattern.folder)
     warnings = rendering.mismatches(document, clip, frames is None)
+    notes = [*clip.notes, *frame_notes(clip, pattern.extension)]
     if tell is not None:
-        for kind, text in [("warning", one) for one in warnings] + [
-            ("note", n) for n in clip.notes
-        ]:
-            tell(kind, text)
+        for kind, texts in (("warning", warnings), ("note", notes)):
+            for text in texts:
+                tell(kind, text)
     data = sidecar.encoded(document.fields())
     at_once = OF_MOVIE if clip.is_movie else FRAMES
     rows = [tuple(todo[i : i + at_once]) for i in range(0, len(todo), at_once)]
@@ -147,7 +152,7 @@ def _on_farm(
         row: FramesTask(data, place, frames, row, drawn, compare, space, fill, pattern, samples)
         for row in rows
     }
-    done = Rendered([], [], [], [*warnings, *clip.notes], sorted(set(clip.frames) - set(todo)))
+    done = Rendered([], [], [], [*warnings, *notes], sorted(set(clip.frames) - set(todo)))
     failed: dict[int, str] = {}
 
     def take(row: tuple[int, ...], found: Files | Failed) -> None:

@@ -1,0 +1,103 @@
+"""A movie of a render: its codec, what it keeps of the clip, and notes on what it cannot keep."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+
+from palette4d.grade.document import Document
+from palette4d.media.clip import Clip, Image
+from palette4d.media.clip_base import F32
+from palette4d.media.clip_movie import MovieClip
+from palette4d.media.movie_writer import Delivery, movie_writer
+from palette4d.media.sound import Sound
+from palette4d.media.stated import Stated
+from palette4d.media.timecode import moved, start_timecode
+
+
+@dataclass(frozen=True)
+class MoviePlan:
+    """A movie that will be written.
+
+    Attributes
+    ----------
+    path, size, rate : of the movie; size is that of the picture.
+    delivery, sound : how it is written, and the sound that is copied.
+    premultiplied : whether the colours of the clip are multiplied by alpha.
+    notes : for the user, what the movie cannot keep.
+    """
+
+    path: Path
+    size: tuple[int, int]
+    rate: Fraction
+    delivery: Delivery
+    sound: Sound | None
+    premultiplied: bool
+    notes: list[str]
+
+    @classmethod
+    def of(
+        cls,
+        clip: Clip,
+        document: Document,
+        path: Path,
+        size: tuple[int, int],
+        *,
+        alpha: bool,
+        codec: str | None,
+        crf: int | None,
+        sound: bool,
+    ) -> MoviePlan:
+        """Plan a movie; OutputError if the codec does not fit."""
+        # Image files rarely state a rate, so the sidecar's rate is used.
+        rate = clip.rate if clip.is_movie else Fraction(*document.core.clip["rate"])
+        delivery = Delivery.plan(path, _stated(clip, rate), alpha=alpha, codec=codec, crf=crf)
+        delivery.check_size(path, *size)
+        copied = None
+        if sound and isinstance(clip, MovieClip):
+            copied = Sound.of(clip, path.suffix.lower().lstrip("."))
+        notes = [*movie_notes(clip, delivery, size), *(copied.notes if copied else ())]
+        return cls(path, size, rate, delivery, copied, clip.premultiplied, notes)
+
+    @contextlib.contextmanager
+    def opened(self) -> Generator[Callable[[Image, F32], Path]]:
+        """Yield a function that appends a frame to the movie."""
+        with movie_writer(self.path, self.size, self.rate, self.delivery, self.sound) as append:
+
+            def write(image: Image, pixels: F32) -> Path:
+                append(pixels, self.premultiplied)
+                return self.path
+
+            yield write
+
+
+def movie_notes(clip: Clip, delivery: Delivery, size: tuple[int, int]) -> list[str]:
+    """Return notes on what a movie of this clip cannot keep: size, alpha, colours."""
+    found = list(delivery.notes)
+    across, rows = delivery.codec.across, delivery.rows
+    if size[0] % across or size[1] % rows:
+        found.append(
+            f"the picture is {size[0]}x{size[1]} pixels, {delivery.codec.name} needs multiples "
+            f"of {across}x{rows}; the last column or row is repeated"
+        )
+    if "linear" in clip.encoding:
+        found.append(
+            f"the clip's code values are {clip.encoding} and stay so: the movie looks dark in most "
+            "players. Render frames, and convert those to a display space"
+        )
+    elif clip.encoding != "unknown" and not clip.stated.tags.known and not clip.is_movie:
+        found.append(
+            f"the movie cannot say that its colours are {clip.encoding}: no colour tag means that"
+        )
+    return found
+
+
+def _stated(clip: Clip, rate: Fraction) -> Stated:
+    """Return what a movie of the clip's frames states; its timecode is that of the first frame."""
+    start = start_timecode(clip) or ""
+    if start and clip.is_movie:
+        start = moved(start, clip.frames[0], rate)
+    return replace(clip.stated, timecode=start)

@@ -1,0 +1,58 @@
+"""What frames of a movie state: rate, timecode, reel, pixel aspect and colours, for each format."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from palette4d.media.clip_base import Clip
+from palette4d.media.colour_tags import chromaticities, interop_name
+from palette4d.media.timecode import encoded, moved
+
+Metadata = tuple[tuple[str, Any, Any], ...]
+
+
+def of_movie(clip: Clip, frame: int) -> Metadata:
+    """Return the metadata of one frame of a movie, for OpenImageIO."""
+    import OpenImageIO as oiio
+
+    stated = clip.stated
+    rate = (clip.rate.numerator, clip.rate.denominator)
+    found: list[tuple[str, Any, Any]] = [
+        ("FramesPerSecond", oiio.TypeDesc("rational"), rate),
+        ("PixelAspectRatio", "float", float(stated.pixel_aspect)),
+        *of_colours(clip),
+    ]
+    if stated.reel:
+        found.append(("reelName", "string", stated.reel))
+    if stated.timecode:
+        word = encoded(moved(stated.timecode, frame, clip.rate))
+        if word is not None:
+            found.append(("smpte:TimeCode", oiio.TypeTimeCode, (word, 0)))
+    return tuple(found)
+
+
+def of_colours(clip: Clip) -> Metadata:
+    """Return the colour tags of a clip as OpenImageIO's attributes."""
+    tags = clip.stated.tags
+    found: list[tuple[str, Any, Any]] = []
+    if name := interop_name(tags):
+        found.append(("oiio:ColorSpace", "string", name))
+    if xy := chromaticities(tags.primaries):
+        found.append(("chromaticities", "float[8]", xy))
+    if tags.known:
+        found.append(("CICP", "int[4]", (tags.primaries, tags.transfer, 0, 1)))
+    return tuple(found)
+
+
+def frame_notes(clip: Clip, extension: str) -> list[str]:
+    """Return notes on what frames of this format cannot state of the clip's colours."""
+    tags, named = clip.stated.tags, clip.encoding
+    fits = {
+        # EXR names spaces; those of other EXR are carried over.
+        "exr": bool(interop_name(tags)) or not clip.is_movie,
+        "png": tags.known,
+        "dpx": named in ("sRGB", "Rec.709") or "linear" in named or not clip.is_movie,
+    }.get(extension, named in ("sRGB", "Rec.709"))
+    if named == "unknown" or fits:
+        return []
+    return [f"the frames cannot say that their colours are {named}: .{extension} has no such tag"]

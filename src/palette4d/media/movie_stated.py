@@ -1,0 +1,88 @@
+"""What a movie file states beside pixels: tags, pixel aspect, fields, timecode and reel."""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+from typing import Any
+
+import av
+from av.error import FFmpegError
+from av.filter import Graph
+
+from palette4d.media.colour_tags import ColourTags
+from palette4d.media.movie_pixels import FULL_RANGE, is_luma_chroma, turn
+from palette4d.media.stated import Fields, Stated
+
+_TIMECODE = re.compile(r"([0-9]{2}:[0-9]{2}:[0-9]{2}[:;.][0-9]{2,3})")
+# AVFieldOrder: unknown, progressive, then four of interlaced pictures.
+_PROGRESSIVE, _TOP_FIRST = 1, (2, 4)
+
+
+def stated_by(container: Any, stream: Any, picture: av.VideoFrame) -> Stated:
+    """Return what a movie states; its first picture has its matrix resolved."""
+    full = int(picture.color_range) == FULL_RANGE
+    aspect = stream.sample_aspect_ratio or stream.codec_context.sample_aspect_ratio
+    aspect = Fraction(aspect) if aspect else Fraction(1)
+    transposed, _, upside_down = turn(picture)
+    order = int(stream.codec_context.field_order)
+    fields = "" if transposed else _fields(picture, order)
+    if upside_down and picture.height % 2 == 0 and fields:
+        fields, order = ("bff" if fields == "tff" else "tff"), 0
+    return Stated(
+        tags=ColourTags(
+            int(picture.color_primaries),
+            int(picture.color_trc),
+            int(picture.colorspace),
+            full or picture.format.is_rgb,
+        ),
+        headroom=is_luma_chroma(picture) or (picture.format.name.startswith("gray") and not full),
+        pixel_aspect=1 / aspect if transposed else aspect,
+        fields=fields,
+        field_order=order if fields else 0,
+        reel=_first(container, "reel_name"),
+        timecode=timecode_of(container),
+    )
+
+
+def timecode_of(container: Any) -> str:
+    """Return the timecode of a movie's first frame, `HH:MM:SS:FF`, or ""."""
+    found = _TIMECODE.search(_first(container, "timecode"))
+    return found[0] if found else ""
+
+
+def _first(container: Any, name: str) -> str:
+    """Return a text that the file or one of its streams states, or ""."""
+    stated = [container.metadata, *(stream.metadata for stream in container.streams)]
+    return next((str(one[name]) for one in stated if one.get(name)), "")
+
+
+def _fields(picture: av.VideoFrame, order: int) -> Fields:
+    """Return which field comes first; the decoder knows better than the container."""
+    if not picture.interlaced_frame and order <= _PROGRESSIVE:
+        return ""
+    if not picture.interlaced_frame:
+        return "tff" if order in _TOP_FIRST else "bff"
+    return "tff" if _top_field_first(picture) else "bff"
+
+
+def _top_field_first(picture: av.VideoFrame) -> bool:
+    """Ask FFmpeg's filter for the flag, which PyAV does not offer."""
+    graph = Graph()
+    source = graph.add_buffer(
+        width=picture.width,
+        height=picture.height,
+        format=picture.format,
+        time_base=Fraction(1, 25),
+    )
+    chosen = graph.add("select", "eq(interlace_type\\,TOPFIRST)")
+    sink = graph.add("buffersink")
+    source.link_to(chosen)
+    chosen.link_to(sink)
+    graph.configure()
+    graph.push(picture)
+    try:
+        graph.pull()
+    except (FFmpegError, EOFError):
+        return False
+    return True
