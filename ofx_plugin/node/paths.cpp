@@ -2,13 +2,19 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cerrno>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
 #include <vector>
 
 #include "sidecar/clip_name.hpp"
 #include "windows.hpp"
+
+#if !defined(_WIN32)
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#endif
 
 namespace palette4d::node {
 namespace {
@@ -183,12 +189,18 @@ std::optional<std::string> bytes_of(const fs::path& file, std::size_t most) {
     CloseHandle(handle);
     if (!read) return std::nullopt;
 #else
-    std::ifstream stream(file, std::ios::binary);
-    while (stream && wanted() > 0) {
-        stream.read(block, static_cast<std::streamsize>(wanted()));
-        text.append(block, static_cast<std::size_t>(stream.gcount()));
+    // A pipe in the file's place would make an ordinary open wait for its writer.
+    const int handle = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+    if (handle < 0) return std::nullopt;
+    struct stat about{};
+    ssize_t got = ::fstat(handle, &about) == 0 && S_ISREG(about.st_mode) ? 1 : -1;
+    while (got > 0 && wanted() > 0) {
+        got = ::read(handle, block, wanted());
+        if (got > 0) text.append(block, static_cast<std::size_t>(got));
+        if (got < 0 && errno == EINTR) got = 1;
     }
-    if (!stream.is_open() || stream.bad()) return std::nullopt;
+    ::close(handle);
+    if (got < 0) return std::nullopt;
 #endif
     return text;
 }

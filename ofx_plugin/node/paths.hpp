@@ -10,6 +10,9 @@ namespace palette4d::node {
 
 /// Folders in which the node searches sidecars, separated as in PATH.
 inline constexpr const char* kSearchPath = "PALETTE4D_PATH";
+/// The longest path in a project, in bytes: eight times what Linux allows. Longer ones are no
+/// paths.
+inline constexpr std::size_t kLongestPath = 32768;
 
 /// The path that a host gives in UTF-8. On Windows bytes that are no UTF-8 become U+FFFD.
 std::filesystem::path native(const std::string& utf8);
@@ -18,8 +21,8 @@ std::filesystem::path native(const std::string& utf8);
 /// 260 characters are the most. Not for people to read.
 std::filesystem::path reachable(const std::filesystem::path& path);
 
-/// The bytes of a file, at most `most`; empty where it cannot be read. Programs may replace or
-/// remove the file meanwhile, also on Windows.
+/// The bytes of a regular file, at most `most`; empty where it cannot be read. Never waits,
+/// whatever the file is. Programs may replace or remove it meanwhile, also on Windows.
 std::optional<std::string> bytes_of(const std::filesystem::path& file, std::size_t most);
 
 /// The path (UTF-8) with a leading ~ and $NAME, ${NAME} and %NAME% replaced from the environment.

@@ -80,15 +80,25 @@ Chosen chosen_file(const Params& params) {
     };
     Chosen chosen;
     const std::string given = text(kParamSidecar), copy = text(kParamEmbedded);
+    const std::string folder = text(kParamClipFolder);
     chosen.media = params.media();
+    for (const std::string* path :
+         {&given, &folder, static_cast<const std::string*>(&chosen.media)}) {
+        if (path->size() <= kLongestPath) continue;
+        chosen.any = true;
+        chosen.result.problem = "found a path of " + std::to_string(path->size()) +
+                                " bytes in this node, expected at most " +
+                                std::to_string(kLongestPath) + "; choose the file again";
+        return chosen;
+    }
     if (given.empty()) {
         const int by_name = params.int_at(kParamFindByName, Params::kAnyTime).value_or(1);
         if (by_name == 0 || chosen.media.empty()) return chosen;
-        find_by_name(chosen, text(kParamClipFolder), copy);
+        find_by_name(chosen, folder, copy);
         return chosen;
     }
     chosen.any = true;
-    const auto found = find_file(given, text(kParamClipFolder));
+    const auto found = find_file(given, folder);
     if (found) {
         chosen.path = *found;
         chosen.result = load_sidecar(chosen.path);

@@ -51,7 +51,11 @@ TEST(unusable_sidecars_pass_the_picture_through) {
         {(folder() / "a\x1b[2J.json").u8string(), "a\\u001b[2J.json"},
         {std::string("\xff\xfe/not utf-8"), ""},
         {std::string(5000, 'x'), ""},
+        {"/" + std::string(10 << 20, 'x'), "at most 32768"},
     };
+    std::string many = "a";  // to look at each folder of these took hours
+    while (many.size() < 10u << 20) many += "/$a" + many;
+    bad.emplace_back(many, "at most 32768");
     std::string newer = whole;
     newer.replace(newer.find("\"version\": 1"), 12, "\"version\": 9");
     bad.emplace_back(write("newer.p4d.json", newer), "/version");

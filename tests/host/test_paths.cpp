@@ -5,8 +5,13 @@
 #include "../../ofx_plugin/node/paths.hpp"
 #include "harness.hpp"
 
+#if !defined(_WIN32)
+#include <sys/stat.h>
+#endif
+
 using namespace strict;
 using namespace test;
+using palette4d::node::bytes_of;
 using palette4d::node::clip_folder;
 using palette4d::node::clip_spec;
 using palette4d::node::expanded;
@@ -210,6 +215,16 @@ TEST(the_long_form_of_windows_paths) {
           "\\\\server\\share\\a b.json");
     CHECK(fs::path("\\\\server\\share\\a").is_absolute() && fs::path("C:a").is_relative());
     CHECK(clip_spec("\\\\server\\share\\shot.1001.exr") == "\\\\server\\share\\shot.####.exr");
+}
+#endif
+
+#if !defined(_WIN32)
+TEST(a_pipe_is_no_file_and_nobody_waits_for_it) {
+    const fs::path pipe = folder() / "pipe";
+    CHECK(::mkfifo(pipe.c_str(), 0600) == 0);
+    CHECK(!bytes_of(pipe, 10));
+    CHECK(!bytes_of(folder(), 10));
+    CHECK(bytes_of(write("four", "four"), 3) == "fou");
 }
 #endif
 
