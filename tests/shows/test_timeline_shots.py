@@ -317,6 +317,22 @@ class TestMedia:
         assert "the edit names no file for it, and nothing under" in none.problem
         assert not take.problem
 
+    @pytest.mark.parametrize(
+        "url",
+        [
+            "S:\\show\\b\\take.mov",
+            "S:/show/b/take.mov",
+            "\\\\server\\show\\b\\take.mov",
+            "file:///S:/show/b/take.mov",
+            "file://server/show/b/take.mov",
+        ],
+    )
+    def test_paths_of_windows_are_found_by_name(
+        self, url: str, tmp_path: Path, plates: Path
+    ) -> None:
+        (shot,) = edit(timeline(clip("a", external(url), 0, 5)), tmp_path, plates).shots
+        assert shot.clip == str(plates / "b" / "take.mov")
+
     def test_no_such_folder(self, tmp_path: Path) -> None:
         with pytest.raises(Palette4dError, match="no such folder"):
             Folder(tmp_path / "nowhere")

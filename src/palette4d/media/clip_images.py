@@ -308,7 +308,13 @@ def _open(path: Path, what: str) -> tuple[Any, Any]:
     config.attribute("oiio:UnassociatedAlpha", 1)  # values as they are stored
     source = oiio.ImageInput.open(oiio_text.file_name(path), config)
     if source is None:
-        raise _unreadable(path, what, oiio_text.problem_of(oiio))
+        problem = oiio_text.problem_of(oiio)
+        if "ubsampl" in problem:
+            raise FrameError(
+                f"{path}: {what} has subsampled channels (luminance and chroma), expected R, G and "
+                "B of full size; write it so in the program that made it"
+            )
+        raise _unreadable(path, what, problem)
     # The part of a multi-part EXR that holds the colours; the first one otherwise.
     part = 0
     while source.seek_subimage(part, 0):
@@ -321,7 +327,10 @@ def _open(path: Path, what: str) -> tuple[Any, Any]:
     spec = source.spec()
     if spec.deep:
         source.close()
-        raise _unreadable(path, what, "it is a deep image, expected a flat one")
+        raise FrameError(
+            f"{path}: {what} is a deep image, expected a flat one; flatten it, as with "
+            "`oiiotool IN --flatten -o OUT`"
+        )
     if spec.width < 1 or spec.height < 1 or spec.nchannels < 1:
         source.close()
         raise _unreadable(path, what, f"its size is {spec.width}x{spec.height}")

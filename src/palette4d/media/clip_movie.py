@@ -57,6 +57,8 @@ _FORMATS = (
 ONLY_FILES = {"format_whitelist": ",".join(_FORMATS), "protocol_whitelist": "file"}
 
 
+#: The most pictures that a codec decodes before one that is shown earlier (H.264, HEVC).
+REORDERED = 16
 #: Pictures whose decoding takes longer than opening the file again for a seek.
 WORTH_SEEKING = 4
 
@@ -322,10 +324,34 @@ def opened_movie(path: Path) -> Any:
             reason = f"its content is none of {', '.join(_FORMATS)}"
         if path.is_file() and path.stat().st_size == 0:
             reason = "the file is empty"
+        elif _lacks_index(path):
+            raise ClipError(
+                f"{path}: the movie has no index yet: it is still being written, or its writing "
+                "was cut short; wait until it is done, or bring a whole copy"
+            ) from error
         raise ClipError(
             f"{path}: the movie cannot be opened ({reason}); expected a whole movie file that "
             "FFmpeg can read. Bring a good copy, or convert it to an image sequence."
         ) from error
+
+
+def _lacks_index(path: Path) -> bool:
+    """Whether a file is a .mov or .mp4 without the box `moov`, which is written last."""
+    kinds, at = set(), 0
+    try:
+        with path.open("rb") as file:
+            while len(head := file.read(16)) >= 8 and len(kinds) < 64:
+                size = int.from_bytes(head[:4], "big")
+                if size == 1:  # a size of 64 bits follows
+                    size = int.from_bytes(head[8:], "big")
+                kinds.add(head[4:8])
+                if size < 8:  # up to the file's end
+                    break
+                at += size
+                file.seek(at)
+    except OSError:
+        return False
+    return bool(kinds & {b"ftyp", b"mdat", b"wide"}) and b"moov" not in kinds
 
 
 def _has_slices(stream: Any) -> bool:
@@ -395,7 +421,13 @@ def _varies(stamps: list[int], base: Fraction, rate: Fraction | None) -> bool:
     if len(stamps) < 3 or not rate:
         return False
     gaps = np.diff(np.asarray(stamps, dtype=np.int64))
-    return bool(np.ptp(gaps) > max(2, float(Fraction(1, 4) / (rate * base))))
+    allowed = max(2, float(Fraction(1, 4) / (rate * base)))
+    # A stream that was trimmed without encoding lacks pictures at its ends, which others need.
+    usual = max(1, int(np.median(gaps)))
+    whole = np.abs(gaps - np.rint(gaps / usual) * usual) <= allowed
+    at = np.arange(len(gaps))
+    lacks = whole & (gaps > 1.5 * usual) & ((at < REORDERED) | (at >= len(gaps) - REORDERED))
+    return bool(np.ptp(gaps[~lacks]) > allowed) if not lacks.all() else False
 
 
 def _fail(error: FrameError, binner: _core.ColourBinner) -> bool:

@@ -6,6 +6,7 @@ timeline, `solid` the polyhedron's projection. The window draws these, too. `tim
 matplotlib is imported inside functions only, and its global state is never changed.
 """
 
+import importlib
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -58,6 +59,7 @@ def plot(
     Palette4dError
         The sidecar, a frame, the clip or the output is unusable; nothing was written.
     """
+    _import_quietly()
     import matplotlib.style
 
     from palette4d.common.errors import Palette4dError
@@ -107,3 +109,16 @@ def plot(
         figure = page.build(sidecar, columns, against, names, graded.colour_names, shares)
         page.save(figure, temporary, output.suffix.lower()[1:], width)
     return [column.frame for column in columns if not column.pictures]
+
+
+def _import_quietly() -> None:
+    """Import matplotlib, which without a home folder would warn of where its cache is."""
+    import logging
+
+    logger = logging.getLogger("matplotlib")
+    before = logger.level
+    logger.setLevel(logging.ERROR)
+    try:
+        importlib.import_module("matplotlib.font_manager")
+    finally:
+        logger.setLevel(before)

@@ -19,6 +19,9 @@ from palette4d.media import clip_sequence
 # name.####.exr, name.%04d.exr, name.@@@@.exr, name.[1001-1100].exr, name.1001.exr
 _NUMBERS = re.compile(r"(%0?[0-9]*d|#+|@+|\[[0-9]+-[0-9]+\]|(?<![0-9])[0-9]+)(?=\.[A-Za-z0-9]+$)")
 
+# A drive's letter or a server, with backslashes; S:/show/x.mov, too.
+_WINDOWS = re.compile(r"[A-Za-z]:[\\/]|\\\\")
+
 #: Extensions of camera originals, whose proxies are analysed.
 CAMERA = frozenset({"mxf", "r3d", "braw", "ari", "arx", "dng"})
 
@@ -26,9 +29,11 @@ CAMERA = frozenset({"mxf", "r3d", "braw", "ari", "arx", "dng"})
 def local_path(url: str) -> Path:
     """Return the path for a media reference's URL or path."""
     parts = urllib.parse.urlsplit(url)
-    if parts.scheme in ("", "file") or len(parts.scheme) == 1:  # a drive's letter
-        if parts.scheme != "file":
-            return Path(url)
+    if _WINDOWS.match(url):  # S:\show\x.mov and \\server\show\x.mov, on any system
+        return Path(url if os.name == "nt" else url.replace("\\", "/"))
+    if parts.scheme == "":
+        return Path(url)
+    if parts.scheme == "file":
         return Path(urllib.request.url2pathname(parts.path))
     raise Palette4dError(
         f"found the media {url!r}, expected a file; relink it, or name its folder with media=…"

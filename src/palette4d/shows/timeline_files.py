@@ -126,6 +126,9 @@ def check_json(path: Path, text: str) -> None:
 
 
 def _first_line(error: Exception) -> str:
+    """Return why a file cannot be read; errors of an adapter's own code say nothing to a user."""
+    if isinstance(error, (AttributeError, LookupError, NameError, TypeError)):
+        return "OpenTimelineIO's reader found something that it does not expect"
     return str(error).strip().partition("\n")[0] or type(error).__name__
 
 
