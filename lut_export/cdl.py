@@ -5,7 +5,9 @@ least-squares fit of the relative error (`bake_error`) finds them. It uses the c
 that time, or the dense grid without a clip. The remaining error is stated as for a 3D LUT.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,8 @@ from numpy.typing import NDArray
 from palette4d.lut_export.bake_error import FLOOR
 from palette4d.lut_export.frame_edit import FrameEdit
 from palette4d.lut_export.writers import Description, one_line
+
+from palette4d.common.errors import Palette4dError
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -102,16 +106,51 @@ def write(cdl: Cdl, format_name: str, shot: str, description: Description) -> st
     """
     import PyOpenColorIO as ocio
 
+    transform = _transform(cdl, shot)
+    metadata = transform.getFormatMetadata()
+    metadata.addChildElement("InputDescription", _unescaped(description.space))
+    for line in (description.name, *description.lines, f"id {description.identifier}"):
+        metadata.addChildElement(ocio.METADATA_DESCRIPTION, _unescaped(line))
+    return _text([transform], _WRITTEN_AS[format_name])
+
+
+def collection(shots: Mapping[str, Cdl]) -> str:
+    """Return the text of a .ccc with a correction for each shot, whose id is the shot's name."""
+    return _text([_transform(cdl, name) for name, cdl in shots.items()], _WRITTEN_AS["ccc"])
+
+
+def read(path: Path) -> Cdl:
+    """Return the first correction of a .cc, .ccc or .cdl file."""
+    import PyOpenColorIO as ocio
+
+    try:
+        found: Any = ocio.CDLTransform.CreateFromFile(str(path), "")
+    except ocio.Exception as error:
+        raise Palette4dError(
+            f"{path}: no CDL can be read ({error}); export it again with force=True"
+        ) from error
+    return Cdl(
+        _triple(found.getSlope()),
+        _triple(found.getOffset()),
+        _triple(found.getPower()),
+        float(found.getSat()),
+    )
+
+
+def _transform(cdl: Cdl, shot: str) -> Any:
+    import PyOpenColorIO as ocio
+
     transform: Any = ocio.CDLTransform()
     transform.setSlope(list(cdl.slope))
     transform.setOffset(list(cdl.offset))
     transform.setPower(list(cdl.power))
     transform.setSat(cdl.saturation)
     transform.setID(_unescaped(shot))
-    metadata = transform.getFormatMetadata()
-    metadata.addChildElement("InputDescription", _unescaped(description.space))
-    for line in (description.name, *description.lines, f"id {description.identifier}"):
-        metadata.addChildElement(ocio.METADATA_DESCRIPTION, _unescaped(line))
-    group = ocio.GroupTransform([transform])
-    text = group.write(formatName=_WRITTEN_AS[format_name], config=ocio.Config.CreateRaw())
-    return str(text)
+    return transform
+
+
+def _text(transforms: list[Any], format_name: str) -> str:
+    import PyOpenColorIO as ocio
+
+    group = ocio.GroupTransform(transforms)
+    return str(group.write(formatName=format_name, config=ocio.Config.CreateRaw()))

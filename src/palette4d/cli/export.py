@@ -31,6 +31,7 @@ examples:
   palette4d export shot010.p4d.json --every 1 -o luts
   palette4d export shot010.p4d.json --frames 1001-1100x10 -o luts --format clf --max-error 0.02
   palette4d export shots/edit.shots.json --stops -o luts --otio edit_luts.otio
+  palette4d export shots/edit.shots.json --stops -o cdls --format ccc --ccc show.ccc
   palette4d export shot010.p4d.json --dctl shot010.dctl
 """
 
@@ -60,6 +61,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_run_options(parser)
     otio = "write the edit of a show with references to its files"
     add("--otio", metavar="OUT.otio", type=Path, help=otio)
+    ccc = "write one collection with a CDL for each shot of a show (--format ccc)"
+    add("--ccc", metavar="OUT.ccc", type=Path, help=ccc)
+    edl = "write the EDL of a show with these CDLs as comments"
+    add("--edl", metavar="OUT.edl", type=Path, help=edl)
     add("--json", action="store_true", help="print the index")
     parser.set_defaults(run=run, usage_error=parser.error)
 
@@ -106,6 +111,8 @@ def run(args: argparse.Namespace) -> int:
                 name=args.name,
                 padding=args.padding,
                 otio=args.otio,
+                ccc=args.ccc,
+                edl=args.edl,
                 progress=progress,
                 **settings,
             )
@@ -118,6 +125,9 @@ def run(args: argparse.Namespace) -> int:
     elif not args.quiet:
         if args.otio is not None:
             print(f"{args.otio}: references in {counted(done.references, 'clip')}")
+        for written in (args.ccc, args.edl):
+            if written is not None:
+                print(f"{written}: a CDL for each of {counted(len(done.series), 'shot')}")
         for one in done.series:
             print("\n".join(report(one)))
     warn(done.series)

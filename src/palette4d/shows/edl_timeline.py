@@ -25,7 +25,23 @@ def timeline_of(path: Path, data: bytes, rate: Fraction | None, otio: Any) -> An
 
     `otio` is OpenTimelineIO. `Palette4dError` says which line is no event.
     """
-    rate = rate or DEFAULT_RATE
+    return _made(path, data, rate or DEFAULT_RATE, otio)[0]
+
+
+def places_of(path: Path, data: bytes, rate: Fraction, otio: Any) -> dict[tuple[int, ...], int]:
+    """Return the numbers of the events by the places of their clips: track, and item in it."""
+    made, numbers = _made(path, data, rate, otio)
+    places = [
+        (i, k)
+        for i, track in enumerate(made.tracks)
+        for k, item in enumerate(track)
+        if isinstance(item, otio.schema.Clip)
+    ]
+    return dict(zip(places, numbers, strict=True))
+
+
+def _made(path: Path, data: bytes, rate: Fraction, otio: Any) -> tuple[Any, list[int]]:
+    """Return the timeline, and the number of the event of each clip, in the timeline's order."""
     text = edl_text.decoded(data)
     try:
         _check_rate(rate, otio)
@@ -39,10 +55,9 @@ def timeline_of(path: Path, data: bytes, rate: Fraction | None, otio: Any) -> An
         made = otio.adapters.read_from_string(source, "cmx_3600", rate=float(rate))
     except Palette4dError as error:
         raise Palette4dError(f"{path}: {error}") from None
-    for clip in made.find_clips():
-        _finish(clip, events, motions, otio)
+    numbers = [_finish(clip, events, motions, otio) for clip in made.find_clips()]
     _rebase(made, otio)
-    return made
+    return made, numbers
 
 
 def _check_rate(rate: Fraction, otio: Any) -> None:
@@ -78,8 +93,11 @@ def _written(index: int, event: Event, motion: Motion) -> str:
     return "\n".join([*lines, *kept, f"* {_MARK} {index}"])
 
 
-def _finish(clip: Any, events: list[Event], motions: list[Motion], otio: Any) -> None:
-    """Put an event's motion effect and CDL on its clip, and take our comment from it."""
+def _finish(clip: Any, events: list[Event], motions: list[Motion], otio: Any) -> int:
+    """Put an event's motion effect and CDL on its clip, and take our comment from it.
+
+    Return the event's number in the list.
+    """
     own = clip.metadata["cmx_3600"]
     comments = [str(comment) for comment in own["comments"]]
     mark = next(comment for comment in comments if comment.startswith(_MARK))
@@ -104,6 +122,7 @@ def _finish(clip: Any, events: list[Event], motions: list[Motion], otio: Any) ->
         clip.effects.append(schema.LinearTimeWarp(time_scalar=motion.speed))
     if cdl := edl_cdl.of_comments(events[index].comments):
         clip.metadata["cdl"] = cdl.metadata
+    return index
 
 
 def _rebase(timeline: Any, otio: Any) -> None:

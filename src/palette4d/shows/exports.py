@@ -20,7 +20,7 @@ from palette4d.lut_export.formats import format_named
 from palette4d.lut_export.measured_write import BakeSettings
 from palette4d.lut_export.series import Request, Series
 from palette4d.shows import manifest as manifests
-from palette4d.shows import timeline_references
+from palette4d.shows import show_cdls, timeline_files, timeline_references
 
 Source = str | os.PathLike[str] | Document
 Progress = Callable[[int, int], object]
@@ -56,6 +56,8 @@ def export(
     padding: int = 4,
     clip: str | None = None,
     otio: str | os.PathLike[str] | None = None,
+    ccc: str | os.PathLike[str] | None = None,
+    edl: str | os.PathLike[str] | None = None,
     format: str = "resolve_cube",
     jobs: int = 0,
     cluster: str | None = None,
@@ -82,6 +84,11 @@ def export(
         Digits of the frame numbers in the files' names.
     otio : path, optional
         For a show: a copy of its timeline, whose clips name the sidecar and files of their shot.
+    ccc : path, optional
+        For a show, with a CDL as the format: one collection with a correction for each shot, of the
+        frame nearest to its middle.
+    edl : path, optional
+        For a show of an EDL: a copy of it with these corrections as comments.
     format : str
         As for `bake`.
     jobs, cluster : int, str
@@ -111,20 +118,31 @@ def export(
                 f"{path}: {argument}=… is not for the manifest of a show, whose shots each have "
                 "their own; leave it out, or export the shots one by one"
             )
-    if otio is not None and not show:
-        raise Palette4dError(
-            f"{path}: otio=… needs the manifest of a show (.shots.json); found a sidecar"
-        )
+    for argument, wanted in (("otio", otio), ("ccc", ccc), ("edl", edl)):
+        if wanted is not None and not show:
+            raise Palette4dError(
+                f"{path}: {argument}=… needs the manifest of a show (.shots.json); found a sidecar"
+            )
     baked = BakeSettings(format=format_named(format).name, **settings)
     request = Request(path, folder, (), baked, name, padding, clip, force)
     choose = _chooser(every, stops, frames, show=show)
-    timeline = None
+    timeline = edit = None
     notes: list[str] = []
     requests = [request]
     if show:
         manifest = manifests.read(path)
         if otio is not None:
             timeline = timeline_references.check(manifest, path, Path(otio), force)
+        if ccc is not None:
+            show_cdls.check(Path(ccc), ".ccc", baked.format, force)
+        if edl is not None:
+            show_cdls.check(Path(edl), ".edl", baked.format, force)
+            edit = timeline_references.source_of(manifest, path, "edl")
+            if not timeline_files.is_edl(edit):
+                raise Palette4dError(
+                    f"{path}: its shots are those of {edit.name}; edl=… expects those of an EDL, "
+                    "use otio=…"
+                )
         files, notes = sidecars([path])
         requests = [
             replace(request, sidecar=file, folder=folder / shot, name=shot)
@@ -140,6 +158,12 @@ def export(
         references = timeline_references.write(
             timeline, manifest, path, exported, Path(otio), force=force
         )
+    if show and (ccc is not None or edl is not None):
+        shots = show_cdls.of_shots(manifest, dict(zip(_done(manifest), done, strict=True)))
+        if ccc is not None:
+            show_cdls.write_collection(shots, Path(ccc), force=force)
+        if edl is not None and edit is not None:
+            notes += show_cdls.write_edl(edit, manifest, shots, Path(edl), force=force)
     exported_all = Exported(done, notes, references)
     if failed := [one for one in done if one.failed]:
         count = sum(len(one.failed) for one in failed)

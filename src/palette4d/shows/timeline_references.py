@@ -26,14 +26,19 @@ NAMESPACE, VERSION = "palette4d", 1
 
 def check(manifest: Manifest, manifest_path: Path, target: Path, force: bool) -> Path:
     """Return the timeline of a show, and refuse early what `write` would refuse."""
-    if not manifest.is_timeline:
-        raise Palette4dError(
-            f"{manifest_path}: its shots are those of the movie {manifest.source}; otio=… expects "
-            "those of a timeline"
-        )
     if target.suffix.lower() != ".otio":
         raise Palette4dError(f"{target}: expected the name of an .otio file")
     refuse_existing(target, force)
+    return source_of(manifest, manifest_path, "otio")
+
+
+def source_of(manifest: Manifest, manifest_path: Path, argument: str) -> Path:
+    """Return the timeline of a show, which has not changed since; `argument` is for errors."""
+    if not manifest.is_timeline:
+        raise Palette4dError(
+            f"{manifest_path}: its shots are those of the movie {manifest.source}; {argument}=… "
+            "expects those of a timeline"
+        )
     source = Path(manifest.source)
     if not source.is_absolute():
         source = manifest_path.absolute().parent / source

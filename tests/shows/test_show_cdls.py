@@ -1,0 +1,114 @@
+"""One .ccc for a show, and an EDL with CDLs, read back by OpenTimelineIO and by an XML reader."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from fractions import Fraction
+from pathlib import Path
+
+import opentimelineio as otio
+import pytest
+from edits import clip, external, movie, save, timeline
+
+from palette4d.cli import main
+from palette4d.common.errors import Palette4dError
+from palette4d.grade.document import Document
+from palette4d.shows.analysis import analyze_shots
+from palette4d.shows.exports import export
+
+QUICK = {"method": "static", "colours": 512, "coarse_colours": 128}
+EDL = """TITLE: Schön
+FCM: NON-DROP FRAME
+
+001  AX       V     C        00:00:00:02 00:00:00:08 01:00:00:00 01:00:00:06
+* FROM CLIP NAME: one.mov
+* ASC_SOP (1 1 1)(0.5 0 0)(1 1 1)
+* ASC_SAT 0.5
+* COMMENT: stays
+
+002  AX       V     C        00:00:00:00 00:00:00:06 01:00:00:12 01:00:00:18
+* FROM CLIP NAME: two.mov
+"""
+
+
+@pytest.fixture
+def show(tmp_path: Path) -> Path:
+    """An analysed EDL of two shots, in Latin-1; the first is graded."""
+    for name in ("one", "two"):
+        movie(tmp_path / "media" / f"{name}.mov", 12)
+    (tmp_path / "cut.edl").write_bytes(EDL.encode("latin-1"))
+    done = analyze_shots(
+        tmp_path / "cut.edl", tmp_path / "s", rate=Fraction(24), media=tmp_path / "media", **QUICK
+    )
+    document = Document.load(tmp_path / "s" / "one.p4d.json")
+    document.set(document.tracks[0].vertices[0], rgb=(0.4, 0.2, 0.1))
+    document.save()
+    return done.path
+
+
+def numbers(text: str) -> list[float]:
+    return [float(word) for word in text.split()]
+
+
+def test_a_collection_and_an_edl(show: Path, tmp_path: Path) -> None:
+    words = [
+        "--every",
+        "2",
+        "--format",
+        "ccc",
+        "--ccc",
+        tmp_path / "show.ccc",
+        "--edl",
+        tmp_path / "o.edl",
+    ]
+    assert main.main([*map(str, ["export", show, "-o", tmp_path / "cdls", *words]), "--quiet"]) == 0
+    corrections = {}
+    for node in ElementTree.parse(tmp_path / "show.ccc").iter():
+        if node.tag.endswith("}ColorCorrection"):
+            corrections[node.get("id")] = [
+                numbers(part.text)
+                for part in node.iter()
+                if part.tag.rpartition("}")[2] in ("Slope", "Offset", "Power", "Saturation")
+            ]
+    assert list(corrections) == ["one", "two"]
+    assert corrections["two"] == [[1, 1, 1], [0, 0, 0], [1, 1, 1], [1]]
+    assert corrections["one"] != corrections["two"]
+    text = (tmp_path / "o.edl").read_text("utf-8")
+    assert "TITLE: Schön" in text
+    assert "* COMMENT: stays" in text
+    assert text.count("ASC_SOP") == text.count("ASC_SAT") == 2
+    read = otio.adapters.read_from_string(text, "cmx_3600", rate=24)
+    for found in read.find_clips():
+        sop = found.metadata["cdl"]["asc_sop"]
+        slope, offset, power, saturation = corrections[found.name.removesuffix(".mov")]
+        assert list(sop["slope"]) == pytest.approx(slope, abs=1e-6)
+        assert list(sop["offset"]) == pytest.approx(offset, abs=1e-6)
+        assert list(sop["power"]) == pytest.approx(power, abs=1e-6)
+        assert [found.metadata["cdl"]["asc_sat"]] == pytest.approx(saturation, abs=1e-6)
+    # The file of the edit stays as it is.
+    assert (tmp_path / "cut.edl").read_bytes() == EDL.encode("latin-1")
+
+
+def test_a_cdl_of_the_edit_that_is_replaced_is_named(show: Path, tmp_path: Path) -> None:
+    done = export(show, tmp_path / "cdls", every=3, format="cc", edl=tmp_path / "o.edl", jobs=1)
+    (note,) = done.notes
+    assert "1 event has a CDL" in note
+    assert note.endswith(": one")
+
+
+def test_what_is_refused_before_anything_is_baked(show: Path, tmp_path: Path) -> None:
+    sidecar = show.parent / "one.p4d.json"
+    for source, format_name, arguments, words in (
+        (show, "clf", {"ccc": tmp_path / "x.ccc"}, "expected a CDL"),
+        (show, "ccc", {"ccc": tmp_path / "x.cdl"}, r"expected the name of an \.ccc file"),
+        (sidecar, "ccc", {"ccc": tmp_path / "x.ccc"}, "needs the manifest of a show"),
+        (sidecar, "ccc", {"edl": tmp_path / "x.edl"}, "needs the manifest of a show"),
+        (show, "ccc", {"edl": tmp_path / "cut.edl"}, "found a file there"),
+    ):
+        with pytest.raises(Palette4dError, match=words):
+            export(source, tmp_path / "cdls", every=1, format=format_name, **arguments)
+    made = timeline(clip("one", external(str(tmp_path / "media" / "one.mov")), 2, 6))
+    other = analyze_shots(save(made, tmp_path / "cut.otio"), tmp_path / "t", **QUICK).path
+    with pytest.raises(Palette4dError, match=r"edl=… expects those of an EDL"):
+        export(other, tmp_path / "cdls", every=1, format="ccc", edl=tmp_path / "x.edl")
+    assert not (tmp_path / "cdls").exists()
