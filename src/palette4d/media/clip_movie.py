@@ -337,7 +337,8 @@ def opened_movie(path: Path) -> Any:
 
 def _lacks_index(path: Path) -> bool:
     """Whether a file is a .mov or .mp4 without the box `moov`, which is written last."""
-    kinds, at = set(), 0
+    kinds: set[bytes] = set()
+    at = 0
     try:
         with path.open("rb") as file:
             while len(head := file.read(16)) >= 8 and len(kinds) < 64:
@@ -420,13 +421,14 @@ def _varies(stamps: list[int], base: Fraction, rate: Fraction | None) -> bool:
     """Whether the time between frames varies by more than the rounding of time stamps."""
     if len(stamps) < 3 or not rate:
         return False
-    gaps = np.diff(np.asarray(stamps, dtype=np.int64))
-    allowed = max(2, float(Fraction(1, 4) / (rate * base)))
+    gaps = np.diff(np.asarray(stamps, dtype=np.int64)).astype(np.float64)
+    allowed = max(2.0, float(Fraction(1, 4) / (rate * base)))
     # A stream that was trimmed without encoding lacks pictures at its ends, which others need.
-    usual = max(1, int(np.median(gaps)))
+    usual = max(1.0, float(np.median(gaps)))
     whole = np.abs(gaps - np.rint(gaps / usual) * usual) <= allowed
     at = np.arange(len(gaps))
-    lacks = whole & (gaps > 1.5 * usual) & ((at < REORDERED) | (at >= len(gaps) - REORDERED))
+    ends = np.logical_or(at < REORDERED, at >= len(gaps) - REORDERED)
+    lacks = whole & (gaps > 1.5 * usual) & ends
     return bool(np.ptp(gaps[~lacks]) > allowed) if not lacks.all() else False
 
 

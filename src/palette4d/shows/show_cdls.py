@@ -20,7 +20,7 @@ from palette4d.shows.edl_cdl import Cdl
 from palette4d.shows.manifest import DONE, Manifest
 
 
-def check(target: Path, ending: str, format_name: str, force: bool) -> None:
+def check(target: Path, ending: str, format_name: str | None, force: bool) -> None:
     """Refuse early what cannot be written."""
     if target.suffix.lower() != ending:
         raise Palette4dError(f"{target}: expected the name of an {ending} file")
