@@ -70,6 +70,12 @@ public:
         check(error, "clCreateBuffer");
         return memory;
     }
+    void upload(void* memory, const void* bytes, std::size_t count) override {
+        check(cl_.get<int(STRICT_API*)(Handle, Handle, std::uint32_t, std::size_t, std::size_t,
+                                       const void*, std::uint32_t, const Handle*, Handle*)>(
+                  "clEnqueueWriteBuffer")(queue_, memory, 1, 0, count, bytes, 0, nullptr, nullptr),
+              "clEnqueueWriteBuffer");
+    }
     void download(void* memory, void* to, std::size_t count) override {
         check(cl_.get<int(STRICT_API*)(Handle, Handle, std::uint32_t, std::size_t, std::size_t,
                                        void*, std::uint32_t, const Handle*, Handle*)>(
@@ -122,10 +128,13 @@ public:
         check(
             cu_.get<int(STRICT_API*)(std::uint64_t*, std::size_t)>("cuMemAlloc_v2")(&memory, count),
             "cuMemAlloc");
-        check(cu_.get<int(STRICT_API*)(std::uint64_t, const void*, std::size_t)>("cuMemcpyHtoD_v2")(
-                  memory, bytes, count),
-              "cuMemcpyHtoD");
+        upload(reinterpret_cast<void*>(memory), bytes, count);
         return reinterpret_cast<void*>(memory);
+    }
+    void upload(void* memory, const void* bytes, std::size_t count) override {
+        check(cu_.get<int(STRICT_API*)(std::uint64_t, const void*, std::size_t)>("cuMemcpyHtoD_v2")(
+                  reinterpret_cast<std::uint64_t>(memory), bytes, count),
+              "cuMemcpyHtoD");
     }
     void download(void* memory, void* to, std::size_t count) override {
         finish();

@@ -16,6 +16,7 @@ public:
     virtual std::string device() const = 0;
     /// Memory with these bytes; what kOfxImagePropData then holds.
     virtual void* allocate(const void* bytes, std::size_t count) = 0;
+    virtual void upload(void* memory, const void* bytes, std::size_t count) = 0;
     /// Waits for the queue, and copies.
     virtual void download(void* memory, void* to, std::size_t count) = 0;
     virtual void release(void* memory) = 0;

@@ -390,6 +390,9 @@ public:
     OfxStatus output_colourspace(std::string& name);
     /// Renders `window`; null source: the host has no picture. Checks images and guards afterwards.
     OfxStatus render(double time, const Picture* source, Picture& output, const OfxRectI& window);
+    /// Renders all of `output` where pictures are in the Gpu's memory, and stay there unchecked.
+    OfxStatus render_there(double time, const Picture& source, Picture& output,
+                           const std::map<const Picture*, void*>& memory);
     /// The same from a host's cache, which knows a frame by its time and by the parameters that are
     /// evaluated on change.
     std::vector<unsigned char> cached(double time, const Picture& source);
@@ -425,8 +428,9 @@ private:
     static void check_released(const std::set<OfxPropertySetHandle>& images, const char* action);
     OfxStatus render_once(double time, const Picture* source, Picture& output,
                           const OfxRectI& window);
-    /// The render action itself, on the Gpu.
-    OfxStatus render_there(OfxPropertySetStruct& arguments, const Picture* source, Picture& output);
+    /// The render action itself, with pictures that are copied to the Gpu and back.
+    OfxStatus render_copied(OfxPropertySetStruct& arguments, const Picture* source,
+                            Picture& output);
 };
 
 }  // namespace strict

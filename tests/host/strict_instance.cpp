@@ -352,8 +352,22 @@ void Instance::check_released(const std::set<OfxPropertySetHandle>& images, cons
     for (OfxPropertySetHandle image : images) delete image;
 }
 
-OfxStatus Instance::render_there(OfxPropertySetStruct& arguments, const Picture* source,
-                                 Picture& output) {
+OfxStatus Instance::render_there(double time, const Picture& source, Picture& output,
+                                 const std::map<const Picture*, void*>& memory) {
+    std::set<OfxPropertySetHandle> images;
+    const Activity before = activity();
+    activity() = {"", false, false, &output, &source, nullptr, &images, "", time};
+    activity().devices = &memory;
+    OfxPropertySetStruct in = render_arguments(time, output.layout().bounds);
+    gpu->describe(in);
+    const OfxStatus status = plugin_.call(kOfxImageEffectActionRender, &effect_, &in, nullptr);
+    activity() = before;
+    check_released(images, "render");
+    return status;
+}
+
+OfxStatus Instance::render_copied(OfxPropertySetStruct& arguments, const Picture* source,
+                                  Picture& output) {
     std::map<const Picture*, void*> devices;
     for (const Picture* picture : {source, static_cast<const Picture*>(&output), brush}) {
         if (!picture || devices.count(picture)) continue;
@@ -397,7 +411,7 @@ OfxStatus Instance::render_once(double time, const Picture* source, Picture& out
     in.put_all(kOfxImageEffectPropRenderScale, {output.layout().scale, output.layout().scale});
     for (const auto& [name, value] : extra_arguments) in.put(name, value);
     const OfxStatus status =
-        gpu ? render_there(in, source, output)
+        gpu ? render_copied(in, source, output)
             : plugin_.call(kOfxImageEffectActionRender, &effect_, &in, nullptr);
     activity() = before;
 

@@ -229,7 +229,7 @@ TEST(gpu_pictures_with_a_brush) {
     }
 }
 
-TEST(gpu_two_contexts_and_sixteen_instances_in_threads) {
+TEST(gpu_two_contexts_and_sixteen_instances_at_once) {
     for (const auto& gpu : gpus()) {
         const bool cuda = gpu->device().find("CUDA") != std::string::npos;
         const auto other = cuda ? cuda_gpu() : opencl_gpu();

@@ -1,0 +1,197 @@
+// What tools/gpu_check.sh measures on a machine with a GPU: the node's errors from double precision
+// and its speed, for the sidecars in the folder PALETTE4D_GPU_CHECK. Without it nothing is done.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <iostream>
+#include <random>
+
+#include "harness.hpp"
+#include "model/vec3.hpp"
+#include "strict_gpu.hpp"
+
+using namespace strict;
+using namespace test;
+using palette4d::Vec3;
+using palette4d::operator+;
+using palette4d::operator*;
+
+namespace {
+
+std::vector<std::string> sidecars_to_check() {
+    const char* const given = std::getenv("PALETTE4D_GPU_CHECK");
+    std::vector<std::string> all;
+    if (!given) return all;
+    for (const auto& entry : std::filesystem::directory_iterator(std::filesystem::u8path(given))) {
+        if (entry.path().extension() == ".json") all.push_back(entry.path().u8string());
+    }
+    std::sort(all.begin(), all.end());
+    return all;
+}
+
+std::vector<std::unique_ptr<Gpu>> gpus_to_check() {
+    Config config;
+    config.gpus = true;
+    config.processors = 16;
+    Host::get().configure(config);
+    std::vector<std::unique_ptr<Gpu>> all;
+    for (const bool stream : {true, false}) {
+        if (auto gpu = cuda_gpu(stream)) all.push_back(std::move(gpu));
+    }
+    if (auto gpu = opencl_gpu()) all.push_back(std::move(gpu));
+    return all;
+}
+
+struct Checked : Ready {
+    explicit Checked(const std::string& of) : Ready(of) {
+        set("mode", 1);
+        set("cleanUp", 0.0);
+    }
+    bool by_kernel() {
+        CHECK(instance->changed("", "", kOfxChangeTime) == kOfxStatOK);
+        const std::string status = instance->text("status");
+        const bool so =
+            status.find("GPU: ") != std::string::npos && status.find("copied") == std::string::npos;
+        EXPECT(so, status);
+        return so;
+    }
+};
+
+/// Colours anywhere around the palette, and at 1e-8 to 1e-2 from its faces, edges and vertices.
+void fill_near(Picture& picture, const palette4d::Slice& slice) {
+    std::mt19937 random(3);
+    std::uniform_real_distribution<double> any(-0.2, 1.2), share(0, 1);
+    std::normal_distribution<double> away(0, 1);
+    const OfxRectI& b = picture.layout().bounds;
+    for (int y = b.y1; y < b.y2; ++y) {
+        for (int x = b.x1; x < b.x2; ++x) {
+            Vec3 colour{any(random), any(random), any(random)};
+            if (y % 2 == 0) {
+                const auto& face = slice.faces[random() % slice.faces.size()];
+                double i = share(random), j = x % 3 == 0 ? 0.0 : share(random),
+                       k = x % 3 == 1 ? 0.0 : share(random);
+                const double sum = i + j + k, step = std::pow(10, -2.0 - 6 * share(random));
+                colour = (i / sum) * slice.rgb[static_cast<std::size_t>(face[0])] +
+                         (j / sum) * slice.rgb[static_cast<std::size_t>(face[1])] +
+                         (k / sum) * slice.rgb[static_cast<std::size_t>(face[2])] +
+                         step * Vec3{away(random), away(random), away(random)};
+            }
+            for (std::size_t c = 0; c < 3; ++c)
+                picture.floats(x, y)[c] = static_cast<float>(colour[c]);
+            picture.floats(x, y)[3] = 1;
+        }
+    }
+}
+
+double milliseconds_since(std::chrono::steady_clock::time_point start) {
+    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+        .count();
+}
+
+std::string name_of(const std::string& path) {
+    return std::filesystem::u8path(path).stem().stem().u8string();
+}
+
+}  // namespace
+
+TEST(gpu_check_errors) {
+    for (const std::string& path : sidecars_to_check()) {
+        Layout layout;
+        layout.bounds = rect(0, 0, 512, 384);
+        for (const auto& gpu : gpus_to_check()) {
+            Checked node(path);
+            const double frame = 15;
+            const auto slice = palette4d::slice_at(node.parsed.polytope, frame);
+            Picture source(layout), output(layout);
+            fill_near(source, slice);
+            node.instance->gpu = gpu.get();
+            // The host's time 0 is the clip's first frame.
+            CHECK(node.instance->render(frame - static_cast<double>(node.parsed.clip.first),
+                                        &source, output, layout.bounds) == kOfxStatOK);
+            node.by_kernel();
+            const palette4d::Recolourer exact(
+                slice.rgb,
+                palette4d::edited_colours(node.parsed.polytope, node.parsed.edits, slice),
+                slice.faces, palette4d::picks_at(node.parsed.edits, frame));
+            const std::vector<float> from = floats(layout, source.pixels(layout.bounds)),
+                                     found = floats(layout, output.pixels(layout.bounds));
+            std::vector<float> expected(from.size());
+            palette4d::RecolourOptions options;
+            options.precision = palette4d::Precision::kDouble;
+            options.threads = 0;
+            const int width = layout.width(), height = layout.height();
+            exact.apply({from.data(), width, height, 4, width * 16},
+                        {expected.data(), width, height, 4, width * 16}, options);
+            double worst = 0, sum = 0, moved = 0;
+            for (std::size_t i = 0; i < from.size(); ++i) {
+                const double error = std::abs(static_cast<double>(found[i]) - expected[i]);
+                worst = std::max(worst, std::isfinite(error) ? error : 1e9);
+                sum += error;
+                moved = std::max(moved, std::abs(static_cast<double>(expected[i]) - from[i]));
+            }
+            char line[256];
+            std::snprintf(line, sizeof line, "%-12s %-40s largest error %.2e, mean %.2e",
+                          name_of(path).c_str(), gpu->device().c_str(), worst,
+                          sum / static_cast<double>(from.size()));
+            figure(line);
+            CHECK(worst < 1e-4);
+            CHECK(moved > 0.05);
+        }
+    }
+}
+
+TEST(gpu_check_speed) {
+    for (const std::string& path : sidecars_to_check()) {
+        Layout layout;
+        layout.bounds = rect(0, 0, 3840, 2160);
+        Picture source(layout), output(layout);
+        bool filled = false;
+        for (const auto& gpu : gpus_to_check()) {
+            Checked node(path);
+            if (!filled) fill_near(source, palette4d::slice_at(node.parsed.polytope, 15));
+            filled = true;
+            std::map<const Picture*, void*> memory;
+            for (Picture* picture : {&source, &output}) {
+                memory[picture] = gpu->allocate(picture->rest(), picture->rest_size());
+            }
+            node.instance->gpu = gpu.get();
+            const auto draw = [&](double time) {
+                CHECK(node.instance->render_there(time, source, output, memory) == kOfxStatOK);
+            };
+            // On a processor a frame takes seconds.
+            const auto began = std::chrono::steady_clock::now();
+            draw(5);
+            gpu->finish();
+            const double first = milliseconds_since(began);
+            const int frames = first > 2000 ? 1 : 100;
+            const auto measured = [&](const auto& each) {
+                for (int i = 0; i < std::min(frames, 5); ++i) each(i);
+                gpu->finish();
+                const auto start = std::chrono::steady_clock::now();
+                for (int i = 0; i < frames; ++i) each(i);
+                gpu->finish();
+                return milliseconds_since(start) / frames;
+            };
+            const double still = measured([&](int) { draw(5); });
+            const double playing = measured([&](int i) { draw(1 + i % 9 + 0.01 * i); });
+            const double copied = measured([&](int i) {
+                if (i % 10) return;  // some are enough
+                gpu->upload(memory[&source], source.rest(), source.rest_size());
+                draw(5);
+                gpu->download(memory[&output], output.rest(), output.rest_size());
+            });
+            node.by_kernel();
+            char line[256];
+            std::snprintf(
+                line, sizeof line,
+                "%-12s %-40s UHD %7.2f ms a frame, %7.2f through time, %7.2f with copies; "
+                "the first %.0f ms",
+                name_of(path).c_str(), gpu->device().c_str(), still, playing,
+                frames > 1 ? copied * 10 : copied, first);
+            figure(line);
+            for (const auto& [picture, at] : memory) gpu->release(at);
+        }
+    }
+}
