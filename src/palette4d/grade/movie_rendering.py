@@ -11,6 +11,7 @@ from pathlib import Path
 from palette4d.grade.document import Document
 from palette4d.media.clip import Clip, Image
 from palette4d.media.clip_base import F32
+from palette4d.media.clip_images import ImageClip
 from palette4d.media.clip_movie import MovieClip
 from palette4d.media.movie_writer import Delivery, movie_writer
 from palette4d.media.sound import Sound
@@ -56,10 +57,12 @@ class MoviePlan:
         rate = clip.rate if clip.is_movie else Fraction(*document.core.clip["rate"])
         delivery = Delivery.plan(path, _stated(clip, rate), alpha=alpha, codec=codec, crf=crf)
         delivery.check_size(path, *size)
-        copied = None
+        copied, lost = None, []
         if sound and isinstance(clip, MovieClip):
             copied = Sound.of(clip, path.suffix.lower().lstrip("."))
-        notes = [*movie_notes(clip, delivery, size), *(copied.notes if copied else ())]
+        if isinstance(clip, ImageClip) and clip.more:
+            lost = [f"not kept of the clip's files: {clip.more}"]
+        notes = [*lost, *movie_notes(clip, delivery, size), *(copied.notes if copied else ())]
         return cls(path, size, rate, delivery, copied, clip.premultiplied, notes)
 
     @contextlib.contextmanager

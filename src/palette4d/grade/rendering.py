@@ -18,7 +18,9 @@ from palette4d.grade.movie_rendering import MoviePlan
 from palette4d.grade.output import Output
 from palette4d.media.clip import Clip, Image, open_clip
 from palette4d.media.clip_base import F32, ClipError, FrameError, describe, named
+from palette4d.media.clip_images import ImageClip
 from palette4d.media.codecs import is_movie
+from palette4d.media.exr_around import write_around
 from palette4d.media.frame_tags import frame_notes, of_colours, of_movie
 from palette4d.media.frame_writer import (
     FramePattern,
@@ -300,7 +302,8 @@ def render(
         samples = sample_type(pattern.extension, clip.depth, half=half, bits=bits)
         todo = frames_to_render(clip, pattern, inputs, skip_existing=skip_existing, force=force)
         make_folder(pattern.folder)
-        notes = frame_notes(clip, pattern.extension)
+        clip, left_out = with_surroundings(clip, pattern, drawn, compare)
+        notes = [*frame_notes(clip, pattern.extension), *left_out]
         opened = frame_files(clip, pattern, samples)
     warnings = mismatches(document, clip, whole)
     notes = [*clip.notes, *notes]
@@ -338,6 +341,21 @@ def render(
         sorted(set(clip.frames) - set(todo)),
         painter.filled,
     )
+
+
+def with_surroundings(
+    clip: Clip, pattern: FramePattern, drawn: Output, compare: Compare | None
+) -> tuple[Clip, list[str]]:
+    """Return the clip as frame files are made of it, and notes on what they do not keep.
+
+    Overscan, further channels and parts of EXR stay in EXR, if the picture is the recoloured one.
+    """
+    if not isinstance(clip, ImageClip) or not clip.more:
+        return clip, []
+    kept = pattern.extension == "exr" and drawn.kind == "recoloured" and compare is None
+    if kept and clip.separable:
+        return replace(clip, whole=True), []
+    return clip, [f"not kept of the clip's files: {clip.more}"]
 
 
 def refuse_codec(output: str, codec: str | None, crf: int | None) -> None:
@@ -401,6 +419,9 @@ def frame_files(clip: Clip, pattern: FramePattern, samples: str) -> Generator[_W
             kept = {name for name, _, _ in metadata}
             metadata += tuple(one for one in of_colours(clip) if one[0] not in kept)
         path = pattern.path(image.frame)
+        if image.around is not None and isinstance(clip, ImageClip) and clip.whole:
+            write_around(path, image.around, pixels, samples)
+            return path
         premultiplied = clip.premultiplied
         write_frame(path, pixels, samples, premultiplied=premultiplied, metadata=metadata)
         return path

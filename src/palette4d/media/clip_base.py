@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
+from palette4d.media.exr_around import Around
 from palette4d.media.stated import Stated
 
 F32 = NDArray[np.float32]
@@ -58,12 +59,14 @@ class Image:
     pixels is (h, w, 3 or 4) float32. Integer formats are divided by their largest value; float
     formats are unchanged, also negatives, values above 1, NaNs and infinities. Y'CbCr has values
     below 0 and above 1, too: sub-blacks, super-whites and colours outside R'G'B'. metadata holds
-    (name, OpenImageIO type, value) for a recoloured copy of the file.
+    (name, OpenImageIO type, value) for a recoloured copy of the file, around the picture's place
+    in it.
     """
 
     frame: int
     pixels: F32
     metadata: tuple[tuple[str, Any, Any], ...] = ()
+    around: Around | None = None
 
 
 @dataclass(repr=False)

@@ -40,27 +40,14 @@ from palette4d.media.colour_tags import (
     primaries_of,
     tags_of,
 )
+from palette4d.media.exr_around import Around, described
 from palette4d.media.stated import Stated
 
-#: Metadata that a recoloured copy of the frame keeps.
-CARRIED = (
-    "FramesPerSecond",
-    "smpte:TimeCode",
-    "smpte:KeyCode",
-    "oiio:ColorSpace",
-    "chromaticities",
-    "colorInteropID",
-    "PixelAspectRatio",
-    "CICP",
-    "ICCProfile",
-    "whiteLuminance",
-    "reelName",
-    "DateTime",
-    "Copyright",
-    "Artist",
-    "ImageDescription",
-    "Make",
-    "Model",
+#: Metadata that a recoloured copy of the frame does not keep: they describe how pixels are stored.
+_STORAGE = (
+    *("oiio:", "openexr:", "tiff:", "png:", "jpeg:", "planarconfig", "compression", "tile"),
+    *("Orientation", "ResolutionUnit", "chunkCount", "dpx:EndOf", "dpx:Packing", "dpx:Version"),
+    *("dpx:ImageDescriptor", "dpx:LowData", "dpx:HighData", "dpx:DittoKey"),
 )
 _RATE_NAMES = ("FramesPerSecond", "dpx:FrameRate", "dpx:TemporalFrameRate")
 _DEPTHS = {"uint": "uint32", "int": "int32"}
@@ -71,6 +58,17 @@ class ImageClip(Clip):
     """An image sequence, or a single image as a clip of one frame."""
 
     sequence: ImageSequence = field(kw_only=True)
+    #: What EXR files hold beside the picture, for people; "" for nothing.
+    more: str = field(kw_only=True, default="")
+    #: Whether frames are read with their overscan: the data window, not the display window.
+    whole: bool = field(kw_only=True, default=False)
+
+    @property
+    def separable(self) -> bool:
+        """Whether the picture can be replaced in its files: EXR, with channels of its own."""
+        header = read_header(next(iter(self.sequence.files.values())), "the first file")
+        exr = self.sequence.suffix.lower() == ".exr"
+        return exr and len(set(header.channels)) == len(header.channels)
 
     def file(self, frame: int) -> Path:
         """The file of a frame, whether it exists or not."""
@@ -86,7 +84,8 @@ class ImageClip(Clip):
         """Read one frame; FrameError when it is missing, unreadable, or of another size."""
         header, stored, orientation = self._read(frame)
         pixels = _upright(_scaled(stored, header.bits), orientation)
-        return Image(frame, np.ascontiguousarray(pixels), header.metadata)
+        around = Around(self.file(frame), header.part, header.channels)
+        return Image(frame, np.ascontiguousarray(pixels), header.metadata, around)
 
     def fills(self, frames: Sequence[int]) -> Iterator[tuple[int, Fill]]:
         """Yield for each frame its number and the function that reads and bins it."""
@@ -112,7 +111,7 @@ class ImageClip(Clip):
         path, what = self._path(frame), f"frame {frame}"
         source, spec = _open(path, what)
         chosen = _channel_choice(spec)
-        header = _header(spec, chosen)
+        header = _header(spec, chosen, source.current_subimage())
         self._check(header, frame)
         first, last = min(chosen), max(chosen) + 1
         stored = source.read_image(source.current_subimage(), 0, first, last, spec.format)
@@ -124,7 +123,9 @@ class ImageClip(Clip):
         samples = np.asarray(stored)
         if chosen != list(range(first, last)):
             samples = samples[..., [channel - first for channel in chosen]]
-        return header, _in_display_window(samples, spec), spec.get_int_attribute("Orientation", 1)
+        if not self.whole:
+            samples = _in_display_window(samples, spec)
+        return header, samples, spec.get_int_attribute("Orientation", 1)
 
     def _path(self, frame: int) -> Path:
         if frame not in self.sequence.files:
@@ -163,6 +164,9 @@ class Header:
     metadata: tuple[tuple[str, Any, Any], ...]
     note: str
     tags: ColourTags
+    part: int
+    channels: tuple[str, ...]
+    more: str
 
 
 def open_images(
@@ -209,6 +213,7 @@ def open_images(
         notes=[f"{source}: {header.note}"] if header.note else [],
         skipped=missing,
         stated=_stated(header),
+        more=header.more,
         sequence=sequence,
     )
 
@@ -286,8 +291,9 @@ def _alpha_of(what: Header | Clip) -> str:
 def read_header(path: Path, what: str) -> Header:
     """Open an image to read its header; FrameError names `what` and the file."""
     source, spec = _open(path, what)
+    part = source.current_subimage()
     source.close()
-    return _header(spec, _channel_choice(spec))
+    return _header(spec, _channel_choice(spec), part)
 
 
 def _unreadable(path: Path, what: str, problem: str) -> FrameError:
@@ -409,7 +415,7 @@ def _upright(pixels: F32, orientation: int) -> F32:
     return turned(pixels) if turned else pixels
 
 
-def _header(spec: Any, chosen: list[int]) -> Header:
+def _header(spec: Any, chosen: list[int], part: int) -> Header:
     width, height = spec.full_width, spec.full_height
     if 5 <= spec.get_int_attribute("Orientation", 1) <= 8:
         width, height = height, width
@@ -429,10 +435,13 @@ def _header(spec: Any, chosen: list[int]) -> Header:
         metadata=tuple(
             (param.name, param.type, oiio_text.readable(param.value))
             for param in spec.extra_attribs
-            if param.name in CARRIED
+            if param.name == "oiio:ColorSpace" or not param.name.startswith(_STORAGE)
         ),
         note=_note(spec, chosen),
         tags=tags,
+        part=part,
+        channels=tuple(spec.channelnames[channel] for channel in chosen),
+        more=described(spec, chosen, spec.get_int_attribute("oiio:subimages", 1)),
     )
 
 

@@ -20,17 +20,20 @@ from palette4d import _core
 from palette4d.common.errors import Palette4dError, WriteError
 from palette4d.common.files import EXISTS, replacing
 from palette4d.media import oiio_text
+from palette4d.media.exr_around import has_every_block
 
 FORMATS = ("exr", "png", "tif", "tiff", "dpx", "jpg", "jpeg")
 _EXPECTED = ".exr, .png, .tif, .dpx or .jpg"
-# What each format can hold of the metadata that `palette4d.media.clip_images.CARRIED` names.
+# What each format can hold of the metadata that `palette4d.media.clip_images` reads. Names with a
+# colon are a format's own: only a copy in that format keeps them.
 _TEXT = ("oiio:ColorSpace", "ICCProfile", "DateTime", "Copyright", "Artist", "ImageDescription")
 _PLAIN = (*_TEXT, "PixelAspectRatio")
 _METADATA: dict[str, tuple[str, ...]] = {
     "png": (*_PLAIN, "CICP"),
-    "tif": (*_PLAIN, "Make", "Model"),
     "jpg": (*_PLAIN, "Make", "Model"),
 }
+_OWN = {"exr": (), "dpx": ("dpx:",), "tif": ("Exif:", "IPTC:", "GPS:")}
+_COMMON = ("oiio:ColorSpace", "smpte:TimeCode", "smpte:KeyCode")
 _HALF_MAX = float(np.finfo(np.float16).max)
 
 
@@ -240,9 +243,8 @@ def write_frame(
     height, width, channels = stored.shape
     kind = "uint16" if samples == "uint10" else samples
     spec = oiio.ImageSpec(width, height, channels, kind)
-    allowed = _METADATA.get(extension)
     for name, kind, value in metadata:
-        if allowed is None or name in allowed:
+        if _holds(extension, name):
             spec.attribute(name, kind, value)
     spec.attribute("compression", "jpeg:95" if extension == "jpg" else "zip")
     if samples == "uint10":
@@ -261,7 +263,7 @@ def write_frame(
         if target is None:
             raise OutputError(f"{path}: {oiio_text.problem_of(oiio)}; expected {_EXPECTED}")
         if not target.open(str(temporary), spec):
-            raise _cannot_write(path, oiio_text.problem_of(target))
+            raise cannot_write(path, oiio_text.problem_of(target))
         written = target.write_image(stored)
         # PNG reports a full disk here, and still returns true.
         problem = oiio_text.problem_of(target)
@@ -270,14 +272,22 @@ def write_frame(
         closing = oiio_text.problem_of(target)
         problem = problem or (closing if extension != "tif" else "")
         if problem or not written or not closed or not _is_whole(temporary, stored):
-            raise _cannot_write(path, problem)
+            raise cannot_write(path, problem)
+
+
+def _holds(extension: str, name: str) -> bool:
+    """Whether a format keeps an attribute of OpenImageIO."""
+    if extension in _METADATA:
+        return name in _METADATA[extension]
+    if name == "CICP":
+        return False
+    return ":" not in name or name in _COMMON or name.startswith(_OWN[extension])
 
 
 def _is_whole(path: Path, stored: NDArray[Any]) -> bool:
     """Whether a file holds the pixels: a write that fails is not always reported.
 
-    Of a TIFF all rows are read, of others the last row. Of an EXR the table of the rows' places is
-    written last: OpenEXR reads without it, others do not.
+    Of a TIFF all rows are read, of others the last row; of an EXR also its table of places.
     """
     import OpenImageIO as oiio
 
@@ -292,7 +302,7 @@ def _is_whole(path: Path, stored: NDArray[Any]) -> bool:
     rows = source.read_scanlines(0, 0, first, height, 0, 0, channels, source.spec().format)
     problem = oiio_text.problem_of(source)
     source.close()
-    if path.suffix.lower() == ".exr" and not _has_table(path.read_bytes(), height):
+    if path.suffix.lower() == ".exr" and not has_every_block(path):
         return False
     if rows is None or problem:
         return False
@@ -301,18 +311,8 @@ def _is_whole(path: Path, stored: NDArray[Any]) -> bool:
     return bool(rows.tobytes() == stored[first:].tobytes())  # NaNs are equal, too
 
 
-def _has_table(exr: bytes, height: int) -> bool:
-    """Whether the table of an EXR with zip compression, 16 rows a block, has been filled in."""
-    at = 8
-    while exr[at]:  # attributes: name, type, size, value
-        kind = exr.index(0, at) + 1
-        size = exr.index(0, kind) + 1
-        at = size + 4 + int.from_bytes(exr[size : size + 4], "little")
-    table = np.frombuffer(exr, "<u8", -(-height // 16), at + 1)
-    return bool(table.all())
-
-
-def _cannot_write(path: Path, reason: str) -> WriteError:
+def cannot_write(path: Path, reason: str) -> WriteError:
+    """Return the error for a frame that could not be written."""
     said = reason.strip().splitlines()[0] if reason.strip() else "the file was cut short"
     return WriteError(
         f"{path}: the frame cannot be written ({said}); expected a folder that may be written to "

@@ -138,7 +138,8 @@ def _on_farm(
     )
     make_folder(pattern.folder)
     warnings = rendering.mismatches(document, clip, frames is None)
-    notes = [*clip.notes, *frame_notes(clip, pattern.extension)]
+    _, left_out = rendering.with_surroundings(clip, pattern, Output(**picture), compare)
+    notes = [*clip.notes, *frame_notes(clip, pattern.extension), *left_out]
     if tell is not None:
         for kind, texts in (("warning", warnings), ("note", notes)):
             for text in texts:
@@ -189,6 +190,7 @@ def _on_farm(
 def render_frames(task: FramesTask, threads: int) -> Files:
     """Render the frames of a task, on a worker."""
     document, clip = _document(task.sidecar), _clip(task.clip, task.asked, task.missing)
+    clip, _ = rendering.with_surroundings(clip, task.pattern, task.drawn, task.compare)
     painter = Painter(document, clip, task.drawn, task.compare, task.space, threads, task.missing)
     content = {}
     skipped_before = set(clip.skipped)

@@ -1,0 +1,146 @@
+"""EXR files that hold more than the picture: overscan, further channels and parts, attributes.
+
+OpenImageIO reads the picture. OpenEXR's own library copies the file around it, because it keeps
+every type of channel and attribute.
+"""
+
+from __future__ import annotations
+
+import mmap
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palette4d.common.errors import WriteError
+from palette4d.common.files import replacing
+
+# Rows of the picture in a block of a file, by the number of the compression.
+_ROWS = {0: 1, 1: 1, 2: 1, 3: 16, 4: 32, 5: 16, 6: 32, 7: 32, 8: 32, 9: 256, 10: 256, 11: 32}
+#: Compressions that lose nothing: none, RLE, ZIPS, ZIP, PIZ.
+_LOSSLESS = (0, 1, 2, 3, 4)
+
+
+@dataclass(frozen=True)
+class Around:
+    """The place of a picture in an EXR file.
+
+    Attributes
+    ----------
+    file : the file.
+    part : number of the part that holds the picture.
+    channels : names of its channels of red, green and blue, and perhaps of alpha.
+    """
+
+    file: Path
+    part: int
+    channels: tuple[str, ...]
+
+
+def described(spec: Any, chosen: list[int], parts: int) -> str:
+    """Return what an EXR's header says that it holds beside its picture; "" for nothing."""
+    found = []
+    left, top = spec.full_x - spec.x, spec.full_y - spec.y
+    right = spec.x + spec.width - spec.full_x - spec.full_width
+    if max(left, top, right, spec.y + spec.height - spec.full_y - spec.full_height) > 0:
+        found.append("overscan")
+    further = [name for i, name in enumerate(spec.channelnames) if i not in chosen]
+    if further:
+        shown = ", ".join(further[:4]) + (", …" if further[4:] else "")
+        found.append(f"{len(further)} further channel{'s' * (len(further) > 1)} ({shown})")
+    if parts > 1:
+        found.append(f"{parts - 1} further part{'s' * (parts > 2)}")
+    return ", ".join(found)
+
+
+def write_around(path: Path, around: Around, pixels: NDArray[np.float32], samples: str) -> None:
+    """Write a copy of an EXR whose picture is replaced, under a temporary name, and rename it.
+
+    Parameters
+    ----------
+    path : of the copy.
+    around : the file and the place of the picture in it.
+    pixels : (h, w, 3 or 4) float32, premultiplied; of the picture's whole data window.
+    samples : "half" or "float", for the picture's channels; others keep their types.
+
+    Raises
+    ------
+    WriteError
+        The folder is not writable or the disk is full; no partial file remains.
+    """
+    import OpenEXR
+
+    from palette4d.media.frame_writer import cannot_write, quantised
+
+    try:
+        file = OpenEXR.File(str(around.file), separate_channels=True)
+    except (RuntimeError, OSError) as error:
+        raise WriteError(
+            f"{path}: {around.file} cannot be copied around the picture ({error}); expected an EXR "
+            "that OpenEXR reads. Render to another format, or mend the file"
+        ) from error
+    channels = file.parts[around.part].channels
+    planes = quantised(pixels, samples)
+    for index, name in enumerate(around.channels):
+        channels[name].pixels = np.ascontiguousarray(planes[..., index])
+    for part in file.parts:
+        _lossless_rows(part.header)
+    with replacing(path, force=True) as temporary:
+        try:
+            file.write(str(temporary))
+        except (RuntimeError, OSError) as error:
+            raise cannot_write(path, str(error)) from error
+        if not has_every_block(temporary):
+            raise cannot_write(path, "")
+
+
+def _lossless_rows(header: dict[str, Any]) -> None:
+    """Let a part be written in rows, by a compression without loss."""
+    import OpenEXR
+
+    header.pop("tiles", None)
+    header.pop("chunkCount", None)
+    if header.get("type") == OpenEXR.tiledimage:
+        header["type"] = OpenEXR.scanlineimage
+    if int(header["compression"]) not in _LOSSLESS:
+        header["compression"] = OpenEXR.ZIP_COMPRESSION
+
+
+def has_every_block(path: Path) -> bool:
+    """Whether an EXR in rows was closed: its tables of places are filled in last.
+
+    OpenEXR writes a full disk's file without an error then, and reads it; others do not.
+    """
+    with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as exr:
+        several, at = bool(exr[5] & 0x10), 8
+        counts = []
+        while exr[at]:
+            at, attributes = _attributes(exr, at)
+            counts.append(_blocks(attributes))
+            if not several:
+                break
+        at += several  # an empty header ends the list
+        table = np.frombuffer(exr[at : at + 8 * sum(counts)], "<u8")
+        return len(table) == sum(counts) and bool(table.all())
+
+
+def _attributes(exr: Any, at: int) -> tuple[int, dict[bytes, bytes]]:
+    """Return the place behind a header, and its attributes: name, type, size, value."""
+    found = {}
+    while exr[at]:
+        kind = exr.find(b"\0", at) + 1
+        size = exr.find(b"\0", kind) + 1
+        value = size + 4
+        end = value + int.from_bytes(exr[size:value], "little")
+        found[exr[at : kind - 1]] = exr[value:end]
+        at = end
+    return at + 1, found
+
+
+def _blocks(attributes: dict[bytes, bytes]) -> int:
+    if b"chunkCount" in attributes:
+        return int.from_bytes(attributes[b"chunkCount"], "little")
+    _, top, _, bottom = np.frombuffer(attributes[b"dataWindow"], "<i4").tolist()
+    return int(-(-(bottom - top + 1) // _ROWS[attributes[b"compression"][0]]))
