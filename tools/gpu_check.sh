@@ -34,10 +34,12 @@ pack() {
 }
 
 run() {
-    [ -x "$folder/palette4d_host_tests" ] || {
+    [ -f "$folder/palette4d_host_tests" ] || {
         echo "gpu_check: found no $folder; pack it where palette4d was built: tools/gpu_check.sh pack" >&2
         exit 1
     }
+    # Copies may lose it.
+    chmod +x "$folder/palette4d_host_tests" "$folder/lib/ld-linux-x86-64.so.2" 2>/dev/null || true
     out=${1:-$folder/report}
     mkdir -p "$out"
     export PALETTE4D_GPU_CHECK="$folder/sidecars" PALETTE4D_REQUIRE_GPU=1
