@@ -191,7 +191,7 @@ def analyze(
             "versions": _versions(),
         },
     )
-    finished = _core.parse_sidecar(sidecar.dumps(document)).polytope
+    finished = sidecar.validate(document).polytope
     report = quality.report(finished, usable, options)
     document["quality"]["stages"][-1] |= report.figures()
     warnings = advice.warnings(

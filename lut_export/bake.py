@@ -6,7 +6,6 @@ repeats this with larger LUTs until the error is small enough.
 """
 
 import hashlib
-import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -280,11 +279,11 @@ def _opened(
         data = sidecars.read_bytes(source)
         return _core.parse_sidecar(data, os.fspath(source)), data, Path(source)
     fields = source.fields()
-    if source.path is not None and source.path.is_file():
-        data = source.path.read_bytes()
-        if json.loads(data) == fields:
+    if not source.changed and source.path is not None and source.path.is_file():
+        data = sidecars.read_bytes(source.path)
+        if sidecars.decoded(data, str(source.path))[1] == fields:
             return source.core, data, source.path
-    return source.core, sidecars.encoded(fields), source.path
+    return source.core, sidecars.dumps(fields).encode("utf-8"), source.path
 
 
 def check_target(path: Path, force: bool) -> None:

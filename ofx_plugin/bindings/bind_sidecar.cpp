@@ -1,30 +1,37 @@
-// The sidecar reader for Python: Sidecar, Edits, read_sidecar and parse_sidecar.
+// Sidecars for Python: Sidecar, Edits, read_sidecar and parse_sidecar.
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "arrays.hpp"
 #include "binders.hpp"
+#include "json_values.hpp"
 #include "recolour/frame_picks.hpp"
 #include "sidecar/clip_name.hpp"
-#include "sidecar/sidecar.hpp"
+#include "sidecar/codec.hpp"
 
 using palette4d::Edits;
+using palette4d::Json;
+using palette4d::Polytope;
 using palette4d::Ramp;
 using palette4d::Sidecar;
 using palette4d::Vec3;
 
+using palette4d::bindings::json_from;
+using palette4d::bindings::python_from;
+
 namespace {
 
-/// Edits by index for the core, with the ids for Python.
+/// Edits by index for the core, with the polytope's ids for Python.
 struct NamedEdits : Edits {
-    std::vector<std::string> vertex_ids, edge_ids;
+    Polytope polytope;
 };
 
 struct BoundSidecar {
@@ -35,19 +42,11 @@ struct BoundSidecar {
 
 py::tuple as_tuple(const Vec3& rgb) { return py::make_tuple(rgb[0], rgb[1], rgb[2]); }
 
-NamedEdits named(const Edits& edits, const palette4d::Polytope& polytope) {
-    NamedEdits result;
-    static_cast<Edits&>(result) = edits;
-    for (const auto& vertex : polytope.vertices()) result.vertex_ids.push_back(vertex.id);
-    for (const auto& edge : polytope.edges()) result.edge_ids.push_back(edge.id);
-    return result;
-}
-
 std::unique_ptr<BoundSidecar> bound(Sidecar sidecar) {
     auto result = std::make_unique<BoundSidecar>();
-    result->edits = named(sidecar.edits, sidecar.polytope);
-    for (const auto& version : sidecar.versions) {
-        result->versions.push_back(named(version.edits, sidecar.polytope));
+    result->edits = {std::move(sidecar.edits), sidecar.polytope};
+    for (palette4d::NamedVersion& version : sidecar.versions) {
+        result->versions.push_back({std::move(version.edits), sidecar.polytope});
     }
     result->sidecar = std::move(sidecar);
     return result;
@@ -101,7 +100,7 @@ py::dict vertex_ramp_of(const NamedEdits& self) {
     py::dict result;
     for (std::size_t i = 0; i < self.vertex_ramp.size(); ++i) {
         if (self.vertex_ramp[i]) {
-            result[py::str(self.vertex_ids[i])] = name_of(*self.vertex_ramp[i]);
+            result[py::str(self.polytope.vertices()[i].id)] = name_of(*self.vertex_ramp[i]);
         }
     }
     return result;
@@ -110,7 +109,8 @@ py::dict vertex_ramp_of(const NamedEdits& self) {
 py::dict vertex_rgb_of(const NamedEdits& self) {
     py::dict result;
     for (std::size_t i = 0; i < self.vertex_rgb.size(); ++i) {
-        if (self.vertex_rgb[i]) result[py::str(self.vertex_ids[i])] = as_tuple(*self.vertex_rgb[i]);
+        if (!self.vertex_rgb[i]) continue;
+        result[py::str(self.polytope.vertices()[i].id)] = as_tuple(*self.vertex_rgb[i]);
     }
     return result;
 }
@@ -120,7 +120,7 @@ py::list stops_of(const NamedEdits& self) {
     for (const palette4d::Stop& stop : self.stops) {
         py::dict entry;
         entry["id"] = stop.id;
-        entry["edge"] = self.edge_ids[static_cast<std::size_t>(stop.edge)];
+        entry["edge"] = self.polytope.edges()[static_cast<std::size_t>(stop.edge)].id;
         entry["frame"] = stop.frame;
         entry["rgb"] = as_tuple(stop.rgb);
         if (stop.ramp) entry["ramp"] = name_of(*stop.ramp);
@@ -153,7 +153,7 @@ std::vector<double> pick_times_of(const NamedEdits& self) {
 
 double clamped(const BoundSidecar& self, double frame) {
     if (std::isnan(frame)) throw py::value_error("found a frame that is not a number");
-    const palette4d::Polytope& polytope = self.sidecar.polytope;
+    const Polytope& polytope = self.sidecar.polytope;
     return std::clamp(frame, polytope.first_frame(), polytope.last_frame());
 }
 
@@ -167,6 +167,40 @@ py::list versions_of(const py::object& bound) {
             py::cast(&self.versions[i], py::return_value_policy::reference_internal, bound)));
     }
     return result;
+}
+
+std::unique_ptr<BoundSidecar> with_members(const BoundSidecar& self, const py::dict& edits,
+                                           const py::object& mattes, const std::string& name) {
+    const Json own = json_from(edits, name);
+    const Json grids = mattes.is_none() ? Json{{"grids", Json::object()}} : json_from(mattes, name);
+    const py::gil_scoped_release unlocked;
+    return bound(palette4d::with_edits(self.sidecar, own, grids, name));
+}
+
+/// The core's view of a text, and its members for Python.
+py::tuple decode(const py::object& text, const std::string& name) {
+    const std::string bytes = text_bytes(text);
+    Json tree;
+    std::unique_ptr<BoundSidecar> sidecar;
+    {
+        const py::gil_scoped_release unlocked;
+        tree = palette4d::json_tree(bytes, name);
+        sidecar = bound(palette4d::sidecar_of(tree, name));
+    }
+    return py::make_tuple(std::move(sidecar), python_from(tree));
+}
+
+/// The core's view of members, and their text.
+py::tuple encode(const py::object& members, const std::string& name) {
+    const Json tree = json_from(members, name);
+    std::unique_ptr<BoundSidecar> sidecar;
+    std::string text;
+    {
+        const py::gil_scoped_release unlocked;
+        sidecar = bound(palette4d::sidecar_of(tree, name));
+        text = palette4d::sidecar_text(tree, name);
+    }
+    return py::make_tuple(std::move(sidecar), py::bytes(text));
 }
 
 }  // namespace
@@ -202,6 +236,9 @@ void bind_sidecar(py::module_& module) {
             "edits", [](const BoundSidecar& self) { return &self.edits; },
             py::return_value_policy::reference_internal)
         .def_property_readonly("versions", &versions_of)
+        .def("with_edits", &with_members, py::arg("edits"), py::arg("mattes") = py::none(),
+             py::arg("name") = "<edits>",
+             "The same palette with other members \"edits\" and \"mattes\", and no versions.")
         .def(
             "picks_at",
             [](const BoundSidecar& self, double frame) {
@@ -243,4 +280,15 @@ void bind_sidecar(py::module_& module) {
         "The same for text (str or bytes) in memory; `name` replaces the file name in errors.");
     module.def("clip_name", &palette4d::clip_name, py::arg("file_name"),
                "A media file's name without extension and frame number: that of its sidecar.");
+    module.def("decode_sidecar", &decode, py::arg("text"), py::arg("name") = "<text>",
+               "The same, and the members as dicts and lists.");
+    module.def("encode_sidecar", &encode, py::arg("members"), py::arg("name") = "<members>",
+               "The core's view of a sidecar's members, and their text as UTF-8.");
+    module.def(
+        "plain",
+        [](const py::object& value, const std::string& name) {
+            return python_from(json_from(value, name));
+        },
+        py::arg("value"), py::arg("name") = "<value>",
+        "A deep copy with dicts, lists, texts and numbers of Python alone.");
 }

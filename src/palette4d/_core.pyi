@@ -1,7 +1,7 @@
 """The compiled core: polytope slicing, mean value coordinates, recolouring, the sidecar reader."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -99,6 +99,10 @@ class Sidecar:
     @property
     def versions(self) -> list[tuple[str, Edits]]:
         """Names and edits of the kept versions, in the file's order."""
+    def with_edits(
+        self, edits: Mapping[str, Any], mattes: Mapping[str, Any] | None = ..., name: str = ...
+    ) -> Sidecar:
+        """The same palette with other members "edits" and "mattes", and no versions."""
     def picks_at(self, frame: float) -> FramePicks:
         """The picks and holds of the active edits; outside the clip, those at its ends."""
     def pick_matte_at(self, id: str, frame: float) -> FramePicks:
@@ -137,6 +141,18 @@ def read_sidecar(path: str | os.PathLike[str]) -> Sidecar: ...
 def parse_sidecar(text: str | bytes, name: str = ...) -> Sidecar: ...
 def clip_name(file_name: str) -> str:
     """A media file's name without extension and frame number: that of its sidecar."""
+
+def decode_sidecar(text: str | bytes, name: str = ...) -> tuple[Sidecar, dict[str, Any]]:
+    """As `parse_sidecar`, and the members of the text."""
+
+def encode_sidecar(members: Mapping[str, Any], name: str = ...) -> tuple[Sidecar, bytes]:
+    """Return the core's view of members, and their text; SidecarError when they are unusable.
+
+    NumPy's arrays and numbers count as lists and numbers. TypeError for what is no JSON value.
+    """
+
+def plain(value: Any, name: str = ...) -> Any:
+    """Return a deep copy with dicts, lists, texts and numbers of Python alone; as above."""
 
 def slice_at(polytope: Polytope, frame: float) -> Slice: ...
 def edited_colours(polytope: Polytope, edits: Edits, slice: Slice) -> F64:

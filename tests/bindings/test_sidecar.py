@@ -445,6 +445,8 @@ TETRAHEDRON = (GOLDEN / "v1_tetrahedron.p4d.json").read_text(encoding="utf-8")
         (" ", "", "JSON"),
         ("{", "", "JSON"),
         (TETRAHEDRON + "x", "", "JSON"),
+        (TETRAHEDRON + "\0", "", "NUL"),
+        (TETRAHEDRON.replace("golden", "gol\0den", 1), "", "NUL"),
         ("\ufeff" + TETRAHEDRON, "", "byte order mark"),
         (TETRAHEDRON.encode("utf-16"), "", "byte order mark"),
         (TETRAHEDRON.encode("utf-16-le"), "", "JSON"),

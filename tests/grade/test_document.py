@@ -316,44 +316,6 @@ def test_saving_changes_the_edits_only(plain: Path) -> None:
     assert sidecar.load(plain) == before
 
 
-@pytest.fixture
-def parses(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """The core's parses of whole sidecars, by name, as they happen."""
-    found: list[str] = []
-
-    def counted(real: Any) -> Any:
-        def parse(*args: Any) -> Any:
-            found.append(real.__name__)
-            return real(*args)
-
-        return parse
-
-    for name in ("parse_sidecar", "read_sidecar"):
-        monkeypatch.setattr(_core, name, counted(getattr(_core, name)))
-    return found
-
-
-@pytest.mark.parametrize(
-    "act",
-    [
-        lambda d: d.set("v1", rgb=WHITE),
-        lambda d: d.set_near((0.9, 0.1, 0.1), frame=3, rgb=WHITE),
-        lambda d: d.stop("e1", frame=2, rgb=WHITE),
-        lambda d: d.move("s1", frame=2),
-        lambda d: d.reset(),
-    ],
-)
-def test_an_edit_parses_the_file_twice(edited: Path, parses: list[str], act: Any) -> None:
-    """Once when it is read, once to validate what is written."""
-    document = Document.load(edited)
-    act(document)
-    document.save()
-    assert len(parses) == 2
-    document.palette(3)
-    document.save()
-    assert len(parses) == 2
-
-
 def test_another_writers_edits_are_kept(edited: Path) -> None:
     mine, theirs = Document.load(edited), Document.load(edited)
     theirs.set("v1", rgb=(0, 0, 0))

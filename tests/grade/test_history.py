@@ -361,7 +361,7 @@ def test_any_edits_can_be_undone_and_done_again(plain: Path, acts: list[Any]) ->
         document.undo()
     document.save()
     bare = {n: v for n, v in sidecar.load(plain).items() if n not in ("history", "versions")}
-    assert sidecar.encoded(bare) == first
+    assert sidecar.dumps(bare).encode() == first
     document = Document.load(plain)
     undone = 0
     while document.undone and undone < len(acts):

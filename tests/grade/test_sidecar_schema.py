@@ -50,7 +50,7 @@ def test_the_schema_is_a_schema() -> None:
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
 def test_golden_files_fit_the_schema(path: Path) -> None:
-    found = sidecar.fields_of(path.read_bytes())  # brought up to date
+    found = sidecar.load(path)  # brought up to date
     jsonschema.Draft202012Validator(SCHEMA).validate(found)
 
 

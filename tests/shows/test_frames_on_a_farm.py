@@ -72,7 +72,7 @@ def test_a_task_leaves_out_bad_frames(tmp_path: Path) -> None:
 
     clip = str(sequence(tmp_path / "in", "sh", 1, 3))
     (tmp_path / "in" / "sh.0002.png").unlink()
-    data = sidecar.encoded(sidecar.load(EDITED))
+    data = sidecar.dumps(sidecar.load(EDITED)).encode()
     pattern = FramePattern.parse(str(tmp_path / "o.####.png"))
     task = FramesTask(
         data, clip, None, (1, 2), Output(), None, "input", "leave out", pattern, "uint8"

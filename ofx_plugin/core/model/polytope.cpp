@@ -28,40 +28,44 @@ int find_index(const std::vector<int>& order, const Wanted& wanted, Key key) {
 }  // namespace
 
 Polytope::Polytope(std::vector<Vertex> vertices, std::vector<Edge> edges,
-                   std::vector<Section> sections)
-    : vertices_(std::move(vertices)), edges_(std::move(edges)), sections_(std::move(sections)) {
-    validate_vertices_and_edges(vertices_, edges_);
-    edges_by_ends_ = sorted_indices(
-        edges_.size(), [this](int i) { return std::make_pair(edges_[i].from, edges_[i].to); });
-    vertices_by_id_ = sorted_indices(
-        vertices_.size(), [this](int i) -> const std::string& { return vertices_[i].id; });
-    edges_by_id_ =
-        sorted_indices(edges_.size(), [this](int i) -> const std::string& { return edges_[i].id; });
+                   std::vector<Section> sections) {
+    validate_vertices_and_edges(vertices, edges);
+    const auto parts = std::make_shared<Parts>();
+    parts->edges_by_ends = sorted_indices(
+        edges.size(), [&](int i) { return std::make_pair(edges[i].from, edges[i].to); });
+    parts->vertices_by_id = sorted_indices(
+        vertices.size(), [&](int i) -> const std::string& { return vertices[i].id; });
+    parts->edges_by_id =
+        sorted_indices(edges.size(), [&](int i) -> const std::string& { return edges[i].id; });
+    parts->vertices = std::move(vertices);
+    parts->edges = std::move(edges);
+    parts->sections = std::move(sections);
+    parts_ = parts;
     validate_sections(*this);
 }
 
 int Polytope::find_edge(int from, int to) const {
-    return find_index(edges_by_ends_, std::make_pair(from, to),
-                      [this](int i) { return std::make_pair(edges_[i].from, edges_[i].to); });
+    return find_index(parts_->edges_by_ends, std::make_pair(from, to),
+                      [this](int i) { return std::make_pair(edges()[i].from, edges()[i].to); });
 }
 
 int Polytope::find_vertex(const std::string& id) const {
-    return find_index(vertices_by_id_, id,
-                      [this](int i) -> const std::string& { return vertices_[i].id; });
+    return find_index(parts_->vertices_by_id, id,
+                      [this](int i) -> const std::string& { return vertices()[i].id; });
 }
 
 int Polytope::find_edge(const std::string& id) const {
-    return find_index(edges_by_id_, id,
-                      [this](int i) -> const std::string& { return edges_[i].id; });
+    return find_index(parts_->edges_by_id, id,
+                      [this](int i) -> const std::string& { return edges()[i].id; });
 }
 
 int Polytope::section_at(double frame) const {
     // The first section that ends at or after the frame; a transition's end belongs to the block.
-    auto at = std::lower_bound(sections_.begin(), sections_.end(), frame,
+    auto at = std::lower_bound(sections().begin(), sections().end(), frame,
                                [](const Section& section, double t) { return section.last < t; });
-    if (at == sections_.end()) return static_cast<int>(sections_.size()) - 1;
+    if (at == sections().end()) return static_cast<int>(sections().size()) - 1;
     if (at->transition && frame >= at->last) ++at;
-    return static_cast<int>(std::distance(sections_.begin(), at));
+    return static_cast<int>(std::distance(sections().begin(), at));
 }
 
 }  // namespace palette4d

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -55,6 +56,7 @@ struct PolytopeProblem {
     std::string expected;
 };
 
+/// Copies share their parts.
 class Polytope {
 public:
     Polytope() = default;
@@ -62,11 +64,11 @@ public:
     /// SidecarError (with an empty file name) when an invariant is violated.
     Polytope(std::vector<Vertex> vertices, std::vector<Edge> edges, std::vector<Section> sections);
 
-    const std::vector<Vertex>& vertices() const { return vertices_; }
-    const std::vector<Edge>& edges() const { return edges_; }
-    const std::vector<Section>& sections() const { return sections_; }
-    double first_frame() const { return sections_.front().first; }
-    double last_frame() const { return sections_.back().last; }
+    const std::vector<Vertex>& vertices() const { return parts_->vertices; }
+    const std::vector<Edge>& edges() const { return parts_->edges; }
+    const std::vector<Section>& sections() const { return parts_->sections; }
+    double first_frame() const { return sections().front().first; }
+    double last_frame() const { return sections().back().last; }
     /// Index of the edge from -> to, or -1.
     int find_edge(int from, int to) const;
     /// Index of the vertex / edge with that id, or -1.
@@ -76,11 +78,14 @@ public:
     int section_at(double frame) const;
 
 private:
-    std::vector<Vertex> vertices_;
-    std::vector<Edge> edges_;
-    std::vector<Section> sections_;
-    // Indices in sorted order, for binary search.
-    std::vector<int> edges_by_ends_, vertices_by_id_, edges_by_id_;
+    struct Parts {
+        std::vector<Vertex> vertices;
+        std::vector<Edge> edges;
+        std::vector<Section> sections;
+        // Indices in sorted order, for binary search.
+        std::vector<int> edges_by_ends, vertices_by_id, edges_by_id;
+    };
+    std::shared_ptr<const Parts> parts_ = std::make_shared<const Parts>();
 };
 
 }  // namespace palette4d

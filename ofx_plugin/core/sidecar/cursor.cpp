@@ -9,8 +9,6 @@
 namespace palette4d {
 namespace {
 
-using Json = nlohmann::json;
-
 constexpr std::size_t kMaxIdLength = 64;
 constexpr std::size_t kMaxNameLength = 100;
 
@@ -27,6 +25,10 @@ std::string described(const Json& value) {
             return "a list of " + std::to_string(value.size());
         case Json::value_t::object:
             return "an object";
+        case Json::value_t::binary:
+            return "the number " + printable(digits_of(value), 40);
+        case Json::value_t::number_float:
+            return "the number " + number_text(value.get<double>());
         default:
             return "the number " + value.dump();
     }
@@ -34,7 +36,10 @@ std::string described(const Json& value) {
 
 }  // namespace
 
-std::string number_text(double number) { return Json(number).dump(); }
+std::string number_text(double number) {
+    if (std::isfinite(number)) return Json(number).dump();
+    return std::isnan(number) ? "NaN" : number < 0 ? "-infinity" : "infinity";
+}
 
 void Cursor::fail(const std::string& found, const std::string& expected) const {
     throw SidecarError(*file_, pointer(), found, expected);

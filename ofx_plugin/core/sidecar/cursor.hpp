@@ -5,12 +5,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <initializer_list>
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "model/polytope.hpp"
+#include "sidecar/json_tree.hpp"
 
 namespace palette4d {
 
@@ -25,7 +25,7 @@ std::string number_text(double number);
 /// A value and its path. The JSON pointer is only built for an error.
 class Cursor {
 public:
-    Cursor(const nlohmann::json& root, const std::string& file) : value_(&root), file_(&file) {}
+    Cursor(const Json& root, const std::string& file) : value_(&root), file_(&file) {}
 
     [[noreturn]] void fail(const std::string& found, const std::string& expected) const;
     [[noreturn]] void wrong(const std::string& expected) const;
@@ -67,7 +67,7 @@ public:
 private:
     std::string pointer() const;
 
-    const nlohmann::json* value_;
+    const Json* value_;
     const std::string* file_;
     const Cursor* parent_ = nullptr;
     const char* name_ = nullptr;

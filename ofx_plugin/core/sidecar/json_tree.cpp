@@ -1,5 +1,6 @@
 #include "sidecar/json_tree.hpp"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstring>
 #include <nlohmann/json.hpp>
@@ -11,14 +12,6 @@
 
 namespace palette4d {
 namespace {
-
-using Json = nlohmann::json;
-
-/// The parser refuses deeper nesting; the format itself has six levels.
-constexpr std::size_t kMaxDepth = 64;
-/// The parser refuses more JSON values than this, to bound memory: "[],[],[]" takes twenty times
-/// the memory of its text.
-constexpr std::size_t kMaxValues = 4'000'000;
 
 /// Builds a Json from parser events; refuses excessive depth, size and duplicate names early.
 class TreeBuilder {
@@ -32,22 +25,25 @@ public:
     bool boolean(bool value) { return add(Json(value)); }
     bool number_integer(Json::number_integer_t value) { return add(Json(value)); }
     bool number_unsigned(Json::number_unsigned_t value) { return add(Json(value)); }
-    bool number_float(Json::number_float_t value, const std::string&) { return add(Json(value)); }
+    bool number_float(Json::number_float_t value, const std::string& digits) {
+        const bool whole = digits.find_first_of(".eE") == std::string::npos;
+        return add(whole ? long_integer(digits) : Json(value));
+    }
     bool string(std::string& value) { return add(Json(std::move(value))); }
     bool binary(Json::binary_t&) { return false; }  // never in text
 
     bool start_object(std::size_t) { return open(Json::object()); }
     bool start_array(std::size_t) { return open(Json::array()); }
-    bool end_object() { return close(); }
+    bool end_object() {
+        refuse_second_names();
+        return close();
+    }
     bool end_array() { return close(); }
 
     bool key(std::string& name) {
         Frame& frame = open_.back();
         frame.name = std::move(name);
         frame.named = true;
-        if (frame.container->contains(frame.name)) {
-            fail("a second member " + in_quotes(frame.name), "each name only once in an object");
-        }
         return true;
     }
 
@@ -88,7 +84,10 @@ private:
             return &frame.container->back();
         }
         frame.named = false;
-        return &(frame.container->get_ref<Json::object_t&>()[frame.name] = std::move(value));
+        auto& members = frame.container->get_ref<Json::object_t&>();
+        return &static_cast<Json::object_t::Container&>(members)
+                    .emplace_back(frame.name, std::move(value))
+                    .second;
     }
 
     bool add(Json&& value) {
@@ -108,6 +107,20 @@ private:
     bool close() {
         open_.pop_back();
         return true;
+    }
+
+    /// Objects keep the file's order, in which a search for each name would take too long.
+    void refuse_second_names() {
+        std::vector<const std::string*> names;
+        for (const auto& [name, unused] : open_.back().container->items()) names.push_back(&name);
+        const auto less = [](const auto* a, const auto* b) { return *a < *b; };
+        std::sort(names.begin(), names.end(), less);
+        const auto same = [](const auto* a, const auto* b) { return *a == *b; };
+        const auto second = std::adjacent_find(names.begin(), names.end(), same);
+        if (second == names.end()) return;
+        open_.back().name = **second;
+        open_.back().named = true;
+        fail("a second member " + in_quotes(**second), "each name only once in an object");
     }
 
     /// The JSON pointer of the parser's position.
@@ -152,22 +165,39 @@ private:
 
 }  // namespace
 
-nlohmann::json json_tree(const std::string& text, const std::string& file) {
+void require_size(const std::string& text, const std::string& file) {
     if (text.size() > kMaxSidecarBytes) {
         throw SidecarError(file, "", "more than " + std::to_string(kMaxSidecarBytes) + " bytes",
                            "a sidecar of at most that size");
     }
+}
+
+Json json_tree(const std::string& text, const std::string& file) {
+    require_size(text, file);
     if (text.empty()) throw SidecarError(file, "", "an empty file", "JSON text (RFC 8259)");
     for (const char* mark : {"\xef\xbb\xbf", "\xff\xfe", "\xfe\xff"}) {
         if (text.compare(0, std::strlen(mark), mark) == 0) {
             throw SidecarError(file, "", "a byte order mark", "UTF-8 text without one");
         }
     }
+    // The parser takes a NUL for the end of the text.
+    if (text.find('\0') != std::string::npos) {
+        throw SidecarError(file, "", "a NUL byte", "JSON text (RFC 8259)");
+    }
     TreeBuilder builder(text, file);
     if (!Json::sax_parse(text, &builder)) {
         throw SidecarError(file, "", "no JSON", "JSON text (RFC 8259)");
     }
     return builder.take();
+}
+
+Json long_integer(const std::string& digits) {
+    return Json::binary({digits.begin(), digits.end()});
+}
+
+std::string digits_of(const Json& long_integer) {
+    const auto& bytes = long_integer.get_binary();
+    return {bytes.begin(), bytes.end()};
 }
 
 std::string pointer_token(const std::string& name) {

@@ -24,9 +24,11 @@ std::optional<Ramp> read_ramp(const Cursor& entry) {
 }
 
 /// Reads the members `edge` and `frame`: a place strictly inside an edge, `occupied` by nothing.
-std::pair<int, double> read_place(const Cursor& entry, const Polytope& polytope, const Ids& ids,
-                                  const char* what, std::set<std::pair<int, double>>& occupied) {
-    const int at = ids.edge(entry.member("edge"));
+std::pair<int, double> read_place(const Cursor& entry, const Polytope& polytope,
+                                  std::set<std::pair<int, double>>& occupied) {
+    const Cursor id = entry.member("edge");
+    const int at = known(id, polytope.find_edge(id.id()), "edge",
+                         std::to_string(polytope.edges().size()) + " edges");
     const Cursor frame = entry.member("frame");
     const double number = frame.frame();
     const Edge& edge = polytope.edges()[static_cast<std::size_t>(at)];
@@ -37,9 +39,8 @@ std::pair<int, double> read_place(const Cursor& entry, const Polytope& polytope,
                     number_text(from) + " and " + number_text(to));
     }
     if (!occupied.emplace(at, number).second) {
-        frame.fail("a second " + std::string(what) + " of the edge " + in_quotes(edge.id) +
-                       " at this frame",
-                   "at most one " + std::string(what) + " of an edge at a frame");
+        frame.fail("a second stop of the edge " + in_quotes(edge.id) + " at this frame",
+                   "at most one stop of an edge at a frame");
     }
     return {at, number};
 }
@@ -66,8 +67,7 @@ void check_colours(const Cursor& colours) {
     }
 }
 
-Edits read_edits(const Cursor& where, const Polytope& polytope, const Ids& ids,
-                 const PickMattes& mattes) {
+Edits read_edits(const Cursor& where, const Polytope& polytope, const PickMattes& mattes) {
     if (mattes.version == 1) {
         // "solution" moved palette colours for picks.
         where.require_members({"vertices", "stops"}, {"ramp", "picks", "locks", "solution"});
@@ -84,7 +84,9 @@ Edits read_edits(const Cursor& where, const Polytope& polytope, const Ids& ids,
         const Cursor entry = vertices.element(i);
         entry.require_members({"vertex", "rgb"}, {"ramp"});
         const Cursor vertex = entry.member("vertex");
-        const auto at = static_cast<std::size_t>(ids.vertex(vertex));
+        const auto at = static_cast<std::size_t>(
+            known(vertex, polytope.find_vertex(vertex.id()), "vertex",
+                  std::to_string(polytope.vertices().size()) + " vertices"));
         if (edits.vertex_rgb[at]) {
             vertex.fail("a second edit of the vertex " + in_quotes(vertex.text()),
                         "at most one edit of each vertex");
@@ -93,7 +95,7 @@ Edits read_edits(const Cursor& where, const Polytope& polytope, const Ids& ids,
         edits.vertex_ramp[at] = read_ramp(entry);
     }
 
-    std::set<std::string> taken = ids.taken;
+    std::set<std::string> taken;
     std::set<std::pair<int, double>> occupied;
     const Cursor stops = where.member("stops");
     for (std::size_t i = 0, n = stops.list("stops"); i < n; ++i) {
@@ -101,7 +103,9 @@ Edits read_edits(const Cursor& where, const Polytope& polytope, const Ids& ids,
         entry.require_members({"id", "edge", "frame", "rgb"}, {"ramp"});
         const Cursor id = entry.member("id");
         Stop stop{id.id(), 0, 0, entry.member("rgb").rgb(), read_ramp(entry)};
-        std::tie(stop.edge, stop.frame) = read_place(entry, polytope, ids, "stop", occupied);
+        std::tie(stop.edge, stop.frame) = read_place(entry, polytope, occupied);
+        const bool palette = polytope.find_vertex(stop.id) >= 0 || polytope.find_edge(stop.id) >= 0;
+        if (palette) taken.insert(stop.id);
         claim(taken, id, stop.id);
         edits.stops.push_back(std::move(stop));
     }
@@ -117,7 +121,7 @@ Edits read_edits(const Cursor& where, const Polytope& polytope, const Ids& ids,
 }
 
 std::vector<NamedVersion> read_versions(const Cursor& where, const Polytope& polytope,
-                                        const Ids& ids, const PickMattes& mattes) {
+                                        const PickMattes& mattes) {
     std::vector<NamedVersion> versions;
     std::set<std::string> taken;
     const std::size_t n = where.list("versions"), vertices = polytope.vertices().size();
@@ -129,7 +133,7 @@ std::vector<NamedVersion> read_versions(const Cursor& where, const Polytope& pol
         const Cursor entry = where.element(i);
         entry.require_members({"name", "edits"});
         const Cursor name = entry.member("name");
-        versions.push_back({name.name(), read_edits(entry.member("edits"), polytope, ids, mattes)});
+        versions.push_back({name.name(), read_edits(entry.member("edits"), polytope, mattes)});
         if (!taken.insert(versions.back().name).second) {
             name.fail("a second version " + in_quotes(name.text()), "each name only once");
         }

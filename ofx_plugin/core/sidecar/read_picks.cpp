@@ -106,10 +106,11 @@ Pick read_pick(const Cursor& where, const PickMattes& mattes, std::set<std::stri
     if (where.has("matte")) {
         const Cursor name = where.member("matte");
         const std::string id = name.id();
-        pick.matte = mattes.of(id);
-        if (!pick.matte) {
+        const auto grid = mattes.grids.find(id);
+        if (grid == mattes.grids.end()) {
             name.fail("the matte " + in_quotes(id), "an id in the file's member \"mattes\"");
         }
+        pick.matte = grid->second.matte;
     } else {
         const Vec3 shown = displayed(pick.rgb, mattes.display.get());
         pick.hue = std::make_shared<const HueMatte>(shown);
@@ -132,8 +133,7 @@ void require_id(const Cursor& grids, const std::string& name) {
     }
 }
 
-Matte matte_from(const Cursor& grid) {
-    const std::string text = grid.text();
+Matte matte_from(const Cursor& grid, const std::string& text) {
     if (text.size() > kMaxMatteText) {
         grid.fail("a text of " + std::to_string(text.size()) + " characters",
                   "at most " + std::to_string(kMaxMatteText));
@@ -157,17 +157,9 @@ Matte matte_from(const Cursor& grid) {
 
 }  // namespace
 
-std::shared_ptr<const Matte> PickMattes::of(const std::string& id) const {
-    const auto at = grids.find(id);
-    return at == grids.end() ? nullptr : at->second;
-}
-
-PickMattes read_mattes(const Cursor& root, int version) {
+PickMattes read_mattes(const Cursor& where, int version, const PickMattes& known) {
     PickMattes mattes;
-    mattes.version = version;
-    if (!root.has("mattes")) return mattes;
-    if (version == 1) root.member("mattes").fail("mattes in a file of version 1", "version 2");
-    const Cursor where = root.member("mattes");
+    if (version == 1) where.fail("mattes in a file of version 1", "version 2");
     where.require_members({"grids"}, {"display"});
     if (where.has("display")) {
         const Cursor curve = where.member("display");
@@ -187,7 +179,13 @@ PickMattes read_mattes(const Cursor& root, int version) {
     const Cursor grids = where.member("grids");
     for (const std::string& id : grids.names("mattes", kMaxPicks)) {
         require_id(grids, id);
-        mattes.grids[id] = std::make_shared<const Matte>(matte_from(grids.member(id.c_str())));
+        const Cursor grid = grids.member(id.c_str());
+        const auto same = known.grids.find(id);
+        std::string text = grid.text();
+        mattes.grids[id] =
+            same != known.grids.end() && same->second.text == text
+                ? same->second
+                : PickMattes::Grid{text, std::make_shared<const Matte>(matte_from(grid, text))};
     }
     return mattes;
 }

@@ -9,18 +9,17 @@
 namespace palette4d {
 namespace {
 
-using Index = std::unordered_map<std::string, int>;
+/// The ids of vertices, and all ids, while a polytope is read.
+struct Ids {
+    std::unordered_map<std::string, int> vertices;
+    std::set<std::string> taken;
 
-int known(const Index& index, const Cursor& where, const char* kind) {
-    const std::string id = where.id();
-    const auto found = index.find(id);
-    if (found == index.end()) {
-        where.fail("the unknown " + std::string(kind) + ' ' + in_quotes(id),
-                   "the id of one of the polytope's " + std::to_string(index.size()) + ' ' +
-                       (std::string(kind) == "vertex" ? "vertices" : "edges"));
+    int vertex(const Cursor& where) const {
+        const auto found = vertices.find(where.id());
+        return known(where, found == vertices.end() ? -1 : found->second, "vertex",
+                     std::to_string(vertices.size()) + " vertices");
     }
-    return found->second;
-}
+};
 
 void read_topology(const Cursor& where, const Ids& ids, Section& section) {
     const Cursor tracks = where.member("tracks");
@@ -48,18 +47,22 @@ void read_topology(const Cursor& where, const Ids& ids, Section& section) {
 
 }  // namespace
 
+int known(const Cursor& where, int index, const char* kind, const std::string& all) {
+    if (index < 0) {
+        where.fail("the unknown " + std::string(kind) + ' ' + in_quotes(where.id()),
+                   "the id of one of the polytope's " + all);
+    }
+    return index;
+}
+
 void claim(std::set<std::string>& taken, const Cursor& where, const std::string& id) {
     if (!taken.insert(id).second) {
         where.fail("the id " + in_quotes(id) + " a second time", "an id of its own");
     }
 }
 
-int Ids::vertex(const Cursor& where) const { return known(vertices, where, "vertex"); }
-
-int Ids::edge(const Cursor& where) const { return known(edges, where, "edge"); }
-
-Polytope read_polytope(const Cursor& where, const ClipInfo& clip, const std::string& file,
-                       Ids& ids) {
+Polytope read_polytope(const Cursor& where, const ClipInfo& clip, const std::string& file) {
+    Ids ids;
     where.require_members({"vertices", "edges", "blocks", "transitions"});
 
     std::vector<Vertex> vertices;
@@ -83,7 +86,6 @@ Polytope read_polytope(const Cursor& where, const ClipInfo& clip, const std::str
         const Cursor id = entry.member("id");
         Edge edge{id.id(), ids.vertex(entry.member("from")), ids.vertex(entry.member("to"))};
         claim(ids.taken, id, edge.id);
-        ids.edges.emplace(edge.id, static_cast<int>(i));
         edges.push_back(std::move(edge));
     }
 

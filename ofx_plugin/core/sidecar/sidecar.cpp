@@ -1,12 +1,12 @@
 // The sidecar reader. Text becomes a JSON tree under limits (json_tree.cpp), and the tree becomes a
-// Sidecar member by member (read_clip.cpp, read_polytope.cpp, read_edits.cpp).
+// Sidecar member by member (read_clip.cpp, read_polytope.cpp, read_edits.cpp, read_picks.cpp).
 #include "sidecar/sidecar.hpp"
 
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "sidecar/json_tree.hpp"
+#include "sidecar/codec.hpp"
 #include "sidecar/members.hpp"
 
 namespace palette4d {
@@ -45,32 +45,48 @@ void read_quality(const Cursor& quality) {
 
 }  // namespace
 
-Sidecar parse_sidecar(const std::string& text, const std::string& name) {
-    const nlohmann::json tree = json_tree(text, name);
-    const Cursor root(tree, name);
+Sidecar sidecar_of(const Json& members, const std::string& name) {
+    const Cursor root(members, name);
     Sidecar sidecar;
     const int version = read_head(root);
-    sidecar.clip = read_clip(root.member("clip"));
     const Cursor clip = root.member("clip");
+    sidecar.clip = read_clip(clip);
     if (clip.has("conversion")) {
         sidecar.conversion = read_conversion(clip.member("conversion"), name);
     }
-    Ids ids;
-    sidecar.polytope = read_polytope(root.member("polytope"), sidecar.clip, name, ids);
+    sidecar.polytope = read_polytope(root.member("polytope"), sidecar.clip, name);
     read_quality(root.member("quality"));
-    PickMattes mattes = read_mattes(root, version);
+    PickMattes& mattes = sidecar.mattes;
+    if (root.has("mattes")) mattes = read_mattes(root.member("mattes"), version, {});
+    mattes.version = version;
     mattes.frame_step = static_cast<double>(sidecar.clip.step);
-    sidecar.edits = read_edits(root.member("edits"), sidecar.polytope, ids, mattes);
+    sidecar.edits = read_edits(root.member("edits"), sidecar.polytope, mattes);
     if (root.has("versions")) {
-        sidecar.versions = read_versions(root.member("versions"), sidecar.polytope, ids, mattes);
+        sidecar.versions = read_versions(root.member("versions"), sidecar.polytope, mattes);
     }
     if (root.has("colours")) check_colours(root.member("colours"));
     if (root.has("history")) root.member("history").require_object();
     return sidecar;
 }
 
+Sidecar with_edits(const Sidecar& palette, const Json& edits, const Json& mattes,
+                   const std::string& name) {
+    Sidecar result{palette.clip, palette.polytope, {}, {}, {}, palette.conversion};
+    const Json members = {{"edits", edits}, {"mattes", mattes}};
+    const Cursor root(members, name);
+    result.mattes = read_mattes(root.member("mattes"), kSidecarVersion, palette.mattes);
+    result.mattes.version = kSidecarVersion;
+    result.mattes.frame_step = palette.mattes.frame_step;
+    result.edits = read_edits(root.member("edits"), palette.polytope, result.mattes);
+    return result;
+}
+
+Sidecar parse_sidecar(const std::string& text, const std::string& name) {
+    return sidecar_of(json_tree(text, name), name);
+}
+
 ColourConversion parse_conversion(const std::string& text, const std::string& name) {
-    const nlohmann::json tree = json_tree(text, name);
+    const Json tree = json_tree(text, name);
     return read_steps(Cursor(tree, name), name, "");
 }
 

@@ -1,9 +1,10 @@
-// Reads and fully validates the sidecar file. Its only writer is Python's grade/sidecar.py.
+// Reads, fully validates and writes sidecars.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "convert/colour_conversion.hpp"
@@ -36,11 +37,24 @@ struct NamedVersion {
     Edits edits;
 };
 
+/// What all picks of a file share.
+struct PickMattes {
+    struct Grid {
+        std::string text;
+        std::shared_ptr<const Matte> matte;
+    };
+    std::unordered_map<std::string, Grid> grids;  ///< by their ids
+    std::shared_ptr<const DisplayCurve> display;
+    int version = 0;        ///< of the file
+    double frame_step = 1;  ///< Edits::frame_step
+};
+
 struct Sidecar {
     ClipInfo clip;
     Polytope polytope;
     Edits edits;  ///< the active ones
     std::vector<NamedVersion> versions;
+    PickMattes mattes;
     /// Null where the palette is in the clip's own code values.
     std::shared_ptr<const ClipConversion> conversion;
 };

@@ -62,9 +62,9 @@ class Document(HandleEdits, PickEdits):
         notes: Iterable[str] = (),
         report: Mapping[str, Any] | None = None,
     ) -> None:
-        data = sidecar.encoded(fields)
         self.path: Path | None = None
-        self._start(data, _core.parse_sidecar(data, self._name))
+        core, data = _core.encode_sidecar(fields, self._name)
+        self._start(core, sidecar.decoded(data, self._name)[1])
         self._disk = None
         self.notes = tuple(notes)
         self.report = dict(report or {})
@@ -84,7 +84,7 @@ class Document(HandleEdits, PickEdits):
         data = sidecar.read_bytes(path)
         document._disk, document.path, document.notes = data, Path(path), ()
         document.report = {}
-        document._start(data, _core.parse_sidecar(data, os.fspath(path)))
+        document._start(*sidecar.decoded(data, os.fspath(path)))
         return document.version(version)
 
     def __repr__(self) -> str:
@@ -297,13 +297,13 @@ class Document(HandleEdits, PickEdits):
 
         path, self.path = self.path, target
         try:
-            fields, notes = reanalysis.save(fields, target, on_edits=on_edits)
+            (core, fields, data), notes = reanalysis.save(fields, target, on_edits=on_edits)
         except BaseException:
             self.path = path
             raise
         self.notes += tuple(notes)
-        self._disk = sidecar.encoded(fields)
-        self._start(self._disk, _core.parse_sidecar(self._disk, str(target)))
+        self._disk = data
+        self._start(core, fields)
 
     def _save_again(self, target: Path, loaded: bytes) -> None:
         with locked(target) as held:
@@ -312,9 +312,7 @@ class Document(HandleEdits, PickEdits):
                 return
             new = self._merged(found) if found != loaded else copy.copy(self)
             new._done = edits.bounded(new._done)
-            data = sidecar.encoded(new._members())
-            if found != loaded or new._core is None:
-                new._core = _core.parse_sidecar(data, str(target))
+            new._core, data = _core.encode_sidecar(new._members(), str(target))
             sidecar.write(target, data, held, replaces=found)
         new._disk = data
         new._mark_saved()
@@ -324,7 +322,7 @@ class Document(HandleEdits, PickEdits):
         """Return the document in the file with this document's changes since it was loaded."""
         new = Document.__new__(Document)
         new.path, new.notes = self.path, self.notes
-        new._start(found, _core.parse_sidecar(found, self._name))
+        new._start(*sidecar.decoded(found, self._name))
         new._mattes = {**self._mattes, **new._mattes}
         if new._fields["polytope"] != self._fields["polytope"]:
             raise Palette4dError(

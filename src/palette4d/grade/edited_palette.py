@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Self
 
 from palette4d import _core
 from palette4d.common.errors import Palette4dError
-from palette4d.grade import sidecar
+from palette4d.grade import edits, sidecar
 from palette4d.grade.edits import (
     RAMP,
     Colour,
@@ -57,9 +57,9 @@ class EditedPalette(Steps):
             id_: value for (kind, id_), value in state.items() if kind == "handle"
         }
 
-    def _start(self, data: bytes, core: _core.Sidecar) -> None:
-        self._fields: Fields = sidecar.fields_of(data)
-        self._from_input = core.conversion
+    def _start(self, core: _core.Sidecar, fields: Fields) -> None:
+        self._fields = fields
+        self._analysed = core
         self._handles = Handles(self._fields["polytope"])
         self._mattes: dict[str, str] = dict(self._fields.get("mattes", {}).get("grids", {}))
         self._become(sidecar.state_of(self._fields))
@@ -84,10 +84,10 @@ class EditedPalette(Steps):
     def core(self) -> _core.Sidecar:
         """The core's view of the document, for this package."""
         if self._core is None:
-            fields = self._members()
-            for member in ("history", "colours"):  # the core needs neither
-                fields.pop(member, None)
-            self._core = _core.parse_sidecar(sidecar.encoded(fields), self._name)
+            fields = edits.to_fields(self._state, self._handles.vertices)
+            picks = fields.get("picks", ())
+            mattes = sidecar.mattes_of(picks, self._mattes, self._display_of_clip)
+            self._core = self._analysed.with_edits(fields, mattes, self._name)
         return self._core
 
     @property
@@ -96,12 +96,12 @@ class EditedPalette(Steps):
 
     def fields(self) -> Fields:
         """Return the members of the sidecar that `save` would write (docs/sidecar.md)."""
-        return copy.deepcopy(self._members())
+        plain: Fields = _core.plain(self._members())
+        return plain
 
     def _members(self) -> Fields:
         """Return the sidecar's members; they share values with the document."""
-        ids = (vertex["id"] for vertex in self._fields["polytope"]["vertices"])
-        fields = sidecar.with_state(self._fields, self._state, ids)
+        fields = sidecar.with_state(self._fields, self._state, self._handles.vertices)
         fields = sidecar.with_history(fields, self._done, self._undone)
         return sidecar.with_mattes(fields, self._mattes, self._display_of_clip)
 
@@ -260,7 +260,7 @@ class EditedPalette(Steps):
     def _conversion(self, space: str) -> _core.ColourConversion | None:
         if space not in ("input", "palette"):
             raise Palette4dError(f"found the space {space!r}, expected 'input' or 'palette'")
-        own = self._from_input
+        own = self._analysed.conversion
         return None if own is None or space == "palette" else own.steps
 
     def frame_of(self, id: str | None, frame: float | None = None) -> float:

@@ -4,6 +4,7 @@ import itertools
 from pathlib import Path
 from typing import Any
 
+from palette4d import _core
 from palette4d.common.errors import SidecarError
 from palette4d.common.files import link_target, replacing
 from palette4d.grade import edits, sidecar
@@ -14,8 +15,10 @@ from palette4d.grade.sidecar import Fields, OnEdits
 _MOVED = "like"
 
 
-def save(fields: Fields, path: Path, *, on_edits: OnEdits = "refuse") -> tuple[Fields, list[str]]:
-    """Write the sidecar of a new analysis; return it as written, and notes for the user.
+def save(
+    fields: Fields, path: Path, *, on_edits: OnEdits = "refuse"
+) -> tuple[tuple[_core.Sidecar, Fields, bytes], list[str]]:
+    """Write the sidecar of a new analysis; return what `sidecar.save` does, and notes for the user.
 
     With `on_edits` "keep" and another palette than before, the edits stay with their handles if
     these are the same (`analyze --like`). Else the grade is copied to the new palette, with its

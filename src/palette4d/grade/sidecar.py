@@ -4,15 +4,11 @@ Input and output are a sidecar's members as plain dicts and lists; `docs/sidecar
 The core (`palette4d._core`) validates every text before it is written.
 """
 
-import itertools
-import json
 import os
 import stat
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
-
-import numpy as np
 
 from palette4d import _core
 from palette4d.common.errors import Palette4dError, SidecarError
@@ -32,77 +28,6 @@ SCHEMA = "palette4d.sidecar"
 
 #: The longest text that the core accepts.
 _LARGEST_FILE = 64 << 20
-
-# Member order in the file; other members keep the document's order.
-_ORDER: dict[str, tuple[str, ...]] = {
-    "": (
-        *("schema", "version", "generator", "clip", "polytope", "colours", "quality"),
-        *("edits", "mattes", "versions", "history", "extra"),
-    ),
-    "/clip": ("name", "source", "frames", "rate", "size", "encoding", "conversion"),
-    "/clip/conversion": ("input_space", "config", "error", "steps"),
-    "/clip/conversion/steps/*": ("kind", "direction"),
-    "/clip/frames": ("first", "last", "step", "skipped"),
-    "/polytope": ("vertices", "edges", "blocks", "transitions"),
-    "/polytope/vertices/*": ("id", "frame", "rgb", "name"),
-    "/polytope/edges/*": ("id", "from", "to"),
-    "/polytope/blocks/*": ("first", "last", "tracks", "faces"),
-    "/polytope/transitions/*": ("tracks", "faces"),
-    "/quality": ("stages", "options", "versions"),
-    "/quality/stages/*": ("stage",),
-    "/edits": ("ramp", "vertices", "stops", "picks", "locks"),
-    "/edits/vertices/*": ("vertex", "rgb", "ramp"),
-    "/edits/stops/*": ("id", "edge", "frame", "rgb", "ramp"),
-    "/mattes": ("display", "grids"),
-    "/mattes/display": ("from", "to", "values"),
-    "/versions/*": ("name", "edits"),
-    "/history": ("done", "undone"),
-}
-
-# Containers that take several lines. All others take one line, so that a diff of two files has one
-# line per vertex, edge, track or edit.
-_SPREAD = {
-    "",
-    "/clip",
-    "/clip/conversion",
-    "/clip/conversion/steps",
-    "/polytope",
-    "/polytope/vertices",
-    "/polytope/edges",
-    "/polytope/blocks",
-    "/polytope/blocks/*",
-    "/polytope/blocks/*/tracks",
-    "/polytope/transitions",
-    "/polytope/transitions/*",
-    "/polytope/transitions/*/tracks",
-    "/quality",
-    "/quality/stages",
-    "/quality/options",
-    "/quality/versions",
-    "/edits",
-    "/edits/vertices",
-    "/edits/stops",
-    "/edits/picks",
-    "/mattes",
-    "/mattes/grids",
-    "/colours",
-    "/versions",
-    "/history",
-    "/history/done",
-    "/history/undone",
-    "/extra",
-}
-
-_FRAME_NUMBERS = {
-    "/clip/frames/first",
-    "/clip/frames/last",
-    "/clip/frames/step",
-    "/clip/frames/skipped/*",
-    "/polytope/vertices/*/frame",
-    "/polytope/blocks/*/first",
-    "/polytope/blocks/*/last",
-    "/edits/stops/*/frame",
-}
 
 
 def new_document(
@@ -140,16 +65,19 @@ def new_document(
         "edits": {"vertices": [], "stops": []},
         "extra": {},
     }
-    plain: Fields = _canonical(document, "")
+    plain: Fields = _core.plain(document)
     return plain
 
 
 def dumps(document: Mapping[str, Any]) -> str:
     """Return the document's text: equal documents give equal text, one row per line.
 
-    Floats have the fewest digits that read back to the same double.
+    Raises
+    ------
+    SidecarError
+        As `validate`.
     """
-    return _text(_canonical(document, ""), "", 0) + "\n"
+    return _core.encode_sidecar(document)[1].decode("utf-8")
 
 
 def validate(document: Mapping[str, Any], name: str = "<document>") -> _core.Sidecar:
@@ -160,12 +88,7 @@ def validate(document: Mapping[str, Any], name: str = "<document>") -> _core.Sid
     SidecarError
         Naming `name`, the JSON pointer, what was found and what was expected.
     """
-    return _core.parse_sidecar(encoded(document), name)
-
-
-def encoded(document: Mapping[str, Any]) -> bytes:
-    """Return the bytes of `dumps`; names that are not Unicode pass, and the core refuses them."""
-    return dumps(document).encode("utf-8", "surrogatepass")
+    return _core.encode_sidecar(document, name)[0]
 
 
 def read_bytes(path: str | os.PathLike[str]) -> bytes:
@@ -206,21 +129,19 @@ def load(path: str | os.PathLike[str]) -> Fields:
     SidecarError
         When there is no such file or the core refuses it.
     """
-    data = read_bytes(path)
-    _core.parse_sidecar(data, os.fspath(path))
-    return fields_of(data)
+    return decoded(read_bytes(path), os.fspath(path))[1]
 
 
-def fields_of(data: bytes) -> Fields:
-    """Return the members of a text that the core accepts; 24.0 becomes 24 where it is whole."""
-    document: Fields = json.loads(data)
+def decoded(data: bytes, name: str) -> tuple[_core.Sidecar, Fields]:
+    """Return the core's view of a text, and its members; 24.0 becomes 24 where it is whole."""
+    core, document = _core.decode_sidecar(data, name)
     if document["version"] < _core.SIDECAR_VERSION:
         _upgrade(document)
     clip = document["clip"]
     frames = clip["frames"]
     for holder, names in ((frames, ("first", "last", "step", "skipped")), (clip, ("rate", "size"))):
         holder.update({name: _whole(holder[name]) for name in names})
-    return document
+    return core, document
 
 
 def _upgrade(document: Fields) -> None:
@@ -267,21 +188,30 @@ def with_mattes(
     picks = list(_picks_in(document))
     document = {name: value for name, value in document.items() if name != "mattes"}
     document["version"] = 2 if picks else 1
-    used = sorted({pick["matte"] for pick in picks if "matte" in pick} & texts.keys())
+    mattes = mattes_of(picks, texts, curve)
+    if len(mattes) > 1 or mattes["grids"]:
+        document["mattes"] = mattes
+    return document
+
+
+def mattes_of(
+    picks: Sequence[Fields], texts: Mapping[str, str], curve: Callable[[], "Display | None"]
+) -> Fields:
+    """Return the member "mattes" for picks."""
     mattes: Fields = {}
     if picks and (display := curve()) is not None:
         start, end, values = display
         mattes["display"] = {"from": start, "to": end, "values": values}
-    if used or mattes:
-        document["mattes"] = {**mattes, "grids": {id_: texts[id_] for id_ in used}}
-    return document
+    used = sorted({pick["matte"] for pick in picks if "matte" in pick} & texts.keys())
+    return {**mattes, "grids": {id_: texts[id_] for id_ in used}}
 
 
 def _picks_in(document: Fields) -> Iterator[Fields]:
     """Yield all picks of a document: of its edits, its versions and its steps."""
     for part in (document["edits"], *(v["edits"] for v in document.get("versions", ()))):
         yield from part.get("picks", ())
-    for step in itertools.chain(*document.get("history", {}).values()):
+    history = document.get("history", {})
+    for step in (*history.get("done", ()), *history.get("undone", ())):
         for kind, _, *values in step["changes"]:
             for value in filter(None, values):
                 if kind == "pick":
@@ -320,7 +250,8 @@ def with_history(
 ) -> Fields:
     """Return a document with these steps; without steps it has no member "history"."""
     parts = {"done": done, "undone": undone}
-    history = {
+    history = {n: v for n, v in document.get("history", {}).items() if n not in parts}
+    history |= {
         n: [edits.step_to_fields(step) for step in part] for n, part in parts.items() if part
     }
     if history:
@@ -350,8 +281,8 @@ def save(
     *,
     on_edits: OnEdits = "refuse",
     replaces: bytes | None = None,
-) -> Fields:
-    """Write a sidecar and return the document as written.
+) -> tuple[_core.Sidecar, Fields, bytes]:
+    """Write a sidecar; return the core's view of it, its members and its text.
 
     The core validates the text before it replaces the file. After any failure, also Ctrl-C, the old
     file is unchanged and no temporary file remains.
@@ -376,19 +307,18 @@ def save(
     SidecarError
         When the core refuses the document.
     """
-    canonical: Fields = _canonical(document, "")
+    members: Fields = _core.plain(document, os.fspath(path))
     target = link_target(path)
     with locked(target) as held:
         old = existing(target, on_edits)
-        if old is not None and has_edits(old) and old["edits"] != canonical.get("edits"):
+        if old is not None and has_edits(old) and old["edits"] != members.get("edits"):
             if on_edits == "refuse":
                 raise _would_lose(target, old)
             if on_edits == "keep":
-                canonical = _with_edits_of(old, canonical, target)
-        data = encoded(canonical)
-        _core.parse_sidecar(data, os.fspath(target))
+                members = _with_edits_of(old, members, target)
+        core, data = _core.encode_sidecar(members, os.fspath(target))
         write(target, data, held, replaces=replaces)
-    return canonical
+    return core, members, data
 
 
 def write(
@@ -424,55 +354,12 @@ def write(
         temporary.write_bytes(data)
 
 
-# ------------------------------------------------------------------------------------- documents
-
-
-def _canonical(value: Any, where: str) -> Any:
-    """Return plain JSON values, with the file's member order and number formats."""
-    if where in ("/history", "/mattes") or type(value) is str:
-        return value  # steps are plain values in their order already, and many
-    if isinstance(value, np.ndarray | np.generic):
-        value = value.tolist()
-    if isinstance(value, Mapping):
-        order = _ORDER.get(where, ())
-        names = [name for name in order if name in value]
-        names += [name for name in value if name not in order]
-        return {str(name): _canonical(value[name], f"{where}/{name}") for name in names}
-    if isinstance(value, Sequence) and not isinstance(value, str | bytes):
-        return [_canonical(item, f"{where}/*") for item in value]
-    if where in _FRAME_NUMBERS and isinstance(value, float) and value.is_integer():
-        return int(value)
-    colour = where.endswith("/rgb/*") and not where.startswith("/extra")
-    if colour and type(value) is int and abs(value) <= 2**53:
-        return float(value)
-    return value
-
-
-def _text(value: Any, where: str, depth: int) -> str:
-    if not isinstance(value, dict | list) or not value or where not in _SPREAD:
-        try:
-            return json.dumps(value, ensure_ascii=False)
-        except TypeError as error:
-            raise TypeError(f"a sidecar holds JSON values only; at {where}: {error}") from None
-    inner = "  " * (depth + 1)
-    if isinstance(value, dict):
-        rows = [
-            f"{json.dumps(name, ensure_ascii=False)}: {_text(item, f'{where}/{name}', depth + 1)}"
-            for name, item in value.items()
-        ]
-    else:
-        rows = [_text(item, f"{where}/*", depth + 1) for item in value]
-    opening, closing = "{}" if isinstance(value, dict) else "[]"
-    body = ",\n".join(inner + row for row in rows)
-    return f"{opening}\n{body}\n{'  ' * depth}{closing}"
-
-
 # ----------------------------------------------------------------------------------- edits at stake
 
 
 def same_palette(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
     """Return whether two documents have the same polytope, so that edits of one fit the other."""
-    return bool(_canonical(one, "")["polytope"] == _canonical(other, "")["polytope"])
+    return bool(_core.plain(one["polytope"]) == _core.plain(other["polytope"]))
 
 
 def existing(target: Path, on_edits: OnEdits) -> Fields | None:
@@ -524,8 +411,7 @@ def _with_edits_of(old: Fields, new: Fields, target: Path) -> Fields:
         )
     names = ("edits", "mattes", "versions", "history")
     users = {name: old[name] for name in names if name in old}
-    kept: Fields = _canonical({**new, **users, "extra": new.get("extra") or old["extra"]}, "")
-    return kept
+    return {**new, **users, "extra": new.get("extra") or old["extra"]}
 
 
 # ------------------------------------------------------------------------------------------- files

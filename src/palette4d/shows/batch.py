@@ -284,7 +284,7 @@ def _edit_of(shot: Shot, frames: tuple[int, int]) -> dict[str, Any]:
 def _tell_edit(target: Path, shot: Shot, frames: tuple[int, int]) -> None:
     """Let a sidecar that is kept say how the edit plays its shot now."""
     read = sidecar.read_bytes(target)
-    document = sidecar.fields_of(read)
+    document = sidecar.decoded(read, str(target))[1]
     edit = json.loads(json.dumps(_edit_of(shot, frames)))
     if document["extra"].get("edit", {}) == edit or shot.place is None:
         return

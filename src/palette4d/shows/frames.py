@@ -144,7 +144,7 @@ def _on_farm(
         for kind, texts in (("warning", warnings), ("note", notes)):
             for text in texts:
                 tell(kind, text)
-    data = sidecar.encoded(document.fields())
+    data = sidecar.dumps(document.fields()).encode("utf-8")
     at_once = OF_MOVIE if clip.is_movie else FRAMES
     rows = [tuple(todo[i : i + at_once]) for i in range(0, len(todo), at_once)]
     drawn = Output(**picture)
@@ -208,7 +208,7 @@ def render_frames(task: FramesTask, threads: int) -> Files:
 
 @functools.lru_cache(maxsize=1)
 def _document(data: bytes) -> Document:
-    return Document(sidecar.fields_of(data))
+    return Document(sidecar.decoded(data, "<document>")[1])
 
 
 @functools.lru_cache(maxsize=1)

@@ -53,25 +53,14 @@ class Grade:
     @classmethod
     def of(cls, document: Document, frame: float) -> "Grade":
         """Return a document's grade at a time."""
-        return cls._with(document, document.palette(frame), document.core.edits)
+        palette, own = document.palette(frame), document.core.conversion
+        picks = document.core.edits.picks_at(palette.frame)
+        return cls(palette, None if own is None else own.steps, picks)
 
     @classmethod
     def of_version(cls, document: Document, name: str, frame: float) -> "Grade | None":
         """Return the grade of a version at a time; None if there is no such version."""
-        core = document.core
-        edits = dict(core.versions).get(name)
-        if edits is None:
-            return None
-        edited = _core.edited_colours(core.polytope, edits, _core.slice_at(core.polytope, frame))
-        return cls._with(
-            document, dataclasses.replace(document.palette(frame), edited=edited), edits
-        )
-
-    @classmethod
-    def _with(cls, document: Document, palette: Palette, edits: _core.Edits) -> "Grade":
-        own = document.core.conversion
-        picks = edits.picks_at(palette.frame)
-        return cls(palette, None if own is None else own.steps, picks)
+        return cls.of(document.version(name), frame) if name in document.versions else None
 
     def recolourer(self) -> _core.Recolourer:
         """Return the exact recolouring."""

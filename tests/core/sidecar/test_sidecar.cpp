@@ -76,6 +76,14 @@ bool behaves(const std::string& text) {
 
 }  // namespace
 
+TEST(a_nul_is_no_end_of_the_text) {
+    const std::string text = golden("tetrahedron");
+    CHECK_EQUAL(refused(text).pointer(), std::string("(accepted)"));
+    for (const std::string& more : {std::string(1, '\0'), std::string("\0{}", 3)}) {
+        CHECK_EQUAL(refused(text + more).found(), std::string("a NUL byte"));
+    }
+}
+
 TEST(every_golden_file_is_read) {
     int count = 0;
     for (const auto& entry : std::filesystem::directory_iterator(golden_folder())) {
