@@ -16,8 +16,9 @@ from palette4d.common.files import make_folder
 from palette4d.grade.document import Document
 from palette4d.grade.movie_rendering import MoviePlan
 from palette4d.grade.output import Output
+from palette4d.media.array_clip import ArrayClip
 from palette4d.media.clip import Clip, Image, open_clip
-from palette4d.media.clip_base import F32, ClipError, FrameError, describe, named
+from palette4d.media.clip_base import F32, ClipError, FrameError, describe, named, strips
 from palette4d.media.clip_images import ImageClip
 from palette4d.media.codecs import is_movie
 from palette4d.media.exr_around import write_around
@@ -31,6 +32,9 @@ from palette4d.media.frame_writer import (
 )
 
 Compare = Literal["wipe", "side"]
+#: Pixels above which frames are not read while others are written, between 5K and 6K: of 8K each
+#: needs 400 MB.
+LARGE = 16_000_000
 Missing = Literal["hold", "black", "error"]
 #: Metadata of a frame that are not those of a frame that it stands for.
 _OF_ONE_FRAME = ("smpte:TimeCode", "smpte:KeyCode")
@@ -161,7 +165,28 @@ class Painter:
             self.clip.skip(frame)
             return None
         source = with_alpha(image.pixels) if self.drawn.in_alpha else image.pixels
-        pixels = self.document.recolour(
+        pixels = self._recoloured(source, frame)
+        if self.compare is not None:
+            pixels = compared(source, pixels, self.compare)
+        painted = image, pixels
+        self._last = None if self.large else painted
+        return painted
+
+    def _recoloured(self, source: F32, frame: int) -> F32:
+        """Recolour a frame; a large one strip by strip in its own memory, where that is the same.
+
+        A filter of picks needs the whole picture, and so does one with its palette below.
+        """
+        whole = self.drawn.kind == "palette" or self.compare is not None
+        filtered = self.drawn.clean_up > 0 and bool(self.document.picks)
+        if not self.large or whole or filtered or isinstance(self.clip, ArrayClip):
+            return self._drawn(source, frame)
+        for rows in strips(*source.shape[:2]):
+            source[rows] = self._drawn(source[rows], frame)
+        return source
+
+    def _drawn(self, source: F32, frame: int) -> F32:
+        return self.document.recolour(
             source,
             frame,
             **asdict(self.drawn),
@@ -169,10 +194,11 @@ class Painter:
             space=self.space,
             threads=self.threads,
         )
-        if self.compare is not None:
-            pixels = compared(source, pixels, self.compare)
-        self._last = image, pixels
-        return self._last
+
+    @property
+    def large(self) -> bool:
+        """Whether memory holds one frame alone: not the next one, nor the one before."""
+        return self.clip.width * self.clip.height > LARGE
 
     def _nearest(self, frame: int) -> tuple[Image, F32]:
         """Return the nearest good frame before another one; the first good one if there is none."""
@@ -208,7 +234,7 @@ def render(
     tell: Callable[[str, str], object] | None = None,
     **picture: Any,
 ) -> Rendered:
-    """Recolour every frame of a clip and write it; memory holds at most three frames.
+    """Recolour every frame of a clip and write it; memory holds three frames, of 6K and more one.
 
     Parameters
     ----------
@@ -330,6 +356,10 @@ def render(
             finish()
             rendered.append(frame)
             pending = writer.submit(write, *painted)
+            del painted
+            if painter.large:
+                finish()
+                pending = None
         finish()
         if todo and not rendered:
             raise clip.none_readable()

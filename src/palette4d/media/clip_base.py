@@ -44,6 +44,17 @@ LEAVE_OUT = (
 """The advice for a bad frame."""
 
 
+STRIP = 4_000_000
+"""Pixels of a strip of a large frame: what is computed of it needs little more memory."""
+
+
+def strips(height: int, width: int) -> Iterator[slice]:
+    """Yield slices of rows that divide a picture into strips of about `STRIP` pixels."""
+    rows = max(1, STRIP // max(1, width))
+    for top in range(0, height, rows):
+        yield slice(top, min(top + rows, height))
+
+
 class ClipError(Palette4dError):
     """A clip cannot be opened; the message says what was found and expected, and the remedy."""
 

@@ -30,6 +30,7 @@ from palette4d.media.clip_base import (
     describe,
     named,
     progression_step,
+    strips,
 )
 from palette4d.media.clip_sequence import ImageSequence
 from palette4d.media.colour_tags import (
@@ -376,6 +377,15 @@ def _bits(spec: Any) -> int:
 
 def _scaled(stored: NDArray[Any], bits: int) -> F32:
     """(h, w, c) float32: integers divided by their largest value, floats unchanged."""
+    if stored.dtype == np.float32:
+        return stored
+    out = np.empty(stored.shape, np.float32)
+    for rows in strips(*stored.shape[:2]):
+        out[rows] = _scaled_strip(stored[rows], bits)
+    return out
+
+
+def _scaled_strip(stored: NDArray[Any], bits: int) -> F32:
     if stored.dtype.kind == "f":
         with np.errstate(over="ignore"):
             return stored.astype(np.float32, copy=False)

@@ -20,6 +20,7 @@ from palette4d import _core
 from palette4d.common.errors import Palette4dError, WriteError
 from palette4d.common.files import EXISTS, replacing
 from palette4d.media import oiio_text
+from palette4d.media.clip_base import strips
 from palette4d.media.exr_around import has_every_block
 
 FORMATS = ("exr", "png", "tif", "tiff", "dpx", "jpg", "jpeg")
@@ -211,6 +212,24 @@ def with_alpha_of(
     return out, True
 
 
+def _stored(
+    extension: str, pixels: NDArray[np.float32], samples: str, premultiplied: bool
+) -> tuple[NDArray[Any], bool]:
+    """Return (samples as they are stored, premultiplied) of a frame, made strip by strip."""
+
+    def strip(rows: slice) -> tuple[NDArray[Any], bool]:
+        part, multiplied = with_alpha_of(extension, pixels[rows], premultiplied)
+        return quantised(part, samples), multiplied
+
+    first, multiplied = strip(slice(0, 1))
+    if samples == "float" and np.may_share_memory(first, pixels):
+        return np.ascontiguousarray(pixels), multiplied
+    stored = np.empty((*pixels.shape[:2], first.shape[2]), first.dtype)
+    for rows in strips(*pixels.shape[:2]):
+        stored[rows] = strip(rows)[0]
+    return stored, multiplied
+
+
 def write_frame(
     path: Path,
     pixels: NDArray[np.float32],
@@ -238,8 +257,7 @@ def write_frame(
     import OpenImageIO as oiio
 
     extension = _format(path.suffix)
-    pixels, premultiplied = with_alpha_of(extension, pixels, premultiplied)
-    stored = np.ascontiguousarray(quantised(pixels, samples))
+    stored, premultiplied = _stored(extension, pixels, samples, premultiplied)
     height, width, channels = stored.shape
     kind = "uint16" if samples == "uint10" else samples
     spec = oiio.ImageSpec(width, height, channels, kind)
@@ -298,17 +316,22 @@ def _is_whole(path: Path, stored: NDArray[Any]) -> bool:
         oiio_text.problem_of(oiio)
         return False
     height, _, channels = stored.shape
-    first = 0 if path.suffix.lower().startswith(".tif") else height - 1
-    rows = source.read_scanlines(0, 0, first, height, 0, 0, channels, source.spec().format)
+    first = 0 if _format(path.suffix) == "tif" else height - 1
+    kind, whole = source.spec().format, True
+    for rows in strips(height - first, stored.shape[1]):
+        top, end = first + rows.start, first + rows.stop
+        read = source.read_scanlines(0, 0, top, end, 0, 0, channels, kind)
+        # JPEG is lossy: its decoder reports a file that ends early. NaNs are equal, too.
+        whole = read is not None and (
+            _format(path.suffix) == "jpg" or read.tobytes() == stored[top:end].tobytes()
+        )
+        if not whole:
+            break
     problem = oiio_text.problem_of(source)
     source.close()
-    if path.suffix.lower() == ".exr" and not has_every_block(path):
+    if _format(path.suffix) == "exr" and not has_every_block(path):
         return False
-    if rows is None or problem:
-        return False
-    if _format(path.suffix) == "jpg":
-        return True  # lossy: its decoder reports a file that ends early
-    return bool(rows.tobytes() == stored[first:].tobytes())  # NaNs are equal, too
+    return whole and not problem
 
 
 def cannot_write(path: Path, reason: str) -> WriteError:
