@@ -15,6 +15,7 @@ from palette4d.analysis.options import LIKE, METHODS, OPTIONS, check_methods, pa
 from palette4d.cli import analysis_report, analyze_shots
 from palette4d.cli.messages import as_options, tell
 from palette4d.cli.progress import progress_bar
+from palette4d.cli.reading import add_reading, clip_name
 from palette4d.common.arguments import checked, frame_range, whole
 from palette4d.common.errors import Palette4dError
 from palette4d.common.text import counted
@@ -142,6 +143,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
             f"--{flag}-edits", dest="on_edits", action="store_const", const=flag, help=text
         )
     parser.set_defaults(on_edits="refuse")
+    add_reading(parser)
     parser.add_argument("--input-space", metavar="SPACE", help="colour space of the clip")
     parser.add_argument(
         "--palette-space",
@@ -207,6 +209,7 @@ def _rate(text: str) -> Fraction:
 def run(args: argparse.Namespace) -> int:
     """Run `palette4d analyze`."""
     settings = _settings(args)
+    args.clip = clip_name(args)
     if analyze_shots.is_show(args):
         return analyze_shots.run(args, settings)
     from palette4d.grade import sidecar

@@ -8,6 +8,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from palette4d.cli.messages import tell
+from palette4d.cli.reading import add_reading, clip_name
 from palette4d.common.arguments import checked, frame_range, number, whole
 from palette4d.common.errors import UnfinishedError
 from palette4d.common.text import counted
@@ -165,6 +166,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         default="",
         help="the version whose edits are used (default: the active edits)",
     )
+    add_reading(parser)
     parser.add_argument("--half", action="store_true", help="EXR with 16-bit float")
     parser.add_argument(
         "--bits",
@@ -239,7 +241,7 @@ def run(args: argparse.Namespace) -> int:
         try:
             done: Any = render(
                 Document.load(args.sidecar, version=args.version),
-                args.clip,
+                clip_name(args),
                 args.output,
                 frames=args.frames,
                 compare=args.compare,

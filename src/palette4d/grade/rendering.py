@@ -30,6 +30,7 @@ from palette4d.media.frame_writer import (
     sample_type,
     write_frame,
 )
+from palette4d.media.reading import like_source
 
 Compare = Literal["wipe", "side"]
 #: Pixels above which frames are not read while others are written, between 5K and 6K: of 8K each
@@ -297,6 +298,8 @@ def render(
         document = Document.load(document)
     drawn = Output(**picture)
     whole, output = frames is None, os.fspath(output)
+    if not isinstance(clip, Clip):
+        clip = like_source(os.fspath(clip), str(document.core.clip["source"]))
     movie = is_movie(Path(output))
     clip, fill = opened_for_render(clip, frames, missing, skip_bad_frames, movie=movie)
     width = clip.width * (2 if compare == "side" else 1)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from palette4d.media import clip_sequence, oiio_text
 from palette4d.media.clip_base import Clip, ClipError, FrameError, Image
+from palette4d.media.reading import Reading, split
 
 __all__ = ["Clip", "ClipError", "FrameError", "Image", "open_clip"]
 
@@ -29,7 +30,9 @@ def open_clip(
     ----------
     spec : str
         `name.####.exr` (one # a digit), `name.%04d.exr`, `name.@@@@.exr`, `name.1-10x2#.exr`, a
-        folder with one image sequence, a single image, or a movie file.
+        folder with one image sequence, a single image, or a movie file. It may end in how the clip
+        is read: `?layer=NAME`, `?view=NAME` of EXR, `?matrix=709` (601, 2020) of a movie that
+        states none; several with `&`.
     frames : str, optional
         `A-B`, `A-BxN`, single numbers or comma lists (`common.arguments.parse_frames`); the
         whole clip by default.
@@ -47,8 +50,6 @@ def open_clip(
     FrameError
         When a frame is missing or unreadable and `skip_bad_frames` is not set.
     """
-    from palette4d.media import clip_images
-
     if rate is not None and rate <= 0:
         raise ClipError(f"rate {rate}: expected frames a second above 0, such as 24 or 24000/1001")
     if not spec.strip():
@@ -56,21 +57,47 @@ def open_clip(
             "the clip's name is empty; expected a pattern such as name.####.exr, a folder (. is "
             "the working folder), an image or a movie file"
         )
+    name, reading = split(spec)
+    if str(reading) and not Path(spec).exists():
+        clip = _opened(name, reading, frames, rate, skip_bad_frames)
+        clip.source += str(reading)
+        return clip
+    return _opened(spec, Reading(), frames, rate, skip_bad_frames)
+
+
+def _opened(
+    spec: str,
+    reading: Reading,
+    frames: str | None,
+    rate: Fraction | None,
+    skip_bad_frames: bool,
+) -> Clip:
+    from palette4d.media import clip_images
+
+    def images(sequence: clip_sequence.ImageSequence, embedded: str | None, single: bool) -> Clip:
+        if reading.matrix is not None:
+            raise ClipError(f"{spec}: found a matrix for images, expected it for movies alone")
+        return clip_images.open_images(
+            sequence, frames, embedded, rate, skip_bad_frames, single, reading
+        )
+
     path = Path(oiio_text.file_name(spec))
     if path.is_dir():
         found = clip_sequence.in_folder(path)
         if isinstance(found, clip_sequence.ImageSequence):
-            return clip_images.open_images(found, frames, None, rate, skip_bad_frames)
+            return images(found, None, False)
         path = found
     extension = clip_sequence.extension(path)
     if path.is_file():
         if extension in clip_sequence.IMAGE_EXTENSIONS:
             sequence, _ = clip_sequence.of_file(path)
-            return clip_images.open_images(sequence, frames, None, rate, skip_bad_frames, True)
+            return images(sequence, None, True)
         if extension in clip_sequence.MOVIE_EXTENSIONS:
             from palette4d.media import clip_movie
 
-            return clip_movie.open_movie(path, frames, rate, skip_bad_frames)
+            if (reading.layer, reading.view) != (None, None):
+                raise ClipError(f"{spec}: found a layer or view for a movie, expected it for EXR")
+            return clip_movie.open_movie(path, frames, rate, skip_bad_frames, reading.matrix)
         raise ClipError(
             f'{path}: found a file with the extension "{extension}", expected an image '
             f"({', '.join(sorted(clip_sequence.IMAGE_EXTENSIONS))}) or a movie "
@@ -78,7 +105,7 @@ def open_clip(
         )
     if any(mark in path.name for mark in "#@%$<"):
         sequence, embedded = clip_sequence.of_pattern(spec)
-        return clip_images.open_images(sequence, frames, embedded, rate, skip_bad_frames)
+        return images(sequence, embedded, False)
     raise ClipError(
         f"{spec}: no such file or folder; expected a pattern such as name.####.exr, a folder with "
         "one image sequence, an image or a movie file. Check the path."

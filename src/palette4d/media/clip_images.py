@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from palette4d import _core
 from palette4d.common.arguments import MAX_FRAMES, parse_frames
-from palette4d.media import oiio_text
+from palette4d.media import exr_layers, oiio_text
 from palette4d.media.clip_base import (
     DEFAULT_RATE,
     F32,
@@ -42,6 +42,8 @@ from palette4d.media.colour_tags import (
     tags_of,
 )
 from palette4d.media.exr_around import Around, described
+from palette4d.media.exr_layers import COLOURS
+from palette4d.media.reading import Reading
 from palette4d.media.stated import Stated
 
 #: Metadata that a recoloured copy of the frame does not keep: they describe how pixels are stored.
@@ -63,11 +65,13 @@ class ImageClip(Clip):
     more: str = field(kw_only=True, default="")
     #: Whether frames are read with their overscan: the data window, not the display window.
     whole: bool = field(kw_only=True, default=False)
+    reading: Reading = field(kw_only=True, default_factory=Reading)
 
     @property
     def separable(self) -> bool:
         """Whether the picture can be replaced in its files: EXR, with channels of its own."""
-        header = read_header(next(iter(self.sequence.files.values())), "the first file")
+        first = next(iter(self.sequence.files.values()))
+        header = read_header(first, "the first file", self.reading)
         exr = self.sequence.suffix.lower() == ".exr"
         return exr and len(set(header.channels)) == len(header.channels)
 
@@ -110,8 +114,7 @@ class ImageClip(Clip):
     def _read(self, frame: int) -> tuple[Header, NDArray[Any], int]:
         """Header, (h, w, 3 or 4) stored samples, and the Exif orientation."""
         path, what = self._path(frame), f"frame {frame}"
-        source, spec = _open(path, what)
-        chosen = _channel_choice(spec)
+        source, spec, chosen = _open(path, what, self.reading)
         header = _header(spec, chosen, source.current_subimage())
         self._check(header, frame)
         first, last = min(chosen), max(chosen) + 1
@@ -177,6 +180,7 @@ def open_images(
     rate: Fraction | None,
     skip_bad_frames: bool,
     single: bool = False,
+    reading: Reading | None = None,
 ) -> ImageClip:
     """Open a sequence over the given range; raises ClipError or FrameError as `open_clip`."""
     wanted = _wanted_frames(sequence, frames, embedded)
@@ -189,7 +193,7 @@ def open_images(
         if frame in missing:
             continue
         try:
-            header = read_header(sequence.path(frame), f"frame {frame}")
+            header = read_header(sequence.path(frame), f"frame {frame}", reading or Reading())
             break
         except FrameError:
             if not skip_bad_frames:
@@ -215,6 +219,7 @@ def open_images(
         skipped=missing,
         stated=_stated(header),
         more=header.more,
+        reading=reading or Reading(),
         sequence=sequence,
     )
 
@@ -289,12 +294,12 @@ def _alpha_of(what: Header | Clip) -> str:
     return "premultiplied alpha" if what.premultiplied else "straight alpha"
 
 
-def read_header(path: Path, what: str) -> Header:
+def read_header(path: Path, what: str, reading: Reading) -> Header:
     """Open an image to read its header; FrameError names `what` and the file."""
-    source, spec = _open(path, what)
+    source, spec, chosen = _open(path, what, reading)
     part = source.current_subimage()
     source.close()
-    return _header(spec, _channel_choice(spec), part)
+    return _header(spec, chosen, part)
 
 
 def _unreadable(path: Path, what: str, problem: str) -> FrameError:
@@ -304,7 +309,8 @@ def _unreadable(path: Path, what: str, problem: str) -> FrameError:
     )
 
 
-def _open(path: Path, what: str) -> tuple[Any, Any]:
+def _open(path: Path, what: str, reading: Reading) -> tuple[Any, Any, list[int]]:
+    """Return an open file at the part that holds the picture, its header and the channels."""
     import OpenImageIO as oiio
 
     if not path.is_file():
@@ -322,16 +328,7 @@ def _open(path: Path, what: str) -> tuple[Any, Any]:
                 "B of full size; write it so in the program that made it"
             )
         raise _unreadable(path, what, problem)
-    # The part of a multi-part EXR that holds the colours; the first one otherwise.
-    part = 0
-    while source.seek_subimage(part, 0):
-        if {"R", "G", "B"} <= set(source.spec().channelnames):
-            break
-        part += 1
-    else:
-        oiio_text.problem_of(source)
-        source.seek_subimage(0, 0)
-    spec = source.spec()
+    spec, layer = _part(source, path, reading)
     if spec.deep:
         source.close()
         raise FrameError(
@@ -341,7 +338,7 @@ def _open(path: Path, what: str) -> tuple[Any, Any]:
     if spec.width < 1 or spec.height < 1 or spec.nchannels < 1:
         source.close()
         raise _unreadable(path, what, f"its size is {spec.width}x{spec.height}")
-    chosen = _channel_choice(spec)
+    chosen = layer or _channel_choice(spec)
     channels = max(chosen) + 1 - min(chosen)
     for width, height in ((spec.width, spec.height), (spec.full_width, spec.full_height)):
         if width * height * channels > MOST_SAMPLES:
@@ -349,7 +346,36 @@ def _open(path: Path, what: str) -> tuple[Any, Any]:
             raise _unreadable(
                 path, what, f"{width}x{height} pixels in {channels} channels are too many"
             )
-    return source, spec
+    return source, spec, chosen
+
+
+def _part(source: Any, path: Path, reading: Reading) -> tuple[Any, list[int] | None]:
+    """Go to the part that holds the picture; return its header, and the channels if asked for.
+
+    Unless a layer or a view is asked for, that is the first one with red, green and blue.
+    """
+    asked = reading.layer is not None or reading.view is not None
+    specs: list[Any] = []
+    while source.seek_subimage(len(specs), 0):
+        spec = source.spec().copy()
+        if asked and (channels := exr_layers.channels_of(spec, reading)):
+            return spec, channels
+        if not asked and {"R", "G", "B"} <= set(spec.channelnames):
+            return source.spec(), None
+        specs.append(spec)
+    oiio_text.problem_of(source)
+    if asked:
+        source.close()
+        wanted = " and ".join(
+            f"the {name} {value!r}"
+            for name, value in (("layer", reading.layer), ("view", reading.view))
+            if value is not None
+        )
+        raise ClipError(
+            f"{path}: found no {wanted}, the file has {exr_layers.described(specs)}; choose one"
+        )
+    source.seek_subimage(0, 0)
+    return source.spec(), None
 
 
 def _channel_choice(spec: Any) -> list[int]:
@@ -475,7 +501,7 @@ def _colours(spec: Any) -> tuple[str, ColourTags]:
 def _note(spec: Any, chosen: list[int]) -> str:
     """Return a note if the channels that are read have no names of colours."""
     names = [oiio_text.readable(spec.channelnames[channel]) for channel in chosen[:3]]
-    if len(set(names)) == 1 or [name.rpartition(".")[2] for name in names] == ["R", "G", "B"]:
+    if len(set(names)) == 1 or tuple(name.rpartition(".")[2] for name in names) in COLOURS:
         return ""
     return f"no channels R, G and B; {', '.join(names)} are used as red, green and blue"
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from palette4d.common.errors import Palette4dError
 from palette4d.media.clip import Clip, open_clip
+from palette4d.media.reading import like_source
 
 
 def candidates(sidecar_path: Path, source: str) -> list[str]:
@@ -29,7 +30,7 @@ def find_clip(sidecar_path: Path, clip: Mapping[str, Any], given: str | None) ->
     `Sidecar.clip`. A `given` clip is used instead and must open.
     """
     if given is not None:
-        return open_clip(given, skip_bad_frames=True)
+        return open_clip(like_source(given, str(clip["source"])), skip_bad_frames=True)
     for spec in candidates(sidecar_path, str(clip["source"])):
         try:
             # Callers need only a few frames: missing frames elsewhere do not matter.

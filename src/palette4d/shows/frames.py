@@ -26,6 +26,7 @@ from palette4d.media.clip import Clip, open_clip
 from palette4d.media.codecs import is_movie
 from palette4d.media.frame_tags import frame_notes
 from palette4d.media.frame_writer import FramePattern, sample_type
+from palette4d.media.reading import like_source
 
 #: Frames of a task: a worker decodes a movie from a key frame, and returns the files of a task
 #: together.
@@ -129,6 +130,7 @@ def _on_farm(
             "OUT.####.exr, .png or .tif with cluster=…, or leave cluster=… out"
         )
     rendering.refuse_codec(str(output), codec, crf)
+    spec = like_source(spec, str(document.core.clip["source"]))
     clip, fill = rendering.opened_for_render(spec, frames, missing, skip_bad_frames, movie=False)
     pattern = FramePattern.parse(str(output))
     samples = sample_type(pattern.extension, clip.depth, half=half, bits=bits)
